@@ -1,0 +1,116 @@
+//! What dense linear algebra lacks for control: ordered real Schur form, Sylvester, Lyapunov and Riccati equations,
+//! matrix exponential and logarithm. Each solver returns its relative residual.
+//!
+//! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
+
+use crate::{Error, Result};
+use faer::prelude::*;
+use faer::{Mat, MatRef, c64};
+
+/// Identity matrix of size n.
+pub fn eye(n: usize) -> Mat<f64> {
+    Mat::identity(n, n)
+}
+
+/// Stacks blocks into one matrix; all blocks of a block row have the same number of rows, and the block rows agree in
+/// their columns (checked by assertion: the callers are in this crate).
+///
+/// ```
+/// # use youla::{Mat, linalg::{block, eye}};
+/// let a = eye(2);
+/// let z = Mat::zeros(2, 1);
+/// let m = block(&[&[a.as_ref(), z.as_ref()]]);
+/// assert_eq!((m.nrows(), m.ncols()), (2, 3));
+/// ```
+pub fn block(rows: &[&[MatRef<'_, f64>]]) -> Mat<f64> {
+    let nrows = rows.iter().map(|r| r.first().map_or(0, |b| b.nrows())).sum();
+    let ncols = rows.first().map_or(0, |r| r.iter().map(|b| b.ncols()).sum());
+    let mut out = Mat::zeros(nrows, ncols);
+    let mut i = 0;
+    for row in rows {
+        let height = row.first().map_or(0, |b| b.nrows());
+        let mut j = 0;
+        for part in *row {
+            assert_eq!(part.nrows(), height, "blocks of one row differ in height");
+            out.as_mut().submatrix_mut(i, j, height, part.ncols()).copy_from(part);
+            j += part.ncols();
+        }
+        assert_eq!(j, ncols, "block rows differ in width");
+        i += height;
+    }
+    out
+}
+
+/// Block-diagonal matrix of two blocks.
+pub fn block_diagonal(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
+    let upper = Mat::zeros(a.nrows(), b.ncols());
+    let lower = Mat::zeros(b.nrows(), a.ncols());
+    block(&[&[a, upper.as_ref()], &[lower.as_ref(), b]])
+}
+
+/// Solves `a x = b` by LU with partial pivoting; refuses with the reciprocal condition number (1-norm) where `a` is
+/// singular to working precision.
+///
+/// # Errors
+/// [`Error::Singular`] naming `what`.
+pub fn solve(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    let rcond = reciprocal_condition(a);
+    if !(rcond > f64::EPSILON) {
+        return Err(Error::Singular { what: what.to_owned(), rcond });
+    }
+    Ok(a.partial_piv_lu().solve(b))
+}
+
+/// Solves `x a = b`, by transposition of [`solve`].
+///
+/// # Errors
+/// [`Error::Singular`] naming `what`.
+pub fn solve_right(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    Ok(solve(what, a.transpose(), b.transpose())?.transpose().to_owned())
+}
+
+/// Ratio of the smallest to the largest singular value; 1 for an empty matrix, 0 where it cannot be computed.
+pub fn reciprocal_condition(a: MatRef<'_, f64>) -> f64 {
+    if a.nrows() == 0 {
+        return 1.0;
+    }
+    match a.singular_values() {
+        Ok(s) if s[0] > 0.0 => s[s.len() - 1] / s[0],
+        _ => 0.0,
+    }
+}
+
+/// Eigenvalues of a square matrix.
+///
+/// # Errors
+/// [`Error::NoConvergence`] naming `what`.
+pub fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
+    if a.nrows() == 0 {
+        return Ok(Vec::new());
+    }
+    a.eigenvalues().map_err(|_| Error::NoConvergence { what: format!("the eigenvalues of {what}"), iterations: 0 })
+}
+
+/// Fails with the position of the first entry that is NaN or infinite.
+///
+/// # Errors
+/// [`Error::NotFinite`] naming `what`.
+pub fn check_finite(what: &str, a: MatRef<'_, f64>) -> Result<()> {
+    for j in 0..a.ncols() {
+        for i in 0..a.nrows() {
+            if !a[(i, j)].is_finite() {
+                return Err(Error::NotFinite { what: what.to_owned(), row: i + 1, column: j + 1 });
+            }
+        }
+    }
+    Ok(())
+}
+
+/// Fails unless the matrix has the given shape.
+///
+/// # Errors
+/// [`Error::Shape`] naming `what`.
+pub fn check_shape(what: &str, a: MatRef<'_, f64>, expected: (usize, usize)) -> Result<()> {
+    let found = (a.nrows(), a.ncols());
+    if found == expected { Ok(()) } else { Err(Error::Shape { what: what.to_owned(), expected, found }) }
+}

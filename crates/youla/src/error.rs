@@ -106,7 +106,36 @@ pub enum Error {
         pole: c64,
     },
     // ---- lti and factor ----------------------------------------------------------------------------------------
-
+    /// Numbers of ports do not fit together.
+    #[error("{what} is {found}, but must be {expected}")]
+    Ports {
+        /// Which number.
+        what: String,
+        /// What is needed.
+        expected: usize,
+        /// What was given.
+        found: usize,
+    },
+    /// A transfer function or difference equation cannot be realised.
+    #[error("the transfer function cannot be used: {problem}")]
+    Polynomial {
+        /// What is wrong with the coefficients.
+        problem: &'static str,
+    },
+    /// A loop of direct feedthroughs has no solution.
+    #[error("the loop is not well posed: its algebraic loop is singular (reciprocal condition number {rcond:.1e})")]
+    AlgebraicLoop {
+        /// Reciprocal condition number.
+        rcond: f64,
+    },
+    /// The controller does not stabilise the model that it was combined with.
+    #[error("the controller does not stabilise {model}: the closed loop has the pole {}; check the sign convention (feedback = \"negative\" or \"positive\"), the sample time and the units of the channels", Pole(*pole))]
+    NotStabilising {
+        /// Which model, in the words of the user.
+        model: String,
+        /// The worst closed-loop pole.
+        pole: c64,
+    },
     // ---- records and files -------------------------------------------------------------------------------------
 
     // ---- identification ----------------------------------------------------------------------------------------
@@ -120,6 +149,7 @@ impl Error {
             | Error::NoConvergence { .. }
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
+            | Error::AlgebraicLoop { .. }
             | Error::NoLogarithm { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }

@@ -3,6 +3,18 @@
 //!
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
+mod balance;
+mod hessenberg;
+mod kronecker;
+mod reflector;
+mod reorder;
+mod schur;
+
+pub use balance::{Balanced, balance};
+pub use hessenberg::{Hessenberg, hessenberg};
+pub use reorder::OrderedSchur;
+pub use schur::{RealSchur, real_schur};
+
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{Mat, MatRef, c64};

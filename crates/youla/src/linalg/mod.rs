@@ -9,11 +9,13 @@ mod kronecker;
 mod reflector;
 mod reorder;
 mod schur;
+mod sylvester;
 
 pub use balance::{Balanced, balance};
 pub use hessenberg::{Hessenberg, hessenberg};
 pub use reorder::OrderedSchur;
 pub use schur::{RealSchur, real_schur};
+pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 
 use crate::{Error, Result};
 use faer::prelude::*;

@@ -2,6 +2,7 @@
 
 mod connect;
 mod partitioned;
+mod scaling;
 mod state_space;
 mod time;
 mod transfer;

@@ -26,7 +26,7 @@ pub fn bearing(cross_coupling: f64) -> StateSpace<Continuous> {
     let k = cross_coupling * 1.8e6;
     b.stiffness[0][1] += k;
     b.stiffness[1][0] -= k;
-    b.plant().unwrap().balanced()
+    b.plant().unwrap().balanced().unwrap()
 }
 
 pub fn sampled(plant: &StateSpace<Continuous>) -> StateSpace<Discrete> {

@@ -1,9 +1,15 @@
 //! Linear time-invariant systems.
 
 mod discretise;
+mod modes;
+mod response;
+mod simulate;
 mod state_space;
 mod time;
 
+pub use modes::Mode;
+pub use response::{FrequencyResponse, frequency_response};
+pub use simulate::{SimulationState, Simulator, simulate};
 pub use state_space::StateSpace;
 pub use time::{Continuous, Discrete, TimeDomain};
 

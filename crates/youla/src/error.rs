@@ -136,6 +136,22 @@ pub enum Error {
         /// The worst closed-loop pole.
         pole: c64,
     },
+    /// A simulation left the range of the numbers.
+    #[error("{what} is no longer finite from sample {sample} on (counted from 1){}", worst_pole(*pole))]
+    Diverged {
+        /// Which simulation.
+        what: String,
+        /// First sample that is not finite, counted from 1.
+        sample: usize,
+        /// The worst pole of the system, `None` without states.
+        pole: Option<c64>,
+    },
+    /// A frequency response is infinite.
+    #[error("the frequency response is infinite at {omega} rad/s: a pole lies there; leave this frequency out")]
+    PoleOnBoundary {
+        /// The frequency, rad/s.
+        omega: f64,
+    },
     // ---- records and files -------------------------------------------------------------------------------------
 
     // ---- identification ----------------------------------------------------------------------------------------
@@ -150,10 +166,17 @@ impl Error {
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
             | Error::AlgebraicLoop { .. }
-            | Error::NoLogarithm { .. } => ErrorKind::Numerical,
+            | Error::NoLogarithm { .. }
+            | Error::Diverged { .. }
+            | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }
+}
+
+/// Names the worst pole where there is one.
+fn worst_pole(pole: Option<c64>) -> String {
+    pole.map_or(String::new(), |p| format!("; the worst pole is {}", Pole(p)))
 }
 
 /// Prints a pole as `-1.2 + 3.4i` with its magnitude.

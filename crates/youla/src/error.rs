@@ -5,6 +5,7 @@
 //! asked for as it is) is returned as data, never here.
 
 use faer::c64;
+use std::path::PathBuf;
 
 /// Result of every fallible function of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -154,6 +155,29 @@ pub enum Error {
     },
     // ---- records and files -------------------------------------------------------------------------------------
 
+    // ---- run and settings --------------------------------------------------------------------------------------
+    /// run.toml cannot be used.
+    #[error("{}{}: {problem}", path.display(), position(*line, *column))]
+    Settings {
+        /// Path of run.toml.
+        path: PathBuf,
+        /// Line counted from 1, 0 where the whole file is meant.
+        line: usize,
+        /// Column counted from 1.
+        column: usize,
+        /// What is wrong, and the nearest known key for a misspelt one.
+        problem: String,
+    },
+    /// A record is used up by the samples that are dropped at its start.
+    #[error("record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle")]
+    TooShort {
+        /// Which record.
+        record: String,
+        /// Its samples.
+        samples: usize,
+        /// Samples dropped.
+        settle: usize,
+    },
     // ---- identification ----------------------------------------------------------------------------------------
 }
 
@@ -172,6 +196,11 @@ impl Error {
             _ => ErrorKind::BadInput,
         }
     }
+}
+
+/// `:line:column` where a line is known.
+fn position(line: usize, column: usize) -> String {
+    if line == 0 { String::new() } else { format!(":{line}:{column}") }
 }
 
 /// Names the worst pole where there is one.

@@ -237,9 +237,9 @@ pub enum Error {
         /// Samples of the other channels.
         expected: usize,
     },
-    /// A variable of a file is not a column of real numbers.
+    /// A variable of a file is not of the kind that is needed, or cannot be written.
     #[error("{}: {name} is {found}, but must be {must}", path.display())]
-    NotAChannel {
+    WrongVariable {
         /// The file.
         path: PathBuf,
         /// The variable as it was asked for.

@@ -8,6 +8,7 @@
 mod choose;
 mod csv;
 mod detrend;
+mod matfile;
 #[allow(clippy::module_inception)]
 mod record;
 #[cfg(test)]
@@ -17,6 +18,7 @@ mod time;
 pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
+pub use matfile::{MatFile, Packing, Value, Variable, read_mat, read_mat_record, write_mat};
 pub use record::{Record, Segments, Split};
 pub use time::TimeSource;
 

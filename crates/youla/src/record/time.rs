@@ -51,11 +51,11 @@ impl TimeSource {
             (None, Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: 0.0 }),
             (Some([start]), Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: *start }),
             (Some([] | [_]), None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
-            (Some(times), declared) => self.from_column(what, times, declared),
+            (Some(times), declared) => self.measured(what, times, declared),
         }
     }
 
-    fn from_column(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
+    fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
         let middle = median_step(times);
         if let Some(ts) = declared {
             let time = Discrete::new(ts)?;
@@ -71,8 +71,8 @@ impl TimeSource {
     }
 
     fn check_steps(&self, what: &str, times: &[f64], ts: f64) -> Result<()> {
-        let bad = |step: &[f64]| !((step[1] - step[0] - ts).abs() <= self.tolerance * ts);
-        match times.windows(2).position(bad) {
+        let good = |step: &[f64]| (step[1] - step[0] - ts).abs() <= self.tolerance * ts;
+        match times.windows(2).position(|step| !good(step)) {
             None => Ok(()),
             Some(k) => {
                 let dt = times[k + 1] - times[k];

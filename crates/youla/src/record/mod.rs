@@ -9,18 +9,24 @@ mod choose;
 mod csv;
 mod detrend;
 mod matfile;
+mod npz;
 #[allow(clippy::module_inception)]
 mod record;
 #[cfg(test)]
 mod scratch;
+mod source;
 mod time;
+mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
-pub use matfile::{MatFile, Packing, Value, Variable, read_mat, read_mat_record, write_mat};
+pub use matfile::{Packing, read_mat, write_mat};
+pub use npz::read_npz;
 pub use record::{Record, Segments, Split};
+pub use source::{Format, Source, read, sha256};
 pub use time::TimeSource;
+pub use values::{Value, Variable, Variables};
 
 use crate::{Error, Result};
 use std::{fs::File, io::ErrorKind, path::Path};

@@ -5,52 +5,11 @@
 //! is packed by zlib. Sizes are believed only as far as there are bytes to fill them.
 
 mod bytes;
-mod path;
 mod read;
-mod value;
 mod write;
 
 pub use read::read_mat;
-pub use value::{MatFile, Value, Variable};
 pub use write::{Packing, write_mat};
-
-use super::csv::assemble;
-use super::{ChannelRef, ChannelSpec, Record, TimeSource};
-use crate::units::Channel;
-use crate::{Error, Result};
-use std::path::Path;
-
-/// Reads a record whose channels are vectors of a MATLAB file, chosen by paths such as `Data.signals.u`.
-///
-/// With `channels` empty, an error lists what the file holds.
-///
-/// # Errors
-/// Those of [`read_mat`] and [`MatFile::column`]; [`Error::UnequalLength`], and those of the sample time:
-/// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`], [`Error::SampleTimeMismatch`].
-///
-/// ```no_run
-/// use youla::record::{ChannelRef, ChannelSpec, TimeSource, read_mat_record};
-/// let channels = ["u", "y"].map(|n| ChannelSpec::from(n, ChannelRef::Name(format!("Data.signals.{n}")), ""));
-/// let record = read_mat_record("cycle1.mat", &channels, &TimeSource::ts(5e-4))?;
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn read_mat_record(path: impl AsRef<Path>, channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
-    let file = read_mat(path)?;
-    if channels.is_empty() {
-        return Err(file.unknown(""));
-    }
-    let read = |reference: &ChannelRef| file.column(&reference.to_string());
-    let columns = channels.iter().map(|spec| read(&spec.source())).collect::<Result<Vec<_>>>()?;
-    let times = time.column.as_ref().map(read).transpose()?;
-    let what = file.path().display().to_string();
-    if let Some(times) = times.as_ref().filter(|times| times.len() != columns[0].len()) {
-        let (found, expected) = (times.len(), columns[0].len());
-        return Err(Error::UnequalLength { what, channel: "the time".into(), found, expected });
-    }
-    let clock = time.resolve(&what, times.as_deref())?;
-    let channels = channels.iter().map(|spec| Channel::new(&spec.name, &spec.unit)).collect();
-    assemble(&what, channels, &columns, clock)
-}
 
 /// Class of an array, as the flags element states it.
 mod class {

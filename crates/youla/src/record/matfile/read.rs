@@ -1,7 +1,8 @@
 //! From bytes to variables.
 
 use super::bytes::{Bytes, Element, Fault};
-use super::{HEADER, MatFile, Value, Variable, class, kind};
+use super::{HEADER, class, kind};
+use crate::record::{Value, Variable, Variables};
 use crate::{Error, Result};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
@@ -19,7 +20,7 @@ const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`], [`Error::NoData`] for an empty file, [`Error::FormatNotRead`] for versions 4
 /// and 7.3, [`Error::Corrupt`] with the position for a damaged or cut file.
-pub fn read_mat(path: impl AsRef<Path>) -> Result<MatFile> {
+pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
     let mut bytes = Vec::new();
     let read = crate::record::open(path)?.read_to_end(&mut bytes);
@@ -27,7 +28,7 @@ pub fn read_mat(path: impl AsRef<Path>) -> Result<MatFile> {
     let big_endian = check_format(path, &bytes)?;
     let body = Bytes { data: &bytes[HEADER..], offset: HEADER, big_endian };
     match variables(body) {
-        Ok(variables) => Ok(MatFile { path: path.to_owned(), variables }),
+        Ok(variables) => Ok(Variables::new(path, variables)),
         Err(fault) => Err(corrupt(path, fault)),
     }
 }

@@ -1,6 +1,8 @@
 use super::*;
 use crate::linalg::eye;
 use crate::record::scratch::{data_folder, scratch};
+use crate::record::{ChannelRef, ChannelSpec, TimeSource, Value, Variable, Variables};
+use crate::{Error, Result};
 use proptest::prelude::*;
 use std::sync::LazyLock;
 
@@ -32,7 +34,7 @@ fn bytes_of(packing: Packing) -> Vec<u8> {
     std::fs::read(file.path()).unwrap()
 }
 
-fn read_bytes(bytes: &[u8]) -> Result<MatFile> {
+fn read_bytes(bytes: &[u8]) -> Result<Variables> {
     let file = scratch("mat");
     std::fs::write(file.path(), bytes).unwrap();
     read_mat(file.path())
@@ -192,7 +194,7 @@ fn the_real_matlab_files_load() {
         [("fs2000/cycle1", 5e-4), ("fs2000/cycle2", 5e-4), ("fs2000/cycle3", 5e-4), ("fs4000/cycle1", 2.5e-4)]
     {
         let path = folder.join("flexible_drive").join(file).with_extension("mat");
-        let record = read_mat_record(&path, &channels, &TimeSource::ts(ts)).unwrap();
+        let record = read_mat(&path).unwrap().record(&channels, &TimeSource::ts(ts)).unwrap();
         assert_eq!(record.samples(), 240_000);
         let (r, e, y) = (record.column("r").unwrap(), record.column("e").unwrap(), record.column("y").unwrap());
         assert!((0..r.len()).all(|k| (e[k] - (r[k] - y[k])).abs() < 1e-6), "e = r - y in {file}");
@@ -202,7 +204,7 @@ fn the_real_matlab_files_load() {
     }
     let emps = ["vir", "qm", "qg"].map(ChannelSpec::named);
     let time = TimeSource::column("t".parse().unwrap());
-    let record = read_mat_record(folder.join("emps/DATA_EMPS.mat"), &emps, &time).unwrap();
+    let record = read_mat(folder.join("emps/DATA_EMPS.mat")).unwrap().record(&emps, &time).unwrap();
     assert_eq!((record.samples(), record.time().ts()), (24_841, 1e-3));
 }
 

@@ -1,6 +1,7 @@
 //! From variables to bytes, little endian.
 
-use super::{HEADER, Value, Variable, class, kind};
+use super::{HEADER, class, kind};
+use crate::record::{Value, Variable};
 use crate::{Error, Result};
 use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;

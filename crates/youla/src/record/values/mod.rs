@@ -1,12 +1,18 @@
-//! What a MATLAB file holds.
+//! What a MATLAB or NumPy file holds, and records from it.
 
+mod path;
+
+use super::csv::assemble;
+use super::{ChannelRef, ChannelSpec, Record, TimeSource};
+use crate::units::Channel;
+use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 
 /// The variables of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct MatFile {
-    pub(super) path: PathBuf,
-    pub(super) variables: Vec<Variable>,
+pub struct Variables {
+    path: PathBuf,
+    variables: Vec<Variable>,
 }
 
 /// A named value.
@@ -18,7 +24,7 @@ pub struct Variable {
     pub value: Value,
 }
 
-/// A MATLAB value. Arrays are stored by column, `dims` has two entries or more.
+/// A value. Arrays are stored by column, `dims` has two entries or more.
 #[derive(Debug, Clone, PartialEq)]
 #[non_exhaustive]
 pub enum Value {
@@ -63,7 +69,11 @@ pub enum Value {
     },
 }
 
-impl MatFile {
+impl Variables {
+    pub(super) fn new(path: &Path, variables: Vec<Variable>) -> Self {
+        Variables { path: path.to_owned(), variables }
+    }
+
     /// The file that was read.
     pub fn path(&self) -> &Path {
         &self.path
@@ -72,6 +82,36 @@ impl MatFile {
     /// The variables in their order.
     pub fn variables(&self) -> &[Variable] {
         &self.variables
+    }
+
+    /// A record whose channels are vectors of the file, chosen by paths such as `Data.signals.u`.
+    ///
+    /// # Errors
+    /// Those of [`Variables::column`], also where `channels` is empty, to list what there is;
+    /// [`Error::UnequalLength`], and those of the sample time: [`Error::SampleTimeMissing`],
+    /// [`Error::NonUniformTime`], [`Error::SampleTimeMismatch`].
+    ///
+    /// ```no_run
+    /// use youla::record::{ChannelRef, ChannelSpec, TimeSource, read_mat};
+    /// let channels = ["u", "y"].map(|n| ChannelSpec::from(n, ChannelRef::Name(format!("Data.signals.{n}")), ""));
+    /// let record = read_mat("cycle1.mat")?.record(&channels, &TimeSource::ts(5e-4))?;
+    /// # Ok::<(), youla::Error>(())
+    /// ```
+    pub fn record(&self, channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
+        if channels.is_empty() {
+            return Err(self.unknown(""));
+        }
+        let read = |reference: &ChannelRef| self.column(&reference.to_string());
+        let columns = channels.iter().map(|spec| read(&spec.source())).collect::<Result<Vec<_>>>()?;
+        let times = time.column.as_ref().map(read).transpose()?;
+        let what = self.path.display().to_string();
+        if let Some(times) = times.as_ref().filter(|times| times.len() != columns[0].len()) {
+            let (found, expected) = (times.len(), columns[0].len());
+            return Err(Error::UnequalLength { what, channel: "the time".into(), found, expected });
+        }
+        let clock = time.resolve(&what, times.as_deref())?;
+        let channels = channels.iter().map(|spec| Channel::new(&spec.name, &spec.unit)).collect();
+        assemble(&what, channels, &columns, clock)
     }
 }
 

@@ -1,10 +1,10 @@
 //! Values by their path, written as in MATLAB: `Data.signals.u`, `runs(2).y`, `names{3}`, `x(:,2)`.
 
-use super::{MatFile, Value};
+use super::{Value, Variables};
 use crate::record::choose::unknown;
 use crate::{Error, Result};
 
-impl MatFile {
+impl Variables {
     /// The value at a path of variable, fields and indices (counted from 1).
     ///
     /// # Errors

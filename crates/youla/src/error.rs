@@ -107,7 +107,52 @@ pub enum Error {
         pole: c64,
     },
     // ---- lti and factor ----------------------------------------------------------------------------------------
-
+    /// Numbers of ports do not fit together.
+    #[error("{what} is {found}, but must be {expected}")]
+    Ports {
+        /// Which number.
+        what: String,
+        /// What is needed.
+        expected: usize,
+        /// What was given.
+        found: usize,
+    },
+    /// A transfer function or difference equation cannot be realised.
+    #[error("the transfer function cannot be used: {problem}")]
+    Polynomial {
+        /// What is wrong with the coefficients.
+        problem: &'static str,
+    },
+    /// A loop of direct feedthroughs has no solution.
+    #[error("the loop is not well posed: its algebraic loop is singular (reciprocal condition number {rcond:.1e})")]
+    AlgebraicLoop {
+        /// Reciprocal condition number.
+        rcond: f64,
+    },
+    /// The controller does not stabilise the model that it was combined with.
+    #[error("the controller does not stabilise {model}: the closed loop has the pole {}; check the sign convention (feedback = \"negative\" or \"positive\"), the sample time and the units of the channels", Pole(*pole))]
+    NotStabilising {
+        /// Which model, in the words of the user.
+        model: String,
+        /// The worst closed-loop pole.
+        pole: c64,
+    },
+    /// A simulation left the range of the numbers.
+    #[error("{what} is no longer finite from sample {sample} on (counted from 1){}", worst_pole(*pole))]
+    Diverged {
+        /// Which simulation.
+        what: String,
+        /// First sample that is not finite, counted from 1.
+        sample: usize,
+        /// The worst pole of the system, `None` without states.
+        pole: Option<c64>,
+    },
+    /// A frequency response is infinite.
+    #[error("the frequency response is infinite at {omega} rad/s: a pole lies there; leave this frequency out")]
+    PoleOnBoundary {
+        /// The frequency, rad/s.
+        omega: f64,
+    },
     // ---- records and files -------------------------------------------------------------------------------------
     /// The operating system refused to read or write a file.
     #[error("{}: {source}", path.display())]
@@ -296,10 +341,18 @@ impl Error {
             | Error::NoConvergence { .. }
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
-            | Error::NoLogarithm { .. } => ErrorKind::Numerical,
+            | Error::AlgebraicLoop { .. }
+            | Error::NoLogarithm { .. }
+            | Error::Diverged { .. }
+            | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }
+}
+
+/// Names the worst pole where there is one.
+fn worst_pole(pole: Option<c64>) -> String {
+    pole.map_or(String::new(), |p| format!("; the worst pole is {}", Pole(p)))
 }
 
 /// Prints a pole as `-1.2 + 3.4i` with its magnitude.

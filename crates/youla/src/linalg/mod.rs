@@ -3,6 +3,25 @@
 //!
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
+mod balance;
+mod complex_schur;
+mod expm;
+mod hessenberg;
+mod kronecker;
+mod logm;
+mod reflector;
+mod reorder;
+mod schur;
+mod sylvester;
+
+pub use balance::{Balanced, balance};
+pub use expm::expm;
+pub use hessenberg::{Hessenberg, hessenberg};
+pub use logm::logm;
+pub use reorder::OrderedSchur;
+pub use schur::{RealSchur, real_schur};
+pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
+
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{Mat, MatRef, c64};

@@ -1,0 +1,141 @@
+//! Reordering of a real Schur form by direct swapping of neighbouring diagonal blocks: Z. Bai and J. W. Demmel, On swapping
+//! diagonal blocks in real Schur form, Linear Algebra Appl. 186 (1993), 73-95.
+//!
+//! Neighbours A11 (p x p) and A22 (q x q) change places under the orthogonal matrix of the QR factorisation
+//! `[-X; I] = Q R`, where `A11 X - X A22 = A12`. A swap that would disturb the matrix by more than rounding is refused.
+
+use super::kronecker::small_sylvester;
+use super::reflector::{Rotation, householder, reflect_columns, reflect_rows};
+use super::schur::{DiagonalBlock, RealSchur, block_eigenvalues, blocks, standardise};
+use crate::{Error, Result};
+use faer::{Mat, c64};
+
+/// A real Schur form whose first `dimension` columns of Q span the invariant subspace of the selected eigenvalues.
+#[derive(Debug, Clone)]
+pub struct OrderedSchur {
+    /// Orthogonal matrix Q, n x n.
+    pub q: Mat<f64>,
+    /// Quasi-triangular matrix T, n x n, the selected eigenvalues first.
+    pub t: Mat<f64>,
+    /// Number of selected eigenvalues.
+    pub dimension: usize,
+    /// Relative residual `||A - Q T Q'|| / ||A||`: that of the Schur form plus what the swaps set to zero.
+    pub residual: f64,
+}
+
+impl OrderedSchur {
+    /// Eigenvalues in the order in which they stand on the diagonal of T.
+    pub fn eigenvalues(&self) -> Vec<c64> {
+        blocks(self.t.as_ref()).into_iter().flat_map(|b| block_eigenvalues(self.t.as_ref(), b)).collect()
+    }
+}
+
+impl RealSchur {
+    /// Moves the eigenvalues for which `select` holds to the top, keeping their order otherwise. A pair moves where
+    /// `select` holds for its member with positive imaginary part.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`] where two blocks are too close to each other to be swapped without losing digits.
+    ///
+    /// ```
+    /// use youla::{Mat, linalg::real_schur};
+    /// let a = Mat::from_fn(2, 2, |i, j| [[3.0, 1.0], [0.0, -2.0]][i][j]);
+    /// let ordered = real_schur("A", a.as_ref())?.reorder(|p| p.re < 0.0)?;
+    /// assert_eq!(ordered.dimension, 1);
+    /// assert!((ordered.t[(0, 0)] + 2.0).abs() < 1e-14);
+    /// # Ok::<(), youla::Error>(())
+    /// ```
+    pub fn reorder(self, select: impl Fn(c64) -> bool) -> Result<OrderedSchur> {
+        let RealSchur { mut q, mut t, residual } = self;
+        let norm = t.norm_l2();
+        let (mut dimension, mut start, mut disturbed) = (0, 0, 0.0_f64);
+        while start < t.nrows() {
+            let size = if start + 1 < t.nrows() && t[(start + 1, start)] != 0.0 { 2 } else { 1 };
+            let chosen = select(block_eigenvalues(t.as_ref(), DiagonalBlock { start, size })[0]);
+            start += size;
+            if chosen {
+                disturbed += move_up(&mut t, &mut q, start - size, dimension, norm)?;
+                dimension += size;
+            }
+        }
+        let residual = residual + if norm == 0.0 { 0.0 } else { disturbed / norm };
+        Ok(OrderedSchur { q, t, dimension, residual })
+    }
+}
+
+/// Moves the block that begins in row `from` up to row `to`; returns the sum of what was set to zero.
+fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize, norm: f64) -> Result<f64> {
+    let (mut row, mut disturbed) = (from, 0.0);
+    while row > to {
+        let above = if row >= to + 2 && t[(row - 1, row - 2)] != 0.0 { 2 } else { 1 };
+        let below = if row + 1 < t.nrows() && t[(row + 1, row)] != 0.0 { 2 } else { 1 };
+        disturbed += swap(t, q, row - above, above, below, norm)?;
+        row -= above;
+        // A pair on the verge of being real may have split: then its first half is moved on, and the second follows.
+        if below == 2 && t[(row + 1, row)] == 0.0 {
+            disturbed += move_up(t, q, row, to, norm)?;
+            disturbed += move_up(t, q, row + 1, to + 1, norm)?;
+            return Ok(disturbed);
+        }
+    }
+    Ok(disturbed)
+}
+
+/// Exchanges the neighbouring blocks of `above` and `below` rows that begin in row k; returns the size of what was set to
+/// zero.
+fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize, norm: f64) -> Result<f64> {
+    if above == 1 && below == 1 {
+        let (first, second) = (t[(k, k)], t[(k + 1, k + 1)]);
+        Rotation::onto_first(t[(k, k + 1)], second - first).similarity(t, q, k);
+        (t[(k, k)], t[(k + 1, k + 1)], t[(k + 1, k)]) = (second, first, 0.0);
+        return Ok(0.0);
+    }
+    let size = above + below;
+    let kept = (t.clone(), q.clone());
+    for (j, v, tau) in swapping_reflections(t, k, above, below)? {
+        reflect_rows(t, &v, tau, k + j, k..t.ncols());
+        reflect_columns(t, &v, tau, k + j, 0..k + size);
+        reflect_columns(q, &v, tau, k + j, 0..q.nrows());
+    }
+    let mut left = 0.0_f64;
+    for i in k + below..k + size {
+        for j in k..k + below {
+            left = left.hypot(t[(i, j)]);
+            t[(i, j)] = 0.0;
+        }
+    }
+    if left > 20.0 * f64::EPSILON * norm {
+        (*t, *q) = kept;
+        let what =
+            format!("the exchange of the eigenvalues {} and {} of a Schur form", t[(k, k)], t[(k + above, k + above)]);
+        return Err(Error::NoConvergence { what, iterations: 1 });
+    }
+    for (row, rows) in [(k, below), (k + below, above)] {
+        if rows == 2 {
+            standardise(t, q, row);
+        }
+    }
+    Ok(left)
+}
+
+/// Householder vectors of the QR factorisation of `[-X; g I]`, where `A11 X - X A22 = g A12`.
+fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> Result<Vec<(usize, Vec<f64>, f64)>> {
+    let middle = k + above;
+    let a11 = t.as_ref().submatrix(k, k, above, above);
+    let a22 = t.as_ref().submatrix(middle, middle, below, below);
+    let minus_a22 = Mat::from_fn(below, below, |i, j| -a22[(j, i)]);
+    let rhs = t.as_ref().submatrix(k, middle, above, below);
+    let (x, scale) = small_sylvester(a11, minus_a22.as_ref(), rhs);
+    let mut panel = Mat::from_fn(above + below, below, |i, j| match i.checked_sub(above) {
+        None => -x[(i, j)],
+        Some(row) => f64::from(u8::from(row == j)) * scale,
+    });
+    let mut reflections = Vec::with_capacity(below);
+    for j in 0..below {
+        let mut v: Vec<f64> = (j..above + below).map(|i| panel[(i, j)]).collect();
+        let (tau, _) = householder(&mut v);
+        reflect_rows(&mut panel, &v, tau, j, j..below);
+        reflections.push((j, v, tau));
+    }
+    Ok(reflections)
+}

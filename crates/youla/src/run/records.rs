@@ -3,7 +3,7 @@
 use super::settings::{DataFile, DataSettings};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
-use crate::record::{ChannelSpec, Format, Record, Source, TimeSource, sha256};
+use crate::record::{ChannelSpec, CsvOptions, Format, Record, Source, TimeSource, read, sha256};
 use crate::units::Channel;
 use crate::{Error, Mat, Result};
 use rayon::prelude::*;
@@ -118,16 +118,16 @@ fn read_file(
     ];
     let source = Source {
         path: path.clone(),
-        format: Format::Auto,
+        format: Format::Detect,
         time: TimeSource {
             column: settings.time_column.clone(),
             ts: settings.sample_time,
             tolerance: settings.time_tolerance,
         },
         channels: groups.iter().flat_map(|g| g.iter().cloned()).collect(),
-        ..Source::default()
+        csv: CsvOptions::default(),
     };
-    let record = source.read()?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
+    let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
     let source = SourceFile {
         path: file.file.display().to_string(),
         purpose: purpose.to_owned(),

@@ -354,6 +354,20 @@ pub enum Error {
         condition: f64,
     },
     // ---- identification ----------------------------------------------------------------------------------------
+
+    // ---- report ------------------------------------------------------------------------------------------------
+    /// The data of a report cannot be written as JSON.
+    #[error("the data of the report cannot be written as JSON: {source}")]
+    ReportData {
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// The page of a report cannot be written.
+    #[error("the page of the report cannot be written: {source}")]
+    ReportTemplate {
+        /// The reason.
+        source: minijinja::Error,
+    },
 }
 
 impl Error {

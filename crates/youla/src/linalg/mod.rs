@@ -3,6 +3,13 @@
 //!
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
+mod least_squares;
+mod triangle;
+
+pub use least_squares::{LeastSquares, least_squares};
+pub use triangle::Triangle;
+pub(crate) use triangle::leading_rank;
+
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{Mat, MatRef, c64};

@@ -367,6 +367,48 @@ pub enum Error {
     ReportTemplate {
         /// The reason.
         source: minijinja::Error,
+    /// A record is too short for the model that was asked for.
+    #[error("{what}: {found} samples are too few, at least {needed} are needed")]
+    TooFewSamples {
+        /// Which record, and for what.
+        what: String,
+        /// Number of samples given.
+        found: usize,
+        /// Number of samples needed.
+        needed: usize,
+    },
+    /// The inputs do not excite the system enough for the horizon.
+    #[error(
+        "the inputs are not exciting enough for a horizon of {horizon} block rows: their Hankel matrix has rank {rank}, \
+         but {needed} is needed; use a richer excitation or a shorter horizon"
+    )]
+    NotExciting {
+        /// Numerical rank of the block-Hankel matrix of the inputs.
+        rank: usize,
+        /// Number of its rows, 2 x horizon x inputs.
+        needed: usize,
+        /// Block rows of the past and of the future.
+        horizon: usize,
+    },
+    /// A channel never changes, so that nothing can be learnt from it.
+    #[error("{what} is constant ({value}) in every experiment")]
+    ConstantChannel {
+        /// Which channel.
+        what: String,
+        /// The value in the first experiment.
+        value: f64,
+    },
+    /// The order does not fit into the horizon.
+    #[error(
+        "the order {order} exceeds {largest}, the largest for a horizon of {horizon} block rows: (horizon - 1) x outputs"
+    )]
+    OrderBeyondHorizon {
+        /// Order asked for.
+        order: usize,
+        /// Largest order possible.
+        largest: usize,
+        /// Block rows of the past and of the future.
+        horizon: usize,
     },
 }
 

@@ -1,1 +1,4 @@
-//! TODO
+//! Identification methods: the subspace family, and what is built on it.
+
+pub mod direct;
+pub mod subspace;

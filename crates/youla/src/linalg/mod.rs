@@ -21,6 +21,12 @@ pub use logm::logm;
 pub use reorder::OrderedSchur;
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
+mod least_squares;
+mod triangle;
+
+pub use least_squares::{LeastSquares, least_squares};
+pub use triangle::Triangle;
+pub(crate) use triangle::leading_rank;
 
 use crate::{Error, Result};
 use faer::prelude::*;

@@ -49,7 +49,7 @@ impl Small {
         &mut self.matrix[equation.0 + equation.1 * self.rows][unknown.0 + unknown.1 * self.rows]
     }
 
-    /// Solution, scale and the ratio of the smallest to the largest pivot before replacement.
+    /// Solution, scale and the size of the smallest pivot before replacement.
     pub(super) fn solve(mut self) -> (Mat<f64>, f64, f64) {
         let n = self.rows * self.columns;
         let mut order = [0, 1, 2, 3];
@@ -89,7 +89,7 @@ impl Small {
         for k in 0..n {
             x[(order[k] % self.rows, order[k] / self.rows)] = solution[k];
         }
-        (x, scale, if largest == 0.0 { 0.0 } else { smallest / largest })
+        (x, scale, smallest)
     }
 
     /// Position of the largest entry of the remaining equations.

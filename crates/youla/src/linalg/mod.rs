@@ -14,6 +14,7 @@ mod lyapunov;
 mod reflector;
 mod reorder;
 mod schur;
+mod sylvester;
 
 pub use balance::{Balanced, balance};
 pub use expm::expm;
@@ -23,6 +24,7 @@ pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use reorder::OrderedSchur;
 pub use schur::{RealSchur, real_schur};
+pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 
 use crate::{Error, Result};
 use faer::prelude::*;

@@ -175,6 +175,16 @@ pub enum Error {
         samples: usize,
         /// Samples dropped.
         settle: usize,
+    // ---- reduction ---------------------------------------------------------------------------------------------
+    /// More states were asked for than a minimal realisation has.
+    #[error(
+        "a model of order {order} was asked for, but only {minimal} states are controllable and observable to working precision; ask for at most {minimal}"
+    )]
+    OrderAboveMinimal {
+        /// The order that was asked for.
+        order: usize,
+        /// The order of the minimal realisation.
+        minimal: usize,
     },
     // ---- records and files -------------------------------------------------------------------------------------
     /// The operating system refused to read or write a file.

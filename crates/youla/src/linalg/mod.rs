@@ -6,9 +6,11 @@
 mod balance;
 mod complex_schur;
 mod expm;
+mod gramian;
 mod hessenberg;
 mod kronecker;
 mod logm;
+mod lyapunov;
 mod reflector;
 mod reorder;
 mod schur;
@@ -16,8 +18,10 @@ mod sylvester;
 
 pub use balance::{Balanced, balance};
 pub use expm::expm;
+pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
 pub use hessenberg::{Hessenberg, hessenberg};
 pub use logm::logm;
+pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use reorder::OrderedSchur;
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};

@@ -175,6 +175,7 @@ pub enum Error {
         samples: usize,
         /// Samples dropped.
         settle: usize,
+    },
     // ---- reduction ---------------------------------------------------------------------------------------------
     /// More states were asked for than a minimal realisation has.
     #[error(
@@ -364,19 +365,6 @@ pub enum Error {
         condition: f64,
     },
     // ---- identification ----------------------------------------------------------------------------------------
-
-    // ---- report ------------------------------------------------------------------------------------------------
-    /// The data of a report cannot be written as JSON.
-    #[error("the data of the report cannot be written as JSON: {source}")]
-    ReportData {
-        /// The reason.
-        source: serde_json::Error,
-    },
-    /// The page of a report cannot be written.
-    #[error("the page of the report cannot be written: {source}")]
-    ReportTemplate {
-        /// The reason.
-        source: minijinja::Error,
     /// A record is too short for the model that was asked for.
     #[error("{what}: {found} samples are too few, at least {needed} are needed")]
     TooFewSamples {
@@ -419,6 +407,19 @@ pub enum Error {
         largest: usize,
         /// Block rows of the past and of the future.
         horizon: usize,
+    },
+    // ---- report ------------------------------------------------------------------------------------------------
+    /// The data of a report cannot be written as JSON.
+    #[error("the data of the report cannot be written as JSON: {source}")]
+    ReportData {
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// The page of a report cannot be written.
+    #[error("the page of the report cannot be written: {source}")]
+    ReportTemplate {
+        /// The reason.
+        source: minijinja::Error,
     },
 }
 

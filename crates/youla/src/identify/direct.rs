@@ -7,17 +7,10 @@ use super::subspace::{Experiment, SubspaceModel, SubspaceOptions, subspace};
 use crate::Result;
 use crate::lti::Discrete;
 
-/// A plant model identified from measured inputs and outputs without regard to the loop.
-#[derive(Debug, Clone)]
-pub struct DirectModel {
-    /// The estimate of the plant.
-    pub plant: SubspaceModel,
-}
-
-/// Identifies the plant from its measured inputs u and outputs y.
+/// Identifies the plant from its measured inputs u and outputs y, without regard to the loop.
 ///
 /// # Errors
 /// Those of [`subspace`].
-pub fn direct(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<DirectModel> {
-    Ok(DirectModel { plant: subspace(experiments, time, options)? })
+pub fn direct(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<SubspaceModel> {
+    subspace(experiments, time, options)
 }

@@ -1,4 +1,5 @@
 //! Identification methods: the subspace family, and what is built on it.
 
 pub mod direct;
+pub mod hansen;
 pub mod subspace;

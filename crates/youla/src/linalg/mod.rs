@@ -9,26 +9,25 @@ mod expm;
 mod gramian;
 mod hessenberg;
 mod kronecker;
+mod least_squares;
 mod logm;
 mod lyapunov;
 mod reflector;
 mod reorder;
 mod schur;
 mod sylvester;
+mod triangle;
 
 pub use balance::{Balanced, balance};
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
 pub use hessenberg::{Hessenberg, hessenberg};
+pub use least_squares::{LeastSquares, least_squares};
 pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use reorder::OrderedSchur;
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
-mod least_squares;
-mod triangle;
-
-pub use least_squares::{LeastSquares, least_squares};
 pub use triangle::Triangle;
 pub(crate) use triangle::leading_rank;
 

@@ -4,16 +4,20 @@
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
 mod balance;
+mod definite;
 mod hessenberg;
 mod kronecker;
 mod reflector;
 mod reorder;
+mod riccati;
 mod schur;
 mod sylvester;
 
 pub use balance::{Balanced, balance};
+pub(crate) use definite::check_semidefinite;
 pub use hessenberg::{Hessenberg, hessenberg};
 pub use reorder::OrderedSchur;
+pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 

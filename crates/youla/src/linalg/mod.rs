@@ -5,6 +5,7 @@
 
 mod balance;
 mod definite;
+mod francis;
 mod hessenberg;
 mod kronecker;
 mod reflector;

@@ -1,3 +1,10 @@
+//! Controllers and the loops that they close.
+
+mod closed_loop;
+mod observer_controller;
+
+pub use closed_loop::{closed_loop, with_input_port};
+pub use observer_controller::observer_controller;
 //! Controller design with positive feedback: state feedback `u = F x` and observer gain L with `A + B F` and `A + L C`
 //! stable.
 

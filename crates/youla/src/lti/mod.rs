@@ -1,7 +1,26 @@
 //! Linear time-invariant systems.
 
+mod connect;
+mod discretise;
+mod modes;
+mod partitioned;
+mod response;
+mod scaling;
+mod simulate;
 mod state_space;
 mod time;
+mod transfer;
 
+pub use modes::Mode;
+pub use partitioned::Partitioned;
+pub use response::{FrequencyResponse, frequency_response};
+pub use simulate::{SimulationState, Simulator, simulate};
 pub use state_space::StateSpace;
 pub use time::{Continuous, Discrete, TimeDomain};
+pub use transfer::PolynomialMatrix;
+
+/// The bearing of eqs (3)-(12) at rest, for tests.
+#[cfg(test)]
+pub(crate) fn bearing() -> StateSpace<Continuous> {
+    crate::rig::Bearing::default().plant().expect("the paper's parameters are finite")
+}

@@ -488,10 +488,9 @@ impl Error {
             | Error::AlgebraicLoop { .. }
             | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
-            | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
+            | Error::PoleOnBoundary { .. }
             | Error::NotStabilisable { .. }
-            | Error::NotDetectable { .. }
-            | Error::NoLogarithm { .. } => ErrorKind::Numerical,
+            | Error::NotDetectable { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }

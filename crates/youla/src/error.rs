@@ -497,8 +497,7 @@ impl Error {
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. }
             | Error::NotStabilisable { .. }
-            | Error::NotDetectable { .. }
-            | Error::NoLogarithm { .. } => ErrorKind::Numerical,
+            | Error::NotDetectable { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }

@@ -3,24 +3,14 @@
 
 use faer::{Mat, MatRef};
 
-/// Solves `A X + X B' = scale C` for A (p x p) and B (q x q), p, q <= 2.
-///
-/// `scale` is 1 except where the solution would overflow by nearness to singularity; pivots below rounding are replaced by
-/// it, so that a solution always exists (the caller checks what it is worth).
-pub(super) fn small_sylvester(a: MatRef<'_, f64>, b: MatRef<'_, f64>, c: MatRef<'_, f64>) -> (Mat<f64>, f64) {
-    let mut system = Small::new(c);
-    for j in 0..b.nrows() {
-        for i in 0..a.nrows() {
-            for l in 0..a.nrows() {
-                *system.entry((i, j), (l, j)) += a[(i, l)];
-            }
-            for l in 0..b.nrows() {
-                *system.entry((i, j), (i, l)) += b[(j, l)];
-            }
-        }
-    }
-    let (x, scale, _) = system.solve();
-    (x, scale)
+/// Solution of a small equation.
+pub(super) struct SmallSolution {
+    /// X for the right-hand side `scale C`.
+    pub(super) x: Mat<f64>,
+    /// 1, except where X would overflow.
+    pub(super) scale: f64,
+    /// Size of the smallest pivot before replacement.
+    pub(super) smallest_pivot: f64,
 }
 
 /// At most four equations in the unknowns of a small matrix X, taken column by column.
@@ -32,28 +22,40 @@ pub(super) struct Small {
 }
 
 impl Small {
-    /// Equations with the right-hand side `c` and no coefficients yet.
-    pub(super) fn new(c: MatRef<'_, f64>) -> Self {
+    /// The equation `A X + X B' = C` for A (p x p) and B (q x q), p, q <= 2.
+    pub(super) fn sum(a: MatRef<'_, f64>, b: MatRef<'_, f64>, c: MatRef<'_, f64>) -> Self {
+        Self::new(c, |(i, j), (k, l)| {
+            let left = if j == l { a[(i, k)] } else { 0.0 };
+            let right = if i == k { b[(j, l)] } else { 0.0 };
+            left + right
+        })
+    }
+
+    /// The equation `A X B' - X = C` for A (p x p) and B (q x q), p, q <= 2.
+    pub(super) fn product(a: MatRef<'_, f64>, b: MatRef<'_, f64>, c: MatRef<'_, f64>) -> Self {
+        Self::new(c, |(i, j), (k, l)| a[(i, k)] * b[(j, l)] - if (i, j) == (k, l) { 1.0 } else { 0.0 })
+    }
+
+    /// Equations with the right-hand side `c`; `coefficient(e, u)` is that of the unknown `x[u]` in the equation of `c[e]`.
+    fn new(c: MatRef<'_, f64>, coefficient: impl Fn((usize, usize), (usize, usize)) -> f64) -> Self {
         let (rows, columns) = (c.nrows(), c.ncols());
-        let mut rhs = [0.0; 4];
-        for j in 0..columns {
-            for i in 0..rows {
-                rhs[i + j * rows] = c[(i, j)];
+        let mut small = Small { rows, columns, matrix: [[0.0; 4]; 4], rhs: [0.0; 4] };
+        for e in 0..rows * columns {
+            let equation = (e % rows, e / rows);
+            small.rhs[e] = c[equation];
+            for u in 0..rows * columns {
+                small.matrix[e][u] = coefficient(equation, (u % rows, u / rows));
             }
         }
-        Small { rows, columns, matrix: [[0.0; 4]; 4], rhs }
+        small
     }
 
-    /// Coefficient of the unknown `x[unknown]` in the equation of `c[equation]`.
-    pub(super) fn entry(&mut self, equation: (usize, usize), unknown: (usize, usize)) -> &mut f64 {
-        &mut self.matrix[equation.0 + equation.1 * self.rows][unknown.0 + unknown.1 * self.rows]
-    }
-
-    /// Solution, scale and the size of the smallest pivot before replacement.
-    pub(super) fn solve(mut self) -> (Mat<f64>, f64, f64) {
+    /// Solves with complete pivoting. Pivots below rounding are replaced by it, so that a solution always exists; the
+    /// caller judges by `smallest_pivot` or by a residual what it is worth.
+    pub(super) fn solve(mut self) -> SmallSolution {
         let n = self.rows * self.columns;
         let mut order = [0, 1, 2, 3];
-        let (mut largest, mut smallest) = (0.0_f64, f64::INFINITY);
+        let (mut largest, mut smallest_pivot) = (0.0_f64, f64::INFINITY);
         for k in 0..n {
             let (row, column) = self.pivot(k, n);
             self.matrix.swap(k, row);
@@ -63,7 +65,7 @@ impl Small {
                 equation.swap(k, column);
             }
             let size = self.matrix[k][k].abs();
-            (largest, smallest) = (largest.max(size), smallest.min(size));
+            (largest, smallest_pivot) = (largest.max(size), smallest_pivot.min(size));
             let floor = (f64::EPSILON * largest).max(f64::MIN_POSITIVE / f64::EPSILON);
             if size < floor {
                 self.matrix[k][k] = floor;
@@ -76,6 +78,13 @@ impl Small {
                 self.rhs[i] -= factor * self.rhs[k];
             }
         }
+        let (x, scale) = self.substitute(order);
+        SmallSolution { x, scale, smallest_pivot }
+    }
+
+    /// Back-substitution after elimination; `order` says which unknown stands in which column.
+    fn substitute(&self, order: [usize; 4]) -> (Mat<f64>, f64) {
+        let n = self.rows * self.columns;
         let scale = self.overflow_guard(n);
         let mut x = Mat::zeros(self.rows, self.columns);
         let mut solution = [0.0; 4];
@@ -85,11 +94,9 @@ impl Small {
                 sum -= self.matrix[k][j] * solution[j];
             }
             solution[k] = sum / self.matrix[k][k];
-        }
-        for k in 0..n {
             x[(order[k] % self.rows, order[k] / self.rows)] = solution[k];
         }
-        (x, scale, smallest)
+        (x, scale)
     }
 
     /// Position of the largest entry of the remaining equations.

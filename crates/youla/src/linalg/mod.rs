@@ -7,6 +7,7 @@ mod balance;
 mod complex_schur;
 mod definite;
 mod expm;
+mod francis;
 mod gramian;
 mod hessenberg;
 mod kronecker;

@@ -26,27 +26,26 @@ pub(super) fn householder(x: &mut [f64]) -> (f64, f64) {
 /// `m := P m`, where P acts on the rows from `row` on, restricted to the given columns.
 pub(super) fn reflect_rows(m: &mut Mat<f64>, v: &[f64], tau: f64, row: usize, columns: Range<usize>) {
     for j in columns {
-        let mut w = 0.0;
-        for (k, e) in v.iter().enumerate() {
-            w += e * m[(row + k, j)];
-        }
-        w *= tau;
-        for (k, e) in v.iter().enumerate() {
-            m[(row + k, j)] -= w * e;
+        let x = &mut m.col_as_slice_mut(j)[row..row + v.len()];
+        let w = tau * x.iter().zip(v).map(|(x, v)| x * v).sum::<f64>();
+        for (x, v) in x.iter_mut().zip(v) {
+            *x -= w * v;
         }
     }
 }
 
 /// `m := m P`, where P acts on the columns from `column` on, restricted to the given rows.
 pub(super) fn reflect_columns(m: &mut Mat<f64>, v: &[f64], tau: f64, column: usize, rows: Range<usize>) {
-    for i in rows {
-        let mut w = 0.0;
-        for (k, e) in v.iter().enumerate() {
-            w += e * m[(i, column + k)];
+    let mut w = vec![0.0; rows.len()];
+    for (k, v) in v.iter().enumerate() {
+        for (w, x) in w.iter_mut().zip(&m.col_as_slice(column + k)[rows.clone()]) {
+            *w += x * v;
         }
-        w *= tau;
-        for (k, e) in v.iter().enumerate() {
-            m[(i, column + k)] -= w * e;
+    }
+    for (k, v) in v.iter().enumerate() {
+        let factor = tau * v;
+        for (x, w) in m.col_as_slice_mut(column + k)[rows.clone()].iter_mut().zip(&w) {
+            *x -= factor * w;
         }
     }
 }

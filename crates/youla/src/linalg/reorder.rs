@@ -4,7 +4,7 @@
 //! Neighbours A11 (p x p) and A22 (q x q) change places under the orthogonal matrix of the QR factorisation
 //! `[-X; I] = Q R`, where `A11 X - X A22 = A12`. A swap that would disturb the matrix by more than rounding is refused.
 
-use super::kronecker::small_sylvester;
+use super::kronecker::{Small, SmallSolution};
 use super::reflector::{Rotation, householder, reflect_columns, reflect_rows};
 use super::schur::{DiagonalBlock, RealSchur, block_eigenvalues, blocks, standardise};
 use crate::{Error, Result};
@@ -91,24 +91,22 @@ fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize
         return Ok(0.0);
     }
     let size = above + below;
-    let kept = (t.clone(), q.clone());
-    for (j, v, tau) in swapping_reflections(t, k, above, below)? {
-        reflect_rows(t, &v, tau, k + j, k..t.ncols());
-        reflect_columns(t, &v, tau, k + j, 0..k + size);
-        reflect_columns(q, &v, tau, k + j, 0..q.nrows());
+    let reflections = swapping_reflections(t, k, above, below);
+    let left = rehearse(t, k, below, size, &reflections);
+    if left > 20.0 * f64::EPSILON * norm {
+        let (first, second) = (t[(k, k)], t[(k + above, k + above)]);
+        let what = format!("the exchange of the eigenvalues with real parts {first} and {second} of a Schur form");
+        return Err(Error::NoConvergence { what, iterations: 1 });
     }
-    let mut left = 0.0_f64;
+    for Reflection { row, v, tau } in &reflections {
+        reflect_rows(t, v, *tau, k + row, k..t.ncols());
+        reflect_columns(t, v, *tau, k + row, 0..k + size);
+        reflect_columns(q, v, *tau, k + row, 0..q.nrows());
+    }
     for i in k + below..k + size {
         for j in k..k + below {
-            left = left.hypot(t[(i, j)]);
             t[(i, j)] = 0.0;
         }
-    }
-    if left > 20.0 * f64::EPSILON * norm {
-        (*t, *q) = kept;
-        let what =
-            format!("the exchange of the eigenvalues {} and {} of a Schur form", t[(k, k)], t[(k + above, k + above)]);
-        return Err(Error::NoConvergence { what, iterations: 1 });
     }
     for (row, rows) in [(k, below), (k + below, above)] {
         if rows == 2 {
@@ -118,14 +116,31 @@ fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize
     Ok(left)
 }
 
+/// A Householder reflection of the rows from `row` on, counted within the two blocks.
+struct Reflection {
+    row: usize,
+    v: Vec<f64>,
+    tau: f64,
+}
+
+/// What the exchange would leave below the new diagonal blocks, tried on a copy of the old ones.
+fn rehearse(t: &Mat<f64>, k: usize, below: usize, size: usize, reflections: &[Reflection]) -> f64 {
+    let mut copy = t.as_ref().submatrix(k, k, size, size).to_owned();
+    for Reflection { row, v, tau } in reflections {
+        reflect_rows(&mut copy, v, *tau, *row, 0..size);
+        reflect_columns(&mut copy, v, *tau, *row, 0..size);
+    }
+    copy.submatrix(below, 0, size - below, below).norm_l2()
+}
+
 /// Householder vectors of the QR factorisation of `[-X; g I]`, where `A11 X - X A22 = g A12`.
-fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> Result<Vec<(usize, Vec<f64>, f64)>> {
+fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> Vec<Reflection> {
     let middle = k + above;
     let a11 = t.as_ref().submatrix(k, k, above, above);
     let a22 = t.as_ref().submatrix(middle, middle, below, below);
     let minus_a22 = Mat::from_fn(below, below, |i, j| -a22[(j, i)]);
     let rhs = t.as_ref().submatrix(k, middle, above, below);
-    let (x, scale) = small_sylvester(a11, minus_a22.as_ref(), rhs);
+    let SmallSolution { x, scale, .. } = Small::sum(a11, minus_a22.as_ref(), rhs).solve();
     let mut panel = Mat::from_fn(above + below, below, |i, j| match i.checked_sub(above) {
         None => -x[(i, j)],
         Some(row) => f64::from(u8::from(row == j)) * scale,
@@ -135,7 +150,45 @@ fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> R
         let mut v: Vec<f64> = (j..above + below).map(|i| panel[(i, j)]).collect();
         let (tau, _) = householder(&mut v);
         reflect_rows(&mut panel, &v, tau, j, j..below);
-        reflections.push((j, v, tau));
+        reflections.push(Reflection { row: j, v, tau });
     }
-    Ok(reflections)
+    reflections
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::Error;
+    use crate::linalg::{eye, real_schur};
+    use faer::Mat;
+    use std::cell::Cell;
+
+    /// Two conjugate pairs `+-i` and `+-i (1 + gap)`, coupled.
+    fn two_pairs(gap: f64) -> Mat<f64> {
+        let w = 1.0 + gap;
+        Mat::from_fn(4, 4, |i, j| {
+            [[0.0, 1.0, 3.0, -1.0], [-1.0, 0.0, 0.5, 2.0], [0.0, 0.0, 0.0, w], [0.0, 0.0, -w, 0.0]][i][j]
+        })
+    }
+
+    #[test]
+    fn close_pairs_change_places_or_are_refused() {
+        for gap in [1.0, 1e-3, 1e-6, 1e-9, 1e-12, 1e-15, 0.0] {
+            let a = two_pairs(gap);
+            let seen = Cell::new(0);
+            let second = |_| {
+                seen.set(seen.get() + 1);
+                seen.get() == 2
+            };
+            match real_schur("A", a.as_ref()).unwrap().reorder(second) {
+                Ok(ordered) => {
+                    assert_eq!(ordered.dimension, 2);
+                    let (q, t) = (&ordered.q, &ordered.t);
+                    assert!((q * t * q.transpose() - &a).norm_l2() < 1e-14 * a.norm_l2(), "gap {gap}");
+                    assert!((q.transpose() * q - eye(4)).norm_l2() < 1e-14);
+                    assert_eq!(t[(2, 0)].abs() + t[(3, 0)].abs() + t[(2, 1)].abs() + t[(3, 1)].abs(), 0.0);
+                }
+                Err(error) => assert!(gap < 1e-9 && matches!(error, Error::NoConvergence { .. }), "{error}"),
+            }
+        }
+    }
 }

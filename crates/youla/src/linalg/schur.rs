@@ -1,13 +1,12 @@
 //! Real Schur form `A = Q T Q'`: Q orthogonal, T quasi-triangular with 1 x 1 blocks for real eigenvalues and 2 x 2 blocks
 //! `[a b; c a]`, b c < 0, for the pairs `a +- i sqrt(-b c)`.
 //!
-//! Hessenberg reduction, then Francis' implicit double shift with deflation: J. G. F. Francis, The QR transformation,
-//! Comput. J. 4 (1961-62); Golub and Van Loan, Matrix Computations, 4th ed., section 7.5; the deflation test is that of
-//! Ahues and Tisseur, LAPACK Working Note 122 (1997).
+//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5).
 
-use super::reflector::{Rotation, householder, reflect_columns, reflect_rows};
+use super::francis::iterate;
+use super::reflector::Rotation;
 use super::{Hessenberg, hessenberg};
-use crate::{Error, Result};
+use crate::Result;
 use faer::{Mat, MatRef, c64};
 
 /// The real Schur form `A = Q T Q'` of an n x n matrix.
@@ -65,7 +64,7 @@ pub(super) fn block_eigenvalues(t: MatRef<'_, f64>, block: DiagonalBlock) -> Vec
 /// `random_matrices_keep_their_schur_form`).
 ///
 /// # Errors
-/// [`Error::Shape`] and [`Error::NotFinite`] naming `what`; [`Error::NoConvergence`] after 30 sweeps per eigenvalue.
+/// [`crate::Error::Shape`] and [`crate::Error::NotFinite`] naming `what`; [`crate::Error::NoConvergence`] after 30 sweeps per eigenvalue.
 ///
 /// ```
 /// use youla::{Mat, linalg::real_schur};
@@ -85,135 +84,6 @@ pub fn real_schur(what: &str, a: MatRef<'_, f64>) -> Result<RealSchur> {
 pub(super) fn relative_residual(a: MatRef<'_, f64>, q: &Mat<f64>, t: &Mat<f64>) -> f64 {
     let norm = a.norm_l2();
     if norm == 0.0 { 0.0 } else { (q * t * q.transpose() - a).norm_l2() / norm }
-}
-
-/// Deflates from the bottom until nothing is left.
-fn iterate(what: &str, t: &mut Mat<f64>, q: &mut Mat<f64>) -> Result<()> {
-    let n = t.nrows();
-    let limit = 30 * n.max(10);
-    let (mut end, mut total, mut since_deflation) = (n, 0, 0);
-    while end > 0 {
-        let start = deflate(t, end);
-        match end - start {
-            1 => (end, since_deflation) = (end - 1, 0),
-            2 => {
-                standardise(t, q, start);
-                (end, since_deflation) = (end - 2, 0);
-            }
-            _ if total == limit => {
-                let what = format!("the Schur form of {what}");
-                return Err(Error::NoConvergence { what, iterations: total });
-            }
-            _ => {
-                total += 1;
-                since_deflation += 1;
-                let shifts = Shifts::choose(t, start, end, since_deflation);
-                sweep(t, q, start, end, shifts);
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Sets the lowest negligible subdiagonal entry above row `end` to zero and returns the first row of the unreduced block.
-fn deflate(t: &mut Mat<f64>, end: usize) -> usize {
-    for k in (1..end).rev() {
-        if is_negligible(t, k) {
-            t[(k, k - 1)] = 0.0;
-            return k;
-        }
-    }
-    0
-}
-
-/// Whether the subdiagonal entry of row k may be set to zero at no more than the cost of a rounding, also for graded
-/// matrices (Ahues and Tisseur 1997).
-fn is_negligible(t: &Mat<f64>, k: usize) -> bool {
-    let eps = f64::EPSILON;
-    let (below, above) = (t[(k, k - 1)].abs(), t[(k - 1, k)].abs());
-    let (upper, lower) = (t[(k - 1, k - 1)], t[(k, k)]);
-    let mut neighbours = upper.abs() + lower.abs();
-    if neighbours == 0.0 {
-        neighbours = t.norm_max();
-    }
-    if below <= f64::MIN_POSITIVE / eps {
-        return true;
-    }
-    if below > eps * neighbours {
-        return false;
-    }
-    let (small, large) = (below.min(above), below.max(above));
-    let gap = (upper - lower).abs();
-    let (least, most) = (lower.abs().min(gap), lower.abs().max(gap));
-    let sum = most + large;
-    small * (large / sum) <= (f64::MIN_POSITIVE / eps).max(eps * (least * (most / sum)))
-}
-
-/// Sum and product of the two shifts, real or a conjugate pair.
-#[derive(Clone, Copy)]
-struct Shifts {
-    sum: f64,
-    product: f64,
-}
-
-impl Shifts {
-    /// Eigenvalues of the trailing 2 x 2 block (if real, twice the one nearer to the last entry), with an exceptional
-    /// pair every tenth sweep to leave a cycle.
-    fn choose(t: &Mat<f64>, start: usize, end: usize, sweeps: usize) -> Self {
-        let n = end - 1;
-        let (a, b, c, d) = (t[(n - 1, n - 1)], t[(n - 1, n)], t[(n, n - 1)], t[(n, n)]);
-        if sweeps.is_multiple_of(10) {
-            let k = if sweeps.is_multiple_of(20) { n } else { start + 2 };
-            let size = t[(k, k - 1)].abs() + t[(k - 1, k - 2)].abs();
-            let centre = t[(k, k)] + 0.75 * size;
-            return Shifts { sum: 2.0 * centre, product: centre * centre + 0.4375 * size * size };
-        }
-        let half = 0.5 * (a - d);
-        let discriminant = half * half + b * c;
-        if discriminant < 0.0 {
-            return Shifts { sum: a + d, product: a * d - b * c };
-        }
-        let away = half + discriminant.sqrt().copysign(half);
-        let near = if away == 0.0 { d } else { d - b * c / away };
-        Shifts { sum: 2.0 * near, product: near * near }
-    }
-
-    /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size.
-    fn first_column(self, t: &Mat<f64>, k: usize) -> [f64; 3] {
-        let (a, b, c, d) = (t[(k, k)], t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)]);
-        let size = a.abs() + b.abs() + c.abs() + d.abs() + self.sum.abs();
-        if size == 0.0 {
-            return [0.0; 3];
-        }
-        let r = c / size;
-        let first = a / size * (a - self.sum) + self.product / size + b * r;
-        [first, r * (a + d - self.sum), r * t[(k + 2, k + 1)]]
-    }
-}
-
-/// One implicit double-shift QR sweep on the unreduced rows `start..end`, chasing the bulge down.
-fn sweep(t: &mut Mat<f64>, q: &mut Mat<f64>, start: usize, end: usize, shifts: Shifts) {
-    let n = t.nrows();
-    let mut column = shifts.first_column(t, start);
-    for k in start..end - 1 {
-        let length = 3.min(end - k);
-        if k > start {
-            for (i, e) in column.iter_mut().enumerate().take(length) {
-                *e = t[(k + i, k - 1)];
-            }
-        }
-        let v = &mut column[..length];
-        let (tau, beta) = householder(v);
-        if k > start {
-            t[(k, k - 1)] = beta;
-            for i in 1..length {
-                t[(k + i, k - 1)] = 0.0;
-            }
-        }
-        reflect_rows(t, v, tau, k, k..n);
-        reflect_columns(t, v, tau, k, 0..end.min(k + 4));
-        reflect_columns(q, v, tau, k, 0..n);
-    }
 }
 
 /// Brings the 2 x 2 block in rows k, k+1 to standard form: triangular where its eigenvalues are real, equal diagonal
@@ -358,6 +228,6 @@ mod tests {
 
     #[test]
     fn a_matrix_that_is_not_square_is_refused() {
-        assert!(matches!(real_schur("A", Mat::zeros(2, 3).as_ref()), Err(Error::Shape { .. })));
+        assert!(matches!(real_schur("A", Mat::zeros(2, 3).as_ref()), Err(crate::Error::Shape { .. })));
     }
 }

@@ -2,7 +2,7 @@
 //! real Schur forms `A = U T U'` and `B' = V S V'` turn them into `T Y + Y S' = D` and `T Y S' - Y = D` with `D = U' C V`,
 //! which are solved block by block from the lower right corner; then `X = U Y V'`.
 
-use super::kronecker::Small;
+use super::kronecker::{Small, SmallSolution};
 use super::schur::{DiagonalBlock, RealSchur, blocks, real_schur};
 use super::{check_finite, check_shape};
 use crate::{Error, Result};
@@ -162,34 +162,11 @@ fn solve_block(
         };
         y[(i + r, j + k)] - from_below
     });
-    let mut system = Small::new(rhs.as_ref());
-    for k in 0..width {
-        for r in 0..height {
-            match form {
-                Form::Sum => {
-                    for l in 0..height {
-                        *system.entry((r, k), (l, k)) += t_ii[(r, l)];
-                    }
-                    for q in 0..width {
-                        *system.entry((r, k), (r, q)) += s_jj[(k, q)];
-                    }
-                }
-                Form::Product => {
-                    for l in 0..height {
-                        for q in 0..width {
-                            *system.entry((r, k), (l, q)) += t_ii[(r, l)] * s_jj[(k, q)];
-                        }
-                    }
-                    *system.entry((r, k), (r, k)) -= 1.0;
-                }
-            }
-        }
-    }
-    let (x, _, smallest_pivot) = system.solve();
-    let size = match form {
-        Form::Sum => t_ii.norm_max() + s_jj.norm_max(),
-        Form::Product => t_ii.norm_max() * s_jj.norm_max() + 1.0,
+    let (system, size) = match form {
+        Form::Sum => (Small::sum(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() + s_jj.norm_max()),
+        Form::Product => (Small::product(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() * s_jj.norm_max() + 1.0),
     };
+    let SmallSolution { x, smallest_pivot, .. } = system.solve();
     let rcond = smallest_pivot / size;
     if !rcond.is_finite() || rcond <= f64::EPSILON {
         return Err(Error::Singular { what: format!("the equation of {what}"), rcond: rcond.max(0.0) });

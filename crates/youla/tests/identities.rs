@@ -39,7 +39,8 @@ impl<T: TimeDomain> Loop<T> {
     fn random(seed: u64, time: T) -> Self {
         let mut rng = rng(seed);
         let shape = (rng.random_range(1..=20), rng.random_range(1..=3), rng.random_range(1..=3));
-        let nominal = random_system(&mut rng, shape, 1.2, time);
+        let instability = rng.random_range(-0.2..0.2);
+        let nominal = random_system(&mut rng, shape, instability, time);
         Self::new(format!("random {shape:?}, {time:?}, seed {seed}"), nominal, 1.0, RANDOM)
     }
 
@@ -170,21 +171,25 @@ fn primal_and_dual_parametrisation_of_the_bearing() {
     on_bearing(|l| primal_and_dual(l, &mut rng(5)), |l| primal_and_dual(l, &mut rng(6)));
 }
 
-/// 1000 random loops, orders to 20, 1 to 3 inputs and outputs, D != 0, stable and unstable, both time domains.
+/// 1000 random loops in both tests together: orders to 20, 1 to 3 inputs and outputs, D != 0, half of them about unstable.
 #[test]
-fn every_identity_on_1000_random_loops() {
-    fn all<T: TimeDomain>(seed: u64, time: T) {
-        let (l, mut rng) = (Loop::random(seed, time), rng(seed + 10_000));
-        factor_identities(&l);
-        star_product(&l);
-        deviation_identities(&l, &mut rng);
-        arbitrary_controller(&l, &mut rng);
-        primal_and_dual(&l, &mut rng);
-    }
-    for seed in 0..500 {
-        all(seed, Continuous);
-        all(seed, Discrete::new(0.1).unwrap());
-    }
+fn every_identity_on_500_random_continuous_loops() {
+    (0..500).for_each(|seed| every_identity(seed, Continuous));
+}
+
+#[test]
+fn every_identity_on_500_random_discrete_loops() {
+    let time = Discrete::new(0.1).unwrap();
+    (0..500).for_each(|seed| every_identity(seed, time));
+}
+
+fn every_identity<T: TimeDomain>(seed: u64, time: T) {
+    let (l, mut rng) = (Loop::random(seed, time), rng(seed + 10_000));
+    factor_identities(&l);
+    star_product(&l);
+    deviation_identities(&l, &mut rng);
+    arbitrary_controller(&l, &mut rng);
+    primal_and_dual(&l, &mut rng);
 }
 
 /// (25), (28) and alpha in the time domain, with known output noise: the true plant differs from the nominal one.
@@ -258,7 +263,8 @@ fn wrong_signs_fail_loudly() {
     assert!(distance(&identity, &product, &l.omega) > 1e-3, "a flipped sign of the feedback passes (15)");
     let star = l.factors.j_g().unwrap().star(&l.factors.j_k().unwrap()).unwrap();
     let response = youla::lti::frequency_response(star.system(), &[1300.0]).unwrap();
-    let literal = (response.at(0) - Mat::<c64>::identity(2 * m, 2 * m)).operator_norm();
+    let difference = response.at(0) - Mat::<c64>::identity(2 * m, 2 * m);
+    let literal = difference.singular_values().unwrap()[0];
     assert!((literal - 2.0).abs() < 1e-9, "the literal (24) misses by {literal}, not by 2");
 }
 

@@ -7,6 +7,7 @@
 mod choose;
 mod csv;
 mod detrend;
+mod excitation;
 mod matfile;
 mod npz;
 mod persistency;
@@ -22,6 +23,7 @@ mod values;
 pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
+pub use excitation::{Chirp, Excitation, Multisine, Prbs, SquareWaves};
 pub use matfile::{Packing, read_mat, write_mat};
 pub use npz::read_npz;
 pub use persistency::{Persistency, persistency};

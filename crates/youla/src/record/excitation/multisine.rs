@@ -45,6 +45,9 @@ impl Multisine {
         time: Discrete,
         rng: &mut impl Rng,
     ) -> Result<Mat<f64>> {
+        const LONGEST: usize = 1 << 24;
+        let fits = (2..=LONGEST).contains(&self.period);
+        check("the period of a multisine", self.period as f64, fits, "from 2 to 2^24 samples")?;
         check_amplitude(self.amplitude)?;
         let lines = self.lines(channels, time)?;
         let mut out = Mat::zeros(samples, channels);

@@ -67,6 +67,8 @@ fn errors_say_where() {
 fn unchosen_columns_may_hold_text() {
     let record = read(b"a,note\n1,x\n2,\n", &[ChannelSpec::named("a")], &second()).unwrap();
     assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
+    let record = read(b"note x\ta\tmore\nx\t1\ty\n\t2\t\n", &[ChannelSpec::named("a")], &second()).unwrap();
+    assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
 }
 
 #[test]

@@ -1,7 +1,7 @@
 //! `[nominal]` and `[controller]` of run.toml: every form in which users have them.
 
 use crate::lti::{Continuous, Discrete, PolynomialMatrix, StateSpace};
-use crate::record::matfile;
+use crate::record::read_mat;
 use crate::rig::{Bearing, degraded};
 use crate::{Error, Mat, Result};
 use faer::Scale;
@@ -236,9 +236,8 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
 }
 
 fn abcd_of(file: &Path) -> Result<[Mat<f64>; 4]> {
-    let variables = matfile::read(file)?;
-    let get = |name: &str| variables.matrix(name);
-    Ok([get("a")?, get("b")?, get("c")?, get("d")?])
+    let variables = read_mat(file)?;
+    Ok([variables.matrix("a")?, variables.matrix("b")?, variables.matrix("c")?, variables.matrix("d")?])
 }
 
 fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {

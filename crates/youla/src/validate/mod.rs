@@ -2,6 +2,8 @@
 
 mod certificate;
 mod fit;
+mod predict;
 
 pub use certificate::{LoopCertificate, certify};
 pub use fit::{fit, vaf};
+pub use predict::{LoopExcitation, predict_closed_loop, predict_open_loop};

@@ -41,6 +41,24 @@ impl Variables {
         }
     }
 
+    /// The real matrix at a path.
+    ///
+    /// # Errors
+    /// [`Error::UnknownChannel`] or [`Error::WrongVariable`].
+    pub fn matrix(&self, path: &str) -> Result<faer::Mat<f64>> {
+        match self.get(path)? {
+            Value::Real { dims, data } if dims.len() == 2 => {
+                Ok(faer::MatRef::from_column_major_slice(data, dims[0], dims[1]).to_owned())
+            }
+            value => Err(Error::WrongVariable {
+                path: self.path.clone(),
+                name: path.to_owned(),
+                found: value.description(),
+                must: "a matrix of real numbers",
+            }),
+        }
+    }
+
     /// The real number at a path.
     ///
     /// # Errors

@@ -220,8 +220,16 @@ pub enum Error {
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
+    /// The output folder holds something already.
+    #[error("{} exists already and is not empty; choose another output folder or remove it", path.display())]
+    OutputExists {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A record is used up by the samples that are dropped at its start.
-    #[error("record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle")]
+    #[error(
+        "record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle"
+    )]
     TooShort {
         /// Which record.
         record: String,
@@ -486,9 +494,8 @@ impl Error {
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
             | Error::AlgebraicLoop { .. }
-            | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
-            | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
+            | Error::PoleOnBoundary { .. }
             | Error::NotStabilisable { .. }
             | Error::NotDetectable { .. }
             | Error::NoLogarithm { .. } => ErrorKind::Numerical,

@@ -5,9 +5,9 @@
 
 mod balance;
 mod complex_schur;
+mod definite;
 mod expm;
 mod gramian;
-mod definite;
 mod hessenberg;
 mod kronecker;
 mod least_squares;
@@ -21,9 +21,9 @@ mod sylvester;
 mod triangle;
 
 pub use balance::{Balanced, balance};
+pub(crate) use definite::check_semidefinite;
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
-pub(crate) use definite::check_semidefinite;
 pub use hessenberg::{Hessenberg, hessenberg};
 pub use least_squares::{LeastSquares, least_squares};
 pub use logm::logm;

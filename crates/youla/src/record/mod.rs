@@ -30,7 +30,7 @@ pub use npz::read_npz;
 pub use persistency::{Persistency, persistency};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, sha256};
-pub use spectrum::{CrossSpectrum, IndirectResponse, Welch, cross_spectrum, indirect_response};
+pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
 pub use time::TimeSource;
 pub use values::{Value, Variable, Variables};
 

@@ -49,6 +49,17 @@ pub struct CrossSpectrum {
     pub segments: usize,
 }
 
+/// One record of an excited loop; row k is time k.
+#[derive(Debug, Clone, Copy)]
+pub struct ExcitedRecord<'a> {
+    /// Excitation that is injected into the loop, samples x m.
+    pub d: MatRef<'a, f64>,
+    /// Plant input, samples x m.
+    pub u: MatRef<'a, f64>,
+    /// Plant output, samples x p.
+    pub y: MatRef<'a, f64>,
+}
+
 /// The frequency response of a plant inside a loop.
 #[derive(Debug, Clone)]
 pub struct IndirectResponse {
@@ -81,37 +92,39 @@ pub struct IndirectResponse {
 pub fn cross_spectrum(y: MatRef<f64>, x: MatRef<f64>, time: Discrete, welch: &Welch) -> Result<CrossSpectrum> {
     let (p, m) = (y.ncols(), x.ncols());
     check_shape("the second signal of a cross spectrum", x, (y.nrows(), m))?;
-    let joint = Joint::estimate(block(&[&[y, x]]).as_ref(), time, welch)?;
+    let joint = Joint::estimate(&[block(&[&[y, x]])], time, welch)?;
     let values = joint.matrices().flat_map(|s| entries(s.submatrix(0, p, p, m))).collect();
     Ok(CrossSpectrum { density: FrequencyResponse::new(joint.omega.clone(), values, p, m), segments: joint.segments })
 }
 
-/// Estimates the response from `u` (samples x m) to `y` (samples x p) with the excitation `d` (samples x m) that is
-/// injected into the loop.
+/// Estimates the response from `u` to `y` with the excitation `d` that is injected into the loop, averaged over the segments
+/// of all records; no segment crosses from one record to the next.
 ///
 /// # Errors
-/// Those of [`cross_spectrum`]; [`Error::Singular`] with the first frequency at which `d` does not reach all inputs.
+/// Those of [`cross_spectrum`], [`Error::Ports`] without any record; [`Error::Singular`] with the first frequency at which `d` does not reach all inputs.
 ///
 /// ```
-/// use youla::{Mat, lti::Discrete, record::{Welch, indirect_response}};
+/// use youla::{Mat, lti::Discrete, record::{ExcitedRecord, Welch, indirect_response}};
 /// let d = Mat::from_fn(4096, 1, |k, _| ((k * k) as f64 * 0.7).sin());
 /// let y = Mat::from_fn(4096, 1, |k, _| 3.0 * d[(k, 0)]);
 /// let welch = Welch { window: 64, ..Welch::default() };
-/// let found = indirect_response(d.as_ref(), d.as_ref(), y.as_ref(), Discrete::new(1.0)?, &welch)?;
+/// let record = ExcitedRecord { d: d.as_ref(), u: d.as_ref(), y: y.as_ref() };
+/// let found = indirect_response(&[record], Discrete::new(1.0)?, &welch)?;
 /// assert!((found.response.at(5)[(0, 0)].re - 3.0).abs() < 1e-12);
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn indirect_response(
-    d: MatRef<f64>,
-    u: MatRef<f64>,
-    y: MatRef<f64>,
-    time: Discrete,
-    welch: &Welch,
-) -> Result<IndirectResponse> {
-    let (m, p) = (u.ncols(), y.ncols());
-    check_shape("the excitation", d, (y.nrows(), m))?;
-    check_shape("the plant input", u, (y.nrows(), m))?;
-    let joint = Joint::estimate(block(&[&[d, u, y]]).as_ref(), time, welch)?;
+pub fn indirect_response(records: &[ExcitedRecord], time: Discrete, welch: &Welch) -> Result<IndirectResponse> {
+    let Some(first) = records.first() else {
+        return Err(Error::Ports { what: "the number of records".into(), expected: 1, found: 0 });
+    };
+    let (m, p) = (first.u.ncols(), first.y.ncols());
+    for r in records {
+        check_shape("the plant output", r.y, (r.y.nrows(), p))?;
+        check_shape("the excitation", r.d, (r.y.nrows(), m))?;
+        check_shape("the plant input", r.u, (r.y.nrows(), m))?;
+    }
+    let signals: Vec<Mat<f64>> = records.iter().map(|r| block(&[&[r.d, r.u, r.y]])).collect();
+    let joint = Joint::estimate(&signals, time, welch)?;
     let (in_d, in_u, in_y) = (0..m, m..2 * m, 2 * m..2 * m + p);
     let first = usize::from(welch.remove_mean);
     let omega = joint.omega[first..].to_vec();
@@ -148,19 +161,26 @@ struct Joint {
 }
 
 impl Joint {
-    fn estimate(z: MatRef<f64>, time: Discrete, welch: &Welch) -> Result<Joint> {
-        check_finite("the signal", z)?;
-        let cut = Cut::new(z.nrows(), welch)?;
-        let size = cut.frequencies() * z.ncols() * z.ncols();
-        let chunks: Vec<Range<usize>> =
-            (0..cut.segments).step_by(CHUNK).map(|first| first..(first + CHUNK).min(cut.segments)).collect();
-        let sums: Vec<Vec<c64>> = chunks.into_par_iter().map(|chunk| cut.sum(z, chunk, size)).collect();
+    /// The mean over the segments of all records, which have the same signals.
+    fn estimate(records: &[Mat<f64>], time: Discrete, welch: &Welch) -> Result<Joint> {
+        let signals = records[0].ncols();
+        let cut = Cut::new(welch)?;
+        let size = cut.frequencies() * signals * signals;
+        let mut chunks = Vec::new();
+        let mut segments = 0;
+        for z in records {
+            check_finite("the signal", z.as_ref())?;
+            let all = cut.segments(z.nrows())?;
+            chunks.extend((0..all).step_by(CHUNK).map(|first| (z, first..(first + CHUNK).min(all))));
+            segments += all;
+        }
+        let sums: Vec<Vec<c64>> = chunks.into_par_iter().map(|(z, chunk)| cut.sum(z.as_ref(), chunk, size)).collect();
         let mut values = vec![c64::new(0.0, 0.0); size];
         sums.iter().for_each(|sum| values.iter_mut().zip(sum).for_each(|(total, part)| *total += part));
-        cut.normalise(&mut values, z.ncols(), time);
+        cut.normalise(&mut values, signals, segments, time);
         let step = TAU / (welch.window as f64 * time.ts());
         let omega = (0..cut.frequencies()).map(|k| k as f64 * step).collect();
-        Ok(Joint { omega, values, signals: z.ncols(), segments: cut.segments })
+        Ok(Joint { omega, values, signals, segments })
     }
 
     fn matrices(&self) -> impl Iterator<Item = MatRef<'_, c64>> {
@@ -174,17 +194,15 @@ impl Joint {
 struct Cut {
     window: Vec<f64>,
     step: usize,
-    segments: usize,
     remove_mean: bool,
     fft: Arc<dyn Fft<f64>>,
 }
 
 impl Cut {
-    fn new(samples: usize, welch: &Welch) -> Result<Cut> {
+    fn new(welch: &Welch) -> Result<Cut> {
         let range = |what: &str, value, must| Err(Error::OutOfRange { what: what.to_owned(), value, must });
-        if welch.window < 4 || welch.window > samples {
-            let must = "at least 4 samples and not longer than the record";
-            return range("the window of a spectrum", welch.window as f64, must);
+        if welch.window < 4 {
+            return range("the window of a spectrum", welch.window as f64, "at least 4 samples");
         }
         if !(0.0..1.0).contains(&welch.overlap) {
             return range("the overlap of a spectrum", welch.overlap, "at least 0 and below 1");
@@ -194,10 +212,19 @@ impl Cut {
         Ok(Cut {
             window: (0..length).map(|k| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos()).collect(),
             step,
-            segments: (samples - length) / step + 1,
             remove_mean: welch.remove_mean,
             fft: FftPlanner::new().plan_fft_forward(length),
         })
+    }
+
+    /// Number of segments of a record.
+    fn segments(&self, samples: usize) -> Result<usize> {
+        let length = self.window.len();
+        if length > samples {
+            let what = "the window of a spectrum".to_owned();
+            return Err(Error::OutOfRange { what, value: length as f64, must: "not longer than any record" });
+        }
+        Ok((samples - length) / self.step + 1)
     }
 
     fn frequencies(&self) -> usize {
@@ -231,10 +258,10 @@ impl Cut {
     }
 
     /// From sums to one-sided densities per Hz: all frequencies but zero and the Nyquist frequency count twice.
-    fn normalise(&self, values: &mut [c64], signals: usize, time: Discrete) {
+    fn normalise(&self, values: &mut [c64], signals: usize, segments: usize, time: Discrete) {
         let length = self.window.len();
         let energy: f64 = self.window.iter().map(|w| w * w).sum();
-        let scale = time.ts() / (energy * self.segments as f64);
+        let scale = time.ts() / (energy * segments as f64);
         for (k, s) in values.chunks_exact_mut((signals * signals).max(1)).enumerate() {
             let sides = if k == 0 || 2 * k == length { 1.0 } else { 2.0 };
             s.iter_mut().for_each(|x| *x *= sides * scale);

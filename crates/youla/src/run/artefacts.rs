@@ -4,7 +4,6 @@ use super::folder::RunFolder;
 use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::settings::RunSettings;
-use super::verdict::Method;
 use crate::factor::YoulaSignals;
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::{Discrete, StateSpace};
@@ -93,7 +92,7 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
 }
 
 /// The provenance that every artefact of a run carries.
-pub fn provenance(found: &Identification) -> Provenance {
+pub(super) fn provenance(found: &Identification) -> Provenance {
     Provenance {
         schema: SCHEMA,
         program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
@@ -241,7 +240,8 @@ impl Writer<'_> {
             });
             models.insert(v.method.key().into(), entry);
         }
-        self.folder.json("7-validate/verdict.json", &serde_json::json!({"models": models, "provenance": self.provenance}))?;
+        self.folder
+            .json("7-validate/verdict.json", &serde_json::json!({"models": models, "provenance": self.provenance}))?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
             for v in &self.found.verdict.models {
@@ -321,4 +321,3 @@ fn number(name: &str, value: f64) -> Variable {
 fn array(name: &str, value: MatRef<'_, f64>) -> Variable {
     Variable { name: name.into(), value: Value::matrix(value) }
 }
-

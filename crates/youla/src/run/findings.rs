@@ -5,7 +5,7 @@ use super::verdict::{Method, ModelVerdict};
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
 /// The answer to "can I trust it?", about five lines, each with its evidence.
-pub fn verdict_lines(found: &Identification) -> Vec<Verdict> {
+pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     [fit_line(found), loop_line(found), deviation_line(found), controller_line(found), factor_line(found)]
         .into_iter()
         .flatten()
@@ -13,7 +13,7 @@ pub fn verdict_lines(found: &Identification) -> Vec<Verdict> {
 }
 
 /// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.
-pub fn notes(found: &Identification) -> Vec<Note> {
+pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let mut all = Vec::new();
     let mut add = |status: Status, text: String| all.push(Note { status, text });
     if let Some(Err(e)) = &found.direct {
@@ -39,7 +39,10 @@ pub fn notes(found: &Identification) -> Vec<Note> {
         }
     }
     let settle = found.signals.settle;
-    add(Status::Info, format!("The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."));
+    add(
+        Status::Info,
+        format!("The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."),
+    );
     all
 }
 
@@ -71,14 +74,16 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
     let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
     let (status, verb) =
         if v.certificate.stable { (Status::Good, "stabilises") } else { (Status::Bad, "does not stabilise") };
-    let text = format!("The controller that ran {verb} G(S); the closed-loop pole of largest magnitude is at |z| = {worst:.5}.");
+    let text = format!(
+        "The controller that ran {verb} G(S); the closed-loop pole of largest magnitude is at |z| = {worst:.5}."
+    );
     Some(Verdict { status, text, evidence: Evidence::Certificate })
 }
 
 fn deviation_line(found: &Identification) -> Option<Verdict> {
     let s = &found.hansen.deviation;
     let stable = if s.stability.stable { "stable" } else { "unstable" };
-    let fit: Vec<String> = s.fit.fit.iter().map(|f| format!("{f:.1} %")).collect();
+    let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
     let text = format!(
         "S has order {} and is {stable}; it reproduces beta with a fit of {} per channel (the rest is noise or unmodelled).",
         s.model.order(),
@@ -93,7 +98,9 @@ fn controller_line(found: &Identification) -> Option<Verdict> {
     let (status, words) = match mismatch {
         m if m < 0.01 => (Status::Good, "the declared controller is the one that ran"),
         m if m < 0.1 => (Status::Caution, "the declared controller nearly explains the logged input"),
-        _ => (Status::Bad, "the declared controller does not explain the logged input; check sign, delay and saturation"),
+        _ => {
+            (Status::Bad, "the declared controller does not explain the logged input; check sign, delay and saturation")
+        }
     };
     let text = format!("Known excitations explain alpha to {mismatch:.1e} (relative): {words}.");
     Some(Verdict { status, text, evidence: Evidence::Signals })

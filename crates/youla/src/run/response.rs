@@ -3,13 +3,13 @@
 use super::pipeline::Identification;
 use super::verdict::Method;
 use crate::lti::{FrequencyResponse, frequency_response};
-use crate::record::{IndirectResponse, WelchOptions, indirect_response};
+use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
 use crate::{Mat, Result};
 use std::f64::consts::TAU;
 
 /// Responses on one grid.
 #[derive(Debug, Clone)]
-pub struct ModelResponses {
+pub(super) struct ModelResponses {
     /// Grid, Hz.
     pub hz: Vec<f64>,
     /// One entry per model.
@@ -21,7 +21,7 @@ pub struct ModelResponses {
 ///
 /// # Errors
 /// A record shorter than a window.
-pub fn measured_response(found: &Identification) -> Result<Option<IndirectResponse>> {
+pub(super) fn measured_response(found: &Identification) -> Result<Option<IndirectResponse>> {
     let settings = &found.settings.frequency_response;
     let records = &found.records.estimation;
     let excitations: Vec<Mat<f64>> = records
@@ -41,10 +41,11 @@ pub fn measured_response(found: &Identification) -> Result<Option<IndirectRespon
         .zip(&excitations)
         .map(|(r, d)| {
             let dropped = r.samples() - d.nrows();
-            (d.as_ref(), r.u.subrows(dropped, d.nrows()), r.y.subrows(dropped, d.nrows()))
+            let (u, y) = (r.u.subrows(dropped, d.nrows()), r.y.subrows(dropped, d.nrows()));
+            ExcitedRecord { d: d.as_ref(), u, y }
         })
         .collect();
-    let options = WelchOptions { window: settings.window, overlap: settings.overlap, ..WelchOptions::default() };
+    let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
     indirect_response(&experiments, found.records.time, &options).map(Some)
 }
 
@@ -52,7 +53,7 @@ pub fn measured_response(found: &Identification) -> Result<Option<IndirectRespon
 ///
 /// # Errors
 /// As [`frequency_response`].
-pub fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<ModelResponses> {
+pub(super) fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<ModelResponses> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
     let models = found.verdict.models.iter().map(response).collect::<Result<_>>()?;
@@ -61,7 +62,7 @@ pub fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<ModelResp
 
 /// Frequencies in Hz, logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just below
 /// Nyquist.
-pub fn log_grid(found: &Identification) -> Vec<f64> {
+pub(super) fn log_grid(found: &Identification) -> Vec<f64> {
     let settings = &found.settings.frequency_response;
     let nyquist = 0.5 / found.records.time.ts();
     let from = settings.from_hz.unwrap_or(nyquist / 300.0);

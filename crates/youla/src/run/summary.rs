@@ -7,6 +7,7 @@ use super::verdict::{Method, ModelVerdict};
 use crate::Result;
 use crate::c64;
 use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
 
 /// The summary of a run, schema 1; magnitudes are those of output 1 from input 1.
 ///
@@ -73,12 +74,12 @@ fn fits(v: &ModelVerdict) -> Value {
 
 fn response_entry(found: &Identification) -> Result<Value> {
     let measured = measured_response(found)?;
-    let hz = measured.as_ref().map_or_else(|| log_grid(found), |m| m.hz.clone());
+    let hz = measured.as_ref().map_or_else(|| log_grid(found), |m| m.response.omega.iter().map(|w| w / TAU).collect());
     let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
     let mut entry = Map::new();
     if let Some(m) = &measured {
-        entry.insert("indirect_db".into(), json!(db(m.entry(0, 0))));
-        entry.insert("coherence".into(), json!(m.coherence(0)));
+        entry.insert("indirect_db".into(), json!(db(m.response.entry(0, 0))));
+        entry.insert("coherence".into(), json!(m.coherence_y.col_as_slice(0)));
     }
     let responses = model_responses(found, hz)?;
     for (method, response) in &responses.models {

@@ -159,8 +159,17 @@ fn report(plan: &Plan) -> ReportData {
             for (method, model) in &models {
                 let predicted = model.simulate(&u, output, ts);
                 let residual: Vec<f64> = y[output].iter().zip(&predicted).map(|(a, b)| a - b).collect();
-                data.fits.push(Fit { record: (*record).into(), output, method: method.key.clone(), fit: Some(fit(&y[output], &residual)) });
-                predictions.push(Prediction { method: method.key.clone(), predicted: trace(&predicted), residual: trace(&residual) });
+                data.fits.push(Fit {
+                    record: (*record).into(),
+                    output,
+                    method: method.key.clone(),
+                    fit: Some(fit(&y[output], &residual)),
+                });
+                predictions.push(Prediction {
+                    method: method.key.clone(),
+                    predicted: trace(&predicted),
+                    residual: trace(&residual),
+                });
             }
             compared.push(VerifiedOutput { output, measured: trace(&y[output]), predictions });
         }
@@ -287,7 +296,14 @@ fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: us
                 });
             }
             let points = grid(280);
-            let mut indirect = Indirect { output, input, hz: points.clone(), magnitude_db: vec![], phase_deg: vec![], coherence: vec![] };
+            let mut indirect = Indirect {
+                output,
+                input,
+                hz: points.clone(),
+                magnitude_db: vec![],
+                phase_deg: vec![],
+                coherence: vec![],
+            };
             for f in points {
                 let g = plan.plant.response(f, output, input);
                 let disturbance = 0.02 * plan.noise * (f / 50.0).sqrt();

@@ -1,6 +1,5 @@
 //! What a MATLAB or NumPy file holds, and records from it.
 
-mod model;
 mod path;
 
 use super::csv::assemble;

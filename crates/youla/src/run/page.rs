@@ -166,7 +166,7 @@ fn verification(found: &Identification, k: usize, record: &LoopRecord) -> Result
     let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
     let prediction = match found.settings.verification.prediction {
         Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
-        Prediction::ClosedLoop => "simulated under the controller from the known excitations alone",
+        Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
     };
     let outputs = (0..record.y.ncols())
         .map(|output| {

@@ -134,7 +134,7 @@ fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &
                 input: record.input_excitation.as_ref().map(|v| v.as_ref()),
                 reference: record.reference.as_ref().map(|r| r.as_ref()),
             };
-            predict_closed_loop(model, &found.factorisation.controller, excitation, record.samples())
+            predict_closed_loop(model, &found.factorisation.controller, excitation, record.y.as_ref())
         }
     };
     let skip = found.settings.verification.skip;

@@ -31,8 +31,9 @@ pub fn predict_open_loop(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: Ma
     simulate(model, u, &x0)
 }
 
-/// Simulates a model under its controller (`u = K y`, positive feedback) from the known excitations alone, from rest. The
-/// measured signals are not used, so that neither noise nor drift of an integrating or unstable plant enters.
+/// Simulates a model under its controller (`u = K y`, positive feedback) from the known excitations alone. Of the measured
+/// output only the initial state of the loop is taken (least squares, as in [`predict_open_loop`]), so that neither noise
+/// nor drift of an integrating or unstable plant enters.
 ///
 /// # Errors
 /// Ports, sample times, [`crate::Error::Diverged`] when the controller does not stabilise the model.
@@ -40,17 +41,17 @@ pub fn predict_closed_loop(
     model: &StateSpace<Discrete>,
     controller: &StateSpace<Discrete>,
     excitation: LoopExcitation<'_>,
-    samples: usize,
+    y: MatRef<'_, f64>,
 ) -> Result<Mat<f64>> {
-    let (m, p) = (model.inputs(), model.outputs());
+    let (samples, m, p) = (y.nrows(), model.inputs(), model.outputs());
     let v1 = excitation.input.map_or_else(|| Mat::zeros(samples, m), |v| v.to_owned());
     let r = excitation.reference.map_or_else(|| Mat::zeros(samples, p), |r| r.to_owned());
     check_shape("the excitation at the plant input", v1.as_ref(), (samples, m))?;
     check_shape("the reference", r.as_ref(), (samples, p))?;
     let closed = closed_loop(model, &with_input_port(controller)?)?;
     let from_outside = block(&[&[v1.as_ref(), (Scale(-1.0) * &r).as_ref()]]);
-    let z = simulate(&closed, from_outside.as_ref(), &vec![0.0; closed.order()])?;
-    Ok(z.subcols(m, p) + r)
+    let to_output = closed.part(m..m + p, 0..m + p);
+    Ok(predict_open_loop(&to_output, from_outside.as_ref(), (y - &r).as_ref())? + r)
 }
 
 /// Least-squares initial state of the free response `C A^k x0`. Samples after the response has decayed to 1e-9 of its

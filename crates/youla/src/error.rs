@@ -529,13 +529,15 @@ impl std::fmt::Display for Pole {
     }
 }
 
-/// Prints a list of names, the first forty of them.
+/// Prints a list of names, the first forty of them, each up to eighty characters.
 struct Names<'a>(&'a [String]);
 
 impl std::fmt::Display for Names<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         const SHOWN: usize = 40;
-        f.write_str(&self.0[..self.0.len().min(SHOWN)].join(", "))?;
+        for (k, name) in self.0.iter().take(SHOWN).enumerate() {
+            write!(f, "{}{name:.80}", if k == 0 { "" } else { ", " })?;
+        }
         match self.0.len() {
             0 => f.write_str("nothing"),
             n if n > SHOWN => write!(f, " and {} more", n - SHOWN),

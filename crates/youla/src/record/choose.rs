@@ -90,10 +90,15 @@ impl fmt::Display for ChannelRef {
 
 /// The error for a name that does not exist, with the most similar one that does.
 pub(super) fn unknown(what: &str, name: &str, known: Vec<String>) -> Error {
-    let similarity =
-        |candidate: &&String| strsim::normalized_damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
-    let nearest = known.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-    let nearest = nearest.filter(|candidate| similarity(candidate) >= 0.5).cloned();
+    const LEAST: f64 = 0.5;
+    let similarity = |candidate: &String| {
+        // Names that differ this much in length are not compared, which would take time and memory by their product.
+        let comparable = candidate.len() <= 2 * name.len() && name.len() <= 2 * candidate.len();
+        let compare = || strsim::normalized_damerau_levenshtein(&candidate.to_lowercase(), &name.to_lowercase());
+        if comparable { compare() } else { 0.0 }
+    };
+    let ranked = known.iter().map(|candidate| (similarity(candidate), candidate));
+    let nearest = ranked.filter(|(s, _)| *s >= LEAST).max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, n)| n.clone());
     Error::UnknownChannel { what: what.to_owned(), name: name.to_owned(), known, nearest }
 }
 

@@ -61,7 +61,7 @@ pub struct CsvOptions {
 /// Reads `channels`, or all columns but the time where `channels` is empty.
 ///
 /// # Errors
-/// [`Error::MissingFile`], [`Error::Io`], [`Error::Corrupt`] for a damaged gzip file, [`Error::NoData`],
+/// [`Error::MissingFile`], [`Error::Io`], [`Error::CorruptGzip`], [`Error::NoData`],
 /// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
 /// and those of the sample time: [`Error::SampleTimeMissing`], [`Error::NonUniformTime`],
 /// [`Error::SampleTimeMismatch`].
@@ -140,6 +140,9 @@ impl Plan {
         if specs.is_empty() {
             plan.columns = (0..names.len()).filter(|&j| Some(j) != clock).collect();
             plan.channels = plan.columns.iter().map(|&j| Channel::new(&names[j], "")).collect();
+        }
+        if plan.channels.is_empty() {
+            return Err(Error::NoData { path: path.to_owned(), problem: "there is no column besides the time" });
         }
         plan.columns.extend(clock);
         Ok(plan)

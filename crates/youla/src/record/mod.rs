@@ -1,4 +1,5 @@
 //! Measured and simulated records: labelled, clocked samples x channels; the files they come from; spectra and
+//! excitation signals.
 //!
 //! A record is read once, checked once and trusted afterwards: every number is finite, every channel has a name of its
 //! own, and the sample time is known. Nothing is repaired on the way: a gap, a NaN or an unequal length is an error that

@@ -97,11 +97,12 @@ pub fn cross_spectrum(y: MatRef<f64>, x: MatRef<f64>, time: Discrete, welch: &We
     Ok(CrossSpectrum { density: FrequencyResponse::new(joint.omega.clone(), values, p, m), segments: joint.segments })
 }
 
-/// Estimates the response from `u` to `y` with the excitation `d` that is injected into the loop, averaged over the segments
-/// of all records; no segment crosses from one record to the next.
+/// Estimates the response from `u` to `y` with the excitation `d` that is injected into the loop, averaged over the
+/// segments of all records; no segment crosses from one record to the next.
 ///
 /// # Errors
-/// Those of [`cross_spectrum`], [`Error::Ports`] without any record; [`Error::Singular`] with the first frequency at which `d` does not reach all inputs.
+/// Those of [`cross_spectrum`], [`Error::Ports`] without any record; [`Error::Singular`] with the first frequency at
+/// which `d` does not reach all inputs.
 ///
 /// ```
 /// use youla::{Mat, lti::Discrete, record::{ExcitedRecord, Welch, indirect_response}};

@@ -47,9 +47,10 @@ impl Lines {
         self.number
     }
 
-    /// The current line without blanks around it.
+    /// The current line without its end; a tab at its end may close an empty cell and stays.
     pub(super) fn current(&self) -> &[u8] {
-        self.line.trim_ascii()
+        let line = self.line.strip_suffix(b"\n").unwrap_or(&self.line);
+        line.strip_suffix(b"\r").unwrap_or(line)
     }
 
     /// Hands out the current line once more at the next [`Lines::advance`].
@@ -72,7 +73,7 @@ impl Lines {
             if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
                 self.line.drain(..3);
             }
-            if !matches!(self.current().first(), None | Some(b'#' | b'%')) {
+            if !matches!(self.line.trim_ascii_start().first(), None | Some(b'#' | b'%')) {
                 return Ok(true);
             }
         }

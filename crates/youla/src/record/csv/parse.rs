@@ -119,7 +119,7 @@ impl<'a> Selection<'a> {
 /// tab may stand at the end of the line.
 fn detect_delimiter(lines: &Lines) -> Result<Option<u8>> {
     const CANDIDATES: [(u8, &str); 3] = [(b',', "a comma"), (b';', "a semicolon"), (b'\t', "a tab")];
-    let line = lines.current();
+    let line = lines.current().trim_ascii();
     let found: Vec<_> = CANDIDATES.iter().filter(|(delimiter, _)| line.contains(delimiter)).collect();
     match found[..] {
         [] => Ok(None),

@@ -1,6 +1,7 @@
 use super::*;
 use crate::lti::Discrete;
 use crate::record::scratch::{data_folder, scratch};
+use proptest::prelude::*;
 use std::io::Write;
 
 fn read(text: &[u8], channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
@@ -49,9 +50,11 @@ fn errors_say_where() {
         ("", "the file is empty (0 bytes)"),
         ("a,a\n1,2\n", "more than one channel named \"a\""),
         ("1,5;2,5\n", "line 1: the delimiter is not clear, the line holds a comma and a semicolon"),
+        ("t\n1\n", "there is no column besides the time"),
         ("a,2\n1,2\n", "line 1, column #1: \"a\""),
     ] {
-        let message = read(text.as_bytes(), &[], &second()).unwrap_err().to_string();
+        let time = if text.starts_with('t') { TimeSource::column("t".parse().unwrap()) } else { second() };
+        let message = read(text.as_bytes(), &[], &time).unwrap_err().to_string();
         assert!(message.contains(part), "{text:?}: {message}");
     }
     let error = read_csv("no/such/file.csv", &[], &second(), &CsvOptions::default()).unwrap_err();
@@ -63,6 +66,8 @@ fn errors_say_where() {
 #[test]
 fn unchosen_columns_may_hold_text() {
     let record = read(b"a,note\n1,x\n2,\n", &[ChannelSpec::named("a")], &second()).unwrap();
+    assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
+    let record = read(b"note x\ta\tmore\nx\t1\ty\n\t2\t\n", &[ChannelSpec::named("a")], &second()).unwrap();
     assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
 }
 
@@ -127,4 +132,21 @@ fn the_real_text_files_load() {
     let record = read_csv(qube, &[], &TimeSource::column("t".parse().unwrap()), &CsvOptions::default()).unwrap();
     assert_eq!((record.samples(), record.channels().len(), record.time().ts()), (10000, 8, 0.002));
     assert_eq!(record.column("control_output").unwrap()[0], -11.799938031611969);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    /// Whatever the bytes, the outcome is a record of finite numbers or an error that names the file.
+    #[test]
+    fn any_text_is_a_record_or_an_error(text in "[ab12.,;\\t \"\r\n#e\\-]{0,60}", by_column in any::<bool>(), raw in any::<[u8; 3]>()) {
+        let mut bytes = text.into_bytes();
+        if raw[0] < 32 {
+            bytes.extend(raw);
+        }
+        let time = if by_column { TimeSource::column(ChannelRef::Column(1)) } else { second() };
+        if let Err(error) = read(&bytes, &[], &time) {
+            prop_assert!(error.to_string().contains(".csv") || matches!(error, Error::OutOfRange { .. }), "{}", error);
+        }
+    }
 }

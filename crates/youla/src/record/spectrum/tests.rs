@@ -11,6 +11,10 @@ fn noise(samples: usize, channels: usize, seed: u64) -> Mat<f64> {
     Mat::from_fn(samples, channels, |_, _| StandardNormal.sample(&mut rng))
 }
 
+fn respond(d: &Mat<f64>, u: &Mat<f64>, y: &Mat<f64>, time: Discrete, welch: &Welch) -> Result<IndirectResponse> {
+    indirect_response(&[ExcitedRecord { d: d.as_ref(), u: u.as_ref(), y: y.as_ref() }], time, welch)
+}
+
 #[test]
 fn a_sine_has_its_power() {
     let (ts, amplitude) = (0.01, 3.0);
@@ -38,7 +42,7 @@ fn two_channels_in_a_noisy_loop() {
     let y = &x + &v;
     let u = &y * faer::Scale(gain) + &d;
     let welch = Welch { window: 128, ..Welch::default() };
-    let found = indirect_response(d.as_ref(), u.as_ref(), y.as_ref(), time, &welch).unwrap();
+    let found = respond(&d, &u, &y, time, &welch).unwrap();
     let exact = frequency_response(&plant, &found.response.omega).unwrap();
     let worst = |estimate: &FrequencyResponse| {
         let errors = estimate.iter().zip(exact.iter()).skip(1).map(|(e, g)| (e - g).norm_l2() / g.norm_l2());
@@ -46,7 +50,7 @@ fn two_channels_in_a_noisy_loop() {
     };
     assert!(worst(&found.response) < 0.2, "{}", worst(&found.response));
     // The direct quotient is biased by the noise that the loop feeds back.
-    let direct = indirect_response(u.as_ref(), u.as_ref(), y.as_ref(), time, &welch).unwrap();
+    let direct = respond(&u, &u, &y, time, &welch).unwrap();
     assert!(worst(&direct.response) > 0.6, "{}", worst(&direct.response));
 }
 
@@ -56,13 +60,31 @@ fn coherence_of_half_noise_is_a_half() {
     let (d, v) = (noise(1 << 16, 1, 3), noise(1 << 16, 1, 4));
     let y = &d + &v;
     let welch = Welch { window: 64, ..Welch::default() };
-    let found = indirect_response(d.as_ref(), d.as_ref(), y.as_ref(), time, &welch).unwrap();
+    let found = respond(&d, &d, &y, time, &welch).unwrap();
     let mean = found.coherence_y.col(0).iter().sum::<f64>() / found.coherence_y.nrows() as f64;
     assert!((mean - 0.5).abs() < 0.01, "{mean}");
     assert!(found.coherence_u.col(0).iter().all(|c| (c - 1.0).abs() < 1e-12));
     let still = Mat::zeros(1 << 16, 1);
-    let error = indirect_response(still.as_ref(), d.as_ref(), y.as_ref(), time, &welch).unwrap_err();
+    let error = respond(&still, &d, &y, time, &welch).unwrap_err();
     assert!(matches!(error, Error::Singular { .. }), "{error}");
+}
+
+/// Without overlap the segments of two records are those of the two halves of one.
+#[test]
+fn records_are_averaged_without_crossing_their_ends() {
+    let time = Discrete::new(1.0).unwrap();
+    let (d, v) = (noise(4096, 1, 6), noise(4096, 1, 7));
+    let y = &d * faer::Scale(2.0) + &v;
+    let welch = Welch { window: 128, overlap: 0.0, ..Welch::default() };
+    let part = |first| {
+        let [d, y] = [&d, &y].map(|z| z.as_ref().subrows(first, 2048));
+        ExcitedRecord { d, u: d, y }
+    };
+    let whole = respond(&d, &d, &y, time, &welch).unwrap();
+    let halves = indirect_response(&[part(0), part(2048)], time, &welch).unwrap();
+    assert_eq!(halves.segments, whole.segments);
+    assert_eq!(halves.response.entry(0, 0), whole.response.entry(0, 0));
+    assert!(indirect_response(&[], time, &welch).is_err());
 }
 
 #[test]
@@ -87,7 +109,7 @@ fn the_flexible_drive_resonates_where_it_should() {
     let record = file.record(&channels, &TimeSource::ts(5e-4)).unwrap();
     let [d, u, y] = ["d", "u", "y"].map(|n| record.matrix(&[n]).unwrap());
     let welch = Welch { window: 4000, ..Welch::default() };
-    let found = indirect_response(d.as_ref(), u.as_ref(), y.as_ref(), record.time(), &welch).unwrap();
+    let found = respond(&d, &u, &y, record.time(), &welch).unwrap();
     let curve: Vec<(f64, f64)> =
         found.response.omega.iter().map(|w| w / TAU).zip(found.response.entry(0, 0).iter().map(|g| g.norm())).collect();
     let between = |lo: f64, hi: f64| curve.iter().copied().filter(move |(f, _)| (lo..=hi).contains(f));

@@ -94,7 +94,9 @@ mod tests {
 
     #[test]
     fn extremes_ends_and_detail_survive_within_the_budget() {
-        for (samples, detail) in [(240_000, 100_000..101_200), (4001, 0..0), (9_999, 0..1_000), (50_000, 49_000..50_000)] {
+        for (samples, detail) in
+            [(240_000, 100_000..101_200), (4001, 0..0), (9_999, 0..1_000), (50_000, 49_000..50_000)]
+        {
             let mut values = record(samples);
             values[samples / 3] = 7.0;
             values[samples / 7 + 1] = -9.0;

@@ -15,8 +15,8 @@ pub(super) fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<
 
 /// Vectors to seven significant digits, more than any figure shows.
 pub(super) mod seven_digits {
-    use super::{Serializer, rounded};
     pub(in super::super) use super::deserialize;
+    use super::{Serializer, rounded};
 
     pub(in super::super) fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(values.iter().map(|&value| rounded(value, decimals(value))))
@@ -34,7 +34,8 @@ pub(super) fn decimals(value: f64, digits: i32) -> i32 {
 
 /// `value` to a number of decimal places, which is negative for tens, hundreds and so on.
 pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
-    let scaled = |power: f64| if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power };
+    let scaled =
+        |power: f64| if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power };
     let result = scaled(10f64.powi(decimals.abs()));
     if result.is_finite() { result } else { value }
 }

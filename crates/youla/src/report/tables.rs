@@ -88,7 +88,8 @@ mod tests {
     use super::*;
 
     fn data() -> ReportData {
-        let fit = |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
+        let fit =
+            |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
         let mode = |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1 };
         ReportData {
             methods: vec![Method::nominal(), Method::direct(), Method::hansen()],

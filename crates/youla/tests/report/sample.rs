@@ -109,6 +109,27 @@ pub fn flexible_drive() -> ReportData {
     data
 }
 
+/// Three inputs and three outputs with two verification records.
+pub fn three_by_three() -> ReportData {
+    let gain = |k: usize, i: usize, j: usize| if i == j { 3.0 } else { 0.4 * (k + i) as f64 - 0.5 };
+    let gains = |k: usize| -> Vec<Vec<f64>> { (0..3).map(|i| (0..3).map(|j| gain(k, i, j)).collect()).collect() };
+    let modes = [(31.0, 0.02), (52.0, 0.05), (90.0, 0.01)];
+    let channels = |name: &str, unit: &str| (1..=3).map(|k| Channel::new(format!("{name}{k}"), unit)).collect();
+    let mut data = report(&Plan {
+        plant: Modal { modes: modes.iter().enumerate().map(|(k, (hz, zeta))| (*hz, *zeta, gains(k))).collect() },
+        ts: 1e-3,
+        samples: 60_000,
+        records: vec!["run7", "run8"],
+        band: (2.0, 480.0),
+        outputs: channels("y", "mm"),
+        inputs: channels("u", "N"),
+        hold: 23,
+        noise: 0.3,
+    });
+    data.title = "Three by three".into();
+    data
+}
+
 fn report(plan: &Plan) -> ReportData {
     let (ts, outputs, inputs) = (plan.ts, plan.outputs.len(), plan.inputs.len());
     let models = [
@@ -159,8 +180,17 @@ fn report(plan: &Plan) -> ReportData {
             for (method, model) in &models {
                 let predicted = model.simulate(&u, output, ts);
                 let residual: Vec<f64> = y[output].iter().zip(&predicted).map(|(a, b)| a - b).collect();
-                data.fits.push(Fit { record: (*record).into(), output, method: method.key.clone(), fit: Some(fit(&y[output], &residual)) });
-                predictions.push(Prediction { method: method.key.clone(), predicted: trace(&predicted), residual: trace(&residual) });
+                data.fits.push(Fit {
+                    record: (*record).into(),
+                    output,
+                    method: method.key.clone(),
+                    fit: Some(fit(&y[output], &residual)),
+                });
+                predictions.push(Prediction {
+                    method: method.key.clone(),
+                    predicted: trace(&predicted),
+                    residual: trace(&residual),
+                });
             }
             compared.push(VerifiedOutput { output, measured: trace(&y[output]), predictions });
         }
@@ -287,7 +317,14 @@ fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: us
                 });
             }
             let points = grid(280);
-            let mut indirect = Indirect { output, input, hz: points.clone(), magnitude_db: vec![], phase_deg: vec![], coherence: vec![] };
+            let mut indirect = Indirect {
+                output,
+                input,
+                hz: points.clone(),
+                magnitude_db: vec![],
+                phase_deg: vec![],
+                coherence: vec![],
+            };
             for f in points {
                 let g = plan.plant.response(f, output, input);
                 let disturbance = 0.02 * plan.noise * (f / 50.0).sqrt();

@@ -4,7 +4,7 @@
 //   label,                                   what the figure shows, for those who cannot see it
 //   x: { label, unit, log },
 //   panels: [{ label, unit, height, log, steps, limits, curves: [{ id, x, y, style, opacity, chosen }] }],
-//   legend: [{ id, name, style, hidden }],
+//   legend: [{ id, name, style }],
 //   shades: [[from, to]],                    bands of the common axis that are shaded
 //   detail: [from, to],                      window in which every sample is drawn, shaded until it fills the view
 //   view: [from, to],                        what is shown first; all where it is absent
@@ -32,13 +32,12 @@ function stack(host, spec) {
   root.append(where);
   host.replaceChildren(...(spec.legend.length ? [legend, root] : [root]));
   legend.style.setProperty("--entry", spec.panels.some(panel => panel.curves.length > 1) ? "208px" : "158px");
-  const hidden = new Set(spec.legend.filter(entry => entry.hidden).map(entry => entry.id));
+  const hidden = new Set();
   const width = () => Math.max(240, root.clientWidth);
   let linking = false, lastX = null;
 
   const plots = spec.panels.map((panel, k) => new uPlot(
     options(panel, k === spec.panels.length - 1), table(panel.curves, xMin, xMax), root));
-  for (const id of hidden) values.get(id)?.button.setAttribute("aria-pressed", "false");
   zoom(...(spec.view ?? [xMin, xMax]));
   const observer = new ResizeObserver(() => {
     plots.forEach(plot => { if (Math.abs(plot.width - width()) > 1) plot.setSize({ width: width(), height: plot.height }); });
@@ -71,7 +70,7 @@ function stack(host, spec) {
           values: (u, splits) => tickLabels(splits), ...logarithmic(panel.log), ...(panel.steps ? { incrs: panel.steps } : {}) },
       ],
       series: [{}, ...panel.curves.map(curve => ({
-        label: curve.id, show: !hidden.has(curve.id), stroke: colour(curve.style.colour), width: curve.style.width,
+        label: curve.id, stroke: colour(curve.style.colour), width: curve.style.width,
         dash: curve.style.dash, alpha: curve.style.points ? 0.45 : 1, points: { show: false },
         ...(curve.chosen === undefined ? {} : { paths: () => null }),
       }))],

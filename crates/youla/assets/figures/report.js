@@ -113,8 +113,8 @@ function verification(host) {
       label: `Measured and predicted ${channel.name} of ${record.record}, and the residuals beneath. The fits are in the table of fits.`,
       x: { label: "Time", unit: "s" }, detail: detailOf(clock), view: detailOf(clock),
       legend: [{ id: "measured", name: "measured", style: MEASURED }, ...predictions.map(p => {
-        const { label, style, role } = methodOf(p.method);
-        return { id: p.method, name: label + fitOf(p.method, output), style, hidden: role === "nominal" && predictions.length > 1 };
+        const { label, style } = methodOf(p.method);
+        return { id: p.method, name: label + fitOf(p.method, output), style };
       })],
       panels: [
         { label: channel.name, unit: channel.unit, height: 280, limits: [low - 0.6 * room, high + 0.6 * room],

@@ -50,6 +50,7 @@ function poleMap(host, sets, sampleTime) {
       <defs><clipPath id="pole-frame"><rect x="${frame.x}" y="${frame.y}" width="${frame.w}" height="${frame.h}"/></clipPath></defs>
       <g clip-path="url(#pole-frame)">${grid()}${marks}<rect class="selection" fill="var(--link)" fill-opacity=".15" width="0" height="0"/></g>
       <rect x="${frame.x}" y="${frame.y}" width="${frame.w}" height="${frame.h}" fill="none" stroke="var(--soft)"/>${ticks()}</svg>`;
+    tip.hidden = true;
     map.append(tip);
   }
 
@@ -135,6 +136,7 @@ function poleMap(host, sets, sampleTime) {
   }
 
   function hover(event) {
+    if (event.buttons) { tip.hidden = true; return; }
     const [x, y] = toMap(event);
     let nearest = null, distance = 14;
     for (const set of sets) {

@@ -4,8 +4,10 @@
 //   label,                                   what the figure shows, for those who cannot see it
 //   x: { label, unit, log },
 //   panels: [{ label, unit, height, log, steps, limits, curves: [{ id, x, y, style, opacity, chosen }] }],
-//   legend: [{ id, name, style, hidden }],
-//   shade: [from, to],                       window in which every sample is drawn
+//   legend: [{ id, name, style }],
+//   shades: [[from, to]],                    bands of the common axis that are shaded
+//   detail: [from, to],                      window in which every sample is drawn, shaded until it fills the view
+//   view: [from, to],                        what is shown first; all where it is absent
 // }
 
 const LEFT = 66, RIGHT = 14, FONT = 12;
@@ -25,18 +27,18 @@ function stack(host, spec) {
   const [xMin, xMax] = extent(spec);
   const values = new Map();
   const where = element("span", { class: "where" });
-  const legend = element("div", { class: "legend" }, where, ...spec.legend.map(entry => legendEntry(entry, values, toggle)));
+  const legend = element("div", { class: "legend" }, ...spec.legend.map(entry => legendEntry(entry, values, toggle)));
   const root = element("div", { class: "stack", tabindex: 0, role: "img", "aria-label": spec.label, onkeydown: pressed });
-  host.replaceChildren(legend, root);
-  legend.style.marginLeft = `${LEFT - 4}px`;
-  const hidden = new Set(spec.legend.filter(entry => entry.hidden).map(entry => entry.id));
+  root.append(where);
+  host.replaceChildren(...(spec.legend.length ? [legend, root] : [root]));
+  legend.style.setProperty("--entry", spec.panels.some(panel => panel.curves.length > 1) ? "208px" : "158px");
+  const hidden = new Set();
   const width = () => Math.max(240, root.clientWidth);
-  let linking = false;
+  let linking = false, lastX = null;
 
   const plots = spec.panels.map((panel, k) => new uPlot(
     options(panel, k === spec.panels.length - 1), table(panel.curves, xMin, xMax), root));
-  for (const id of hidden) values.get(id)?.button.setAttribute("aria-pressed", "false");
-  reset();
+  zoom(...(spec.view ?? [xMin, xMax]));
   const observer = new ResizeObserver(() => {
     plots.forEach(plot => { if (Math.abs(plot.width - width()) > 1) plot.setSize({ width: width(), height: plot.height }); });
   });
@@ -64,16 +66,16 @@ function stack(host, spec) {
         { ...axis, space: 64, size: last ? 26 : 4, label: last ? withUnit(spec.x.label, spec.x.unit) : null, labelSize: 20,
           values: (u, splits) => last ? tickLabels(splits) : splits.map(() => ""), ...logarithmic(spec.x.log),
           ...(spec.x.log && !last ? { values: (u, splits) => splits.map(() => "") } : {}), ...(spec.x.whole ? { incrs: [1, 2, 5, 10, 20, 50] } : {}) },
-        { ...axis, space: 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: withUnit(panel.label, panel.unit),
+        { ...axis, space: panel.height < 120 ? 18 : 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: withUnit(panel.label, panel.axisUnit ?? panel.unit),
           values: (u, splits) => tickLabels(splits), ...logarithmic(panel.log), ...(panel.steps ? { incrs: panel.steps } : {}) },
       ],
       series: [{}, ...panel.curves.map(curve => ({
-        label: curve.id, show: !hidden.has(curve.id), stroke: colour(curve.style.colour), width: curve.style.width,
+        label: curve.id, stroke: colour(curve.style.colour), width: curve.style.width,
         dash: curve.style.dash, alpha: curve.style.points ? 0.45 : 1, points: { show: false },
         ...(curve.chosen === undefined ? {} : { paths: () => null }),
       }))],
       hooks: {
-        drawClear: [u => spec.shade && shadeWindow(u, spec.shade)],
+        drawClear: [u => { spec.shades?.forEach(band => shade(u, band)); if (spec.detail && !fills(u, spec.detail)) shade(u, spec.detail); }],
         drawAxes: [u => frame(u, soft)],
         drawSeries: [(u, k) => {
           const curve = panel.curves[k - 1];
@@ -91,6 +93,13 @@ function stack(host, spec) {
     const { min, max } = source.scales.x;
     plots?.forEach(plot => { if (plot !== source && (plot.scales.x.min !== min || plot.scales.x.max !== max)) plot.setScale("x", { min, max }); });
     linking = false;
+    requestAnimationFrame(readAgain);
+  }
+
+  // The cursor stays where it is while the scale under it changes.
+  function readAgain() {
+    const { left, top } = plots?.[0]?.cursor ?? {};
+    if (left >= 0 && root.isConnected) plots.forEach(plot => plot.setCursor({ left, top }));
   }
 
   function zoom(min, max) {
@@ -105,9 +114,11 @@ function stack(host, spec) {
     plots.forEach((plot, k) => spec.panels[k].curves.forEach((curve, i) => {
       if (curve.id === id) plot.setSeries(i + 1, { show: !hidden.has(id) }, false);
     }));
+    tellWhere(lastX);
   }
 
   function tellWhere(x) {
+    lastX = x;
     where.textContent = x == null ? "" : `${spec.x.label} ${readOut(spec.x.whole ? Math.round(x) : x)} ${spec.x.unit}`;
     for (const [id, { value }] of values) {
       const parts = x == null || hidden.has(id) ? [] : spec.panels.map((panel, k) => read(panel, plots[k], id)).filter(Boolean);
@@ -119,7 +130,7 @@ function stack(host, spec) {
     const k = panel.curves.findIndex(curve => curve.id === id) + 1;
     const row = k > 0 ? plot.cursor.idxs?.[k] : null;
     if (row == null) return "";
-    return (panel.short ? panel.short + " " : "") + readOut(plot.data[k][row]) + (panel.unit ? "\u00a0" + prettyUnit(panel.unit) : "");
+    return (panel.short ? panel.short + " " : "") + readOut(plot.data[k][row]) + (panel.unit === "deg" ? "°" : panel.unit ? "\u00a0" + prettyUnit(panel.unit) : "");
   }
 
   function pressed(event) {
@@ -201,11 +212,12 @@ function logLabels(splits) {
   if (splits.length < 2) return splits.map(readOut);
   const decades = Math.log10(splits[splits.length - 1] / splits[0]);
   if (decades < 0.7) return tickLabels(splits);
+  const plain = splits[0] >= 1e-2 * (1 - 1e-9) && splits[splits.length - 1] < 1e5;
   const shown = decades > 2.2 ? [1] : decades > 1.2 ? [1, 2, 5] : [1, 2, 3, 5, 7];
   return splits.map(v => {
     const exponent = Math.floor(Math.log10(v) + 1e-9), mantissa = Math.round(v / 10 ** exponent);
     if (!shown.includes(mantissa)) return "";
-    if (exponent >= -2 && exponent <= 4) return String(Number((mantissa * 10 ** exponent).toPrecision(3)));
+    if (plain) return String(Number((mantissa * 10 ** exponent).toPrecision(3)));
     return (mantissa === 1 ? "" : mantissa + "×") + "10" + superscript(exponent);
   });
 }
@@ -215,7 +227,9 @@ function niceStep(rough) {
   return (mantissa < 1.5 ? 1 : mantissa < 3.5 ? 2 : mantissa < 7.5 ? 5 : 10) * power;
 }
 
-function shadeWindow(u, [from, to]) {
+const fills = (u, [from, to]) => from <= u.scales.x.min && to >= u.scales.x.max;
+
+function shade(u, [from, to]) {
   const { left, top, width, height } = u.bbox;
   const a = Math.max(left, u.valToPos(from, "x", true)), b = Math.min(left + width, u.valToPos(to, "x", true));
   if (b <= a) return;
@@ -282,6 +296,7 @@ function stems(u, curve) {
     ctx.lineTo(end, top + height);
     ctx.stroke();
     ctx.font = `${FONT * ratio}px ${colour("--sans")}`;
+    ctx.textAlign = "left";
     ctx.fillText(`order ${curve.chosen}`, end + 6 * ratio, top + 16 * ratio);
   });
 }

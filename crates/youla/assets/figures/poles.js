@@ -50,6 +50,7 @@ function poleMap(host, sets, sampleTime) {
       <defs><clipPath id="pole-frame"><rect x="${frame.x}" y="${frame.y}" width="${frame.w}" height="${frame.h}"/></clipPath></defs>
       <g clip-path="url(#pole-frame)">${grid()}${marks}<rect class="selection" fill="var(--link)" fill-opacity=".15" width="0" height="0"/></g>
       <rect x="${frame.x}" y="${frame.y}" width="${frame.w}" height="${frame.h}" fill="none" stroke="var(--soft)"/>${ticks()}</svg>`;
+    tip.hidden = true;
     map.append(tip);
   }
 
@@ -135,6 +136,7 @@ function poleMap(host, sets, sampleTime) {
   }
 
   function hover(event) {
+    if (event.buttons) { tip.hidden = true; return; }
     const [x, y] = toMap(event);
     let nearest = null, distance = 14;
     for (const set of sets) {
@@ -198,6 +200,12 @@ function widened([x0, x1], [y0, y1], aspect) {
   return { x0: cx - w / 2, x1: cx + w / 2, y0: cy - h / 2, y1: cy + h / 2 };
 }
 
+// The same view moved such that little more than room for labels is right of x.
+function leftOf(view, x) {
+  const shift = x + 0.25 * (view.x1 - view.x0) - view.x1;
+  return shift < 0 ? { ...view, x0: view.x0 + shift, x1: view.x1 + shift } : view;
+}
+
 function poleViews(sets, discrete, aspect) {
   const all = sets.flatMap(set => set.poles);
   const around = (poles, pad) => {
@@ -212,5 +220,7 @@ function poleViews(sets, discrete, aspect) {
   const reach = Math.max(1.12, 1.05 * Math.max(...all.map(p => Math.hypot(...p))));
   const whole = { name: "unit circle", view: widened([-reach, reach], [-reach, reach], aspect) };
   const near = all.filter(([re, im]) => im >= 0 && Math.hypot(re, im) > 0.9);
-  return near.length ? [whole, { name: "near the unit circle", view: around(near, 0.2) }] : [whole];
+  if (!near.length) return [whole];
+  const close = { name: "near the unit circle", view: leftOf(around(near, 0.2), Math.max(...near.map(p => p[0]))) };
+  return close.view.x1 - close.view.x0 < reach ? [close, whole] : [whole, close];
 }

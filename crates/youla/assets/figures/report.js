@@ -5,9 +5,6 @@ const FADED = 0.6; // Coherence below which a point of the indirect response is 
 for (const node of document.querySelectorAll("[data-method]")) node.style.setProperty("--c", `var(${methodOf(node.dataset.method).style.colour})`);
 for (const node of document.querySelectorAll("[data-swatch]")) node.innerHTML = swatch(methodOf(node.dataset.swatch).style);
 
-const BUILDERS = { data, signals, order, verification, frequency, poles, reduction };
-for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dataset.figure](host);
-
 // Rows of a trace as seconds.
 function seconds(trace, clock) {
   let row = 0;
@@ -17,28 +14,27 @@ function seconds(trace, clock) {
 const detailOf = clock => clock.detail.end > clock.detail.start ? [clock.detail.start, clock.detail.end - 1].map(k => k * clock.sample_time) : null;
 
 function statement(clock) {
-  const length = `${grouped(clock.samples)} samples (${readOut(clock.samples * clock.sample_time)} s)`;
+  const length = `${grouped(clock.samples)} samples (${inProse(clock.samples * clock.sample_time)} s)`;
   if (clock.bucket === 1) return `Every one of ${length} is drawn.`;
   const detail = detailOf(clock);
   return `${length}, drawn by minimum and maximum of every ${clock.bucket} samples` +
-    (detail ? `; in the shaded window, ${readOut(detail[0])} s to ${readOut(detail[1])} s, every sample is drawn.` : ".");
+    (detail ? `; in the shaded detail window, ${inProse(detail[0])} s to ${inProse(detail[1])} s, every sample is drawn.` : ".");
 }
 
 // Figures over time: choices above, a stack, and how much of the record is drawn.
 function timeFigure(host, choices, clockNow, specNow, sentence) {
   const controls = element("div", { class: "controls" });
   const plotHost = element("div"), caption = element("p", { class: "caption" });
+  host.replaceChildren(controls, plotHost, caption);
   const figure = mount(plotHost, () => stack(plotHost, specNow()));
-  const redraw = () => { figure.draw(); tell(); };
   const whole = element("button", { type: "button", class: "action", onclick: () => figure.plot.reset() }, "Whole record");
-  const detail = element("button", { type: "button", class: "action", onclick: () => figure.plot.zoom(...detailOf(clockNow())) }, "Every sample");
+  const detail = element("button", { type: "button", class: "action", onclick: () => figure.plot.zoom(...detailOf(clockNow())) }, "Detail window");
   const tell = () => {
     caption.textContent = `${sentence()} ${statement(clockNow())}`;
     whole.hidden = detail.hidden = !detailOf(clockNow());
   };
-  controls.append(...choices.filter(c => c.options.length > 1).map(c => chooser(c.label, c.options, k => { c.changed(k); redraw(); })), whole, detail);
-  host.replaceChildren(controls, plotHost, caption);
-  redraw();
+  controls.append(...choices.filter(c => c.options.length > 1).map(c => chooser(c.label, c.options, k => { c.changed(k); figure.draw(); tell(); })), whole, detail);
+  tell();
 }
 
 function signalFigure(host, kinds, names, sentence) {
@@ -52,9 +48,9 @@ function signalFigure(host, kinds, names, sentence) {
       const style = { colour: "--measured", dash: [], width: 1 };
       return {
         label: `${sentence} Signals: ${shown.map(s => channelLabel(s.channel)).join(", ")}.`,
-        x: { label: "Time", unit: "s" }, shade: detailOf(now.clock), legend: shown.map((s, k) => ({ id: String(k), name: `${s.channel.name}, ${names[s.kind]}`, style: signalStyle(s.kind, style) })),
+        x: { label: "Time", unit: "s" }, detail: detailOf(now.clock), legend: shown.map((s, k) => ({ id: String(k), name: `${prettyName(s.channel.name)}, ${names[s.kind]}`, style: signalStyle(s.kind, style) })),
         panels: shown.map((s, k) => ({
-          label: s.channel.name, unit: s.channel.unit, height: shown.length > 4 ? 92 : 128,
+          label: prettyName(s.channel.name), unit: s.channel.unit, height: shown.length > 4 ? 92 : 128,
           curves: [{ id: String(k), x: seconds(s.trace, now.clock), y: s.trace.values, style: signalStyle(s.kind, style) }],
         })),
       };
@@ -81,7 +77,7 @@ function order(host) {
 
 function reduction(host) {
   const { hankel, chosen, bound, label } = report.reduction;
-  const said = bound == null ? "" : ` The error is at most ${readOut(bound)} in the H∞ norm, twice the sum of the values left out or the bound of the method.`;
+  const said = bound == null ? "" : ` The error is at most ${inProse(bound)} in the H∞ norm.`;
   stemFigure(host, label, { ...methodOf("hansen_reduced").style, dash: [] }, hankel, chosen, "Hankel singular value", `Hankel singular values (${label}). ${chosen} of ${hankel.length} states are kept.${said}`);
 }
 
@@ -101,7 +97,10 @@ function verification(host) {
   const outputs = record.outputs.map(o => o.output);
   const name = k => report.outputs[k]?.name ?? `output ${k + 1}`;
   const entry = () => record.outputs.find(o => o.output === outputs[place]) ?? record.outputs[0];
-  const fitOf = (method, output) => report.fits.find(f => f.record === record.record && f.output === output && f.method === method)?.fit;
+  const fitOf = (method, output) => {
+    const found = report.fits.find(f => f.record === record.record && f.output === output && f.method === method);
+    return !found ? "" : found.fit == null ? ", diverged" : `, ${minus(found.fit.toFixed(1))} %`;
+  };
   timeFigure(host, [
     { label: "Record", options: records.map(r => r.record), changed: k => { record = records[k]; } },
     { label: "Output", options: outputs.map(name), changed: k => { place = k; } },
@@ -109,20 +108,20 @@ function verification(host) {
     const { output, measured, predictions } = entry(), clock = record.clock;
     const channel = report.outputs[output] ?? { name: name(output), unit: "" };
     const [low, high] = span(measured.values), room = high - low || 1;
-    const time = trace => seconds(trace, clock);
+    const time = trace => seconds(trace, clock), size = p => { const [a, b] = span(p.residual.values); return b - a; };
     return {
       label: `Measured and predicted ${channel.name} of ${record.record}, and the residuals beneath. The fits are in the table of fits.`,
-      x: { label: "Time", unit: "s" }, shade: detailOf(clock),
+      x: { label: "Time", unit: "s" }, detail: detailOf(clock), view: detailOf(clock),
       legend: [{ id: "measured", name: "measured", style: MEASURED }, ...predictions.map(p => {
-        const fit = fitOf(p.method, output), { label, style } = methodOf(p.method);
-        return { id: p.method, name: label + (fit == null ? "" : `, ${minus(fit.toFixed(1))} %`), style, hidden: methodOf(p.method).role === "nominal" && predictions.length > 1 };
+        const { label, style } = methodOf(p.method);
+        return { id: p.method, name: label + fitOf(p.method, output), style };
       })],
       panels: [
         { label: channel.name, unit: channel.unit, height: 280, limits: [low - 0.6 * room, high + 0.6 * room],
           curves: [{ id: "measured", x: time(measured), y: measured.values, style: MEASURED },
             ...predictions.map(p => ({ id: p.method, x: time(p.predicted), y: p.predicted.values, style: methodOf(p.method).style }))] },
-        { label: "residual", short: "residual", unit: channel.unit, height: 150, limits: [-room, room],
-          curves: predictions.map(p => ({ id: p.method, x: time(p.residual), y: p.residual.values, style: { ...methodOf(p.method).style, width: 1.1, dash: [] } })) },
+        { label: "residual e", short: "e", unit: channel.unit, height: 150, limits: [-room, room],
+          curves: [...predictions].sort((a, b) => size(b) - size(a)).map(p => ({ id: p.method, x: time(p.residual), y: p.residual.values, style: { ...methodOf(p.method).style, width: 1.1, dash: [] } })) },
       ],
     };
   }, () => {
@@ -152,8 +151,10 @@ function frequency(host) {
   const plotHost = element("div"), caption = element("p", { class: "caption" });
   const tell = () => {
     const some = indirect.some(same);
-    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. Where coherence is below ${FADED} the points say little.` : "");
+    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "");
   };
+  const controls = element("div", { class: "controls" });
+  host.append(controls, plotHost, caption);
   const figure = mount(plotHost, () => {
     const measured = indirect.filter(same), shown = models.filter(same);
     const opacity = m => m.coherence.map(c => c == null ? 0.1 : 0.08 + 0.92 * Math.min(1, Math.max(0, (c - 0.2) / 0.7)) ** 2);
@@ -165,24 +166,40 @@ function frequency(host) {
     const gain = units[0] && units[1] ? ` re ${prettyUnit(units[0])}/${prettyUnit(units[1])}` : "";
     return stack(plotHost, {
       label: `Bode diagram, ${title(pair)}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
-      x: { label: "Frequency", unit: "Hz", log: true },
+      x: { label: "Frequency", unit: "Hz", log: true }, shades: measured.flatMap(lowCoherence),
       legend: [...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
       panels: [
-        { label: "Magnitude", unit: "dB" , axisUnit: `dB${gain}`, height: 280, curves: curves("magnitude_db") },
+        { label: "Magnitude", unit: "dB", axisUnit: `dB${gain}`, height: 280, curves: curves("magnitude_db") },
         { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
-        ...(measured.length ? [{ label: "Coherence", short: "coherence", unit: "", height: 84, fixed: [0, 1.04], line: FADED,
+        ...(measured.length ? [{ label: "Coherence γ²", short: "γ²", unit: "", height: 84, fixed: [0, 1.04],
           curves: measured.map(m => ({ id: "indirect", x: m.hz, y: m.coherence, style: { ...INDIRECT, points: false, width: 1.2 } })) }] : []),
       ],
     });
   });
-  host.append(element("div", { class: "controls" }, pairs.length > 1 ? chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); tell(); }) : null), plotHost, caption);
-  figure.draw();
+  if (pairs.length > 1) controls.append(chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); tell(); }));
   tell();
+}
+
+// Bands of at least three neighbouring points of low coherence.
+function lowCoherence({ hz, coherence }) {
+  const bands = [];
+  for (let k = 0, start = 0; k <= hz.length; k++) {
+    if (k < hz.length && !(coherence[k] >= FADED)) continue;
+    if (k - start >= 3) bands.push([hz[start], hz[k - 1]]);
+    start = k + 1;
+  }
+  return bands;
 }
 
 function poles(host) {
   if (report.poles.some(set => set.poles.length)) poleMap(host, report.poles, report.sample_time);
 }
+
+// A line of the verdict leads nowhere where the run has no such part.
+for (const link of document.querySelectorAll(".evidence")) if (!document.querySelector(link.hash)) link.remove();
+
+const BUILDERS = { data, signals, order, verification, frequency, poles, reduction };
+for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dataset.figure](host);
 
 // Worst closed-loop poles of discrete loops are judged by their magnitude.
 if (report.sample_time != null) {

@@ -71,13 +71,18 @@ function readOut(value) {
   return minus(value.toFixed(places));
 }
 
+// The same in a sentence, without zeros at the end.
+const inProse = value => readOut(value).replace(/(\.\d*?)0+(?=$|×)/, "$1").replace(/\.(?=$|×)/, "");
+
 // Labels of an axis: as many decimals as the increment needs, a power of ten where numbers are very small or large.
 function tickLabels(splits) {
   const finite = splits.filter(v => v != null);
   const largest = Math.max(...finite.map(Math.abs));
   const step = finite.length > 1 ? Math.abs(finite[1] - finite[0]) : largest || 1;
   const exponent = largest > 0 && (largest < 1e-3 || largest >= 1e6) ? Math.floor(Math.log10(largest)) : 0;
-  const places = Math.max(0, Math.min(9, Math.ceil(-Math.log10(step / 10 ** exponent) - 1e-9)));
+  const unit = step / 10 ** exponent;
+  let places = 0;
+  while (places < 9 && Math.abs(unit * 10 ** places - Math.round(unit * 10 ** places)) > 1e-6 * unit * 10 ** places) places++;
   return splits.map(v => {
     if (v == null) return "";
     const text = minus((Math.abs(v) < step * 1e-6 ? 0 : v / 10 ** exponent).toFixed(places));
@@ -87,7 +92,9 @@ function tickLabels(splits) {
 
 const prettyUnit = unit => unit.replace(/^u(?=[A-Za-z])/, "µ").replace(/\bdeg\b/, "°");
 const withUnit = (name, unit) => unit ? `${name} (${prettyUnit(unit)})` : name;
-const channelLabel = channel => withUnit(channel.name, channel.unit);
+const GREEK = { alpha: "α", beta: "β", eta: "η", epsilon: "ε" };
+const prettyName = name => name.replace(/^(alpha|beta|eta|epsilon)(?=_|$)/, word => GREEK[word]);
+const channelLabel = channel => withUnit(prettyName(channel.name), channel.unit);
 
 function element(tag, attributes = {}, ...children) {
   const node = document.createElement(tag);

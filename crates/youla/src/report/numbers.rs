@@ -33,11 +33,15 @@ pub(super) fn decimals(value: f64, digits: i32) -> i32 {
 }
 
 /// `value` to a number of decimal places, which is negative for tens, hundreds and so on.
+///
+/// Powers of ten are exact up to 10^22, so that the quotient is the number nearest to the short decimal; values that would
+/// need a larger one stay as they are.
 pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
-    let scaled =
-        |power: f64| if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power };
-    let result = scaled(10f64.powi(decimals.abs()));
-    if result.is_finite() { result } else { value }
+    if decimals.abs() > 22 {
+        return value;
+    }
+    let power = 10f64.powi(decimals.abs());
+    if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power }
 }
 
 #[cfg(test)]

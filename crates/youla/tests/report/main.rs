@@ -57,6 +57,12 @@ fn several_inputs_and_outputs_are_all_inside() {
 }
 
 #[test]
+fn nine_pairs_stay_within_five_megabytes() {
+    let page = written("report-three-by-three", &sample::three_by_three());
+    assert!(page.len() < FIVE_MEGABYTES, "{} bytes", page.len());
+}
+
+#[test]
 fn the_page_asks_for_nothing() {
     let page = html(&sample::bearing()).unwrap();
     assert!(page.contains("default-src 'none'"));

@@ -66,7 +66,7 @@ struct Plan {
 }
 
 /// Two inputs and two outputs, like the gas bearing.
-pub fn bearing() -> ReportData {
+pub(crate) fn bearing() -> ReportData {
     let plant = Modal {
         modes: vec![
             (112.0, 0.028, vec![vec![6.0, 0.9], vec![0.7, 2.1]]),
@@ -91,7 +91,7 @@ pub fn bearing() -> ReportData {
 }
 
 /// One input and one output, 240 000 samples, two verification records.
-pub fn flexible_drive() -> ReportData {
+pub(crate) fn flexible_drive() -> ReportData {
     let plant = Modal { modes: vec![(0.8, 0.3, vec![vec![2.0]]), (54.6, 0.012, vec![vec![-0.03]])] };
     let mut data = report(&Plan {
         plant,
@@ -106,6 +106,27 @@ pub fn flexible_drive() -> ReportData {
     });
     data.title = "Flexible drive, fs2000".into();
     data.run = "flexible-drive".into();
+    data
+}
+
+/// Three inputs and three outputs with two verification records.
+pub(crate) fn three_by_three() -> ReportData {
+    let gain = |k: usize, i: usize, j: usize| if i == j { 3.0 } else { 0.4 * (k + i) as f64 - 0.5 };
+    let gains = |k: usize| -> Vec<Vec<f64>> { (0..3).map(|i| (0..3).map(|j| gain(k, i, j)).collect()).collect() };
+    let modes = [(31.0, 0.02), (52.0, 0.05), (90.0, 0.01)];
+    let channels = |name: &str, unit: &str| (1..=3).map(|k| Channel::new(format!("{name}{k}"), unit)).collect();
+    let mut data = report(&Plan {
+        plant: Modal { modes: modes.iter().enumerate().map(|(k, (hz, zeta))| (*hz, *zeta, gains(k))).collect() },
+        ts: 1e-3,
+        samples: 60_000,
+        records: vec!["run7", "run8"],
+        band: (2.0, 480.0),
+        outputs: channels("y", "mm"),
+        inputs: channels("u", "N"),
+        hold: 23,
+        noise: 0.3,
+    });
+    data.title = "Three by three".into();
     data
 }
 

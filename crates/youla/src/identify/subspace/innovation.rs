@@ -7,7 +7,7 @@
 //! (Van Overschee and De Moor, section 3.4). Where no stabilising solution exists this is said, and no gain is returned.
 
 use super::realisation::{OutputPair, StateSequences};
-use crate::linalg::{check_finite, eigenvalues, solve, solve_right};
+use crate::linalg::{block, check_finite, eigenvalues, solve, solve_right};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, Side, c64};
 
@@ -152,14 +152,21 @@ fn kalman(pair: &OutputPair, noise: &NoiseModel) -> Result<Gain> {
 /// The stabilising P by the structure-preserving doubling algorithm (Chu, Fan, Lin, Wang, Int. J. Control 77, 767, 2004).
 fn riccati(pair: &OutputPair, noise: &NoiseModel) -> Result<Mat<f64>> {
     let n = pair.a.nrows();
-    let whitened = solve("the output noise covariance", noise.r.as_ref(), block_row(&pair.c, &noise.s).as_ref())?;
+    let whitened = solve(
+        "the output noise covariance",
+        noise.r.as_ref(),
+        block(&[&[pair.c.as_ref(), noise.s.transpose()]]).as_ref(),
+    )?;
     let (rc, rs) = (whitened.as_ref().subcols(0, n), whitened.as_ref().subcols(n, n));
     let mut a = (&pair.a - &noise.s * rc).transpose().to_owned();
     let mut g = pair.c.transpose() * rc;
     let mut h = &noise.q - &noise.s * rs;
     for _ in 0..60 {
-        let w =
-            solve("the doubling step", (Mat::<f64>::identity(n, n) + &g * &h).as_ref(), block_row(&a, &g).as_ref())?;
+        let w = solve(
+            "the doubling step",
+            (Mat::<f64>::identity(n, n) + &g * &h).as_ref(),
+            block(&[&[a.as_ref(), g.as_ref()]]).as_ref(),
+        )?;
         let (wa, wg) = (w.as_ref().subcols(0, n), w.as_ref().subcols(n, n));
         let step = a.transpose() * &h * wa;
         g = &g + &a * wg * a.transpose();
@@ -171,9 +178,4 @@ fn riccati(pair: &OutputPair, noise: &NoiseModel) -> Result<Mat<f64>> {
         }
     }
     Err(Error::NoConvergence { what: "the Riccati equation of the innovations".into(), iterations: 60 })
-}
-
-/// `[C S']`.
-fn block_row(c: &Mat<f64>, s: &Mat<f64>) -> Mat<f64> {
-    crate::linalg::block(&[&[c.as_ref(), if c.nrows() == s.nrows() { s.as_ref() } else { s.transpose() }]])
 }

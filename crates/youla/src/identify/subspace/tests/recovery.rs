@@ -43,7 +43,8 @@ fn kalman_gain_of_an_innovation_model() {
     let rng = &mut ChaCha8Rng::seed_from_u64(6);
     let u = uniform(40_000, 1, rng);
     let e = 0.3 * uniform(40_000, 2, rng);
-    let gain = 0.3 * uniform(2, 2, rng);
+    // A - K C = 0.6 A, so that K is the gain of the innovation form.
+    let gain = 0.4 * system.c().transpose().partial_piv_lu().solve(system.a().transpose()).transpose();
     let y = respond(&system, &u, 0.0, Some((&gain, &e)));
     let found = subspace(&one(&u, &y), clock(), &fixed(2, 12)).unwrap();
     let (k, covariance) = (found.innovation.gain().unwrap(), found.innovation.covariance().unwrap());
@@ -145,7 +146,6 @@ fn canonical_correlations_do_not_depend_on_an_output_transformation() {
     for (a, b) in left.singular_values.iter().zip(&right.singular_values) {
         assert!((a - b).abs() < 1e-10 && *a < 1.0 + 1e-12);
     }
-    assert!((left.stability.worst - right.stability.worst).norm() < 1e-9);
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn noise_free_output_beside_a_noisy_one() {
     let y = respond(&system, &u, 0.0, Some((&Mat::zeros(4, 2), &e)));
     let found = subspace(&one(&u, &y), clock(), &fixed(4, 8)).unwrap();
     assert!(distance(&found.model, &system) < 0.02, "{}", distance(&found.model, &system));
-    assert!(found.fit.percent[0] > 99.99);
+    assert!(found.fit.percent[0] > 99.0);
 }
 
 #[test]

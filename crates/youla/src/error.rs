@@ -105,6 +105,60 @@ pub enum Error {
         /// The eigenvalue without a principal logarithm.
         pole: c64,
     },
+    /// A matrix that must be symmetric is not.
+    #[error(
+        "{what} is not symmetric: row {row}, column {column} holds {upper}, but row {column}, column {row} holds {lower}"
+    )]
+    NotSymmetric {
+        /// Which matrix.
+        what: String,
+        /// Row of the entry above the diagonal, counted from 1.
+        row: usize,
+        /// Column of the entry above the diagonal, counted from 1.
+        column: usize,
+        /// The entry above the diagonal.
+        upper: f64,
+        /// Its mirror image below the diagonal.
+        lower: f64,
+    },
+    /// A matrix that must be positive definite is not, or not clear of rounding.
+    #[error("{what} is not positive definite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}")]
+    NotPositiveDefinite {
+        /// Which matrix.
+        what: String,
+        /// Smallest eigenvalue after scaling to unit diagonal.
+        eigenvalue: f64,
+    },
+    /// A weight or covariance is indefinite.
+    #[error(
+        "{what} is not positive semidefinite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}"
+    )]
+    NotPositiveSemidefinite {
+        /// Which matrix.
+        what: String,
+        /// Smallest eigenvalue after scaling to unit diagonal.
+        eigenvalue: f64,
+    },
+    /// A mode that is not stable is out of reach of the inputs.
+    #[error("{what} has no solution: no input moves the mode {} (distance {distance:.1e})", Pole(*pole))]
+    NotStabilisable {
+        /// Which design.
+        what: String,
+        /// The mode (in z for discrete, in rad/s for continuous systems).
+        pole: c64,
+        /// Smallest singular value of `[A - p I, B]` in balanced coordinates.
+        distance: f64,
+    },
+    /// A mode on the stability boundary (for an observer: a mode that is not stable) does not show.
+    #[error("{what} has no solution: nothing that is weighted or measured shows the mode {} (distance {distance:.1e})", Pole(*pole))]
+    NotDetectable {
+        /// Which design.
+        what: String,
+        /// The mode (in z for discrete, in rad/s for continuous systems).
+        pole: c64,
+        /// Smallest singular value of `[A - p I; C]` in balanced coordinates.
+        distance: f64,
+    },
     // ---- lti and factor ----------------------------------------------------------------------------------------
 
     // ---- records and files -------------------------------------------------------------------------------------
@@ -163,6 +217,8 @@ impl Error {
             | Error::NoConvergence { .. }
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
+            | Error::NotStabilisable { .. }
+            | Error::NotDetectable { .. }
             | Error::NoLogarithm { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }

@@ -3,10 +3,27 @@
 //!
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
+mod balance;
+mod definite;
+mod francis;
+mod hessenberg;
+mod kronecker;
 mod least_squares;
+mod reflector;
+mod reorder;
+mod riccati;
+mod schur;
+mod sylvester;
 mod triangle;
 
+pub use balance::{Balanced, balance};
+pub(crate) use definite::check_semidefinite;
+pub use hessenberg::{Hessenberg, hessenberg};
 pub use least_squares::{LeastSquares, least_squares};
+pub use reorder::OrderedSchur;
+pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
+pub use schur::{RealSchur, real_schur};
+pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 pub use triangle::Triangle;
 pub(crate) use triangle::leading_rank;
 

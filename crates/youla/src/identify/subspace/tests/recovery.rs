@@ -34,6 +34,9 @@ fn automatic_order_is_the_true_one() {
         assert_eq!((found.order.order, found.order.rule), (4, OrderRule::Svc));
         assert!(distance(&found.model, &system) < 0.02);
         assert_eq!(found.model.d().norm_max(), 0.0);
+        // White noise at the outputs: the Kalman filter does not correct the states.
+        let correction = found.model.c() * found.innovation.gain().unwrap();
+        assert!(correction.norm_max() < 0.05, "{correction:?}");
     }
 }
 
@@ -106,6 +109,20 @@ fn unstable_system_is_recovered_where_allowed() {
     assert!(found.stability.moved.is_empty());
     assert!(distance(&found.model, &system) < 1e-6, "{:e}", distance(&found.model, &system));
     assert_eq!(found.fit.by, InputFit::Observer);
+}
+
+#[test]
+fn unstable_system_in_noise_is_fitted_by_its_predictor() {
+    let system = random_system(&[1.01, 0.9], 1, 1, false, 23);
+    let rng = &mut ChaCha8Rng::seed_from_u64(24);
+    let u = uniform(600, 1, rng);
+    let e = 0.1 * uniform(600, 1, rng);
+    let y = respond(&system, &u, 0.0, Some((&(0.1 * uniform(4, 1, rng)), &e)));
+    let options = SubspaceOptions { stability: Stability::Allow, ..fixed(4, 12) };
+    let found = subspace(&one(&u, &y), clock(), &options).unwrap();
+    assert_eq!(found.fit.by, InputFit::Prediction);
+    assert!((found.stability.worst.norm() - 1.01).abs() < 1e-3);
+    assert!(distance(&found.model, &system) < 0.05, "{}", distance(&found.model, &system));
 }
 
 #[test]

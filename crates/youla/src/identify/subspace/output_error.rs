@@ -8,7 +8,7 @@
 use super::channels::{Channels, Signals};
 use super::innovation::observer_gain;
 use super::realisation::OutputPair;
-use super::sensitivity::{Predictor, Sensitivity, Unknowns, predict};
+use super::sensitivity::{Observer, Predictor, Sensitivity, Unknowns};
 use super::stability::StabilityReport;
 use super::{Feedthrough, InitialState, SubspaceOptions};
 use crate::Result;
@@ -82,7 +82,10 @@ pub(super) fn fit(
         parts.iter().map(|part| part.initial_state(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
     let percent = fit_percent(data, &predictor, driven.as_ref(), d.as_ref(), &initial_states);
     let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
-    let b = driven + &predictor.k * &d;
+    let b = match &predictor.k {
+        Some(k) => driven + k * &d,
+        None => driven,
+    };
     Ok(Fitted { b, d, initial_states, quality })
 }
 
@@ -93,11 +96,13 @@ fn predictor(
     stability: &StabilityReport,
 ) -> Result<(Predictor, InputFit)> {
     let (k, by) = match kalman_gain {
-        _ if stability.stable => (Mat::zeros(pair.a.nrows(), pair.c.nrows()), InputFit::Simulation),
+        _ if stability.stable => {
+            return Ok((Predictor { a: pair.a.clone(), c: pair.c.clone(), k: None }, InputFit::Simulation));
+        }
         Some(gain) => (gain.to_owned(), InputFit::Prediction),
         None => (observer_gain(pair)?, InputFit::Observer),
     };
-    Ok((Predictor { a: &pair.a - &k * &pair.c, c: pair.c.clone(), k }, by))
+    Ok((Predictor { a: &pair.a - &k * &pair.c, c: pair.c.clone(), k: Some(k) }, by))
 }
 
 /// What one experiment says: the triangular factor over `[x0 | B D y]`, split behind the directions of x0.
@@ -158,8 +163,10 @@ fn fit_percent(
     initial_states: &[Vec<f64>],
 ) -> Vec<f64> {
     let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
-    let errors: Vec<Mat<f64>> =
-        pairs.par_iter().map(|(e, x0)| &e.y - predict(predictor, driven, d, x0, e.u.as_ref(), e.y.as_ref())).collect();
+    let errors: Vec<Mat<f64>> = pairs
+        .par_iter()
+        .map(|(e, x0)| &e.y - Observer::new(predictor, Some((driven, d)), x0).run(e.u.as_ref(), e.y.as_ref()))
+        .collect();
     let samples: usize = errors.iter().map(|e| e.nrows()).sum();
     (0..data.outputs)
         .map(|i| {

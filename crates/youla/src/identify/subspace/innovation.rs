@@ -7,9 +7,9 @@
 //! (Van Overschee and De Moor, section 3.4). Where no stabilising solution exists this is said, and no gain is returned.
 
 use super::realisation::{OutputPair, StateSequences};
-use crate::linalg::{check_finite, eigenvalues, solve, solve_right};
+use crate::linalg::{RiccatiProblem, dare};
 use crate::{Error, Result};
-use faer::{Mat, MatRef, Side, c64};
+use faer::{Mat, MatRef, Side};
 
 /// Residual powers below this share of the output power are rounding.
 const NOISE_FREE: f64 = 1e-20;
@@ -116,7 +116,7 @@ fn noise_model(states: &StateSequences<'_>, pair: &OutputPair) -> Result<Option<
     let (n, p, samples) = (pair.a.nrows(), pair.c.nrows(), states.columns as f64);
     let moments = |rows: MatRef<'_, f64>| {
         let gram = rows.transpose() * rows;
-        Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| gram[(i, j)] / samples)
+        Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| 0.5 * (gram[(i, j)] + gram[(j, i)]) / samples)
     };
     let all = moments(residuals.as_ref());
     let power = moments(states.target.as_ref().subcols(n, p));
@@ -129,51 +129,16 @@ fn noise_model(states: &StateSequences<'_>, pair: &OutputPair) -> Result<Option<
     Ok((least > NOISE_FREE).then_some(noise))
 }
 
-/// `K = (A P C' + S) Lambda^-1` with the stabilising P.
+/// The stabilising P by the dual regulator equation, and `Lambda = C P C' + R`.
 fn kalman(pair: &OutputPair, noise: &NoiseModel) -> Result<Gain> {
-    let (a, c) = (&pair.a, &pair.c);
-    let p = riccati(pair, noise)?;
-    let covariance = c * &p * c.transpose() + &noise.r;
-    let cross = a * &p * c.transpose() + &noise.s;
-    let gain = solve_right("the innovation covariance", covariance.as_ref(), cross.as_ref())?;
-    let next = a * &p * a.transpose() + &noise.q - &gain * cross.transpose();
-    let residual = (&next - &p).norm_l2() / p.norm_l2().max(noise.q.norm_l2()).max(f64::MIN_POSITIVE);
-    let predictor = a - &gain * c;
-    let poles = eigenvalues("the predictor", predictor.as_ref())?;
-    let worst = poles.iter().copied().fold(c64::new(0.0, 0.0), |w, z| if z.norm() > w.norm() { z } else { w });
-    if worst.norm() >= 1.0 || !(residual < 1e-6) {
-        let condition =
-            format!("no solution makes A - K C stable (its largest pole has magnitude {:.6})", worst.norm());
-        return Err(Error::NoSolution { what: "the Riccati equation of the innovations".into(), condition, residual });
-    }
-    Ok(Gain { gain, covariance, residual })
-}
-
-/// The stabilising P by the structure-preserving doubling algorithm (Chu, Fan, Lin, Wang, Int. J. Control 77, 767, 2004).
-fn riccati(pair: &OutputPair, noise: &NoiseModel) -> Result<Mat<f64>> {
-    let n = pair.a.nrows();
-    let whitened = solve("the output noise covariance", noise.r.as_ref(), block_row(&pair.c, &noise.s).as_ref())?;
-    let (rc, rs) = (whitened.as_ref().subcols(0, n), whitened.as_ref().subcols(n, n));
-    let mut a = (&pair.a - &noise.s * rc).transpose().to_owned();
-    let mut g = pair.c.transpose() * rc;
-    let mut h = &noise.q - &noise.s * rs;
-    for _ in 0..60 {
-        let w =
-            solve("the doubling step", (Mat::<f64>::identity(n, n) + &g * &h).as_ref(), block_row(&a, &g).as_ref())?;
-        let (wa, wg) = (w.as_ref().subcols(0, n), w.as_ref().subcols(n, n));
-        let step = a.transpose() * &h * wa;
-        g = &g + &a * wg * a.transpose();
-        a = &a * wa;
-        h = &h + &step;
-        check_finite("the solution of the Riccati equation", h.as_ref())?;
-        if step.norm_l2() <= 1e-15 * h.norm_l2() {
-            return Ok(Mat::from_fn(n, n, |i, j| 0.5 * (h[(i, j)] + h[(j, i)])));
-        }
-    }
-    Err(Error::NoConvergence { what: "the Riccati equation of the innovations".into(), iterations: 60 })
-}
-
-/// `[C S']`.
-fn block_row(c: &Mat<f64>, s: &Mat<f64>) -> Mat<f64> {
-    crate::linalg::block(&[&[c.as_ref(), if c.nrows() == s.nrows() { s.as_ref() } else { s.transpose() }]])
+    let problem = RiccatiProblem {
+        a: pair.a.transpose(),
+        b: pair.c.transpose(),
+        q: noise.q.as_ref(),
+        r: noise.r.as_ref(),
+        s: Some(noise.s.as_ref()),
+    };
+    let solution = dare("the innovations", &problem)?;
+    let covariance = &pair.c * &solution.x * pair.c.transpose() + &noise.r;
+    Ok(Gain { gain: solution.gain.transpose().to_owned(), covariance, residual: solution.relative_residual })
 }

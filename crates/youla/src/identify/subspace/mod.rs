@@ -93,8 +93,8 @@ pub enum Weight {
     Moesp,
     /// Robust N4SID: the same weights; A and C by regression of the state sequence on its past.
     N4sid,
-    /// Canonical variates: `W1` whitens the future outputs; A from the shift of the observability matrix. Does not depend
-    /// on the units of the outputs.
+    /// Canonical variates: `W1` whitens the future outputs, so that the singular values do not depend on the units of the
+    /// outputs; A from the shift of the observability matrix.
     Cva,
 }
 

@@ -8,11 +8,11 @@
 use super::channels::{Channels, Signals};
 use super::innovation::observer_gain;
 use super::realisation::OutputPair;
-use super::sensitivity::{Predictor, Sensitivity, Unknowns, predict};
+use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
 use super::stability::StabilityReport;
 use super::{Feedthrough, InitialState, SubspaceOptions};
 use crate::Result;
-use crate::linalg::{Triangle, leading_rank, least_squares};
+use crate::linalg::{Triangle, block, leading_rank, least_squares};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -71,7 +71,7 @@ pub(super) fn fit(
         initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
         feedthrough: options.feedthrough == Feedthrough::Estimated,
     };
-    let parts: Vec<Part> = data.experiments.par_iter().map(|e| condense(e, &predictor, unknowns)).collect();
+    let parts = condense(data, &predictor, unknowns);
     let common = unknowns.common();
     let mut whole = Triangle::new(common + 1, common + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
@@ -82,7 +82,10 @@ pub(super) fn fit(
         parts.iter().map(|part| part.initial_state(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
     let percent = fit_percent(data, &predictor, driven.as_ref(), d.as_ref(), &initial_states);
     let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
-    let b = driven + &predictor.k * &d;
+    let b = match &predictor.k {
+        Some(k) => driven + k * &d,
+        None => driven,
+    };
     Ok(Fitted { b, d, initial_states, quality })
 }
 
@@ -93,11 +96,13 @@ fn predictor(
     stability: &StabilityReport,
 ) -> Result<(Predictor, InputFit)> {
     let (k, by) = match kalman_gain {
-        _ if stability.stable => (Mat::zeros(pair.a.nrows(), pair.c.nrows()), InputFit::Simulation),
+        _ if stability.stable => {
+            return Ok((Predictor { a: pair.a.clone(), c: pair.c.clone(), k: None }, InputFit::Simulation));
+        }
         Some(gain) => (gain.to_owned(), InputFit::Prediction),
         None => (observer_gain(pair)?, InputFit::Observer),
     };
-    Ok((Predictor { a: &pair.a - &k * &pair.c, c: pair.c.clone(), k }, by))
+    Ok((Predictor { a: &pair.a - &k * &pair.c, c: pair.c.clone(), k: Some(k) }, by))
 }
 
 /// What one experiment says: the triangular factor over `[x0 | B D y]`, split behind the directions of x0.
@@ -107,19 +112,55 @@ struct Part {
     initial_rank: usize,
 }
 
-fn condense(signals: &Signals, predictor: &Predictor, unknowns: Unknowns) -> Part {
-    let Signals { u, y } = signals;
-    let p = unknowns.outputs;
+/// One triangular factor per output, joined for each experiment.
+fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
+    let targets: Vec<Mat<f64>> =
+        data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
+    let tasks: Vec<_> = (0..targets.len()).flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
+    let triangles: Vec<Triangle> = tasks
+        .par_iter()
+        .map(|&(e, i)| condense_output(&data.experiments[e].u, &targets[e], i, predictor, unknowns))
+        .collect();
+    triangles.chunks(unknowns.outputs).map(|outputs| join(outputs, unknowns)).collect()
+}
+
+/// The outputs without what they drive themselves through K.
+fn without_known_share(signals: &Signals, predictor: &Predictor) -> Mat<f64> {
+    let Some(k) = &predictor.k else { return signals.y.clone() };
+    let (n, p) = (k.nrows(), k.ncols());
+    let ak = block(&[&[predictor.a.as_ref(), k.as_ref()]]);
+    let c0 = block(&[&[predictor.c.as_ref(), Mat::zeros(p, p).as_ref()]]);
+    &signals.y - simulate(ak.as_ref(), c0.as_ref(), &vec![0.0; n], signals.y.as_ref())
+}
+
+fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predictor, unknowns: Unknowns) -> Triangle {
+    let target: Vec<f64> = targets.col(i).iter().copied().collect();
     let piece = PIECE.min(u.nrows());
-    let mut triangle = Triangle::new(unknowns.width(), piece * p);
-    let mut sensitivity = Sensitivity::new(predictor, unknowns);
+    let mut triangle = Triangle::new(unknowns.width_of_output(), piece);
+    let mut sensitivity = Sensitivity::new(predictor, i, unknowns);
     for start in (0..u.nrows()).step_by(piece) {
         let count = piece.min(u.nrows() - start);
-        let (u, y) = (u.as_ref().subrows(start, count), y.as_ref().subrows(start, count));
-        triangle.fold(count * p, |rows| sensitivity.fill(u, y, rows));
+        let (u, target) = (u.as_ref().subrows(start, count), &target[start..start + count]);
+        triangle.fold(count, |rows| sensitivity.fill(u, target, rows));
     }
-    let initial_rank = leading_rank(triangle.r(), unknowns.initial);
-    Part { r: triangle.r().to_owned(), initial: unknowns.initial, initial_rank }
+    triangle
+}
+
+/// Puts the outputs of one experiment below each other, each with its own row of D.
+fn join(outputs: &[Triangle], unknowns: Unknowns) -> Part {
+    let shared = unknowns.initial + unknowns.of_b();
+    let of_d = unknowns.of_d_row();
+    let mut whole = Triangle::new(unknowns.width(), unknowns.width_of_output());
+    for (i, output) in outputs.iter().enumerate() {
+        let r = output.r();
+        whole.fold(r.nrows(), |mut rows| {
+            rows.as_mut().subcols_mut(0, shared).copy_from(r.subcols(0, shared));
+            rows.as_mut().subcols_mut(shared + i * of_d, of_d).copy_from(r.subcols(shared, of_d));
+            rows.col_mut(unknowns.width() - 1).copy_from(r.col(r.ncols() - 1));
+        });
+    }
+    let initial_rank = leading_rank(whole.r(), unknowns.initial);
+    Part { r: whole.r().to_owned(), initial: unknowns.initial, initial_rank }
 }
 
 impl Part {
@@ -146,7 +187,7 @@ impl Part {
 fn unpack(solution: MatRef<'_, f64>, unknowns: Unknowns) -> (Mat<f64>, Mat<f64>) {
     let Unknowns { states: n, inputs: m, outputs: p, feedthrough, .. } = unknowns;
     let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
-    let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + q * p + i, 0)] } else { 0.0 });
+    let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + i * m + q, 0)] } else { 0.0 });
     (driven, d)
 }
 
@@ -157,9 +198,18 @@ fn fit_percent(
     d: MatRef<'_, f64>,
     initial_states: &[Vec<f64>],
 ) -> Vec<f64> {
+    let none = Mat::zeros(predictor.a.nrows(), 0);
+    let k = predictor.k.as_ref().unwrap_or(&none);
+    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
+    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
     let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
-    let errors: Vec<Mat<f64>> =
-        pairs.par_iter().map(|(e, x0)| &e.y - predict(predictor, driven, d, x0, e.u.as_ref(), e.y.as_ref())).collect();
+    let errors: Vec<Mat<f64>> = pairs
+        .par_iter()
+        .map(|(e, x0)| {
+            let driving = block(&[&[e.u.as_ref(), e.y.as_ref().subcols(0, k.ncols())]]);
+            &e.y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
+        })
+        .collect();
     let samples: usize = errors.iter().map(|e| e.nrows()).sum();
     (0..data.outputs)
         .map(|i| {

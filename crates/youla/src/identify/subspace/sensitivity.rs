@@ -1,8 +1,12 @@
-//! How the outputs depend on x0, B and D: the regressors of the output-error problem, one sample after another.
+//! How one output depends on x0, B and D: the regressors of the output-error problem, one sample after another.
 //!
-//! The predictor is `xhat+ = A xhat + B u + K y, yhat = C xhat + D u`; a plain simulation is the case K = 0. Since
-//! `yhat = C A^k x0 + sum_q (sum_j C A^(k-1-j) u_q(j)) b_q + D u + known`, the sensitivities to all of B are rows of
-//! length n that obey `M_q+ = M_q A + C u_q`: p n numbers per input, instead of the n n of `(z I - A)^-1 u_q`.
+//! The predictor is `xhat+ = A xhat + B u + K y, yhat = C xhat + D u`; a plain simulation is the case K = 0. For one output
+//! with the row c of C,
+//! ```text
+//! yhat(k) = c A^k x0 + sum_q (sum_{j<k} c A^(k-1-j) u_q(j)) b_q + d u(k) + (driven by y through K, known beforehand)
+//! ```
+//! so the sensitivities to the column b_q of B are a row of length n that obeys `g_q+ = g_q A + c u_q`: n numbers per input
+//! and output, instead of the n n of `(z I - A)^-1 u_q`.
 
 use faer::{Mat, MatMut, MatRef};
 
@@ -15,11 +19,11 @@ pub(super) struct Predictor {
     pub(super) a: Mat<f64>,
     /// Output matrix, p x n.
     pub(super) c: Mat<f64>,
-    /// Gain K, n x p, zero for a simulation.
-    pub(super) k: Mat<f64>,
+    /// Gain K, n x p; none for a simulation.
+    pub(super) k: Option<Mat<f64>>,
 }
 
-/// Where the unknowns stand among the columns: `[x0 | b_1 .. b_m | d_1 .. d_m | y]`.
+/// What is sought, and where it stands among the columns.
 #[derive(Clone, Copy)]
 pub(super) struct Unknowns {
     pub(super) states: usize,
@@ -32,119 +36,101 @@ pub(super) struct Unknowns {
 }
 
 impl Unknowns {
-    /// Columns that are common to all experiments: B and D.
-    pub(super) fn common(&self) -> usize {
-        self.states * self.inputs + if self.feedthrough { self.outputs * self.inputs } else { 0 }
+    /// Unknowns of B.
+    pub(super) fn of_b(&self) -> usize {
+        self.states * self.inputs
     }
 
-    /// All columns, with the one of the outputs.
+    /// Unknowns of one row of D.
+    pub(super) fn of_d_row(&self) -> usize {
+        if self.feedthrough { self.inputs } else { 0 }
+    }
+
+    /// Unknowns that all experiments share: B by columns, then D by rows.
+    pub(super) fn common(&self) -> usize {
+        self.of_b() + self.outputs * self.of_d_row()
+    }
+
+    /// Columns of one output: `[x0 | B | its row of D | y]`.
+    pub(super) fn width_of_output(&self) -> usize {
+        self.initial + self.of_b() + self.of_d_row() + 1
+    }
+
+    /// Columns of one experiment: `[x0 | B | D | y]`.
     pub(super) fn width(&self) -> usize {
         self.initial + self.common() + 1
     }
 }
 
-/// The recursion over one experiment.
-pub(super) struct Sensitivity<'a> {
+/// The recursion for one output of one experiment.
+pub(super) struct Sensitivity {
     unknowns: Unknowns,
-    predictor: &'a Predictor,
     /// Rows of A, contiguous.
-    a_rows: Vec<f64>,
-    /// p rows for x0, then p rows for each input.
+    a: Vec<f64>,
+    /// Row of C.
+    c: Vec<f64>,
+    /// Sensitivities to x0 and to the columns of B, n each.
     rows: Vec<f64>,
-    /// The state that the known outputs drive through K.
-    known: Vec<f64>,
+    next: Vec<f64>,
 }
 
-impl<'a> Sensitivity<'a> {
-    pub(super) fn new(predictor: &'a Predictor, unknowns: Unknowns) -> Self {
-        let (n, p) = (unknowns.states, unknowns.outputs);
-        let a_rows = (0..n * n).map(|k| predictor.a[(k / n, k % n)]).collect();
-        let mut rows = vec![0.0; (1 + unknowns.inputs) * p * n];
-        (0..p * n).for_each(|k| rows[k] = predictor.c[(k / n, k % n)]);
-        Sensitivity { unknowns, predictor, a_rows, rows, known: vec![0.0; n] }
+impl Sensitivity {
+    pub(super) fn new(predictor: &Predictor, output: usize, unknowns: Unknowns) -> Self {
+        let n = unknowns.states;
+        let c: Vec<f64> = predictor.c.row(output).iter().copied().collect();
+        let mut rows = vec![0.0; (1 + unknowns.inputs) * n];
+        rows[..n].copy_from_slice(&c);
+        Sensitivity { unknowns, a: by_rows(predictor.a.as_ref()), c, rows, next: vec![0.0; n] }
     }
 
-    /// Writes the rows of the samples `u, y` (p rows each) and moves on behind them.
-    pub(super) fn fill(&mut self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, mut block: MatMut<'_, f64>) {
+    /// Writes the rows of the next samples and moves on behind them. The last column is `target`.
+    pub(super) fn fill(&mut self, u: MatRef<'_, f64>, target: &[f64], mut piece: MatMut<'_, f64>) {
+        let skipped = self.unknowns.states - self.unknowns.initial;
         for k in 0..u.nrows() {
-            self.write(u, y, k, block.as_mut().subrows_mut(k * self.unknowns.outputs, self.unknowns.outputs));
-            self.advance(u, y, k);
+            let of_d = (0..self.unknowns.of_d_row()).map(|q| u[(k, q)]);
+            let values = self.rows[skipped..].iter().copied().chain(of_d).chain([target[k]]);
+            piece.as_mut().row_mut(k).iter_mut().zip(values).for_each(|(entry, value)| *entry = value);
+            self.advance(|input| u[(k, input)]);
         }
     }
 
-    fn write(&self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, k: usize, mut block: MatMut<'_, f64>) {
-        let Unknowns { states: n, inputs, outputs: p, initial, feedthrough } = self.unknowns;
-        for i in 0..p {
-            for l in 0..initial {
-                block[(i, l)] = self.rows[i * n + l];
+    /// `g+ = g A + c u`, with u = 0 for x0.
+    fn advance(&mut self, u: impl Fn(usize) -> f64) {
+        let n = self.c.len();
+        for (group, row) in self.rows.chunks_exact_mut(n).enumerate() {
+            let drive = if group == 0 { 0.0 } else { u(group - 1) };
+            self.next.iter_mut().zip(&self.c).for_each(|(next, c)| *next = drive * c);
+            for (value, a) in row.iter().zip(self.a.chunks_exact(n)) {
+                self.next.iter_mut().zip(a).for_each(|(next, a)| *next += value * a);
             }
-            for q in 0..inputs {
-                let row = &self.rows[((1 + q) * p + i) * n..][..n];
-                for (l, value) in row.iter().enumerate() {
-                    block[(i, initial + q * n + l)] = *value;
-                }
-                if feedthrough {
-                    block[(i, initial + inputs * n + q * p + i)] = u[(k, q)];
-                }
-            }
-            let known: f64 = (0..n).map(|l| self.predictor.c[(i, l)] * self.known[l]).sum();
-            block[(i, self.unknowns.width() - 1)] = y[(k, i)] - known;
-        }
-    }
-
-    fn advance(&mut self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, k: usize) {
-        let Unknowns { states: n, inputs, outputs: p, .. } = self.unknowns;
-        let mut next = vec![0.0; n];
-        for (r, row) in self.rows.chunks_exact_mut(n).enumerate() {
-            let (group, i) = (r / p, r % p);
-            let drive = if group == 0 { 0.0 } else { u[(k, group - 1)] };
-            next.iter_mut().enumerate().for_each(|(l, v)| *v = drive * self.predictor.c[(i, l)]);
-            for (value, a_row) in row.iter().zip(self.a_rows.chunks_exact(n)) {
-                if *value != 0.0 {
-                    next.iter_mut().zip(a_row).for_each(|(sum, a)| *sum += value * a);
-                }
-            }
-            row.iter_mut().zip(&next).for_each(|(v, new)| *v = if new.abs() < VANISHED { 0.0 } else { *new });
-        }
-        debug_assert_eq!(self.rows.len(), (1 + inputs) * p * n);
-        advance_state(&self.a_rows, &mut self.known, &mut next);
-        for (l, state) in self.known.iter_mut().enumerate() {
-            *state += (0..p).map(|i| self.predictor.k[(l, i)] * y[(k, i)]).sum::<f64>();
+            row.iter_mut().zip(&self.next).for_each(|(v, new)| *v = if new.abs() < VANISHED { 0.0 } else { *new });
         }
     }
 }
 
-/// `x = A x`, with A by rows.
-fn advance_state(a_rows: &[f64], x: &mut [f64], scratch: &mut [f64]) {
-    for (new, row) in scratch.iter_mut().zip(a_rows.chunks_exact(x.len())) {
-        *new = row.iter().zip(x.iter()).map(|(a, v)| a * v).sum();
+/// Outputs of `x+ = A x + B w, y = C x + D w` from an initial state; `ab` is `[A B]`, `cd` is `[C D]`.
+pub(super) fn simulate(ab: MatRef<'_, f64>, cd: MatRef<'_, f64>, x0: &[f64], w: MatRef<'_, f64>) -> Mat<f64> {
+    let (n, width) = (x0.len(), ab.ncols());
+    let (state_rows, output_rows) = (by_rows(ab), by_rows(cd));
+    let mut joint = vec![0.0; width];
+    let mut next = x0.to_vec();
+    let mut y = Mat::zeros(w.nrows(), cd.nrows());
+    for k in 0..w.nrows() {
+        joint[..n].copy_from_slice(&next);
+        (n..width).for_each(|q| joint[q] = w[(k, q - n)]);
+        for (i, row) in output_rows.chunks_exact(width).enumerate() {
+            y[(k, i)] = dot(row, &joint);
+        }
+        next.iter_mut().zip(state_rows.chunks_exact(width)).for_each(|(x, row)| *x = dot(row, &joint));
     }
-    x.copy_from_slice(scratch);
+    y
 }
 
-/// One-step predictions (for K = 0: the simulated output) from an initial state.
-pub(super) fn predict(
-    predictor: &Predictor,
-    b: MatRef<'_, f64>,
-    d: MatRef<'_, f64>,
-    x0: &[f64],
-    u: MatRef<'_, f64>,
-    y: MatRef<'_, f64>,
-) -> Mat<f64> {
-    let (n, m, p) = (x0.len(), u.ncols(), y.ncols());
-    let a_rows: Vec<f64> = (0..n * n).map(|k| predictor.a[(k / n, k % n)]).collect();
-    let (mut x, mut scratch) = (x0.to_vec(), vec![0.0; n]);
-    let mut predicted = Mat::zeros(u.nrows(), p);
-    for k in 0..u.nrows() {
-        for i in 0..p {
-            let states: f64 = (0..n).map(|l| predictor.c[(i, l)] * x[l]).sum();
-            predicted[(k, i)] = states + (0..m).map(|q| d[(i, q)] * u[(k, q)]).sum::<f64>();
-        }
-        advance_state(&a_rows, &mut x, &mut scratch);
-        for (l, state) in x.iter_mut().enumerate() {
-            *state += (0..m).map(|q| b[(l, q)] * u[(k, q)]).sum::<f64>();
-            *state += (0..p).map(|i| predictor.k[(l, i)] * y[(k, i)]).sum::<f64>();
-        }
-    }
-    predicted
+/// The entries of a matrix, row after row.
+fn by_rows(a: MatRef<'_, f64>) -> Vec<f64> {
+    a.row_iter().flat_map(|row| row.iter().copied()).collect()
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }

@@ -64,7 +64,7 @@ fn slicot_figures() {
         }
         let found = subspace(&one(&u, &y), clock(), &published(order, horizon)).unwrap();
         let error = relative_error(&found, &u, &y);
-        println!("{file}, order {order}: {error:.4e}, expected {expected:.4e}");
+        println!("{file}, order {order}: {error:.4e}, expected {expected:.4e}; {:?}", found.order.candidates);
         assert!((error / expected - 1.0).abs() < 5e-4, "{file}: {error:e}, expected {expected:e}");
     }
 }

@@ -40,8 +40,8 @@ fn respond(system: &StateSpace<Discrete>, u: &Mat<f64>, x0: f64, noise: Option<(
     let mut y = Mat::zeros(u.nrows(), system.outputs());
     for k in 0..u.nrows() {
         let uk = u.as_ref().row(k).transpose();
-        let mut yk = system.c() * &x.col(0) + system.d() * uk;
-        x = (system.a() * &x.col(0) + system.b() * uk).as_mat().to_owned();
+        let mut yk = system.c() * x.col(0) + system.d() * uk;
+        x = (system.a() * x.col(0) + system.b() * uk).as_mat().to_owned();
         if let Some((gain, e)) = noise {
             let ek = e.as_ref().row(k).transpose();
             yk += ek;
@@ -64,7 +64,7 @@ fn response(system: &StateSpace<Discrete>, omega: f64) -> Mat<c64> {
 
 /// Largest distance of two frequency responses on a grid, relative to the largest response.
 fn distance(left: &StateSpace<Discrete>, right: &StateSpace<Discrete>) -> f64 {
-    let grid = (0..200).map(|k| 0.001 + 3.14 * k as f64 / 200.0);
+    let grid = (0..200).map(|k| 0.001 + 0.0157 * k as f64);
     let (mut gap, mut size) = (0.0_f64, 0.0_f64);
     for omega in grid {
         let reference = response(right, omega);

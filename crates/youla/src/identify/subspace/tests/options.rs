@@ -78,6 +78,21 @@ fn unfit_records_are_refused() {
 }
 
 #[test]
+fn zero_initial_state_is_used_where_said() {
+    let system = random_system(&[0.95, 0.8], 1, 2, true, 8);
+    let u = uniform(300, 1, &mut ChaCha8Rng::seed_from_u64(9));
+    let options = SubspaceOptions { initial_state: InitialState::Zero, ..fixed(4, 8) };
+    let run = |x0| {
+        let y = respond(&system, &u, x0, None);
+        subspace(&one(&u, &y), clock(), &options).unwrap()
+    };
+    let (rest, moving) = (run(0.0), run(5.0));
+    assert_eq!(rest.initial_states, [[0.0; 4]]);
+    assert!(distance(&rest.model, &system) < 1e-8);
+    assert!(distance(&moving.model, &system) > 1e-3);
+}
+
+#[test]
 fn options_read_from_a_table_and_refuse_unknown_names() {
     let text = "weight = 'cva'\nhorizon = 30\norder = { fixed = 8 }\nfeedthrough = 'none'\nstability = 'allow'\n";
     let options: SubspaceOptions = toml::from_str(text).unwrap();

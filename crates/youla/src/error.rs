@@ -5,6 +5,7 @@
 //! asked for as it is) is returned as data, never here.
 
 use faer::c64;
+use std::path::PathBuf;
 
 /// Result of every fallible function of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -106,6 +107,36 @@ pub enum Error {
         pole: c64,
     },
     // ---- lti and factor ----------------------------------------------------------------------------------------
+    /// Numbers of ports do not fit together.
+    #[error("{what} is {found}, but must be {expected}")]
+    Ports {
+        /// Which number.
+        what: String,
+        /// What is needed.
+        expected: usize,
+        /// What was given.
+        found: usize,
+    },
+    /// A transfer function or difference equation cannot be realised.
+    #[error("the transfer function cannot be used: {problem}")]
+    Polynomial {
+        /// What is wrong with the coefficients.
+        problem: &'static str,
+    },
+    /// A loop of direct feedthroughs has no solution.
+    #[error("the loop is not well posed: its algebraic loop is singular (reciprocal condition number {rcond:.1e})")]
+    AlgebraicLoop {
+        /// Reciprocal condition number.
+        rcond: f64,
+    },
+    /// The controller does not stabilise the model that it was combined with.
+    #[error("the controller does not stabilise {model}: the closed loop has the pole {}; check the sign convention (feedback = \"negative\" or \"positive\"), the sample time and the units of the channels", Pole(*pole))]
+    NotStabilising {
+        /// Which model, in the words of the user.
+        model: String,
+        /// The worst closed-loop pole.
+        pole: c64,
+    },
     /// A simulation left the range of the numbers.
     #[error("{what} is no longer finite from sample {sample} on (counted from 1){}", worst_pole(*pole))]
     Diverged {
@@ -133,8 +164,209 @@ pub enum Error {
         /// The order of the minimal realisation.
         minimal: usize,
     },
-    // ---- records and files -------------------------------------------------------------------------------------
 
+    // ---- run and settings --------------------------------------------------------------------------------------
+    /// run.toml cannot be used.
+    #[error("{}{}: {problem}", path.display(), position(*line, *column))]
+    Settings {
+        /// Path of run.toml.
+        path: PathBuf,
+        /// Line counted from 1, 0 where the whole file is meant.
+        line: usize,
+        /// Column counted from 1.
+        column: usize,
+        /// What is wrong, and the nearest known key for a misspelt one.
+        problem: String,
+    },
+    /// A record is used up by the samples that are dropped at its start.
+    #[error(
+        "record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle"
+    )]
+    TooShort {
+        /// Which record.
+        record: String,
+        /// Its samples.
+        samples: usize,
+        /// Samples dropped.
+        settle: usize,
+    },
+    // ---- records and files -------------------------------------------------------------------------------------
+    /// The operating system refused to read or write a file.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// There is no such file.
+    #[error("{}: no such file", path.display())]
+    MissingFile {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file holds no samples.
+    #[error("{}: {problem}", path.display())]
+    NoData {
+        /// The file.
+        path: PathBuf,
+        /// What is missing, for example "the file is empty (0 bytes)".
+        problem: &'static str,
+    },
+    /// A cell of a text file is not a finite number.
+    #[error("{}, line {line}, column {column}: {text:?} is not a finite number", path.display())]
+    Cell {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1 with comments and blank lines.
+        line: usize,
+        /// Name of the column, or `#` and its number.
+        column: String,
+        /// What stands there.
+        text: String,
+    },
+    /// A line of a text file has more or fewer fields than the first one.
+    #[error("{}, line {line}: {found} fields, but the first line has {expected}", path.display())]
+    RaggedRow {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1 with comments and blank lines.
+        line: usize,
+        /// Fields on this line.
+        found: usize,
+        /// Fields on the first line.
+        expected: usize,
+    },
+    /// The delimiter of a text file does not follow from its first line.
+    #[error("{}, line {line}: the delimiter is not clear, the line holds {found}; state the delimiter", path.display())]
+    Delimiter {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1 with comments and blank lines.
+        line: usize,
+        /// The candidates that were found, in words.
+        found: String,
+    },
+    /// A file is damaged, cut off or not of the format it claims.
+    #[error("{}, byte {offset}: expected {expected}", path.display())]
+    Corrupt {
+        /// The file.
+        path: PathBuf,
+        /// Position in the file, counted from 0.
+        offset: u64,
+        /// What should stand there.
+        expected: String,
+    },
+    /// A gzip file is damaged or cut off.
+    #[error("{}: the gzip file is damaged or cut off after line {line}: {source}", path.display())]
+    CorruptGzip {
+        /// The file.
+        path: PathBuf,
+        /// Last line, counted from 1, that could be unpacked.
+        line: usize,
+        /// What the decoder says.
+        source: std::io::Error,
+    },
+    /// A file is of a format that this library does not read.
+    #[error("{}: {found}, which is not read; {remedy}", path.display())]
+    FormatNotRead {
+        /// The file.
+        path: PathBuf,
+        /// The format that was found.
+        found: &'static str,
+        /// What to do instead.
+        remedy: &'static str,
+    },
+    /// A channel, column or variable was asked for that does not exist.
+    #[error("{what} has no {name:?}{}; known: {}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default(), Names(known))]
+    UnknownChannel {
+        /// The record or file.
+        what: String,
+        /// The name that was asked for.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+        /// The most similar of them, where one is similar.
+        nearest: Option<String>,
+    },
+    /// Two channels of one record have the same name.
+    #[error("{what} has more than one channel named {name:?}")]
+    DuplicateChannel {
+        /// The record or file.
+        what: String,
+        /// The name.
+        name: String,
+    },
+    /// A value of a record is NaN or infinite.
+    #[error("{what}: channel {channel:?} is not finite in row {row} (counted from 1)")]
+    NotFiniteSample {
+        /// The record or file.
+        what: String,
+        /// The channel.
+        channel: String,
+        /// Row, counted from 1.
+        row: usize,
+    },
+    /// The channels of one record have different lengths.
+    #[error("{what}: channel {channel:?} has {found} samples, the channels before it have {expected}")]
+    UnequalLength {
+        /// The record or file.
+        what: String,
+        /// The channel.
+        channel: String,
+        /// Its samples.
+        found: usize,
+        /// Samples of the other channels.
+        expected: usize,
+    },
+    /// A variable of a file is not of the kind that is needed, or cannot be written.
+    #[error("{}: {name} is {found}, but must be {must}", path.display())]
+    WrongVariable {
+        /// The file.
+        path: PathBuf,
+        /// The variable as it was asked for.
+        name: String,
+        /// What it is.
+        found: String,
+        /// What it must be.
+        must: &'static str,
+    },
+    /// The time column is not uniform.
+    #[error(
+        "{what}: time is not uniform: row {row} (counted from 1) comes {dt} s after the one before, the sample time is {ts} s"
+    )]
+    NonUniformTime {
+        /// The record or file.
+        what: String,
+        /// First row, counted from 1, whose distance from the row before is wrong.
+        row: usize,
+        /// That distance in seconds.
+        dt: f64,
+        /// The sample time in seconds.
+        ts: f64,
+    },
+    /// Neither a sample time nor a time column was given.
+    #[error("{what}: the sample time is not known; state `ts` in seconds or name the time column")]
+    SampleTimeMissing {
+        /// The record or file.
+        what: String,
+    },
+    /// An excitation does not excite enough to identify from it.
+    #[error(
+        "{what} does not excite enough: its block-Hankel matrix with {block_rows} block rows has rank {rank} of {needed} (condition number {condition:.1e})"
+    )]
+    InsufficientExcitation {
+        /// The signal.
+        what: String,
+        /// Number of block rows s.
+        block_rows: usize,
+        /// Numerical rank.
+        rank: usize,
+        /// Rank that is needed: s times the number of channels.
+        needed: usize,
+        /// Ratio of the largest to the smallest singular value.
+        condition: f64,
+    },
     // ---- identification ----------------------------------------------------------------------------------------
 }
 
@@ -146,12 +378,18 @@ impl Error {
             | Error::NoConvergence { .. }
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
+            | Error::AlgebraicLoop { .. }
             | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }
+}
+
+/// `:line:column` where a line is known.
+fn position(line: usize, column: usize) -> String {
+    if line == 0 { String::new() } else { format!(":{line}:{column}") }
 }
 
 /// Names the worst pole where there is one.
@@ -171,6 +409,21 @@ impl std::fmt::Display for Pole {
         } else {
             let sign = if im < 0.0 { '-' } else { '+' };
             write!(f, "{re:.6} {sign} {:.6}i (magnitude {magnitude:.6})", im.abs())
+        }
+    }
+}
+
+/// Prints a list of names, the first forty of them.
+struct Names<'a>(&'a [String]);
+
+impl std::fmt::Display for Names<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const SHOWN: usize = 40;
+        f.write_str(&self.0[..self.0.len().min(SHOWN)].join(", "))?;
+        match self.0.len() {
+            0 => f.write_str("nothing"),
+            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
+            _ => Ok(()),
         }
     }
 }

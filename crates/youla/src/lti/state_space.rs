@@ -38,6 +38,12 @@ impl<T: TimeDomain> StateSpace<T> {
         Ok(StateSpace { a, b, c, d, time })
     }
 
+    /// Builds a system from matrices whose shapes follow from those of checked systems.
+    pub(super) fn from_checked(a: Mat<f64>, b: Mat<f64>, c: Mat<f64>, d: Mat<f64>, time: T) -> Self {
+        debug_assert_eq!((b.nrows(), b.ncols(), c.nrows(), c.ncols()), (a.nrows(), d.ncols(), d.nrows(), a.nrows()));
+        StateSpace { a, b, c, d, time }
+    }
+
     /// A system without states.
     ///
     /// # Errors

@@ -1,1 +1,40 @@
-//! TODO
+//! Measured and simulated records: labelled, clocked samples x channels; the files they come from; spectra and
+//! excitation signals.
+//!
+//! A record is read once, checked once and trusted afterwards: every number is finite, every channel has a name of its
+//! own, and the sample time is known. Nothing is repaired on the way: a gap, a NaN or an unequal length is an error that
+//! says where it is.
+
+mod choose;
+mod csv;
+mod detrend;
+mod matfile;
+mod npz;
+#[allow(clippy::module_inception)]
+mod record;
+#[cfg(test)]
+mod scratch;
+mod source;
+mod time;
+mod values;
+
+pub use choose::{ChannelRef, ChannelSpec};
+pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
+pub use detrend::{Detrend, Detrended, Trend};
+pub use matfile::{Packing, read_mat, write_mat};
+pub use npz::read_npz;
+pub use record::{Record, Segments, Split};
+pub use source::{Format, Source, read, sha256};
+pub use time::TimeSource;
+pub use values::{Value, Variable, Variables};
+
+use crate::{Error, Result};
+use std::{fs::File, io::ErrorKind, path::Path};
+
+/// Opens a file to read; a missing file has an error of its own.
+fn open(path: &Path) -> Result<File> {
+    File::open(path).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => Error::MissingFile { path: path.to_owned() },
+        _ => Error::Io { path: path.to_owned(), source },
+    })
+}

@@ -1,1 +1,5 @@
-//! TODO
+//! Simulated machines: the gas bearing of the paper.
+
+mod bearing;
+
+pub use bearing::{Bearing, degraded};

@@ -1,0 +1,150 @@
+//! State-space realisations of transfer functions and difference equations.
+
+use super::{Discrete, StateSpace, TimeDomain};
+use crate::linalg::{block, block_diagonal};
+use crate::{Error, Result};
+use faer::Mat;
+
+/// A matrix of polynomials: `[row][column][coefficient]`.
+pub type PolynomialMatrix = Vec<Vec<Vec<f64>>>;
+
+impl<T: TimeDomain> StateSpace<T> {
+    /// Realises the transfer matrix `numerator[i][j](x) / denominator[i][j](x)`, coefficients in **descending** powers of
+    /// s or z.
+    ///
+    /// Where all denominators agree, the realisation has `degree * min(inputs, outputs)` states, otherwise each entry is
+    /// realised by itself.
+    ///
+    /// # Errors
+    /// [`Error::Polynomial`] for empty or ragged input, a leading coefficient of zero in a denominator, or a numerator of
+    /// higher degree than its denominator.
+    ///
+    /// ```
+    /// use youla::lti::{Continuous, StateSpace};
+    /// let rigid_body = StateSpace::transfer_matrix(&vec![vec![vec![3.0]]], &vec![vec![vec![1.0, 0.5, 0.0]]], Continuous)?;
+    /// assert_eq!(rigid_body.order(), 2);
+    /// # Ok::<(), youla::Error>(())
+    /// ```
+    pub fn transfer_matrix(numerator: &PolynomialMatrix, denominator: &PolynomialMatrix, time: T) -> Result<Self> {
+        let (p, m) = check_matrix(numerator, denominator)?;
+        let common = denominator.iter().flatten().all(|d| d == &denominator[0][0]);
+        if common && p <= m {
+            // One row of the transposed system at a time would double the states; the dual needs only its columns.
+            let transposed: PolynomialMatrix =
+                (0..m).map(|j| (0..p).map(|i| numerator[i][j].clone()).collect()).collect();
+            return Ok(columns(&transposed, &denominator[0][0], time)?.dual());
+        }
+        if common {
+            return columns(numerator, &denominator[0][0], time);
+        }
+        entries(numerator, denominator, time)
+    }
+}
+
+impl StateSpace<Discrete> {
+    /// Realises the difference equations `denominator(z^-1) u = numerator(z^-1) y` per entry, coefficients in
+    /// **ascending** powers of z^-1 (the first is that of the present sample), as controllers are logged and programmed.
+    ///
+    /// # Errors
+    /// As [`Self::transfer_matrix`].
+    pub fn difference_equation(
+        numerator: &PolynomialMatrix,
+        denominator: &PolynomialMatrix,
+        time: Discrete,
+    ) -> Result<Self> {
+        check_matrix(numerator, denominator)?;
+        // Times z^k, both polynomials of one length read as descending powers of z.
+        let length = numerator.iter().chain(denominator).flatten().map(Vec::len).max().unwrap_or(0);
+        let pad = |polynomials: &PolynomialMatrix| -> PolynomialMatrix {
+            let padded = |c: &Vec<f64>| c.iter().copied().chain(std::iter::repeat(0.0)).take(length).collect();
+            polynomials.iter().map(|row| row.iter().map(padded).collect()).collect()
+        };
+        Self::transfer_matrix(&pad(numerator), &pad(denominator), time)
+    }
+}
+
+fn check_matrix(numerator: &PolynomialMatrix, denominator: &PolynomialMatrix) -> Result<(usize, usize)> {
+    let p = numerator.len();
+    let m = numerator.first().map_or(0, Vec::len);
+    let bad = |problem: &'static str| Err(Error::Polynomial { problem });
+    if p == 0 || m == 0 {
+        return bad("the numerator is empty");
+    }
+    let same_shape = |x: &PolynomialMatrix| x.len() == p && x.iter().all(|row| row.len() == m);
+    if !same_shape(numerator) || !same_shape(denominator) {
+        return bad("numerator and denominator must have the same number of rows, and all rows the same length");
+    }
+    for coefficients in numerator.iter().chain(denominator).flatten() {
+        if coefficients.is_empty() {
+            return bad("a polynomial has no coefficients");
+        }
+        if coefficients.iter().any(|c| !c.is_finite()) {
+            return bad("a coefficient is not a finite number");
+        }
+    }
+    if denominator.iter().flatten().any(|d| d[0] == 0.0) {
+        return bad("the first coefficient of a denominator is zero");
+    }
+    let degree = |c: &[f64]| c.len() - c.iter().take_while(|&&x| x == 0.0).count();
+    if (0..p).any(|i| (0..m).any(|j| degree(&numerator[i][j]) > denominator[i][j].len())) {
+        return bad("a numerator has a higher degree than its denominator (the system is not proper)");
+    }
+    Ok((p, m))
+}
+
+/// Controllable canonical form of each input column, all with the same denominator.
+fn columns<T: TimeDomain>(numerator: &PolynomialMatrix, denominator: &[f64], time: T) -> Result<StateSpace<T>> {
+    let (p, m) = (numerator.len(), numerator[0].len());
+    let mut system: Option<StateSpace<T>> = None;
+    for j in 0..m {
+        let column: Vec<&[f64]> = (0..p).map(|i| numerator[i][j].as_slice()).collect();
+        let next = controllable_form(&column, denominator, time)?;
+        system = Some(match system {
+            None => next,
+            Some(all) => StateSpace::new(
+                block_diagonal(all.a(), next.a()),
+                block_diagonal(all.b(), next.b()),
+                block(&[&[all.c(), next.c()]]),
+                block(&[&[all.d(), next.d()]]),
+                time,
+            )?,
+        });
+    }
+    system.ok_or(Error::Polynomial { problem: "the numerator is empty" })
+}
+
+/// Every entry realised by itself, outputs of a row added.
+fn entries<T: TimeDomain>(
+    numerator: &PolynomialMatrix,
+    denominator: &PolynomialMatrix,
+    time: T,
+) -> Result<StateSpace<T>> {
+    let (p, m) = (numerator.len(), numerator[0].len());
+    let mut total = StateSpace::gain(Mat::zeros(p, m), time)?;
+    for i in 0..p {
+        for j in 0..m {
+            let entry = controllable_form(&[&numerator[i][j]], &denominator[i][j], time)?;
+            let place = |rows: usize, index: usize| Mat::from_fn(rows, 1, |k, _| f64::from(k == index));
+            let placed = entry.map_output(&place(p, i)).map_input(&place(m, j).transpose().to_owned());
+            total = total.plus(&placed)?;
+        }
+    }
+    Ok(total)
+}
+
+/// One input, several outputs over one denominator, coefficients in descending powers.
+fn controllable_form<T: TimeDomain>(column: &[&[f64]], denominator: &[f64], time: T) -> Result<StateSpace<T>> {
+    let n = denominator.len() - 1;
+    let den: Vec<f64> = denominator.iter().map(|c| c / denominator[0]).collect();
+    // Numerator coefficient of x^(n-k), left-padded with zeros.
+    let num = |i: usize, k: usize| {
+        let c = column[i];
+        let index = (k + c.len()) as isize - (n + 1) as isize;
+        if index < 0 { 0.0 } else { c[index as usize] / denominator[0] }
+    };
+    let a = Mat::from_fn(n, n, |i, j| if i == 0 { -den[j + 1] } else { f64::from(i == j + 1) });
+    let b = Mat::from_fn(n, 1, |i, _| f64::from(i == 0));
+    let c = Mat::from_fn(column.len(), n, |i, j| num(i, j + 1) - den[j + 1] * num(i, 0));
+    let d = Mat::from_fn(column.len(), 1, |i, _| num(i, 0));
+    StateSpace::new(a, b, c, d, time)
+}

@@ -1,0 +1,173 @@
+//! Text files: comma, semicolon, tab or blank separated, plain or gzip, with or without a line of names.
+//!
+//! Lines that begin with `#` or `%` and blank lines are passed over. Only the chosen columns are read as numbers; a cell
+//! of them that is not a finite number is an error with its line and column. The decimal sign is the point.
+
+use super::time::{Clock, TimeSource};
+use super::{ChannelRef, ChannelSpec, Record};
+use crate::units::Channel;
+use crate::{Error, Result};
+use faer::Mat;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+mod lines;
+mod parse;
+
+use lines::Lines;
+use parse::{Fields, Selection};
+
+/// What stands between two cells.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Delimiter {
+    /// Read it off the first line: the only one of comma, semicolon and tab that it holds, else blanks. A line that
+    /// holds two of them is an error.
+    #[default]
+    Detect,
+    /// `,`
+    Comma,
+    /// `;`
+    Semicolon,
+    /// One tab.
+    Tab,
+    /// Any number of blanks and tabs.
+    Whitespace,
+}
+
+/// Whether the first line holds the names of the columns.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeaderLine {
+    /// It does when none of its cells is a number.
+    #[default]
+    Detect,
+    /// It does.
+    Present,
+    /// It does not: the columns are chosen by number and named `#1`, `#2` and so on.
+    Absent,
+}
+
+/// How to read a text file.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct CsvOptions {
+    /// What stands between two cells.
+    pub delimiter: Delimiter,
+    /// Whether the first line holds names.
+    pub header: HeaderLine,
+}
+
+/// Reads `channels`, or all columns but the time where `channels` is empty.
+///
+/// # Errors
+/// [`Error::MissingFile`], [`Error::Io`], [`Error::Corrupt`] for a damaged gzip file, [`Error::NoData`],
+/// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
+/// and those of the sample time: [`Error::SampleTimeMissing`], [`Error::NonUniformTime`],
+/// [`Error::SampleTimeMismatch`].
+///
+/// ```no_run
+/// use youla::record::{ChannelSpec, CsvOptions, TimeSource, read_csv};
+/// let channels = [ChannelSpec::named("u"), ChannelSpec::named("y")];
+/// let record = read_csv("run.csv.gz", &channels, &TimeSource::column("t".parse().unwrap()), &CsvOptions::default())?;
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn read_csv(
+    path: impl AsRef<Path>,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Record> {
+    let path = path.as_ref();
+    let mut lines = Lines::open(path)?;
+    let fields = Fields::detect(&mut lines, options)?;
+    let plan = Plan::new(path, fields.names(), channels, time)?;
+    let columns = Selection::new(&fields, plan.columns.clone()).read(&mut lines)?;
+    plan.assemble(path, time, columns)
+}
+
+/// Writes the time in a column `t` and all channels; every number reads back as the same number.
+///
+/// Units are not written.
+///
+/// # Errors
+/// [`Error::DuplicateChannel`] where a channel is named `t`, [`Error::Io`].
+pub fn write_csv(record: &Record, path: impl AsRef<Path>) -> Result<()> {
+    let path = path.as_ref();
+    if record.channels().iter().any(|c| c.name == TIME) {
+        return Err(Error::DuplicateChannel { what: path.display().to_string(), name: TIME.to_owned() });
+    }
+    write_rows(record, path).map_err(|source| Error::Io { path: path.to_owned(), source })
+}
+
+/// Name of the time column that is written.
+const TIME: &str = "t";
+
+fn write_rows(record: &Record, path: &Path) -> std::io::Result<()> {
+    let mut writer = ::csv::Writer::from_path(path)?;
+    writer.write_record([TIME].into_iter().chain(record.channels().iter().map(|c| c.name.as_str())))?;
+    let mut cell = String::new();
+    for k in 0..record.samples() {
+        for x in std::iter::once(record.time_at(k)).chain(record.data().row(k).iter().copied()) {
+            use std::fmt::Write;
+            cell.clear();
+            write!(cell, "{x:?}").map_err(std::io::Error::other)?;
+            writer.write_field(&cell)?;
+        }
+        writer.write_record(None::<&[u8]>)?;
+    }
+    writer.flush()
+}
+
+/// Which columns of the file become what.
+struct Plan {
+    channels: Vec<Channel>,
+    /// Indices of the channels and, last, of the time column.
+    columns: Vec<usize>,
+    timed: bool,
+}
+
+impl Plan {
+    fn new(path: &Path, names: &[String], specs: &[ChannelSpec], time: &TimeSource) -> Result<Plan> {
+        let what = path.display().to_string();
+        let index = |reference: &ChannelRef| reference.index(&what, names);
+        let clock = time.column.as_ref().map(index).transpose()?;
+        let mut plan = Plan { channels: Vec::new(), columns: Vec::new(), timed: clock.is_some() };
+        for spec in specs {
+            plan.channels.push(Channel::new(&spec.name, &spec.unit));
+            plan.columns.push(index(&spec.source())?);
+        }
+        if specs.is_empty() {
+            plan.columns = (0..names.len()).filter(|&j| Some(j) != clock).collect();
+            plan.channels = plan.columns.iter().map(|&j| Channel::new(&names[j], "")).collect();
+        }
+        plan.columns.extend(clock);
+        Ok(plan)
+    }
+
+    fn assemble(self, path: &Path, time: &TimeSource, mut columns: Vec<Vec<f64>>) -> Result<Record> {
+        let what = path.display().to_string();
+        let times = if self.timed { columns.pop() } else { None };
+        let clock = time.resolve(&what, times.as_deref())?;
+        assemble(&what, self.channels, &columns, clock)
+    }
+}
+
+/// The record of columns of equal length.
+pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>], clock: Clock) -> Result<Record> {
+    let samples = columns.first().map_or(0, Vec::len);
+    for (channel, column) in channels.iter().zip(columns) {
+        if column.len() != samples {
+            let (what, channel, found) = (what.to_owned(), channel.name.clone(), column.len());
+            return Err(Error::UnequalLength { what, channel, found, expected: samples });
+        }
+    }
+    let mut data = Mat::zeros(samples, columns.len());
+    for (j, column) in columns.iter().enumerate() {
+        data.col_as_slice_mut(j).copy_from_slice(column);
+    }
+    Record::new(what, channels, data, clock.time)?.starting_at(clock.start)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,93 @@
+//! The lines of a text file that hold data, with their numbers, through gzip where the file is compressed.
+
+use crate::{Error, Result};
+use flate2::bufread::MultiGzDecoder;
+use std::fs::File;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+const BUFFER: usize = 1 << 17;
+
+/// Reads line by line, so that a file that unpacks to more than the memory is met by its first bad line.
+pub(super) struct Lines {
+    path: PathBuf,
+    reader: Box<dyn BufRead>,
+    gzip: bool,
+    line: Vec<u8>,
+    number: usize,
+    /// The current line is to be handed out again.
+    held: bool,
+}
+
+impl Lines {
+    pub(super) fn open(path: &Path) -> Result<Lines> {
+        let mut file = BufReader::with_capacity(BUFFER, crate::record::open(path)?);
+        let start = file.fill_buf().map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        if start.is_empty() {
+            return Err(Error::NoData { path: path.to_owned(), problem: "the file is empty (0 bytes)" });
+        }
+        let gzip = start.starts_with(&GZIP_MAGIC);
+        Ok(Lines {
+            path: path.to_owned(),
+            reader: unpacked(file, gzip),
+            gzip,
+            line: Vec::new(),
+            number: 0,
+            held: false,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Number of the current line, counted from 1.
+    pub(super) fn number(&self) -> usize {
+        self.number
+    }
+
+    /// The current line without blanks around it.
+    pub(super) fn current(&self) -> &[u8] {
+        self.line.trim_ascii()
+    }
+
+    /// Hands out the current line once more at the next [`Lines::advance`].
+    pub(super) fn hold(&mut self) {
+        self.held = true;
+    }
+
+    /// Goes to the next line that is neither blank nor a comment; false at the end.
+    pub(super) fn advance(&mut self) -> Result<bool> {
+        if std::mem::take(&mut self.held) {
+            return Ok(true);
+        }
+        loop {
+            self.line.clear();
+            let read = self.reader.read_until(b'\n', &mut self.line);
+            if read.map_err(|source| read_error(&self.path, self.gzip, self.number, source))? == 0 {
+                return Ok(false);
+            }
+            self.number += 1;
+            if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
+                self.line.drain(..3);
+            }
+            if !matches!(self.current().first(), None | Some(b'#' | b'%')) {
+                return Ok(true);
+            }
+        }
+    }
+}
+
+fn unpacked(file: BufReader<File>, gzip: bool) -> Box<dyn BufRead> {
+    if gzip { Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file))) } else { Box::new(file) }
+}
+
+fn read_error(path: &Path, gzip: bool, line: usize, source: std::io::Error) -> Error {
+    let damaged = matches!(source.kind(), ErrorKind::InvalidInput | ErrorKind::InvalidData | ErrorKind::UnexpectedEof);
+    if gzip && damaged {
+        Error::CorruptGzip { path: path.to_owned(), line, source }
+    } else {
+        Error::Io { path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,166 @@
+//! From lines to cells, and from the chosen cells to numbers.
+
+use super::lines::Lines;
+use super::{CsvOptions, Delimiter, HeaderLine};
+use crate::{Error, Result};
+
+/// The form of a text file: its columns and what stands between them.
+pub(super) struct Fields {
+    delimiter: Option<u8>,
+    names: Vec<String>,
+}
+
+impl Fields {
+    /// Reads the first line that is not a comment; leaves it to be read again where it holds numbers.
+    pub(super) fn detect(lines: &mut Lines, options: &CsvOptions) -> Result<Fields> {
+        if !lines.advance()? {
+            return Err(no_rows(lines));
+        }
+        let delimiter = match options.delimiter {
+            Delimiter::Detect => detect_delimiter(lines)?,
+            Delimiter::Comma => Some(b','),
+            Delimiter::Semicolon => Some(b';'),
+            Delimiter::Tab => Some(b'\t'),
+            Delimiter::Whitespace => None,
+        };
+        let cells = header_cells(lines, delimiter);
+        let named = match options.header {
+            HeaderLine::Present => true,
+            HeaderLine::Absent => false,
+            HeaderLine::Detect => cells.iter().all(|cell| cell.parse::<f64>().is_err()),
+        };
+        if !named {
+            lines.hold();
+            return Ok(Fields { delimiter, names: (1..=cells.len()).map(|j| format!("#{j}")).collect() });
+        }
+        match (1..cells.len()).find(|&j| cells[..j].contains(&cells[j])) {
+            Some(j) => {
+                Err(Error::DuplicateChannel { what: lines.path().display().to_string(), name: cells[j].clone() })
+            }
+            None => Ok(Fields { delimiter, names: cells }),
+        }
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+}
+
+/// The columns to read as numbers.
+pub(super) struct Selection<'a> {
+    fields: &'a Fields,
+    columns: Vec<usize>,
+    /// The positions in `columns` that each column of the file goes to.
+    targets: Vec<Vec<usize>>,
+}
+
+impl<'a> Selection<'a> {
+    pub(super) fn new(fields: &'a Fields, columns: Vec<usize>) -> Self {
+        let mut targets = vec![Vec::new(); fields.names.len()];
+        for (position, &column) in columns.iter().enumerate() {
+            targets[column].push(position);
+        }
+        Selection { fields, columns, targets }
+    }
+
+    /// Reads all remaining lines; one vector for each chosen column.
+    pub(super) fn read(&self, lines: &mut Lines) -> Result<Vec<Vec<f64>>> {
+        let mut out = vec![Vec::new(); self.columns.len()];
+        while lines.advance()? {
+            let found = match self.fields.delimiter {
+                Some(delimiter) => self.row(lines, lines.current().split(|&b| b == delimiter), &mut out)?,
+                None => {
+                    let cells = lines.current().split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty());
+                    self.row(lines, cells, &mut out)?
+                }
+            };
+            if found != self.targets.len() {
+                let (path, line) = (lines.path().to_owned(), lines.number());
+                return Err(Error::RaggedRow { path, line, found, expected: self.targets.len() });
+            }
+        }
+        if out.iter().all(Vec::is_empty) { Err(no_rows(lines)) } else { Ok(out) }
+    }
+
+    /// Reads the cells of one line and returns their number.
+    fn row<'b>(
+        &self,
+        lines: &Lines,
+        cells: impl Iterator<Item = &'b [u8]> + Clone,
+        out: &mut [Vec<f64>],
+    ) -> Result<usize> {
+        let mut found = 0;
+        for cell in cells.clone() {
+            for &position in self.targets.get(found).into_iter().flatten() {
+                match number(cell) {
+                    Some(value) => out[position].push(value),
+                    None => return Err(self.bad_cell(lines, cells.count(), found, cell)),
+                }
+            }
+            found += 1;
+        }
+        Ok(found)
+    }
+
+    /// A line with a field too many or too few is reported as that, not as the cell that moved.
+    fn bad_cell(&self, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
+        let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.targets.len());
+        if found != expected {
+            return Error::RaggedRow { path, line, found, expected };
+        }
+        let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
+        Error::Cell { path, line, column: self.fields.names[column].clone(), text }
+    }
+}
+
+/// The only one of comma, semicolon and tab on the line; `None` means blanks.
+///
+/// A line of numbers with tabs and blanks is read as blank separated where the count of cells is the same, because a
+/// tab may stand at the end of the line.
+fn detect_delimiter(lines: &Lines) -> Result<Option<u8>> {
+    const CANDIDATES: [(u8, &str); 3] = [(b',', "a comma"), (b';', "a semicolon"), (b'\t', "a tab")];
+    let line = lines.current();
+    let found: Vec<_> = CANDIDATES.iter().filter(|(delimiter, _)| line.contains(delimiter)).collect();
+    match found[..] {
+        [] => Ok(None),
+        [(b'\t', _)] => {
+            let blank_separated = line.split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty()).count();
+            let tab_separated = line.split(|&b| b == b'\t').count();
+            Ok((tab_separated != blank_separated).then_some(b'\t'))
+        }
+        [(delimiter, _)] => Ok(Some(*delimiter)),
+        _ => {
+            let names: Vec<_> = found.iter().map(|(_, name)| *name).collect();
+            Err(Error::Delimiter { path: lines.path().to_owned(), line: lines.number(), found: names.join(" and ") })
+        }
+    }
+}
+
+/// The cells of the first line; names may stand in quotes.
+fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
+    let text = |cell: &[u8]| String::from_utf8_lossy(cell).trim().to_owned();
+    let Some(delimiter) = delimiter else {
+        return lines.current().split(|b| b.is_ascii_whitespace()).filter(|c| !c.is_empty()).map(text).collect();
+    };
+    let mut reader = ::csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(delimiter)
+        .trim(::csv::Trim::All)
+        .from_reader(lines.current());
+    let mut record = ::csv::ByteRecord::new();
+    match reader.read_byte_record(&mut record) {
+        Ok(true) => record.iter().map(text).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A finite number, perhaps in quotes and with blanks around it.
+fn number(cell: &[u8]) -> Option<f64> {
+    let cell = cell.trim_ascii();
+    let cell = cell.strip_prefix(b"\"").and_then(|c| c.strip_suffix(b"\"")).unwrap_or(cell);
+    std::str::from_utf8(cell).ok()?.trim().parse().ok().filter(|x: &f64| x.is_finite())
+}
+
+fn no_rows(lines: &Lines) -> Error {
+    Error::NoData { path: lines.path().to_owned(), problem: "there is no line with data" }
+}

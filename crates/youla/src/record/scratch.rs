@@ -1,0 +1,36 @@
+//! Files for the tests of this module.
+
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A file name of its own, removed at the end of the test.
+pub(super) struct Scratch(PathBuf);
+
+impl Scratch {
+    pub(super) fn path(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Scratch {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
+
+pub(super) fn scratch(extension: &str) -> Scratch {
+    static NEXT: AtomicUsize = AtomicUsize::new(0);
+    let number = NEXT.fetch_add(1, Ordering::Relaxed);
+    Scratch(std::env::temp_dir().join(format!("youla-{}-{number}.{extension}", std::process::id())))
+}
+
+/// The folder of measured data beside the workspace, if it is there.
+pub(super) fn data_folder() -> Option<PathBuf> {
+    let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let candidates = ["../../../shared/data", "../../../../shared/data"].map(|relative| crate_folder.join(relative));
+    let folder = candidates.into_iter().find(|folder| folder.is_dir());
+    if folder.is_none() {
+        println!("skipped: the folder of measured data ../shared/data is absent");
+    }
+    folder
+}

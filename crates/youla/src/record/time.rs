@@ -1,0 +1,138 @@
+//! The sample time of a file: declared, taken from a time column, or both, in which case they must agree.
+
+use super::ChannelRef;
+use crate::lti::Discrete;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+
+/// Where the sample time comes from; one of `column` and `ts` at least.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TimeSource {
+    /// Column with the time in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<ChannelRef>,
+    /// Sample time in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ts: Option<f64>,
+    /// Greatest deviation of a step of the time column from the sample time, as a part of the sample time.
+    pub tolerance: f64,
+}
+
+impl Default for TimeSource {
+    fn default() -> Self {
+        TimeSource { column: None, ts: None, tolerance: 1e-3 }
+    }
+}
+
+impl TimeSource {
+    /// A declared sample time in seconds.
+    pub fn ts(ts: f64) -> Self {
+        TimeSource { ts: Some(ts), ..Self::default() }
+    }
+
+    /// A time column in seconds.
+    pub fn column(column: ChannelRef) -> Self {
+        TimeSource { column: Some(column), ..Self::default() }
+    }
+
+    /// The clock and the time of the first sample from the time column, which is there when `self.column` is set.
+    ///
+    /// # Errors
+    /// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`] with the first bad row, [`Error::SampleTimeMismatch`]
+    /// where column and declaration disagree, [`Error::OutOfRange`] for a bad `ts` or `tolerance`.
+    pub(super) fn resolve(&self, what: &str, column: Option<&[f64]>) -> Result<Clock> {
+        if !(self.tolerance >= 0.0 && self.tolerance < 1.0) {
+            let what = format!("{what}: the tolerance of the time column");
+            return Err(Error::OutOfRange { what, value: self.tolerance, must: "at least 0 and below 1" });
+        }
+        match (column, self.ts) {
+            (None, None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
+            (None, Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: 0.0 }),
+            (Some([start]), Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: *start }),
+            (Some([] | [_]), None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
+            (Some(times), declared) => self.measured(what, times, declared),
+        }
+    }
+
+    fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
+        let middle = median_step(times);
+        if let Some(ts) = declared {
+            let time = Discrete::new(ts)?;
+            if (middle - ts).abs() > self.tolerance * ts {
+                let what = format!("{what}, declared sample time and time column");
+                return Err(Error::SampleTimeMismatch { what, left: ts, right: middle });
+            }
+            self.check_steps(what, times, ts)?;
+            return Ok(Clock { time, start: times[0] });
+        }
+        self.check_steps(what, times, middle)?;
+        Ok(Clock { time: Discrete::new(mean_step(times))?, start: times[0] })
+    }
+
+    fn check_steps(&self, what: &str, times: &[f64], ts: f64) -> Result<()> {
+        let good = |step: &[f64]| (step[1] - step[0] - ts).abs() <= self.tolerance * ts;
+        match times.windows(2).position(|step| !good(step)) {
+            None => Ok(()),
+            Some(k) => {
+                let dt = times[k + 1] - times[k];
+                Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts })
+            }
+        }
+    }
+}
+
+/// Sample time and time of the first sample.
+#[derive(Debug)]
+pub(super) struct Clock {
+    pub(super) time: Discrete,
+    pub(super) start: f64,
+}
+
+/// The step in the middle of all steps, which a gap or a repeated row does not move.
+fn median_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The mean step, as the shortest decimal number within the rounding of the time column.
+fn mean_step(times: &[f64]) -> f64 {
+    let (first, last, steps) = (times[0], times[times.len() - 1], (times.len() - 1) as f64);
+    let mean = (last - first) / steps;
+    let rounding = 2.0 * f64::EPSILON * (first.abs().max(last.abs()) / steps).max(mean.abs() / 2.0);
+    let rounded = (0..17).filter_map(|digits| format!("{mean:.digits$e}").parse::<f64>().ok());
+    rounded.into_iter().find(|r| (r - mean).abs() <= rounding).unwrap_or(mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(n: usize, ts: f64) -> Vec<f64> {
+        (0..n).map(|k| 0.3 + k as f64 * ts).collect()
+    }
+
+    #[test]
+    fn the_sample_time_survives_the_time_column() {
+        for ts in [0.002, 1.0 / 5000.0, 2.5e-4, 0.08] {
+            let clock = TimeSource::default().resolve("t", Some(&times(1000, ts))).unwrap();
+            assert_eq!(clock.time.ts(), ts);
+        }
+        let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
+        assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_gap_is_reported_at_its_row() {
+        let mut gap = times(100, 0.1);
+        gap.remove(60);
+        let error = TimeSource::default().resolve("t", Some(&gap)).unwrap_err();
+        assert!(matches!(error, Error::NonUniformTime { row: 61, .. }), "{error}");
+        let error = TimeSource::ts(0.1).resolve("t", Some(&times(100, 0.2))).unwrap_err();
+        assert!(matches!(error, Error::SampleTimeMismatch { .. }), "{error}");
+        assert!(TimeSource::default().resolve("t", Some(&[0.0, 0.0, 0.0])).is_err());
+        assert!(TimeSource::default().resolve("t", None).is_err());
+        assert!(TimeSource::default().resolve("t", Some(&[1.0])).is_err());
+    }
+}

@@ -1,0 +1,124 @@
+//! From nominal model and controller of a run to its coprime factors, with balanced states.
+
+use super::models::Controller;
+use super::records::{RunRecords, rms};
+use super::settings::{Construction, FactorSettings};
+use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+use crate::factor::CoprimeFactors;
+use crate::linalg::eye;
+use crate::lti::{Discrete, StateSpace};
+use crate::{Mat, MatRef, Result};
+use faer::Scale;
+
+/// The factors of a run and what they rest on.
+#[derive(Debug, Clone)]
+pub struct Factorisation {
+    /// The eight factors.
+    pub factors: CoprimeFactors<Discrete>,
+    /// The controller that ran, `u = K y` (positive feedback).
+    pub controller: StateSpace<Discrete>,
+    /// Largest relative residual of the Bezout identity (15) up to Nyquist.
+    pub bezout_residual: f64,
+}
+
+/// Builds the factors of the nominal model and the controller. States are scaled by powers of two first: entries of
+/// physical models span 1e6, which would cost three to six digits of (15).
+///
+/// # Errors
+/// [`crate::Error::NotStabilising`] with the pole when the controller does not stabilise the nominal model, shapes, and
+/// the conditions of the Riccati equations.
+pub fn factorise(
+    nominal: &StateSpace<Discrete>,
+    controller: &Controller,
+    records: &RunRecords,
+    settings: &FactorSettings,
+) -> Result<Factorisation> {
+    let scale = nominal.state_scales()?;
+    let balanced = nominal.with_scaled_states(&scale);
+    let factors = match controller {
+        Controller::Observer { f, l } => {
+            crate::linalg::check_shape("state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+            crate::linalg::check_shape("observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+            let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
+            let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
+            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?
+        }
+        Controller::System(k) => {
+            let weights = Weights::new(records, settings);
+            match settings.construction {
+                Construction::Stacked => {
+                    let f = weights.state_feedback(&balanced)?;
+                    let fk = controller_feedback(k)?;
+                    CoprimeFactors::stacked(&balanced, k, f.as_ref(), fk.as_ref())?
+                }
+                Construction::Shifted => {
+                    let (f, l) = (weights.state_feedback(&balanced)?, weights.observer_gain(&balanced)?);
+                    CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?.shifted_to(k)?
+                }
+            }
+        }
+    };
+    let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
+    Ok(Factorisation { controller: factors.controller()?, factors, bezout_residual })
+}
+
+/// Angular frequencies, logarithmic over four decades below Nyquist.
+fn grid_to_nyquist(time: Discrete, count: usize) -> Vec<f64> {
+    let nyquist = std::f64::consts::PI / time.ts();
+    (0..count).map(|k| nyquist * 10f64.powf(-4.0 + 4.0 * k as f64 / count as f64)).collect()
+}
+
+/// Weights in the units of the machine: inputs and outputs count in their rms on the estimation records.
+struct Weights {
+    u: Vec<f64>,
+    y: Vec<f64>,
+    input_weight: f64,
+    output_noise: f64,
+}
+
+impl Weights {
+    fn new(records: &RunRecords, settings: &FactorSettings) -> Self {
+        let estimation = records.estimation.iter();
+        Weights {
+            u: rms(estimation.clone().map(|r| &r.u), records.inputs.len()),
+            y: rms(estimation.map(|r| &r.y), records.outputs.len()),
+            input_weight: settings.input_weight,
+            output_noise: settings.output_noise,
+        }
+    }
+
+    /// LQR with `Q = C' W C`, `W = diag(1 / rms(y)^2)`, `R = input_weight diag(1 / rms(u)^2)`.
+    fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+        let q = weighted_gram(plant.c(), &self.y);
+        let r = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
+        Ok(lqr(plant, &LqrWeights { q, r, s: None })?.f)
+    }
+
+    /// Kalman predictor with process noise of the size of the inputs and output noise of the size of the outputs.
+    fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+        let inverse: Vec<f64> = self.u.iter().map(|s| 1.0 / s).collect();
+        let process = weighted_gram(plant.b().transpose(), &inverse);
+        let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
+        Ok(kalman(plant, &NoiseCovariance { process, measurement, cross: None })?.l)
+    }
+}
+
+/// `M' diag(1 / scale^2) M`.
+fn weighted_gram(m: MatRef<'_, f64>, scale: &[f64]) -> Mat<f64> {
+    let scaled = Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / scale[i]);
+    scaled.transpose() * &scaled
+}
+
+fn diagonal(values: impl Iterator<Item = f64>) -> Mat<f64> {
+    let values: Vec<f64> = values.collect();
+    Mat::from_fn(values.len(), values.len(), |i, j| if i == j { values[i] } else { 0.0 })
+}
+
+/// Feedback of the controller's right factors: zero for a stable controller (U = K, V = I), else an LQR of its own.
+fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+    if k.is_stable()? {
+        return Ok(Mat::zeros(k.inputs(), k.order()));
+    }
+    let weights = LqrWeights { q: Scale(1.0) * eye(k.order()), r: eye(k.inputs()), s: None };
+    Ok(lqr(k, &weights)?.f)
+}

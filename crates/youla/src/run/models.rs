@@ -1,0 +1,253 @@
+//! `[nominal]` and `[controller]` of run.toml: every form in which users have them.
+
+use crate::lti::{Continuous, Discrete, PolynomialMatrix, StateSpace};
+use crate::record::read_mat;
+use crate::rig::{Bearing, degraded};
+use crate::{Error, Mat, Result};
+use faer::Scale;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The domain in which matrices or polynomials are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Domain {
+    /// In s, rad/s; discretised by a zero-order hold at the sample time of the data.
+    Continuous,
+    /// In z, at the sample time of the data.
+    Discrete,
+}
+
+/// A transfer function: one polynomial for one input and output, or a matrix `[row][column]` of polynomials.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged, expecting = "expected a list of coefficients, or a matrix [row][column] of such lists")]
+pub enum Polynomials {
+    /// Coefficients of the only entry.
+    Single(Vec<f64>),
+    /// Coefficients per entry, `[row][column]`.
+    Matrix(PolynomialMatrix),
+}
+
+impl Polynomials {
+    /// As a matrix with the given shape; a single polynomial stands for every entry.
+    fn spread(&self, rows: usize, columns: usize) -> PolynomialMatrix {
+        match self {
+            Polynomials::Single(c) => vec![vec![c.clone(); columns]; rows],
+            Polynomials::Matrix(m) => m.clone(),
+        }
+    }
+
+    fn shape(&self) -> (usize, usize) {
+        match self {
+            Polynomials::Single(_) => (1, 1),
+            Polynomials::Matrix(m) => (m.len(), m.first().map_or(0, Vec::len)),
+        }
+    }
+}
+
+/// The nominal model G(0).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum NominalModel {
+    /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
+    TransferFunction {
+        /// Continuous or discrete.
+        domain: Domain,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+    },
+    /// State-space matrices, row by row.
+    StateSpace {
+        /// Continuous or discrete.
+        domain: Domain,
+        /// A, n x n.
+        a: Vec<Vec<f64>>,
+        /// B, n x m.
+        b: Vec<Vec<f64>>,
+        /// C, p x n.
+        c: Vec<Vec<f64>>,
+        /// D, p x m; zero when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        d: Option<Vec<Vec<f64>>>,
+    },
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB v5 file.
+    MatFile {
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+        /// Continuous or discrete.
+        domain: Domain,
+    },
+    /// The gas bearing (3)-(6), degraded by factors on all entries of A and B as in (27).
+    Bearing {
+        /// Parameters; those of the paper when absent.
+        #[serde(default)]
+        parameters: Bearing,
+        /// Factor on A.
+        a_factor: f64,
+        /// Factor on B.
+        b_factor: f64,
+    },
+}
+
+impl NominalModel {
+    /// The discrete-time nominal model at the sample time of the data, with balanced states where it was continuous.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the matrices, polynomials or file.
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+        match self {
+            NominalModel::TransferFunction { domain, numerator, denominator } => {
+                let (p, m) = numerator.shape();
+                let (num, den) = (numerator.spread(p, m), denominator.spread(p, m));
+                match domain {
+                    Domain::Continuous => StateSpace::transfer_matrix(&num, &den, Continuous)?.zoh(time),
+                    Domain::Discrete => StateSpace::transfer_matrix(&num, &den, time),
+                }
+            }
+            NominalModel::StateSpace { domain, a, b, c, d } => {
+                let (a, b, c) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?);
+                let d = d.as_ref().map_or_else(|| Ok(Mat::zeros(c.nrows(), b.ncols())), |d| matrix("D", d))?;
+                sampled([a, b, c, d], *domain, time)
+            }
+            NominalModel::MatFile { file, domain } => sampled(abcd_of(&folder.join(file))?, *domain, time),
+            NominalModel::Bearing { parameters, a_factor, b_factor } => {
+                degraded(&parameters.plant()?, *a_factor, *b_factor)?.zoh(time)
+            }
+        }
+    }
+}
+
+/// Which sign the controller was written down with; never guessed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Feedback {
+    /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
+    /// return them.
+    Negative,
+    /// `u = K (y - r)`; for observer gains `u = F x` and `x+ = A x + B u + L (C x + D u - y)`.
+    Positive,
+}
+
+impl Feedback {
+    /// The factor that turns a gain written in this convention into one of positive feedback.
+    fn sign(self) -> f64 {
+        match self {
+            Feedback::Negative => -1.0,
+            Feedback::Positive => 1.0,
+        }
+    }
+}
+
+/// The controller that ran while the data were logged, at the sample time of the data, in one of its usual forms. The
+/// sign convention is mandatory in each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ControllerSettings {
+    /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single
+    /// denominator is common to all entries.
+    DifferenceEquation {
+        /// Sign convention.
+        feedback: Feedback,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+    },
+    /// Discrete-time matrices, row by row.
+    StateSpace {
+        /// Sign convention.
+        feedback: Feedback,
+        /// Ak.
+        a: Vec<Vec<f64>>,
+        /// Bk.
+        b: Vec<Vec<f64>>,
+        /// Ck.
+        c: Vec<Vec<f64>>,
+        /// Dk.
+        d: Vec<Vec<f64>>,
+    },
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB v5 file, discrete-time.
+    MatFile {
+        /// Sign convention.
+        feedback: Feedback,
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
+    /// State feedback and observer gain for the discrete-time nominal model in its own states.
+    Observer {
+        /// Sign convention.
+        feedback: Feedback,
+        /// m x n.
+        state_feedback: Vec<Vec<f64>>,
+        /// n x p.
+        observer_gain: Vec<Vec<f64>>,
+    },
+}
+
+/// A controller in the library's convention, positive feedback.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Controller {
+    /// `u = K y`.
+    System(StateSpace<Discrete>),
+    /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
+    Observer {
+        /// m x n.
+        f: Mat<f64>,
+        /// n x p.
+        l: Mat<f64>,
+    },
+}
+
+impl ControllerSettings {
+    /// The controller with positive feedback.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the matrices, polynomials or file.
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+        let (feedback, system) = match self {
+            Self::DifferenceEquation { feedback, numerator, denominator } => {
+                let (p, m) = numerator.shape();
+                (feedback, StateSpace::difference_equation(&numerator.spread(p, m), &denominator.spread(p, m), time)?)
+            }
+            Self::StateSpace { feedback, a, b, c, d } => {
+                let (a, b, c, d) = (matrix("Ak", a)?, matrix("Bk", b)?, matrix("Ck", c)?, matrix("Dk", d)?);
+                (feedback, StateSpace::new(a, b, c, d, time)?)
+            }
+            Self::MatFile { feedback, file } => {
+                (feedback, sampled(abcd_of(&folder.join(file))?, Domain::Discrete, time)?)
+            }
+            Self::Observer { feedback, state_feedback, observer_gain } => {
+                let sign = Scale(feedback.sign());
+                let f = sign * matrix("state_feedback", state_feedback)?;
+                return Ok(Controller::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
+            }
+        };
+        Ok(Controller::System(if *feedback == Feedback::Negative { system.negated() } else { system }))
+    }
+}
+
+fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+    match domain {
+        Domain::Continuous => StateSpace::new(a, b, c, d, Continuous)?.zoh(time),
+        Domain::Discrete => StateSpace::new(a, b, c, d, time),
+    }
+}
+
+fn abcd_of(file: &Path) -> Result<[Mat<f64>; 4]> {
+    let variables = read_mat(file)?;
+    Ok([variables.matrix("a")?, variables.matrix("b")?, variables.matrix("c")?, variables.matrix("d")?])
+}
+
+fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
+    let columns = rows.first().map_or(0, Vec::len);
+    match rows.iter().position(|r| r.len() != columns) {
+        Some(bad) => Err(Error::Shape {
+            what: format!("row {} of the matrix {name}", bad + 1),
+            expected: (1, columns),
+            found: (1, rows[bad].len()),
+        }),
+        None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
+    }
+}

@@ -1,0 +1,157 @@
+//! The driver: from records, nominal model and controller to models with evidence. Read this file first.
+
+use super::factorise::{Factorisation, factorise};
+use super::records::RunRecords;
+use super::settings::RunSettings;
+use super::signals::{DeviationSignals, deviation_signals};
+use super::verdict::{Verdict, verify};
+use crate::Result;
+use crate::identify::direct::direct;
+use crate::identify::hansen::{HansenModel, hansen};
+use crate::identify::subspace::SubspaceModel;
+use crate::lti::{Discrete, StateSpace};
+use crate::reduce::{Reduction, reduce};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::time::Instant;
+
+/// A stage of a run, in the order in which data flow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Stage {
+    /// Records are read.
+    Record,
+    /// Coprime factors (13)-(15).
+    Factor,
+    /// alpha and beta (28).
+    Signals,
+    /// S and the direct model.
+    Identify,
+    /// `G_red(S)` (29).
+    Reduce,
+    /// Fits (26) and certificates.
+    Validate,
+    /// Artefacts are written.
+    Write,
+    /// The report is drawn.
+    Report,
+}
+
+impl Stage {
+    /// All stages in order.
+    pub const ALL: [Stage; 8] = [
+        Stage::Record,
+        Stage::Factor,
+        Stage::Signals,
+        Stage::Identify,
+        Stage::Reduce,
+        Stage::Validate,
+        Stage::Write,
+        Stage::Report,
+    ];
+
+    /// Name in summary.json and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Stage::Record => "record",
+            Stage::Factor => "factor",
+            Stage::Signals => "signals",
+            Stage::Identify => "identify",
+            Stage::Reduce => "reduce",
+            Stage::Validate => "validate",
+            Stage::Write => "write",
+            Stage::Report => "report",
+        }
+    }
+}
+
+/// Seconds that each stage took.
+pub type StageTimes = Vec<(Stage, f64)>;
+
+/// Announces stages and measures them.
+pub struct StageClock<'a> {
+    announce: &'a mut dyn FnMut(Stage),
+    /// Stages finished so far.
+    pub seconds: StageTimes,
+}
+
+impl<'a> StageClock<'a> {
+    /// A clock that calls `announce` at the start of each stage.
+    pub fn new(announce: &'a mut dyn FnMut(Stage)) -> Self {
+        StageClock { announce, seconds: Vec::new() }
+    }
+
+    /// Runs one stage.
+    pub fn run<T>(&mut self, stage: Stage, work: impl FnOnce() -> T) -> T {
+        (self.announce)(stage);
+        let start = Instant::now();
+        let result = work();
+        self.seconds.push((stage, start.elapsed().as_secs_f64()));
+        result
+    }
+}
+
+/// Everything that a run found.
+#[derive(Debug)]
+pub struct Identification {
+    /// What was asked for.
+    pub settings: RunSettings,
+    /// The records.
+    pub records: RunRecords,
+    /// The nominal model as given, in its own states.
+    pub nominal: StateSpace<Discrete>,
+    /// Factors and controller.
+    pub factorisation: Factorisation,
+    /// alpha and beta of the estimation records.
+    pub signals: DeviationSignals,
+    /// S and G(S).
+    pub hansen: HansenModel,
+    /// `G_red(S)` where it was asked for, or the reason why there is none.
+    pub reduction: Option<Result<Reduction<Discrete>>>,
+    /// The direct model where it was asked for, or the reason why there is none.
+    pub direct: Option<Result<SubspaceModel>>,
+    /// Evidence on every model.
+    pub verdict: Verdict,
+}
+
+/// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
+///
+/// A reduction or a direct model that is impossible does not end the run: the reason stands in its place.
+///
+/// # Errors
+/// Whatever makes the scheme itself impossible; see the functions called here in turn.
+pub fn identify(
+    settings: RunSettings,
+    records: RunRecords,
+    folder: &Path,
+    clock: &mut StageClock<'_>,
+) -> Result<Identification> {
+    let nominal = settings.nominal.realise(folder, records.time)?;
+    let controller = settings.controller.realise(folder, records.time)?;
+    let factorisation =
+        clock.run(Stage::Factor, || factorise(&nominal, &controller, &records, &settings.factors))?; // (13)-(15)
+    let factors = &factorisation.factors;
+    let signals =
+        clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
+    let (hansen, direct) = clock.run(Stage::Identify, || {
+        rayon::join(
+            || hansen(factors, &signals.experiments, &settings.hansen), // (25), (17)
+            || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
+        )
+    });
+    let hansen = hansen?;
+    let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
+    let mut found = Identification {
+        verdict: Verdict::default(),
+        settings,
+        records,
+        nominal,
+        factorisation,
+        signals,
+        hansen,
+        reduction,
+        direct,
+    };
+    found.verdict = clock.run(Stage::Validate, || verify(&found))?; // (26) and the loop certificate
+    Ok(found)
+}

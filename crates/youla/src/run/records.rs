@@ -1,0 +1,173 @@
+//! The records of a run: read, cut, detrended, and split by the meaning of their channels.
+
+use super::settings::{DataFile, DataSettings};
+use crate::identify::subspace::Experiment;
+use crate::lti::{Discrete, StateSpace};
+use crate::record::{ChannelSpec, CsvOptions, Format, Record, Source, TimeSource, read, sha256};
+use crate::units::Channel;
+use crate::{Error, Mat, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// One record of a machine under feedback, samples x channels each.
+#[derive(Debug, Clone)]
+pub struct LoopRecord {
+    /// Name in reports.
+    pub name: String,
+    /// Clock of the samples.
+    pub time: Discrete,
+    /// Plant input as applied, samples x m.
+    pub u: Mat<f64>,
+    /// Measured output, samples x p.
+    pub y: Mat<f64>,
+    /// Known excitation added at the plant input, samples x m.
+    pub input_excitation: Option<Mat<f64>>,
+    /// Known reference, samples x p.
+    pub reference: Option<Mat<f64>>,
+    /// Known excitation alpha of Fig. 3, samples x m.
+    pub alpha: Option<Mat<f64>>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// Path as given in run.toml.
+    pub path: String,
+    /// `estimation` or `verification`.
+    pub purpose: String,
+    /// SHA-256 of its bytes; empty for simulated records.
+    pub sha256: String,
+}
+
+/// All records of a run.
+#[derive(Debug, Clone)]
+pub struct RunRecords {
+    /// Clock common to all records.
+    pub time: Discrete,
+    /// Plant inputs.
+    pub inputs: Vec<Channel>,
+    /// Plant outputs.
+    pub outputs: Vec<Channel>,
+    /// Records to identify from.
+    pub estimation: Vec<LoopRecord>,
+    /// Records to verify on.
+    pub verification: Vec<LoopRecord>,
+    /// Where they came from.
+    pub sources: Vec<SourceFile>,
+    /// The plant itself, known in simulations only.
+    pub true_plant: Option<StateSpace<Discrete>>,
+}
+
+impl RunRecords {
+    /// The estimation records as (u, y).
+    pub fn experiments(&self) -> Vec<Experiment<'_>> {
+        self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()
+    }
+}
+
+/// Reads all records that the settings name, files in parallel; paths are relative to `folder`.
+///
+/// # Errors
+/// The first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
+pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords> {
+    let purposes = [("estimation", &settings.estimation), ("verification", &settings.verification)];
+    let files: Vec<(&str, &DataFile)> =
+        purposes.iter().flat_map(|(purpose, files)| files.iter().map(move |f| (*purpose, f))).collect();
+    let read: Vec<Result<(LoopRecord, SourceFile)>> =
+        files.par_iter().map(|(purpose, file)| read_file(settings, folder, purpose, file)).collect();
+    let (mut records, mut sources) = (Vec::new(), Vec::new());
+    for one in read {
+        let (record, source) = one?;
+        records.push(record);
+        sources.push(source);
+    }
+    let time = records[0].time;
+    for (record, source) in records.iter().zip(&sources) {
+        if (record.time.ts() / time.ts() - 1.0).abs() > settings.time_tolerance {
+            let what = format!("{} and {}", sources[0].path, source.path);
+            return Err(Error::SampleTimeMismatch { what, left: time.ts(), right: record.time.ts() });
+        }
+    }
+    let verification = records.split_off(settings.estimation.len());
+    let channels = |specs: &[ChannelSpec]| specs.iter().map(|s| Channel::new(&s.name, &s.unit)).collect();
+    Ok(RunRecords {
+        time,
+        inputs: channels(&settings.inputs),
+        outputs: channels(&settings.outputs),
+        estimation: records,
+        verification,
+        sources,
+        true_plant: None,
+    })
+}
+
+fn read_file(
+    settings: &DataSettings,
+    folder: &Path,
+    purpose: &str,
+    file: &DataFile,
+) -> Result<(LoopRecord, SourceFile)> {
+    let path = folder.join(&file.file);
+    let groups = [
+        &settings.inputs,
+        &settings.outputs,
+        &settings.input_excitation,
+        &settings.reference,
+        &settings.alpha,
+    ];
+    let source = Source {
+        path: path.clone(),
+        format: Format::Detect,
+        time: TimeSource {
+            column: settings.time_column.clone(),
+            ts: settings.sample_time,
+            tolerance: settings.time_tolerance,
+        },
+        channels: groups.iter().flat_map(|g| g.iter().cloned()).collect(),
+        csv: CsvOptions::default(),
+    };
+    let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
+    let source = SourceFile {
+        path: file.file.display().to_string(),
+        purpose: purpose.to_owned(),
+        sha256: sha256(&path)?,
+    };
+    Ok((LoopRecord::from_record(&record, file.label(), groups)?, source))
+}
+
+impl LoopRecord {
+    fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
+        let matrix = |group: &[ChannelSpec]| {
+            let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();
+            record.matrix(&names)
+        };
+        let optional = |group: &[ChannelSpec]| if group.is_empty() { Ok(None) } else { matrix(group).map(Some) };
+        let [inputs, outputs, input_excitation, reference, alpha] = groups;
+        Ok(LoopRecord {
+            name,
+            time: record.time(),
+            u: matrix(inputs)?,
+            y: matrix(outputs)?,
+            input_excitation: optional(input_excitation)?,
+            reference: optional(reference)?,
+            alpha: optional(alpha)?,
+        })
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.u.nrows()
+    }
+}
+
+/// Root mean square of each channel over several records, 1 for a channel that is zero throughout.
+pub(super) fn rms<'a>(records: impl Iterator<Item = &'a Mat<f64>> + Clone, channels: usize) -> Vec<f64> {
+    let samples: usize = records.clone().map(|r| r.nrows()).sum();
+    (0..channels)
+        .map(|j| {
+            let energy: f64 = records.clone().map(|r| r.col(j).squared_norm_l2()).sum();
+            if energy > 0.0 { (energy / samples as f64).sqrt() } else { 1.0 }
+        })
+        .collect()
+}

@@ -1,0 +1,267 @@
+//! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
+
+use super::models::{ControllerSettings, NominalModel};
+use crate::identify::subspace::SubspaceOptions;
+use crate::record::{ChannelRef, ChannelSpec, Detrend};
+use crate::reduce::ReductionOptions;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+
+/// The whole of run.toml.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// Name of the machine or of the experiment; titles and file names use it.
+    pub name: String,
+    /// Where the records are and what their channels mean.
+    pub data: DataSettings,
+    /// The nominal model G(0).
+    pub nominal: NominalModel,
+    /// The controller that ran while the data were logged.
+    pub controller: ControllerSettings,
+    /// How the coprime factors are built.
+    #[serde(default)]
+    pub factors: FactorSettings,
+    /// Identification of S from (alpha, beta).
+    #[serde(default)]
+    pub hansen: SubspaceOptions,
+    /// Direct identification from (u, y), for comparison; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direct: Option<SubspaceOptions>,
+    /// Reduction of G(S); left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduction: Option<ReductionOptions>,
+    /// How models are held against the verification records.
+    #[serde(default)]
+    pub verification: VerificationSettings,
+    /// Frequency responses.
+    #[serde(default)]
+    pub frequency_response: FrequencySettings,
+    /// Seed of a simulated record; absent for measured data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+}
+
+/// Records and the meaning of their channels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataSettings {
+    /// Sample time in seconds; this or `time_column` must be given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_time: Option<f64>,
+    /// Column with the time in seconds.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_column: Option<ChannelRef>,
+    /// Greatest deviation of a time step, as a part of the sample time.
+    #[serde(default = "default_tolerance")]
+    pub time_tolerance: f64,
+    /// Plant inputs u as applied, after saturation.
+    pub inputs: Vec<ChannelSpec>,
+    /// Measured plant outputs y.
+    pub outputs: Vec<ChannelSpec>,
+    /// Known excitation added at the plant input, one channel per input.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub input_excitation: Vec<ChannelSpec>,
+    /// Known reference r, one channel per output.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reference: Vec<ChannelSpec>,
+    /// Known excitation alpha of Fig. 3, one channel per input.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alpha: Vec<ChannelSpec>,
+    /// What is removed from u and y before identification.
+    #[serde(default)]
+    pub detrend: Detrend,
+    /// Records to identify from; several files are several experiments.
+    pub estimation: Vec<DataFile>,
+    /// Records to verify on; never used for identification.
+    #[serde(default)]
+    pub verification: Vec<DataFile>,
+}
+
+fn default_tolerance() -> f64 {
+    1e-3
+}
+
+/// One file, or a part of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DataFile {
+    /// Path, relative to run.toml.
+    pub file: PathBuf,
+    /// Samples skipped at the start.
+    #[serde(default)]
+    pub skip: usize,
+    /// Samples used after that; all when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub take: Option<usize>,
+    /// Name in reports; the file's name when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+impl DataFile {
+    /// Name in reports and in summary.json.
+    pub fn label(&self) -> String {
+        let stem = || {
+            let name = self.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            name.split('.').next().unwrap_or_default().to_owned()
+        };
+        self.name.clone().unwrap_or_else(stem)
+    }
+}
+
+/// How the factors of an arbitrary controller are built (`CoprimeFactors::stacked` or `shifted_to`).
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Construction {
+    /// Right factors of plant and controller stacked, then inverted.
+    #[default]
+    Stacked,
+    /// Observer-based factors of the plant, shifted by Q.
+    Shifted,
+}
+
+/// Options of the coprime factors.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FactorSettings {
+    /// For controllers that are not given as observer gains.
+    pub construction: Construction,
+    /// Weight of the inputs against the outputs in the LQR that chooses F; both are measured in their rms on the
+    /// estimation records.
+    pub input_weight: f64,
+    /// Covariance of the output noise against that of the inputs in the Kalman predictor that chooses L (shifted
+    /// construction only), both in rms of the estimation records.
+    pub output_noise: f64,
+    /// Samples of alpha and beta dropped at the start of each record, where the signal filter starts from an unknown
+    /// state; when absent, until its slowest transient has decayed to 1e-3.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settle: Option<usize>,
+}
+
+impl Default for FactorSettings {
+    fn default() -> Self {
+        FactorSettings { construction: Construction::default(), input_weight: 1.0, output_noise: 1.0, settle: None }
+    }
+}
+
+/// How a model predicts a verification record.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Prediction {
+    /// The model under the actual controller, driven by the known excitations alone. The only fair test for unstable or
+    /// integrating plants.
+    ClosedLoop,
+    /// The model driven by the measured u, initial state estimated.
+    #[default]
+    OpenLoop,
+}
+
+/// Options of the verification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct VerificationSettings {
+    /// What drives the models.
+    pub prediction: Prediction,
+    /// Samples at the start of each record that do not count in the fit (transient of unknown initial states).
+    pub skip: usize,
+}
+
+/// Options of the frequency responses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct FrequencySettings {
+    /// Samples per window of the non-parametric estimate (Welch, Hann).
+    pub window: usize,
+    /// Overlap of windows, as a part of a window.
+    pub overlap: f64,
+    /// Lowest frequency shown, Hz; a decade below the resolution of a window when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub from_hz: Option<f64>,
+    /// Number of frequencies of the models' curves, spaced logarithmically up to Nyquist.
+    pub points: usize,
+}
+
+impl Default for FrequencySettings {
+    fn default() -> Self {
+        FrequencySettings { window: 4096, overlap: 0.5, from_hz: None, points: 400 }
+    }
+}
+
+impl RunSettings {
+    /// Reads run.toml.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] with line and column, and the nearest known key for a misspelt one; [`Error::Io`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        Self::parse(&text, path)
+    }
+
+    /// Parses the text of run.toml; `path` is named in errors.
+    ///
+    /// # Errors
+    /// [`Error::Settings`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let settings: Self = toml::from_str(text).map_err(|e| settings_error(&e, text, path))?;
+        settings.check(path)?;
+        Ok(settings)
+    }
+
+    /// The same settings as TOML.
+    ///
+    /// # Errors
+    /// [`Error::Settings`] for values that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self).map_err(|e| Error::Settings {
+            path: PathBuf::from("run.toml"),
+            line: 0,
+            column: 0,
+            problem: e.to_string(),
+        })
+    }
+
+    fn check(&self, path: &Path) -> Result<()> {
+        let problem = |problem: String| {
+            Err(Error::Settings { path: path.to_owned(), line: 0, column: 0, problem })
+        };
+        let d = &self.data;
+        if d.sample_time.is_none() && d.time_column.is_none() {
+            return problem("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
+        }
+        if d.estimation.is_empty() {
+            return problem("[data] names no estimation record; add [[data.estimation]] with a file".into());
+        }
+        for (key, channels, wanted) in [
+            ("inputs", d.inputs.len(), d.inputs.len().max(1)),
+            ("outputs", d.outputs.len(), d.outputs.len().max(1)),
+            ("input_excitation", d.input_excitation.len(), d.inputs.len()),
+            ("alpha", d.alpha.len(), d.inputs.len()),
+            ("reference", d.reference.len(), d.outputs.len()),
+        ] {
+            if channels != wanted && !(channels == 0 && !matches!(key, "inputs" | "outputs")) {
+                return problem(format!("[data] {key} has {channels} channels, but must have {wanted}"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Turns the parser's error into one sentence with line, column and the nearest known key.
+fn settings_error(error: &toml::de::Error, text: &str, path: &Path) -> Error {
+    let before = &text[..error.span().map_or(0, |s| s.start.min(text.len()))];
+    let line = before.matches('\n').count() + 1;
+    let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+    let message = error.message();
+    let mut problem = message.to_owned();
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        let mut words = message.split('`').skip(1).step_by(2);
+        let unknown = words.next().unwrap_or_default();
+        let nearest = words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
+        if let Some(nearest) = nearest {
+            problem = format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})");
+        }
+    }
+    Error::Settings { path: path.to_owned(), line, column, problem }
+}

@@ -1,0 +1,75 @@
+//! alpha and beta of the estimation records, with the transient of the filter dropped and the controller checked.
+
+use super::records::LoopRecord;
+use crate::factor::{CoprimeFactors, YoulaSignals};
+use crate::lti::Discrete;
+use crate::{Error, Mat, Result};
+use faer::Scale;
+
+/// Signals of the deviation system for all estimation records.
+#[derive(Debug, Clone)]
+pub struct DeviationSignals {
+    /// One pair per record, after the settling samples.
+    pub experiments: Vec<YoulaSignals>,
+    /// The part of alpha that the known excitations cause, per record, after the settling samples; empty where no
+    /// excitation is known.
+    pub expected_alpha: Vec<Mat<f64>>,
+    /// Samples dropped at the start of each record.
+    pub settle: usize,
+    /// `||alpha - expected|| / ||expected||` over all records: 0 when the declared controller is the one that ran and
+    /// nothing else (saturation, unknown excitation) acted. `None` where no excitation is known.
+    pub controller_mismatch: Option<f64>,
+}
+
+/// Filters every estimation record by the left factors. alpha is always taken from the **measured** u and y, so that
+/// saturation and unknown excitations are accounted for; known excitations serve as a check of the controller.
+///
+/// # Errors
+/// [`Error::TooShort`] for a record that the settling samples use up; shapes.
+pub fn deviation_signals(
+    factors: &CoprimeFactors<Discrete>,
+    records: &[LoopRecord],
+    settle: Option<usize>,
+) -> Result<DeviationSignals> {
+    let settle = settle.map_or_else(|| factors.settling_samples(SETTLED), Ok)?;
+    let mut experiments = Vec::new();
+    let mut expected_alpha = Vec::new();
+    for record in records {
+        if record.samples() <= settle {
+            return Err(Error::TooShort { record: record.name.clone(), samples: record.samples(), settle });
+        }
+        let kept = |m: &Mat<f64>| m.subrows(settle, m.nrows() - settle).to_owned();
+        let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        experiments.push(YoulaSignals { alpha: kept(&signals.alpha), beta: kept(&signals.beta) });
+        if let Some(expected) = expected(factors, record)? {
+            expected_alpha.push(kept(&expected));
+        }
+    }
+    let controller_mismatch = (!expected_alpha.is_empty()).then(|| {
+        let pairs = || experiments.iter().zip(&expected_alpha);
+        let miss: f64 = pairs().map(|(s, e)| (&s.alpha - e).squared_norm_l2()).sum();
+        let size: f64 = pairs().map(|(_, e)| e.squared_norm_l2()).sum();
+        (miss / size).sqrt()
+    });
+    Ok(DeviationSignals { experiments, expected_alpha, settle, controller_mismatch })
+}
+
+/// Fraction to which the slowest transient of the filter must have decayed.
+const SETTLED: f64 = 1e-3;
+
+/// `alpha + Vt v1 - Ut r` of the known excitations.
+fn expected(factors: &CoprimeFactors<Discrete>, record: &LoopRecord) -> Result<Option<Mat<f64>>> {
+    let outside = match (&record.input_excitation, &record.reference) {
+        (None, None) => None,
+        (v1, r) => {
+            let v1 = v1.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.inputs()));
+            let r = r.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.outputs()));
+            Some(factors.alpha_of_excitation(v1.as_ref(), (Scale(-1.0) * &r).as_ref())?)
+        }
+    };
+    Ok(match (&record.alpha, outside) {
+        (Some(alpha), Some(outside)) => Some(alpha + outside),
+        (Some(alpha), None) => Some(alpha.clone()),
+        (None, outside) => outside,
+    })
+}

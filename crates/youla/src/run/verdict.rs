@@ -1,0 +1,160 @@
+//! The evidence on every model of a run: fit (26) on verification records, loop certificate, modes.
+
+use super::pipeline::Identification;
+use super::records::LoopRecord;
+use super::settings::Prediction;
+use crate::lti::{Discrete, Mode, StateSpace};
+use crate::validate::{
+    LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf,
+};
+use crate::{Error, Mat, Result, c64};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// A model of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// G(0).
+    Nominal,
+    /// Subspace identification from (u, y).
+    Direct,
+    /// G(S).
+    Hansen,
+    /// `G_red(S)`.
+    HansenReduced,
+    /// The simulated plant itself; in simulations only.
+    TruePlant,
+}
+
+impl Method {
+    /// Key in summary.json and in file names.
+    pub fn key(self) -> &'static str {
+        match self {
+            Method::Nominal => "nominal",
+            Method::Direct => "direct",
+            Method::Hansen => "hansen",
+            Method::HansenReduced => "hansen_reduced",
+            Method::TruePlant => "true_plant",
+        }
+    }
+
+    /// Name in tables and figures.
+    pub fn label(self) -> &'static str {
+        match self {
+            Method::Nominal => "nominal G(0)",
+            Method::Direct => "direct N4SID",
+            Method::Hansen => "Hansen G(S)",
+            Method::HansenReduced => "Hansen reduced G_red(S)",
+            Method::TruePlant => "true plant",
+        }
+    }
+}
+
+/// Prediction of one verification record by one model.
+#[derive(Debug, Clone)]
+pub struct RecordVerdict {
+    /// Name of the record.
+    pub record: String,
+    /// Predicted outputs, samples x p, or why there are none (a model that diverges).
+    pub predicted: Result<Mat<f64>, String>,
+    /// Fit (26) per output, percent; NaN where there is no prediction.
+    pub fit: Vec<f64>,
+    /// Variance accounted for per output, percent; NaN where there is no prediction.
+    pub vaf: Vec<f64>,
+}
+
+/// What is known of one model.
+#[derive(Debug, Clone)]
+pub struct ModelVerdict {
+    /// Which model.
+    pub method: Method,
+    /// The model.
+    pub model: StateSpace<Discrete>,
+    /// Its poles.
+    pub poles: Vec<c64>,
+    /// Its modes.
+    pub modes: Vec<Mode>,
+    /// Its loop with the controller that ran.
+    pub certificate: LoopCertificate,
+    /// One entry per verification record.
+    pub records: Vec<RecordVerdict>,
+}
+
+/// The evidence on all models, in the order nominal, direct, Hansen, reduced.
+#[derive(Debug, Clone, Default)]
+pub struct Verdict {
+    /// One entry per model that exists.
+    pub models: Vec<ModelVerdict>,
+}
+
+impl Verdict {
+    /// The entry of a method, `None` where there is no such model.
+    pub fn of(&self, method: Method) -> Option<&ModelVerdict> {
+        self.models.iter().find(|m| m.method == method)
+    }
+}
+
+/// Holds every model of a run against the verification records and the controller; models in parallel.
+///
+/// # Errors
+/// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
+pub fn verify(found: &Identification) -> Result<Verdict> {
+    let mut models = vec![(Method::Nominal, &found.nominal)];
+    if let Some(Ok(direct)) = &found.direct {
+        models.push((Method::Direct, &direct.model));
+    }
+    models.push((Method::Hansen, &found.hansen.plant));
+    if let Some(Ok(reduction)) = &found.reduction {
+        models.push((Method::HansenReduced, &reduction.model));
+    }
+    if let Some(plant) = &found.records.true_plant {
+        models.push((Method::TruePlant, plant));
+    }
+    let verdicts: Vec<Result<ModelVerdict>> =
+        models.par_iter().map(|(method, model)| verify_model(found, *method, model)).collect();
+    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()? })
+}
+
+fn verify_model(found: &Identification, method: Method, model: &StateSpace<Discrete>) -> Result<ModelVerdict> {
+    let records = found.records.verification.iter().map(|r| verify_record(found, model, r)).collect::<Result<_>>()?;
+    Ok(ModelVerdict {
+        method,
+        model: model.clone(),
+        poles: model.poles()?,
+        modes: model.modes()?,
+        certificate: certify(model, &found.factorisation.controller)?,
+        records,
+    })
+}
+
+fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &LoopRecord) -> Result<RecordVerdict> {
+    let predicted = match found.settings.verification.prediction {
+        Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), record.y.as_ref()),
+        Prediction::ClosedLoop => {
+            let excitation = LoopExcitation {
+                input: record.input_excitation.as_ref().map(|v| v.as_ref()),
+                reference: record.reference.as_ref().map(|r| r.as_ref()),
+            };
+            predict_closed_loop(model, &found.factorisation.controller, excitation, record.samples())
+        }
+    };
+    let skip = found.settings.verification.skip;
+    if record.samples() <= skip {
+        return Err(Error::TooShort { record: record.name.clone(), samples: record.samples(), settle: skip });
+    }
+    let record_name = record.name.clone();
+    match predicted {
+        Ok(predicted) => {
+            let counted = |m: &Mat<f64>| m.subrows(skip, m.nrows() - skip).to_owned();
+            let (y, yp) = (counted(&record.y), counted(&predicted));
+            let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
+            Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf })
+        }
+        Err(e @ Error::Diverged { .. }) => {
+            let none = vec![f64::NAN; record.y.ncols()];
+            Ok(RecordVerdict { record: record_name, predicted: Err(e.to_string()), fit: none.clone(), vaf: none })
+        }
+        Err(e) => Err(e),
+    }
+}

@@ -1,0 +1,99 @@
+//! Prediction of a record by a model: from the measured input, or in closed loop from the excitations alone.
+
+use crate::control::{closed_loop, with_input_port};
+use crate::linalg::{block, check_shape};
+use crate::lti::{Discrete, StateSpace, simulate};
+use crate::{Mat, MatRef, Result};
+use faer::Scale;
+use faer::prelude::*;
+
+/// The known signals that enter a loop `u = K (y - r) + v1` (positive feedback) from outside.
+#[derive(Debug, Clone, Copy)]
+pub struct LoopExcitation<'a> {
+    /// Added at the plant input, samples x m.
+    pub input: Option<MatRef<'a, f64>>,
+    /// Reference r, samples x p.
+    pub reference: Option<MatRef<'a, f64>>,
+}
+
+/// Simulates a model from the measured input, with the initial state that fits the measured output best:
+///
+/// ```text
+/// min over x0 of sum |y(k) - yp(k)|^2,    x(k+1) = A x(k) + B u(k),  yp(k) = C x(k) + D u(k)
+/// ```
+///
+/// # Errors
+/// [`crate::Error::Shape`]; [`crate::Error::Diverged`] when an unstable model leaves the range of the numbers.
+pub fn predict_open_loop(
+    model: &StateSpace<Discrete>,
+    u: MatRef<'_, f64>,
+    y: MatRef<'_, f64>,
+) -> Result<Mat<f64>> {
+    check_shape("the record of measured outputs", y, (u.nrows(), model.outputs()))?;
+    let forced = simulate(model, u, &vec![0.0; model.order()])?;
+    let residual = y - &forced;
+    let x0 = initial_state(model, residual.as_ref());
+    simulate(model, u, &x0)
+}
+
+/// Simulates a model under its controller (`u = K y`, positive feedback) from the known excitations alone, from rest. The
+/// measured signals are not used, so that neither noise nor drift of an integrating or unstable plant enters.
+///
+/// # Errors
+/// Ports, sample times, [`crate::Error::Diverged`] when the controller does not stabilise the model.
+pub fn predict_closed_loop(
+    model: &StateSpace<Discrete>,
+    controller: &StateSpace<Discrete>,
+    excitation: LoopExcitation<'_>,
+    samples: usize,
+) -> Result<Mat<f64>> {
+    let (m, p) = (model.inputs(), model.outputs());
+    let v1 = excitation.input.map_or_else(|| Mat::zeros(samples, m), |v| v.to_owned());
+    let r = excitation.reference.map_or_else(|| Mat::zeros(samples, p), |r| r.to_owned());
+    check_shape("the excitation at the plant input", v1.as_ref(), (samples, m))?;
+    check_shape("the reference", r.as_ref(), (samples, p))?;
+    let closed = closed_loop(model, &with_input_port(controller)?)?;
+    let from_outside = block(&[&[v1.as_ref(), (Scale(-1.0) * &r).as_ref()]]);
+    let z = simulate(&closed, from_outside.as_ref(), &vec![0.0; closed.order()])?;
+    Ok(z.subcols(m, p) + r)
+}
+
+/// Least-squares initial state of the free response `C A^k x0`. Samples after the response has decayed to 1e-9 of its
+/// start carry no information and are not visited.
+fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec<f64> {
+    let (n, p) = (model.order(), model.outputs());
+    if n == 0 {
+        return Vec::new();
+    }
+    let mut powers = model.c().to_owned();
+    let floor = 1e-9 * powers.norm_max();
+    let mut r = Mat::<f64>::zeros(n, n + 1);
+    let mut start = 0;
+    while start < residual.nrows() && powers.norm_max() > floor && powers.norm_max().is_finite() {
+        let rows = CHUNK.min(residual.nrows() - start);
+        let mut stacked = Mat::<f64>::zeros(n + rows * p, n + 1);
+        stacked.as_mut().subrows_mut(0, n).copy_from(&r);
+        for k in 0..rows {
+            let top = n + k * p;
+            stacked.as_mut().submatrix_mut(top, 0, p, n).copy_from(&powers);
+            for i in 0..p {
+                stacked[(top + i, n)] = residual[(start + k, i)];
+            }
+            powers = &powers * model.a();
+        }
+        let factor = stacked.qr().R().to_owned();
+        r = Mat::from_fn(n, n + 1, |i, j| if i <= j && i < factor.nrows() { factor[(i, j)] } else { 0.0 });
+        start += rows;
+    }
+    // The singular value decomposition settles states that the outputs do not show: they stay zero.
+    match r.subcols(0, n).thin_svd() {
+        Ok(svd) => {
+            let x0 = svd.pseudoinverse() * r.col(n);
+            (0..n).map(|i| x0[i]).collect()
+        }
+        Err(_) => vec![0.0; n],
+    }
+}
+
+/// Samples per block of the streaming least squares.
+const CHUNK: usize = 256;

@@ -1,0 +1,308 @@
+//! The identities of the doubly coprime factors and of the Youla parametrisation, eqs (13)-(25), each as a number.
+//!
+//! Tolerances: 1e-12 relative for the bearing (continuous and at 5 kHz, states balanced), 1e-9 for random non-square and
+//! unstable plants. Negative controls show that a wrong sign cannot pass.
+#![allow(missing_docs)]
+
+mod common;
+
+use common::*;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use youla::control::{RiccatiDomain, closed_loop, observer_controller, with_input_port};
+use youla::factor::CoprimeFactors;
+use youla::lti::{Continuous, Discrete, Partitioned, StateSpace, TimeDomain, simulate};
+use youla::{Mat, MatRef, c64};
+
+const BEARING: f64 = 1e-12;
+const RANDOM: f64 = 1e-9;
+
+/// One nominal plant with its observer-based factors, and how exactly they must hold.
+struct Loop<T: TimeDomain> {
+    name: String,
+    nominal: StateSpace<T>,
+    f: Mat<f64>,
+    l: Mat<f64>,
+    factors: CoprimeFactors<T>,
+    omega: Vec<f64>,
+    tolerance: f64,
+}
+
+impl<T: TimeDomain + RiccatiDomain> Loop<T> {
+    fn new(name: impl Into<String>, nominal: StateSpace<T>, centre: f64, tolerance: f64) -> Self {
+        let (f, l) = gains(&nominal);
+        let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref()).unwrap();
+        let omega = grid_of(nominal.time(), centre);
+        Loop { name: name.into(), nominal, f, l, factors, omega, tolerance }
+    }
+
+    fn random(seed: u64, time: T) -> Self {
+        let mut rng = rng(seed);
+        let shape = (rng.random_range(1..=20), rng.random_range(1..=3), rng.random_range(1..=3));
+        let nominal = random_system(&mut rng, shape, 1.2, time);
+        Self::new(format!("random {shape:?}, {time:?}, seed {seed}"), nominal, 1.0, RANDOM)
+    }
+
+    fn holds(&self, what: &str, error: f64) {
+        assert!(error <= self.tolerance, "{}: {what} misses by {error:.1e}", self.name);
+    }
+
+    fn same(&self, what: &str, x: &StateSpace<T>, y: &StateSpace<T>) {
+        self.holds(what, distance(x, y, &self.omega));
+    }
+
+    /// A random stable S with feedthrough, small enough that the loop with S stays well posed.
+    fn deviation(&self, rng: &mut ChaCha8Rng, order: usize) -> StateSpace<T> {
+        random_stable(rng, (order, self.nominal.inputs(), self.nominal.outputs()), self.nominal.time())
+    }
+}
+
+/// Runs a check on the bearing (stable and unstable, continuous and sampled).
+fn on_bearing(check: impl Fn(&Loop<Continuous>), check_sampled: impl Fn(&Loop<Discrete>)) {
+    for (cross_coupling, label) in [(0.0, "stable bearing"), (0.25, "unstable bearing")] {
+        let plant = bearing(cross_coupling);
+        check_sampled(&Loop::new(format!("{label}, 5 kHz"), sampled(&plant), 1300.0, BEARING));
+        check(&Loop::new(label, plant, 1300.0, BEARING));
+    }
+}
+
+fn factor_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
+    l.holds("(15) Bezout in both orders", l.factors.bezout_residual(&l.omega).unwrap());
+    let k = observer_controller(&l.nominal, l.f.as_ref(), l.l.as_ref()).unwrap();
+    l.same("K of J_K against the observer-based controller", &k, &l.factors.controller().unwrap());
+    let u_over_v = stack(&l.factors.v(), &l.factors.u());
+    l.same("(14) K = U V^-1", &k, &right_quotient(&u_over_v, l.nominal.outputs()));
+    let n_over_m = stack(&l.factors.m(), &l.factors.n());
+    l.same("(13) G = N M^-1", &l.nominal, &right_quotient(&n_over_m, l.nominal.inputs()));
+    let product = l.nominal.then(&l.factors.m_t()).unwrap();
+    l.same("(13) Mt G = Nt", &product, &l.factors.n_t());
+    let product = k.then(&l.factors.v_t()).unwrap();
+    l.same("(14) Vt K = Ut", &product, &l.factors.u_t());
+}
+
+fn star_product<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
+    let star = l.factors.j_g().unwrap().star(&l.factors.j_k().unwrap()).unwrap();
+    let (m, p) = (l.nominal.inputs(), l.nominal.outputs());
+    let swap = Mat::from_fn(m + p, m + p, |i, j| f64::from(j == (i + p) % (m + p)));
+    let expected = StateSpace::gain(swap, l.nominal.time()).unwrap();
+    l.same("(24) J_G * J_K = [0 I; I 0] from (epsilon, alpha) to (eta, beta)", &expected, star.system());
+    let hidden = star.system().poles().unwrap();
+    let (right, left) = (l.factors.right().system().poles().unwrap(), l.factors.left().system().poles().unwrap());
+    // Eigenvalues of a random matrix of order 40 are only as well conditioned as its eigenvectors.
+    let error = spectrum_distance(hidden, [right, left].concat());
+    assert!(error <= 1e-6, "{}: hidden modes of the star product miss by {error:.1e}", l.name);
+}
+
+fn deviation_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+    for order in [0, 1, 5] {
+        let s = l.deviation(rng, order);
+        let g = l.factors.plant_of(&s).unwrap();
+        assert_eq!(g.order(), l.nominal.order() + order, "G(S) is one LFT of order n + n_S");
+        l.same("(16) against (18)", &g, &l.factors.plant_of_right(&s).unwrap());
+        l.same("(17) against (18)", &g, &l.factors.plant_of_left(&s).unwrap());
+        let back = l.factors.deviation_of(&g).unwrap();
+        l.same("S(G(S)) = S", &s, &back);
+        l.same("G(S(G)) = G", &g, &l.factors.plant_of(&back).unwrap());
+    }
+}
+
+fn arbitrary_controller<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+    // K(Q) for a random stable Q is a controller that is not observer-based for these F and L.
+    let q = random_stable(rng, (3, l.nominal.outputs(), l.nominal.inputs()), l.nominal.time());
+    let k = l.factors.controller_of(&q).unwrap();
+    let shifted = l.factors.shifted_to(&k).unwrap();
+    l.holds("(15) of shifted factors", shifted.bezout_residual(&l.omega).unwrap());
+    l.same("K of shifted factors", &k, &shifted.controller().unwrap());
+    let unit = |n: usize| Mat::<f64>::identity(n, n);
+    let weights = youla::control::LqrWeights { q: unit(k.order()), r: unit(k.inputs()), s: None };
+    let fk = youla::control::lqr(&k, &weights).unwrap().f;
+    let stacked = CoprimeFactors::stacked(&l.nominal, &k, l.f.as_ref(), fk.as_ref()).unwrap();
+    l.holds("(15) of stacked factors", stacked.bezout_residual(&l.omega).unwrap());
+    l.same("K of stacked factors", &k, &stacked.controller().unwrap());
+    let s = l.deviation(rng, 4);
+    for factors in [&shifted, &stacked] {
+        let g = factors.plant_of(&s).unwrap();
+        l.same("(16) against (18), arbitrary K", &g, &factors.plant_of_right(&s).unwrap());
+        l.same("(17) against (18), arbitrary K", &g, &factors.plant_of_left(&s).unwrap());
+        l.same("S(G(S)) = S, arbitrary K", &s, &factors.deviation_of(&g).unwrap());
+        assert!(
+            closed_loop(&g, &with_input_port(&k).unwrap()).unwrap().is_stable().unwrap(),
+            "K stabilises every G(S)"
+        );
+    }
+}
+
+fn primal_and_dual<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+    let (m, p) = (l.nominal.inputs(), l.nominal.outputs());
+    let s = l.deviation(rng, 3);
+    let q = random_stable(rng, (2, p, m), l.nominal.time());
+    let (g, k) = (l.factors.plant_of(&s).unwrap(), l.factors.controller_of(&q).unwrap());
+    let outer = closed_loop(&g, &with_input_port(&k).unwrap()).unwrap().poles().unwrap();
+    let inner = closed_loop(&s, &with_input_port(&q).unwrap()).unwrap().poles().unwrap();
+    let (right, left) = (l.factors.right().system().poles().unwrap(), l.factors.left().system().poles().unwrap());
+    let scale = outer.iter().map(|p| p.norm()).fold(1.0, f64::max);
+    let error = spectrum_distance(outer, [inner, right, left].concat()) / scale.min(1e4);
+    assert!(error <= 1e-6, "{}: eig(G(S), K(Q)) misses by {error:.1e}", l.name);
+}
+
+#[test]
+fn factors_of_the_bearing() {
+    on_bearing(factor_identities, factor_identities);
+}
+
+#[test]
+fn star_product_of_the_bearing() {
+    on_bearing(star_product, star_product);
+}
+
+#[test]
+fn deviation_system_of_the_bearing() {
+    on_bearing(|l| deviation_identities(l, &mut rng(1)), |l| deviation_identities(l, &mut rng(2)));
+}
+
+#[test]
+fn any_controller_of_the_bearing() {
+    on_bearing(|l| arbitrary_controller(l, &mut rng(3)), |l| arbitrary_controller(l, &mut rng(4)));
+}
+
+#[test]
+fn primal_and_dual_parametrisation_of_the_bearing() {
+    on_bearing(|l| primal_and_dual(l, &mut rng(5)), |l| primal_and_dual(l, &mut rng(6)));
+}
+
+/// 1000 random loops, orders to 20, 1 to 3 inputs and outputs, D != 0, stable and unstable, both time domains.
+#[test]
+fn every_identity_on_1000_random_loops() {
+    fn all<T: TimeDomain + RiccatiDomain>(seed: u64, time: T) {
+        let (l, mut rng) = (Loop::random(seed, time), rng(seed + 10_000));
+        factor_identities(&l);
+        star_product(&l);
+        deviation_identities(&l, &mut rng);
+        arbitrary_controller(&l, &mut rng);
+        primal_and_dual(&l, &mut rng);
+    }
+    for seed in 0..500 {
+        all(seed, Continuous);
+        all(seed, Discrete::new(0.1).unwrap());
+    }
+}
+
+/// (25), (28) and alpha in the time domain, with known output noise: the true plant differs from the nominal one.
+#[test]
+fn signals_in_the_time_domain() {
+    for (true_plant, nominal) in [(bearing(0.0), 0.5), (bearing(0.25), 0.97)] {
+        let nominal = youla::rig::degraded(&true_plant, nominal, 1.0).unwrap();
+        let (plant, nominal) = (sampled(&true_plant), sampled(&nominal));
+        let factors = stabilising_factors(&plant, &nominal);
+        let mut rng = rng(7);
+        let (alpha, noise) = (normal(&mut rng, 4000, 2), normal(&mut rng, 4000, 2));
+        let closed = closed_loop(&plant, &factors.j_k().unwrap()).unwrap();
+        let z = simulate(&closed, beside(&alpha, &noise).as_ref(), &vec![0.0; closed.order()]).unwrap();
+        let (u, y, beta) = (z.subcols(0, 2), z.subcols(2, 2), z.subcols(4, 2));
+        let signals = factors.signals(u, y).unwrap();
+        let close = |what: &str, x: MatRef<'_, f64>, y: MatRef<'_, f64>| {
+            let error = relative(x, y);
+            assert!(error <= BEARING, "{what} misses by {error:.1e}");
+        };
+        close("alpha = Vt u - Ut y", signals.alpha.as_ref(), alpha.as_ref());
+        close("(28) beta = Mt y - Nt u", signals.beta.as_ref(), beta);
+        let s = factors.deviation_of(&plant).unwrap();
+        let filter = factors.residual_filter(&s).unwrap().part(0..2, 2..4);
+        let from_alpha = run(&s, alpha.as_ref());
+        let expected = &from_alpha + run(&filter, noise.as_ref());
+        close("(25) beta = S alpha + (Mt + S Ut) n", beta, expected.as_ref());
+        let predicted = run(&factors.residual_filter(&s).unwrap(), z.subcols(0, 4));
+        close("beta - S alpha is the filtered noise", predicted.as_ref(), run(&filter, noise.as_ref()).as_ref());
+    }
+}
+
+/// An excitation v1 at the plant input and v2 at the output give alpha = Vt v1 + Ut v2, free of noise.
+#[test]
+fn external_excitation_reaches_alpha() {
+    let plant = sampled(&bearing(0.0));
+    let nominal = sampled(&youla::rig::degraded(&bearing(0.0), 0.5, 1.0).unwrap());
+    let factors = stabilising_factors(&plant, &nominal);
+    let mut rng = rng(8);
+    let (v1, v2, noise) = (normal(&mut rng, 3000, 2), normal(&mut rng, 3000, 2), normal(&mut rng, 3000, 2));
+    let controller = with_input_port(&factors.controller().unwrap()).unwrap();
+    let closed = closed_loop(&plant, &controller).unwrap();
+    let at_output = &v2 + &noise;
+    let z = run(&closed, beside(&v1, &at_output).as_ref());
+    let measured = z.subcols(2, 2) - &v2;
+    let alpha = factors.signals(z.subcols(0, 2), measured.as_ref()).unwrap().alpha;
+    let expected = factors.alpha_of_excitation(v1.as_ref(), v2.as_ref()).unwrap();
+    let error = relative(alpha.as_ref(), expected.as_ref());
+    assert!(error <= BEARING, "alpha of the excitation misses by {error:.1e}");
+}
+
+/// `theory.md` section 1, negative controls: a flipped sign of the feedback and the literal (24) fail by their known size.
+#[test]
+fn wrong_signs_fail_loudly() {
+    let l = Loop::new("bearing", bearing(0.0), 1300.0, BEARING);
+    let m = l.nominal.inputs();
+    let flipped = {
+        let left = l.factors.left().system();
+        let signs = Mat::from_fn(2 * m, 2 * m, |i, j| {
+            if i != j {
+                0.0
+            } else if i < m {
+                1.0
+            } else {
+                -1.0
+            }
+        });
+        left.map_output(&signs).map_input(&signs)
+    };
+    let product = flipped.then(l.factors.right().system()).unwrap();
+    let identity = StateSpace::gain(Mat::identity(2 * m, 2 * m), Continuous).unwrap();
+    assert!(distance(&identity, &product, &l.omega) > 1e-3, "a flipped sign of the feedback passes (15)");
+    let star = l.factors.j_g().unwrap().star(&l.factors.j_k().unwrap()).unwrap();
+    let response = youla::lti::frequency_response(star.system(), &[1300.0]).unwrap();
+    let literal = (response.at(0) - Mat::<c64>::identity(2 * m, 2 * m)).operator_norm();
+    assert!((literal - 2.0).abs() < 1e-9, "the literal (24) misses by {literal}, not by 2");
+}
+
+/// A controller that does not stabilise the nominal plant is refused with the closed-loop pole, by both constructions.
+#[test]
+fn destabilising_controller_is_refused() {
+    let l = Loop::new("bearing", sampled(&bearing(0.25)), 1300.0, BEARING);
+    let zero = StateSpace::gain(Mat::zeros(2, 2), l.nominal.time()).unwrap();
+    let none = Mat::zeros(2, 0);
+    let stacked = CoprimeFactors::stacked(&l.nominal, &zero, l.f.as_ref(), none.as_ref());
+    for refused in [stacked, l.factors.shifted_to(&zero)] {
+        match refused {
+            Err(youla::Error::NotStabilising { pole, .. }) => assert!((pole.norm() - 1.0084).abs() < 5e-4, "{pole}"),
+            other => panic!("expected a refusal, got {other:?}"),
+        }
+    }
+}
+
+/// Factors of the nominal plant whose controller also stabilises the true plant.
+fn stabilising_factors(plant: &StateSpace<Discrete>, nominal: &StateSpace<Discrete>) -> CoprimeFactors<Discrete> {
+    let factors = observer_factors(nominal);
+    let controller = with_input_port(&factors.controller().unwrap()).unwrap();
+    assert!(closed_loop(plant, &controller).unwrap().is_stable().unwrap(), "the test loop is unstable");
+    factors
+}
+
+fn beside(x: &Mat<f64>, y: &Mat<f64>) -> Mat<f64> {
+    youla::linalg::block(&[&[x.as_ref(), y.as_ref()]])
+}
+
+fn run(s: &StateSpace<Discrete>, u: MatRef<'_, f64>) -> Mat<f64> {
+    simulate(s, u, &vec![0.0; s.order()]).unwrap()
+}
+
+/// `[x; y]` of two systems that share their states.
+fn stack<T: TimeDomain>(x: &StateSpace<T>, y: &StateSpace<T>) -> Partitioned<T> {
+    let c = youla::linalg::block(&[&[x.c()], &[y.c()]]);
+    let d = youla::linalg::block(&[&[x.d()], &[y.d()]]);
+    let system = StateSpace::new(x.a().to_owned(), x.b().to_owned(), c, d, x.time()).unwrap();
+    Partitioned::new(system, x.outputs(), x.inputs()).unwrap()
+}
+
+/// Y X^-1 of `[X; Y]`.
+fn right_quotient<T: TimeDomain>(stacked: &Partitioned<T>, inputs: usize) -> StateSpace<T> {
+    assert_eq!(stacked.part(0, 0).inputs(), inputs);
+    stacked.exchange_first().unwrap().part(1, 0)
+}

@@ -106,6 +106,60 @@ pub enum Error {
         /// The eigenvalue without a principal logarithm.
         pole: c64,
     },
+    /// A matrix that must be symmetric is not.
+    #[error(
+        "{what} is not symmetric: row {row}, column {column} holds {upper}, but row {column}, column {row} holds {lower}"
+    )]
+    NotSymmetric {
+        /// Which matrix.
+        what: String,
+        /// Row of the entry above the diagonal, counted from 1.
+        row: usize,
+        /// Column of the entry above the diagonal, counted from 1.
+        column: usize,
+        /// The entry above the diagonal.
+        upper: f64,
+        /// Its mirror image below the diagonal.
+        lower: f64,
+    },
+    /// A matrix that must be positive definite is not, or not clear of rounding.
+    #[error("{what} is not positive definite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}")]
+    NotPositiveDefinite {
+        /// Which matrix.
+        what: String,
+        /// Smallest eigenvalue after scaling to unit diagonal.
+        eigenvalue: f64,
+    },
+    /// A weight or covariance is indefinite.
+    #[error(
+        "{what} is not positive semidefinite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}"
+    )]
+    NotPositiveSemidefinite {
+        /// Which matrix.
+        what: String,
+        /// Smallest eigenvalue after scaling to unit diagonal.
+        eigenvalue: f64,
+    },
+    /// A mode that is not stable is out of reach of the inputs.
+    #[error("{what} has no solution: no input moves the mode {} (distance {distance:.1e})", Pole(*pole))]
+    NotStabilisable {
+        /// Which design.
+        what: String,
+        /// The mode (in z for discrete, in rad/s for continuous systems).
+        pole: c64,
+        /// Smallest singular value of `[A - p I, B]` in balanced coordinates.
+        distance: f64,
+    },
+    /// A mode on the stability boundary (for an observer: a mode that is not stable) does not show.
+    #[error("{what} has no solution: nothing that is weighted or measured shows the mode {} (distance {distance:.1e})", Pole(*pole))]
+    NotDetectable {
+        /// Which design.
+        what: String,
+        /// The mode (in z for discrete, in rad/s for continuous systems).
+        pole: c64,
+        /// Smallest singular value of `[A - p I; C]` in balanced coordinates.
+        distance: f64,
+    },
     // ---- lti and factor ----------------------------------------------------------------------------------------
     /// Numbers of ports do not fit together.
     #[error("{what} is {found}, but must be {expected}")]
@@ -153,18 +207,6 @@ pub enum Error {
         /// The frequency, rad/s.
         omega: f64,
     },
-    // ---- reduction ---------------------------------------------------------------------------------------------
-    /// More states were asked for than a minimal realisation has.
-    #[error(
-        "a model of order {order} was asked for, but only {minimal} states are controllable and observable to working precision; ask for at most {minimal}"
-    )]
-    OrderAboveMinimal {
-        /// The order that was asked for.
-        order: usize,
-        /// The order of the minimal realisation.
-        minimal: usize,
-    },
-
     // ---- run and settings --------------------------------------------------------------------------------------
     /// run.toml cannot be used.
     #[error("{}{}: {problem}", path.display(), position(*line, *column))]
@@ -178,6 +220,12 @@ pub enum Error {
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
+    /// The output folder holds something already.
+    #[error("{} exists already and is not empty; choose another output folder or remove it", path.display())]
+    OutputExists {
+        /// The folder.
+        path: PathBuf,
+    },
     /// A record is used up by the samples that are dropped at its start.
     #[error(
         "record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle"
@@ -189,6 +237,17 @@ pub enum Error {
         samples: usize,
         /// Samples dropped.
         settle: usize,
+    },
+    // ---- reduction ---------------------------------------------------------------------------------------------
+    /// More states were asked for than a minimal realisation has.
+    #[error(
+        "a model of order {order} was asked for, but only {minimal} states are controllable and observable to working precision; ask for at most {minimal}"
+    )]
+    OrderAboveMinimal {
+        /// The order that was asked for.
+        order: usize,
+        /// The order of the minimal realisation.
+        minimal: usize,
     },
     // ---- records and files -------------------------------------------------------------------------------------
     /// The operating system refused to read or write a file.
@@ -368,6 +427,62 @@ pub enum Error {
         condition: f64,
     },
     // ---- identification ----------------------------------------------------------------------------------------
+    /// A record is too short for the model that was asked for.
+    #[error("{what}: {found} samples are too few, at least {needed} are needed")]
+    TooFewSamples {
+        /// Which record, and for what.
+        what: String,
+        /// Number of samples given.
+        found: usize,
+        /// Number of samples needed.
+        needed: usize,
+    },
+    /// The inputs do not excite the system enough for the horizon.
+    #[error(
+        "the inputs are not exciting enough for a horizon of {horizon} block rows: their Hankel matrix has rank {rank}, \
+         but {needed} is needed; use a richer excitation or a shorter horizon"
+    )]
+    NotExciting {
+        /// Numerical rank of the block-Hankel matrix of the inputs.
+        rank: usize,
+        /// Number of its rows, 2 x horizon x inputs.
+        needed: usize,
+        /// Block rows of the past and of the future.
+        horizon: usize,
+    },
+    /// A channel never changes, so that nothing can be learnt from it.
+    #[error("{what} is constant ({value}) in every experiment")]
+    ConstantChannel {
+        /// Which channel.
+        what: String,
+        /// The value in the first experiment.
+        value: f64,
+    },
+    /// The order does not fit into the horizon.
+    #[error(
+        "the order {order} exceeds {largest}, the largest for a horizon of {horizon} block rows: (horizon - 1) x outputs"
+    )]
+    OrderBeyondHorizon {
+        /// Order asked for.
+        order: usize,
+        /// Largest order possible.
+        largest: usize,
+        /// Block rows of the past and of the future.
+        horizon: usize,
+    },
+    // ---- report ------------------------------------------------------------------------------------------------
+    /// The data of a report cannot be written as JSON.
+    #[error("the data of the report cannot be written as JSON: {source}")]
+    ReportData {
+        /// The reason.
+        source: serde_json::Error,
+    },
+    /// The page of a report cannot be written.
+    #[error("the page of the report cannot be written: {source}")]
+    ReportTemplate {
+        /// The reason.
+        source: minijinja::Error,
+    },
 }
 
 impl Error {
@@ -379,9 +494,11 @@ impl Error {
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
             | Error::AlgebraicLoop { .. }
-            | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
-            | Error::PoleOnBoundary { .. } => ErrorKind::Numerical,
+            | Error::PoleOnBoundary { .. }
+            | Error::NotStabilisable { .. }
+            | Error::NotDetectable { .. }
+            | Error::NoLogarithm { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }

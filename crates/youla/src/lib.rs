@@ -10,6 +10,7 @@ pub mod record;
 pub mod reduce;
 pub mod report;
 pub mod rig;
+pub mod run;
 pub mod study;
 pub mod units;
 pub mod validate;

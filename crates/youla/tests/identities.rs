@@ -9,7 +9,7 @@ mod common;
 use common::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
-use youla::control::{RiccatiDomain, closed_loop, observer_controller, with_input_port};
+use youla::control::{closed_loop, observer_controller, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::lti::{Continuous, Discrete, Partitioned, StateSpace, TimeDomain, simulate};
 use youla::{Mat, MatRef, c64};
@@ -28,7 +28,7 @@ struct Loop<T: TimeDomain> {
     tolerance: f64,
 }
 
-impl<T: TimeDomain + RiccatiDomain> Loop<T> {
+impl<T: TimeDomain> Loop<T> {
     fn new(name: impl Into<String>, nominal: StateSpace<T>, centre: f64, tolerance: f64) -> Self {
         let (f, l) = gains(&nominal);
         let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref()).unwrap();
@@ -66,7 +66,7 @@ fn on_bearing(check: impl Fn(&Loop<Continuous>), check_sampled: impl Fn(&Loop<Di
     }
 }
 
-fn factor_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
+fn factor_identities<T: TimeDomain>(l: &Loop<T>) {
     l.holds("(15) Bezout in both orders", l.factors.bezout_residual(&l.omega).unwrap());
     let k = observer_controller(&l.nominal, l.f.as_ref(), l.l.as_ref()).unwrap();
     l.same("K of J_K against the observer-based controller", &k, &l.factors.controller().unwrap());
@@ -80,7 +80,7 @@ fn factor_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
     l.same("(14) Vt K = Ut", &product, &l.factors.u_t());
 }
 
-fn star_product<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
+fn star_product<T: TimeDomain>(l: &Loop<T>) {
     let star = l.factors.j_g().unwrap().star(&l.factors.j_k().unwrap()).unwrap();
     let (m, p) = (l.nominal.inputs(), l.nominal.outputs());
     let swap = Mat::from_fn(m + p, m + p, |i, j| f64::from(j == (i + p) % (m + p)));
@@ -93,7 +93,7 @@ fn star_product<T: TimeDomain + RiccatiDomain>(l: &Loop<T>) {
     assert!(error <= 1e-6, "{}: hidden modes of the star product miss by {error:.1e}", l.name);
 }
 
-fn deviation_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+fn deviation_identities<T: TimeDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
     for order in [0, 1, 5] {
         let s = l.deviation(rng, order);
         let g = l.factors.plant_of(&s).unwrap();
@@ -106,7 +106,7 @@ fn deviation_identities<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut Ch
     }
 }
 
-fn arbitrary_controller<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+fn arbitrary_controller<T: TimeDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
     // K(Q) for a random stable Q is a controller that is not observer-based for these F and L.
     let q = random_stable(rng, (3, l.nominal.outputs(), l.nominal.inputs()), l.nominal.time());
     let k = l.factors.controller_of(&q).unwrap();
@@ -132,7 +132,7 @@ fn arbitrary_controller<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut Ch
     }
 }
 
-fn primal_and_dual<T: TimeDomain + RiccatiDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
+fn primal_and_dual<T: TimeDomain>(l: &Loop<T>, rng: &mut ChaCha8Rng) {
     let (m, p) = (l.nominal.inputs(), l.nominal.outputs());
     let s = l.deviation(rng, 3);
     let q = random_stable(rng, (2, p, m), l.nominal.time());
@@ -173,7 +173,7 @@ fn primal_and_dual_parametrisation_of_the_bearing() {
 /// 1000 random loops, orders to 20, 1 to 3 inputs and outputs, D != 0, stable and unstable, both time domains.
 #[test]
 fn every_identity_on_1000_random_loops() {
-    fn all<T: TimeDomain + RiccatiDomain>(seed: u64, time: T) {
+    fn all<T: TimeDomain>(seed: u64, time: T) {
         let (l, mut rng) = (Loop::random(seed, time), rng(seed + 10_000));
         factor_identities(&l);
         star_product(&l);

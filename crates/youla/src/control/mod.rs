@@ -1,7 +1,12 @@
-//! Controllers and the loops that they close.
+//! Controller design with positive feedback (state feedback `u = F x` and observer gain L with `A + B F` and `A + L C`
+//! stable) and the loops that controllers close.
 
 mod closed_loop;
+mod kalman;
+mod lqr;
 mod observer_controller;
 
 pub use closed_loop::{closed_loop, with_input_port};
+pub use kalman::{NoiseCovariance, ObserverGain, kalman};
+pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
 pub use observer_controller::observer_controller;

@@ -32,8 +32,7 @@ pub fn hansen(
     signals: &[YoulaSignals],
     options: &SubspaceOptions,
 ) -> Result<HansenModel> {
-    let experiments: Vec<_> =
-        signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
+    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
     let deviation = subspace(&experiments, factors.nominal().time(), options)?;
     let plant = factors.plant_of(&deviation.model)?;
     Ok(HansenModel { deviation, plant })

@@ -1,1 +1,5 @@
-//! TODO
+//! Identification methods: the subspace family, and what is built on it.
+
+pub mod direct;
+pub mod hansen;
+pub mod subspace;

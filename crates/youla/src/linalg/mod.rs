@@ -5,26 +5,35 @@
 
 mod balance;
 mod complex_schur;
+mod definite;
 mod expm;
 mod gramian;
 mod hessenberg;
 mod kronecker;
+mod least_squares;
 mod logm;
 mod lyapunov;
 mod reflector;
 mod reorder;
+mod riccati;
 mod schur;
 mod sylvester;
+mod triangle;
 
 pub use balance::{Balanced, balance};
+pub(crate) use definite::check_semidefinite;
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
 pub use hessenberg::{Hessenberg, hessenberg};
+pub use least_squares::{LeastSquares, least_squares};
 pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use reorder::OrderedSchur;
+pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
+pub use triangle::Triangle;
+pub(crate) use triangle::leading_rank;
 
 use crate::{Error, Result};
 use faer::prelude::*;

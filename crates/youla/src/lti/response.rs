@@ -28,6 +28,12 @@ pub struct FrequencyResponse {
 }
 
 impl FrequencyResponse {
+    /// A response from its values: one p x m matrix after the other, each column-major.
+    pub(crate) fn new(omega: Vec<f64>, values: Vec<c64>, outputs: usize, inputs: usize) -> Self {
+        assert_eq!(values.len(), omega.len() * outputs * inputs, "one matrix for each frequency");
+        FrequencyResponse { omega, values, outputs, inputs }
+    }
+
     /// The response at frequency number `k`, p x m.
     ///
     /// # Panics

@@ -1,5 +1,4 @@
 //! Measured and simulated records: labelled, clocked samples x channels; the files they come from; spectra and
-//! excitation signals.
 //!
 //! A record is read once, checked once and trusted afterwards: every number is finite, every channel has a name of its
 //! own, and the sample time is known. Nothing is repaired on the way: a gap, a NaN or an unequal length is an error that
@@ -8,23 +7,29 @@
 mod choose;
 mod csv;
 mod detrend;
+mod excitation;
 mod matfile;
 mod npz;
+mod persistency;
 #[allow(clippy::module_inception)]
 mod record;
 #[cfg(test)]
 mod scratch;
 mod source;
+mod spectrum;
 mod time;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
+pub use excitation::{Chirp, Excitation, Multisine, Prbs, SquareWaves};
 pub use matfile::{Packing, read_mat, write_mat};
 pub use npz::read_npz;
+pub use persistency::{Persistency, persistency};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, sha256};
+pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
 pub use time::TimeSource;
 pub use values::{Value, Variable, Variables};
 

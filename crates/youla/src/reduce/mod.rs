@@ -36,6 +36,15 @@ pub enum ReductionMethod {
     SingularPerturbation,
 }
 
+impl std::fmt::Display for ReductionMethod {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            ReductionMethod::BalancedTruncation => "balanced truncation",
+            ReductionMethod::SingularPerturbation => "singular-perturbation approximation",
+        })
+    }
+}
+
 /// How many states are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -1,1 +1,26 @@
-//! TODO
+//! A run as one self-contained HTML file.
+//!
+//! Results come in as plain data, [`ReportData`], which holds what is drawn and nothing else, and go out as one file that
+//! opens without a network: tables are written by a template, figures are drawn by the embedded plotting library from
+//! the same data as JSON. Long records are reduced to their minimum and maximum per bucket ([`Trace`]) before they enter.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `data` | the structs of the report |
+//! | `trace` | one drawn curve over time and the clock it refers to |
+//! | `decimate` | minimum and maximum per bucket |
+//! | `phase` | the branch on which a phase is drawn |
+//! | `tables` | fits by record and output, modes by frequency |
+//! | `html` | template, data and library put into one file |
+
+pub mod data;
+mod decimate;
+mod html;
+mod numbers;
+mod phase;
+mod tables;
+pub mod trace;
+
+pub use data::ReportData;
+pub use html::html;
+pub use trace::{Timeline, Trace};

@@ -2,13 +2,13 @@
 
 use super::models::Controller;
 use super::records::{RunRecords, rms};
-use super::settings::{Construction, FactorSettings};
+use super::settings::{Construction, FactorSettings, RunSettings};
 use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr};
 use crate::factor::CoprimeFactors;
 use crate::linalg::eye;
 use crate::lti::{Discrete, StateSpace};
-use crate::{Mat, MatRef, Result};
-use faer::Scale;
+use crate::{Error, Mat, Result};
+use std::path::Path;
 
 /// The factors of a run and what they rest on.
 #[derive(Debug, Clone)]
@@ -19,6 +19,24 @@ pub struct Factorisation {
     pub controller: StateSpace<Discrete>,
     /// Largest relative residual of the Bezout identity (15) up to Nyquist.
     pub bezout_residual: f64,
+}
+
+/// Builds the factors that the settings of a run describe; paths in them are relative to `folder`.
+///
+/// # Errors
+/// As [`factorise`], and whatever is wrong with the given model or controller.
+pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Factorisation> {
+    let nominal = settings.nominal.realise(folder, records.time)?;
+    let controller = settings.controller.realise(folder, records.time)?;
+    for (what, expected, found) in [
+        ("the number of inputs of the nominal model", records.inputs.len(), nominal.inputs()),
+        ("the number of outputs of the nominal model", records.outputs.len(), nominal.outputs()),
+    ] {
+        if expected != found {
+            return Err(Error::Ports { what: what.into(), expected, found });
+        }
+    }
+    factorise(&nominal, &controller, records, &settings.factors)
 }
 
 /// Builds the factors of the nominal model and the controller. States are scaled by powers of two first: entries of
@@ -87,26 +105,19 @@ impl Weights {
         }
     }
 
-    /// LQR with `Q = C' W C`, `W = diag(1 / rms(y)^2)`, `R = input_weight diag(1 / rms(u)^2)`.
+    /// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs.
     fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-        let q = weighted_gram(plant.c(), &self.y);
-        let r = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
-        Ok(lqr(plant, &LqrWeights { q, r, s: None })?.f)
+        let outputs = diagonal(self.y.iter().map(|s| 1.0 / (s * s)));
+        let inputs = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
+        Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f)
     }
 
-    /// Kalman predictor with process noise of the size of the inputs and output noise of the size of the outputs.
+    /// Kalman predictor with input noise of the size of the inputs and output noise of the size of the outputs.
     fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-        let inverse: Vec<f64> = self.u.iter().map(|s| 1.0 / s).collect();
-        let process = weighted_gram(plant.b().transpose(), &inverse);
+        let input = diagonal(self.u.iter().map(|s| s * s));
         let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
-        Ok(kalman(plant, &NoiseCovariance { process, measurement, cross: None })?.l)
+        Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l)
     }
-}
-
-/// `M' diag(1 / scale^2) M`.
-fn weighted_gram(m: MatRef<'_, f64>, scale: &[f64]) -> Mat<f64> {
-    let scaled = Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / scale[i]);
-    scaled.transpose() * &scaled
 }
 
 fn diagonal(values: impl Iterator<Item = f64>) -> Mat<f64> {
@@ -119,6 +130,6 @@ fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
     if k.is_stable()? {
         return Ok(Mat::zeros(k.inputs(), k.order()));
     }
-    let weights = LqrWeights { q: Scale(1.0) * eye(k.order()), r: eye(k.inputs()), s: None };
+    let weights = LqrWeights { q: eye(k.order()), r: eye(k.inputs()), s: None };
     Ok(lqr(k, &weights)?.f)
 }

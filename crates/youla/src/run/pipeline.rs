@@ -1,6 +1,6 @@
 //! The driver: from records, nominal model and controller to models with evidence. Read this file first.
 
-use super::factorise::{Factorisation, factorise};
+use super::factorise::{Factorisation, factorise_run};
 use super::records::RunRecords;
 use super::settings::RunSettings;
 use super::signals::{DeviationSignals, deviation_signals};
@@ -127,9 +127,7 @@ pub fn identify(
     clock: &mut StageClock<'_>,
 ) -> Result<Identification> {
     let nominal = settings.nominal.realise(folder, records.time)?;
-    let controller = settings.controller.realise(folder, records.time)?;
-    let factorisation =
-        clock.run(Stage::Factor, || factorise(&nominal, &controller, &records, &settings.factors))?; // (13)-(15)
+    let factorisation = clock.run(Stage::Factor, || factorise_run(&settings, &records, folder))?; // (13)-(15)
     let factors = &factorisation.factors;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)

@@ -109,13 +109,8 @@ fn read_file(
     file: &DataFile,
 ) -> Result<(LoopRecord, SourceFile)> {
     let path = folder.join(&file.file);
-    let groups = [
-        &settings.inputs,
-        &settings.outputs,
-        &settings.input_excitation,
-        &settings.reference,
-        &settings.alpha,
-    ];
+    let groups =
+        [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
     let source = Source {
         path: path.clone(),
         format: Format::Detect,
@@ -128,11 +123,8 @@ fn read_file(
         csv: CsvOptions::default(),
     };
     let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
-    let source = SourceFile {
-        path: file.file.display().to_string(),
-        purpose: purpose.to_owned(),
-        sha256: sha256(&path)?,
-    };
+    let source =
+        SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
     Ok((LoopRecord::from_record(&record, file.label(), groups)?, source))
 }
 

@@ -223,9 +223,7 @@ impl RunSettings {
     }
 
     fn check(&self, path: &Path) -> Result<()> {
-        let problem = |problem: String| {
-            Err(Error::Settings { path: path.to_owned(), line: 0, column: 0, problem })
-        };
+        let problem = |problem: String| Err(Error::Settings { path: path.to_owned(), line: 0, column: 0, problem });
         let d = &self.data;
         if d.sample_time.is_none() && d.time_column.is_none() {
             return problem("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
@@ -258,7 +256,8 @@ fn settings_error(error: &toml::de::Error, text: &str, path: &Path) -> Error {
     if message.starts_with("unknown field") || message.starts_with("unknown variant") {
         let mut words = message.split('`').skip(1).step_by(2);
         let unknown = words.next().unwrap_or_default();
-        let nearest = words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
+        let nearest =
+            words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
         if let Some(nearest) = nearest {
             problem = format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})");
         }

@@ -1,8 +1,11 @@
 //! alpha and beta of the estimation records, with the transient of the filter dropped and the controller checked.
 
-use super::records::LoopRecord;
+use super::records::{LoopRecord, RunRecords};
 use crate::factor::{CoprimeFactors, YoulaSignals};
+use crate::linalg::block;
 use crate::lti::Discrete;
+use crate::record::Record;
+use crate::units::Channel;
 use crate::{Error, Mat, Result};
 use faer::Scale;
 
@@ -52,6 +55,29 @@ pub fn deviation_signals(
         (miss / size).sqrt()
     });
     Ok(DeviationSignals { experiments, expected_alpha, settle, controller_mismatch })
+}
+
+/// The signals of every estimation record as records of their own, over all samples:
+///
+/// - `eta_<input> = Vt u - Ut y` and `epsilon_<output> = Mt y - Nt u`, computed from the measured signals;
+/// - `alpha_<input>`, the part of eta that the known excitations cause (eta itself where none is known);
+/// - `beta_<output>`, the innovation (28), which is epsilon plus noise and computed by the same filter.
+///
+/// # Errors
+/// Shapes.
+pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) -> Result<Vec<Record>> {
+    let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
+        channels.iter().map(|c| Channel::new(format!("{prefix}_{}", c.name), &c.unit)).collect()
+    };
+    let (u, y) = (&records.inputs, &records.outputs);
+    let channels = [named("alpha", u), named("beta", y), named("eta", u), named("epsilon", y)].concat();
+    let one = |record: &LoopRecord| {
+        let YoulaSignals { alpha: eta, beta } = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        let alpha = expected(factors, record)?.unwrap_or_else(|| eta.clone());
+        let data = block(&[&[alpha.as_ref(), beta.as_ref(), eta.as_ref(), beta.as_ref()]]);
+        Record::new(&record.name, channels.clone(), data, record.time)
+    };
+    records.estimation.iter().map(one).collect()
 }
 
 /// Fraction to which the slowest transient of the filter must have decayed.

@@ -4,9 +4,7 @@ use super::pipeline::Identification;
 use super::records::LoopRecord;
 use super::settings::Prediction;
 use crate::lti::{Discrete, Mode, StateSpace};
-use crate::validate::{
-    LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf,
-};
+use crate::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
 use crate::{Error, Mat, Result, c64};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -99,7 +97,7 @@ impl Verdict {
 ///
 /// # Errors
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
-pub fn verify(found: &Identification) -> Result<Verdict> {
+pub(super) fn verify(found: &Identification) -> Result<Verdict> {
     let mut models = vec![(Method::Nominal, &found.nominal)];
     if let Some(Ok(direct)) = &found.direct {
         models.push((Method::Direct, &direct.model));

@@ -5,7 +5,6 @@ use crate::linalg::{block, check_shape};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::{Mat, MatRef, Result};
 use faer::Scale;
-use faer::prelude::*;
 
 /// The known signals that enter a loop `u = K (y - r) + v1` (positive feedback) from outside.
 #[derive(Debug, Clone, Copy)]
@@ -24,11 +23,7 @@ pub struct LoopExcitation<'a> {
 ///
 /// # Errors
 /// [`crate::Error::Shape`]; [`crate::Error::Diverged`] when an unstable model leaves the range of the numbers.
-pub fn predict_open_loop(
-    model: &StateSpace<Discrete>,
-    u: MatRef<'_, f64>,
-    y: MatRef<'_, f64>,
-) -> Result<Mat<f64>> {
+pub fn predict_open_loop(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: MatRef<'_, f64>) -> Result<Mat<f64>> {
     check_shape("the record of measured outputs", y, (u.nrows(), model.outputs()))?;
     let forced = simulate(model, u, &vec![0.0; model.order()])?;
     let residual = y - &forced;

@@ -47,7 +47,7 @@ pub fn grid_of<T: TimeDomain>(time: T, centre: f64) -> Vec<f64> {
 }
 
 /// F and L of an observer-based controller, from unit weights.
-pub fn gains<T: TimeDomain + youla::control::RiccatiDomain>(plant: &StateSpace<T>) -> (Mat<f64>, Mat<f64>) {
+pub fn gains<T: TimeDomain>(plant: &StateSpace<T>) -> (Mat<f64>, Mat<f64>) {
     let (n, m, p) = (plant.order(), plant.inputs(), plant.outputs());
     let one = |k: usize| Mat::<f64>::identity(k, k);
     let f = lqr(plant, &LqrWeights { q: one(n), r: one(m), s: None }).unwrap().f;
@@ -55,7 +55,7 @@ pub fn gains<T: TimeDomain + youla::control::RiccatiDomain>(plant: &StateSpace<T
     (f, l)
 }
 
-pub fn observer_factors<T: TimeDomain + youla::control::RiccatiDomain>(plant: &StateSpace<T>) -> CoprimeFactors<T> {
+pub fn observer_factors<T: TimeDomain>(plant: &StateSpace<T>) -> CoprimeFactors<T> {
     let (f, l) = gains(plant);
     CoprimeFactors::observer(plant, f.as_ref(), l.as_ref()).unwrap()
 }

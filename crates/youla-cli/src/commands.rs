@@ -1,0 +1,82 @@
+//! What each verb does: read, call the library, print.
+
+use crate::args::{Args, Command, OutputFolder};
+use crate::output::{Failure, Progress, say};
+use crate::table;
+use std::path::{Path, PathBuf};
+use youla::record::write_csv;
+use youla::report::{ReportData, html};
+use youla::run::{
+    RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, signal_records,
+    unused_folder, write_run,
+};
+
+/// Runs the verb that was asked for.
+pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+    match &args.command {
+        Command::Demo { seed, output } => {
+            let demo = demo(*seed)?;
+            identify_and_write(args, output, Path::new("."), demo.settings, |_| Ok(demo.records))
+        }
+        Command::Identify { settings, output } => {
+            let folder = folder_of(settings);
+            identify_and_write(args, output, &folder, RunSettings::read(settings)?, |s| read_records(&s.data, &folder))
+        }
+        Command::Signals { settings, out } => signals(args, settings, out),
+        Command::Report { run } => report(args, run),
+    }
+}
+
+fn identify_and_write(
+    args: &Args,
+    output: &OutputFolder,
+    folder: &Path,
+    settings: RunSettings,
+    read: impl FnOnce(&RunSettings) -> youla::Result<RunRecords>,
+) -> Result<(), Failure> {
+    let target = output.out.clone().unwrap_or_else(|| unused_folder(Path::new("."), &settings.name));
+    let progress = Progress::new(args.quiet || args.json);
+    let mut announce = |stage: Stage| progress.stage(stage);
+    let mut clock = StageClock::new(&mut announce);
+    let records = clock.run(Stage::Record, || read(&settings))?;
+    let found = identify(settings, records, folder, &mut clock)?;
+    let written = write_run(&found, &target, output.force, &mut clock)?;
+    progress.finish();
+    if args.json {
+        say(&written.summary.to_string())
+    } else if args.quiet {
+        Ok(())
+    } else {
+        say(&table::results(&found, &written.folder))
+    }
+}
+
+fn signals(args: &Args, settings: &Path, out: &Path) -> Result<(), Failure> {
+    let folder = folder_of(settings);
+    let settings = RunSettings::read(settings)?;
+    let records = read_records(&settings.data, &folder)?;
+    let factorisation = factorise_run(&settings, &records, &folder)?;
+    std::fs::create_dir_all(out).map_err(|source| Failure::io(out, source))?;
+    for record in signal_records(&factorisation.factors, &records)? {
+        let path = out.join(format!("{}.csv", record.name()));
+        write_csv(&record, &path)?;
+        if !args.quiet && !args.json {
+            say(&format!("{} ({} samples)", path.display(), record.samples()))?;
+        }
+    }
+    Ok(())
+}
+
+fn report(args: &Args, run: &Path) -> Result<(), Failure> {
+    let data = run.join("report.json");
+    let text = std::fs::read_to_string(&data).map_err(|source| Failure::io(&data, source))?;
+    let page: ReportData = serde_json::from_str(&text).map_err(|e| Failure::io(&data, e.into()))?;
+    let path = run.join("report.html");
+    std::fs::write(&path, html(&page)?).map_err(|source| Failure::io(&path, source))?;
+    if args.quiet || args.json { Ok(()) } else { say(&path.display().to_string()) }
+}
+
+/// The folder to which the paths in a settings file are relative.
+fn folder_of(settings: &Path) -> PathBuf {
+    settings.parent().map_or_else(PathBuf::new, Path::to_owned)
+}

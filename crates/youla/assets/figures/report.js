@@ -1,0 +1,208 @@
+// The figures of this report.
+
+const FADED = 0.6; // Coherence below which a point of the indirect response is said to carry little.
+
+for (const node of document.querySelectorAll("[data-method]")) node.style.setProperty("--c", `var(${methodOf(node.dataset.method).style.colour})`);
+for (const node of document.querySelectorAll("[data-swatch]")) node.innerHTML = swatch(methodOf(node.dataset.swatch).style);
+
+const BUILDERS = { data, signals, order, verification, frequency, poles, reduction };
+for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dataset.figure](host);
+
+// Rows of a trace as seconds.
+function seconds(trace, clock) {
+  let row = 0;
+  return trace.steps.map(step => (row += step) * clock.sample_time);
+}
+
+const detailOf = clock => clock.detail.end > clock.detail.start ? [clock.detail.start, clock.detail.end - 1].map(k => k * clock.sample_time) : null;
+
+function statement(clock) {
+  const length = `${grouped(clock.samples)} samples (${readOut(clock.samples * clock.sample_time)} s)`;
+  if (clock.bucket === 1) return `Every one of ${length} is drawn.`;
+  const detail = detailOf(clock);
+  return `${length}, drawn by minimum and maximum of every ${clock.bucket} samples` +
+    (detail ? `; in the shaded window, ${readOut(detail[0])} s to ${readOut(detail[1])} s, every sample is drawn.` : ".");
+}
+
+// Figures over time: choices above, a stack, and how much of the record is drawn.
+function timeFigure(host, choices, clockNow, specNow, sentence) {
+  const controls = element("div", { class: "controls" });
+  const plotHost = element("div"), caption = element("p", { class: "caption" });
+  const figure = mount(plotHost, () => stack(plotHost, specNow()));
+  const redraw = () => { figure.draw(); tell(); };
+  const whole = element("button", { type: "button", class: "action", onclick: () => figure.plot.reset() }, "Whole record");
+  const detail = element("button", { type: "button", class: "action", onclick: () => figure.plot.zoom(...detailOf(clockNow())) }, "Every sample");
+  const tell = () => {
+    caption.textContent = `${sentence()} ${statement(clockNow())}`;
+    whole.hidden = detail.hidden = !detailOf(clockNow());
+  };
+  controls.append(...choices.filter(c => c.options.length > 1).map(c => chooser(c.label, c.options, k => { c.changed(k); redraw(); })), whole, detail);
+  host.replaceChildren(controls, plotHost, caption);
+  redraw();
+}
+
+function signalFigure(host, kinds, names, sentence) {
+  const experiments = report.experiments.filter(e => e.signals.some(s => kinds.includes(s.kind)));
+  let now = experiments[0];
+  timeFigure(host,
+    [{ label: "Experiment", options: experiments.map(e => e.name), changed: k => { now = experiments[k]; } }],
+    () => now.clock,
+    () => {
+      const shown = now.signals.filter(s => kinds.includes(s.kind));
+      const style = { colour: "--measured", dash: [], width: 1 };
+      return {
+        label: `${sentence} Signals: ${shown.map(s => channelLabel(s.channel)).join(", ")}.`,
+        x: { label: "Time", unit: "s" }, shade: detailOf(now.clock), legend: shown.map((s, k) => ({ id: String(k), name: `${s.channel.name}, ${names[s.kind]}`, style: signalStyle(s.kind, style) })),
+        panels: shown.map((s, k) => ({
+          label: s.channel.name, unit: s.channel.unit, height: shown.length > 4 ? 92 : 128,
+          curves: [{ id: String(k), x: seconds(s.trace, now.clock), y: s.trace.values, style: signalStyle(s.kind, style) }],
+        })),
+      };
+    }, () => sentence);
+}
+
+const signalStyle = (kind, style) => ["input", "alpha"].includes(kind) ? { ...style, colour: "--soft" } : kind === "excitation" ? { ...style, colour: "--indirect" } : style;
+
+function data(host) {
+  signalFigure(host, ["input", "output", "excitation"], { input: "input", output: "output", excitation: "excitation" }, "Signals of the record from which the models were identified.");
+}
+
+function signals(host) {
+  signalFigure(host, ["alpha", "beta"], { alpha: "input of S", beta: "output of S" }, "The signals from which S was identified.");
+}
+
+function order(host) {
+  for (const choice of report.orders) {
+    const { label, style } = methodOf(choice.method);
+    stemFigure(host, choice.label || label, { ...style, dash: [] }, choice.values, choice.chosen, "Singular value",
+      `Singular values (${choice.label || label}). ${choice.chosen} are kept, ${choice.values.length} are shown.`);
+  }
+}
+
+function reduction(host) {
+  const { hankel, chosen, bound, label } = report.reduction;
+  const said = bound == null ? "" : ` The error is at most ${readOut(bound)} in the H∞ norm, twice the sum of the values left out or the bound of the method.`;
+  stemFigure(host, label, { ...methodOf("hansen_reduced").style, dash: [] }, hankel, chosen, "Hankel singular value", `Hankel singular values (${label}). ${chosen} of ${hankel.length} states are kept.${said}`);
+}
+
+function stemFigure(host, title, style, values, chosen, label, caption) {
+  const largest = Math.max(...values), plotHost = element("div");
+  const kept = values.map((v, k) => [k + 1, v]).filter(([, v]) => v > largest * 1e-18);
+  host.append(element("div", {}, element("p", { class: "panel-title" }, title), plotHost, element("p", { class: "caption" }, caption)));
+  mount(plotHost, () => stack(plotHost, {
+    label: caption, x: { label: "Number", unit: "", whole: true }, legend: [],
+    panels: [{ label, unit: "", height: 220, log: true, curves: [{ id: "values", x: kept.map(v => v[0]), y: kept.map(v => v[1]), style, chosen }] }],
+  }));
+}
+
+function verification(host) {
+  const records = report.verification;
+  let record = records[0], place = 0;
+  const outputs = record.outputs.map(o => o.output);
+  const name = k => report.outputs[k]?.name ?? `output ${k + 1}`;
+  const entry = () => record.outputs.find(o => o.output === outputs[place]) ?? record.outputs[0];
+  const fitOf = (method, output) => report.fits.find(f => f.record === record.record && f.output === output && f.method === method)?.fit;
+  timeFigure(host, [
+    { label: "Record", options: records.map(r => r.record), changed: k => { record = records[k]; } },
+    { label: "Output", options: outputs.map(name), changed: k => { place = k; } },
+  ], () => record.clock, () => {
+    const { output, measured, predictions } = entry(), clock = record.clock;
+    const channel = report.outputs[output] ?? { name: name(output), unit: "" };
+    const [low, high] = span(measured.values), room = high - low || 1;
+    const time = trace => seconds(trace, clock);
+    return {
+      label: `Measured and predicted ${channel.name} of ${record.record}, and the residuals beneath. The fits are in the table of fits.`,
+      x: { label: "Time", unit: "s" }, shade: detailOf(clock),
+      legend: [{ id: "measured", name: "measured", style: MEASURED }, ...predictions.map(p => {
+        const fit = fitOf(p.method, output), { label, style } = methodOf(p.method);
+        return { id: p.method, name: label + (fit == null ? "" : `, ${minus(fit.toFixed(1))} %`), style, hidden: methodOf(p.method).role === "nominal" && predictions.length > 1 };
+      })],
+      panels: [
+        { label: channel.name, unit: channel.unit, height: 280, limits: [low - 0.6 * room, high + 0.6 * room],
+          curves: [{ id: "measured", x: time(measured), y: measured.values, style: MEASURED },
+            ...predictions.map(p => ({ id: p.method, x: time(p.predicted), y: p.predicted.values, style: methodOf(p.method).style }))] },
+        { label: "residual", short: "residual", unit: channel.unit, height: 150, limits: [-room, room],
+          curves: predictions.map(p => ({ id: p.method, x: time(p.residual), y: p.residual.values, style: { ...methodOf(p.method).style, width: 1.1, dash: [] } })) },
+      ],
+    };
+  }, () => {
+    const { output, measured, predictions } = entry();
+    const [low, high] = span(measured.values), room = high - low || 1;
+    const away = predictions.filter(p => { const [a, b] = span(p.predicted.values); return a < low - 0.6 * room || b > high + 0.6 * room; });
+    return `${name(output)} of ${record.record}, ${record.prediction}; beneath, measured less predicted.` +
+      (away.length ? ` Axes follow the measured signal; ${away.map(p => methodOf(p.method).label).join(", ")} leaves them.` : "");
+  });
+}
+
+function span(values) {
+  let low = Infinity, high = -Infinity;
+  for (const v of values) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); }
+  return low <= high ? [low, high] : [0, 0];
+}
+
+function frequency(host) {
+  const { hz, models, indirect } = report.frequency;
+  const pairs = [];
+  for (const { output, input } of [...models, ...indirect]) if (!pairs.some(p => p.output === output && p.input === input)) pairs.push({ output, input });
+  pairs.sort((a, b) => a.output - b.output || a.input - b.input);
+  const nameOf = (list, k, word) => list[k]?.name ?? `${word} ${k + 1}`;
+  const title = p => `${nameOf(report.outputs, p.output, "output")} from ${nameOf(report.inputs, p.input, "input")}`;
+  let pair = pairs[0];
+  const same = curve => curve.output === pair.output && curve.input === pair.input;
+  const plotHost = element("div"), caption = element("p", { class: "caption" });
+  const tell = () => {
+    const some = indirect.some(same);
+    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. Where coherence is below ${FADED} the points say little.` : "");
+  };
+  const figure = mount(plotHost, () => {
+    const measured = indirect.filter(same), shown = models.filter(same);
+    const opacity = m => m.coherence.map(c => c == null ? 0.1 : 0.08 + 0.92 * Math.min(1, Math.max(0, (c - 0.2) / 0.7)) ** 2);
+    const curves = part => [
+      ...measured.map(m => ({ id: "indirect", x: m.hz, y: m[part], style: INDIRECT, opacity: opacity(m) })),
+      ...shown.map(m => ({ id: m.method, x: hz, y: m[part], style: methodOf(m.method).style })),
+    ];
+    const units = [report.outputs[pair.output]?.unit, report.inputs[pair.input]?.unit];
+    const gain = units[0] && units[1] ? ` re ${prettyUnit(units[0])}/${prettyUnit(units[1])}` : "";
+    return stack(plotHost, {
+      label: `Bode diagram, ${title(pair)}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
+      x: { label: "Frequency", unit: "Hz", log: true },
+      legend: [...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
+      panels: [
+        { label: "Magnitude", unit: "dB" , axisUnit: `dB${gain}`, height: 280, curves: curves("magnitude_db") },
+        { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
+        ...(measured.length ? [{ label: "Coherence", short: "coherence", unit: "", height: 84, fixed: [0, 1.04], line: FADED,
+          curves: measured.map(m => ({ id: "indirect", x: m.hz, y: m.coherence, style: { ...INDIRECT, points: false, width: 1.2 } })) }] : []),
+      ],
+    });
+  });
+  host.append(element("div", { class: "controls" }, pairs.length > 1 ? chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); tell(); }) : null), plotHost, caption);
+  figure.draw();
+  tell();
+}
+
+function poles(host) {
+  if (report.poles.some(set => set.poles.length)) poleMap(host, report.poles, report.sample_time);
+}
+
+// Worst closed-loop poles of discrete loops are judged by their magnitude.
+if (report.sample_time != null) {
+  document.querySelectorAll("#certificate tbody tr").forEach((row, k) => {
+    const pole = report.certificates[k].worst_closed_loop_pole;
+    if (pole) row.lastElementChild.append(`, |z| = ${Math.hypot(...pole).toFixed(6)}`);
+  });
+}
+
+const redrawAll = () => figures.forEach(figure => figure.draw());
+matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
+addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); redrawAll(); });
+addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); redrawAll(); });
+
+// The part in view is marked in the list of parts.
+const entries = new Map([...document.querySelectorAll("nav a")].map(link => [link.hash.slice(1), link]));
+const visible = new Set();
+const watcher = new IntersectionObserver(changes => {
+  for (const { target, isIntersecting } of changes) isIntersecting ? visible.add(target.id) : visible.delete(target.id);
+  const first = [...entries.keys()].find(id => visible.has(id));
+  for (const [id, link] of entries) id === first ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current");
+}, { rootMargin: "-10% 0px -60% 0px" });
+for (const id of entries.keys()) watcher.observe(document.getElementById(id));

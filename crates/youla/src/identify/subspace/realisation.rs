@@ -1,0 +1,83 @@
+//! A and C, from the shift of the observability matrix or by regression of the state sequence.
+//!
+//! All sequences are held in the coordinates of the triangular factor: a row per direction instead of one per sample.
+
+use super::Weight;
+use super::hankel::HankelFactor;
+use crate::Result;
+use crate::linalg::{block, least_squares};
+use faer::{Mat, MatRef};
+
+/// The matrices through which the states are seen.
+pub(super) struct OutputPair {
+    /// State matrix, n x n.
+    pub(super) a: Mat<f64>,
+    /// Output matrix, p x n.
+    pub(super) c: Mat<f64>,
+}
+
+/// Sequences of the state equation `[x+; y] = [A; C] x + (..) U_f + [w; v]`, transposed: rows are directions.
+pub(super) struct StateSequences<'a> {
+    /// Observability matrix with orthonormal columns, s p x n.
+    pub(super) gamma: MatRef<'a, f64>,
+    /// State now, and what the future inputs add to it.
+    pub(super) x: Mat<f64>,
+    /// `[x+ y]`: state one sample later and output now.
+    pub(super) target: Mat<f64>,
+    /// Future inputs.
+    pub(super) u_future: MatRef<'a, f64>,
+    /// Number of outputs.
+    pub(super) outputs: usize,
+    /// Number of samples behind the directions.
+    pub(super) columns: usize,
+}
+
+impl<'a> StateSequences<'a> {
+    /// `Gamma^+ Z_i` and `Gamma_{s-1}^+ Z_{i+1}` (Van Overschee and De Moor, section 4.3).
+    pub(super) fn new(factor: &'a HankelFactor, gamma: MatRef<'a, f64>) -> Result<Self> {
+        let shorter = gamma.subrows(0, gamma.nrows() - factor.outputs);
+        let present = factor.present_outputs();
+        let mut x = Mat::zeros(present.nrows(), gamma.ncols());
+        let now = factor.future_projected();
+        x.as_mut().subrows_mut(0, now.nrows()).copy_from(now * gamma);
+        let later = factor.later_future_projected();
+        let x_next = least_squares("the shortened observability matrix", shorter, later.transpose())?.x;
+        let target = block(&[&[x_next.transpose(), present]]);
+        let (outputs, columns) = (factor.outputs, factor.columns);
+        Ok(StateSequences { gamma, x, target, u_future: factor.future_inputs(), outputs, columns })
+    }
+
+    /// Residuals `[w v]` for given A and C, with the best share of the future inputs taken off.
+    pub(super) fn residuals(&self, pair: &OutputPair) -> Result<Mat<f64>> {
+        let explained = block(&[&[pair.a.transpose(), pair.c.transpose()]]);
+        let rest = &self.target - &self.x * explained;
+        let by_inputs = least_squares("the future inputs", self.u_future, rest.as_ref())?.x;
+        Ok(rest - self.u_future * by_inputs)
+    }
+}
+
+/// A and C in the way of the weight.
+pub(super) fn realise(weight: Weight, states: &StateSequences<'_>) -> Result<OutputPair> {
+    match weight {
+        Weight::Moesp | Weight::Cva => shift(states),
+        Weight::N4sid => regression(states),
+    }
+}
+
+/// `C = Gamma(1:p, :)`, `Gamma(1:end-p, :) A = Gamma(p+1:end, :)`.
+fn shift(states: &StateSequences<'_>) -> Result<OutputPair> {
+    let (gamma, p) = (states.gamma, states.outputs);
+    let rows = gamma.nrows() - p;
+    let a = least_squares("the observability matrix", gamma.subrows(0, rows), gamma.subrows(p, rows))?.x;
+    Ok(OutputPair { a, c: gamma.subrows(0, p).to_owned() })
+}
+
+/// `[x+; y] = [A; C] x + K U_f`, all three unknown.
+fn regression(states: &StateSequences<'_>) -> Result<OutputPair> {
+    let n = states.gamma.ncols();
+    let regressors = block(&[&[states.x.as_ref(), states.u_future]]);
+    let found = least_squares("the state sequence", regressors.as_ref(), states.target.as_ref())?.x;
+    let a = found.as_ref().submatrix(0, 0, n, n).transpose().to_owned();
+    let c = found.as_ref().submatrix(0, n, n, states.outputs).transpose().to_owned();
+    Ok(OutputPair { a, c })
+}

@@ -1,0 +1,209 @@
+//! Algebraic Riccati equations with cross term, continuous and discrete, and their stabilising solution X:
+//!
+//! ```text
+//! A'X + X A     - (X B + S) R^-1 (B'X + S')              + Q = 0      K = R^-1 (B'X + S')
+//! A'X A   - X   - (A'X B + S) (R + B'X B)^-1 (B'X A + S') + Q = 0      K = (R + B'X B)^-1 (B'X A + S')
+//! ```
+//!
+//! One path serves both. The problem is brought to normal form (R = I, balanced states), the discrete pencil is mapped to
+//! a Hamiltonian matrix by a Cayley transformation, the stable invariant subspace comes from an ordered real Schur form
+//! (A. J. Laub, IEEE Trans. Autom. Control 24 (1979), 913), and Newton steps (D. L. Kleinman, IEEE Trans. Autom. Control 13
+//! (1968), 114; G. A. Hewer, 16 (1971), 382) refine X on the original data while they lower the residual. A singular
+//! A in discrete time needs no special care: nothing inverts it.
+
+mod hamiltonian;
+mod modes;
+mod newton;
+mod normal_form;
+
+use super::{check_finite, check_shape};
+use crate::{Error, Result};
+use faer::{Mat, MatRef, c64};
+use normal_form::{NormalForm, check_symmetric};
+
+/// Relative residual beyond which a computed solution is refused.
+const ACCEPTED_RESIDUAL: f64 = 1e-8;
+
+/// Data of a Riccati equation: n states, m inputs.
+#[derive(Debug, Clone, Copy)]
+pub struct RiccatiProblem<'a> {
+    /// State matrix A, n x n.
+    pub a: MatRef<'a, f64>,
+    /// Input matrix B, n x m.
+    pub b: MatRef<'a, f64>,
+    /// Weight of the states, n x n, symmetric.
+    pub q: MatRef<'a, f64>,
+    /// Weight of the inputs, m x m, symmetric and positive definite.
+    pub r: MatRef<'a, f64>,
+    /// Cross term S of the weight `[Q S; S' R]`, n x m; none means zero.
+    pub s: Option<MatRef<'a, f64>>,
+}
+
+impl RiccatiProblem<'_> {
+    /// Shapes, finite entries, symmetric weights.
+    pub(crate) fn check(&self, what: &str) -> Result<()> {
+        let RiccatiProblem { a, b, q, r, s } = *self;
+        let (n, m) = (a.nrows(), b.ncols());
+        let cross = s.map(|s| ("the cross weight S", s, (n, m)));
+        let named = [
+            ("the state matrix A", a, (n, n)),
+            ("the input matrix B", b, (n, m)),
+            ("the state weight Q", q, (n, n)),
+            ("the input weight R", r, (m, m)),
+        ];
+        for (name, matrix, expected) in named.into_iter().chain(cross) {
+            let name = format!("{name} of {what}");
+            check_shape(&name, matrix, expected)?;
+            check_finite(&name, matrix)?;
+        }
+        check_symmetric(&format!("the state weight Q of {what}"), q)?;
+        check_symmetric(&format!("the input weight R of {what}"), r)
+    }
+}
+
+/// Stabilising solution of a Riccati equation.
+#[derive(Debug, Clone)]
+pub struct RiccatiSolution {
+    /// Symmetric solution X, n x n.
+    pub x: Mat<f64>,
+    /// Gain K, m x n, in the sign of the textbooks: `A - B K` is stable.
+    pub gain: Mat<f64>,
+    /// Eigenvalues of `A - B K`, strictly inside of the stability boundary.
+    pub closed_loop_poles: Vec<c64>,
+    /// Norm of the left-hand side, written with the closed loop, over the sum of the norms of its terms, in coordinates in
+    /// which R = I and the states are balanced: there no large entry can hide an error in a small one.
+    pub relative_residual: f64,
+    /// Newton steps that lowered the residual.
+    pub newton_steps: usize,
+}
+
+/// Stabilising solution of the continuous-time Riccati equation.
+///
+/// Relative residual below 1e-12 on random problems of 2 to 40 states (`tests::random_problems`) and below 1e-10 where the
+/// units of the states differ by six decades (`tests::scaling_over_six_decades`).
+///
+/// # Errors
+/// [`Error::Shape`], [`Error::NotFinite`], [`Error::NotSymmetric`] and [`Error::NotPositiveDefinite`] name the matrix;
+/// [`Error::NotStabilisable`] and [`Error::NotDetectable`] name the mode for which no stabilising solution exists;
+/// [`Error::NoSolution`] where the computed solution does not hold.
+///
+/// ```
+/// use youla::{Mat, linalg::{RiccatiProblem, care, eye}};
+/// // x^+ = x + u with unit weights: x = 1 + sqrt 2.
+/// let one = eye(1);
+/// let problem = RiccatiProblem { a: one.as_ref(), b: one.as_ref(), q: one.as_ref(), r: one.as_ref(), s: None };
+/// let solution = care("the regulator", &problem)?;
+/// assert!((solution.x[(0, 0)] - (1.0 + 2f64.sqrt())).abs() < 1e-14);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn care(what: &str, problem: &RiccatiProblem<'_>) -> Result<RiccatiSolution> {
+    solve(what, Equation::Continuous, problem)
+}
+
+/// Stabilising solution of the discrete-time Riccati equation; A may be singular.
+///
+/// R must be positive definite by itself (not only `R + B'X B`). Accuracy as for [`care`].
+///
+/// # Errors
+/// As for [`care`].
+///
+/// ```
+/// use youla::{Mat, linalg::{RiccatiProblem, dare, eye}};
+/// // x^+ = x + u with unit weights: x is the golden ratio.
+/// let one = eye(1);
+/// let problem = RiccatiProblem { a: one.as_ref(), b: one.as_ref(), q: one.as_ref(), r: one.as_ref(), s: None };
+/// let solution = dare("the regulator", &problem)?;
+/// assert!((solution.x[(0, 0)] - 0.5 * (1.0 + 5f64.sqrt())).abs() < 1e-14);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn dare(what: &str, problem: &RiccatiProblem<'_>) -> Result<RiccatiSolution> {
+    solve(what, Equation::Discrete, problem)
+}
+
+/// Which of the two equations.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Equation {
+    Continuous,
+    Discrete,
+}
+
+impl Equation {
+    /// Distance beyond the stability boundary, negative where stable.
+    fn instability(self, pole: c64) -> f64 {
+        match self {
+            Equation::Continuous => pole.re,
+            Equation::Discrete => pole.norm() - 1.0,
+        }
+    }
+
+    /// The nearest point of the stability boundary.
+    fn on_boundary(self, pole: c64) -> c64 {
+        match self {
+            Equation::Continuous => c64::new(0.0, pole.im),
+            Equation::Discrete if pole.norm() == 0.0 => c64::new(1.0, 0.0),
+            Equation::Discrete => pole / pole.norm(),
+        }
+    }
+}
+
+fn solve(what: &str, equation: Equation, problem: &RiccatiProblem<'_>) -> Result<RiccatiSolution> {
+    let normal = NormalForm::new(what, equation, problem)?;
+    let attempt = stabilising_solution(what, &normal);
+    // Rounding may push a mode that no feedback moves, or a double eigenvalue on the boundary, to either side: where the
+    // closed loop comes near the boundary, the modes of the plant decide whether a solution exists at all.
+    let doubtful = attempt.as_ref().map_or(true, |solution| solution.is_near_boundary(&normal));
+    if doubtful && let Some(refusal) = modes::obstacle(what, &normal)? {
+        return Err(refusal);
+    }
+    let Stabilised { x, gain, closed_loop_poles, relative_residual, newton_steps } = attempt?;
+    let (x, gain) = (normal.original_solution(&x), normal.original_gain(&gain));
+    Ok(RiccatiSolution { x, gain, closed_loop_poles, relative_residual, newton_steps })
+}
+
+/// A solution in normal form.
+struct Stabilised {
+    x: Mat<f64>,
+    gain: Mat<f64>,
+    closed_loop_poles: Vec<c64>,
+    relative_residual: f64,
+    newton_steps: usize,
+}
+
+impl Stabilised {
+    fn is_near_boundary(&self, normal: &NormalForm) -> bool {
+        let tolerance = 1e-7 * normal.size();
+        self.closed_loop_poles.iter().any(|p| normal.equation.instability(*p) > -tolerance)
+    }
+}
+
+/// Invariant subspace, refinement, and the proof that the outcome solves and stabilises.
+fn stabilising_solution(what: &str, normal: &NormalForm) -> Result<Stabilised> {
+    let start = hamiltonian::stabilising_solution(what, normal)?;
+    let newton::Refined { x, relative_residual, steps } = newton::refine(what, normal, start)?;
+    let gain = newton::gain(normal, &x)?;
+    let closed_loop = &normal.a - &normal.b * &gain;
+    let closed_loop_poles =
+        super::real_schur(&format!("the closed loop of {what}"), closed_loop.as_ref())?.eigenvalues();
+    let worst = closed_loop_poles.iter().copied().max_by(|p, q| {
+        let (p, q) = (normal.equation.instability(*p), normal.equation.instability(*q));
+        p.total_cmp(&q)
+    });
+    let refusal = match worst {
+        Some(p) if normal.equation.instability(p) >= 0.0 => {
+            format!("the closed loop keeps the pole {}", crate::error::Pole(p))
+        }
+        _ if relative_residual > ACCEPTED_RESIDUAL || relative_residual.is_nan() => {
+            "the equation is too ill-conditioned for its solution to be computed".to_owned()
+        }
+        _ => return Ok(Stabilised { x, gain, closed_loop_poles, relative_residual, newton_steps: steps }),
+    };
+    Err(Error::NoSolution { what: equation_name(what), condition: refusal, residual: relative_residual })
+}
+
+/// How errors name the equation of `what`.
+fn equation_name(what: &str) -> String {
+    format!("the Riccati equation of {what}")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,396 @@
+//! What a report shows, as plain data: every struct here is drawn as it is, none is computed with.
+//!
+//! Parts that a run does not have stay empty and their figures are left out. Methods are named by a key, listed once in
+//! [`ReportData::methods`] in the order in which they are drawn; outputs and inputs by their place in the channel lists.
+
+use serde::{Deserialize, Serialize};
+
+use super::numbers;
+use super::trace::{Timeline, Trace};
+use crate::units::Channel;
+
+/// Everything in one report.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct ReportData {
+    /// Title, for example the machine.
+    pub title: String,
+    /// What was done, in one sentence.
+    pub summary: String,
+    /// Program and version.
+    pub program: String,
+    /// Name of the run.
+    pub run: String,
+    /// Options of the run as TOML.
+    pub settings: String,
+    /// Files that were read.
+    pub sources: Vec<Source>,
+    /// Input channels of the plant.
+    pub inputs: Vec<Channel>,
+    /// Output channels of the plant.
+    pub outputs: Vec<Channel>,
+    /// Seconds between samples; absent where the models are in continuous time.
+    pub sample_time: Option<f64>,
+    /// Models that are compared, in the order in which they are listed and drawn.
+    pub methods: Vec<Method>,
+    /// The answer to "can I trust it?", in about five lines.
+    pub verdict: Vec<Verdict>,
+    /// What the user should know besides.
+    pub notes: Vec<Note>,
+    /// Fits on verification data.
+    pub fits: Vec<Fit>,
+    /// Records used for estimation.
+    pub experiments: Vec<Experiment>,
+    /// How orders were chosen.
+    pub orders: Vec<OrderChoice>,
+    /// Measured against predicted.
+    pub verification: Vec<Verification>,
+    /// Frequency responses.
+    pub frequency: Option<FrequencyResponse>,
+    /// Poles of each model.
+    pub poles: Vec<Poles>,
+    /// Modes of each model.
+    pub modes: Vec<Mode>,
+    /// Hankel singular values of the reduction.
+    pub reduction: Option<Reduction>,
+    /// Loop certificate of each model.
+    pub certificates: Vec<Certificate>,
+    /// Relative residual of the Bezout identity of the factors.
+    pub bezout_residual: Option<f64>,
+    /// Duration of each stage.
+    pub stages: Vec<Stage>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Source {
+    /// Path as the user gave it.
+    pub path: String,
+    /// What it was used for, for example "estimation".
+    pub purpose: String,
+    /// SHA-256 of its bytes, hexadecimal.
+    pub sha256: String,
+}
+
+/// What a model is in the comparison. It decides colour and marker.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Role {
+    /// The model known before.
+    Nominal,
+    /// Identified from u and y directly.
+    Direct,
+    /// Identified by the Hansen scheme.
+    Hansen,
+    /// The Hansen model after reduction.
+    HansenReduced,
+    /// Any further method; colours are taken from the rest of the palette.
+    Other,
+}
+
+/// A model that is compared.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Method {
+    /// Key by which the other structs name it.
+    pub key: String,
+    /// Name that figures and tables show.
+    pub label: String,
+    /// Its role.
+    pub role: Role,
+}
+
+impl Method {
+    /// A method under any key and label.
+    pub fn new(key: impl Into<String>, label: impl Into<String>, role: Role) -> Self {
+        Method { key: key.into(), label: label.into(), role }
+    }
+
+    /// `nominal`: the model known before.
+    pub fn nominal() -> Self {
+        Self::new("nominal", "nominal G(0)", Role::Nominal)
+    }
+
+    /// `direct`: N4SID on u and y.
+    pub fn direct() -> Self {
+        Self::new("direct", "direct N4SID", Role::Direct)
+    }
+
+    /// `hansen`: the model of the Hansen scheme, full order.
+    pub fn hansen() -> Self {
+        Self::new("hansen", "Hansen G(S)", Role::Hansen)
+    }
+
+    /// `hansen_reduced`: the same after reduction.
+    pub fn hansen_reduced() -> Self {
+        Self::new("hansen_reduced", "Hansen reduced G_red(S)", Role::HansenReduced)
+    }
+}
+
+/// A part of the report to which a line of the verdict leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Evidence {
+    /// Table of fits.
+    Fits,
+    /// Records used for estimation.
+    Data,
+    /// Alpha and beta.
+    Signals,
+    /// Singular values.
+    Order,
+    /// Measured against predicted.
+    Verification,
+    /// Frequency responses.
+    Frequency,
+    /// Poles and modes.
+    Poles,
+    /// Hankel singular values.
+    Reduction,
+    /// Loop certificate.
+    Certificate,
+}
+
+/// How a finding is to be taken.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Status {
+    /// In order.
+    Good,
+    /// To be looked at.
+    Caution,
+    /// Speaks against the model.
+    Bad,
+    /// Said for completeness.
+    Info,
+}
+
+/// One line of the answer to "can I trust it?".
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Whether it speaks for or against the model.
+    pub status: Status,
+    /// One sentence.
+    pub text: String,
+    /// Where the report shows it.
+    pub evidence: Evidence,
+}
+
+/// A remark on the data or the run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Note {
+    /// Weight of the remark.
+    pub status: Status,
+    /// One sentence.
+    pub text: String,
+}
+
+/// Fit of one model to one output of one record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// Name of the record.
+    pub record: String,
+    /// Output, by its place.
+    pub output: usize,
+    /// Key of the method.
+    pub method: String,
+    /// NRMSE fit of eq. (26), percent; absent where the prediction diverged.
+    pub fit: Option<f64>,
+}
+
+/// What a signal of an experiment is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum SignalKind {
+    /// Plant input u.
+    Input,
+    /// Plant output y.
+    Output,
+    /// External excitation.
+    Excitation,
+    /// Input alpha of S.
+    Alpha,
+    /// Output beta of S.
+    Beta,
+}
+
+/// One record used for estimation, with the signals derived from it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Experiment {
+    /// Name of the record.
+    pub name: String,
+    /// Time axis of all its signals.
+    pub clock: Timeline,
+    /// The signals, in the order in which they are drawn.
+    pub signals: Vec<Signal>,
+}
+
+/// One signal of an experiment.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Signal {
+    /// What it is.
+    pub kind: SignalKind,
+    /// Its name and unit.
+    pub channel: Channel,
+    /// Its course.
+    pub trace: Trace,
+}
+
+/// Singular values from which an order was chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrderChoice {
+    /// Key of the method.
+    pub method: String,
+    /// What was identified, for example "S from alpha to beta".
+    pub label: String,
+    /// Singular values, falling.
+    #[serde(with = "numbers")]
+    pub values: Vec<f64>,
+    /// The order that was taken.
+    pub chosen: usize,
+}
+
+/// Measured against predicted on one record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Verification {
+    /// Name of the record.
+    pub record: String,
+    /// How the prediction was made, for example "simulated from the measured input".
+    pub prediction: String,
+    /// Time axis of all its curves.
+    pub clock: Timeline,
+    /// One entry per output that was compared.
+    pub outputs: Vec<VerifiedOutput>,
+}
+
+/// One output of a verification record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct VerifiedOutput {
+    /// Output, by its place.
+    pub output: usize,
+    /// What the machine did.
+    pub measured: Trace,
+    /// What the models say.
+    pub predictions: Vec<Prediction>,
+}
+
+/// What one model says of one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Key of the method.
+    pub method: String,
+    /// Predicted output.
+    pub predicted: Trace,
+    /// Measured less predicted, reduced from all samples by itself.
+    pub residual: Trace,
+}
+
+/// Frequency responses of all models on one grid, and the measured ones on theirs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrequencyResponse {
+    /// Grid of the models, Hz, rising.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// One entry per method, output and input.
+    pub models: Vec<ModelResponse>,
+    /// Non-parametric responses where the external excitation is known, per output and input.
+    pub indirect: Vec<Indirect>,
+}
+
+/// Response of one model from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelResponse {
+    /// Key of the method.
+    pub method: String,
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Magnitude in dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub magnitude_db: Vec<f64>,
+    /// Phase in degrees, on any branch.
+    #[serde(with = "numbers::seven_digits")]
+    pub phase_deg: Vec<f64>,
+}
+
+/// Indirect non-parametric response from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Indirect {
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Its own grid, Hz, rising.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// Magnitude in dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub magnitude_db: Vec<f64>,
+    /// Phase in degrees, on any branch.
+    #[serde(with = "numbers::seven_digits")]
+    pub phase_deg: Vec<f64>,
+    /// Coherence with the excitation, 0 to 1.
+    #[serde(with = "numbers::seven_digits")]
+    pub coherence: Vec<f64>,
+}
+
+/// Poles of one model, in z or, without a sample time, in rad/s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Poles {
+    /// Key of the method.
+    pub method: String,
+    /// Real and imaginary parts.
+    pub poles: Vec<[f64; 2]>,
+}
+
+/// A mode of one model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mode {
+    /// Key of the method.
+    pub method: String,
+    /// Natural frequency, Hz.
+    pub hz: f64,
+    /// Damping ratio; negative where the mode is unstable.
+    pub zeta: f64,
+}
+
+/// Hankel singular values of a model that was reduced.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Reduction {
+    /// What was reduced and how, for example "G(S) by balanced truncation".
+    pub label: String,
+    /// Hankel singular values, falling.
+    #[serde(with = "numbers")]
+    pub hankel: Vec<f64>,
+    /// Order that was kept.
+    pub chosen: usize,
+    /// Bound of the error in the H-infinity norm, in the units of the model.
+    pub bound: Option<f64>,
+}
+
+/// What can be said of one model in the loop with the actual controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Certificate {
+    /// Key of the method.
+    pub method: String,
+    /// Order of the model.
+    pub order: usize,
+    /// Order of S where the model came from one.
+    pub s_order: Option<usize>,
+    /// Whether S is stable.
+    pub s_stable: Option<bool>,
+    /// Whether the controller of the log stabilises the model.
+    pub stabilised_by_controller: Option<bool>,
+    /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
+    pub worst_closed_loop_pole: Option<[f64; 2]>,
+}
+
+/// Duration of one stage of the run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stage {
+    /// Its name.
+    pub name: String,
+    /// Seconds.
+    pub seconds: f64,
+}

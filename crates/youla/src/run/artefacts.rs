@@ -1,0 +1,323 @@
+//! The numbered artefacts of a run folder, as data.
+
+use super::folder::RunFolder;
+use super::pipeline::Identification;
+use super::records::{LoopRecord, SourceFile};
+use super::settings::RunSettings;
+use crate::factor::YoulaSignals;
+use crate::identify::subspace::SubspaceModel;
+use crate::lti::{Discrete, StateSpace};
+use crate::record::{Packing, Value, Variable, write_mat};
+use crate::units::Channel;
+use crate::{Mat, MatRef, Result, c64};
+use serde::{Deserialize, Serialize};
+
+/// Version of the layout of all artefacts and of summary.json.
+pub const SCHEMA: u32 = 1;
+
+/// Where an artefact comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Version of the layout.
+    pub schema: u32,
+    /// Program and version.
+    pub program: String,
+    /// Seed of simulated data.
+    pub seed: Option<u64>,
+    /// Files that were read, with their SHA-256.
+    pub sources: Vec<SourceFile>,
+    /// All options of the run.
+    pub options: RunSettings,
+}
+
+/// A discrete-time model as an artefact.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelFile {
+    /// What the model is.
+    pub name: String,
+    /// Channels of its inputs.
+    pub inputs: Vec<Channel>,
+    /// Channels of its outputs.
+    pub outputs: Vec<Channel>,
+    /// Sample time, seconds.
+    pub ts: f64,
+    /// A by rows.
+    pub a: Vec<Vec<f64>>,
+    /// B by rows.
+    pub b: Vec<Vec<f64>>,
+    /// C by rows.
+    pub c: Vec<Vec<f64>>,
+    /// D by rows.
+    pub d: Vec<Vec<f64>>,
+    /// Poles, real and imaginary parts.
+    pub poles: Vec<[f64; 2]>,
+    /// Further results that belong to the model.
+    pub details: serde_json::Value,
+    /// Where it comes from.
+    pub provenance: Provenance,
+}
+
+impl ModelFile {
+    /// The model itself.
+    ///
+    /// # Errors
+    /// Shapes that do not fit, as in a file that was changed by hand.
+    pub fn system(&self) -> Result<StateSpace<Discrete>> {
+        let (n, m, p) = (self.a.len(), self.inputs.len(), self.outputs.len());
+        let matrix = |rows: &[Vec<f64>], columns: usize| {
+            Mat::from_fn(rows.len(), columns, |i, j| rows[i].get(j).copied().unwrap_or(f64::NAN))
+        };
+        StateSpace::new(
+            matrix(&self.a, n),
+            matrix(&self.b, m),
+            matrix(&self.c, n),
+            matrix(&self.d, m.min(p.max(m))),
+            Discrete::new(self.ts)?,
+        )
+    }
+}
+
+/// Writes all artefacts of a run except report and summary.
+///
+/// # Errors
+/// [`crate::Error::Io`].
+pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()> {
+    let writer = Writer { found, folder, provenance: provenance(found) };
+    folder.text("run.toml", &found.settings.to_toml()?)?;
+    writer.records()?;
+    writer.factors()?;
+    writer.signals()?;
+    writer.models()?;
+    writer.verdict()
+}
+
+/// The provenance that every artefact of a run carries.
+pub(super) fn provenance(found: &Identification) -> Provenance {
+    Provenance {
+        schema: SCHEMA,
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        seed: found.settings.seed,
+        sources: found.records.sources.clone(),
+        options: found.settings.clone(),
+    }
+}
+
+/// Real and imaginary parts, as JSON has them.
+pub(super) fn pairs(poles: &[c64]) -> Vec<[f64; 2]> {
+    poles.iter().map(|p| [p.re, p.im]).collect()
+}
+
+struct Writer<'a> {
+    found: &'a Identification,
+    folder: &'a RunFolder,
+    provenance: Provenance,
+}
+
+impl Writer<'_> {
+    /// `1-record/`: every record as it was used, channels by name.
+    fn records(&self) -> Result<()> {
+        let records = &self.found.records;
+        let purposes = [("estimation", &records.estimation), ("verification", &records.verification)];
+        for (purpose, group) in purposes {
+            for record in group {
+                self.record(purpose, record)?;
+            }
+        }
+        let count = |group: &[LoopRecord]| -> Vec<serde_json::Value> {
+            group.iter().map(|r| serde_json::json!({"name": r.name, "samples": r.samples()})).collect()
+        };
+        let index = serde_json::json!({
+            "sample_time": records.time.ts(),
+            "inputs": records.inputs,
+            "outputs": records.outputs,
+            "estimation": count(&records.estimation),
+            "verification": count(&records.verification),
+            "provenance": self.provenance,
+        });
+        self.folder.json("1-record/records.json", &index)
+    }
+
+    fn record(&self, purpose: &str, record: &LoopRecord) -> Result<()> {
+        let mut variables = vec![number("ts", record.time.ts())];
+        let groups = [
+            ("u", Some(&record.u)),
+            ("y", Some(&record.y)),
+            ("input_excitation", record.input_excitation.as_ref()),
+            ("reference", record.reference.as_ref()),
+            ("alpha", record.alpha.as_ref()),
+        ];
+        for (name, matrix) in groups {
+            variables.extend(matrix.map(|m| array(name, m.as_ref())));
+        }
+        self.mat(&format!("1-record/{purpose}-{}.mat", record.name), &variables)
+    }
+
+    /// `2-factor/`: the two systems of (15), the controller and the nominal model.
+    fn factors(&self) -> Result<()> {
+        let f = &self.found.factorisation;
+        let details = serde_json::json!({"bezout_residual": f.bezout_residual});
+        let loop_ports: Vec<Channel> =
+            self.found.records.inputs.iter().chain(&self.found.records.outputs).cloned().collect();
+        let youla = |names: [&str; 2]| -> Vec<Channel> {
+            let channel = |name: &str, c: &Channel| Channel::new(format!("{name} of {}", c.name), &c.unit);
+            let (u, y) = (self.found.records.inputs.iter(), self.found.records.outputs.iter());
+            u.map(|c| channel(names[0], c)).chain(y.map(|c| channel(names[1], c))).collect()
+        };
+        let (right, left) = (f.factors.right().system(), f.factors.left().system());
+        self.model_with("2-factor/right", right, youla(["eta", "epsilon"]), loop_ports.clone(), details.clone())?;
+        self.model_with("2-factor/left", left, loop_ports, youla(["alpha", "beta"]), details)?;
+        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+        self.model_with("2-factor/controller", &f.controller, y, u, serde_json::Value::Null)?;
+        self.model("2-factor/nominal", &self.found.nominal, serde_json::Value::Null)
+    }
+
+    /// `3-signals/`: alpha and beta of each estimation record.
+    fn signals(&self) -> Result<()> {
+        let s = &self.found.signals;
+        for (record, YoulaSignals { alpha, beta }) in self.found.records.estimation.iter().zip(&s.experiments) {
+            let variables = [
+                number("ts", record.time.ts()),
+                number("dropped_samples", s.settle as f64),
+                array("alpha", alpha.as_ref()),
+                array("beta", beta.as_ref()),
+            ];
+            self.mat(&format!("3-signals/{}.mat", record.name), &variables)?;
+        }
+        let index = serde_json::json!({
+            "dropped_samples": s.settle,
+            "controller_mismatch": s.controller_mismatch,
+            "provenance": self.provenance,
+        });
+        self.folder.json("3-signals/signals.json", &index)
+    }
+
+    /// `4-identify/`, `5-recombine/`, `6-reduce/`: the models.
+    fn models(&self) -> Result<()> {
+        let found = self.found;
+        let (u, y) = (&found.records.inputs, &found.records.outputs);
+        let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
+            channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
+        };
+        let s = &found.hansen.deviation;
+        self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), subspace_details(s))?;
+        match &found.direct {
+            Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, subspace_details(direct))?,
+            Some(Err(e)) => self.folder.json("4-identify/direct.json", &refused(e))?,
+            None => {}
+        }
+        self.model("5-recombine/hansen", &found.hansen.plant, serde_json::Value::Null)?;
+        match &found.reduction {
+            Some(Ok(r)) => {
+                let details = serde_json::json!({
+                    "hankel_singular_values": r.hankel, "error_bound": r.error_bound, "minimal_order": r.minimal_order,
+                });
+                self.model("6-reduce/hansen_reduced", &r.model, details)
+            }
+            Some(Err(e)) => self.folder.json("6-reduce/hansen_reduced.json", &refused(e)),
+            None => Ok(()),
+        }
+    }
+
+    /// `7-validate/verdict.json` and the predictions.
+    fn verdict(&self) -> Result<()> {
+        let mut models = serde_json::Map::new();
+        for v in &self.found.verdict.models {
+            let records: Vec<_> = v
+                .records
+                .iter()
+                .map(|r| {
+                    let failure = r.predicted.as_ref().err();
+                    serde_json::json!({"record": r.record, "fit": r.fit, "vaf": r.vaf, "failure": failure})
+                })
+                .collect();
+            let entry = serde_json::json!({
+                "order": v.model.order(),
+                "poles": pairs(&v.poles),
+                "modes": v.modes.iter().map(|m| serde_json::json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
+                "stabilised_by_controller": v.certificate.stable,
+                "closed_loop_poles": pairs(&v.certificate.poles),
+                "records": records,
+            });
+            models.insert(v.method.key().into(), entry);
+        }
+        self.folder
+            .json("7-validate/verdict.json", &serde_json::json!({"models": models, "provenance": self.provenance}))?;
+        for (k, record) in self.found.records.verification.iter().enumerate() {
+            let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
+            for v in &self.found.verdict.models {
+                let predicted = v.records[k].predicted.as_ref().ok();
+                variables.extend(predicted.map(|p| array(v.method.key(), p.as_ref())));
+            }
+            self.mat(&format!("7-validate/{}.mat", record.name), &variables)?;
+        }
+        Ok(())
+    }
+
+    fn model(&self, name: &str, model: &StateSpace<Discrete>, details: serde_json::Value) -> Result<()> {
+        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+        self.model_with(name, model, u, y, details)
+    }
+
+    fn model_with(
+        &self,
+        name: &str,
+        model: &StateSpace<Discrete>,
+        inputs: Vec<Channel>,
+        outputs: Vec<Channel>,
+        details: serde_json::Value,
+    ) -> Result<()> {
+        let rows = |m: MatRef<'_, f64>| (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect();
+        let file = ModelFile {
+            name: name.rsplit('/').next().unwrap_or(name).to_owned(),
+            inputs,
+            outputs,
+            ts: model.time().ts(),
+            a: rows(model.a()),
+            b: rows(model.b()),
+            c: rows(model.c()),
+            d: rows(model.d()),
+            poles: pairs(&model.poles()?),
+            details,
+            provenance: self.provenance.clone(),
+        };
+        self.folder.json(&format!("{name}.json"), &file)?;
+        let variables = [
+            array("a", model.a()),
+            array("b", model.b()),
+            array("c", model.c()),
+            array("d", model.d()),
+            number("ts", model.time().ts()),
+            Variable { name: "program".into(), value: Value::text(&self.provenance.program) },
+        ];
+        self.mat(&format!("{name}.mat"), &variables)
+    }
+
+    fn mat(&self, name: &str, variables: &[Variable]) -> Result<()> {
+        write_mat(self.folder.path(name)?, variables, Packing::Plain)
+    }
+}
+
+fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
+    serde_json::json!({
+        "order": s.order.order,
+        "horizon": s.horizon,
+        "columns": s.columns,
+        "singular_values": s.singular_values,
+        "excitation_rcond": s.excitation_rcond,
+        "stable": s.stability.stable,
+        "moved_poles": s.stability.moved.iter().map(|m| [[m.from.re, m.from.im], [m.to.re, m.to.im]]).collect::<Vec<_>>(),
+        "initial_states": s.initial_states,
+    })
+}
+
+fn refused(e: &crate::Error) -> serde_json::Value {
+    serde_json::json!({"refused": e.to_string()})
+}
+
+fn number(name: &str, value: f64) -> Variable {
+    Variable { name: name.into(), value: Value::scalar(value) }
+}
+
+fn array(name: &str, value: MatRef<'_, f64>) -> Variable {
+    Variable { name: name.into(), value: Value::matrix(value) }
+}

@@ -1,0 +1,114 @@
+//! What a run says in words: the answer to "can I trust it?" and the remarks besides.
+
+use super::pipeline::Identification;
+use super::verdict::{Method, ModelVerdict};
+use crate::report::data::{Evidence, Note, Status, Verdict};
+
+/// The answer to "can I trust it?", about five lines, each with its evidence.
+pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
+    [fit_line(found), loop_line(found), deviation_line(found), controller_line(found), factor_line(found)]
+        .into_iter()
+        .flatten()
+        .collect()
+}
+
+/// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.
+pub(super) fn notes(found: &Identification) -> Vec<Note> {
+    let mut all = Vec::new();
+    let mut add = |status: Status, text: String| all.push(Note { status, text });
+    if let Some(Err(e)) = &found.direct {
+        add(Status::Info, format!("There is no direct model: {e}."));
+    }
+    if let Some(Err(e)) = &found.reduction {
+        add(Status::Info, format!("G(S) was not reduced: {e}."));
+    }
+    for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
+        let moved = model.map_or(0, |m| m.stability.moved.len());
+        if moved > 0 {
+            add(
+                Status::Caution,
+                format!("{moved} unstable poles of {name} were reflected, because stability = \"constrain\"."),
+            );
+        }
+    }
+    for v in &found.verdict.models {
+        for r in &v.records {
+            if let Err(reason) = &r.predicted {
+                add(Status::Caution, format!("{} has no prediction of {}: {reason}.", v.method.label(), r.record));
+            }
+        }
+    }
+    let settle = found.signals.settle;
+    add(
+        Status::Info,
+        format!("The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."),
+    );
+    all
+}
+
+fn direct(found: &Identification) -> Option<&crate::identify::subspace::SubspaceModel> {
+    found.direct.as_ref()?.as_ref().ok()
+}
+
+/// Mean fit over all verification records and outputs.
+fn mean_fit(v: &ModelVerdict) -> f64 {
+    let all: Vec<f64> = v.records.iter().flat_map(|r| r.fit.iter().copied()).collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+fn fit_line(found: &Identification) -> Option<Verdict> {
+    if found.records.verification.is_empty() {
+        let text = "No verification record was given: nothing shows how the model does on fresh data.".into();
+        return Some(Verdict { status: Status::Caution, text, evidence: Evidence::Fits });
+    }
+    let hansen = mean_fit(found.verdict.of(Method::Hansen)?);
+    let nominal = mean_fit(found.verdict.of(Method::Nominal)?);
+    let against = if nominal.is_finite() { format!("{nominal:.1} %") } else { "no prediction".into() };
+    let text = format!("On fresh data G(S) has a mean fit of {hansen:.1} %, the nominal model {against}.");
+    let better = hansen.is_finite() && (!nominal.is_finite() || hansen > nominal);
+    Some(Verdict { status: if better { Status::Good } else { Status::Bad }, text, evidence: Evidence::Fits })
+}
+
+fn loop_line(found: &Identification) -> Option<Verdict> {
+    let v = found.verdict.of(Method::Hansen)?;
+    let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
+    let (status, verb) =
+        if v.certificate.stable { (Status::Good, "stabilises") } else { (Status::Bad, "does not stabilise") };
+    let text = format!(
+        "The controller that ran {verb} G(S); the closed-loop pole of largest magnitude is at |z| = {worst:.5}."
+    );
+    Some(Verdict { status, text, evidence: Evidence::Certificate })
+}
+
+fn deviation_line(found: &Identification) -> Option<Verdict> {
+    let s = &found.hansen.deviation;
+    let stable = if s.stability.stable { "stable" } else { "unstable" };
+    let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
+    let text = format!(
+        "S has order {} and is {stable}; it reproduces beta with a fit of {} per channel (the rest is noise or unmodelled).",
+        s.model.order(),
+        fit.join(", "),
+    );
+    let status = if s.stability.stable { Status::Good } else { Status::Bad };
+    Some(Verdict { status, text, evidence: Evidence::Order })
+}
+
+fn controller_line(found: &Identification) -> Option<Verdict> {
+    let mismatch = found.signals.controller_mismatch?;
+    let (status, words) = match mismatch {
+        m if m < 0.01 => (Status::Good, "the declared controller is the one that ran"),
+        m if m < 0.1 => (Status::Caution, "the declared controller nearly explains the logged input"),
+        _ => {
+            (Status::Bad, "the declared controller does not explain the logged input; check sign, delay and saturation")
+        }
+    };
+    let text = format!("Known excitations explain alpha to {mismatch:.1e} (relative): {words}.");
+    Some(Verdict { status, text, evidence: Evidence::Signals })
+}
+
+fn factor_line(found: &Identification) -> Option<Verdict> {
+    let residual = found.factorisation.bezout_residual;
+    let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
+    let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
+    Some(Verdict { status, text, evidence: Evidence::Certificate })
+}

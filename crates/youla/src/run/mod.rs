@@ -1,0 +1,34 @@
+//! A whole run: run.toml and a log in, models with evidence out. The program and the Python package call this.
+
+mod artefacts;
+mod demo;
+mod factorise;
+mod findings;
+mod folder;
+mod models;
+mod page;
+mod pipeline;
+mod records;
+mod response;
+mod settings;
+mod signals;
+mod summary;
+mod verdict;
+mod write;
+
+pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
+pub use demo::{Demo, demo};
+pub use factorise::{Factorisation, factorise, factorise_run};
+pub use folder::{RunFolder, unused_folder};
+pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
+pub use page::page;
+pub use pipeline::{Identification, Stage, StageClock, StageTimes, identify};
+pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
+pub use settings::{
+    Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
+    VerificationSettings,
+};
+pub use signals::{DeviationSignals, deviation_signals, signal_records};
+pub use summary::summary;
+pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
+pub use write::{WrittenRun, write_run};

@@ -1,0 +1,272 @@
+//! What the report of a run shows: plain data, drawn by [`crate::report`].
+
+use super::artefacts::pairs;
+use super::findings::{notes, verdict_lines};
+use super::pipeline::{Identification, StageTimes};
+use super::records::LoopRecord;
+use super::response::{decibel, log_grid, measured_response, model_responses};
+use super::settings::Prediction;
+use super::verdict::{Method, ModelVerdict};
+use crate::identify::subspace::SubspaceModel;
+use crate::lti::FrequencyResponse;
+use crate::report::data::{self as draw, ReportData, Role, SignalKind};
+use crate::report::{Timeline, Trace};
+use crate::units::Channel;
+use crate::{Mat, Result, c64};
+use std::f64::consts::TAU;
+
+/// Collects what the report of a run shows; `run` names the run folder.
+///
+/// # Errors
+/// Those of the frequency responses, and settings that TOML cannot hold.
+pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<ReportData> {
+    Ok(ReportData {
+        title: found.settings.name.clone(),
+        summary: summary_sentence(found),
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        run: run.to_owned(),
+        settings: found.settings.to_toml()?,
+        sources: sources(found),
+        inputs: found.records.inputs.clone(),
+        outputs: found.records.outputs.clone(),
+        sample_time: Some(found.records.time.ts()),
+        methods: found.verdict.models.iter().map(|v| method(v.method)).collect(),
+        verdict: verdict_lines(found),
+        notes: notes(found),
+        fits: fits(found),
+        experiments: experiments(found)?,
+        orders: orders(found),
+        verification: found
+            .records
+            .verification
+            .iter()
+            .enumerate()
+            .map(|(k, r)| verification(found, k, r))
+            .collect::<Result<_>>()?,
+        frequency: Some(frequency(found)?),
+        poles: found.verdict.models.iter().map(poles).collect(),
+        modes: found.verdict.models.iter().flat_map(modes).collect(),
+        reduction: reduction(found),
+        certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
+        bezout_residual: Some(found.factorisation.bezout_residual),
+        stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
+    })
+}
+
+fn summary_sentence(found: &Identification) -> String {
+    let records = &found.records;
+    let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
+    format!(
+        "Identified in closed loop by the modified Hansen scheme from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
+        records.estimation.len(),
+        plural(records.estimation.len()),
+        records.time.ts(),
+        records.inputs.len(),
+        plural(records.inputs.len()),
+        records.outputs.len(),
+        plural(records.outputs.len()),
+    )
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+fn sources(found: &Identification) -> Vec<draw::Source> {
+    let source = |s: &super::records::SourceFile| draw::Source {
+        path: s.path.clone(),
+        purpose: s.purpose.clone(),
+        sha256: s.sha256.clone(),
+    };
+    found.records.sources.iter().map(source).collect()
+}
+
+fn method(method: Method) -> draw::Method {
+    let role = match method {
+        Method::Nominal => Role::Nominal,
+        Method::Direct => Role::Direct,
+        Method::Hansen => Role::Hansen,
+        Method::HansenReduced => Role::HansenReduced,
+        Method::TruePlant => Role::Other,
+    };
+    draw::Method::new(method.key(), method.label(), role)
+}
+
+fn fits(found: &Identification) -> Vec<draw::Fit> {
+    let mut all = Vec::new();
+    for v in &found.verdict.models {
+        for r in &v.records {
+            for (output, fit) in r.fit.iter().enumerate() {
+                all.push(draw::Fit {
+                    record: r.record.clone(),
+                    output,
+                    method: v.method.key().into(),
+                    fit: fit.is_finite().then_some(*fit),
+                });
+            }
+        }
+    }
+    all
+}
+
+fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {
+    found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
+}
+
+fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Experiment> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let (u, y) = (&found.records.inputs, &found.records.outputs);
+    let signals = &found.signals.experiments[k];
+    let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
+        channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
+    };
+    let mut drawn = Vec::new();
+    let mut add = |kind: SignalKind, channels: &[Channel], data: &Mat<f64>| -> Result<()> {
+        let dropped = record.samples() - data.nrows();
+        for (j, channel) in channels.iter().enumerate() {
+            // Samples dropped at the start are a gap, so that all signals share one clock.
+            let mut values = vec![f64::NAN; dropped];
+            values.extend_from_slice(data.col_as_slice(j));
+            let trace = Trace::new(&channel.name, &values, &clock)?;
+            drawn.push(draw::Signal { kind, channel: channel.clone(), trace });
+        }
+        Ok(())
+    };
+    for (name, channels, excitation) in [
+        ("excitation of", u, &record.input_excitation),
+        ("reference of", y, &record.reference),
+        ("injected alpha of", u, &record.alpha),
+    ] {
+        if let Some(data) = excitation {
+            add(SignalKind::Excitation, &named(name, channels), data)?;
+        }
+    }
+    add(SignalKind::Input, u, &record.u)?;
+    add(SignalKind::Output, y, &record.y)?;
+    add(SignalKind::Alpha, &named("alpha of", u), &signals.alpha)?;
+    add(SignalKind::Beta, &named("beta of", y), &signals.beta)?;
+    Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
+}
+
+fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
+    let choice = |method: Method, label: &str, s: &SubspaceModel| draw::OrderChoice {
+        method: method.key().into(),
+        label: label.into(),
+        values: s.singular_values.clone(),
+        chosen: s.order.order,
+    };
+    let mut all = vec![choice(Method::Hansen, "S from alpha to beta", &found.hansen.deviation)];
+    if let Some(Ok(direct)) = &found.direct {
+        all.push(choice(Method::Direct, "plant from u to y", direct));
+    }
+    all
+}
+
+fn verification(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let prediction = match found.settings.verification.prediction {
+        Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
+        Prediction::ClosedLoop => "simulated under the controller from the known excitations alone",
+    };
+    let outputs = (0..record.y.ncols())
+        .map(|output| {
+            let name = &found.records.outputs[output].name;
+            let measured = record.y.col_as_slice(output);
+            let mut predictions = Vec::new();
+            for v in &found.verdict.models {
+                let Ok(predicted) = &v.records[k].predicted else { continue };
+                let values = predicted.col_as_slice(output);
+                let residual: Vec<f64> = measured.iter().zip(values).map(|(y, yp)| y - yp).collect();
+                predictions.push(draw::Prediction {
+                    method: v.method.key().into(),
+                    predicted: Trace::new(name, values, &clock)?,
+                    residual: Trace::new(name, &residual, &clock)?,
+                });
+            }
+            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, measured, &clock)?, predictions })
+        })
+        .collect::<Result<_>>()?;
+    Ok(draw::Verification { record: record.name.clone(), prediction: prediction.into(), clock, outputs })
+}
+
+fn frequency(found: &Identification) -> Result<draw::FrequencyResponse> {
+    let responses = model_responses(found, log_grid(found))?;
+    let pairs = |method: Method, r: &FrequencyResponse| {
+        let entry = |(output, input): (usize, usize)| {
+            let values = r.entry(output, input);
+            draw::ModelResponse {
+                method: method.key().into(),
+                output,
+                input,
+                magnitude_db: magnitude(&values),
+                phase_deg: phase(&values),
+            }
+        };
+        ports(found).map(entry).collect::<Vec<_>>()
+    };
+    let models = responses.models.iter().flat_map(|(m, r)| pairs(*m, r)).collect();
+    let indirect = match measured_response(found)? {
+        None => Vec::new(),
+        Some(m) => {
+            let hz: Vec<f64> = m.response.omega.iter().map(|w| w / TAU).collect();
+            let entry = |(output, input): (usize, usize)| {
+                let values = m.response.entry(output, input);
+                draw::Indirect {
+                    output,
+                    input,
+                    hz: hz.clone(),
+                    magnitude_db: magnitude(&values),
+                    phase_deg: phase(&values),
+                    coherence: m.coherence_y.col_as_slice(output).to_vec(),
+                }
+            };
+            ports(found).map(entry).collect()
+        }
+    };
+    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect })
+}
+
+/// All pairs of output and input.
+fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> + use<> {
+    let (p, m) = (found.records.outputs.len(), found.records.inputs.len());
+    (0..p).flat_map(move |i| (0..m).map(move |j| (i, j)))
+}
+
+fn magnitude(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| decibel(v.norm())).collect()
+}
+
+fn phase(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| v.im.atan2(v.re).to_degrees()).collect()
+}
+
+fn poles(v: &ModelVerdict) -> draw::Poles {
+    draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles) }
+}
+
+fn modes(v: &ModelVerdict) -> Vec<draw::Mode> {
+    let mode = |m: &crate::lti::Mode| draw::Mode { method: v.method.key().into(), hz: m.hz, zeta: m.zeta };
+    v.modes.iter().map(mode).collect()
+}
+
+fn reduction(found: &Identification) -> Option<draw::Reduction> {
+    let reduction = found.reduction.as_ref()?.as_ref().ok()?;
+    Some(draw::Reduction {
+        label: format!("G(S) by {}", reduction.method),
+        hankel: reduction.hankel.clone(),
+        chosen: reduction.model.order(),
+        bound: Some(reduction.error_bound),
+    })
+}
+
+fn certificate(found: &Identification, v: &ModelVerdict) -> draw::Certificate {
+    let from_s = matches!(v.method, Method::Hansen | Method::HansenReduced);
+    draw::Certificate {
+        method: v.method.key().into(),
+        order: v.model.order(),
+        s_order: from_s.then(|| found.hansen.deviation.model.order()),
+        s_stable: from_s.then_some(found.hansen.deviation.stability.stable),
+        stabilised_by_controller: Some(v.certificate.stable),
+        worst_closed_loop_pole: v.certificate.worst_pole.map(|p| [p.re, p.im]),
+    }
+}

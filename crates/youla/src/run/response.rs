@@ -1,0 +1,76 @@
+//! Frequency responses of a run: every model, and the indirect non-parametric one where the excitation is known.
+
+use super::pipeline::Identification;
+use super::verdict::Method;
+use crate::lti::{FrequencyResponse, frequency_response};
+use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
+use crate::{Mat, Result};
+use std::f64::consts::TAU;
+
+/// Responses on one grid.
+#[derive(Debug, Clone)]
+pub(super) struct ModelResponses {
+    /// Grid, Hz.
+    pub hz: Vec<f64>,
+    /// One entry per model.
+    pub models: Vec<(Method, FrequencyResponse)>,
+}
+
+/// The indirect response `S_dy S_du^-1`, with d the known excitation at the plant input, else alpha, else the image of the
+/// references in alpha; averaged over all estimation records. `None` where no excitation is known.
+///
+/// # Errors
+/// A record shorter than a window.
+pub(super) fn measured_response(found: &Identification) -> Result<Option<IndirectResponse>> {
+    let settings = &found.settings.frequency_response;
+    let records = &found.records.estimation;
+    let excitations: Vec<Mat<f64>> = records
+        .iter()
+        .enumerate()
+        .filter_map(|(k, r)| {
+            let direct = r.input_excitation.clone().or_else(|| r.alpha.clone());
+            direct.or_else(|| found.signals.expected_alpha.get(k).cloned())
+        })
+        .collect();
+    if excitations.len() < records.len() {
+        return Ok(None);
+    }
+    // The image of the references starts after the settling samples.
+    let experiments: Vec<_> = records
+        .iter()
+        .zip(&excitations)
+        .map(|(r, d)| {
+            let dropped = r.samples() - d.nrows();
+            let (u, y) = (r.u.subrows(dropped, d.nrows()), r.y.subrows(dropped, d.nrows()));
+            ExcitedRecord { d: d.as_ref(), u, y }
+        })
+        .collect();
+    let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
+    indirect_response(&experiments, found.records.time, &options).map(Some)
+}
+
+/// Responses of all models on the given frequencies in Hz.
+///
+/// # Errors
+/// As [`frequency_response`].
+pub(super) fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<ModelResponses> {
+    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
+    let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
+    let models = found.verdict.models.iter().map(response).collect::<Result<_>>()?;
+    Ok(ModelResponses { hz, models })
+}
+
+/// Frequencies in Hz, logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just below
+/// Nyquist.
+pub(super) fn log_grid(found: &Identification) -> Vec<f64> {
+    let settings = &found.settings.frequency_response;
+    let nyquist = 0.5 / found.records.time.ts();
+    let from = settings.from_hz.unwrap_or(nyquist / 300.0);
+    let (last, ratio) = (settings.points.max(2) - 1, 0.999 * nyquist / from);
+    (0..=last).map(|k| from * ratio.powf(k as f64 / last as f64)).collect()
+}
+
+/// Magnitude in dB.
+pub(super) fn decibel(magnitude: f64) -> f64 {
+    20.0 * magnitude.log10()
+}

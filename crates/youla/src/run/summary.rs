@@ -1,0 +1,90 @@
+//! summary.json: the stable contract for scripts.
+
+use super::artefacts::{SCHEMA, pairs};
+use super::pipeline::{Identification, StageTimes};
+use super::response::{decibel, log_grid, measured_response, model_responses};
+use super::verdict::{Method, ModelVerdict};
+use crate::Result;
+use crate::c64;
+use serde_json::{Map, Value, json};
+use std::f64::consts::TAU;
+
+/// The summary of a run, schema 1; magnitudes are those of output 1 from input 1.
+///
+/// ```text
+/// {"schema":1, "nominal":{"fit":{record:[per output]}}, "methods":{method:{"order", "s_order", "s_stable",
+///  "stabilised_by_controller", "fit", "modes":[{"hz","zeta"}], "poles":[[re,im]]}},
+///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
+/// ```
+///
+/// A method that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
+///
+/// # Errors
+/// Those of the frequency responses.
+pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
+    let mut methods = Map::new();
+    let mut refused = Map::new();
+    for v in &found.verdict.models {
+        if !matches!(v.method, Method::Nominal | Method::TruePlant) {
+            methods.insert(v.method.key().into(), method_entry(found, v));
+        }
+    }
+    let mut refuse = |method: Method, error: Option<&crate::Error>| {
+        if let Some(e) = error {
+            refused.insert(method.key().into(), json!(e.to_string()));
+        }
+    };
+    refuse(Method::Direct, found.direct.as_ref().and_then(|d| d.as_ref().err()));
+    refuse(Method::HansenReduced, found.reduction.as_ref().and_then(|r| r.as_ref().err()));
+    let mut all = json!({
+        "schema": SCHEMA,
+        "name": found.settings.name,
+        "nominal": {"fit": found.verdict.of(Method::Nominal).map(fits)},
+        "methods": methods,
+        "refused": refused,
+        "frequency_response": response_entry(found)?,
+        "bezout_residual": found.factorisation.bezout_residual,
+        "controller_mismatch": found.signals.controller_mismatch,
+        "seconds": seconds.iter().map(|(s, t)| (s.name().to_owned(), json!(t))).collect::<Map<_, _>>(),
+    });
+    if let Some(v) = found.verdict.of(Method::TruePlant) {
+        all["true_plant"] = json!({"fit": fits(v)});
+    }
+    Ok(all)
+}
+
+fn method_entry(found: &Identification, v: &ModelVerdict) -> Value {
+    let mut entry = json!({
+        "order": v.model.order(),
+        "stabilised_by_controller": v.certificate.stable,
+        "fit": fits(v),
+        "modes": v.modes.iter().map(|m| json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
+        "poles": pairs(&v.poles),
+    });
+    if matches!(v.method, Method::Hansen | Method::HansenReduced) {
+        entry["s_order"] = json!(found.hansen.deviation.model.order());
+        entry["s_stable"] = json!(found.hansen.deviation.stability.stable);
+    }
+    entry
+}
+
+fn fits(v: &ModelVerdict) -> Value {
+    v.records.iter().map(|r| (r.record.clone(), json!(r.fit))).collect::<Map<_, _>>().into()
+}
+
+fn response_entry(found: &Identification) -> Result<Value> {
+    let measured = measured_response(found)?;
+    let hz = measured.as_ref().map_or_else(|| log_grid(found), |m| m.response.omega.iter().map(|w| w / TAU).collect());
+    let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
+    let mut entry = Map::new();
+    if let Some(m) = &measured {
+        entry.insert("indirect_db".into(), json!(db(m.response.entry(0, 0))));
+        entry.insert("coherence".into(), json!(m.coherence_y.col_as_slice(0)));
+    }
+    let responses = model_responses(found, hz)?;
+    for (method, response) in &responses.models {
+        entry.insert(format!("{}_db", method.key()), json!(db(response.entry(0, 0))));
+    }
+    entry.insert("hz".into(), json!(responses.hz));
+    Ok(entry.into())
+}

@@ -10,6 +10,7 @@ mod simulate;
 mod state_space;
 mod time;
 mod transfer;
+mod zeros;
 
 pub use modes::Mode;
 pub use partitioned::Partitioned;

@@ -5,7 +5,7 @@
 //! Control 26 (1981), 407).
 
 use super::{StateSpace, TimeDomain};
-use crate::linalg::{balance, hessenberg};
+use crate::linalg::hessenberg;
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use rayon::prelude::*;
@@ -104,12 +104,9 @@ struct HessenbergSystem<T> {
 
 impl<T: TimeDomain> HessenbergSystem<T> {
     fn new(system: &StateSpace<T>) -> Result<Self> {
-        let (n, m, p) = (system.order(), system.inputs(), system.outputs());
-        let balanced = balance("the state matrix", system.a())?;
-        let form = hessenberg("the state matrix", balanced.a.as_ref())?;
-        let b = Mat::from_fn(n, m, |i, j| system.b()[(i, j)] / balanced.scale[i]);
-        let c = Mat::from_fn(p, n, |i, j| system.c()[(i, j)] * balanced.scale[j]);
-        let (b, c) = (form.q.transpose() * b, c * &form.q);
+        let system = system.balanced()?;
+        let form = hessenberg("the state matrix", system.a())?;
+        let (b, c) = (form.q.transpose() * system.b(), system.c() * &form.q);
         Ok(HessenbergSystem { h: form.h, b, c, d: system.d().to_owned(), time: system.time() })
     }
 

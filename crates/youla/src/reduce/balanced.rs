@@ -5,7 +5,7 @@
 //! coordinates and their duals. Orthonormal bases X and Z of those that are kept give the projection
 //! `(Z'X)^-1 Z' A X`; the ill-conditioned balancing transformation itself is never formed.
 
-use crate::linalg::{balance, discrete_gramian_factor, gramian_factor, solve};
+use crate::linalg::{discrete_gramian_factor, gramian_factor, solve};
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -63,13 +63,4 @@ impl<'a, T: TimeDomain> HankelDecomposition<'a, T> {
 /// Orthonormal basis of the span of the columns.
 fn orthonormal(columns: MatRef<'_, f64>) -> Mat<f64> {
     columns.qr().compute_thin_Q()
-}
-
-/// The system in state coordinates that balance A, without rounding.
-pub(super) fn scale_states<T: TimeDomain>(system: &StateSpace<T>) -> Result<StateSpace<T>> {
-    let (n, m, p) = (system.order(), system.inputs(), system.outputs());
-    let balanced = balance("the state matrix", system.a())?;
-    let b = Mat::from_fn(n, m, |i, j| system.b()[(i, j)] / balanced.scale[i]);
-    let c = Mat::from_fn(p, n, |i, j| system.c()[(i, j)] * balanced.scale[j]);
-    StateSpace::new(balanced.a, b, c, system.d().to_owned(), system.time())
 }

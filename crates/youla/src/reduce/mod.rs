@@ -20,7 +20,7 @@ mod reference;
 use crate::linalg::solve;
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Result};
-use balanced::{HankelDecomposition, scale_states};
+use balanced::HankelDecomposition;
 use faer::prelude::*;
 use faer::{Mat, c64};
 use serde::{Deserialize, Serialize};
@@ -116,7 +116,7 @@ pub struct Reduction<T: TimeDomain> {
 pub fn reduce<T: TimeDomain>(system: &StateSpace<T>, options: &ReductionOptions) -> Result<Reduction<T>> {
     check(options)?;
     system.require_stable("the system to be reduced")?;
-    reduce_in_coordinates(&scale_states(system)?, options)
+    reduce_in_coordinates(&system.balanced()?, options)
 }
 
 /// The reduction of a stable system in the state coordinates in which it is given: the bases of the reduced model are
@@ -143,7 +143,7 @@ fn reduce_in_coordinates<T: TimeDomain>(system: &StateSpace<T>, options: &Reduct
 /// [`Error::Unstable`] with the pole; [`Error::NoConvergence`].
 pub fn hankel_singular_values<T: TimeDomain>(system: &StateSpace<T>) -> Result<Vec<f64>> {
     system.require_stable("the system")?;
-    Ok(HankelDecomposition::new(&scale_states(system)?)?.hankel)
+    Ok(HankelDecomposition::new(&system.balanced()?)?.hankel)
 }
 
 fn check(options: &ReductionOptions) -> Result<()> {

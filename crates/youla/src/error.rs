@@ -494,6 +494,7 @@ impl Error {
             | Error::Unstable { .. }
             | Error::NoSolution { .. }
             | Error::AlgebraicLoop { .. }
+            | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. }
             | Error::NotStabilisable { .. }

@@ -2,14 +2,12 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use youla::run::{Identification, ModelVerdict};
+use youla::run::Identification;
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
-    let mut rows = vec![header(found)];
-    rows.extend(found.verdict.models.iter().map(|v| model_row(found, v)));
-    let mut text = format!("{}\n\nfit (26) on verification records, percent\n", found.settings.name);
-    text += &aligned(&rows);
+    let mut text = format!("{}\n\n", found.settings.name);
+    text += &aligned(&rows(found));
     for (name, refusal) in [
         ("no direct model", found.direct.as_ref().and_then(|d| d.as_ref().err())),
         ("no reduced model", found.reduction.as_ref().and_then(|r| r.as_ref().err())),
@@ -22,25 +20,23 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     text
 }
 
-fn header(found: &Identification) -> Vec<String> {
-    let mut row = vec!["model".to_owned()];
-    for record in &found.records.verification {
-        row.extend(found.records.outputs.iter().map(|y| format!("{} {}", record.name, y.name)));
+/// One column per model; fits of every record and output, then order, stability and loop.
+fn rows(found: &Identification) -> Vec<Vec<String>> {
+    let models = &found.verdict.models;
+    let row = |label: &str, cells: Vec<String>| [vec![label.to_owned()], cells].concat();
+    let mut rows = vec![row("fit (26), percent", models.iter().map(|v| v.method.label().into()).collect())];
+    for (k, record) in found.records.verification.iter().enumerate() {
+        for (i, output) in found.records.outputs.iter().enumerate() {
+            let percent = |fit: f64| if fit.is_finite() { format!("{fit:.2}") } else { "-".into() };
+            let fits = models.iter().map(|v| percent(v.records[k].fit[i])).collect();
+            rows.push(row(&format!("{}, {}", record.name, output.name), fits));
+        }
     }
-    row.extend(["order", "stable", "stabilised by K"].map(str::to_owned));
-    row
-}
-
-fn model_row(found: &Identification, v: &ModelVerdict) -> Vec<String> {
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    let mut row = vec![v.method.label().to_owned()];
-    for record in &v.records {
-        row.extend(record.fit.iter().map(|f| if f.is_finite() { format!("{f:.2}") } else { "-".into() }));
-    }
-    let stable = v.poles.iter().all(|p| p.norm() < 1.0);
-    debug_assert_eq!(v.records.len(), found.records.verification.len());
-    row.extend([v.model.order().to_string(), yes(stable), yes(v.certificate.stable)]);
-    row
+    rows.push(row("order", models.iter().map(|v| v.model.order().to_string()).collect()));
+    rows.push(row("stable", models.iter().map(|v| yes(v.poles.iter().all(|p| p.norm() < 1.0))).collect()));
+    rows.push(row("stabilised by K", models.iter().map(|v| yes(v.certificate.stable)).collect()));
+    rows
 }
 
 /// Columns as wide as their widest cell, the first left, the others right.
@@ -50,12 +46,9 @@ fn aligned(rows: &[Vec<String>]) -> String {
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
     for row in rows {
-        for (j, cell) in row.iter().enumerate() {
-            let _ = if j == 0 {
-                write!(text, "{cell:<w$}", w = widths[j])
-            } else {
-                write!(text, "  {cell:>w$}", w = widths[j])
-            };
+        let _ = write!(text, "{:<w$}", row[0], w = widths[0]);
+        for (cell, w) in row.iter().zip(&widths).skip(1) {
+            let _ = write!(text, "  {cell:>w$}");
         }
         text.push('\n');
     }

@@ -405,7 +405,7 @@ pub enum Error {
         ts: f64,
     },
     /// Neither a sample time nor a time column was given.
-    #[error("{what}: the sample time is not known; state `ts` in seconds or name the time column")]
+    #[error("{what}: the sample time is not known; state it in seconds or name the time column")]
     SampleTimeMissing {
         /// The record or file.
         what: String,
@@ -497,6 +497,8 @@ impl Error {
             | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. }
+            | Error::ReportData { .. }
+            | Error::ReportTemplate { .. }
             | Error::NotStabilisable { .. }
             | Error::NotDetectable { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,

@@ -63,7 +63,7 @@ impl ModelFile {
     /// # Errors
     /// Shapes that do not fit, as in a file that was changed by hand.
     pub fn system(&self) -> Result<StateSpace<Discrete>> {
-        let (n, m, p) = (self.a.len(), self.inputs.len(), self.outputs.len());
+        let (n, m) = (self.a.len(), self.inputs.len());
         let matrix = |rows: &[Vec<f64>], columns: usize| {
             Mat::from_fn(rows.len(), columns, |i, j| rows[i].get(j).copied().unwrap_or(f64::NAN))
         };
@@ -71,7 +71,7 @@ impl ModelFile {
             matrix(&self.a, n),
             matrix(&self.b, m),
             matrix(&self.c, n),
-            matrix(&self.d, m.min(p.max(m))),
+            matrix(&self.d, m),
             Discrete::new(self.ts)?,
         )
     }

@@ -8,7 +8,7 @@ use crate::factor::CoprimeFactors;
 use crate::identify::subspace::{Order, Stability, SubspaceOptions};
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
-use crate::record::{ChannelRef, ChannelSpec, Detrend, Excitation, SquareWaves};
+use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, SquareWaves};
 use crate::reduce::{ReducedOrder, ReductionOptions};
 use crate::rig::{Bearing, degraded};
 use crate::units::Channel;
@@ -22,7 +22,7 @@ use rand_distr::StandardNormal;
 const TS: f64 = 2e-4;
 /// Samples of the estimation record (4 s) and of the verification record (2 s).
 const SAMPLES: [usize; 2] = [20_000, 10_000];
-/// White output noise, um rms; the paper states none, `theory.md` section 5 takes 0.3 to 0.6 um.
+/// White output noise, um rms. The paper states none; its fits fit 0.3 to 0.6 um.
 const NOISE: f64 = 0.3;
 /// Amplitude of alpha, V, and its hold in samples.
 const AMPLITUDE: f64 = 0.5;
@@ -146,6 +146,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
             input_excitation: Vec::new(),
             reference: Vec::new(),
             alpha: channels(["alpha_h", "alpha_v"], "alpha", "V"),
+            csv: CsvOptions::default(),
             detrend: Detrend::default(),
             estimation: vec![file(NAMES[0])],
             verification: vec![file(NAMES[1])],

@@ -73,11 +73,16 @@ impl RunFolder {
     /// [`Error::Io`].
     pub fn finish(mut self) -> Result<PathBuf> {
         let io = |source| Error::Io { path: self.target.clone(), source };
+        // The old run goes only when the new one is in its place.
+        let old = self.partial.with_extension("old");
         if self.replace {
-            fs::remove_dir_all(&self.target).map_err(io)?;
+            fs::rename(&self.target, &old).map_err(io)?;
         }
         fs::rename(&self.partial, &self.target).map_err(io)?;
         self.finished = true;
+        if self.replace {
+            fs::remove_dir_all(&old).map_err(io)?;
+        }
         Ok(self.target.clone())
     }
 }

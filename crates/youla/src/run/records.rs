@@ -3,7 +3,7 @@
 use super::settings::{DataFile, DataSettings};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
-use crate::record::{ChannelSpec, CsvOptions, Format, Record, Source, TimeSource, read, sha256};
+use crate::record::{ChannelSpec, Format, Record, Source, TimeSource, read, sha256};
 use crate::units::Channel;
 use crate::{Error, Mat, Result};
 use rayon::prelude::*;
@@ -120,7 +120,7 @@ fn read_file(
             tolerance: settings.time_tolerance,
         },
         channels: groups.iter().flat_map(|g| g.iter().cloned()).collect(),
-        csv: CsvOptions::default(),
+        csv: settings.csv.clone(),
     };
     let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
     let source =

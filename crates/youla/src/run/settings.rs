@@ -2,10 +2,11 @@
 
 use super::models::{ControllerSettings, NominalModel};
 use crate::identify::subspace::SubspaceOptions;
-use crate::record::{ChannelRef, ChannelSpec, Detrend};
+use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend};
 use crate::reduce::ReductionOptions;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 /// The whole of run.toml.
@@ -69,7 +70,10 @@ pub struct DataSettings {
     /// Known excitation alpha of Fig. 3, one channel per input.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alpha: Vec<ChannelSpec>,
-    /// What is removed from u and y before identification.
+    /// How text files are read.
+    #[serde(default)]
+    pub csv: CsvOptions,
+    /// What is removed from every channel before identification and verification.
     #[serde(default)]
     pub detrend: Detrend,
     /// Records to identify from; several files are several experiments.
@@ -176,7 +180,7 @@ pub struct FrequencySettings {
     pub window: usize,
     /// Overlap of windows, as a part of a window.
     pub overlap: f64,
-    /// Lowest frequency shown, Hz; a decade below the resolution of a window when absent.
+    /// Lowest frequency of the models' curves, Hz; a 300th of the Nyquist frequency when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_hz: Option<f64>,
     /// Number of frequencies of the models' curves, spaced logarithmically up to Nyquist.
@@ -230,6 +234,15 @@ impl RunSettings {
         }
         if d.estimation.is_empty() {
             return problem("[data] names no estimation record; add [[data.estimation]] with a file".into());
+        }
+        let mut labels = HashSet::new();
+        for label in d.estimation.iter().chain(&d.verification).map(DataFile::label) {
+            if label.is_empty() || label.contains(['/', '\\']) {
+                return problem(format!("the record name {label:?} cannot be a file name; give another `name`"));
+            }
+            if !labels.insert(label.clone()) {
+                return problem(format!("two records are named {label:?}; give one of them another `name`"));
+            }
         }
         for (key, channels, wanted) in [
             ("inputs", d.inputs.len(), d.inputs.len().max(1)),

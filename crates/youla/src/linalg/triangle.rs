@@ -25,9 +25,9 @@ pub struct Triangle {
 }
 
 impl Triangle {
-    /// An empty factor of `width` columns that takes up to `capacity` new rows at a time.
+    /// An empty factor of `width` columns that takes up to `capacity` (at least 1) new rows at a time.
     pub fn new(width: usize, capacity: usize) -> Self {
-        Triangle { work: Mat::zeros(width + capacity, width), used: 0 }
+        Triangle { work: Mat::zeros(width + capacity.max(1), width), used: 0 }
     }
 
     /// Number of columns.

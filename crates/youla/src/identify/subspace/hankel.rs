@@ -50,7 +50,9 @@ impl HankelFactor {
     pub(super) fn require_excitation(&self) -> Result<f64> {
         let needed = 2 * self.horizon * self.inputs;
         let inputs = self.r.as_ref().submatrix(0, 0, needed.min(self.r.nrows()), needed);
-        let unit = Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / inputs.col(j).norm_l2());
+        let unit = Mat::from_fn(inputs.nrows(), needed, |i, j| {
+            inputs[(i, j)] / inputs.col(j).norm_l2().max(f64::MIN_POSITIVE)
+        });
         let sigma = unit.singular_values().map_err(|_| Error::NoConvergence {
             what: "the singular values of the input Hankel matrix".into(),
             iterations: 0,
@@ -108,24 +110,23 @@ impl HankelFactor {
 /// can take the place of this function.
 fn triangular_factor(rows: &RowMap<'_>, width: usize) -> Mat<f64> {
     let lanes = rows.total.div_ceil(PIECE).min(LANES);
-    let parts: Vec<Triangle> = (0..lanes)
+    let parts: Vec<Mat<f64>> = (0..lanes)
         .into_par_iter()
         .map(|lane| lane_factor(rows, width, lane * rows.total / lanes, (lane + 1) * rows.total / lanes))
         .collect();
-    let mut parts = parts.into_iter();
-    let Some(mut whole) = parts.next() else { return Mat::zeros(0, width) };
-    parts.for_each(|part| whole.fold_rows(part.r()));
+    let mut whole = Triangle::new(width, width);
+    parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
     whole.r().to_owned()
 }
 
-fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Triangle {
+fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat<f64> {
     let pieces = (end - start).div_ceil(PIECE);
     let cut = |k: usize| start + k * (end - start) / pieces;
     let mut triangle = Triangle::new(width, (end - start).div_ceil(pieces));
     for k in 0..pieces {
         triangle.fold(cut(k + 1) - cut(k), |piece| rows.fill(cut(k), piece));
     }
-    triangle
+    triangle.r().to_owned()
 }
 
 /// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.

@@ -4,7 +4,8 @@
 //! ```text
 //! P = A P A' + Q - K Lambda K',   K = (A P C' + S) Lambda^-1,   Lambda = C P C' + R
 //! ```
-//! (Van Overschee and De Moor, section 3.4). Where no stabilising solution exists this is said, and no gain is returned.
+//! (Van Overschee and De Moor, section 3.4). The residuals are those of a filter that has seen s samples: the gain is biased
+//! where `(A - K C)^s` is not small. Where no stabilising solution exists this is said, and no gain is returned.
 
 use super::realisation::{OutputPair, StateSequences};
 use crate::linalg::{RiccatiProblem, dare};

@@ -215,8 +215,8 @@ impl SubspaceModel {
 /// [`crate::Error::Unstable`] unless unstable estimates are allowed.
 ///
 /// # Accuracy
-/// Noise-free records of random systems give their transfer function back to 1e-8 (`tests::recovers_random_systems`);
-/// the published figures of SLICOT on measured data hold to 0.5 % (`tests::slicot_figures`). The result does not depend
+/// Noise-free records of random systems give their transfer function back to 1e-8 (`tests::recovery::recovers_random_systems`);
+/// the published figures of SLICOT on measured data hold to 0.5 % (`tests::measured::slicot_figures`). The result does not depend
 /// on the number of threads.
 ///
 /// ```

@@ -117,7 +117,7 @@ fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<P
     let targets: Vec<Mat<f64>> =
         data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
     let tasks: Vec<_> = (0..targets.len()).flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
-    let triangles: Vec<Triangle> = tasks
+    let triangles: Vec<Mat<f64>> = tasks
         .par_iter()
         .map(|&(e, i)| condense_output(&data.experiments[e].u, &targets[e], i, predictor, unknowns))
         .collect();
@@ -133,7 +133,7 @@ fn without_known_share(signals: &Signals, predictor: &Predictor) -> Mat<f64> {
     &signals.y - simulate(ak.as_ref(), c0.as_ref(), &vec![0.0; n], signals.y.as_ref())
 }
 
-fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predictor, unknowns: Unknowns) -> Triangle {
+fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predictor, unknowns: Unknowns) -> Mat<f64> {
     let target: Vec<f64> = targets.col(i).iter().copied().collect();
     let piece = PIECE.min(u.nrows());
     let mut triangle = Triangle::new(unknowns.width_of_output(), piece);
@@ -143,19 +143,18 @@ fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predi
         let (u, target) = (u.as_ref().subrows(start, count), &target[start..start + count]);
         triangle.fold(count, |rows| sensitivity.fill(u, target, rows));
     }
-    triangle
+    triangle.r().to_owned()
 }
 
 /// Puts the outputs of one experiment below each other, each with its own row of D.
-fn join(outputs: &[Triangle], unknowns: Unknowns) -> Part {
+fn join(outputs: &[Mat<f64>], unknowns: Unknowns) -> Part {
     let shared = unknowns.initial + unknowns.of_b();
     let of_d = unknowns.of_d_row();
     let mut whole = Triangle::new(unknowns.width(), unknowns.width_of_output());
-    for (i, output) in outputs.iter().enumerate() {
-        let r = output.r();
+    for (i, r) in outputs.iter().enumerate() {
         whole.fold(r.nrows(), |mut rows| {
-            rows.as_mut().subcols_mut(0, shared).copy_from(r.subcols(0, shared));
-            rows.as_mut().subcols_mut(shared + i * of_d, of_d).copy_from(r.subcols(shared, of_d));
+            rows.as_mut().subcols_mut(0, shared).copy_from(r.as_ref().subcols(0, shared));
+            rows.as_mut().subcols_mut(shared + i * of_d, of_d).copy_from(r.as_ref().subcols(shared, of_d));
             rows.col_mut(unknowns.width() - 1).copy_from(r.col(r.ncols() - 1));
         });
     }

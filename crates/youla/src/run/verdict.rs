@@ -43,7 +43,7 @@ impl Method {
             Method::Nominal => "nominal G(0)",
             Method::Direct => "direct N4SID",
             Method::Hansen => "Hansen G(S)",
-            Method::HansenReduced => "Hansen reduced G_red(S)",
+            Method::HansenReduced => "reduced G_red(S)",
             Method::TruePlant => "true plant",
         }
     }

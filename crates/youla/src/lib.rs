@@ -37,9 +37,10 @@
 //! use youla::identify::{hansen::hansen, subspace::{Order, SubspaceOptions}};
 //! use youla::linalg::{block, eye};
 //! use youla::lti::{Discrete, simulate};
+//! use youla::record::{Excitation, SquareWaves};
 //! use youla::rig::{Bearing, degraded};
-//! use youla::validate::certify;
-//! use youla::Mat;
+//! use youla::{Mat, validate::certify};
+//! # use {rand::{RngExt, SeedableRng}, rand_chacha::ChaCha8Rng, rand_distr::StandardNormal};
 //!
 //! let time = Discrete::new(2e-4)?;
 //! let machine = Bearing::default().plant()?.zoh(time)?;
@@ -49,13 +50,15 @@
 //! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?; // (13)-(15)
 //!
 //! // What the rig would log: alpha excites the loop, n is output noise.
-//! let alpha = Mat::from_fn(4000, 2, |k, j| if (k * k / 97 + 3 * k * j) % 7 < 3 { 0.5 } else { -0.5 });
-//! let n = Mat::from_fn(4000, 2, |k, j| 0.05 * ((k * k) as f64 * (0.7 + j as f64)).sin());
+//! let mut rng = ChaCha8Rng::seed_from_u64(1);
+//! let waves = SquareWaves { amplitude: 0.5, hold_min: 5, hold_max: 40 };
+//! let alpha = Excitation::SquareWaves(waves).generate(8000, 2, time, &mut rng)?;
+//! let n = Mat::from_fn(8000, 2, |_, _| 0.3 * rng.sample::<f64, _>(StandardNormal));
 //! let rig = closed_loop(&machine, &factors.j_k()?)?;
 //! let log = simulate(&rig, block(&[&[alpha.as_ref(), n.as_ref()]]).as_ref(), &vec![0.0; rig.order()])?;
 //!
 //! let signals = factors.signals(log.subcols(0, 2), log.subcols(2, 2))?; // (28): one filter of [u; y]
-//! let options = SubspaceOptions { horizon: 30, order: Order::Fixed(10), ..Default::default() };
+//! let options = SubspaceOptions { horizon: 30, order: Order::Fixed(8), ..Default::default() };
 //! let found = hansen(&factors, &[signals], &options)?; // (25), (17)
 //! let verdict = certify(&found.plant, &factors.controller()?)?;
 //! assert!(verdict.stable);

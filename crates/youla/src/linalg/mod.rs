@@ -88,10 +88,11 @@ pub fn block_diagonal(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Mat<f64> {
 /// [`Error::Singular`] naming `what`.
 pub fn solve(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     let rcond = reciprocal_condition(a);
-    if !(rcond > f64::EPSILON) {
-        return Err(Error::Singular { what: what.to_owned(), rcond });
+    if rcond > f64::EPSILON {
+        Ok(a.partial_piv_lu().solve(b))
+    } else {
+        Err(Error::Singular { what: what.to_owned(), rcond })
     }
-    Ok(a.partial_piv_lu().solve(b))
 }
 
 /// Solves `x a = b`, by transposition of [`solve`].

@@ -5,7 +5,7 @@ use super::records::{LoopRecord, RunRecords, SourceFile};
 use super::settings::{DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings};
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
-use crate::identify::subspace::{Order, Stability, SubspaceOptions};
+use crate::identify::subspace::{Order, Stability, SubspaceOptions, Weight};
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, SquareWaves};
@@ -134,7 +134,8 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         take: None,
         name: Some(name.into()),
     };
-    let subspace = SubspaceOptions { horizon: 40, order: Order::Fixed(12), ..SubspaceOptions::default() };
+    let subspace =
+        SubspaceOptions { weight: Weight::Cva, horizon: 40, order: Order::Fixed(10), ..SubspaceOptions::default() };
     RunSettings {
         name: "demo: gas bearing".into(),
         data: DataSettings {

@@ -244,15 +244,18 @@ impl RunSettings {
                 return problem(format!("two records are named {label:?}; give one of them another `name`"));
             }
         }
+        for (key, channels) in [("inputs", &d.inputs), ("outputs", &d.outputs)] {
+            if channels.is_empty() {
+                return problem(format!("[data] {key} names no channel"));
+            }
+        }
         for (key, channels, wanted) in [
-            ("inputs", d.inputs.len(), d.inputs.len().max(1)),
-            ("outputs", d.outputs.len(), d.outputs.len().max(1)),
             ("input_excitation", d.input_excitation.len(), d.inputs.len()),
             ("alpha", d.alpha.len(), d.inputs.len()),
             ("reference", d.reference.len(), d.outputs.len()),
         ] {
-            if channels != wanted && !(channels == 0 && !matches!(key, "inputs" | "outputs")) {
-                return problem(format!("[data] {key} has {channels} channels, but must have {wanted}"));
+            if channels != 0 && channels != wanted {
+                return problem(format!("[data] {key} has {channels} channels, but must have {wanted} or none"));
             }
         }
         Ok(())

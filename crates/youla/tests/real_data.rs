@@ -1,0 +1,108 @@
+//! The examples on measured data, held to what the data allow. The data are not part of this project: without
+//! `../shared/data` beside the workspace every test here prints that it is skipped.
+#![allow(missing_docs)]
+
+use std::path::{Path, PathBuf};
+use youla::record::Detrend;
+use youla::run::{
+    Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, signal_records, summary,
+};
+
+/// The example's settings file, if its data are there.
+fn example(name: &str, data: &str) -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    if root.join("../shared/data").join(data).is_dir() {
+        return Some(root.join("examples").join(name).join("run.toml"));
+    }
+    println!("skipped: ../shared/data/{data} is not there");
+    None
+}
+
+fn run(path: &Path) -> Identification {
+    let (settings, folder) = (RunSettings::read(path).unwrap(), path.parent().unwrap());
+    let records = read_records(&settings.data, folder).unwrap();
+    let mut silent = |_| ();
+    identify(settings, records, folder, &mut StageClock::new(&mut silent)).unwrap()
+}
+
+fn numbers(value: &serde_json::Value) -> Vec<f64> {
+    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
+}
+
+/// Flexible drive: over 10-150 Hz the Hansen model follows the indirect response S_dy / S_du (Welch, Hann, 8000 samples,
+/// half overlap) within 2 dB rms; the rigid nominal model knew nothing of the resonance, the direct estimate misses it.
+#[test]
+fn flexible_drive() {
+    let Some(path) = example("flexible-drive", "flexible_drive") else { return };
+    let found = run(&path);
+    assert_eq!(found.settings.frequency_response.window, 8000);
+    let summary = summary(&found, &Vec::new()).unwrap();
+    let response = &summary["frequency_response"];
+    let hz = numbers(&response["hz"]);
+    let curve = |name: &str| numbers(&response[name]);
+    let (indirect, hansen) = (curve("indirect_db"), curve("hansen_db"));
+    let band = |from: f64, to: f64| (0..hz.len()).filter(|&k| (from..=to).contains(&hz[k])).collect::<Vec<_>>();
+    let rms = |model: &[f64]| {
+        let band = band(10.0, 150.0);
+        let energy: f64 = band.iter().map(|&k| (model[k] - indirect[k]).powi(2)).sum();
+        (energy / band.len() as f64).sqrt()
+    };
+    assert!(rms(&hansen) <= 2.0, "Hansen misses the indirect response by {:.2} dB", rms(&hansen));
+    assert!(rms(&curve("direct_db")) > 2.0 * rms(&hansen), "the direct estimate is expected to be biased");
+    let extreme = |from, to, sign: f64| {
+        let k = band(from, to).into_iter().max_by(|&a, &b| (sign * hansen[a]).total_cmp(&(sign * hansen[b])));
+        hz[k.unwrap()]
+    };
+    let (resonance, anti) = (extreme(45.0, 70.0, 1.0), extreme(30.0, 50.0, -1.0));
+    assert!((53.0..=56.5).contains(&resonance), "resonance at {resonance} Hz");
+    assert!((39.0..=43.0).contains(&anti), "anti-resonance at {anti} Hz");
+    let verdict = found.verdict.of(Method::Hansen).unwrap();
+    assert!(verdict.certificate.stable, "the logged controller stabilises G(S)");
+    assert!(found.signals.controller_mismatch.unwrap() < 1e-3, "the logged controller is the declared one");
+    for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
+        assert!(hansen.fit[0] > nominal.fit[0] + 15.0, "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
+    }
+}
+
+/// Rotary pendulum: one unstable pole, stabilised by the logged controller, better than the nominal model in closed-loop
+/// simulation on every unused episode and both outputs; nothing that is unstable is reduced.
+#[test]
+fn rotary_pendulum() {
+    let Some(path) = example("qube", "qube_pendulum") else { return };
+    let found = run(&path);
+    assert_eq!((found.records.estimation.len(), found.records.verification.len()), (6, 6));
+    let verdict = found.verdict.of(Method::Hansen).unwrap();
+    let unstable: Vec<_> = verdict.poles.iter().filter(|p| p.norm() >= 1.0).collect();
+    assert_eq!(unstable.len(), 1, "{unstable:?}");
+    assert!(unstable[0].im == 0.0 && (1.02..1.04).contains(&unstable[0].re), "{unstable:?}");
+    assert!(verdict.certificate.stable && found.hansen.deviation.stability.stable);
+    assert!(found.hansen.deviation.stability.moved.is_empty(), "no pole was moved");
+    for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
+        for (h, n) in hansen.fit.iter().zip(&nominal.fit) {
+            assert!(h > &(n + 5.0), "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
+        }
+    }
+    let refusal = found.reduction.unwrap().unwrap_err();
+    assert!(matches!(refusal, youla::Error::Unstable { .. }), "{refusal}");
+}
+
+/// `youla signals`: alpha and beta of every episode; alpha of the known excitations is that of the measured signals.
+#[test]
+fn signals_of_the_rotary_pendulum() {
+    let Some(path) = example("qube", "qube_pendulum") else { return };
+    let (mut settings, folder) = (RunSettings::read(&path).unwrap(), path.parent().unwrap());
+    settings.data.detrend = Detrend::None;
+    let records = read_records(&settings.data, folder).unwrap();
+    let factors = factorise_run(&settings, &records, folder).unwrap().factors;
+    let signals = signal_records(&factors, &records).unwrap();
+    assert_eq!(signals.len(), 6);
+    let names: Vec<_> = signals[0].channels().iter().map(|c| c.name.as_str()).collect();
+    let expected =
+        ["alpha_plant_input", "beta_theta", "beta_alpha", "eta_plant_input", "epsilon_theta", "epsilon_alpha"];
+    assert_eq!(names, expected);
+    let (alpha, eta) = (signals[0].column("alpha_plant_input").unwrap(), signals[0].column("eta_plant_input").unwrap());
+    let tail = 2000..alpha.len();
+    let miss: f64 = tail.clone().map(|k| (alpha[k] - eta[k]).powi(2)).sum();
+    let size: f64 = tail.map(|k| alpha[k].powi(2)).sum();
+    assert!((miss / size).sqrt() < 1e-6, "{}", (miss / size).sqrt());
+}

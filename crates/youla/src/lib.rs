@@ -40,13 +40,15 @@
 //! use youla::record::{Excitation, SquareWaves};
 //! use youla::rig::{Bearing, degraded};
 //! use youla::{Mat, validate::certify};
+//! # use faer::Scale;
 //! # use {rand::{RngExt, SeedableRng}, rand_chacha::ChaCha8Rng, rand_distr::StandardNormal};
 //!
 //! let time = Discrete::new(2e-4)?;
 //! let machine = Bearing::default().plant()?.zoh(time)?;
 //! let nominal = degraded(&Bearing::default().plant()?, 0.5, 1.0)?.zoh(time)?.balanced()?; // every entry of A halved
-//! let f = lqr(&nominal, &LqrWeights::on_outputs(&nominal, eye(2).as_ref(), eye(2).as_ref())?)?.f;
-//! let l = kalman(&nominal, &NoiseCovariance::at_inputs(&nominal, eye(2).as_ref(), eye(2).as_ref())?)?.l;
+//! let (one, calm) = (eye(2), Scale(100.0) * eye(2)); // a gentle controller, which stabilises the machine too
+//! let f = lqr(&nominal, &LqrWeights::on_outputs(&nominal, one.as_ref(), calm.as_ref())?)?.f;
+//! let l = kalman(&nominal, &NoiseCovariance::at_inputs(&nominal, one.as_ref(), calm.as_ref())?)?.l;
 //! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?; // (13)-(15)
 //!
 //! // What the rig would log: alpha excites the loop, n is output noise.

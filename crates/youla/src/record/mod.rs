@@ -15,7 +15,7 @@ mod persistency;
 #[allow(clippy::module_inception)]
 mod record;
 #[cfg(test)]
-mod scratch;
+pub(crate) mod scratch;
 mod source;
 mod spectrum;
 mod time;

@@ -35,9 +35,9 @@ pub(super) fn problem_at(path: &Path, text: &str, start: usize, problem: String)
 
 /// Where the parser stopped.
 struct Place<'a> {
-    /// `[data]`, or the top level.
+    /// Path of the table, empty at the top level.
     table: String,
-    /// The key whose value is meant, where one stands before it on the same line.
+    /// The key whose value, or whose inline table, is meant, where one stands before it on the same line.
     key: Option<&'a str>,
     /// The text that is meant.
     found: &'a str,
@@ -47,24 +47,55 @@ impl<'a> Place<'a> {
     fn at(text: &'a str, start: usize, found: &'a str) -> Self {
         let line_start = text[..start].rfind('\n').map_or(0, |i| i + 1);
         let line_end = text[start..].find('\n').map_or(text.len(), |i| start + i);
-        let header = text[..line_end].lines().rev().find_map(header);
-        let before = text[line_start..start].trim_end().strip_suffix('=').map(str::trim_end);
-        let key = before.and_then(|b| b.rsplit(|c: char| !is_key(c)).next()).filter(|key| !key.is_empty());
-        Place { table: header.map_or_else(|| "the top level".into(), |h| format!("[{h}]")), key, found }
+        let before = &text[line_start..start];
+        let table = match header(&text[line_start..line_end]) {
+            // A word of a header belongs to the table before it.
+            Some(_) if !found.starts_with('[') => before.trim_start_matches(['[', ' ']).trim_end_matches('.'),
+            _ => text[..line_end].lines().rev().find_map(header).unwrap_or_default(),
+        };
+        Place { table: table.to_owned(), key: owner(before), found }
     }
 
-    /// The value that is wrong.
+    fn table(&self) -> String {
+        if self.table.is_empty() { "the top level".into() } else { format!("[{}]", self.table) }
+    }
+
+    /// The value or the inline table that is meant.
     fn subject(&self) -> String {
-        match self.key {
-            Some(key) => format!("`{key}` in {}", self.table),
-            None => format!("a value in {}", self.table),
+        let of = if self.table.is_empty() { "at the top level".into() } else { format!("in [{}]", self.table) };
+        self.key.map_or_else(|| format!("a value {of}"), |key| format!("`{key}` {of}"))
+    }
+
+    /// What is given in one of several forms: the value of a key, a table, or the one that a word of a header names.
+    fn form(&self) -> String {
+        match (self.key, self.table.is_empty()) {
+            (Some(_), _) => self.subject(),
+            (None, true) => format!("[{}]", self.found),
+            (None, false) => self.table(),
         }
     }
 
-    /// The table that is incomplete: an inline one, or the one of the header.
+    /// The table that holds a key: an inline one, or the one of the header.
     fn holder(&self) -> String {
-        if self.found.starts_with('{') { format!("an inline table in {}", self.table) } else { self.table.clone() }
+        if self.key.is_some() { self.subject() } else { self.table() }
     }
+}
+
+/// The key before the last open `=` of a line that is cut off: `file` in `{ file = `, `order` in `order = { fixed = 1, `.
+fn owner(line: &str) -> Option<&str> {
+    let mut open = Vec::new();
+    let mut last = None;
+    for (i, c) in line.char_indices() {
+        match c {
+            '=' => last = Some(i),
+            '{' => open.push(last),
+            '}' => last = open.pop().flatten(),
+            ',' if !open.is_empty() => last = open.last().copied().flatten(),
+            _ => {}
+        }
+    }
+    let before = line[..last?].trim_end();
+    before.rsplit(|c: char| !is_key(c)).next().filter(|key| !key.is_empty())
 }
 
 /// The name in a line `[name]` or `[[name]]`; not a row of a matrix.
@@ -96,7 +127,7 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
     }
     if message.starts_with("wanted exactly 1 element") {
         let count = if message.contains("found 0") { "none" } else { "more than one" };
-        return format!("{} must hold exactly one of {}, but holds {count}", place.table, forms_at(place));
+        return format!("{} must hold exactly one of {}, but holds {count}", place.form(), forms_at(place));
     }
     if let Some(must) = message.strip_prefix("wanted ").or_else(|| message.strip_prefix("expected ")) {
         return format!("{} is {}, but must be {}", place.subject(), shortened(place.found), expected(must));
@@ -113,23 +144,23 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
 /// A key or a choice that does not exist, with those that do.
 fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
     let (is, are) = if place.found.starts_with(['"', '\'']) { ("choice", "choices") } else { ("key", "keys") };
-    let of = if is == "choice" { place.subject() } else { place.table.clone() };
+    let of = if is == "choice" { place.subject() } else { place.holder() };
     let similarity = |k: &str| strsim::jaro_winkler(word, k);
     let nearest = known.iter().copied().max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
     let hint = match nearest.filter(|k| similarity(k) >= SIMILAR) {
-        Some(k) => format!("; did you mean `{k}`?"),
-        None => ";".into(),
+        Some(k) => format!("did you mean `{k}`? The"),
+        None => "the".into(),
     };
-    format!("`{word}` is not a {is} of {of}{hint} The {are} are {}", known.join(", "))
+    format!("`{word}` is not a {is} of {of}; {hint} {are} are {}", known.join(", "))
 }
 
 /// The forms among which the user chooses one, asked of the types themselves.
 fn forms_at(place: &Place<'_>) -> String {
-    let table = place.table.trim_matches(['[', ']']);
-    match (place.key, table.split('.').next()) {
-        (Some("order"), Some("reduction")) => forms::<ReducedOrder>(),
+    let table = place.table.split('.').next().unwrap_or_default();
+    match (place.key, table) {
+        (Some("order"), "reduction") => forms::<ReducedOrder>(),
         (Some("order"), _) => forms::<Order>(),
-        (_, Some("controller")) => forms::<ControllerSettings>(),
+        _ if table == "controller" || place.found == "controller" => forms::<ControllerSettings>(),
         _ => forms::<NominalModel>(),
     }
 }
@@ -170,6 +201,15 @@ mod tests {
         assert_eq!(header(" [[data.estimation]] # one"), Some("data.estimation"));
         assert_eq!(header("[0.9, 0.1],"), None);
         assert_eq!(header("a = [data]"), None);
+    }
+
+    #[test]
+    fn the_owner_of_a_word_is_the_key_before_it() {
+        assert_eq!(owner("take = "), Some("take"));
+        assert_eq!(owner("order = { auto = { "), Some("auto"));
+        assert_eq!(owner("estimation = [{ file = 1, skip = 2 }, { file = 3, "), Some("estimation"));
+        assert_eq!(owner("order = { fixed = "), Some("fixed"));
+        assert_eq!(owner(""), None);
     }
 
     #[test]

@@ -183,6 +183,7 @@ pub fn identify(
         direct,
         indirect: None,
     };
-    (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?; // (26) and the loop certificate
+    // (26), the loop certificate and the response that rests on no model.
+    (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?;
     Ok(found)
 }

@@ -8,13 +8,8 @@ use youla::run::Identification;
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
     text += &aligned(&rows(found));
-    for (name, refusal) in [
-        ("no direct model", found.direct.as_ref().and_then(|d| d.as_ref().err())),
-        ("no reduced model", found.reduction.as_ref().and_then(|r| r.as_ref().err())),
-    ] {
-        if let Some(reason) = refusal {
-            let _ = write!(text, "\n{name}: {reason}");
-        }
+    for refusal in found.refusals() {
+        let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
     text

@@ -57,11 +57,11 @@ pub fn factorise(
     let balanced = nominal.with_scaled_states(&scale);
     let factors = match controller {
         Controller::Observer { f, l } => {
-            crate::linalg::check_shape("state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
-            crate::linalg::check_shape("observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+            crate::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+            crate::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
             let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
             let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
-            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?
+            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
         }
         Controller::System(k) => {
             let weights = Weights::new(records, settings);
@@ -80,6 +80,14 @@ pub fn factorise(
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
     Ok(Factorisation { nominal: nominal.clone(), controller: factors.controller()?, factors, bezout_residual })
+}
+
+/// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.
+fn not_stabilising(error: Error) -> Error {
+    match error {
+        Error::Unstable { pole, .. } => Error::NotStabilising { model: "the nominal model".into(), pole },
+        other => other,
+    }
 }
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.
@@ -111,14 +119,16 @@ impl Weights {
     fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         let outputs = diagonal(self.y.iter().map(|s| 1.0 / (s * s)));
         let inputs = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
-        Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f)
+        let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
+        gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
     }
 
     /// Kalman predictor with input noise of the size of the inputs and output noise of the size of the outputs.
     fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         let input = diagonal(self.u.iter().map(|s| s * s));
         let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
-        Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l)
+        let gain = || Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l);
+        gain().map_err(|e: Error| e.within("observer gain L of the nominal model"))
     }
 }
 
@@ -133,7 +143,7 @@ fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         return Ok(Mat::zeros(k.inputs(), k.order()));
     }
     let weights = LqrWeights { q: eye(k.order()), r: eye(k.inputs()), s: None };
-    Ok(lqr(k, &weights)?.f)
+    Ok(lqr(k, &weights).map_err(|e| e.within("state feedback of the controller's factors"))?.f)
 }
 
 #[cfg(test)]

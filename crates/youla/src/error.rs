@@ -218,14 +218,12 @@ pub enum Error {
     },
     // ---- run and settings --------------------------------------------------------------------------------------
     /// run.toml cannot be used.
-    #[error("{}{}: {problem}", path.display(), position(*line, *column))]
+    #[error("{}{}: {problem}", path.display(), position(*at))]
     Settings {
         /// Path of run.toml.
         path: PathBuf,
-        /// Line counted from 1, 0 where the whole file is meant.
-        line: usize,
-        /// Column counted from 1.
-        column: usize,
+        /// Where, `None` where the file as a whole is meant.
+        at: Option<TextPosition>,
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
@@ -532,9 +530,18 @@ impl Error {
     }
 }
 
-/// `:line:column` where a line is known.
-fn position(line: usize, column: usize) -> String {
-    if line == 0 { String::new() } else { format!(":{line}:{column}") }
+/// A place in a text file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TextPosition {
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Column, counted from 1.
+    pub column: usize,
+}
+
+/// `:line:column` where they are known.
+fn position(at: Option<TextPosition>) -> String {
+    at.map_or(String::new(), |p| format!(":{}:{}", p.line, p.column))
 }
 
 /// Names the worst pole where there is one.

@@ -2,6 +2,7 @@
 
 use super::models::{ControllerSettings, NominalModel};
 use crate::Error;
+use crate::error::TextPosition;
 use crate::identify::subspace::Order;
 use crate::reduce::ReducedOrder;
 use serde::de::value::{Error as ProbeError, StrDeserializer};
@@ -30,7 +31,7 @@ pub(super) fn problem_at(path: &Path, text: &str, start: usize, problem: String)
     let before = &text[..start];
     let line = before.matches('\n').count() + 1;
     let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
-    Error::Settings { path: path.to_owned(), line, column, problem }
+    Error::Settings { path: path.to_owned(), at: Some(TextPosition { line, column }), problem }
 }
 
 /// Where the parser stopped.

@@ -227,15 +227,14 @@ impl RunSettings {
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string_pretty(self).map_err(|e| Error::Settings {
             path: PathBuf::from("run.toml"),
-            line: 0,
-            column: 0,
+            at: None,
             problem: e.to_string(),
         })
     }
 
     fn check(&self, path: &Path) -> Result<()> {
         let problem = self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.number_problem());
-        problem.map_or(Ok(()), |problem| Err(Error::Settings { path: path.to_owned(), line: 0, column: 0, problem }))
+        problem.map_or(Ok(()), |problem| Err(Error::Settings { path: path.to_owned(), at: None, problem }))
     }
 
     fn record_problem(&self) -> Option<String> {

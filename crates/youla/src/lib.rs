@@ -1,4 +1,71 @@
-//! Closed-loop identification without opening the loop.
+//! Closed-loop identification: finding out how a machine behaves while its controller keeps running.
+//!
+//! Feedback makes the input of a plant depend on its noise, which biases ordinary identification. With a doubly coprime
+//! factorisation of a nominal model and of the controller that ran, the same data tell of the *Youla deviation system* S,
+//! which is stable, driven by a signal that is free of noise, and stands for the true plant G(S). This library factorises,
+//! filters, identifies S, recombines it to G(S), reduces it and says what the result is worth.
+//!
+//! # Data flow
+//!
+//! Modules depend on each other in one direction only, in the order in which data flow:
+//!
+//! ```text
+//! error, units -> linalg -> lti -> record -> control -> rig -> factor -> identify -> reduce -> validate -> report -> run
+//! ```
+//!
+//! | module | holds |
+//! |---|---|
+//! | [`linalg`] | ordered real Schur form, Sylvester, Lyapunov and Riccati equations, exponential and logarithm, each with its residual |
+//! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, simulation |
+//! | [`record`] | labelled, clocked data; CSV, MATLAB and NumPy files; spectra; excitation signals |
+//! | [`control`] | LQR, Kalman predictor, observer-based controller, closed loops |
+//! | [`rig`] | the gas bearing of the paper |
+//! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
+//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it |
+//! | [`reduce`] | balanced truncation and singular perturbation |
+//! | [`validate`] | fit, variance accounted for, loop certificate, prediction of fresh data |
+//! | [`report`] | results as data and as one offline page |
+//! | [`run`] | run.toml in, run folder out: the driver of the program |
+//!
+//! # The scheme in a few lines
+//!
+//! Feedback is positive everywhere, `u = K y`; records are samples x channels; the sample time is never guessed.
+//!
+//! ```
+//! use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
+//! use youla::factor::CoprimeFactors;
+//! use youla::identify::{hansen::hansen, subspace::{Order, SubspaceOptions}};
+//! use youla::linalg::{block, eye};
+//! use youla::lti::{Discrete, simulate};
+//! use youla::record::{Excitation, SquareWaves};
+//! use youla::rig::{Bearing, degraded};
+//! use youla::{Mat, validate::certify};
+//! # use faer::Scale;
+//! # use {rand::{RngExt, SeedableRng}, rand_chacha::ChaCha8Rng, rand_distr::StandardNormal};
+//!
+//! let time = Discrete::new(2e-4)?;
+//! let machine = Bearing::default().plant()?.zoh(time)?;
+//! let nominal = degraded(&Bearing::default().plant()?, 0.5, 1.0)?.zoh(time)?.balanced()?; // every entry of A halved
+//! let (one, calm) = (eye(2), Scale(100.0) * eye(2)); // a gentle controller, which stabilises the machine too
+//! let f = lqr(&nominal, &LqrWeights::on_outputs(&nominal, one.as_ref(), calm.as_ref())?)?.f;
+//! let l = kalman(&nominal, &NoiseCovariance::at_inputs(&nominal, one.as_ref(), calm.as_ref())?)?.l;
+//! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?; // (13)-(15)
+//!
+//! // What the rig would log: alpha excites the loop, n is output noise.
+//! let mut rng = ChaCha8Rng::seed_from_u64(1);
+//! let waves = SquareWaves { amplitude: 0.5, hold_min: 5, hold_max: 40 };
+//! let alpha = Excitation::SquareWaves(waves).generate(8000, 2, time, &mut rng)?;
+//! let n = Mat::from_fn(8000, 2, |_, _| 0.3 * rng.sample::<f64, _>(StandardNormal));
+//! let rig = closed_loop(&machine, &factors.j_k()?)?;
+//! let log = simulate(&rig, block(&[&[alpha.as_ref(), n.as_ref()]]).as_ref(), &vec![0.0; rig.order()])?;
+//!
+//! let signals = factors.signals(log.subcols(0, 2), log.subcols(2, 2))?; // (28): one filter of [u; y]
+//! let options = SubspaceOptions { horizon: 30, order: Order::Fixed(8), ..Default::default() };
+//! let found = hansen(&factors, &[signals], &options)?; // (25), (17)
+//! let verdict = certify(&found.plant, &factors.controller()?)?;
+//! assert!(verdict.stable);
+//! # Ok::<(), youla::Error>(())
+//! ```
 
 pub mod control;
 pub mod error;
@@ -11,7 +78,6 @@ pub mod reduce;
 pub mod report;
 pub mod rig;
 pub mod run;
-pub mod study;
 pub mod units;
 pub mod validate;
 

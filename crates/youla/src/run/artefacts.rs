@@ -168,7 +168,7 @@ impl Writer<'_> {
         self.model_with("2-factor/left", left, loop_ports, youla(["alpha", "beta"]), details)?;
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
         self.model_with("2-factor/controller", &f.controller, y, u, serde_json::Value::Null)?;
-        self.model("2-factor/nominal", &self.found.nominal, serde_json::Value::Null)
+        self.model("2-factor/nominal", &f.nominal, serde_json::Value::Null)
     }
 
     /// `3-signals/`: alpha and beta of each estimation record.

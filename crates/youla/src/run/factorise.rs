@@ -13,6 +13,8 @@ use std::path::Path;
 /// The factors of a run and what they rest on.
 #[derive(Debug, Clone)]
 pub struct Factorisation {
+    /// The nominal model as given, in its own states.
+    pub nominal: StateSpace<Discrete>,
     /// The eight factors.
     pub factors: CoprimeFactors<Discrete>,
     /// The controller that ran, `u = K y` (positive feedback).
@@ -77,7 +79,7 @@ pub fn factorise(
         }
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
-    Ok(Factorisation { controller: factors.controller()?, factors, bezout_residual })
+    Ok(Factorisation { nominal: nominal.clone(), controller: factors.controller()?, factors, bezout_residual })
 }
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.

@@ -39,10 +39,12 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         }
     }
     let settle = found.signals.settle;
-    add(
-        Status::Info,
-        format!("The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."),
-    );
+    if settle > 0 {
+        let text = format!(
+            "The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."
+        );
+        add(Status::Info, text);
+    }
     all
 }
 
@@ -61,10 +63,15 @@ fn fit_line(found: &Identification) -> Option<Verdict> {
         let text = "No verification record was given: nothing shows how the model does on fresh data.".into();
         return Some(Verdict { status: Status::Caution, text, evidence: Evidence::Fits });
     }
-    let hansen = mean_fit(found.verdict.of(Method::Hansen)?);
-    let nominal = mean_fit(found.verdict.of(Method::Nominal)?);
-    let against = if nominal.is_finite() { format!("{nominal:.1} %") } else { "no prediction".into() };
-    let text = format!("On fresh data G(S) has a mean fit of {hansen:.1} %, the nominal model {against}.");
+    let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
+    let of = |method: Method| found.verdict.of(method).map(mean_fit);
+    let (hansen, nominal) = (of(Method::Hansen)?, of(Method::Nominal)?);
+    let mut text =
+        format!("On fresh data G(S) has a mean fit of {}, the nominal model {}", percent(hansen), percent(nominal));
+    if let Some(direct) = of(Method::Direct) {
+        text += &format!(", direct identification {}", percent(direct));
+    }
+    text.push('.');
     let better = hansen.is_finite() && (!nominal.is_finite() || hansen > nominal);
     Some(Verdict { status: if better { Status::Good } else { Status::Bad }, text, evidence: Evidence::Fits })
 }

@@ -111,7 +111,11 @@ impl NominalModel {
                 let d = d.as_ref().map_or_else(|| Ok(Mat::zeros(c.nrows(), b.ncols())), |d| matrix("D", d))?;
                 sampled([a, b, c, d], *domain, time)
             }
-            NominalModel::MatFile { file, domain } => sampled(abcd_of(&folder.join(file))?, *domain, time),
+            NominalModel::MatFile { file, domain } => {
+                let file = folder.join(file);
+                check_clock(&file, *domain, time)?;
+                sampled(abcd_of(&file)?, *domain, time)
+            }
             NominalModel::Bearing { parameters, a_factor, b_factor } => {
                 degraded(&parameters.plant()?, *a_factor, *b_factor)?.zoh(time)
             }
@@ -216,7 +220,9 @@ impl ControllerSettings {
                 (feedback, StateSpace::new(a, b, c, d, time)?)
             }
             Self::MatFile { feedback, file } => {
-                (feedback, sampled(abcd_of(&folder.join(file))?, Domain::Discrete, time)?)
+                let file = folder.join(file);
+                check_clock(&file, Domain::Discrete, time)?;
+                (feedback, sampled(abcd_of(&file)?, Domain::Discrete, time)?)
             }
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
@@ -233,6 +239,20 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
         Domain::Continuous => StateSpace::new(a, b, c, d, Continuous)?.zoh(time),
         Domain::Discrete => StateSpace::new(a, b, c, d, time),
     }
+}
+
+/// A discrete-time model whose file states a sample time `ts` must have that of the data.
+fn check_clock(file: &Path, domain: Domain, time: Discrete) -> Result<()> {
+    let variables = read_mat(file)?;
+    let stated = variables.variables().iter().any(|v| v.name == "ts");
+    if domain == Domain::Continuous || !stated {
+        return Ok(());
+    }
+    let ts = variables.scalar("ts")?;
+    if (ts / time.ts() - 1.0).abs() < 1e-6 {
+        return Ok(());
+    }
+    Err(Error::SampleTimeMismatch { what: format!("{} and the data", file.display()), left: ts, right: time.ts() })
 }
 
 fn abcd_of(file: &Path) -> Result<[Mat<f64>; 4]> {

@@ -3,7 +3,7 @@
 use super::artefacts::pairs;
 use super::findings::{notes, verdict_lines};
 use super::pipeline::{Identification, StageTimes};
-use super::records::LoopRecord;
+use super::records::{LoopRecord, channels_of};
 use super::response::{decibel, log_grid, measured_response, model_responses};
 use super::settings::Prediction;
 use super::verdict::{Method, ModelVerdict};
@@ -132,19 +132,20 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
         }
         Ok(())
     };
-    for (name, channels, excitation) in [
-        ("excitation of", u, &record.input_excitation),
-        ("reference of", y, &record.reference),
-        ("injected alpha of", u, &record.alpha),
+    let data = &found.settings.data;
+    for (specs, excitation) in [
+        (&data.input_excitation, &record.input_excitation),
+        (&data.reference, &record.reference),
+        (&data.alpha, &record.alpha),
     ] {
-        if let Some(data) = excitation {
-            add(SignalKind::Excitation, &named(name, channels), data)?;
+        if let Some(excitation) = excitation {
+            add(SignalKind::Excitation, &channels_of(specs), excitation)?;
         }
     }
     add(SignalKind::Input, u, &record.u)?;
     add(SignalKind::Output, y, &record.y)?;
-    add(SignalKind::Alpha, &named("alpha of", u), &signals.alpha)?;
-    add(SignalKind::Beta, &named("beta of", y), &signals.beta)?;
+    add(SignalKind::Alpha, &named("alpha", u), &signals.alpha)?;
+    add(SignalKind::Beta, &named("beta", y), &signals.beta)?;
     Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
 }
 

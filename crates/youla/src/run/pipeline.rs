@@ -9,7 +9,7 @@ use crate::Result;
 use crate::identify::direct::direct;
 use crate::identify::hansen::{HansenModel, hansen};
 use crate::identify::subspace::SubspaceModel;
-use crate::lti::{Discrete, StateSpace};
+use crate::lti::Discrete;
 use crate::reduce::{Reduction, reduce};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -98,9 +98,7 @@ pub struct Identification {
     pub settings: RunSettings,
     /// The records.
     pub records: RunRecords,
-    /// The nominal model as given, in its own states.
-    pub nominal: StateSpace<Discrete>,
-    /// Factors and controller.
+    /// Nominal model, controller and their factors.
     pub factorisation: Factorisation,
     /// alpha and beta of the estimation records.
     pub signals: DeviationSignals,
@@ -126,7 +124,6 @@ pub fn identify(
     folder: &Path,
     clock: &mut StageClock<'_>,
 ) -> Result<Identification> {
-    let nominal = settings.nominal.realise(folder, records.time)?;
     let factorisation = clock.run(Stage::Factor, || factorise_run(&settings, &records, folder))?; // (13)-(15)
     let factors = &factorisation.factors;
     let signals =
@@ -143,7 +140,6 @@ pub fn identify(
         verdict: Verdict::default(),
         settings,
         records,
-        nominal,
         factorisation,
         signals,
         hansen,

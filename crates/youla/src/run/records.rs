@@ -90,11 +90,10 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
         }
     }
     let verification = records.split_off(settings.estimation.len());
-    let channels = |specs: &[ChannelSpec]| specs.iter().map(|s| Channel::new(&s.name, &s.unit)).collect();
     Ok(RunRecords {
         time,
-        inputs: channels(&settings.inputs),
-        outputs: channels(&settings.outputs),
+        inputs: channels_of(&settings.inputs),
+        outputs: channels_of(&settings.outputs),
         estimation: records,
         verification,
         sources,
@@ -151,6 +150,11 @@ impl LoopRecord {
     pub fn samples(&self) -> usize {
         self.u.nrows()
     }
+}
+
+/// Names and units without the places in the files.
+pub(super) fn channels_of(specs: &[ChannelSpec]) -> Vec<Channel> {
+    specs.iter().map(|s| Channel::new(&s.name, &s.unit)).collect()
 }
 
 /// Root mean square of each channel over several records, 1 for a channel that is zero throughout.

@@ -1,6 +1,7 @@
 //! Frequency responses of a run: every model, and the indirect non-parametric one where the excitation is known.
 
 use super::pipeline::Identification;
+use super::records::LoopRecord;
 use super::verdict::Method;
 use crate::lti::{FrequencyResponse, frequency_response};
 use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
@@ -16,26 +17,32 @@ pub(super) struct ModelResponses {
     pub models: Vec<(Method, FrequencyResponse)>,
 }
 
-/// The indirect response `S_dy S_du^-1`, with d the known excitation at the plant input, else alpha, else the image of the
-/// references in alpha; averaged over all estimation records. `None` where no excitation is known.
+/// The indirect response `S_dy S_du^-1` averaged over all estimation records, `None` where no excitation is known.
+///
+/// The excitation d is the signal added at the plant input or injected as alpha where it acts alone; where references move
+/// too, it is the image of all of them in alpha, so that none is mistaken for noise.
 ///
 /// # Errors
 /// A record shorter than a window.
 pub(super) fn measured_response(found: &Identification) -> Result<Option<IndirectResponse>> {
     let settings = &found.settings.frequency_response;
     let records = &found.records.estimation;
+    let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
     let excitations: Vec<Mat<f64>> = records
         .iter()
         .enumerate()
         .filter_map(|(k, r)| {
-            let direct = r.input_excitation.clone().or_else(|| r.alpha.clone());
-            direct.or_else(|| found.signals.expected_alpha.get(k).cloned())
+            let alone = [&r.input_excitation, &r.alpha].into_iter().flatten().collect::<Vec<_>>();
+            match alone[..] {
+                [d] if at_rest(r) => Some(d.clone()),
+                _ => found.signals.expected_alpha.get(k).cloned(),
+            }
         })
         .collect();
     if excitations.len() < records.len() {
         return Ok(None);
     }
-    // The image of the references starts after the settling samples.
+    // The image in alpha starts after the settling samples.
     let experiments: Vec<_> = records
         .iter()
         .zip(&excitations)
@@ -47,6 +54,10 @@ pub(super) fn measured_response(found: &Identification) -> Result<Option<Indirec
         .collect();
     let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
     indirect_response(&experiments, found.records.time, &options).map(Some)
+}
+
+fn is_constant(signals: &Mat<f64>) -> bool {
+    signals.col_iter().all(|c| c.iter().all(|v| *v == c[0]))
 }
 
 /// Responses of all models on the given frequencies in Hz.

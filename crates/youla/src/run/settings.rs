@@ -249,6 +249,16 @@ impl RunSettings {
                 return problem(format!("[data] {key} names no channel"));
             }
         }
+        if !d.alpha.is_empty() && !d.input_excitation.is_empty() {
+            return problem("[data] has both alpha and input_excitation; give the one that was injected".into());
+        }
+        let known = !(d.alpha.is_empty() && d.input_excitation.is_empty() && d.reference.is_empty());
+        if self.verification.prediction == Prediction::ClosedLoop && !known {
+            return problem(
+                "[verification] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha"
+                    .into(),
+            );
+        }
         for (key, channels, wanted) in [
             ("input_excitation", d.input_excitation.len(), d.inputs.len()),
             ("alpha", d.alpha.len(), d.inputs.len()),

@@ -1,8 +1,10 @@
 //! The evidence on every model of a run: fit (26) on verification records, loop certificate, modes.
 
+use super::factorise::Factorisation;
 use super::pipeline::Identification;
 use super::records::LoopRecord;
 use super::settings::Prediction;
+use crate::control::with_input_port;
 use crate::lti::{Discrete, Mode, StateSpace};
 use crate::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
 use crate::{Error, Mat, Result, c64};
@@ -43,7 +45,7 @@ impl Method {
             Method::Nominal => "nominal G(0)",
             Method::Direct => "direct N4SID",
             Method::Hansen => "Hansen G(S)",
-            Method::HansenReduced => "Hansen reduced G_red(S)",
+            Method::HansenReduced => "reduced G_red(S)",
             Method::TruePlant => "true plant",
         }
     }
@@ -98,7 +100,7 @@ impl Verdict {
 /// # Errors
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
 pub(super) fn verify(found: &Identification) -> Result<Verdict> {
-    let mut models = vec![(Method::Nominal, &found.nominal)];
+    let mut models = vec![(Method::Nominal, &found.factorisation.nominal)];
     if let Some(Ok(direct)) = &found.direct {
         models.push((Method::Direct, &direct.model));
     }
@@ -130,11 +132,13 @@ fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &
     let predicted = match found.settings.verification.prediction {
         Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), record.y.as_ref()),
         Prediction::ClosedLoop => {
+            let Factorisation { factors, controller, .. } = &found.factorisation;
+            let ports = if record.alpha.is_some() { factors.j_k()? } else { with_input_port(controller)? };
             let excitation = LoopExcitation {
-                input: record.input_excitation.as_ref().map(|v| v.as_ref()),
+                input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
                 reference: record.reference.as_ref().map(|r| r.as_ref()),
             };
-            predict_closed_loop(model, &found.factorisation.controller, excitation, record.y.as_ref())
+            predict_closed_loop(model, &ports, excitation, record.y.as_ref())
         }
     };
     let skip = found.settings.verification.skip;

@@ -1,15 +1,16 @@
 //! Prediction of a record by a model: from the measured input, or in closed loop from the excitations alone.
 
-use crate::control::{closed_loop, with_input_port};
+use crate::control::closed_loop;
 use crate::linalg::{block, check_shape};
-use crate::lti::{Discrete, StateSpace, simulate};
+use crate::lti::{Discrete, Partitioned, StateSpace, simulate};
 use crate::{Mat, MatRef, Result};
 use faer::Scale;
 
-/// The known signals that enter a loop `u = K (y - r) + v1` (positive feedback) from outside.
+/// The known signals that enter a loop from outside.
 #[derive(Debug, Clone, Copy)]
 pub struct LoopExcitation<'a> {
-    /// Added at the plant input, samples x m.
+    /// Enters the second input of the controller, samples x m: alpha for `J_K`, an excitation at the plant input for
+    /// [`crate::control::with_input_port`].
     pub input: Option<MatRef<'a, f64>>,
     /// Reference r, samples x p.
     pub reference: Option<MatRef<'a, f64>>,
@@ -31,7 +32,7 @@ pub fn predict_open_loop(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: Ma
     simulate(model, u, &x0)
 }
 
-/// Simulates a model under its controller (`u = K y`, positive feedback) from the known excitations alone. Of the measured
+/// Simulates a model under a controller with ports, `(y - r, w) -> (u, z)`, from the known excitations alone. Of the measured
 /// output only the initial state of the loop is taken (least squares, as in [`predict_open_loop`]), so that neither noise
 /// nor drift of an integrating or unstable plant enters.
 ///
@@ -39,16 +40,16 @@ pub fn predict_open_loop(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: Ma
 /// Ports, sample times, [`crate::Error::Diverged`] when the controller does not stabilise the model.
 pub fn predict_closed_loop(
     model: &StateSpace<Discrete>,
-    controller: &StateSpace<Discrete>,
+    controller: &Partitioned<Discrete>,
     excitation: LoopExcitation<'_>,
     y: MatRef<'_, f64>,
 ) -> Result<Mat<f64>> {
     let (samples, m, p) = (y.nrows(), model.inputs(), model.outputs());
     let v1 = excitation.input.map_or_else(|| Mat::zeros(samples, m), |v| v.to_owned());
     let r = excitation.reference.map_or_else(|| Mat::zeros(samples, p), |r| r.to_owned());
-    check_shape("the excitation at the plant input", v1.as_ref(), (samples, m))?;
+    check_shape("the excitation of the loop", v1.as_ref(), (samples, m))?;
     check_shape("the reference", r.as_ref(), (samples, p))?;
-    let closed = closed_loop(model, &with_input_port(controller)?)?;
+    let closed = closed_loop(model, controller)?;
     let from_outside = block(&[&[v1.as_ref(), (Scale(-1.0) * &r).as_ref()]]);
     let to_output = closed.part(m..m + p, 0..m + p);
     Ok(predict_open_loop(&to_output, from_outside.as_ref(), (y - &r).as_ref())? + r)

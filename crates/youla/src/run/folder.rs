@@ -74,13 +74,24 @@ impl RunFolder {
         self.file(name, |path| fs::write(path, text).map_err(|source| Error::Io { path: path.to_owned(), source }))
     }
 
-    /// Writes a value as JSON.
+    /// Writes a value as JSON for people.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn json(&self, name: &str, value: &impl Serialize) -> Result<()> {
-        let text = serde_json::to_string_pretty(value)
-            .map_err(|e| Error::Io { path: self.target.join(name), source: e.into() })?;
+        self.line(name, serde_json::to_string_pretty(value))
+    }
+
+    /// Writes a value as JSON on one line: for curves, of which a line per number would be mostly blanks.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn compact_json(&self, name: &str, value: &impl Serialize) -> Result<()> {
+        self.line(name, serde_json::to_string(value))
+    }
+
+    fn line(&self, name: &str, text: serde_json::Result<String>) -> Result<()> {
+        let text = text.map_err(|e| Error::Io { path: self.target.join(name), source: e.into() })?;
         self.text(name, &(text + "\n"))
     }
 

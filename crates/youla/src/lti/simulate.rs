@@ -173,15 +173,11 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
 
 /// The loop over the samples, on contiguous columns.
 fn run(simulator: &Simulator, state: &mut SimulationState, u: MatRef<'_, f64>, y: &mut Mat<f64>) {
-    let copy;
-    let u = match u.try_as_col_major() {
-        Some(u) => u,
-        None => {
-            copy = u.to_owned();
-            copy.as_ref().try_as_col_major().unwrap_or_else(|| unreachable!("an owned matrix is column-major"))
-        }
+    let copy = if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() };
+    let inputs: Vec<&[f64]> = match u.try_as_col_major() {
+        Some(u) => u.col_iter().map(|c| c.as_slice()).collect(),
+        None => (0..copy.ncols()).map(|j| copy.col_as_slice(j)).collect(),
     };
-    let inputs: Vec<&[f64]> = u.col_iter().map(|c| c.as_slice()).collect();
     let samples = y.nrows();
     let mut outputs: Vec<&mut [f64]> =
         y.col_iter_mut().filter_map(|c| c.try_as_col_major_mut()).map(|c| c.as_slice_mut()).collect();

@@ -59,7 +59,7 @@ pub enum Error {
     #[error("{part}: {source}")]
     Within {
         /// The part, in the words of the user, for example `[controller]`.
-        part: &'static str,
+        part: String,
         /// What failed.
         source: Box<Error>,
     },
@@ -505,8 +505,8 @@ pub enum Error {
 
 impl Error {
     /// The same error, said of a part of a larger task.
-    pub(crate) fn within(self, part: &'static str) -> Self {
-        Error::Within { part, source: Box::new(self) }
+    pub(crate) fn within(self, part: impl Into<String>) -> Self {
+        Error::Within { part: part.into(), source: Box::new(self) }
     }
 
     /// Whether the input is at fault or the computation is impossible on it.

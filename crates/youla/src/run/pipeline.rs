@@ -116,6 +116,22 @@ pub struct Identification {
     pub verdict: Verdict,
 }
 
+/// Where a failure of the scheme happened, with the likely cause when the log contradicts the declared controller.
+fn deviation_context(signals: &DeviationSignals) -> String {
+    let place = "[hansen] S from alpha to beta";
+    match signals.controller_mismatch {
+        Some(mismatch) if mismatch > SUSPICIOUS_MISMATCH => format!(
+            "{place}, where the declared [controller] misses the known excitations by {:.0} % (check its coefficients, \
+             sign, delay and saturation)",
+            100.0 * mismatch
+        ),
+        _ => place.to_owned(),
+    }
+}
+
+/// Relative miss of alpha from which the controller is to be doubted.
+const SUSPICIOUS_MISMATCH: f64 = 0.05;
+
 /// Something that was asked for but is impossible; the run goes on without it.
 #[derive(Debug, Clone, Copy)]
 pub struct Refusal<'a> {
@@ -170,7 +186,7 @@ pub fn identify(
             || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
         )
     });
-    let hansen = hansen.map_err(|e| e.within("[hansen] S from alpha to beta"))?;
+    let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;
     let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
     let mut found = Identification {
         verdict: Verdict::default(),

@@ -3,10 +3,10 @@
 //!
 //! No standard library, no allocation, no `unsafe`, no dependency, no panic: all sizes are part of the types, and there is
 //! no index, division or conversion that could fail while the controller runs. Optimised code for `thumbv7em-none-eabihf`
-//! refers to no panic at all; without optimisation it holds the debug assertions of `core`. One step takes `n^2 + 2 n (m + p) + m p`
-//! products. The matrices are a [`Controller`], which never changes; what moves is a [`State`], which the caller keeps.
-//! `f64` on the host, `f32` or `f64` on the target ([`Real`]). `youla::control::real_time_controller` makes a controller
-//! from a design.
+//! refers to no panic at all; without optimisation it holds the debug assertions of `core`. One step takes
+//! `n^2 + 2 n (m + p) + m p` products. The matrices are a [`Controller`], which never changes; what moves is a [`State`],
+//! which the caller keeps. `f64` on the host, `f32` or `f64` on the target ([`Real`]).
+//! `youla::control::real_time_controller` makes a controller from a design.
 //!
 //! # Equations
 //!

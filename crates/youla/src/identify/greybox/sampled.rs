@@ -9,9 +9,9 @@
 //! 30 (2009), 1639). It is exact; an entry of A moves all entries of Ad and Bd.
 
 use super::structure::{Matrix, Slope, Structure};
-use crate::Result;
 use crate::linalg::{block, check_shape, expm};
 use crate::lti::{Continuous, Discrete, StateSpace};
+use crate::{Error, Result};
 use faer::{Mat, Scale};
 
 /// The coordinates in which everything is computed: balanced states `x = diag(states) z` (powers of two), outputs divided
@@ -73,6 +73,7 @@ pub(super) fn sampled_slopes(
             let mut direction = Mat::zeros(n + m, n + m);
             let mut outputs = Mat::zeros(p, n + m);
             for slope in structure.slopes(theta, parameter) {
+                check_entry(slope, model)?;
                 let value = coordinates.slope(slope);
                 match slope.matrix {
                     Matrix::A => direction[(slope.row, slope.column)] += time.ts() * value,
@@ -91,6 +92,24 @@ pub(super) fn sampled_slopes(
             Ok(SampledSlope { states, outputs })
         })
         .collect()
+}
+
+/// Refuses a slope of an entry that does not exist.
+fn check_entry(slope: Slope, model: &StateSpace<Continuous>) -> Result<()> {
+    let matrix = match slope.matrix {
+        Matrix::A => model.a(),
+        Matrix::B => model.b(),
+        Matrix::C => model.c(),
+        Matrix::D => model.d(),
+    };
+    if slope.row < matrix.nrows() && slope.column < matrix.ncols() {
+        return Ok(());
+    }
+    Err(Error::Shape {
+        what: format!("the matrix {:?} of the structure", slope.matrix),
+        expected: (slope.row + 1, slope.column + 1),
+        found: (matrix.nrows(), matrix.ncols()),
+    })
 }
 
 /// `L(M, E)`, linear in E, which is therefore brought to the size of M first.

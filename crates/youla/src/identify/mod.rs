@@ -1,5 +1,6 @@
 //! Identification methods: the subspace family, and what is built on it.
 
 pub mod direct;
+pub mod greybox;
 pub mod hansen;
 pub mod subspace;

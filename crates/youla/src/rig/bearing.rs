@@ -62,6 +62,22 @@ impl Bearing {
         let input = block(&[&[zero], &[zero], &[p.as_ref()]]);
         StateSpace::new(a, input, block(&[&[one, zero, zero]]), Mat::zeros(2, 2), Continuous)
     }
+
+    /// The bearing with the transfer function of [`degraded`]: with `c = a_factor` its stiffness is `c^2 K`, its damping
+    /// `c D`, its actuators `c b_factor B` and `c P`. Its states are scaled, so the factor on A does not show in them.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] unless both factors are positive.
+    pub fn degraded(&self, a_factor: f64, b_factor: f64) -> Result<Bearing> {
+        positive_factors(a_factor, b_factor)?;
+        let times = |x: &[[f64; 2]; 2], factor: f64| x.map(|row| row.map(|v| factor * v));
+        Ok(Bearing {
+            stiffness: times(&self.stiffness, a_factor * a_factor),
+            damping: times(&self.damping, a_factor),
+            actuator_gain: times(&self.actuator_gain, a_factor * b_factor),
+            actuator_pole: self.actuator_pole.map(|p| a_factor * p),
+        })
+    }
 }
 
 /// A nominal model with inferior knowledge: every entry of A times `a_factor` and of B times `b_factor`, before any
@@ -70,11 +86,36 @@ impl Bearing {
 /// # Errors
 /// [`Error::OutOfRange`] unless both factors are positive.
 pub fn degraded(plant: &StateSpace<Continuous>, a_factor: f64, b_factor: f64) -> Result<StateSpace<Continuous>> {
+    positive_factors(a_factor, b_factor)?;
+    let a = Scale(a_factor) * plant.a();
+    StateSpace::new(a, Scale(b_factor) * plant.b(), plant.c().to_owned(), plant.d().to_owned(), Continuous)
+}
+
+fn positive_factors(a_factor: f64, b_factor: f64) -> Result<()> {
     for (what, value) in [("the factor on A", a_factor), ("the factor on B", b_factor)] {
         if !(value > 0.0 && value.is_finite()) {
             return Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" });
         }
     }
-    let a = Scale(a_factor) * plant.a();
-    StateSpace::new(a, Scale(b_factor) * plant.b(), plant.c().to_owned(), plant.d().to_owned(), Continuous)
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lti::frequency_response;
+
+    #[test]
+    fn degraded_bearing_is_the_degraded_plant() {
+        let bearing = Bearing::default();
+        let (a_factor, b_factor) = (0.4, 0.7);
+        let model = degraded(&bearing.plant().unwrap(), a_factor, b_factor).unwrap();
+        let same = bearing.degraded(a_factor, b_factor).unwrap().plant().unwrap();
+        let omega = [0.0, 300.0, 547.0, 900.0];
+        let (one, other) = (frequency_response(&model, &omega).unwrap(), frequency_response(&same, &omega).unwrap());
+        for (one, other) in one.iter().zip(other.iter()) {
+            assert!((&one.to_owned() - other).norm_max() < 1e-11 * one.norm_max());
+        }
+        assert!(matches!(bearing.degraded(0.0, 1.0), Err(Error::OutOfRange { .. })));
+    }
 }

@@ -1,0 +1,71 @@
+//! The seam between an estimator and a physical structure: continuous-time matrices as functions of named parameters, and
+//! their derivatives.
+
+use crate::Result;
+use crate::lti::{Continuous, StateSpace};
+
+/// One of the four matrices of `x' = A x + B u, y = C x + D u`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Matrix {
+    /// State matrix, n x n.
+    A,
+    /// Input matrix, n x m.
+    B,
+    /// Output matrix, p x n.
+    C,
+    /// Feedthrough, p x m.
+    D,
+}
+
+/// A derivative that is not zero: of one entry of one matrix with respect to one parameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slope {
+    /// The matrix.
+    pub matrix: Matrix,
+    /// Row of the entry, counted from 0.
+    pub row: usize,
+    /// Column of the entry, counted from 0.
+    pub column: usize,
+    /// `d entry / d parameter`.
+    pub value: f64,
+}
+
+/// A family of continuous-time models `A(theta), B(theta), C(theta), D(theta)` with derivatives.
+///
+/// The shapes of the matrices must not depend on the parameters. Entries that a parameter does not move are left out of
+/// its slopes; a parameter may move any number of entries, each named once.
+///
+/// ```
+/// use youla::identify::greybox::{Matrix, Slope, Structure};
+/// use youla::lti::{Continuous, StateSpace};
+/// use youla::{Mat, Result, linalg::eye};
+///
+/// /// `x' = -rate x + rate u, y = x`.
+/// struct Lag;
+///
+/// impl Structure for Lag {
+///     fn names(&self) -> Vec<String> {
+///         vec!["rate".into()]
+///     }
+///     fn model(&self, theta: &[f64]) -> Result<StateSpace<Continuous>> {
+///         let rate = Mat::from_fn(1, 1, |_, _| theta[0]);
+///         StateSpace::new(-&rate, rate, eye(1), Mat::zeros(1, 1), Continuous)
+///     }
+///     fn slopes(&self, _: &[f64], _: usize) -> Vec<Slope> {
+///         [(Matrix::A, -1.0), (Matrix::B, 1.0)].map(|(matrix, value)| Slope { matrix, row: 0, column: 0, value }).into()
+///     }
+/// }
+/// ```
+pub trait Structure: Sync {
+    /// Names of the parameters, in the order of `theta`.
+    fn names(&self) -> Vec<String>;
+
+    /// The model at `theta`, one value per name.
+    ///
+    /// # Errors
+    /// Whatever makes a model impossible there; a trial point with an error counts as rejected.
+    fn model(&self, theta: &[f64]) -> Result<StateSpace<Continuous>>;
+
+    /// Derivatives of the entries with respect to parameter `parameter` (counted from 0) at `theta`.
+    fn slopes(&self, theta: &[f64], parameter: usize) -> Vec<Slope>;
+}

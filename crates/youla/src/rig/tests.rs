@@ -126,7 +126,8 @@ fn without_its_imperfections_a_level_is_its_true_plant() {
         let plant = rig.true_plant().unwrap();
         let exact = simulate(&plant, alpha.as_ref(), &vec![0.0; plant.order()]).unwrap();
         let error = (run(&parameters, fidelity, 1, alpha.as_ref()).y - &exact).norm_max() / exact.norm_max();
-        assert!(error < 1e-12, "{fidelity:?}: {error}");
+        // The 10 kHz low-pass costs two digits in the exponential of the longer step.
+        assert!(error < 1e-11, "{fidelity:?}: {error}");
     }
 }
 

@@ -66,7 +66,7 @@ pub struct BearingRig {
 #[derive(Debug, Clone)]
 enum Machine {
     Linear(LinearMotion),
-    Real { drive: Drive, motion: FineMotion },
+    Real { drive: Drive, motion: Box<FineMotion> },
 }
 
 impl BearingRig {
@@ -99,7 +99,7 @@ impl BearingRig {
             None => parameters.bearing.model(),
         };
         let linear = linear_part(&bearing, flexible, parameters.sensor.low_pass.as_ref())?;
-        let motion = FineMotion::new(parameters, &linear, rpm_or_still)?;
+        let motion = Box::new(FineMotion::new(parameters, &linear, rpm_or_still)?);
         let sensors = match rpm {
             Some(_) => Sensors::of_turning_shaft(parameters, seed),
             None => Sensors::converted(parameters, seed),

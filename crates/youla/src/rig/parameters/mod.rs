@@ -275,8 +275,8 @@ mod tests {
 
     #[test]
     fn optional_effects_may_be_left_out() {
-        let start = RigParameters::TOML.find("[sensor.adc]").unwrap();
-        let end = RigParameters::TOML.find("[sensor.low_pass]").unwrap();
+        let start = RigParameters::TOML.find("\n[sensor.adc]").unwrap();
+        let end = RigParameters::TOML.find("\n[sensor.low_pass]").unwrap();
         let text = format!("{}{}", &RigParameters::TOML[..start], &RigParameters::TOML[end..]);
         assert_eq!(RigParameters::parse(&text, "copy.toml".as_ref()).unwrap().sensor.adc, None);
     }

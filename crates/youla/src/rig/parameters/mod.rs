@@ -19,7 +19,7 @@ use std::path::Path;
 /// use youla::rig::{Basis, RigParameters};
 /// let parameters = RigParameters::shipped();
 /// assert_eq!(parameters.bearing.stiffness.basis, Basis::Paper);
-/// let copy = RigParameters::TOML.replace("\"um\"", "\"mm\"");
+/// let copy = RigParameters::TOML.replacen("\"um\"", "\"mm\"", 1);
 /// let refused = RigParameters::parse(&copy, "copy.toml".as_ref()).unwrap_err();
 /// assert!(refused.to_string().ends_with("sensor.noise: the unit is \"mm\", but must be \"um\""));
 /// ```

@@ -78,7 +78,6 @@ pub mod reduce;
 pub mod report;
 pub mod rig;
 pub mod run;
-mod toml_file;
 pub mod units;
 pub mod validate;
 

@@ -7,22 +7,13 @@ use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Mat, MatRef, Result};
 
-/// What a controller sends and sees.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct ControlOutput {
-    /// Command u(k), V.
-    pub u: [f64; 2],
-    /// Innovation beta(k), um; of a controller without observer, y.
-    pub beta: [f64; 2],
-}
-
 /// The controller of Fig. 3 in two phases, so that its observer learns the command as the actuators took it.
 pub trait LoopController {
-    /// u(k) and beta(k) from y(k) and the excitation alpha(k).
-    fn output(&self, y: [f64; 2], alpha: [f64; 2]) -> ControlOutput;
+    /// The command u(k), V, from y(k), which an observer that predicts does not need yet, and the excitation alpha(k).
+    fn command(&self, y: [f64; 2], alpha: [f64; 2]) -> [f64; 2];
 
-    /// Moves the state on to k + 1.
-    fn update(&mut self, beta: [f64; 2], u_applied: [f64; 2]);
+    /// Moves the state on to k + 1; returns the innovation beta(k), um, or y(k) where there is no observer.
+    fn observe(&mut self, y: [f64; 2], u_applied: [f64; 2]) -> [f64; 2];
 }
 
 /// No controller: `u = alpha`, `beta = y`, for open-loop experiments.
@@ -30,11 +21,13 @@ pub trait LoopController {
 pub struct OpenLoop;
 
 impl LoopController for OpenLoop {
-    fn output(&self, y: [f64; 2], alpha: [f64; 2]) -> ControlOutput {
-        ControlOutput { u: alpha, beta: y }
+    fn command(&self, _y: [f64; 2], alpha: [f64; 2]) -> [f64; 2] {
+        alpha
     }
 
-    fn update(&mut self, _beta: [f64; 2], _u_applied: [f64; 2]) {}
+    fn observe(&mut self, y: [f64; 2], _u_applied: [f64; 2]) -> [f64; 2] {
+        y
+    }
 }
 
 /// What was logged; all matrices samples x 2, row k at time k.
@@ -95,10 +88,10 @@ pub fn run_experiment(
         let y = rig.measure();
         log.watch(k, y, safety);
         let injected = log.inject(k, [alpha[(k, 0)], alpha[(k, 1)]], safety);
-        let ControlOutput { u, beta } = controller.output(y, injected);
-        let actuation = rig.actuate(u);
-        controller.update(beta, actuation.applied);
-        log.write(k, y, injected, ControlOutput { u, beta }, actuation);
+        let u = controller.command(y, injected);
+        let Actuation { applied, saturated } = rig.actuate(u);
+        let beta = controller.observe(y, applied);
+        log.write(k, [injected, u, applied, y, beta], saturated);
         if log.touched.is_some() {
             return Ok(log.cut(k + 1));
         }
@@ -147,20 +140,23 @@ impl ExperimentRecord {
         wanted.map(|wanted| share * wanted.clamp(-limit, limit))
     }
 
-    fn write(&mut self, k: usize, y: [f64; 2], alpha: [f64; 2], control: ControlOutput, actuation: Actuation) {
-        for j in 0..2 {
-            self.alpha[(k, j)] = alpha[j];
-            self.u_commanded[(k, j)] = control.u[j];
-            self.u_applied[(k, j)] = actuation.applied[j];
-            self.y[(k, j)] = y[j];
-            self.beta[(k, j)] = control.beta[j];
-            self.saturated[j] += usize::from(actuation.saturated[j]);
+    /// Row k of alpha, u commanded, u applied, y and beta.
+    fn write(&mut self, k: usize, row: [[f64; 2]; 5], saturated: [bool; 2]) {
+        for (signal, values) in self.signals().into_iter().zip(row) {
+            (signal[(k, 0)], signal[(k, 1)]) = (values[0], values[1]);
         }
+        for (count, saturated) in self.saturated.iter_mut().zip(saturated) {
+            *count += usize::from(saturated);
+        }
+    }
+
+    fn signals(&mut self) -> [&mut Mat<f64>; 5] {
+        [&mut self.alpha, &mut self.u_commanded, &mut self.u_applied, &mut self.y, &mut self.beta]
     }
 
     /// The first samples alone.
     fn cut(mut self, samples: usize) -> Self {
-        for signal in [&mut self.alpha, &mut self.u_commanded, &mut self.u_applied, &mut self.y, &mut self.beta] {
+        for signal in self.signals() {
             *signal = signal.subrows(0, samples).to_owned();
         }
         self

@@ -62,15 +62,16 @@ impl Observer {
 }
 
 impl LoopController for Observer {
-    fn output(&self, y: [f64; 2], alpha: [f64; 2]) -> ControlOutput {
-        let (u, seen) = (&self.f * &self.x, self.factors.nominal().c() * &self.x);
-        let sum = |i: usize| u[(i, 0)] + alpha[i];
-        ControlOutput { u: [sum(0), sum(1)], beta: [y[0] - seen[(0, 0)], y[1] - seen[(1, 0)]] }
+    fn command(&self, _y: [f64; 2], alpha: [f64; 2]) -> [f64; 2] {
+        let u = &self.f * &self.x;
+        [u[(0, 0)] + alpha[0], u[(1, 0)] + alpha[1]]
     }
 
-    fn update(&mut self, beta: [f64; 2], u_applied: [f64; 2]) {
+    fn observe(&mut self, y: [f64; 2], u_applied: [f64; 2]) -> [f64; 2] {
         let g = self.factors.nominal();
-        self.x = g.a() * &self.x + g.b() * column(u_applied) - &self.l * column(beta);
+        let beta = column(y) - g.c() * &self.x;
+        self.x = g.a() * &self.x + g.b() * column(u_applied) - &self.l * &beta;
+        [beta[(0, 0)], beta[(1, 0)]]
     }
 }
 

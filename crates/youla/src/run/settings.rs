@@ -208,7 +208,7 @@ impl RunSettings {
     /// # Errors
     /// [`Error::Settings`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let settings: Self = crate::toml_file::parse(text, path)?;
+        let settings: Self = toml::from_str(text).map_err(|e| settings_error(&e, text, path))?;
         settings.check(path)?;
         Ok(settings)
     }
@@ -270,4 +270,23 @@ impl RunSettings {
         }
         Ok(())
     }
+}
+
+/// Turns the parser's error into one sentence with line, column and the nearest known key.
+fn settings_error(error: &toml::de::Error, text: &str, path: &Path) -> Error {
+    let before = &text[..error.span().map_or(0, |s| s.start.min(text.len()))];
+    let line = before.matches('\n').count() + 1;
+    let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+    let message = error.message();
+    let mut problem = message.to_owned();
+    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
+        let mut words = message.split('`').skip(1).step_by(2);
+        let unknown = words.next().unwrap_or_default();
+        let nearest =
+            words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
+        if let Some(nearest) = nearest {
+            problem = format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})");
+        }
+    }
+    Error::Settings { path: path.to_owned(), line, column, problem }
 }

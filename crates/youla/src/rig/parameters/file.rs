@@ -1,15 +1,15 @@
-//! TOML read from users: errors with file, line, column, key, and the nearest known name for a misspelt one.
+//! The parameter file as text: errors with line, column and key, and the nearest known name for a misspelt one.
 
 use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-/// Reads the text of a TOML file; `path` is named in errors.
+/// Reads the text of a parameter file; `path` is named in errors.
 ///
 /// # Errors
 /// [`Error::Settings`].
-pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
+pub(super) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
     toml::from_str(text).map_err(|e| in_words(&e, text, path))
 }
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 /// Identifies a machine while its controller keeps running.
 #[derive(Debug, Parser)]
-#[command(name = "youla", version, about, after_help = EXAMPLES)]
+#[command(name = "youla", version, after_help = EXAMPLES)]
 pub(crate) struct Args {
     /// What to do.
     #[command(subcommand)]

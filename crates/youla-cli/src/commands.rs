@@ -4,11 +4,9 @@ use crate::args::{Args, Command, OutputFolder};
 use crate::output::{Failure, Progress, say};
 use crate::table;
 use std::path::{Path, PathBuf};
-use youla::record::write_csv;
-use youla::report::{ReportData, html};
 use youla::run::{
-    RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, signal_records,
-    unused_folder, write_run,
+    RunFolder, RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, redraw,
+    signal_records, unused_folder, write_run, write_signals,
 };
 
 /// Runs the verb that was asked for.
@@ -35,6 +33,7 @@ fn identify_and_write(
     read: impl FnOnce(&RunSettings) -> youla::Result<RunRecords>,
 ) -> Result<(), Failure> {
     let target = output.out.clone().unwrap_or_else(|| unused_folder(Path::new("."), &settings.name));
+    RunFolder::check(&target, output.force)?;
     let progress = Progress::new(args.quiet || args.json);
     let mut announce = |stage: Stage| progress.stage(stage);
     let mut clock = StageClock::new(&mut announce);
@@ -56,10 +55,8 @@ fn signals(args: &Args, settings: &Path, out: &Path) -> Result<(), Failure> {
     let settings = RunSettings::read(settings)?;
     let records = read_records(&settings.data, &folder)?;
     let factorisation = factorise_run(&settings, &records, &folder)?;
-    std::fs::create_dir_all(out).map_err(|source| Failure::io(out, source))?;
-    for record in signal_records(&factorisation.factors, &records)? {
-        let path = out.join(format!("{}.csv", record.name()));
-        write_csv(&record, &path)?;
+    let signals = signal_records(&factorisation.factors, &records)?;
+    for (record, path) in signals.iter().zip(write_signals(&signals, out)?) {
         if !args.quiet && !args.json {
             say(&format!("{} ({} samples)", path.display(), record.samples()))?;
         }
@@ -68,11 +65,7 @@ fn signals(args: &Args, settings: &Path, out: &Path) -> Result<(), Failure> {
 }
 
 fn report(args: &Args, run: &Path) -> Result<(), Failure> {
-    let data = run.join("report.json");
-    let text = std::fs::read_to_string(&data).map_err(|source| Failure::io(&data, source))?;
-    let page: ReportData = serde_json::from_str(&text).map_err(|e| Failure::io(&data, e.into()))?;
-    let path = run.join("report.html");
-    std::fs::write(&path, html(&page)?).map_err(|source| Failure::io(&path, source))?;
+    let path = redraw(run)?;
     if args.quiet || args.json { Ok(()) } else { say(&path.display().to_string()) }
 }
 

@@ -8,13 +8,8 @@ use youla::run::Identification;
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
     text += &aligned(&rows(found));
-    for (name, refusal) in [
-        ("no direct model", found.direct.as_ref().and_then(|d| d.as_ref().err())),
-        ("no reduced model", found.reduction.as_ref().and_then(|r| r.as_ref().err())),
-    ] {
-        if let Some(reason) = refusal {
-            let _ = write!(text, "\n{name}: {reason}");
-        }
+    for refusal in found.refusals() {
+        let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
     text
@@ -27,7 +22,12 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     let mut rows = vec![row("fit (26), percent", models.iter().map(|v| v.method.label().into()).collect())];
     for (k, record) in found.records.verification.iter().enumerate() {
         for (i, output) in found.records.outputs.iter().enumerate() {
-            let percent = |fit: f64| if fit.is_finite() { format!("{fit:.2}") } else { "-".into() };
+            // A model that nearly diverges has a fit that no column holds.
+            let percent = |fit: f64| match fit {
+                _ if !fit.is_finite() => "-".to_owned(),
+                _ if fit < -9999.0 => format!("{fit:.1e}"),
+                _ => format!("{fit:.2}"),
+            };
             let fits = models.iter().map(|v| percent(v.records[k].fit[i])).collect();
             rows.push(row(&format!("{}, {}", record.name, output.name), fits));
         }

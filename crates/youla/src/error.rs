@@ -5,6 +5,7 @@
 //! asked for as it is) is returned as data, never here.
 
 use faer::c64;
+use std::fmt::Write;
 use std::path::PathBuf;
 
 /// Result of every fallible function of the library.
@@ -54,8 +55,16 @@ pub enum Error {
         /// The range in words, for example "a positive number of seconds".
         must: &'static str,
     },
+    /// Something failed in a part of a larger task.
+    #[error("{part}: {source}")]
+    Within {
+        /// The part, in the words of the user, for example `[controller]`.
+        part: String,
+        /// What failed.
+        source: Box<Error>,
+    },
     /// Two systems or records with different sample times were to be joined.
-    #[error("{what}: sample times differ ({left} s and {right} s)")]
+    #[error("{what}: sample times differ ({} s and {} s)", Seconds(*left), Seconds(*right))]
     SampleTimeMismatch {
         /// The operation.
         what: String,
@@ -209,14 +218,12 @@ pub enum Error {
     },
     // ---- run and settings --------------------------------------------------------------------------------------
     /// run.toml cannot be used.
-    #[error("{}{}: {problem}", path.display(), position(*line, *column))]
+    #[error("{}{}: {problem}", path.display(), position(*at))]
     Settings {
         /// Path of run.toml.
         path: PathBuf,
-        /// Line counted from 1, 0 where the whole file is meant.
-        line: usize,
-        /// Column counted from 1.
-        column: usize,
+        /// Where, `None` where the file as a whole is meant.
+        at: Option<TextPosition>,
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
@@ -228,7 +235,7 @@ pub enum Error {
     },
     /// A record is used up by the samples that are dropped at its start.
     #[error(
-        "record {record} has {samples} samples, but the first {settle} are dropped; give a longer record or lower settle"
+        "record {record} has {samples} samples, but the first {dropped} are dropped; give a longer record or lower {key}"
     )]
     TooShort {
         /// Which record.
@@ -236,7 +243,9 @@ pub enum Error {
         /// Its samples.
         samples: usize,
         /// Samples dropped.
-        settle: usize,
+        dropped: usize,
+        /// The option that says so.
+        key: &'static str,
     },
     // ---- reduction ---------------------------------------------------------------------------------------------
     /// More states were asked for than a minimal realisation has.
@@ -392,7 +401,8 @@ pub enum Error {
     },
     /// The time column is not uniform.
     #[error(
-        "{what}: time is not uniform: row {row} (counted from 1) comes {dt} s after the one before, the sample time is {ts} s"
+        "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s",
+        Seconds(*dt), Seconds(*ts)
     )]
     NonUniformTime {
         /// The record or file.
@@ -477,6 +487,14 @@ pub enum Error {
         /// The reason.
         source: serde_json::Error,
     },
+    /// A file is not the data of a report.
+    #[error("{}: this is not the report.json of a run: {source}", path.display())]
+    NotAReport {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: serde_json::Error,
+    },
     /// The page of a report cannot be written.
     #[error("the page of the report cannot be written: {source}")]
     ReportTemplate {
@@ -486,9 +504,15 @@ pub enum Error {
 }
 
 impl Error {
+    /// The same error, said of a part of a larger task.
+    pub(crate) fn within(self, part: impl Into<String>) -> Self {
+        Error::Within { part: part.into(), source: Box::new(self) }
+    }
+
     /// Whether the input is at fault or the computation is impossible on it.
     pub fn kind(&self) -> ErrorKind {
         match self {
+            Error::Within { source, .. } => source.kind(),
             Error::Singular { .. }
             | Error::NoConvergence { .. }
             | Error::Unstable { .. }
@@ -506,9 +530,18 @@ impl Error {
     }
 }
 
-/// `:line:column` where a line is known.
-fn position(line: usize, column: usize) -> String {
-    if line == 0 { String::new() } else { format!(":{line}:{column}") }
+/// A place in a text file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TextPosition {
+    /// Line, counted from 1.
+    pub line: usize,
+    /// Column, counted from 1.
+    pub column: usize,
+}
+
+/// `:line:column` where they are known.
+fn position(at: Option<TextPosition>) -> String {
+    at.map_or(String::new(), |p| format!(":{}:{}", p.line, p.column))
 }
 
 /// Names the worst pole where there is one.
@@ -532,6 +565,15 @@ impl std::fmt::Display for Pole {
     }
 }
 
+/// Prints a time without the last digits, which hold the rounding of a difference.
+struct Seconds(f64);
+
+impl std::fmt::Display for Seconds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", format!("{:.9e}", self.0).parse().unwrap_or(self.0))
+    }
+}
+
 /// Prints a list of names, the first forty of them, each up to eighty characters.
 struct Names<'a>(&'a [String]);
 
@@ -539,7 +581,11 @@ impl std::fmt::Display for Names<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         const SHOWN: usize = 40;
         for (k, name) in self.0.iter().take(SHOWN).enumerate() {
-            write!(f, "{}{name:.80}", if k == 0 { "" } else { ", " })?;
+            f.write_str(if k == 0 { "" } else { ", " })?;
+            name.chars()
+                .take(80)
+                .map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c })
+                .try_for_each(|c| f.write_char(c))?;
         }
         match self.0.len() {
             0 => f.write_str("nothing"),

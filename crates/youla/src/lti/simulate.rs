@@ -2,12 +2,16 @@
 //!
 //! One sample is one product of the packed matrix `[B A; D C]` with `[u; x]`. The rows are taken in groups of eight, each
 //! group stored column after column, so that eight running sums stay in registers and the compiler vectorises them for
-//! every processor; the inputs come first because their terms do not wait for the state.
+//! every processor; the inputs come first because their terms do not wait for the state. Two vectors `[u; x; y]` take turns:
+//! a step reads one and writes the other, so that no state is copied between two samples, which would cost as much as the
+//! product.
 
 use super::{Discrete, StateSpace};
 use crate::linalg::{check_finite, check_shape};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
+use std::mem::swap;
+use std::ops::Range;
 
 /// Rows whose sums are kept in registers at a time.
 const GROUP: usize = 8;
@@ -35,17 +39,18 @@ pub struct Simulator {
 /// The moving part of a simulation.
 #[derive(Debug, Clone)]
 pub struct SimulationState {
-    /// `[u(k); x(k)]`.
-    from: Vec<f64>,
-    /// `[x(k+1); y(k)]`, padded.
-    to: Vec<f64>,
+    /// `[u(k); x(k); y(k-1)]`, padded.
+    now: Vec<f64>,
+    /// `[u; x(k+1); y(k)]`, of which u is not set yet, padded.
+    next: Vec<f64>,
     inputs: usize,
+    states: usize,
 }
 
 impl SimulationState {
     /// The state x, n values.
     pub fn x(&self) -> &[f64] {
-        &self.from[self.inputs..]
+        &self.now[self.inputs..self.inputs + self.states]
     }
 }
 
@@ -67,13 +72,12 @@ impl Simulator {
     /// # Errors
     /// [`Error::Shape`] unless `x0` has n values, [`Error::NotFinite`] for a bad one.
     pub fn start(&self, x0: &[f64]) -> Result<SimulationState> {
-        let x0 = MatRef::from_column_major_slice(x0, x0.len(), 1);
-        check_shape("the initial state", x0, (self.states, 1))?;
-        check_finite("the initial state", x0)?;
-        let mut from = vec![0.0; self.inputs + self.states];
-        from[self.inputs..].copy_from_slice(x0.col(0).try_as_col_major().map_or(&[], |c| c.as_slice()));
-        let to = vec![0.0; (self.states + self.outputs).next_multiple_of(GROUP)];
-        Ok(SimulationState { from, to, inputs: self.inputs })
+        let column = MatRef::from_column_major_slice(x0, x0.len(), 1);
+        check_shape("the initial state", column, (self.states, 1))?;
+        check_finite("the initial state", column)?;
+        let mut now = vec![0.0; self.inputs + (self.states + self.outputs).next_multiple_of(GROUP)];
+        now[self.inputs..self.inputs + self.states].copy_from_slice(x0);
+        Ok(SimulationState { next: now.clone(), now, inputs: self.inputs, states: self.states })
     }
 
     /// The output `y(k) = C x(k) + D u` without advancing: with `u = 0` what a loop around a system without feedthrough
@@ -82,9 +86,9 @@ impl Simulator {
     /// # Panics
     /// If `u` has not m values or the state belongs to a system of another size.
     pub fn output<'a>(&self, state: &'a mut SimulationState, u: &[f64]) -> &'a [f64] {
-        state.from[..self.inputs].copy_from_slice(u);
-        self.multiply(state);
-        &state.to[self.states..self.states + self.outputs]
+        state.now[..self.inputs].copy_from_slice(u);
+        self.multiply(&state.now, &mut state.next);
+        &state.next[self.output_range()]
     }
 
     /// Advances by one sample: returns `y(k) = C x(k) + D u(k)` and leaves `x(k+1)` in the state. Allocates nothing.
@@ -92,28 +96,29 @@ impl Simulator {
     /// # Panics
     /// If `u` has not m values or the state belongs to a system of another size.
     pub fn step<'a>(&self, state: &'a mut SimulationState, u: &[f64]) -> &'a [f64] {
-        state.from[..self.inputs].copy_from_slice(u);
-        self.advance(state);
-        &state.to[self.states..self.states + self.outputs]
+        state.now[..self.inputs].copy_from_slice(u);
+        self.multiply(&state.now, &mut state.next);
+        swap(&mut state.now, &mut state.next);
+        &state.now[self.output_range()]
     }
 
-    /// One step with the input that already stands in the state.
-    #[inline]
-    fn advance(&self, state: &mut SimulationState) {
-        self.multiply(state);
-        state.from[self.inputs..].copy_from_slice(&state.to[..self.states]);
+    /// Where y stands in `[u; x; y]`.
+    fn output_range(&self) -> Range<usize> {
+        let first = self.inputs + self.states;
+        first..first + self.outputs
     }
 
     /// `[x(k+1); y(k)] = [B A; D C] [u(k); x(k)]`.
     #[inline]
-    fn multiply(&self, state: &mut SimulationState) {
-        let SimulationState { from, to, .. } = state;
-        if from.is_empty() {
+    fn multiply(&self, now: &[f64], next: &mut [f64]) {
+        let width = self.inputs + self.states;
+        if width == 0 {
             return;
         }
-        for (group, sums) in self.packed.chunks_exact(GROUP * from.len()).zip(to.chunks_exact_mut(GROUP)) {
+        let (from, to) = (&now[..width], &mut next[self.inputs..]);
+        for (group, sums) in self.packed.chunks_exact(GROUP * width).zip(to.chunks_exact_mut(GROUP)) {
             let mut total = [0.0; GROUP];
-            for (column, value) in group.chunks_exact(GROUP).zip(from.iter()) {
+            for (column, value) in group.chunks_exact(GROUP).zip(from) {
                 for (sum, coefficient) in total.iter_mut().zip(column) {
                     *sum += coefficient * value;
                 }
@@ -168,27 +173,28 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
 
 /// The loop over the samples, on contiguous columns.
 fn run(simulator: &Simulator, state: &mut SimulationState, u: MatRef<'_, f64>, y: &mut Mat<f64>) {
-    let copy;
-    let u = match u.try_as_col_major() {
-        Some(u) => u,
-        None => {
-            copy = u.to_owned();
-            copy.as_ref().try_as_col_major().unwrap_or_else(|| unreachable!("an owned matrix is column-major"))
-        }
+    let copy = if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() };
+    let inputs: Vec<&[f64]> = match u.try_as_col_major() {
+        Some(u) => u.col_iter().map(|c| c.as_slice()).collect(),
+        None => (0..copy.ncols()).map(|j| copy.col_as_slice(j)).collect(),
     };
-    let inputs: Vec<&[f64]> = u.col_iter().map(|c| c.as_slice()).collect();
     let samples = y.nrows();
     let mut outputs: Vec<&mut [f64]> =
         y.col_iter_mut().filter_map(|c| c.try_as_col_major_mut()).map(|c| c.as_slice_mut()).collect();
-    let n = simulator.states;
+    // Slices change places in registers; vectors would do so in memory, at the price of a third of the step.
+    let (mut now, mut next) = (&mut state.now[..], &mut state.next[..]);
     for k in 0..samples {
-        for (value, column) in state.from.iter_mut().zip(&inputs) {
+        for (value, column) in now.iter_mut().zip(&inputs) {
             *value = column[k];
         }
-        simulator.advance(state);
-        for (column, value) in outputs.iter_mut().zip(&state.to[n..]) {
+        simulator.multiply(now, next);
+        for (column, value) in outputs.iter_mut().zip(&next[simulator.output_range()]) {
             column[k] = *value;
         }
+        swap(&mut now, &mut next);
+    }
+    if samples % 2 == 1 {
+        swap(&mut state.now, &mut state.next);
     }
 }
 

@@ -148,3 +148,75 @@ fn controllable_form<T: TimeDomain>(column: &[&[f64]], denominator: &[f64], time
     let d = Mat::from_fn(column.len(), 1, |i, _| num(i, 0));
     StateSpace::new(a, b, c, d, time)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lti::{Continuous, frequency_response, simulate};
+    use faer::c64;
+
+    fn horner(coefficients: &[f64], x: c64) -> c64 {
+        coefficients.iter().fold(c64::new(0.0, 0.0), |sum, c| sum * x + c)
+    }
+
+    /// Largest relative distance between a realisation and its polynomials.
+    fn distance<T: TimeDomain>(system: &StateSpace<T>, num: &PolynomialMatrix, den: &PolynomialMatrix) -> f64 {
+        let omega = [0.1, 0.7, 1.3, 2.9];
+        let response = frequency_response(system, &omega).unwrap();
+        let mut worst = 0.0f64;
+        for (k, w) in omega.iter().enumerate() {
+            let x = system.time().boundary(*w);
+            for (i, row) in num.iter().enumerate() {
+                for (j, n) in row.iter().enumerate() {
+                    let expected = horner(n, x) / horner(&den[i][j], x);
+                    worst = worst.max((response.at(k)[(i, j)] - expected).norm() / expected.norm());
+                }
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn realisations_have_the_response_of_their_polynomials() {
+        let num = vec![vec![vec![2.0, 1.0], vec![3.0]], vec![vec![1.0, 0.5, 4.0], vec![0.0, 1.0]]];
+        let common = vec![vec![vec![2.0, 0.3, 5.0]; 2]; 2];
+        let each = vec![vec![vec![1.0, 3.0], vec![1.0, 0.2, 9.0]], vec![vec![2.0, 1.0, 1.0], vec![1.0, 4.0]]];
+        for (den, order) in [(&common, 4), (&each, 6)] {
+            let system = StateSpace::transfer_matrix(&num, den, Continuous).unwrap();
+            assert_eq!(system.order(), order);
+            assert!(distance(&system, &num, den) < 1e-14);
+        }
+        let (row, column) = (vec![vec![vec![1.0], vec![2.0, 3.0]]], vec![vec![vec![1.0]], vec![vec![2.0, 3.0]]]);
+        for num in [row, column] {
+            let den = num.iter().map(|r| vec![vec![1.0, 0.4, 2.0]; r.len()]).collect();
+            let system = StateSpace::transfer_matrix(&num, &den, Discrete::new(0.5).unwrap()).unwrap();
+            assert_eq!(system.order(), 2, "one denominator needs its degree only once");
+            assert!(distance(&system, &num, &den) < 1e-14);
+        }
+    }
+
+    #[test]
+    fn difference_equation_is_the_recursion() {
+        let (b, a) = ([5.5, 0.3, -5.2], [2.0, -1.1, 0.4]);
+        let time = Discrete::new(5e-4).unwrap();
+        let system = StateSpace::difference_equation(&vec![vec![b.to_vec()]], &vec![vec![a.to_vec()]], time).unwrap();
+        let u = Mat::from_fn(50, 1, |k, _| ((k * k) as f64).sin());
+        let y = simulate(&system, u.as_ref(), &[0.0, 0.0]).unwrap();
+        let past = |m: &Mat<f64>, k: usize, delay: usize| if k < delay { 0.0 } else { m[(k - delay, 0)] };
+        for k in 0..50 {
+            let forced: f64 = (0..3).map(|d| b[d] * past(&u, k, d)).sum();
+            let free: f64 = (1..3).map(|d| a[d] * past(&y, k, d)).sum();
+            assert!((y[(k, 0)] - (forced - free) / a[0]).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn unusable_polynomials_are_refused() {
+        let refused = |num: &[f64], den: &[f64]| {
+            StateSpace::transfer_matrix(&vec![vec![num.to_vec()]], &vec![vec![den.to_vec()]], Continuous).is_err()
+        };
+        assert!(refused(&[1.0, 0.0, 0.0], &[1.0, 1.0]), "not proper");
+        assert!(!refused(&[0.0, 1.0, 0.0], &[1.0, 1.0]), "leading zeros do not count");
+        assert!(refused(&[1.0], &[0.0, 1.0]) && refused(&[], &[1.0]) && refused(&[f64::NAN], &[1.0]));
+    }
+}

@@ -104,7 +104,7 @@ pub(super) fn unknown(what: &str, name: &str, known: Vec<String>) -> Error {
 
 /// The form in configuration files.
 #[derive(Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "expected a name, or the number of a column")]
 enum Written {
     Column(usize),
     Text(String),

@@ -80,15 +80,27 @@ pub fn read_csv(
 ) -> Result<Record> {
     let path = path.as_ref();
     let mut lines = Lines::open(path)?;
-    let fields = Fields::detect(&mut lines, options)?;
-    let plan = Plan::new(path, fields.names(), channels, time)?;
-    let columns = Selection::new(&fields, plan.columns.clone()).read(&mut lines)?;
+    // What damage in a gzip file makes of its text is not the user's mistake.
+    let (plan, columns) =
+        read_columns(&mut lines, channels, time, options).map_err(|error| lines.damage().unwrap_or(error))?;
     plan.assemble(path, time, columns)
+}
+
+fn read_columns(
+    lines: &mut Lines,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<(Plan, Vec<Vec<f64>>)> {
+    let fields = Fields::detect(lines, options)?;
+    let plan = Plan::new(lines.path(), fields.names(), channels, time)?;
+    let columns = Selection::new(&fields, plan.columns.clone()).read(lines)?;
+    Ok((plan, columns))
 }
 
 /// Writes the time in a column `t` and all channels; every number reads back as the same number.
 ///
-/// Units are not written.
+/// Units are not written. After an error there is no file.
 ///
 /// # Errors
 /// [`Error::DuplicateChannel`] where a channel is named `t`, [`Error::Io`].
@@ -97,7 +109,11 @@ pub fn write_csv(record: &Record, path: impl AsRef<Path>) -> Result<()> {
     if record.channels().iter().any(|c| c.name == TIME) {
         return Err(Error::DuplicateChannel { what: path.display().to_string(), name: TIME.to_owned() });
     }
-    write_rows(record, path).map_err(|source| Error::Io { path: path.to_owned(), source })
+    write_rows(record, path).map_err(|source| {
+        // Best effort: the error that led here is the one to report.
+        let _ = std::fs::remove_file(path);
+        Error::Io { path: path.to_owned(), source }
+    })
 }
 
 /// Name of the time column that is written.

@@ -15,7 +15,7 @@ mod persistency;
 #[allow(clippy::module_inception)]
 mod record;
 #[cfg(test)]
-mod scratch;
+pub(crate) mod scratch;
 mod source;
 mod spectrum;
 mod time;
@@ -38,7 +38,7 @@ use crate::{Error, Result};
 use std::{fs::File, io::ErrorKind, path::Path};
 
 /// Opens a file to read; a missing file has an error of its own.
-fn open(path: &Path) -> Result<File> {
+pub(crate) fn open(path: &Path) -> Result<File> {
     File::open(path).map_err(|source| match source.kind() {
         ErrorKind::NotFound => Error::MissingFile { path: path.to_owned() },
         _ => Error::Io { path: path.to_owned(), source },

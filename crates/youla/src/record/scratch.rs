@@ -25,12 +25,11 @@ pub(super) fn scratch(extension: &str) -> Scratch {
 }
 
 /// The folder of measured data beside the workspace, if it is there.
-pub(super) fn data_folder() -> Option<PathBuf> {
-    let crate_folder = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let candidates = ["../../../shared/data", "../../../../shared/data"].map(|relative| crate_folder.join(relative));
-    let folder = candidates.into_iter().find(|folder| folder.is_dir());
-    if folder.is_none() {
-        println!("skipped: the folder of measured data ../shared/data is absent");
+pub(crate) fn data_folder() -> Option<PathBuf> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    if folder.is_dir() {
+        return Some(folder);
     }
-    folder
+    println!("skipped: the folder of measured data ../shared/data is absent");
+    None
 }

@@ -165,13 +165,14 @@ impl Joint {
     /// The mean over the segments of all records, which have the same signals.
     fn estimate(records: &[Mat<f64>], time: Discrete, welch: &Welch) -> Result<Joint> {
         let signals = records[0].ncols();
-        let cut = Cut::new(welch)?;
+        let shortest = records.iter().map(Mat::nrows).min().unwrap_or(0);
+        let cut = Cut::new(welch, shortest)?;
         let size = cut.frequencies() * signals * signals;
         let mut chunks = Vec::new();
         let mut segments = 0;
         for z in records {
             check_finite("the signal", z.as_ref())?;
-            let all = cut.segments(z.nrows())?;
+            let all = cut.segments(z.nrows());
             chunks.extend((0..all).step_by(CHUNK).map(|first| (z, first..(first + CHUNK).min(all))));
             segments += all;
         }
@@ -200,10 +201,15 @@ struct Cut {
 }
 
 impl Cut {
-    fn new(welch: &Welch) -> Result<Cut> {
+    /// `shortest` is the number of samples of the shortest record.
+    fn new(welch: &Welch, shortest: usize) -> Result<Cut> {
         let range = |what: &str, value, must| Err(Error::OutOfRange { what: what.to_owned(), value, must });
         if welch.window < 4 {
             return range("the window of a spectrum", welch.window as f64, "at least 4 samples");
+        }
+        if welch.window > shortest {
+            let what = format!("the window of a spectrum of records of {shortest} samples");
+            return range(&what, welch.window as f64, "not longer than any record");
         }
         if !(0.0..1.0).contains(&welch.overlap) {
             return range("the overlap of a spectrum", welch.overlap, "at least 0 and below 1");
@@ -219,13 +225,8 @@ impl Cut {
     }
 
     /// Number of segments of a record.
-    fn segments(&self, samples: usize) -> Result<usize> {
-        let length = self.window.len();
-        if length > samples {
-            let what = "the window of a spectrum".to_owned();
-            return Err(Error::OutOfRange { what, value: length as f64, must: "not longer than any record" });
-        }
-        Ok((samples - length) / self.step + 1)
+    fn segments(&self, samples: usize) -> usize {
+        (samples - self.window.len()) / self.step + 1
     }
 
     fn frequencies(&self) -> usize {

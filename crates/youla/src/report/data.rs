@@ -11,7 +11,7 @@ use crate::units::Channel;
 
 /// Everything in one report.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
-#[serde(default)]
+#[serde(deny_unknown_fields)]
 pub struct ReportData {
     /// Title, for example the machine.
     pub title: String,

@@ -30,6 +30,25 @@ impl LoopController for OpenLoop {
     }
 }
 
+/// The controller of Fig. 3 with its state: the code that firmware runs.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ObserverLoop<const N: usize> {
+    /// Nominal model and gains, from [`crate::control::real_time_controller`].
+    pub controller: youla_rt::Controller<f64, N, 2, 2>,
+    /// The observer's state.
+    pub state: youla_rt::State<f64, N>,
+}
+
+impl<const N: usize> LoopController for ObserverLoop<N> {
+    fn command(&self, _y: [f64; 2], alpha: [f64; 2]) -> [f64; 2] {
+        self.controller.command(&self.state, &alpha)
+    }
+
+    fn observe(&mut self, y: [f64; 2], u_applied: [f64; 2]) -> [f64; 2] {
+        self.controller.observe(&mut self.state, &y, &u_applied)
+    }
+}
+
 /// What was logged; all matrices samples x 2, row k at time k.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExperimentRecord {

@@ -15,7 +15,7 @@ mod twin;
 
 pub use bearing::{Bearing, degraded};
 pub use drive::Actuation;
-pub use experiment::{ExperimentRecord, LoopController, OpenLoop, run_experiment};
+pub use experiment::{ExperimentRecord, LoopController, ObserverLoop, OpenLoop, run_experiment};
 pub use parameters::{
     AccelerationPerVolt, Actuator, Adc, Basis, BearingParameters, Bits, Count, FlexibleMode, Hertz, Hysteresis,
     LowPass, Micrometres, One, PerSecond, PerSecondSquared, Quantity, Radians, RigParameters, Rotation, Rpm, Safety,

@@ -2,7 +2,7 @@
 
 use super::sensor::noise_stream;
 use super::*;
-use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
+use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, real_time_controller};
 use crate::factor::CoprimeFactors;
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
@@ -13,6 +13,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::PI;
+use youla_rt::State;
 
 /// Samples in one turn at 2500 rpm and 5 kHz.
 const TURN: usize = 120;
@@ -38,41 +39,14 @@ fn run(parameters: &RigParameters, fidelity: Fidelity, seed: u64, alpha: MatRef<
     run_experiment(&mut rig, &mut OpenLoop, alpha, &parameters.safety).unwrap()
 }
 
-/// The controller of Fig. 3 from the matrices of its design.
-struct Observer {
-    factors: CoprimeFactors<Discrete>,
-    f: Mat<f64>,
-    l: Mat<f64>,
-    x: Mat<f64>,
-}
-
-fn column(x: [f64; 2]) -> Mat<f64> {
-    Mat::from_fn(2, 1, |i, _| x[i])
-}
-
-impl Observer {
-    fn new(nominal: &StateSpace<Discrete>) -> Self {
-        let (one, calm) = (eye(2), Scale(20.0) * eye(2));
-        let f = lqr(nominal, &LqrWeights::on_outputs(nominal, one.as_ref(), calm.as_ref()).unwrap()).unwrap().f;
-        let noise = NoiseCovariance::at_inputs(nominal, one.as_ref(), calm.as_ref()).unwrap();
-        let l = kalman(nominal, &noise).unwrap().l;
-        let factors = CoprimeFactors::observer(nominal, f.as_ref(), l.as_ref()).unwrap();
-        Observer { x: Mat::zeros(nominal.order(), 1), factors, f, l }
-    }
-}
-
-impl LoopController for Observer {
-    fn command(&self, _y: [f64; 2], alpha: [f64; 2]) -> [f64; 2] {
-        let u = &self.f * &self.x;
-        [u[(0, 0)] + alpha[0], u[(1, 0)] + alpha[1]]
-    }
-
-    fn observe(&mut self, y: [f64; 2], u_applied: [f64; 2]) -> [f64; 2] {
-        let g = self.factors.nominal();
-        let beta = column(y) - g.c() * &self.x;
-        self.x = g.a() * &self.x + g.b() * column(u_applied) - &self.l * &beta;
-        [beta[(0, 0)], beta[(1, 0)]]
-    }
+/// A gentle controller on a nominal model, and its factors.
+fn observer(nominal: &StateSpace<Discrete>) -> (ObserverLoop<6>, CoprimeFactors<Discrete>) {
+    let (one, calm) = (eye(2), Scale(20.0) * eye(2));
+    let f = lqr(nominal, &LqrWeights::on_outputs(nominal, one.as_ref(), calm.as_ref()).unwrap()).unwrap().f;
+    let l = kalman(nominal, &NoiseCovariance::at_inputs(nominal, one.as_ref(), calm.as_ref()).unwrap()).unwrap().l;
+    let controller = real_time_controller(nominal, f.as_ref(), l.as_ref()).unwrap();
+    let factors = CoprimeFactors::observer(nominal, f.as_ref(), l.as_ref()).unwrap();
+    (ObserverLoop { controller, state: State::at_rest() }, factors)
 }
 
 /// Amplitude and angle of the line at a multiple of the speed, over whole turns at the end of a record.
@@ -92,8 +66,8 @@ fn the_linear_level_is_the_closed_loop() {
     let (parameters, seed, samples) = (RigParameters::shipped(), 7, 10_000);
     let mut rig = BearingRig::new(&parameters, Fidelity::Linear, seed).unwrap();
     let nominal = degraded(&Bearing::default().plant().unwrap(), 0.97, 1.0).unwrap();
-    let mut controller = Observer::new(&nominal.zoh(rig.time()).unwrap().balanced().unwrap());
-    let closed = closed_loop(&rig.true_plant().unwrap(), &controller.factors.j_k().unwrap()).unwrap();
+    let (mut controller, factors) = observer(&nominal.zoh(rig.time()).unwrap().balanced().unwrap());
+    let closed = closed_loop(&rig.true_plant().unwrap(), &factors.j_k().unwrap()).unwrap();
     let alpha = waves(samples, 0.5);
     let log = run_experiment(&mut rig, &mut controller, alpha.as_ref(), &parameters.safety).unwrap();
 

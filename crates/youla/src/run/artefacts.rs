@@ -293,7 +293,7 @@ impl Writer<'_> {
     }
 
     fn mat(&self, name: &str, variables: &[Variable]) -> Result<()> {
-        write_mat(self.folder.path(name)?, variables, Packing::Plain)
+        self.folder.file(name, |path| write_mat(path, variables, Packing::Plain))
     }
 }
 

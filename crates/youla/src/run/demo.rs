@@ -148,7 +148,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
             reference: Vec::new(),
             alpha: channels(["alpha_h", "alpha_v"], "alpha", "V"),
             csv: CsvOptions::default(),
-            detrend: Detrend::default(),
+            detrend: Detrend::None,
             estimation: vec![file(NAMES[0])],
             verification: vec![file(NAMES[1])],
         },

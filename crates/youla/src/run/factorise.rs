@@ -57,11 +57,11 @@ pub fn factorise(
     let balanced = nominal.with_scaled_states(&scale);
     let factors = match controller {
         Controller::Observer { f, l } => {
-            crate::linalg::check_shape("state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
-            crate::linalg::check_shape("observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+            crate::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+            crate::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
             let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
             let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
-            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?
+            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
         }
         Controller::System(k) => {
             let weights = Weights::new(records, settings);
@@ -80,6 +80,14 @@ pub fn factorise(
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
     Ok(Factorisation { nominal: nominal.clone(), controller: factors.controller()?, factors, bezout_residual })
+}
+
+/// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.
+fn not_stabilising(error: Error) -> Error {
+    match error {
+        Error::Unstable { pole, .. } => Error::NotStabilising { model: "the nominal model".into(), pole },
+        other => other,
+    }
 }
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.
@@ -111,14 +119,16 @@ impl Weights {
     fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         let outputs = diagonal(self.y.iter().map(|s| 1.0 / (s * s)));
         let inputs = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
-        Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f)
+        let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
+        gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
     }
 
     /// Kalman predictor with input noise of the size of the inputs and output noise of the size of the outputs.
     fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         let input = diagonal(self.u.iter().map(|s| s * s));
         let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
-        Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l)
+        let gain = || Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l);
+        gain().map_err(|e: Error| e.within("observer gain L of the nominal model"))
     }
 }
 
@@ -133,5 +143,54 @@ fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
         return Ok(Mat::zeros(k.inputs(), k.order()));
     }
     let weights = LqrWeights { q: eye(k.order()), r: eye(k.inputs()), s: None };
-    Ok(lqr(k, &weights)?.f)
+    Ok(lqr(k, &weights).map_err(|e| e.within("state feedback of the controller's factors"))?.f)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::run::{demo, models::ControllerSettings};
+    use std::path::Path;
+
+    /// States that span 1e6 (um, um/s, V) cost no digits of (15), because they are scaled first.
+    #[test]
+    fn states_are_scaled_before_factorising() {
+        let demo = demo(1).unwrap();
+        let found = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
+        assert!(found.bezout_residual < 1e-13, "{:.1e}", found.bezout_residual);
+        assert!(found.factors.nominal() != &found.nominal);
+    }
+
+    /// One controller written down in three ways gives the same loop: observer gains, and its matrices with either sign.
+    #[test]
+    fn forms_and_signs_of_one_controller_agree() {
+        let demo = demo(1).unwrap();
+        let observer = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
+        let k = &observer.controller;
+        let rows = |m: crate::MatRef<'_, f64>, sign: f64| -> Vec<Vec<f64>> {
+            (0..m.nrows()).map(|i| m.row(i).iter().map(|x| sign * x).collect()).collect()
+        };
+        for (feedback, sign) in [(super::super::Feedback::Positive, 1.0), (super::super::Feedback::Negative, -1.0)] {
+            let controller = ControllerSettings::StateSpace {
+                feedback,
+                a: rows(k.a(), 1.0),
+                b: rows(k.b(), 1.0),
+                c: rows(k.c(), sign),
+                d: rows(k.d(), sign),
+            };
+            for construction in [Construction::Stacked, Construction::Shifted] {
+                let factors = FactorSettings { construction, ..demo.settings.factors };
+                let settings = RunSettings { controller: controller.clone(), factors, ..demo.settings.clone() };
+                let found = factorise_run(&settings, &demo.records, Path::new(".")).unwrap();
+                assert!(found.bezout_residual < 1e-12, "{construction:?}: {:.1e}", found.bezout_residual);
+                let omega = grid_to_nyquist(k.time(), 50);
+                let (x, y) = (
+                    crate::lti::frequency_response(k, &omega).unwrap(),
+                    crate::lti::frequency_response(&found.controller, &omega).unwrap(),
+                );
+                let miss = (0..50).map(|i| (x.at(i) - y.at(i)).norm_l2() / x.at(i).norm_l2()).fold(0.0, f64::max);
+                assert!(miss < 1e-9, "{construction:?}: {miss:.1e}");
+            }
+        }
+    }
 }

@@ -16,11 +16,8 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
 pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let mut all = Vec::new();
     let mut add = |status: Status, text: String| all.push(Note { status, text });
-    if let Some(Err(e)) = &found.direct {
-        add(Status::Info, format!("There is no direct model: {e}."));
-    }
-    if let Some(Err(e)) = &found.reduction {
-        add(Status::Info, format!("G(S) was not reduced: {e}."));
+    for refusal in found.refusals() {
+        add(Status::Info, format!("There is no {}: {}.", refusal.what, refusal.error));
     }
     for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
         let moved = model.map_or(0, |m| m.stability.moved.len());

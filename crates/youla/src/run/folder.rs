@@ -10,42 +10,60 @@ use std::path::{Path, PathBuf};
 pub struct RunFolder {
     target: PathBuf,
     partial: PathBuf,
+    /// Folders above that did not exist before, innermost first.
+    parents: Vec<PathBuf>,
     replace: bool,
     finished: bool,
 }
 
 impl RunFolder {
-    /// Begins a folder that will be `target`. An existing folder is refused unless it is empty, or `replace` is set and it
-    /// is a run folder (holds a summary.json).
+    /// Whether `target` can become a run folder: it does not exist, is empty, or is to be replaced and is a run folder
+    /// (holds a summary.json). Nothing is written; ask before a long computation.
     ///
     /// # Errors
-    /// [`Error::OutputExists`]; [`Error::Io`] where it cannot be written.
-    pub fn create(target: &Path, replace: bool) -> Result<Self> {
+    /// [`Error::OutputExists`]; [`Error::Io`] where it cannot be read or is a file.
+    pub fn check(target: &Path, replace: bool) -> Result<()> {
         let occupied = match fs::read_dir(target) {
             Ok(mut entries) => entries.next().is_some(),
             Err(e) if e.kind() == std::io::ErrorKind::NotFound => false,
             Err(source) => return Err(Error::Io { path: target.to_owned(), source }),
         };
-        let replace = replace && target.join("summary.json").is_file();
-        if occupied && !replace {
+        if occupied && !(replace && is_run_folder(target)) {
             return Err(Error::OutputExists { path: target.to_owned() });
         }
-        let name = target.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned());
-        let partial = target.with_file_name(format!(".{name}.partial-{}", std::process::id()));
-        fs::create_dir_all(&partial).map_err(|source| Error::Io { path: partial.clone(), source })?;
-        Ok(RunFolder { target: target.to_owned(), partial, replace, finished: false })
+        Ok(())
     }
 
-    /// Where a file is written now; its folder is made.
+    /// Begins a folder that will be `target`, under the conditions of [`RunFolder::check`].
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub fn path(&self, name: &str) -> Result<PathBuf> {
+    /// Those of [`RunFolder::check`]; [`Error::Io`] where it cannot be written.
+    pub fn create(target: &Path, replace: bool) -> Result<Self> {
+        Self::check(target, replace)?;
+        let name = target.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned());
+        let partial = target.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+        let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+        let parents = target.ancestors().skip(1).take_while(new).map(Path::to_owned).collect();
+        let replace = replace && is_run_folder(target);
+        let folder = RunFolder { target: target.to_owned(), partial, parents, replace, finished: false };
+        fs::create_dir_all(&folder.partial).map_err(|source| Error::Io { path: target.to_owned(), source })?;
+        Ok(folder)
+    }
+
+    /// Writes a file by `write`, which is told where; its folder is made. Errors name the file by its final place.
+    ///
+    /// # Errors
+    /// [`Error::Io`], and those of `write`.
+    pub fn file(&self, name: &str, write: impl FnOnce(&Path) -> Result<()>) -> Result<()> {
         let path = self.partial.join(name);
+        let at_target = |source| Error::Io { path: self.target.join(name), source };
         if let Some(folder) = path.parent() {
-            fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
+            fs::create_dir_all(folder).map_err(at_target)?;
         }
-        Ok(path)
+        write(&path).map_err(|error| match error {
+            Error::Io { source, .. } => at_target(source),
+            other => other,
+        })
     }
 
     /// Writes a text file.
@@ -53,17 +71,27 @@ impl RunFolder {
     /// # Errors
     /// [`Error::Io`].
     pub fn text(&self, name: &str, text: &str) -> Result<()> {
-        let path = self.path(name)?;
-        fs::write(&path, text).map_err(|source| Error::Io { path, source })
+        self.file(name, |path| fs::write(path, text).map_err(|source| Error::Io { path: path.to_owned(), source }))
     }
 
-    /// Writes a value as JSON.
+    /// Writes a value as JSON for people.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn json(&self, name: &str, value: &impl Serialize) -> Result<()> {
-        let text = serde_json::to_string_pretty(value)
-            .map_err(|e| Error::Io { path: self.target.join(name), source: e.into() })?;
+        self.line(name, serde_json::to_string_pretty(value))
+    }
+
+    /// Writes a value as JSON on one line: for curves, of which a line per number would be mostly blanks.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn compact_json(&self, name: &str, value: &impl Serialize) -> Result<()> {
+        self.line(name, serde_json::to_string(value))
+    }
+
+    fn line(&self, name: &str, text: serde_json::Result<String>) -> Result<()> {
+        let text = text.map_err(|e| Error::Io { path: self.target.join(name), source: e.into() })?;
         self.text(name, &(text + "\n"))
     }
 
@@ -92,8 +120,25 @@ impl Drop for RunFolder {
         if !self.finished {
             // Best effort: the error that led here is the one to report.
             let _ = fs::remove_dir_all(&self.partial);
+            // Only those that are empty go.
+            let _ = self.parents.iter().try_for_each(fs::remove_dir);
         }
     }
+}
+
+fn is_run_folder(folder: &Path) -> bool {
+    folder.join("summary.json").is_file()
+}
+
+/// Writes a text beside its final place and moves it there when whole; an older file stays until then.
+pub(super) fn replace_file(path: &Path, text: &str) -> Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let partial = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
+        // Best effort: the error that led here is the one to report.
+        let _ = fs::remove_file(&partial);
+        Error::Io { path: path.to_owned(), source }
+    })
 }
 
 /// The first folder `runs/<name>-<number>` below `parent` that does not exist yet.

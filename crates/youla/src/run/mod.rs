@@ -2,6 +2,7 @@
 
 mod artefacts;
 mod demo;
+mod explain;
 mod factorise;
 mod findings;
 mod folder;
@@ -9,6 +10,7 @@ mod models;
 mod page;
 mod pipeline;
 mod records;
+mod redraw;
 mod response;
 mod settings;
 mod signals;
@@ -22,13 +24,14 @@ pub use factorise::{Factorisation, factorise, factorise_run};
 pub use folder::{RunFolder, unused_folder};
 pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
 pub use page::page;
-pub use pipeline::{Identification, Stage, StageClock, StageTimes, identify};
+pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
+pub use redraw::redraw;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
     VerificationSettings,
 };
-pub use signals::{DeviationSignals, deviation_signals, signal_records};
+pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use summary::summary;
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

@@ -97,6 +97,10 @@ impl NominalModel {
     /// # Errors
     /// Whatever is wrong with the matrices, polynomials or file.
     pub fn realise(&self, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+        self.system(folder, time).map_err(|e| e.within("[nominal]"))
+    }
+
+    fn system(&self, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
         match self {
             NominalModel::TransferFunction { domain, numerator, denominator } => {
                 let (p, m) = numerator.shape();
@@ -210,13 +214,17 @@ impl ControllerSettings {
     /// # Errors
     /// Whatever is wrong with the matrices, polynomials or file.
     pub fn realise(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+        self.controller(folder, time).map_err(|e| e.within("[controller]"))
+    }
+
+    fn controller(&self, folder: &Path, time: Discrete) -> Result<Controller> {
         let (feedback, system) = match self {
             Self::DifferenceEquation { feedback, numerator, denominator } => {
                 let (p, m) = numerator.shape();
                 (feedback, StateSpace::difference_equation(&numerator.spread(p, m), &denominator.spread(p, m), time)?)
             }
             Self::StateSpace { feedback, a, b, c, d } => {
-                let (a, b, c, d) = (matrix("Ak", a)?, matrix("Bk", b)?, matrix("Ck", c)?, matrix("Dk", d)?);
+                let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
                 (feedback, StateSpace::new(a, b, c, d, time)?)
             }
             Self::MatFile { feedback, file } => {

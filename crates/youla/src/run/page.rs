@@ -4,7 +4,7 @@ use super::artefacts::pairs;
 use super::findings::{notes, verdict_lines};
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
-use super::response::{decibel, log_grid, measured_response, model_responses};
+use super::response::{decibel, log_grid, model_responses};
 use super::settings::Prediction;
 use super::verdict::{Method, ModelVerdict};
 use crate::identify::subspace::SubspaceModel;
@@ -206,9 +206,9 @@ fn frequency(found: &Identification) -> Result<draw::FrequencyResponse> {
         ports(found).map(entry).collect::<Vec<_>>()
     };
     let models = responses.models.iter().flat_map(|(m, r)| pairs(*m, r)).collect();
-    let indirect = match measured_response(found)? {
-        None => Vec::new(),
-        Some(m) => {
+    let indirect = match &found.indirect {
+        None | Some(Err(_)) => Vec::new(),
+        Some(Ok(m)) => {
             let hz: Vec<f64> = m.response.omega.iter().map(|w| w / TAU).collect();
             let entry = |(output, input): (usize, usize)| {
                 let values = m.response.entry(output, input);

@@ -2,15 +2,17 @@
 
 use super::factorise::{Factorisation, factorise_run};
 use super::records::RunRecords;
+use super::response::{check_grid, indirect};
 use super::settings::RunSettings;
 use super::signals::{DeviationSignals, deviation_signals};
-use super::verdict::{Verdict, verify};
-use crate::Result;
+use super::verdict::{Method, Verdict, verify};
 use crate::identify::direct::direct;
 use crate::identify::hansen::{HansenModel, hansen};
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::Discrete;
+use crate::record::IndirectResponse;
 use crate::reduce::{Reduction, reduce};
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use std::time::Instant;
@@ -108,13 +110,62 @@ pub struct Identification {
     pub reduction: Option<Result<Reduction<Discrete>>>,
     /// The direct model where it was asked for, or the reason why there is none.
     pub direct: Option<Result<SubspaceModel>>,
+    /// The non-parametric response of the plant where an excitation is known, or the reason why there is none.
+    pub indirect: Option<Result<IndirectResponse>>,
     /// Evidence on every model.
     pub verdict: Verdict,
 }
 
+/// Where a failure of the scheme happened, with the likely cause when the log contradicts the declared controller.
+fn deviation_context(signals: &DeviationSignals) -> String {
+    let place = "[hansen] S from alpha to beta";
+    match signals.controller_mismatch {
+        Some(mismatch) if mismatch > SUSPICIOUS_MISMATCH => format!(
+            "{place}, where the declared [controller] misses the known excitations by {:.0} % (check its coefficients, \
+             sign, delay and saturation)",
+            100.0 * mismatch
+        ),
+        _ => place.to_owned(),
+    }
+}
+
+/// Relative miss of alpha from which the controller is to be doubted.
+const SUSPICIOUS_MISMATCH: f64 = 0.05;
+
+/// Something that was asked for but is impossible; the run goes on without it.
+#[derive(Debug, Clone, Copy)]
+pub struct Refusal<'a> {
+    /// Key in summary.json.
+    pub key: &'static str,
+    /// In words.
+    pub what: &'static str,
+    /// The reason.
+    pub error: &'a Error,
+}
+
+impl Identification {
+    /// What was asked for but is impossible, with the reasons.
+    pub fn refusals(&self) -> Vec<Refusal<'_>> {
+        [
+            refusal(Method::Direct.key(), "direct model", &self.direct),
+            refusal(Method::HansenReduced.key(), "reduced model", &self.reduction),
+            refusal("indirect", "indirect frequency response", &self.indirect),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+}
+
+fn refusal<'a, T>(key: &'static str, what: &'static str, outcome: &'a Option<Result<T>>) -> Option<Refusal<'a>> {
+    let error = outcome.as_ref()?.as_ref().err()?;
+    Some(Refusal { key, what, error })
+}
+
 /// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
 ///
-/// A reduction or a direct model that is impossible does not end the run: the reason stands in its place.
+/// A direct model, a reduction or an indirect response that is impossible does not end the run: the reason stands in its
+/// place.
 ///
 /// # Errors
 /// Whatever makes the scheme itself impossible; see the functions called here in turn.
@@ -124,6 +175,7 @@ pub fn identify(
     folder: &Path,
     clock: &mut StageClock<'_>,
 ) -> Result<Identification> {
+    check_grid(&settings.frequency_response, records.time)?;
     let factorisation = clock.run(Stage::Factor, || factorise_run(&settings, &records, folder))?; // (13)-(15)
     let factors = &factorisation.factors;
     let signals =
@@ -134,7 +186,7 @@ pub fn identify(
             || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
         )
     });
-    let hansen = hansen?;
+    let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;
     let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
     let mut found = Identification {
         verdict: Verdict::default(),
@@ -145,7 +197,9 @@ pub fn identify(
         hansen,
         reduction,
         direct,
+        indirect: None,
     };
-    found.verdict = clock.run(Stage::Validate, || verify(&found))?; // (26) and the loop certificate
+    // (26), the loop certificate and the response that rests on no model.
+    (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?;
     Ok(found)
 }

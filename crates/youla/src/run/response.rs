@@ -2,10 +2,11 @@
 
 use super::pipeline::Identification;
 use super::records::LoopRecord;
+use super::settings::FrequencySettings;
 use super::verdict::Method;
-use crate::lti::{FrequencyResponse, frequency_response};
+use crate::lti::{Discrete, FrequencyResponse, frequency_response};
 use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
-use crate::{Mat, Result};
+use crate::{Error, Mat, Result};
 use std::f64::consts::TAU;
 
 /// Responses on one grid.
@@ -22,9 +23,8 @@ pub(super) struct ModelResponses {
 /// The excitation d is the signal added at the plant input or injected as alpha where it acts alone; where references move
 /// too, it is the image of all of them in alpha, so that none is mistaken for noise.
 ///
-/// # Errors
-/// A record shorter than a window.
-pub(super) fn measured_response(found: &Identification) -> Result<Option<IndirectResponse>> {
+/// The reason where it cannot be had: a record shorter than a window, an excitation without power at a frequency.
+pub(super) fn indirect(found: &Identification) -> Option<Result<IndirectResponse>> {
     let settings = &found.settings.frequency_response;
     let records = &found.records.estimation;
     let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
@@ -40,7 +40,7 @@ pub(super) fn measured_response(found: &Identification) -> Result<Option<Indirec
         })
         .collect();
     if excitations.len() < records.len() {
-        return Ok(None);
+        return None;
     }
     // The image in alpha starts after the settling samples.
     let experiments: Vec<_> = records
@@ -53,7 +53,7 @@ pub(super) fn measured_response(found: &Identification) -> Result<Option<Indirec
         })
         .collect();
     let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
-    indirect_response(&experiments, found.records.time, &options).map(Some)
+    Some(indirect_response(&experiments, found.records.time, &options))
 }
 
 fn is_constant(signals: &Mat<f64>) -> bool {
@@ -69,6 +69,18 @@ pub(super) fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<Mo
     let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
     let models = found.verdict.models.iter().map(response).collect::<Result<_>>()?;
     Ok(ModelResponses { hz, models })
+}
+
+/// Refuses a lowest frequency that leaves no room below Nyquist.
+pub(super) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result<()> {
+    let nyquist = 0.5 / time.ts();
+    match settings.from_hz {
+        Some(from) if from >= nyquist => {
+            let what = format!("[frequency_response] from_hz, with a Nyquist frequency of {nyquist:.6} Hz,");
+            Err(Error::OutOfRange { what, value: from, must: "below it" })
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Frequencies in Hz, logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just below

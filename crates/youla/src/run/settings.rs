@@ -1,12 +1,14 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+use super::explain::{explain, problem_at};
 use super::models::{ControllerSettings, NominalModel};
 use crate::identify::subspace::SubspaceOptions;
-use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend};
+use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, open};
 use crate::reduce::ReductionOptions;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The whole of run.toml.
@@ -199,8 +201,13 @@ impl RunSettings {
     /// # Errors
     /// [`Error::Settings`] with line and column, and the nearest known key for a misspelt one; [`Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        Self::parse(&text, path)
+        let mut bytes = Vec::new();
+        open(path)?.read_to_end(&mut bytes).map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        let text = std::str::from_utf8(&bytes).map_err(|e| {
+            let good = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
+            problem_at(path, &good, good.len(), "this is not text in UTF-8".into())
+        })?;
+        Self::parse(text, path)
     }
 
     /// Parses the text of run.toml; `path` is named in errors.
@@ -208,7 +215,7 @@ impl RunSettings {
     /// # Errors
     /// [`Error::Settings`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let settings: Self = toml::from_str(text).map_err(|e| settings_error(&e, text, path))?;
+        let settings: Self = toml::from_str(text).map_err(|e| explain(&e, text, path))?;
         settings.check(path)?;
         Ok(settings)
     }
@@ -220,73 +227,95 @@ impl RunSettings {
     pub fn to_toml(&self) -> Result<String> {
         toml::to_string_pretty(self).map_err(|e| Error::Settings {
             path: PathBuf::from("run.toml"),
-            line: 0,
-            column: 0,
+            at: None,
             problem: e.to_string(),
         })
     }
 
     fn check(&self, path: &Path) -> Result<()> {
-        let problem = |problem: String| Err(Error::Settings { path: path.to_owned(), line: 0, column: 0, problem });
+        let problem = self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.number_problem());
+        problem.map_or(Ok(()), |problem| Err(Error::Settings { path: path.to_owned(), at: None, problem }))
+    }
+
+    fn record_problem(&self) -> Option<String> {
         let d = &self.data;
         if d.sample_time.is_none() && d.time_column.is_none() {
-            return problem("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
+            return Some("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
         }
         if d.estimation.is_empty() {
-            return problem("[data] names no estimation record; add [[data.estimation]] with a file".into());
+            return Some("[data] names no estimation record; add [[data.estimation]] with a file".into());
         }
         let mut labels = HashSet::new();
         for label in d.estimation.iter().chain(&d.verification).map(DataFile::label) {
-            if label.is_empty() || label.contains(['/', '\\']) {
-                return problem(format!("the record name {label:?} cannot be a file name; give another `name`"));
+            if label.is_empty() || label.contains(['/', '\\']) || label.contains(char::is_control) {
+                return Some(format!("the record name {label:?} cannot be a file name; give another `name`"));
             }
             if !labels.insert(label.clone()) {
-                return problem(format!("two records are named {label:?}; give one of them another `name`"));
+                return Some(format!("two records are named {label:?}; give one of them another `name`"));
             }
+        }
+        None
+    }
+
+    fn channel_problem(&self) -> Option<String> {
+        let d = &self.data;
+        let mut names = HashSet::new();
+        let groups = [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha];
+        if let Some(twice) = groups.into_iter().flatten().find(|c| !names.insert(&c.name)) {
+            return Some(format!("[data] has more than one channel named {:?}", twice.name));
         }
         for (key, channels) in [("inputs", &d.inputs), ("outputs", &d.outputs)] {
             if channels.is_empty() {
-                return problem(format!("[data] {key} names no channel"));
+                return Some(format!("[data] {key} is empty, but must list at least one channel"));
             }
         }
         if !d.alpha.is_empty() && !d.input_excitation.is_empty() {
-            return problem("[data] has both alpha and input_excitation; give the one that was injected".into());
+            return Some("[data] has both alpha and input_excitation; give the one that was injected".into());
+        }
+        for (key, channels, of, wanted) in [
+            ("input_excitation", &d.input_excitation, "inputs", d.inputs.len()),
+            ("alpha", &d.alpha, "inputs", d.inputs.len()),
+            ("reference", &d.reference, "outputs", d.outputs.len()),
+        ] {
+            if !channels.is_empty() && channels.len() != wanted {
+                let found = channels.len();
+                return Some(format!("[data] {key} must list as many channels as {of} ({wanted}), but lists {found}"));
+            }
         }
         let known = !(d.alpha.is_empty() && d.input_excitation.is_empty() && d.reference.is_empty());
         if self.verification.prediction == Prediction::ClosedLoop && !known {
-            return problem(
+            return Some(
                 "[verification] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha"
                     .into(),
             );
         }
-        for (key, channels, wanted) in [
-            ("input_excitation", d.input_excitation.len(), d.inputs.len()),
-            ("alpha", d.alpha.len(), d.inputs.len()),
-            ("reference", d.reference.len(), d.outputs.len()),
-        ] {
-            if channels != 0 && channels != wanted {
-                return problem(format!("[data] {key} has {channels} channels, but must have {wanted} or none"));
-            }
-        }
-        Ok(())
+        None
     }
-}
 
-/// Turns the parser's error into one sentence with line, column and the nearest known key.
-fn settings_error(error: &toml::de::Error, text: &str, path: &Path) -> Error {
-    let before = &text[..error.span().map_or(0, |s| s.start.min(text.len()))];
-    let line = before.matches('\n').count() + 1;
-    let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
-    let message = error.message();
-    let mut problem = message.to_owned();
-    if message.starts_with("unknown field") || message.starts_with("unknown variant") {
-        let mut words = message.split('`').skip(1).step_by(2);
-        let unknown = words.next().unwrap_or_default();
-        let nearest =
-            words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)));
-        if let Some(nearest) = nearest {
-            problem = format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})");
-        }
+    /// The first number outside of its range.
+    fn number_problem(&self) -> Option<String> {
+        let (factors, response) = (&self.factors, &self.frequency_response);
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let part = |x: f64| (0.0..1.0).contains(&x);
+        let given = |x: Option<f64>| x.unwrap_or(1.0);
+        let (points, window) = (response.points, response.window);
+        [
+            (
+                "[data] sample_time",
+                given(self.data.sample_time),
+                "a positive number of seconds",
+                positive as fn(f64) -> bool,
+            ),
+            ("[data] time_tolerance", self.data.time_tolerance, "at least 0 and below 1", part),
+            ("[factors] input_weight", factors.input_weight, "positive", positive),
+            ("[factors] output_noise", factors.output_noise, "positive", positive),
+            ("[frequency_response] overlap", response.overlap, "at least 0 and below 1", part),
+            ("[frequency_response] from_hz", given(response.from_hz), "a positive frequency", positive),
+            ("[frequency_response] window", window as f64, "at least 4 samples", |x| x >= 4.0),
+            ("[frequency_response] points", points as f64, "from 2 to 100000", |x| (2.0..=1e5).contains(&x)),
+        ]
+        .into_iter()
+        .find(|(_, value, _, good)| !good(*value))
+        .map(|(key, value, must, _)| format!("{key} is {value}, but must be {must}"))
     }
-    Error::Settings { path: path.to_owned(), line, column, problem }
 }

@@ -4,10 +4,11 @@ use super::records::{LoopRecord, RunRecords};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::linalg::block;
 use crate::lti::Discrete;
-use crate::record::Record;
+use crate::record::{Record, write_csv};
 use crate::units::Channel;
 use crate::{Error, Mat, Result};
 use faer::Scale;
+use std::path::{Path, PathBuf};
 
 /// Signals of the deviation system for all estimation records.
 #[derive(Debug, Clone)]
@@ -39,7 +40,8 @@ pub fn deviation_signals(
     let mut expected_alpha = Vec::new();
     for record in records {
         if record.samples() <= settle {
-            return Err(Error::TooShort { record: record.name.clone(), samples: record.samples(), settle });
+            let (record, samples) = (record.name.clone(), record.samples());
+            return Err(Error::TooShort { record, samples, dropped: settle, key: "`settle` in [factors]" });
         }
         let kept = |m: &Mat<f64>| m.subrows(settle, m.nrows() - settle).to_owned();
         let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
@@ -78,6 +80,28 @@ pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) 
         Record::new(&record.name, channels.clone(), data, record.time)
     };
     records.estimation.iter().map(one).collect()
+}
+
+/// Writes [`signal_records`] to `folder`, one CSV file each, and returns their paths. The folder is made if need be;
+/// files of other names in it stay.
+///
+/// # Errors
+/// [`Error::Io`]; then none of these files is there.
+pub fn write_signals(records: &[Record], folder: &Path) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::Io { path: folder.to_owned(), source };
+    let made = !folder.exists();
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let paths: Vec<PathBuf> = records.iter().map(|r| folder.join(format!("{}.csv", r.name()))).collect();
+    records.iter().zip(&paths).try_for_each(|(record, path)| write_csv(record, path)).inspect_err(|_| {
+        // Best effort: the error that led here is the one to report.
+        for path in &paths {
+            let _ = std::fs::remove_file(path);
+        }
+        if made {
+            let _ = std::fs::remove_dir(folder);
+        }
+    })?;
+    Ok(paths)
 }
 
 /// Fraction to which the slowest transient of the filter must have decayed.

@@ -2,7 +2,7 @@
 
 use super::artefacts::{SCHEMA, pairs};
 use super::pipeline::{Identification, StageTimes};
-use super::response::{decibel, log_grid, measured_response, model_responses};
+use super::response::{decibel, log_grid, model_responses};
 use super::verdict::{Method, ModelVerdict};
 use crate::Result;
 use crate::c64;
@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 ///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
 /// ```
 ///
-/// A method that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
+/// A method or an indirect response that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
 ///
 /// # Errors
 /// Those of the frequency responses.
@@ -29,13 +29,9 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
             methods.insert(v.method.key().into(), method_entry(found, v));
         }
     }
-    let mut refuse = |method: Method, error: Option<&crate::Error>| {
-        if let Some(e) = error {
-            refused.insert(method.key().into(), json!(e.to_string()));
-        }
-    };
-    refuse(Method::Direct, found.direct.as_ref().and_then(|d| d.as_ref().err()));
-    refuse(Method::HansenReduced, found.reduction.as_ref().and_then(|r| r.as_ref().err()));
+    for refusal in found.refusals() {
+        refused.insert(refusal.key.into(), json!(refusal.error.to_string()));
+    }
     let mut all = json!({
         "schema": SCHEMA,
         "name": found.settings.name,
@@ -73,11 +69,11 @@ fn fits(v: &ModelVerdict) -> Value {
 }
 
 fn response_entry(found: &Identification) -> Result<Value> {
-    let measured = measured_response(found)?;
-    let hz = measured.as_ref().map_or_else(|| log_grid(found), |m| m.response.omega.iter().map(|w| w / TAU).collect());
+    let measured = found.indirect.as_ref().and_then(|r| r.as_ref().ok());
+    let hz = measured.map_or_else(|| log_grid(found), |m| m.response.omega.iter().map(|w| w / TAU).collect());
     let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
     let mut entry = Map::new();
-    if let Some(m) = &measured {
+    if let Some(m) = measured {
         entry.insert("indirect_db".into(), json!(db(m.response.entry(0, 0))));
         entry.insert("coherence".into(), json!(m.coherence_y.col_as_slice(0)));
     }

@@ -143,7 +143,8 @@ fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &
     };
     let skip = found.settings.verification.skip;
     if record.samples() <= skip {
-        return Err(Error::TooShort { record: record.name.clone(), samples: record.samples(), settle: skip });
+        let (record, samples) = (record.name.clone(), record.samples());
+        return Err(Error::TooShort { record, samples, dropped: skip, key: "`skip` in [verification]" });
     }
     let record_name = record.name.clone();
     match predicted {

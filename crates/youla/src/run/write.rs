@@ -34,7 +34,7 @@ pub fn write_run(
     let so_far = clock.seconds.clone();
     clock.run(Stage::Report, || {
         let page = page(found, &so_far, &name)?;
-        folder.json("report.json", &page)?;
+        folder.compact_json("report.json", &page)?;
         folder.text("report.html", &html(&page)?)
     })?;
     let summary = summary(found, &clock.seconds)?;

@@ -94,3 +94,60 @@ fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec
 
 /// Samples per block of the streaming least squares.
 const CHUNK: usize = 256;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::with_input_port;
+    use crate::rig::Bearing;
+
+    fn bearing() -> StateSpace<Discrete> {
+        Bearing::default().plant().unwrap().zoh(Discrete::new(2e-4).unwrap()).unwrap()
+    }
+
+    fn noise(samples: usize, channels: usize) -> Mat<f64> {
+        Mat::from_fn(samples, channels, |k, j| ((k * k * (j + 2)) as f64 * 0.37).sin())
+    }
+
+    fn relative(x: &Mat<f64>, y: &Mat<f64>) -> f64 {
+        (x - y).norm_l2() / y.norm_l2()
+    }
+
+    #[test]
+    fn open_loop_prediction_finds_the_initial_state() {
+        let (plant, u) = (bearing(), noise(1000, 2));
+        let y = simulate(&plant, u.as_ref(), &[3.0, -1.0, 2000.0, 500.0, 0.2, -0.4]).unwrap();
+        let predicted = predict_open_loop(&plant, u.as_ref(), y.as_ref()).unwrap();
+        assert!(relative(&predicted, &y) < 1e-10, "{:.1e}", relative(&predicted, &y));
+    }
+
+    #[test]
+    fn closed_loop_prediction_finds_the_initial_state_of_the_loop() {
+        let plant = bearing();
+        let gain = Mat::from_fn(2, 2, |i, j| if i == j { 0.02 } else { 0.0 });
+        let controller = with_input_port(&StateSpace::gain(gain, plant.time()).unwrap()).unwrap();
+        let (v1, r) = (noise(1000, 2), noise(1000, 2));
+        let closed = closed_loop(&plant, &controller).unwrap();
+        let outside = block(&[&[v1.as_ref(), (Scale(-1.0) * &r).as_ref()]]);
+        let z = simulate(&closed, outside.as_ref(), &[1.0, 2.0, -700.0, 0.0, 0.1, 0.0]).unwrap();
+        let y = z.subcols(2, 2) + &r;
+        let excitation = LoopExcitation { input: Some(v1.as_ref()), reference: Some(r.as_ref()) };
+        let predicted = predict_closed_loop(&plant, &controller, excitation, y.as_ref()).unwrap();
+        assert!(relative(&predicted, &y) < 1e-10, "{:.1e}", relative(&predicted, &y));
+    }
+
+    #[test]
+    fn a_model_that_diverges_is_an_error() {
+        let unstable = StateSpace::new(
+            Mat::from_fn(1, 1, |_, _| 2.0),
+            Mat::from_fn(1, 1, |_, _| 1.0),
+            Mat::from_fn(1, 1, |_, _| 1.0),
+            Mat::zeros(1, 1),
+            Discrete::new(1.0).unwrap(),
+        )
+        .unwrap();
+        let u = noise(5000, 1);
+        let refused = predict_open_loop(&unstable, u.as_ref(), u.as_ref());
+        assert!(matches!(refused, Err(crate::Error::Diverged { .. })), "{refused:?}");
+    }
+}

@@ -42,6 +42,13 @@ impl Lines {
         &self.path
     }
 
+    /// The error of the rest of a gzip file, if it cannot be unpacked to its end or its checksum is wrong.
+    pub(super) fn damage(&mut self) -> Option<Error> {
+        let line = self.number;
+        let rest = if self.gzip { std::io::copy(&mut self.reader, &mut std::io::sink()) } else { Ok(0) };
+        rest.err().map(|source| read_error(&self.path, self.gzip, line, source))
+    }
+
     /// Number of the current line, counted from 1.
     pub(super) fn number(&self) -> usize {
         self.number

@@ -42,12 +42,7 @@ pub fn write_mat(path: impl AsRef<Path>, variables: &[Variable], packing: Packin
         if variable.name.is_empty() {
             return Err(wrong("given a name"));
         }
-        let packed = array(&variable.name, &variable.value).and_then(|body| {
-            let mut matrix = Vec::new();
-            element(&mut matrix, kind::MATRIX, &body)?;
-            pack(matrix, packing)
-        });
-        out.extend(packed.map_err(wrong)?);
+        append(&mut out, variable, packing).map_err(wrong)?;
     }
     std::fs::write(path, out).map_err(|source| Error::Io { path: path.to_owned(), source })
 }
@@ -63,46 +58,56 @@ fn header() -> Vec<u8> {
     out
 }
 
-fn pack(matrix: Vec<u8>, packing: Packing) -> Result<Vec<u8>, Unwritable> {
+fn append(out: &mut Vec<u8>, variable: &Variable, packing: Packing) -> Result<(), Unwritable> {
+    let Variable { name, value } = variable;
     if packing == Packing::Plain {
-        return Ok(matrix);
+        return array(out, name, value);
     }
+    let mut plain = Vec::new();
+    array(&mut plain, name, value)?;
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::default());
-    let packed = encoder.write_all(&matrix).and_then(|()| encoder.finish()).map_err(|_| "packed by zlib")?;
-    let mut out = Vec::new();
-    tag(&mut out, kind::COMPRESSED, packed.len())?;
+    let packed = encoder.write_all(&plain).and_then(|()| encoder.finish()).map_err(|_| "packed by zlib")?;
+    tag(out, kind::COMPRESSED, packed.len())?;
     out.extend(packed);
-    Ok(out)
+    Ok(())
 }
 
-fn array(name: &str, value: &Value) -> Result<Vec<u8>, Unwritable> {
-    let mut out = Vec::new();
+/// An array as an element, written in place: its size is filled in when it is known.
+fn array(out: &mut Vec<u8>, name: &str, value: &Value) -> Result<(), Unwritable> {
+    let at = out.len();
+    tag(out, kind::MATRIX, 0)?;
+    array_parts(out, name, value)?;
+    let size = size_of_element(out.len() - at - 8)?;
+    out[at + 4..at + 8].copy_from_slice(&size.to_le_bytes());
+    Ok(())
+}
+
+fn array_parts(out: &mut Vec<u8>, name: &str, value: &Value) -> Result<(), Unwritable> {
     match value {
         Value::Real { dims, data } => {
-            start(&mut out, u32::from(class::DOUBLE), dims, name, data.len())?;
-            doubles(&mut out, data)?;
+            start(out, u32::from(class::DOUBLE), dims, name, data.len())?;
+            doubles(out, data)
         }
         Value::Complex { dims, re, im } => {
-            start(&mut out, u32::from(class::DOUBLE) | class::COMPLEX, dims, name, re.len())?;
+            start(out, u32::from(class::DOUBLE) | class::COMPLEX, dims, name, re.len())?;
             full(re.len() == im.len())?;
-            doubles(&mut out, re)?;
-            doubles(&mut out, im)?;
+            doubles(out, re)?;
+            doubles(out, im)
         }
-        Value::Text(rows) => text(&mut out, name, rows)?,
+        Value::Text(rows) => text(out, name, rows),
         Value::Cell { dims, items } => {
-            start(&mut out, u32::from(class::CELL), dims, name, items.len())?;
-            nested(&mut out, items)?;
+            start(out, u32::from(class::CELL), dims, name, items.len())?;
+            nested(out, items)
         }
         Value::Struct { dims, fields, items } => {
             let elements = items.len().checked_div(fields.len()).unwrap_or_else(|| dims.iter().product());
-            start(&mut out, u32::from(class::STRUCT), dims, name, elements)?;
+            start(out, u32::from(class::STRUCT), dims, name, elements)?;
             full(items.len() == elements * fields.len())?;
-            field_names(&mut out, fields)?;
-            nested(&mut out, items)?;
+            field_names(out, fields)?;
+            nested(out, items)
         }
-        Value::Unsupported { .. } => return Err("of a class that is written"),
+        Value::Unsupported { .. } => Err("of a class that is written"),
     }
-    Ok(out)
 }
 
 fn full(filled: bool) -> Result<(), Unwritable> {
@@ -122,7 +127,8 @@ fn start(out: &mut Vec<u8>, flags: u32, dims: &[usize], name: &str, count: usize
 
 fn doubles(out: &mut Vec<u8>, data: &[f64]) -> Result<(), Unwritable> {
     tag(out, kind::DOUBLE, 8 * data.len())?;
-    data.iter().for_each(|x| out.extend(x.to_le_bytes()));
+    out.reserve(8 * data.len());
+    data.iter().for_each(|x| out.extend_from_slice(&x.to_le_bytes()));
     Ok(())
 }
 
@@ -156,12 +162,12 @@ fn field_names(out: &mut Vec<u8>, fields: &[String]) -> Result<(), Unwritable> {
 }
 
 fn nested(out: &mut Vec<u8>, items: &[Value]) -> Result<(), Unwritable> {
-    items.iter().try_for_each(|item| element(out, kind::MATRIX, &array("", item)?))
+    items.iter().try_for_each(|item| array(out, "", item))
 }
 
 /// Tag, data and padding to eight bytes; up to four bytes share the tag.
 fn element(out: &mut Vec<u8>, code: u32, data: &[u8]) -> Result<(), Unwritable> {
-    if (1..=4).contains(&data.len()) && code != kind::MATRIX {
+    if (1..=4).contains(&data.len()) {
         let size = data.len() as u32;
         out.extend((code | (size << 16)).to_le_bytes());
         out.extend(data);
@@ -175,8 +181,11 @@ fn element(out: &mut Vec<u8>, code: u32, data: &[u8]) -> Result<(), Unwritable> 
 }
 
 fn tag(out: &mut Vec<u8>, code: u32, size: usize) -> Result<(), Unwritable> {
-    let size = u32::try_from(size).map_err(|_| "smaller than 4 GiB")?;
     out.extend(code.to_le_bytes());
-    out.extend(size.to_le_bytes());
+    out.extend(size_of_element(size)?.to_le_bytes());
     Ok(())
+}
+
+fn size_of_element(bytes: usize) -> Result<u32, Unwritable> {
+    u32::try_from(bytes).map_err(|_| "smaller than 4 GiB")
 }

@@ -123,7 +123,8 @@ impl Value {
 
     /// A real matrix.
     pub fn matrix(matrix: faer::MatRef<'_, f64>) -> Value {
-        let data = matrix.col_iter().flat_map(|column| column.iter().copied()).collect();
+        let mut data = Vec::with_capacity(matrix.nrows() * matrix.ncols());
+        matrix.col_iter().for_each(|column| data.extend(column.iter()));
         Value::Real { dims: vec![matrix.nrows(), matrix.ncols()], data }
     }
 

@@ -1,5 +1,6 @@
 //! The parameter file as text: errors with line, column and key, and the nearest known name for a misspelt one.
 
+use crate::error::TextPosition;
 use crate::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
@@ -18,13 +19,13 @@ fn in_words(error: &toml::de::Error, text: &str, path: &Path) -> Error {
     let offset = error.span().map_or(0, |s| s.start.min(text.len()));
     let before = &text[..offset];
     let line = before.matches('\n').count() + 1;
-    let column = before.len() - before.rfind('\n').map_or(0, |i| i + 1) + 1;
+    let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
     let message = error.message();
     let problem = nearest_name(message).unwrap_or_else(|| match key_at(text, offset) {
         Some(key) => format!("{key}: {message}"),
         None => message.to_owned(),
     });
-    Error::Settings { path: path.to_owned(), line, column, problem }
+    Error::Settings { path: path.to_owned(), at: Some(TextPosition { line, column }), problem }
 }
 
 /// For a key or choice that is not known, the known one that is spelt most like it.

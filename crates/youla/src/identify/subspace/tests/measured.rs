@@ -2,15 +2,10 @@
 //! `||y - yhat||_1 / ||y||_1` of table 7 in SLICOT working note 2000-4.
 
 use super::*;
-use std::path::Path;
 
 /// Columns of a file of the shared data; `None`, said aloud, where the data are absent.
 fn load(file: &str, inputs: usize) -> Option<(Mat<f64>, Mat<f64>)> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../../shared/data").join(file);
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is absent", path.display());
-        return None;
-    };
+    let text = std::fs::read_to_string(crate::record::scratch::data_folder()?.join(file)).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect()).collect();
     let columns = rows[0].len();

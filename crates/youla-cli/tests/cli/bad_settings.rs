@@ -1,0 +1,144 @@
+//! run.toml that cannot be used: line, column, what is wrong, what would be right.
+
+use crate::common::{SETTINGS, loop_folder, refused, refused_by, settings, settings_refused};
+use std::process::Command;
+
+#[test]
+fn missing_file() {
+    let folder = loop_folder("missing-toml", &[]);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
+    refused_by(command.args(["identify", "nope.toml"]), &folder, 2, &["nope.toml: no such file"]);
+}
+
+#[test]
+fn misspelt_keys_at_every_level() {
+    let cases: [(&str, &str, &[&str]); 12] = [
+        ("name = \"loop\"", "nam = \"loop\"", &["run.toml:1:1:", "`nam`", "top level", "did you mean `name`?"]),
+        ("[hansen]", "[hansn]", &["run.toml:21:2:", "`hansn` is not a key of the top level", "did you mean `hansen`?"]),
+        ("time_column", "time_colum", &["run.toml:4:1:", "`time_colum`", "[data]", "`time_column`"]),
+        ("unit = \"um\"", "unt = \"um\"", &["run.toml:6:26:", "`unt`", "`outputs` in [data]", "`unit`"]),
+        ("take = 1200", "tak = 1200", &["run.toml:8:35:", "`tak`", "`estimation` in [data]", "`take`"]),
+        ("denominator = [1.0, -0.9]", "denominater = [1.0]", &["run.toml:14:1:", "`denominater`", "`denominator`"]),
+        (
+            "feedback = \"negative\"",
+            "feedback = \"negative\"\ngain = 2.0",
+            &["run.toml:18:1:", "`gain` is not a key of [controller.difference_equation]; the keys are feedback"],
+        ),
+        (
+            "[controller.difference_equation]",
+            "[controller.difference_equations]",
+            &["run.toml:16:13:", "`difference_equations` is not a key of [controller]", "`difference_equation`?"],
+        ),
+        ("horizon = 10", "horizn = 10", &["run.toml:22:1:", "`horizn`", "[hansen]", "`horizon`"]),
+        ("{ fixed = 3 }", "{ fixd = 3 }", &["run.toml:23:11:", "`fixd`", "`order` in [hansen]", "`fixed`"]),
+        ("{ fixed = 3 }", "{ auto = { mx = 3 } }", &["run.toml:23:20:", "`mx`", "`auto` in [hansen]", "max"]),
+        (
+            "[nominal.transfer_function]",
+            "[[data.verification]]\nfile = \"log.csv\"\nskp = 3\n\n[nominal.transfer_function]",
+            &["run.toml:", "verification"],
+        ),
+    ];
+    for (passage, replacement, evidence) in cases {
+        settings_refused("misspelt-key", &settings(passage, replacement), evidence);
+    }
+    let lists = settings("estimation = [{ file = \"log.csv\", take = 1200 }]\n", "")
+        .replace("[nominal", "[[data.estimation]]\nfile = \"log.csv\"\nskp = 3\n\n[nominal");
+    settings_refused("misspelt-key", &lists, &["run.toml:12:1:", "`skp`", "[data.estimation]", "did you mean `skip`?"]);
+}
+
+#[test]
+fn misspelt_choices() {
+    let weight = settings("horizon = 10", "horizon = 10\nweight = \"moespp\"");
+    settings_refused(
+        "choice",
+        &weight,
+        &["run.toml:23:10:", "`moespp` is not a choice of `weight` in [hansen]", "`moesp`", "n4sid, cva"],
+    );
+    let sign = settings("feedback = \"negative\"", "feedback = \"minus\"");
+    settings_refused("choice", &sign, &["run.toml:17:12:", "`minus`", "`feedback`", "negative, positive"]);
+}
+
+#[test]
+fn missing_keys_and_tables() {
+    let cases: [(&str, &str, &str); 6] = [
+        ("inputs = [{ name = \"u\", unit = \"V\" }]\n", "run.toml:3:1:", "[data] lacks `inputs`"),
+        ("feedback = \"negative\"\n", "run.toml:16:1:", "[controller.difference_equation] lacks `feedback`"),
+        ("file = \"log.csv\", take", "run.toml:8:15:", "`estimation` in [data] lacks `file`"),
+        ("name = \"loop\"\n", "run.toml:1:1:", "the top level lacks `name`"),
+        ("time_column = \"t\"\n", "run.toml: [data]", "neither sample_time nor time_column"),
+        (
+            "[nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [0.1]\ndenominator = [1.0, -0.9]\n",
+            "run.toml:1:1:",
+            "the top level lacks `nominal`",
+        ),
+    ];
+    for (passage, place, sentence) in cases {
+        let replacement = if passage.starts_with("file") { "take" } else { "" };
+        settings_refused("missing-key", &settings(passage, replacement), &[place, sentence]);
+    }
+    let two = SETTINGS.to_owned() + "[nominal.bearing]\na_factor = 1.0\nb_factor = 1.0\n";
+    settings_refused("missing-key", &two, &["[nominal] must hold exactly one of transfer_function", "more than one"]);
+}
+
+#[test]
+fn wrong_types() {
+    let whole = "but must be a whole number, zero or positive";
+    let cases: [(&str, &str, &[&str]); 8] = [
+        ("take = 1200", "take = \"many\"", &["run.toml:8:42:", "`take` in [data] is \"many\"", whole]),
+        ("take = 1200", "take = -5", &["run.toml:8:42:", "`take` in [data] is -5", whole]),
+        ("horizon = 10", "horizon = 1.5", &["run.toml:22:11:", "`horizon` in [hansen] is 1.5", whole]),
+        ("[{ name = \"u\", unit = \"V\" }]", "\"u\"", &["run.toml:5:10:", "`inputs` in [data]", "must be a list"]),
+        ("numerator = [0.1]", "numerator = 0.1", &["run.toml:13:13:", "`numerator`", "a list of coefficients"]),
+        ("unit = \"um\"", "from = 1.5", &["run.toml:6:33:", "`from` in [data] is 1.5", "name, or the number"]),
+        ("name = \"loop\"", "name = 5", &["run.toml:1:8:", "`name` at the top level is 5", "text in quotes"]),
+        ("{ fixed = 3 }", "3", &["run.toml:23:9:", "`order` in [hansen] is 3", "a table"]),
+    ];
+    for (passage, replacement, evidence) in cases {
+        settings_refused("wrong-type", &settings(passage, replacement), evidence);
+    }
+}
+
+#[test]
+fn text_that_is_not_toml() {
+    let cases: [(&str, &str, &[&str]); 4] = [
+        ("[data]", "[data", &["run.toml:3:6:", "this is not TOML", "expected `]`"]),
+        ("time_column = \"t\"", "time_column = \"t", &["run.toml:4:17:", "this is not TOML"]),
+        ("time_column = \"t\"", "time_column = t", &["run.toml:4:15:", "this is not TOML"]),
+        ("domain = \"discrete\"", "domain = \"discrete\"\ndomain = \"discrete\"", &["`domain` is given twice"]),
+    ];
+    for (passage, replacement, evidence) in cases {
+        settings_refused("not-toml", &settings(passage, replacement), evidence);
+    }
+    let folder = loop_folder("not-toml", &[("run.toml", b"name = \"\xff\"\n")]);
+    refused(&folder, 2, &["run.toml:1:9:", "UTF-8"]);
+}
+
+#[test]
+fn numbers_out_of_range() {
+    let cases = [
+        ("time_column = \"t\"", "sample_time = -1.0", "[data] sample_time is -1, but must be a positive"),
+        ("window = 256", "window = 256\noverlap = 2.0", "[frequency_response] overlap is 2"),
+        ("window = 256", "window = 256\nfrom_hz = -2.0", "[frequency_response] from_hz is -2"),
+        ("window = 256", "window = 256\nfrom_hz = 1e9", "Nyquist frequency of 50"),
+        ("window = 256", "window = 256\npoints = 9000000000000000000", "[frequency_response] points is"),
+        ("[hansen]", "[factors]\ninput_weight = -1.0\n[hansen]", "[factors] input_weight is -1"),
+        ("horizon = 10", "horizon = 1", "horizon is 1, but must be at least 2"),
+        ("take = 1200", "take = 100000", "is 100000"),
+    ];
+    for (passage, replacement, evidence) in cases {
+        settings_refused("range", &settings(passage, replacement), &[evidence]);
+    }
+}
+
+#[test]
+fn names_and_numbers_of_channels() {
+    settings_refused("twice", &settings(", name = \"rest\"", ""), &["two records are named \"log\""]);
+    settings_refused("slash", &settings("\"rest\"", "\"a/b\""), &["\"a/b\" cannot be a file name"]);
+    let same = settings("inputs = [{ name = \"u\"", "inputs = [{ name = \"u\" }, { name = \"u\"");
+    settings_refused("same-channel", &same, &["more than one channel named \"u\""]);
+    let reference = settings("estimation =", "reference = [{ name = \"r\" }, { name = \"s\" }]\nestimation =");
+    settings_refused("reference-count", &reference, &["[data] reference", "outputs (1)", "lists 2"]);
+    let undriven = settings("input_excitation = [{ name = \"d\", unit = \"V\" }]\n", "")
+        + "[verification]\nprediction = \"closed-loop\"\n";
+    settings_refused("undriven", &undriven, &["[verification] prediction = \"closed-loop\" needs"]);
+}

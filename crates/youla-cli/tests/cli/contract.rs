@@ -1,0 +1,198 @@
+//! What programs may rely on: summary.json, artefacts, signals, and the same result for the same seed.
+
+use crate::common::{demo, empty_folder, outcome, youla};
+use serde_json::{Map, Value};
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+use youla::record::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
+use youla::run::ModelFile;
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).expect("readable")).expect("JSON")
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("an array").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+#[test]
+fn summary_has_the_documented_structure() {
+    let summary = json(&demo().join("summary.json"));
+    let mut expected =
+        ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
+    expected.extend(["controller_mismatch", "seconds", "true_plant"]);
+    expected.sort_unstable();
+    assert_eq!(keys(&summary), expected);
+    assert_eq!(summary["schema"], 1);
+    assert_eq!(summary["refused"], Value::Object(Map::new()));
+    for fit in [&summary["nominal"]["fit"], &summary["true_plant"]["fit"]] {
+        assert_eq!(keys(fit), ["verification"]);
+        assert_eq!(numbers(&fit["verification"]).len(), 2);
+    }
+    assert!(summary["bezout_residual"].as_f64().expect("a number") < 1e-12);
+    assert!(summary["controller_mismatch"].as_f64().expect("a number") < 1e-9);
+    let stages = ["factor", "identify", "record", "reduce", "report", "signals", "validate", "write"];
+    assert_eq!(keys(&summary["seconds"]), stages);
+    assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
+}
+
+#[test]
+fn summary_describes_every_method() {
+    let summary = json(&demo().join("summary.json"));
+    assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced"]);
+    let common = ["fit", "modes", "order", "poles", "stabilised_by_controller"];
+    let hansen = ["fit", "modes", "order", "poles", "s_order", "s_stable", "stabilised_by_controller"];
+    for (name, expected, order) in
+        [("direct", &common[..], 6), ("hansen", &hansen[..], 16), ("hansen_reduced", &hansen[..], 6)]
+    {
+        let method = &summary["methods"][name];
+        assert_eq!(keys(method), expected, "{name}");
+        assert_eq!(method["order"], order, "{name}");
+        assert!(method["stabilised_by_controller"].is_boolean());
+        assert!(numbers(&method["fit"]["verification"]).iter().all(|f| (20.0..100.0).contains(f)), "{name}");
+        let poles = method["poles"].as_array().expect("an array");
+        assert_eq!(poles.len(), order);
+        assert!(poles.iter().all(|p| numbers(p).len() == 2));
+        let modes = method["modes"].as_array().expect("an array");
+        assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == ["hz", "zeta"]));
+    }
+    assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
+    assert_eq!(summary["methods"]["hansen"]["s_stable"], true);
+}
+
+#[test]
+fn frequency_responses_share_one_grid() {
+    let response = &json(&demo().join("summary.json"))["frequency_response"];
+    let all = [
+        "coherence",
+        "direct_db",
+        "hansen_db",
+        "hansen_reduced_db",
+        "hz",
+        "indirect_db",
+        "nominal_db",
+        "true_plant_db",
+    ];
+    assert_eq!(keys(response), all);
+    let hz = numbers(&response["hz"]);
+    assert!(hz.len() > 100 && hz.windows(2).all(|w| w[0] < w[1]));
+    assert!(all.iter().all(|key| numbers(&response[key]).len() == hz.len()));
+    assert!(numbers(&response["coherence"]).iter().all(|c| (0.0..=1.0 + 1e-12).contains(c)));
+}
+
+#[test]
+fn run_toml_of_the_demonstration_reproduces_its_fits() {
+    let again = demo().with_file_name("again");
+    let _ = fs::remove_dir_all(&again);
+    let out = again.to_str().expect("UTF-8");
+    let found = youla(
+        &empty_folder("elsewhere"),
+        &["identify", demo().join("run.toml").to_str().expect("UTF-8"), "--out", out, "--json"],
+    );
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    let printed: Value = serde_json::from_str(&found.stdout).expect("JSON only");
+    assert_eq!(printed, json(&again.join("summary.json")), "--json prints summary.json");
+    let first = json(&demo().join("summary.json"));
+    for pointer in ["/nominal/fit", "/methods/hansen/fit", "/methods/hansen_reduced/fit", "/methods/direct/fit"] {
+        let fits = |summary: &Value| numbers(&summary.pointer(pointer).expect("there")["verification"]);
+        for (a, b) in fits(&first).into_iter().zip(fits(&printed)) {
+            assert!((a - b).abs() < 1e-6, "{pointer}: {a} and {b}");
+        }
+    }
+}
+
+#[test]
+fn same_seed_same_artefacts_on_any_number_of_threads() {
+    for threads in ["1", "2"] {
+        let folder = empty_folder(&format!("threads-{threads}"));
+        let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
+        command.current_dir(&folder).env("RAYON_NUM_THREADS", threads).args(["demo", "--out", "run", "--quiet"]);
+        assert_eq!(outcome(&mut command).code, Some(0));
+        for name in [
+            "run.toml",
+            "1-record/estimation-estimation.mat",
+            "2-factor/right.json",
+            "4-identify/deviation.json",
+            "4-identify/direct.json",
+            "5-recombine/hansen.json",
+            "6-reduce/hansen_reduced.json",
+            "7-validate/verdict.json",
+        ] {
+            let bytes = |run: &Path| fs::read(run.join(name)).expect("readable");
+            assert!(bytes(&folder.join("run")) == bytes(demo()), "{name} differs on {threads} threads");
+        }
+        let timeless = |run: &Path| {
+            let mut summary = json(&run.join("summary.json"));
+            summary.as_object_mut().expect("an object").remove("seconds");
+            summary
+        };
+        assert_eq!(timeless(&folder.join("run")), timeless(demo()));
+    }
+    let folder = empty_folder("other-seed");
+    assert_eq!(youla(&folder, &["demo", "--seed", "2", "--out", "run", "--quiet"]).code, Some(0));
+    let bytes = |run: &Path| fs::read(run.join("5-recombine/hansen.json")).expect("readable");
+    assert!(bytes(&folder.join("run")) != bytes(demo()));
+}
+
+#[test]
+fn matlab_models_equal_the_json_ones() {
+    for name in [
+        "2-factor/nominal",
+        "2-factor/controller",
+        "2-factor/right",
+        "2-factor/left",
+        "4-identify/deviation",
+        "4-identify/direct",
+        "5-recombine/hansen",
+        "6-reduce/hansen_reduced",
+    ] {
+        let path = demo().join(name);
+        let text = fs::read_to_string(path.with_extension("json")).expect("readable");
+        let model: ModelFile = serde_json::from_str(&text).expect("a model");
+        let system = model.system().expect("shapes that fit");
+        let variables = read_mat(path.with_extension("mat")).expect("a MATLAB file");
+        for (variable, matrix) in [("a", system.a()), ("b", system.b()), ("c", system.c()), ("d", system.d())] {
+            assert_eq!(variables.matrix(variable).expect("there").as_ref(), matrix, "{name}: {variable}");
+        }
+        assert_eq!(variables.scalar("ts").expect("there"), system.time().ts());
+        assert_eq!(model.provenance.seed, Some(1));
+    }
+}
+
+#[test]
+fn report_needs_no_network() {
+    let page = fs::read_to_string(demo().join("report.html")).expect("readable");
+    for loading in ["src=\"http", "href=\"http", "url(http", "@import", "fetch(", "XMLHttpRequest"] {
+        assert!(!page.contains(loading), "{loading}");
+    }
+    let known = ["http://www.w3.org/", "https://github.com/leeoniya/uPlot"];
+    let addresses = page.match_indices("http").map(|(at, _)| &page[at..]);
+    for address in addresses.filter(|a| a.starts_with("http://") || a.starts_with("https://")) {
+        let shown: String = address.chars().take(60).collect();
+        assert!(known.iter().any(|k| address.starts_with(k)), "{shown}");
+    }
+}
+
+#[test]
+fn signals_read_back() {
+    let folder = empty_folder("signals");
+    let toml = demo().join("run.toml");
+    let found = youla(&folder, &["signals", toml.to_str().expect("UTF-8"), "--out", "deep/csv"]);
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    assert!(found.stdout.contains("estimation.csv (20000 samples)"), "{}", found.stdout);
+    let path = folder.join("deep/csv/estimation.csv");
+    let header = fs::read_to_string(&path).expect("readable").lines().next().map(str::to_owned).expect("a header");
+    let names = ["alpha_u_h", "alpha_u_v", "beta_y_h", "beta_y_v", "eta_u_h", "eta_u_v", "epsilon_y_h", "epsilon_y_v"];
+    assert_eq!(header, format!("t,{}", names.join(",")));
+    let time = TimeSource::column("t".parse().expect("a name"));
+    let record = read_csv(&path, &names.map(ChannelSpec::named), &time, &CsvOptions::default()).expect("a record");
+    assert_eq!((record.samples(), record.time().ts()), (20_000, 2e-4));
+    // Nothing but alpha drives the simulated loop, and all samples are there from rest on.
+    let (alpha, eta) = (record.column("alpha_u_h").expect("there"), record.column("eta_u_h").expect("there"));
+    assert!(alpha.iter().zip(eta).all(|(a, e)| (a - e).abs() < 1e-6));
+}

@@ -1,0 +1,9 @@
+//! The program as users run it: what it writes, what it prints, and what it says about input that it cannot use.
+
+mod bad_output;
+mod bad_problem;
+mod bad_records;
+mod bad_settings;
+mod common;
+mod contract;
+mod verbs;

@@ -1,0 +1,70 @@
+//! Verbs, help and what is printed where.
+
+use crate::common::{demo, empty_folder, loop_folder, youla};
+use std::fs;
+
+#[test]
+fn without_arguments_help_is_shown() {
+    let found = youla(&empty_folder("help"), &[]);
+    assert_eq!(found.code, Some(2));
+    assert!(found.stderr.contains("Usage: youla") && found.stderr.contains("identify run.toml"), "{}", found.stderr);
+    assert_eq!(found.stdout, "");
+}
+
+#[test]
+fn every_verb_has_an_example() {
+    let folder = empty_folder("help-verbs");
+    for verb in ["demo", "identify", "signals", "report"] {
+        let found = youla(&folder, &[verb, "--help"]);
+        assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""), "{verb}");
+        assert!(found.stdout.contains(&format!("Example:\n  youla {verb}")), "{}", found.stdout);
+    }
+    let found = youla(&folder, &["--help"]);
+    assert!(found.stdout.contains("Examples:") && found.stdout.contains("Exit codes: 0 done, 2"), "{}", found.stdout);
+}
+
+#[test]
+fn wrong_arguments_end_with_code_two() {
+    let folder = loop_folder("arguments", &[]);
+    let cases: [(&[&str], &str); 4] = [
+        (&["identfy"], "identify"),
+        (&["identify"], "RUN.TOML"),
+        (&["identify", "run.toml", "--force"], "--out"),
+        (&["identify", "run.toml", "--quiet", "--json"], "cannot be used with"),
+    ];
+    for (arguments, evidence) in cases {
+        let found = youla(&folder, arguments);
+        assert_eq!((found.code, found.stdout.as_str()), (Some(2), ""), "{arguments:?}");
+        assert!(found.stderr.contains(evidence), "{}", found.stderr);
+    }
+}
+
+#[test]
+fn piped_output_is_a_plain_table() {
+    let folder = loop_folder("table", &[]);
+    for number in ["001", "002"] {
+        let found = youla(&folder, &["identify", "run.toml"]);
+        assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""), "no progress where nobody looks");
+        assert!(!found.stdout.contains('\u{1b}') && !found.stdout.contains('\r'));
+        for text in ["nominal G(0)", "direct N4SID", "Hansen G(S)", "rest, y", "order", "stabilised by K"] {
+            assert!(found.stdout.contains(text), "{text} is not in: {}", found.stdout);
+        }
+        let run = format!("runs/loop-{number}");
+        assert!(found.stdout.contains(&run) && folder.join(run).join("report.html").is_file());
+    }
+}
+
+#[test]
+fn report_draws_again() {
+    let folder = empty_folder("redraw");
+    fs::copy(demo().join("report.json"), folder.join("report.json")).expect("copied");
+    let found = youla(&folder, &["report", "."]);
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    assert_eq!(found.stdout.trim(), "./report.html");
+    let page = || fs::read_to_string(folder.join("report.html")).expect("readable");
+    let (first, original) = (page(), fs::read_to_string(demo().join("report.html")).expect("readable"));
+    // Numbers in report.json are rounded already, so that a last digit on the page may round the other way.
+    assert!(first.len().abs_diff(original.len()) < 1000 && first[..2000] == original[..2000]);
+    assert_eq!(youla(&folder, &["report", "."]).code, Some(0));
+    assert!(page() == first, "the same data give the same page");
+}

@@ -1,0 +1,24 @@
+//! The report of a finished run, drawn again from its data.
+
+use super::folder::replace_file;
+use crate::record::open;
+use crate::report::{ReportData, html};
+use crate::{Error, Result};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+
+/// Draws `report.html` of a run folder again from its `report.json` and returns its path.
+///
+/// # Errors
+/// [`Error::MissingFile`] where there is no `report.json`, [`Error::NotAReport`] where it is of another kind,
+/// [`Error::Io`]; the old report stays then.
+pub fn redraw(run: &Path) -> Result<PathBuf> {
+    let data = run.join("report.json");
+    let mut text = String::new();
+    open(&data)?.read_to_string(&mut text).map_err(|source| Error::Io { path: data.clone(), source })?;
+    let report: ReportData =
+        serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })?;
+    let path = run.join("report.html");
+    replace_file(&path, &html(&report)?)?;
+    Ok(path)
+}

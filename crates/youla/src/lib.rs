@@ -19,7 +19,7 @@
 //! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, simulation |
 //! | [`record`] | labelled, clocked data; CSV, MATLAB and NumPy files; spectra; excitation signals |
 //! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops |
-//! | [`rig`] | the gas bearing of the paper |
+//! | [`rig`] | the gas bearing of the paper, its digital twin with sensors, actuators and rotation, and experiments on it |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
 //! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it |
 //! | [`reduce`] | balanced truncation and singular perturbation |

@@ -21,7 +21,7 @@
 //! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops |
 //! | [`rig`] | the gas bearing of the paper, its digital twin with sensors, actuators and rotation, and experiments on it |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
-//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it |
+//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it; grey-box prediction error |
 //! | [`reduce`] | balanced truncation and singular perturbation |
 //! | [`validate`] | fit, variance accounted for, loop certificate, prediction of fresh data |
 //! | [`report`] | results as data and as one offline page |

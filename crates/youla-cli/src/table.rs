@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use youla::run::Identification;
+use youla::run::{Identification, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
@@ -10,6 +10,9 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     text += &aligned(&rows(found));
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
+    }
+    for caution in cautions(found) {
+        let _ = write!(text, "\ncaution: {caution}");
     }
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
     text
@@ -19,7 +22,8 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
 fn rows(found: &Identification) -> Vec<Vec<String>> {
     let models = &found.verdict.models;
     let row = |label: &str, cells: Vec<String>| [vec![label.to_owned()], cells].concat();
-    let mut rows = vec![row("fit (26), percent", models.iter().map(|v| v.method.label().into()).collect())];
+    let corner = if found.records.verification.is_empty() { "model" } else { "fit (26), percent" };
+    let mut rows = vec![row(corner, models.iter().map(|v| v.method.label().into()).collect())];
     for (k, record) in found.records.verification.iter().enumerate() {
         for (i, output) in found.records.outputs.iter().enumerate() {
             // A model that nearly diverges has a fit that no column holds.

@@ -12,6 +12,13 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
         .collect()
 }
 
+/// What speaks against the result or asks for a look, in sentences: for a terminal that shows no report.
+pub fn cautions(found: &Identification) -> Vec<String> {
+    let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
+    let lines = verdict_lines(found).into_iter().map(|v| weigh(v.status, v.text));
+    lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten().collect()
+}
+
 /// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.
 pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let mut all = Vec::new();

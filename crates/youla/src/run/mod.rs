@@ -21,6 +21,7 @@ mod write;
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use demo::{Demo, demo};
 pub use factorise::{Factorisation, factorise, factorise_run};
+pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};
 pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
 pub use page::page;

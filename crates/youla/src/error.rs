@@ -193,7 +193,7 @@ pub enum Error {
         rcond: f64,
     },
     /// The controller does not stabilise the model that it was combined with.
-    #[error("the controller does not stabilise {model}: the closed loop has the pole {}; check its coefficients, the sign convention (feedback = \"negative\" or \"positive\"), the sample time, the units of the channels, and the nominal model itself", Pole(*pole))]
+    #[error("the controller does not stabilise {model}: the closed loop has the pole {}; check the sign convention (feedback = \"negative\" or \"positive\"), the coefficients, the sample time, the units of the channels and the nominal model", Pole(*pole))]
     NotStabilising {
         /// Which model, in the words of the user.
         model: String,

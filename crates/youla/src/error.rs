@@ -539,6 +539,16 @@ pub struct TextPosition {
     pub column: usize,
 }
 
+impl TextPosition {
+    /// The place of byte `offset` of a text; columns count characters. An offset that is no place of the text is its
+    /// end.
+    pub(crate) fn of(text: &str, offset: usize) -> Self {
+        let before = text.get(..offset).unwrap_or(text);
+        let line = before.matches('\n').count() + 1;
+        TextPosition { line, column: before.rsplit('\n').next().unwrap_or_default().chars().count() + 1 }
+    }
+}
+
 /// `:line:column` where they are known.
 fn position(at: Option<TextPosition>) -> String {
     at.map_or(String::new(), |p| format!(":{}:{}", p.line, p.column))

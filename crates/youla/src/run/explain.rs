@@ -28,10 +28,7 @@ pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path) -> Error
 
 /// An error at a position of the text, line and column counted from 1 in characters.
 pub(super) fn problem_at(path: &Path, text: &str, start: usize, problem: String) -> Error {
-    let before = &text[..start];
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
-    Error::Settings { path: path.to_owned(), at: Some(TextPosition { line, column }), problem }
+    Error::Settings { path: path.to_owned(), at: Some(TextPosition::of(text, start)), problem }
 }
 
 /// Where the parser stopped.

@@ -92,7 +92,7 @@ pub enum NominalModel {
 }
 
 impl NominalModel {
-    /// The discrete-time nominal model at the sample time of the data, with balanced states where it was continuous.
+    /// The discrete-time nominal model at the sample time of the data, in the states in which it was given.
     ///
     /// # Errors
     /// Whatever is wrong with the matrices, polynomials or file.
@@ -115,11 +115,7 @@ impl NominalModel {
                 let d = d.as_ref().map_or_else(|| Ok(Mat::zeros(c.nrows(), b.ncols())), |d| matrix("D", d))?;
                 sampled([a, b, c, d], *domain, time)
             }
-            NominalModel::MatFile { file, domain } => {
-                let file = folder.join(file);
-                check_clock(&file, *domain, time)?;
-                sampled(abcd_of(&file)?, *domain, time)
-            }
+            NominalModel::MatFile { file, domain } => mat_model(&folder.join(file), *domain, time),
             NominalModel::Bearing { parameters, a_factor, b_factor } => {
                 degraded(&parameters.plant()?, *a_factor, *b_factor)?.zoh(time)
             }
@@ -227,11 +223,7 @@ impl ControllerSettings {
                 let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
                 (feedback, StateSpace::new(a, b, c, d, time)?)
             }
-            Self::MatFile { feedback, file } => {
-                let file = folder.join(file);
-                check_clock(&file, Domain::Discrete, time)?;
-                (feedback, sampled(abcd_of(&file)?, Domain::Discrete, time)?)
-            }
+            Self::MatFile { feedback, file } => (feedback, mat_model(&folder.join(file), Domain::Discrete, time)?),
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
@@ -249,23 +241,20 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
     }
 }
 
-/// A discrete-time model whose file states a sample time `ts` must have that of the data.
-fn check_clock(file: &Path, domain: Domain, time: Discrete) -> Result<()> {
+/// Variables `a`, `b`, `c`, `d` of a MATLAB file. A discrete-time model whose file states a sample time `ts` must have that
+/// of the data.
+fn mat_model(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
     let variables = read_mat(file)?;
-    let stated = variables.variables().iter().any(|v| v.name == "ts");
-    if domain == Domain::Continuous || !stated {
-        return Ok(());
+    if domain == Domain::Discrete && variables.variables().iter().any(|v| v.name == "ts") {
+        let ts = variables.scalar("ts")?;
+        let agrees = (ts / time.ts() - 1.0).abs() < 1e-6;
+        if !agrees {
+            let what = format!("{} and the data", file.display());
+            return Err(Error::SampleTimeMismatch { what, left: ts, right: time.ts() });
+        }
     }
-    let ts = variables.scalar("ts")?;
-    if (ts / time.ts() - 1.0).abs() < 1e-6 {
-        return Ok(());
-    }
-    Err(Error::SampleTimeMismatch { what: format!("{} and the data", file.display()), left: ts, right: time.ts() })
-}
-
-fn abcd_of(file: &Path) -> Result<[Mat<f64>; 4]> {
-    let variables = read_mat(file)?;
-    Ok([variables.matrix("a")?, variables.matrix("b")?, variables.matrix("c")?, variables.matrix("d")?])
+    let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| variables.matrix(name));
+    sampled([a?, b?, c?, d?], domain, time)
 }
 
 fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {

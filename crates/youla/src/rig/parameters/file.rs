@@ -17,15 +17,12 @@ pub(super) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
 /// Turns the parser's error into one sentence.
 fn in_words(error: &toml::de::Error, text: &str, path: &Path) -> Error {
     let offset = error.span().map_or(0, |s| s.start.min(text.len()));
-    let before = &text[..offset];
-    let line = before.matches('\n').count() + 1;
-    let column = before.rsplit('\n').next().unwrap_or_default().chars().count() + 1;
     let message = error.message();
     let problem = nearest_name(message).unwrap_or_else(|| match key_at(text, offset) {
         Some(key) => format!("{key}: {message}"),
         None => message.to_owned(),
     });
-    Error::Settings { path: path.to_owned(), at: Some(TextPosition { line, column }), problem }
+    Error::Settings { path: path.to_owned(), at: Some(TextPosition::of(text, offset)), problem }
 }
 
 /// For a key or choice that is not known, the known one that is spelt most like it.

@@ -78,6 +78,10 @@ pub struct Source {
 pub enum Role {
     /// The model known before.
     Nominal,
+    /// Prediction error from the nominal model.
+    Pem,
+    /// Prediction error from several starts.
+    PemMultiStart,
     /// Identified from u and y directly.
     Direct,
     /// Identified by the Hansen scheme.
@@ -108,6 +112,16 @@ impl Method {
     /// `nominal`: the model known before.
     pub fn nominal() -> Self {
         Self::new("nominal", "nominal G(0)", Role::Nominal)
+    }
+
+    /// `pem`: grey-box prediction error, started at the nominal model.
+    pub fn pem() -> Self {
+        Self::new("pem", "PEM", Role::Pem)
+    }
+
+    /// `pem_multi_start`: the same from several starts.
+    pub fn pem_multi_start() -> Self {
+        Self::new("pem_multi_start", "PEM, several starts", Role::PemMultiStart)
     }
 
     /// `direct`: N4SID on u and y.

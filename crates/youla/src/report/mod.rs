@@ -10,17 +10,23 @@
 //! | `trace` | one drawn curve over time and the clock it refers to |
 //! | `decimate` | minimum and maximum per bucket |
 //! | `phase` | the branch on which a phase is drawn |
+//! | `figure` | a figure as data |
+//! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `html` | template, data and library put into one file |
 
 pub mod data;
 mod decimate;
+pub mod figure;
 mod html;
 mod numbers;
 mod phase;
+pub mod story;
 mod tables;
 pub mod trace;
 
 pub use data::ReportData;
+pub use figure::Figure;
 pub use html::html;
+pub use story::Story;
 pub use trace::{Timeline, Trace};

@@ -227,6 +227,49 @@ pub enum Error {
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
+    // ---- the study ---------------------------------------------------------------------------------------------
+    /// No controller of a list stabilises both the nominal model and the true plant with the margin asked for.
+    #[error(
+        "none of the {tried} command weights gives a controller that stabilises both the nominal model and the true plant \
+         with a peak sensitivity of at most {limit}{}; allow a larger peak, add command weights or leave out such models",
+        lowest.map(|peak| format!(" (the lowest peak is {peak:.2})")).unwrap_or_default()
+    )]
+    NoController {
+        /// Number of weights that were tried.
+        tried: usize,
+        /// Largest peak of the output sensitivity that counts as stabilised.
+        limit: f64,
+        /// Lowest peak of those that stabilise both.
+        lowest: Option<f64>,
+    },
+    /// A results file is not one.
+    #[error("{} is not a results file of this version of the program; remove it or choose another folder", path.display())]
+    NotResults {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Another process writes to a file.
+    #[error("{}: another process is writing to it", path.display())]
+    InUse {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A results folder belongs to other settings.
+    #[error("{} holds results of other settings: {difference}; choose another folder or remove it", path.display())]
+    OtherSettings {
+        /// The folder.
+        path: PathBuf,
+        /// The first difference, with both values.
+        difference: String,
+    },
+    /// Parts of a study do not make a whole.
+    #[error("{}: {problem}", path.display())]
+    Parts {
+        /// The part.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// The output folder holds something already.
     #[error("{} exists already and is not empty; choose another output folder or remove it", path.display())]
     OutputExists {

@@ -10,7 +10,7 @@
 //! Modules depend on each other in one direction only, in the order in which data flow:
 //!
 //! ```text
-//! error, units -> linalg -> lti -> record -> control -> rig -> factor -> identify -> reduce -> validate -> report -> run
+//! error, units -> linalg -> lti -> record -> control -> rig -> factor -> identify -> reduce -> validate -> study -> report -> run
 //! ```
 //!
 //! | module | holds |
@@ -24,6 +24,7 @@
 //! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it; grey-box prediction error |
 //! | [`reduce`] | balanced truncation and singular perturbation |
 //! | [`validate`] | fit, variance accounted for, loop certificate, prediction of fresh data |
+//! | [`study`] | the paper: its 500 models, its three experiments, the map of which method wins where |
 //! | [`report`] | results as data and as one offline page |
 //! | [`run`] | run.toml in, run folder out: the driver of the program |
 //!
@@ -78,6 +79,8 @@ pub mod reduce;
 pub mod report;
 pub mod rig;
 pub mod run;
+pub mod study;
+mod toml_file;
 pub mod units;
 pub mod validate;
 

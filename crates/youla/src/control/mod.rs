@@ -4,11 +4,13 @@
 mod closed_loop;
 mod kalman;
 mod lqr;
+mod margin;
 mod observer_controller;
 mod real_time;
 
 pub use closed_loop::{closed_loop, with_input_port};
 pub use kalman::{NoiseCovariance, ObserverGain, kalman};
 pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
+pub use margin::peak_sensitivity;
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;

@@ -1,7 +1,6 @@
 //! Parameters of the digital twin: one TOML file, every value with its unit and its basis.
 
 mod check;
-mod file;
 mod quantity;
 
 pub use quantity::{
@@ -207,7 +206,7 @@ impl RigParameters {
     /// [`Error::Settings`] with line, column and key for an unknown or missing key and for a wrong unit;
     /// [`Error::OutOfRange`] for a value without meaning.
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let parameters: Self = file::parse(text, path)?;
+        let parameters: Self = crate::toml_file::parse(text, path)?;
         parameters.check()?;
         Ok(parameters)
     }

@@ -1,4 +1,4 @@
-//! The parameter file as text: errors with line, column and key, and the nearest known name for a misspelt one.
+//! A file of settings as text: errors with line, column and key, and the nearest known name for a misspelt one.
 
 use crate::error::TextPosition;
 use crate::{Error, Result};
@@ -6,11 +6,11 @@ use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
 
-/// Reads the text of a parameter file; `path` is named in errors.
+/// Reads the text of a settings file; `path` is named in errors.
 ///
 /// # Errors
 /// [`Error::Settings`].
-pub(super) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
+pub(crate) fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
     toml::from_str(text).map_err(|e| in_words(&e, text, path))
 }
 

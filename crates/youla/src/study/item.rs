@@ -1,0 +1,234 @@
+//! One nominal model: its controller, its loop, identification by every method, verification without noise.
+
+use super::controller::{Design, design};
+use super::method::Method;
+use super::row::{Row, Status};
+use super::settings::PaperSettings;
+use crate::control::closed_loop;
+use crate::identify::direct::direct;
+use crate::identify::greybox::{BearingStructure, GreyBoxModel, greybox};
+use crate::identify::hansen::{HansenModel, hansen};
+use crate::identify::subspace;
+use crate::linalg::block;
+use crate::lti::{Discrete, StateSpace, simulate};
+use crate::record::{Excitation, SquareWaves};
+use crate::reduce::reduce;
+use crate::rig::Bearing;
+use crate::validate::fit;
+use crate::{Error, Mat, Result};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use std::time::{Duration, Instant};
+
+/// What distinguishes one loop from another.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Item {
+    /// Number, from 0.
+    pub index: usize,
+    /// First of two random streams of this item: estimation and verification.
+    pub stream: u64,
+    /// Degradation of the nominal model: `A_model = (1 - theta) A`, eq. (27).
+    pub theta: f64,
+    /// Output noise, um rms.
+    pub noise: f64,
+    /// Weights of the command that may be tried, in order.
+    pub command_weights: Vec<f64>,
+}
+
+/// The rows of an item, and how long each took.
+#[derive(Debug, Clone)]
+pub struct Evaluated {
+    /// The nominal model, then the methods in the order of the settings.
+    pub rows: Vec<Row>,
+    /// Design and simulation, then as `rows`.
+    pub durations: Vec<Duration>,
+}
+
+/// Runs one loop around the bearing `truth` and identifies it by every method.
+///
+/// The data are those of the linear rig at rest: the plant behind a zero-order hold, white noise on the outputs. Models are
+/// held against a second record without noise, from rest, by the fit (26). A method that finds no model, or an unstable one,
+/// is an outcome.
+///
+/// # Errors
+/// [`Error::NoController`]; [`Error::OutOfRange`] for settings without meaning.
+pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSettings) -> Result<Evaluated> {
+    let mut clock = Laps::start();
+    // theta = 1 would leave nothing of A.
+    let a_factor = (1.0 - item.theta).max(f64::EPSILON);
+    let nominal = crate::rig::degraded(&truth.plant()?, a_factor, 1.0)?.zoh(time)?;
+    let plant = truth.plant()?.zoh(time)?;
+    let design = design(&nominal, &plant, &item.command_weights, &settings.controller)?;
+    let (samples, verification_samples) = (settings.study.samples, settings.study.verification_samples);
+    let estimation = record(&design, &plant, samples, item.noise, settings, item.stream)?;
+    let verification = record(&design, &plant, verification_samples, 0.0, settings, item.stream + 1)?;
+    clock.lap();
+    let loop_data = LoopData { design: &design, estimation, verification, start: truth.degraded(a_factor, 1.0)? };
+    let methods =
+        [Method::Nominal].into_iter().chain(settings.methods.iter().copied().filter(|m| *m != Method::Nominal));
+    let rows = methods
+        .map(|method| {
+            let row = loop_data.row(item, method, settings);
+            clock.lap();
+            row
+        })
+        .collect();
+    Ok(Evaluated { rows, durations: clock.laps })
+}
+
+/// Seconds of one part after the other.
+struct Laps {
+    last: Instant,
+    laps: Vec<Duration>,
+}
+
+impl Laps {
+    fn start() -> Self {
+        Laps { last: Instant::now(), laps: Vec::new() }
+    }
+
+    fn lap(&mut self) {
+        let now = Instant::now();
+        self.laps.push(now - self.last);
+        self.last = now;
+    }
+}
+
+/// A record of the loop, from rest.
+struct LoopRecord {
+    u: Mat<f64>,
+    y: Mat<f64>,
+}
+
+fn record(
+    design: &Design,
+    plant: &StateSpace<Discrete>,
+    samples: usize,
+    noise: f64,
+    settings: &PaperSettings,
+    stream: u64,
+) -> Result<LoopRecord> {
+    let alpha = excitation(&settings.study.excitation, samples, plant.time(), settings.seed, 2 * stream)?;
+    let mut rng = generator(settings.seed, 2 * stream + 1);
+    let n = Mat::from_fn(samples, 2, |_, _| noise * rng.sample::<f64, _>(StandardNormal));
+    let closed = closed_loop(plant, &design.factors.j_k()?)?;
+    let driving = block(&[&[alpha.as_ref(), n.as_ref()]]);
+    let z = simulate(&closed, driving.as_ref(), &vec![0.0; closed.order()])?;
+    Ok(LoopRecord { u: z.subcols(0, 2).to_owned(), y: z.subcols(2, 2).to_owned() })
+}
+
+/// alpha from its own random stream.
+pub(super) fn excitation(
+    waves: &SquareWaves,
+    samples: usize,
+    time: Discrete,
+    seed: u64,
+    stream: u64,
+) -> Result<Mat<f64>> {
+    Excitation::SquareWaves(waves.clone()).generate(samples, 2, time, &mut generator(seed, stream))
+}
+
+/// The generator of one stream.
+pub(super) fn generator(seed: u64, stream: u64) -> ChaCha8Rng {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    rng.set_stream(stream);
+    rng
+}
+
+struct LoopData<'a> {
+    design: &'a Design,
+    estimation: LoopRecord,
+    verification: LoopRecord,
+    start: Bearing,
+}
+
+/// A model and the steps of the search that led to it.
+struct Found {
+    model: StateSpace<Discrete>,
+    steps: Option<usize>,
+}
+
+impl LoopData<'_> {
+    fn row(&self, item: &Item, method: Method, settings: &PaperSettings) -> Row {
+        let judged = self.identify(method, settings).and_then(|found| {
+            let stable = found.model.is_stable()?;
+            Ok((if stable { Status::Stable } else { Status::Unstable }, self.fit_of(&found.model)?, found.steps))
+        });
+        let (status, fit, steps, reason) = match judged {
+            Ok((status, fit, steps)) => (status, fit, steps, String::new()),
+            Err(e) => (Status::Refused, [f64::NAN; 2], None, e.to_string()),
+        };
+        Row {
+            item: item.index,
+            theta: item.theta,
+            noise: item.noise,
+            command_weight: self.design.command_weight,
+            peak_nominal: self.design.peak_nominal,
+            peak_plant: self.design.peak_plant,
+            method,
+            status,
+            fit,
+            steps,
+            reason,
+        }
+    }
+
+    fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found> {
+        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
+        let time = self.design.factors.nominal().time();
+        let black_box = |model| Found { model, steps: None };
+        match method {
+            Method::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
+            Method::Pem => self.pem(&self.start, settings).map(grey_box),
+            Method::PemMultiStart => self.best_pem(settings).map(grey_box),
+            Method::Direct => Ok(black_box(direct(&experiment, time, &settings.direct)?.model)),
+            Method::Hansen => Ok(black_box(self.hansen(settings)?.plant)),
+            Method::HansenReduced => Ok(black_box(reduce(&self.hansen(settings)?.plant, &settings.reduction)?.model)),
+        }
+    }
+
+    fn pem(&self, start: &Bearing, settings: &PaperSettings) -> Result<GreyBoxModel> {
+        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
+        let time = self.design.factors.nominal().time();
+        greybox(&BearingStructure, &BearingStructure::parameters(start), &experiment, time, &settings.pem)
+    }
+
+    /// The lowest criterion over all starts; a start from which nothing is found is left out.
+    fn best_pem(&self, settings: &PaperSettings) -> Result<GreyBoxModel> {
+        let mut best = self.pem(&self.start, settings);
+        for factor in &settings.experiments.start_factors {
+            let found = self.start.degraded(*factor, 1.0).and_then(|start| self.pem(&start, settings));
+            let better = match (&found, &best) {
+                (Ok(found), Ok(best)) => found.cost < best.cost,
+                (found, _) => found.is_ok(),
+            };
+            if better {
+                best = found;
+            }
+        }
+        best
+    }
+
+    fn hansen(&self, settings: &PaperSettings) -> Result<HansenModel> {
+        let signals = self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref())?;
+        hansen(&self.design.factors, &[signals], &settings.hansen)
+    }
+
+    /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
+    fn fit_of(&self, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
+        let LoopRecord { u, y } = &self.verification;
+        match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
+            Ok(predicted) => {
+                let percent = fit(y.as_ref(), predicted.as_ref())?;
+                Ok([percent[0], percent[1]])
+            }
+            Err(Error::Diverged { .. }) => Ok([f64::NEG_INFINITY; 2]),
+            Err(e) => Err(e),
+        }
+    }
+}
+
+fn grey_box(found: GreyBoxModel) -> Found {
+    Found { model: found.model, steps: Some(found.iterations) }
+}

@@ -1,0 +1,159 @@
+//! One line of a results file: one nominal model by one method, with a check of its own.
+
+use super::method::Method;
+use sha2::{Digest, Sha256};
+
+/// What became of an identification.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Status {
+    /// A stable model.
+    Stable,
+    /// An unstable model.
+    Unstable,
+    /// No model; the reason stands beside.
+    Refused,
+    /// No loop: no weight of the command stabilises nominal model and plant with the margin.
+    NoController,
+}
+
+impl Status {
+    const ALL: [(Status, &'static str); 4] = [
+        (Status::Stable, "stable"),
+        (Status::Unstable, "unstable"),
+        (Status::Refused, "refused"),
+        (Status::NoController, "no-controller"),
+    ];
+
+    fn word(self) -> &'static str {
+        Status::ALL.iter().find(|(status, _)| *status == self).map_or("", |(_, word)| word)
+    }
+}
+
+/// The result of one method on one loop.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Row {
+    /// Number of the loop, from 0.
+    pub item: usize,
+    /// Degradation of the nominal model, eq. (27).
+    pub theta: f64,
+    /// Output noise, um rms.
+    pub noise: f64,
+    /// Weight of the command in the design of the controller, per V^2.
+    pub command_weight: f64,
+    /// Peak of the output sensitivity with the nominal model.
+    pub peak_nominal: f64,
+    /// Peak of the output sensitivity with the true plant.
+    pub peak_plant: f64,
+    /// The method.
+    pub method: Method,
+    /// What became of it.
+    pub status: Status,
+    /// Fit (26) on the noise-free record, percent, horizontal and vertical; NaN without a model, minus infinity where the
+    /// model's output leaves the range of the numbers.
+    pub fit: [f64; 2],
+    /// Steps of a search.
+    pub steps: Option<usize>,
+    /// Why there is no model.
+    pub reason: String,
+}
+
+impl Row {
+    /// The first line of a results file.
+    pub const HEADER: &str = "item,theta,noise_um,command_weight,peak_nominal,peak_plant,method,status,\
+                              fit_horizontal,fit_vertical,steps,reason,check";
+
+    /// The fit of the worse axis.
+    pub fn worse_fit(&self) -> f64 {
+        self.fit[0].min(self.fit[1])
+    }
+
+    /// The line of the file, without its end. Numbers are written such that they read back bit by bit; `check` is the
+    /// beginning of the SHA-256 of what stands before it.
+    pub fn line(&self) -> String {
+        let reason: String = self.reason.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect();
+        let text = format!(
+            "{},{},{},{},{},{},{},{},{},{},{},{}",
+            self.item,
+            self.theta,
+            self.noise,
+            self.command_weight,
+            self.peak_nominal,
+            self.peak_plant,
+            self.method.key(),
+            self.status.word(),
+            self.fit[0],
+            self.fit[1],
+            self.steps.map_or_else(String::new, |steps| steps.to_string()),
+            reason,
+        );
+        let check = check(&text);
+        format!("{text},{check}")
+    }
+
+    /// Reads a line; `None` where it is damaged.
+    pub fn parse(line: &str) -> Option<Row> {
+        let (text, found) = line.rsplit_once(',')?;
+        if check(text) != found {
+            return None;
+        }
+        let fields: Vec<&str> = text.split(',').collect();
+        let [item, theta, noise, weight, peak_nominal, peak_plant, method, status, h, v, steps, reason] =
+            fields.as_slice().try_into().ok()?;
+        Some(Row {
+            item: str::parse(item).ok()?,
+            theta: str::parse(theta).ok()?,
+            noise: str::parse(noise).ok()?,
+            command_weight: str::parse(weight).ok()?,
+            peak_nominal: str::parse(peak_nominal).ok()?,
+            peak_plant: str::parse(peak_plant).ok()?,
+            method: Method::of_key(method)?,
+            status: Status::ALL.iter().find(|(_, word)| *word == status)?.0,
+            fit: [str::parse(h).ok()?, str::parse(v).ok()?],
+            steps: if steps.is_empty() { None } else { Some(str::parse(steps).ok()?) },
+            reason: str::to_owned(reason),
+        })
+    }
+}
+
+fn check(text: &str) -> String {
+    Sha256::digest(text.as_bytes()).iter().take(4).map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn row() -> Row {
+        Row {
+            item: 7,
+            theta: 0.1 + 0.2,
+            noise: 0.2,
+            command_weight: 1e9,
+            peak_nominal: 1.5,
+            peak_plant: f64::INFINITY,
+            method: Method::Pem,
+            status: Status::Unstable,
+            fit: [f64::NEG_INFINITY, -1.0 / 3.0],
+            steps: Some(25),
+            reason: "a, b\nc".into(),
+        }
+    }
+
+    #[test]
+    fn a_line_reads_back_bit_by_bit() {
+        let expected = Row { reason: "a; b;c".into(), ..row() };
+        assert_eq!(Row::parse(&row().line()), Some(expected));
+        assert_eq!(row().line().split(',').count(), Row::HEADER.split(',').count());
+    }
+
+    #[test]
+    fn any_change_of_a_character_is_seen() {
+        let line = row().line();
+        for at in 0..line.len() {
+            let mut bytes = line.clone().into_bytes();
+            bytes[at] = if bytes[at] == b'7' { b'8' } else { b'7' };
+            assert_eq!(Row::parse(&String::from_utf8(bytes).unwrap()), None, "character {at}");
+            assert_eq!(Row::parse(&line[..at]), None);
+        }
+    }
+}

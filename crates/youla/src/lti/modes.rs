@@ -57,25 +57,8 @@ fn mode<T: TimeDomain>(time: T, pole: c64) -> Mode {
 mod tests {
     use super::*;
     use crate::linalg::eye;
-    use crate::lti::{Continuous, Discrete, bearing};
+    use crate::lti::{Continuous, Discrete};
     use faer::Mat;
-
-    fn check_bearing<T: TimeDomain>(system: &StateSpace<T>) {
-        // Actuator poles 150.0 and 157.4 Hz, rigid modes 209.7 Hz (zeta 0.102) and 217.6 Hz (zeta 0.082).
-        let modes = system.modes().unwrap();
-        assert_eq!(modes.len(), 4);
-        for (mode, (hz, zeta)) in modes.iter().zip([(150.0, 1.0), (157.4, 1.0), (209.7, 0.102), (217.6, 0.082)]) {
-            assert!((mode.hz - hz).abs() < 0.05, "{mode:?}");
-            assert!((mode.zeta - zeta).abs() < 5e-4, "{mode:?}");
-        }
-    }
-
-    #[test]
-    fn bearing_has_its_published_modes_in_both_domains() {
-        let plant = bearing();
-        check_bearing(&plant);
-        check_bearing(&plant.zoh(Discrete::new(2e-4).unwrap()).unwrap());
-    }
 
     #[test]
     fn boundary_and_unstable_poles_have_modes() {

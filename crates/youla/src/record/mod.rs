@@ -24,10 +24,13 @@ mod values;
 pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
-pub use excitation::{Chirp, Excitation, Multisine, Prbs, SquareWaves};
+pub use excitation::{
+    Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,
+    RampedExcitation, SquareWaves, describe_excitation,
+};
 pub use matfile::{Packing, read_mat, write_mat};
 pub use npz::read_npz;
-pub use persistency::{Persistency, persistency};
+pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, sha256};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};

@@ -81,6 +81,34 @@ pub fn persistency(signal: MatRef<f64>, block_rows: usize) -> Result<Persistency
     Ok(Persistency { block_rows, rank, needed, condition, singular_values: values })
 }
 
+/// The largest order, up to `highest`, of which `signal` (samples x m) is persistently exciting: the largest s for which
+/// its block-Hankel matrix with s block rows has rank s m. A signal of order s is of every lower order, so the search
+/// halves; it decides the rank as [`persistency`] does. Zero where a channel is zero.
+///
+/// k sines are of order 2 k. Where they crowd in a small part of the band, rounding leaves less: the order is what a
+/// computation in double precision can use.
+///
+/// # Errors
+/// [`Error::NotFinite`], [`Error::NoConvergence`] of the singular values.
+///
+/// ```
+/// use youla::{Mat, record::persistency_order};
+/// let sine = Mat::from_fn(500, 1, |k, _| (k as f64 * 0.3).sin());
+/// assert_eq!(persistency_order(sine.as_ref(), 10)?, 2);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn persistency_order(signal: MatRef<f64>, highest: usize) -> Result<usize> {
+    check_finite("the excitation", signal)?;
+    // A matrix with fewer columns, samples - s + 1, than rows, s m, has not got the rank.
+    let (mut reached, mut beyond) = (0, highest.min((signal.nrows() + 1) / (signal.ncols() + 1)) + 1);
+    while beyond - reached > 1 {
+        let middle = reached.midpoint(beyond);
+        let found = persistency(signal, middle)?;
+        *(if found.rank == found.needed { &mut reached } else { &mut beyond }) = middle;
+    }
+    Ok(reached)
+}
+
 /// Channels with a root mean square of one; a channel of zeros stays.
 fn unit_channels(signal: MatRef<f64>) -> Mat<f64> {
     let rms = |j: usize| signal.col(j).norm_l2() / (signal.nrows() as f64).sqrt();

@@ -76,22 +76,4 @@ mod tests {
         assert!((fit(y.as_ref(), offset.as_ref()).unwrap()[0] - 50.0).abs() < 1e-12);
         assert!((vaf(y.as_ref(), offset.as_ref()).unwrap()[0] - 100.0).abs() < 1e-12);
     }
-
-    /// All entries of B times 0.7 give exactly 70 % without noise, whatever the input.
-    #[test]
-    fn gain_error_of_the_bearing() {
-        let plant = crate::rig::Bearing::default().plant().unwrap();
-        let time = crate::lti::Discrete::new(2e-4).unwrap();
-        let weak = crate::rig::degraded(&plant, 1.0, 0.7).unwrap().zoh(time).unwrap();
-        let u = Mat::from_fn(3000, 2, |k, j| if (k / (40 + 13 * j)) % 2 == 0 { 0.5 } else { -0.5 });
-        let run = |s: &crate::lti::StateSpace<_>| crate::lti::simulate(s, u.as_ref(), &[0.0; 6]).unwrap();
-        let (y, yp) = (run(&plant.zoh(time).unwrap()), run(&weak));
-        for (j, percent) in fit(y.as_ref(), yp.as_ref()).unwrap().into_iter().enumerate() {
-            // (26) measures the spread about the mean, which is nearly zero here.
-            let mean = y.col(j).iter().sum::<f64>() / 3000.0;
-            let spread = (y.col(j).squared_norm_l2() - 3000.0 * mean * mean).sqrt();
-            let exact = 100.0 * (1.0 - 0.3 * y.col(j).norm_l2() / spread);
-            assert!((percent - exact).abs() < 1e-9 && (percent - 70.0).abs() < 1.0, "{percent} against {exact}");
-        }
-    }
 }

@@ -4,9 +4,9 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, with_input_port};
 use youla::factor::CoprimeFactors;
-use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};
+use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response, simulate};
 use youla::rig::Bearing;
 use youla::{Mat, MatRef, c64};
 
@@ -122,4 +122,47 @@ pub(crate) fn spectrum_distance(mut x: Vec<c64>, mut y: Vec<c64>) -> f64 {
 
 pub(crate) fn relative(x: MatRef<'_, f64>, y: MatRef<'_, f64>) -> f64 {
     (x - y).norm_l2() / y.norm_l2().max(1.0)
+}
+
+/// Factors of the nominal plant whose controller also stabilises the true plant.
+pub(crate) fn stabilising_factors(
+    plant: &StateSpace<Discrete>,
+    nominal: &StateSpace<Discrete>,
+) -> CoprimeFactors<Discrete> {
+    let factors = observer_factors(nominal);
+    let controller = with_input_port(&factors.controller().unwrap()).unwrap();
+    assert!(closed_loop(plant, &controller).unwrap().is_stable().unwrap(), "the test loop is unstable");
+    factors
+}
+
+pub(crate) fn beside(x: &Mat<f64>, y: &Mat<f64>) -> Mat<f64> {
+    youla::linalg::block(&[&[x.as_ref(), y.as_ref()]])
+}
+
+/// The response from rest.
+pub(crate) fn run(s: &StateSpace<Discrete>, u: MatRef<'_, f64>) -> Mat<f64> {
+    simulate(s, u, &vec![0.0; s.order()]).unwrap()
+}
+
+/// (24): `J_G * J_K = [0 I; I 0]` from (epsilon, alpha) to (eta, beta), and the modes that this hides are those of the
+/// factors. Rounding is relative to the product of the norms of `J_G` and `J_K` at each frequency.
+pub(crate) fn check_star_product<T: TimeDomain>(
+    name: &str,
+    factors: &CoprimeFactors<T>,
+    omega: &[f64],
+    tolerance: f64,
+) {
+    let (j_g, j_k) = (factors.j_g().unwrap(), factors.j_k().unwrap());
+    let star = j_g.star(&j_k).unwrap();
+    let (m, p) = (factors.inputs(), factors.outputs());
+    let swap = Mat::from_fn(m + p, m + p, |i, j| c64::new(f64::from(j == (i + p) % (m + p)), 0.0));
+    let response = |s: &StateSpace<T>| frequency_response(s, omega).unwrap();
+    let [found, j_g, j_k] = [star.system(), j_g.system(), j_k.system()].map(response);
+    let relative = |k: usize| (found.at(k) - &swap).norm_l2() / (j_g.at(k).norm_l2() * j_k.at(k).norm_l2()).max(1.0);
+    let error = (0..omega.len()).map(relative).fold(0.0, f64::max);
+    assert!(error <= tolerance, "{name}: (24) J_G * J_K = [0 I; I 0] misses by {error:.1e}");
+    let (right, left) = (factors.right().system().poles().unwrap(), factors.left().system().poles().unwrap());
+    // Eigenvalues of a random matrix of order 40 are only as well conditioned as its eigenvectors.
+    let error = spectrum_distance(star.system().poles().unwrap(), [right, left].concat());
+    assert!(error <= 1e-6, "{name}: hidden modes of the star product miss by {error:.1e}");
 }

@@ -1,15 +1,19 @@
-//! Excitation signals, samples x channels, each channel independent of the others.
+//! Excitation signals, samples x channels, each channel independent of the others; and what a signal excites.
 //!
 //! Randomness comes from the generator that is handed in: the same seed gives the same signal.
 
 mod chirp;
 mod multisine;
 mod prbs;
+mod ramp;
+mod report;
 mod square;
 
 pub use chirp::Chirp;
 pub use multisine::Multisine;
 pub use prbs::Prbs;
+pub use ramp::RampedExcitation;
+pub use report::{ExcitationReport, ExcitationReportOptions, ExcitedChannel, PowerBand, describe_excitation};
 pub use square::SquareWaves;
 
 use crate::lti::Discrete;
@@ -34,7 +38,7 @@ pub enum Excitation {
 }
 
 impl Excitation {
-    /// Makes the signal, `samples` x `channels`, with the clock `time`.
+    /// Makes the signal, `samples` x `channels`, with the clock `time`. [`RampedExcitation`] fades it in and out.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] naming the option that has no meaning.

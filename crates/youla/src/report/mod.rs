@@ -11,10 +11,12 @@
 //! | `decimate` | minimum and maximum per bucket |
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
+//! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `html` | template, data and library put into one file |
 
+mod csv;
 pub mod data;
 mod decimate;
 pub mod figure;
@@ -25,6 +27,7 @@ pub mod story;
 mod tables;
 pub mod trace;
 
+pub use csv::{figure_csv, table_csv};
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;

@@ -11,6 +11,7 @@
 //! | `decimate` | minimum and maximum per bucket |
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
+//! | `svg` | a figure for print |
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
@@ -24,6 +25,7 @@ mod html;
 mod numbers;
 mod phase;
 pub mod story;
+mod svg;
 mod tables;
 pub mod trace;
 
@@ -32,4 +34,5 @@ pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
 pub use story::Story;
+pub use svg::svg;
 pub use trace::{Timeline, Trace};

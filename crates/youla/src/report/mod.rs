@@ -11,10 +11,13 @@
 //! | `decimate` | minimum and maximum per bucket |
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
+//! | `svg` | a figure for print |
+//! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `html` | template, data and library put into one file |
 
+mod csv;
 pub mod data;
 mod decimate;
 pub mod figure;
@@ -22,11 +25,14 @@ mod html;
 mod numbers;
 mod phase;
 pub mod story;
+mod svg;
 mod tables;
 pub mod trace;
 
+pub use csv::{figure_csv, table_csv};
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
 pub use story::Story;
+pub use svg::svg;
 pub use trace::{Timeline, Trace};

@@ -1,0 +1,95 @@
+//! A figure as SVG for print.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `layout` | where the panels stand |
+//! | `panel` | scales and axes of one panel |
+//! | `curves`, `lines` | lines and clouds of points |
+//! | `boxes`, `spread` | box plots and what they show |
+//! | `cells` | maps |
+//! | `legend`, `style` | which method is which |
+//! | `scale`, `ticks`, `text` | places, numbers and names |
+//! | `canvas`, `path` | the document |
+
+mod boxes;
+mod canvas;
+mod cells;
+mod curves;
+mod layout;
+mod legend;
+mod lines;
+mod panel;
+mod path;
+mod scale;
+mod spread;
+mod style;
+#[cfg(test)]
+mod tests;
+mod text;
+mod ticks;
+
+use super::data::Method;
+use super::figure::{Content, Figure, Panel};
+use crate::{Error, Result};
+
+/// Draws a figure as an SVG file for print: 170 mm wide, text of 9 points, white paper.
+///
+/// Colours, dashes and markers belong to the methods in the order of `methods`, as on the page; title and caption are in
+/// the file, for readers and programs that list figures, but not drawn. What cannot be drawn in place is not lost:
+///
+/// - A line has gaps where it has no value and ends at the edge of the range. Of a line of more than 4000 points the
+///   minimum and the maximum per bucket are drawn; fewer where a figure has more than eight lines.
+/// - A point beyond the range of the vertical axis is a triangle, and one without a value a cross, in a strip at the edge
+///   of the frame.
+/// - Below a box stands how many values are NaN ("failed") or beyond the range. Quartiles are interpolated linearly
+///   between the sorted values; whiskers reach to the last value within 1.5 quartile ranges.
+/// - A cell of strength 1 has 70 % of the colour, so that the text on it stays legible.
+///
+/// The same figure gives the same bytes.
+///
+/// # Errors
+/// [`Error::Shape`] where a curve has not as many places as values or a map not as many cells as its rows and columns
+/// say, [`Error::OutOfRange`] where the range of an axis is not one.
+///
+/// ```
+/// use youla::report::data::Method;
+/// use youla::report::figure::{Content, Curve, Drawn, Figure, Panel};
+/// let curve = Curve {
+///     method: "hansen".into(),
+///     note: String::new(),
+///     drawn: Drawn::Line,
+///     x: vec![0.0, 0.5, 1.0],
+///     y: vec![90.0, f64::NAN, 80.0],
+/// };
+/// let panel = Panel { content: Content::Curves(vec![curve]), ..Panel::default() };
+/// let figure = Figure { panels: vec![panel], ..Figure::default() };
+/// let file = youla::report::svg(&figure, &[Method::hansen()])?;
+/// assert!(file.starts_with("<svg") && file.contains("Hansen G(S)"));
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
+    for panel in &figure.panels {
+        check(panel)?;
+    }
+    Ok(layout::draw(figure, &style::Styles::new(methods)))
+}
+
+fn check(panel: &Panel) -> Result<()> {
+    let shape = |what: String, expected, found| {
+        if expected == found { Ok(()) } else { Err(Error::Shape { what, expected, found }) }
+    };
+    let part = |what: &str| format!("{what} of the panel {:?}", panel.title);
+    scale::check(&panel.x, &part("horizontal axis"))?;
+    scale::check(&panel.y, &part("vertical axis"))?;
+    match &panel.content {
+        Content::Curves(curves) => curves.iter().try_for_each(|curve| {
+            let what = part(&format!("the values of the curve {:?}", curve.method));
+            shape(what, (curve.x.len(), 1), (curve.y.len(), 1))
+        }),
+        Content::Boxes(_) => Ok(()),
+        Content::Cells(map) => {
+            let cells = map.rows.len() * map.columns.len();
+            shape(part("the list of cells"), (cells, 1), (map.cells.len(), 1))
+        }
+    }
+}

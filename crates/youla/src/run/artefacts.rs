@@ -304,6 +304,7 @@ fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
         "columns": s.columns,
         "singular_values": s.singular_values,
         "excitation_rcond": s.excitation_rcond,
+        "factor": s.factor,
         "stable": s.stability.stable,
         "moved_poles": s.stability.moved.iter().map(|m| [[m.from.re, m.from.im], [m.to.re, m.to.im]]).collect::<Vec<_>>(),
         "initial_states": s.initial_states,

@@ -4,6 +4,8 @@
 //! of lanes that depends on the data alone, so the result is the same on any number of threads.
 
 use super::channels::Channels;
+use super::gram;
+use super::{DataFactor, Factorisation};
 use crate::linalg::{Triangle, leading_rank};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
@@ -26,10 +28,12 @@ pub(super) struct HankelFactor {
     input_rank: usize,
     past_rank: usize,
     present_rank: usize,
+    /// How R was found.
+    pub(super) report: DataFactor,
 }
 
 impl HankelFactor {
-    pub(super) fn new(data: &Channels, horizon: usize) -> Result<Self> {
+    pub(super) fn new(data: &Channels, horizon: usize, factorisation: Factorisation) -> Result<Self> {
         let rows = RowMap::new(data, horizon);
         let width = 2 * horizon * (data.inputs + data.outputs);
         if rows.total < width {
@@ -38,12 +42,22 @@ impl HankelFactor {
             let what = format!("all experiments together, with a horizon of {horizon} block rows");
             return Err(Error::TooFewSamples { what, found, needed });
         }
-        let r = triangular_factor(&rows, width);
+        let (r, report) = factor(data, &rows, width, factorisation)?;
         let (inputs, outputs) = (data.inputs, data.outputs);
         let past = horizon * (2 * inputs + outputs);
         let rank = |columns| leading_rank(r.as_ref(), columns);
         let (input_rank, past_rank, present_rank) = (rank(2 * horizon * inputs), rank(past), rank(past + outputs));
-        Ok(HankelFactor { inputs, outputs, horizon, columns: rows.total, input_rank, past_rank, present_rank, r })
+        Ok(HankelFactor {
+            inputs,
+            outputs,
+            horizon,
+            columns: rows.total,
+            input_rank,
+            past_rank,
+            present_rank,
+            r,
+            report,
+        })
     }
 
     /// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length.
@@ -106,8 +120,34 @@ impl HankelFactor {
     }
 }
 
-/// R of all Hankel columns, by lanes and then over the lanes. A factorisation that uses the displacement structure
-/// can take the place of this function.
+/// R by the way that was asked for; `Auto` takes the Gram matrix where it is well enough conditioned.
+fn factor(
+    data: &Channels,
+    rows: &RowMap<'_>,
+    width: usize,
+    factorisation: Factorisation,
+) -> Result<(Mat<f64>, DataFactor)> {
+    let by_gram = match factorisation {
+        Factorisation::Qr => None,
+        _ => gram::factor(data, rows.horizon),
+    };
+    let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
+    match by_gram {
+        Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
+            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+        }
+        None if factorisation == Factorisation::Gram => {
+            let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
+            Err(Error::Singular { what, rcond: 0.0 })
+        }
+        found => Ok((
+            triangular_factor(rows, width),
+            DataFactor { by: Factorisation::Qr, condition: found.map(|found| found.condition) },
+        )),
+    }
+}
+
+/// R of all Hankel columns, by lanes and then over the lanes.
 fn triangular_factor(rows: &RowMap<'_>, width: usize) -> Mat<f64> {
     let lanes = rows.total.div_ceil(PIECE).min(LANES);
     let parts: Vec<Mat<f64>> = (0..lanes)
@@ -174,5 +214,64 @@ impl<'a> RowMap<'a> {
                 }
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::subspace::{Experiment, SubspaceOptions};
+
+    /// Two inputs and one output with noise, in experiments of unequal length.
+    fn experiments(noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
+        let wave = |k: usize, seed: usize| ((k * k * (seed + 2) + 7 * k) as f64 * 0.37).sin();
+        let experiment = |samples: usize, seed: usize| {
+            let u = Mat::from_fn(samples, 2, |k, j| wave(k, seed + 3 * j));
+            let mut y = Mat::zeros(samples, 1);
+            for k in 2..samples {
+                let clean = 1.6 * y[(k - 1, 0)] - 0.8 * y[(k - 2, 0)] + u[(k - 1, 0)] - 0.4 * u[(k - 2, 1)];
+                y[(k, 0)] = clean + noise * wave(k, seed + 11);
+            }
+            (u, y)
+        };
+        vec![experiment(9000, 1), experiment(700, 2)]
+    }
+
+    fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<HankelFactor> {
+        let records = experiments(noise);
+        let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+        let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
+        HankelFactor::new(&data, horizon, by)
+    }
+
+    /// Rows of R with a positive diagonal.
+    fn normal(r: &Mat<f64>) -> Mat<f64> {
+        Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * r[(i, i)].signum())
+    }
+
+    #[test]
+    fn gram_and_qr_give_the_same_factor() {
+        for horizon in [2, 7, 20] {
+            let [gram, qr] = [Factorisation::Auto, Factorisation::Qr].map(|by| factors(0.3, horizon, by).unwrap());
+            assert_eq!((gram.report.by, qr.report.by), (Factorisation::Gram, Factorisation::Qr));
+            let (one, other) = (normal(&gram.r), normal(&qr.r));
+            let error = (&one - &other).norm_max() / other.norm_max();
+            assert!(error < 1e-11, "horizon {horizon}: {error:.1e}");
+            let sigma = Mat::from_fn(qr.r.ncols(), qr.r.ncols(), |i, j| qr.r[(i, j)] / qr.r.col(j).norm_l2());
+            let sigma = sigma.singular_values().unwrap();
+            let ratio = gram.report.condition.unwrap() / (sigma[0] / sigma[sigma.len() - 1]);
+            assert!((0.5..1.0 + 1e-9).contains(&ratio), "horizon {horizon}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn data_without_noise_are_left_to_qr() {
+        let found = factors(0.0, 7, Factorisation::Auto).unwrap();
+        assert_eq!(found.report.by, Factorisation::Qr);
+        let refused = factors(0.0, 7, Factorisation::Gram);
+        assert!(matches!(refused.err(), None | Some(Error::Singular { .. })));
+        let nearly = factors(1e-6, 7, Factorisation::Auto).unwrap();
+        assert_eq!(nearly.report.by, Factorisation::Qr);
+        assert!(nearly.report.condition.is_some_and(|condition| condition > gram::LIMIT));
     }
 }

@@ -11,6 +11,7 @@
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
 mod channels;
+mod gram;
 mod hankel;
 mod innovation;
 mod order;
@@ -61,6 +62,8 @@ pub struct SubspaceOptions {
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,
+    /// How the block-Hankel data are factored.
+    pub factorisation: Factorisation,
     /// What to do with an unstable estimate.
     pub stability: Stability,
     /// Units in which the least-squares problems are posed. The model always comes in the units of the record.
@@ -76,6 +79,7 @@ impl Default for SubspaceOptions {
             horizon: 20,
             order: Order::default(),
             feedthrough: Feedthrough::default(),
+            factorisation: Factorisation::default(),
             stability: Stability::default(),
             scaling: ChannelScaling::default(),
             initial_state: InitialState::default(),
@@ -126,6 +130,30 @@ pub enum Feedthrough {
     None,
     /// D is estimated.
     Estimated,
+}
+
+/// How the triangular factor of the block-Hankel data is found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Factorisation {
+    /// From the Gram matrix where the condition number of the data allows it (up to 1e4 with columns of unit length), else
+    /// by QR.
+    #[default]
+    Auto,
+    /// Cholesky factor of the Gram matrix, which lag sums give: fast, with the square of the condition number.
+    Gram,
+    /// Orthogonal reduction of the data.
+    Qr,
+}
+
+/// How the block-Hankel data were factored.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DataFactor {
+    /// [`Factorisation::Gram`] or [`Factorisation::Qr`].
+    pub by: Factorisation,
+    /// Condition number of the data, columns of unit length, as estimated from the Gram matrix; absent where that was not
+    /// tried or is not positive definite to working precision.
+    pub condition: Option<f64>,
 }
 
 /// What to do with an unstable estimate of A. A stable one is never touched, however lightly damped.
@@ -188,6 +216,8 @@ pub struct SubspaceModel {
     pub columns: usize,
     /// Smallest over largest singular value of the block-Hankel matrix of the inputs with rows of unit length.
     pub excitation_rcond: f64,
+    /// How the data were factored.
+    pub factor: DataFactor,
 }
 
 impl SubspaceModel {
@@ -235,7 +265,7 @@ impl SubspaceModel {
 /// ```
 pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<SubspaceModel> {
     let data = Channels::new(experiments, options)?;
-    let factor = HankelFactor::new(&data, options.horizon)?;
+    let factor = HankelFactor::new(&data, options.horizon, options.factorisation)?;
     let excitation_rcond = factor.require_excitation()?;
     let projection = projection::project(&factor, options.weight)?;
     let order = order::choose(options.order, &factor, &projection)?;
@@ -255,5 +285,6 @@ pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &Subspa
         horizon: options.horizon,
         columns: factor.columns,
         excitation_rcond,
+        factor: factor.report,
     })
 }

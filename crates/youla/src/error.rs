@@ -242,6 +242,12 @@ pub enum Error {
         /// Lowest peak of those that stabilise both.
         lowest: Option<f64>,
     },
+    /// A shard is not written as one number of another.
+    #[error("{text:?} is not a shard; write the number of the part and the number of parts, for example 2/4")]
+    BadShard {
+        /// What was given.
+        text: String,
+    },
     /// A results file is not one.
     #[error("{} is not a results file of this version of the program; remove it or choose another folder", path.display())]
     NotResults {

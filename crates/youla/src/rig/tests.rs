@@ -75,7 +75,7 @@ fn the_linear_level_is_the_closed_loop() {
     let mut n = Mat::zeros(samples, 2);
     for k in 0..samples {
         for j in 0..2 {
-            n[(k, j)] = 0.3 * streams[j].sample::<f64, _>(StandardNormal);
+            n[(k, j)] = parameters.sensor.noise.value * streams[j].sample::<f64, _>(StandardNormal);
         }
     }
     let inputs = block(&[&[alpha.as_ref(), n.as_ref()]]);

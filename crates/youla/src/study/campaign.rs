@@ -4,17 +4,20 @@
 use super::item::Evaluated;
 use super::row::Row;
 use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::Write;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::str::FromStr;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::Duration;
 
-/// A part of a campaign: number `index` of `count`, counted from 1.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// A part of a campaign: number `index` of `count`, counted from 1; `2/4` as text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
 pub struct Shard {
     index: usize,
     count: usize,
@@ -36,6 +39,16 @@ impl Shard {
         Ok(Shard { index, count })
     }
 
+    /// Number of this part, from 1.
+    pub fn index(self) -> usize {
+        self.index
+    }
+
+    /// Number of parts.
+    pub fn count(self) -> usize {
+        self.count
+    }
+
     /// Whether it is all there is.
     pub fn is_whole(self) -> bool {
         self.count == 1
@@ -50,6 +63,32 @@ impl Shard {
 impl std::fmt::Display for Shard {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}/{}", self.index, self.count)
+    }
+}
+
+impl From<Shard> for String {
+    fn from(shard: Shard) -> String {
+        shard.to_string()
+    }
+}
+
+impl TryFrom<String> for Shard {
+    type Error = Error;
+
+    fn try_from(text: String) -> Result<Self> {
+        text.parse()
+    }
+}
+
+impl FromStr for Shard {
+    type Err = Error;
+
+    /// # Errors
+    /// [`Error::OutOfRange`] and [`Error::BadShard`].
+    fn from_str(text: &str) -> Result<Self> {
+        let bad = || Error::BadShard { text: text.to_owned() };
+        let (index, count) = text.split_once('/').ok_or_else(bad)?;
+        Shard::new(index.trim().parse().map_err(|_| bad())?, count.trim().parse().map_err(|_| bad())?)
     }
 }
 
@@ -69,10 +108,8 @@ pub struct Campaign {
 pub struct Outcome {
     /// All rows, those of an earlier call included.
     pub rows: Vec<Row>,
-    /// Items that were found complete in the file.
-    pub resumed: usize,
-    /// Rows that were found damaged, or that belonged to an item that was not complete, and were computed again.
-    pub redone: usize,
+    /// Items that were computed in this call, without those that had no loop.
+    pub computed: usize,
     /// Time per part of an item, summed over the items of this call; see [`Evaluated::durations`].
     pub durations: Vec<Duration>,
 }
@@ -81,8 +118,9 @@ impl Campaign {
     /// Computes the items that the file lacks, on all threads of rayon's pool, and adds their rows to it.
     ///
     /// The file is a prefix of the result at any time: an item is written as soon as all items before it are. Its contents do
-    /// not depend on the number of threads nor on interruptions, as long as `evaluate` depends on the item alone. Rows behind the
-    /// first damaged one are computed again. `progress` is told the items done and the rows that were found damaged.
+    /// not depend on the number of threads nor on interruptions, as long as `evaluate` depends on the item alone. Rows from the
+    /// first damaged one on are computed again. `continued` is told how many items the file holds and how many rows behind them are
+    /// computed again, `progress` how many items are done.
     ///
     /// # Errors
     /// Of the item with the lowest number that fails; rows before it stay. [`Error::NotResults`] where the file is something
@@ -90,6 +128,7 @@ impl Campaign {
     pub fn run(
         &self,
         evaluate: impl Fn(usize) -> Result<Evaluated> + Sync,
+        continued: &dyn Fn(usize, usize),
         progress: &(dyn Fn(usize) + Sync),
     ) -> Result<Outcome> {
         let io = |source| Error::Io { path: self.path.clone(), source };
@@ -105,9 +144,10 @@ impl Campaign {
             writeln!(file, "{}", Row::HEADER).map_err(io)?;
         }
         let done = found.rows.len() / self.rows_per_item;
+        continued(done, found.damaged);
         progress(done);
         let start = self.items.start + done;
-        let outcome = Outcome { rows: found.rows, resumed: done, redone: found.damaged, durations: Vec::new() };
+        let outcome = Outcome { rows: found.rows, ..Outcome::default() };
         let writer = Mutex::new(Writer { file, next: start, waiting: BTreeMap::new(), outcome, failure: None });
         let (next, stop) = (AtomicUsize::new(start), AtomicBool::new(false));
         rayon::broadcast(|_| {
@@ -155,16 +195,26 @@ impl Writer {
     fn write(&mut self, evaluated: Evaluated, path: &Path) -> Result<()> {
         let text: String = evaluated.rows.iter().map(|row| row.line() + "\n").collect();
         self.file.write_all(text.as_bytes()).map_err(|source| Error::Io { path: path.to_owned(), source })?;
-        self.outcome.durations.resize(evaluated.durations.len(), Duration::ZERO);
+        let parts = self.outcome.durations.len().max(evaluated.durations.len());
+        self.outcome.durations.resize(parts, Duration::ZERO);
         self.outcome.durations.iter_mut().zip(&evaluated.durations).for_each(|(sum, lap)| *sum += *lap);
+        self.outcome.computed += usize::from(!evaluated.durations.is_empty());
         self.outcome.rows.extend(evaluated.rows);
         Ok(())
     }
 }
 
+/// The rows of the complete items at the beginning of a results file.
+///
+/// # Errors
+/// [`Error::NotResults`], [`Error::Io`].
+pub fn read_results(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Vec<Row>> {
+    Ok(Found::read(path, items, rows_per_item)?.rows)
+}
+
 /// The usable beginning of a results file.
-pub(super) struct Found {
-    pub(super) rows: Vec<Row>,
+struct Found {
+    rows: Vec<Row>,
     /// Its length.
     bytes: usize,
     /// Lines behind it.
@@ -173,7 +223,7 @@ pub(super) struct Found {
 
 impl Found {
     /// Reads the complete items at the beginning of a file.
-    pub(super) fn read(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Self> {
+    fn read(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Self> {
         let text = std::fs::read(path).map_err(|source| Error::Io { path: path.to_owned(), source })?;
         let mut lines = text.split_inclusive(|byte| *byte == b'\n');
         let header = lines.next().unwrap_or_default();

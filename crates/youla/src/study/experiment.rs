@@ -11,6 +11,7 @@ use crate::identify::greybox::{BearingStructure, GreyBoxModel, GreyBoxOptions, S
 use crate::identify::hansen::{HansenModel, hansen};
 use crate::identify::subspace::{self, InitialState, SubspaceOptions};
 use crate::lti::{Discrete, Mode, StateSpace, simulate};
+use crate::record::{ExcitationReport, ExcitationReportOptions, describe_excitation};
 use crate::reduce::reduce;
 use crate::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, ObserverLoop, RigParameters, run_experiment};
 use crate::validate::{certify, fit, predict_open_loop};
@@ -49,12 +50,16 @@ pub struct Experiment {
     pub estimation: ExperimentRecord,
     /// The record that they are held against.
     pub verification: ExperimentRecord,
+    /// What alpha of the estimation record excites, for the horizon of S.
+    pub excitation: ExcitationReport,
     /// Samples at the start of both that are not used.
     pub settle: usize,
     /// One per method, in the order of Table 1.
     pub models: Vec<ExperimentModel>,
     /// The prediction-error method from several starts.
     pub starts: Vec<Start>,
+    /// Poles of S that were reflected at the unit circle.
+    pub reflected: usize,
     /// beta of the verification record, and what S makes of its alpha; from sample `settle` on.
     pub beta: Option<[Mat<f64>; 2]>,
 }
@@ -146,9 +151,18 @@ pub(super) fn run(
         data.judge(Method::Hansen, hansen.0.as_ref().map(|h| h.plant.clone()).map_err(String::clone), hansen.1)?,
         data.judge(Method::HansenReduced, reduced.0.map(|r| r.model), reduced.1)?,
     ];
+    let excitation = described(&estimation, settings)?;
+    let reflected = hansen.0.as_ref().map_or(0, |found| found.deviation.stability.moved.len());
     let beta = hansen.0.ok().map(|found| data.beta(&found)).transpose()?;
     let starts = starts.into_iter().map(|(start, _)| start).collect();
-    Ok(Experiment { case, design, estimation, verification, settle, models, starts, beta })
+    Ok(Experiment { case, design, estimation, verification, excitation, settle, models, starts, reflected, beta })
+}
+
+/// Persistency up to the block rows that the identification of S needs.
+fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
+    let order = 2 * settings.hansen.horizon;
+    let options = ExcitationReportOptions { wanted_order: order, highest_order: order, ..Default::default() };
+    describe_excitation(record.alpha.as_ref(), record.time, &options)
 }
 
 /// The rig under the controller that firmware would run.

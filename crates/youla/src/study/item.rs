@@ -11,7 +11,7 @@ use crate::identify::hansen::{HansenModel, hansen};
 use crate::identify::subspace;
 use crate::linalg::block;
 use crate::lti::{Discrete, StateSpace, simulate};
-use crate::record::{Excitation, SquareWaves};
+use crate::record::RampedExcitation;
 use crate::reduce::reduce;
 use crate::rig::Bearing;
 use crate::validate::fit;
@@ -120,13 +120,13 @@ fn record(
 
 /// alpha from its own random stream.
 pub(super) fn excitation(
-    waves: &SquareWaves,
+    signal: &RampedExcitation,
     samples: usize,
     time: Discrete,
     seed: u64,
     stream: u64,
 ) -> Result<Mat<f64>> {
-    Excitation::SquareWaves(waves.clone()).generate(samples, 2, time, &mut generator(seed, stream))
+    signal.generate(samples, 2, time, &mut generator(seed, stream))
 }
 
 /// The generator of one stream.
@@ -143,20 +143,22 @@ struct LoopData<'a> {
     start: Bearing,
 }
 
-/// A model and the steps of the search that led to it.
+/// A model, the steps of the search that led to it, and what was done to it.
 struct Found {
     model: StateSpace<Discrete>,
     steps: Option<usize>,
+    note: String,
 }
 
 impl LoopData<'_> {
     fn row(&self, item: &Item, method: Method, settings: &PaperSettings) -> Row {
         let judged = self.identify(method, settings).and_then(|found| {
             let stable = found.model.is_stable()?;
-            Ok((if stable { Status::Stable } else { Status::Unstable }, self.fit_of(&found.model)?, found.steps))
+            let status = if stable { Status::Stable } else { Status::Unstable };
+            Ok((status, self.fit_of(&found.model)?, found.steps, found.note))
         });
-        let (status, fit, steps, reason) = match judged {
-            Ok((status, fit, steps)) => (status, fit, steps, String::new()),
+        let (status, fit, steps, note) = match judged {
+            Ok(outcome) => outcome,
             Err(e) => (Status::Refused, [f64::NAN; 2], None, e.to_string()),
         };
         Row {
@@ -170,21 +172,25 @@ impl LoopData<'_> {
             status,
             fit,
             steps,
-            reason,
+            note,
         }
     }
 
     fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found> {
         let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
         let time = self.design.factors.nominal().time();
-        let black_box = |model| Found { model, steps: None };
+        let black_box = |model| Found { model, steps: None, note: String::new() };
+        let from_s = |model, hansen: &HansenModel| Found { model, steps: None, note: reflected(hansen) };
         match method {
             Method::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
             Method::Pem => self.pem(&self.start, settings).map(grey_box),
             Method::PemMultiStart => self.best_pem(settings).map(grey_box),
             Method::Direct => Ok(black_box(direct(&experiment, time, &settings.direct)?.model)),
-            Method::Hansen => Ok(black_box(self.hansen(settings)?.plant)),
-            Method::HansenReduced => Ok(black_box(reduce(&self.hansen(settings)?.plant, &settings.reduction)?.model)),
+            Method::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), &found)),
+            Method::HansenReduced => {
+                let found = self.hansen(settings)?;
+                Ok(from_s(reduce(&found.plant, &settings.reduction)?.model, &found))
+            }
         }
     }
 
@@ -230,5 +236,13 @@ impl LoopData<'_> {
 }
 
 fn grey_box(found: GreyBoxModel) -> Found {
-    Found { model: found.model, steps: Some(found.iterations) }
+    Found { model: found.model, steps: Some(found.iterations), note: String::new() }
+}
+
+/// What was done to the poles of S.
+fn reflected(found: &HansenModel) -> String {
+    match found.deviation.stability.moved.len() {
+        0 => String::new(),
+        poles => format!("{poles} poles of S reflected"),
+    }
 }

@@ -27,7 +27,7 @@ mod settings;
 mod statistics;
 mod synchronous;
 
-pub use campaign::{Campaign, Outcome, Shard};
+pub use campaign::{Campaign, Outcome, Shard, read_results};
 pub use controller::{Design, design, design_with};
 pub use crossover::{count as crossover_items, crossover};
 pub use experiment::{Case, Experiment, ExperimentModel, Start};

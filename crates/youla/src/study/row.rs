@@ -53,14 +53,14 @@ pub struct Row {
     pub fit: [f64; 2],
     /// Steps of a search.
     pub steps: Option<usize>,
-    /// Why there is no model.
-    pub reason: String,
+    /// Why there is no model, or what was done to one.
+    pub note: String,
 }
 
 impl Row {
     /// The first line of a results file.
     pub const HEADER: &str = "item,theta,noise_um,command_weight,peak_nominal,peak_plant,method,status,\
-                              fit_horizontal,fit_vertical,steps,reason,check";
+                              fit_horizontal,fit_vertical,steps,note,check";
 
     /// The fit of the worse axis.
     pub fn worse_fit(&self) -> f64 {
@@ -70,7 +70,7 @@ impl Row {
     /// The line of the file, without its end. Numbers are written such that they read back bit by bit; `check` is the
     /// beginning of the SHA-256 of what stands before it.
     pub fn line(&self) -> String {
-        let reason: String = self.reason.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect();
+        let note: String = self.note.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect();
         let text = format!(
             "{},{},{},{},{},{},{},{},{},{},{},{}",
             self.item,
@@ -84,7 +84,7 @@ impl Row {
             self.fit[0],
             self.fit[1],
             self.steps.map_or_else(String::new, |steps| steps.to_string()),
-            reason,
+            note,
         );
         let check = check(&text);
         format!("{text},{check}")
@@ -97,7 +97,7 @@ impl Row {
             return None;
         }
         let fields: Vec<&str> = text.split(',').collect();
-        let [item, theta, noise, weight, peak_nominal, peak_plant, method, status, h, v, steps, reason] =
+        let [item, theta, noise, weight, peak_nominal, peak_plant, method, status, h, v, steps, note] =
             fields.as_slice().try_into().ok()?;
         Some(Row {
             item: str::parse(item).ok()?,
@@ -110,7 +110,7 @@ impl Row {
             status: Status::ALL.iter().find(|(_, word)| *word == status)?.0,
             fit: [str::parse(h).ok()?, str::parse(v).ok()?],
             steps: if steps.is_empty() { None } else { Some(str::parse(steps).ok()?) },
-            reason: str::to_owned(reason),
+            note: str::to_owned(note),
         })
     }
 }
@@ -135,13 +135,13 @@ mod tests {
             status: Status::Unstable,
             fit: [f64::NEG_INFINITY, -1.0 / 3.0],
             steps: Some(25),
-            reason: "a, b\nc".into(),
+            note: "a, b\nc".into(),
         }
     }
 
     #[test]
     fn a_line_reads_back_bit_by_bit() {
-        let expected = Row { reason: "a; b;c".into(), ..row() };
+        let expected = Row { note: "a; b;c".into(), ..row() };
         assert_eq!(Row::parse(&row().line()), Some(expected));
         assert_eq!(row().line().split(',').count(), Row::HEADER.split(',').count());
     }

@@ -3,7 +3,7 @@
 use super::method::Method;
 use crate::identify::greybox::GreyBoxOptions;
 use crate::identify::subspace::SubspaceOptions;
-use crate::record::SquareWaves;
+use crate::record::RampedExcitation;
 use crate::reduce::ReductionOptions;
 use crate::rig::Bearing;
 use crate::{Error, Result};
@@ -72,7 +72,7 @@ pub struct StudySettings {
     /// Samples of the noise-free verification record.
     pub verification_samples: usize,
     /// alpha.
-    pub excitation: SquareWaves,
+    pub excitation: RampedExcitation,
 }
 
 /// The grid of the crossover map; its records are those of the study.
@@ -106,7 +106,7 @@ pub struct ExperimentSettings {
     /// Harmonics of the speed that are subtracted before identification.
     pub harmonics: usize,
     /// alpha.
-    pub excitation: SquareWaves,
+    pub excitation: RampedExcitation,
     /// Factors on A of the nominal model at which the prediction-error method is started besides.
     pub start_factors: Vec<f64>,
     /// Where the open-loop fit of the nominal model starts.
@@ -139,6 +139,11 @@ impl PaperSettings {
         let settings: Self = crate::toml_file::parse(text, path)?;
         settings.check().map_err(|e| e.within(path.display().to_string()))?;
         Ok(settings)
+    }
+
+    /// The models that are compared: the nominal one, then the methods.
+    pub fn compared(&self) -> impl Iterator<Item = Method> {
+        [Method::Nominal].into_iter().chain(self.methods.iter().copied().filter(|m| *m != Method::Nominal))
     }
 
     /// The same with a number of models, and with the coarse map that suits a study of fewer than 100.
@@ -179,6 +184,10 @@ impl PaperSettings {
         within("experiments.rpm", e.rpm, f64::MIN_POSITIVE, f64::MAX, "a positive number")?;
         filled("experiments.start_factors", &e.start_factors)?;
         count("methods", self.methods.len(), 1, Method::ALL.len())?;
+        if let Some(twice) = (1..self.methods.len()).find(|k| self.methods[..*k].contains(&self.methods[*k])) {
+            let what = format!("the number of times that methods names {}", self.methods[twice].key());
+            return Err(Error::OutOfRange { what, value: 2.0, must: "1" });
+        }
         for (what, samples) in [
             ("study.samples", s.samples),
             ("study.verification_samples", s.verification_samples),

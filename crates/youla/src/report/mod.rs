@@ -12,6 +12,7 @@
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
 //! | `story` | a page of text, tables and figures as data |
+//! | `paper` | the results of the whole paper as such a page |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `html` | template, data and library put into one file |
 
@@ -20,6 +21,7 @@ mod decimate;
 pub mod figure;
 mod html;
 mod numbers;
+mod paper;
 mod phase;
 pub mod story;
 mod tables;
@@ -28,5 +30,8 @@ pub mod trace;
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
+pub use paper::{
+    Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
+};
 pub use story::Story;
 pub use trace::{Timeline, Trace};

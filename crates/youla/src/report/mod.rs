@@ -14,6 +14,7 @@
 //! | `svg` | a figure for print |
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
+//! | `paper` | the results of the whole paper as such a page |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `html` | template, data and library put into one file |
 
@@ -23,6 +24,7 @@ mod decimate;
 pub mod figure;
 mod html;
 mod numbers;
+mod paper;
 mod phase;
 pub mod story;
 mod svg;
@@ -33,6 +35,9 @@ pub use csv::{figure_csv, table_csv};
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
+pub use paper::{
+    Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
+};
 pub use story::Story;
 pub use svg::svg;
 pub use trace::{Timeline, Trace};

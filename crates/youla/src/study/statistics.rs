@@ -6,6 +6,13 @@ use super::row::{Row, Status};
 /// Fit of the worse axis, percent, below which a stable model counts as lost.
 pub const LOST: f64 = 50.0;
 
+impl Row {
+    /// Whether there is no usable model: none, an unstable one, or one that is lost on an axis.
+    pub fn failed(&self) -> bool {
+        self.status != Status::Stable || self.worse_fit() < LOST
+    }
+}
+
 /// Margin in percentage points below which nobody wins.
 pub const TIE: f64 = 1.0;
 
@@ -36,8 +43,10 @@ pub struct Decile {
     pub theta: [f64; 2],
     /// Loops.
     pub count: usize,
-    /// Median fit per axis, percent, over all loops.
+    /// Median fit per axis, percent, over all loops; minus infinity where that many gave no model.
     pub median: [f64; 2],
+    /// Median of the fit of the worse axis, by which methods are compared.
+    pub worse: f64,
     /// Loops without a model.
     pub refused: usize,
     /// Loops with an unstable model.
@@ -47,6 +56,11 @@ pub struct Decile {
 }
 
 impl Decile {
+    /// Loops with a usable model.
+    pub fn usable(&self) -> usize {
+        self.count - self.failed()
+    }
+
     /// Loops without a usable model.
     pub fn failed(&self) -> usize {
         self.refused + self.unstable + self.lost
@@ -78,6 +92,7 @@ fn summary(method: Method, theta: [f64; 2], rows: &[&Row]) -> Decile {
         theta,
         count: rows.len(),
         median: [axis(0), axis(1)],
+        worse: median(&rows.iter().map(|r| r.worse_fit()).collect::<Vec<_>>()),
         refused: count(&|r| matches!(r.status, Status::Refused | Status::NoController)),
         unstable: count(&|r| r.status == Status::Unstable),
         lost: count(&|r| r.status == Status::Stable && r.worse_fit() < LOST),

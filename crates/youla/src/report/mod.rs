@@ -13,13 +13,15 @@
 //! | `figure` | a figure as data |
 //! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
-//! | `html` | template, data and library put into one file |
+//! | `page` | template, style, code, data and library put into one file |
+//! | `html` | a run as a page |
 
 pub mod data;
 mod decimate;
 pub mod figure;
 mod html;
 mod numbers;
+mod page;
 mod phase;
 pub mod story;
 mod tables;

@@ -15,6 +15,8 @@
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `page` | template, style, code, data and library put into one file |
 //! | `html` | a run as a page |
+//! | `thin` | figures with as many points as a page takes |
+//! | `story_html` | a story as a page |
 
 pub mod data;
 mod decimate;
@@ -24,11 +26,14 @@ mod numbers;
 mod page;
 mod phase;
 pub mod story;
+mod story_html;
 mod tables;
+mod thin;
 pub mod trace;
 
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
 pub use story::Story;
+pub use story_html::story_html;
 pub use trace::{Timeline, Trace};

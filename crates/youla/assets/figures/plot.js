@@ -3,8 +3,10 @@
 // spec = {
 //   label,                                   what the figure shows, for those who cannot see it
 //   x: { label, unit, log },
-//   panels: [{ label, unit, height, log, steps, limits, curves: [{ id, x, y, style, opacity, chosen }] }],
-//   legend: [{ id, name, style }],
+//   panels: [{ title, label, unit, height, log, steps, limits, curves: [{ id, x, y, style, opacity, chosen, draw }] }],
+//                                            a curve with `draw` draws itself; a panel may choose the `ends` of its vertical
+//                                            axis and its `ticks`, and draw `over` the curves
+//   legend: [{ id, name, style, swatch }],   or `shared`, a legend that other stacks show too
 //   shades: [[from, to]],                    bands of the common axis that are shaded
 //   detail: [from, to],                      window in which every sample is drawn, shaded until it fills the view
 //   view: [from, to],                        what is shown first; all where it is absent
@@ -25,26 +27,28 @@ function mount(host, build) {
 function stack(host, spec) {
   const key = `figure-${figureCount++}`;
   const [xMin, xMax] = extent(spec);
-  const values = new Map();
+  const legend = spec.shared ?? makeLegend(spec.legend);
+  const { hidden } = legend;
   const where = element("span", { class: "where" });
-  const legend = element("div", { class: "legend" }, ...spec.legend.map(entry => legendEntry(entry, values, toggle)));
   const root = element("div", { class: "stack", tabindex: 0, role: "img", "aria-label": spec.label, onkeydown: pressed });
   root.append(where);
-  host.replaceChildren(...(spec.legend.length ? [legend, root] : [root]));
-  legend.style.setProperty("--entry", spec.panels.some(panel => panel.curves.length > 1) ? "208px" : "158px");
-  const hidden = new Set();
+  host.replaceChildren(...(spec.shared || !spec.legend.length ? [root] : [legend.node, root]));
+  if (!spec.shared) legend.node.style.setProperty("--entry", spec.panels.some(panel => panel.curves.length > 1) ? "208px" : "158px");
+  legend.listeners.push(toggled);
   const width = () => Math.max(240, root.clientWidth);
   let linking = false, lastX = null;
 
-  const plots = spec.panels.map((panel, k) => new uPlot(
-    options(panel, k === spec.panels.length - 1), table(panel.curves, xMin, xMax), root));
+  const plots = spec.panels.map((panel, k) => {
+    if (panel.title) root.append(element("p", { class: "panel-title" }, panel.title));
+    return new uPlot(options(panel, k === spec.panels.length - 1), table(panel.curves, xMin, xMax), root);
+  });
   zoom(...(spec.view ?? [xMin, xMax]));
   const observer = new ResizeObserver(() => {
     plots.forEach(plot => { if (Math.abs(plot.width - width()) > 1) plot.setSize({ width: width(), height: plot.height }); });
   });
   observer.observe(root);
   tellWhere(null);
-  return { destroy() { observer.disconnect(); plots.forEach(plot => plot.destroy()); host.replaceChildren(); }, zoom, reset };
+  return { destroy() { observer.disconnect(); plots.forEach(plot => plot.destroy()); host.replaceChildren(); }, zoom, reset, root, plots };
 
   function options(panel, last) {
     const ink = colour("--ink"), soft = colour("--soft"), grid = colour("--grid");
@@ -60,19 +64,19 @@ function stack(host, spec) {
       },
       scales: {
         x: { time: false, distr: spec.x.log ? 3 : 1, range: (u, low, high) => [low, high] },
-        y: { distr: panel.log ? 3 : 1, range: (u, low, high) => padded(low, high, panel) },
+        y: { distr: panel.log ? 3 : 1, range: (u, low, high) => panel.ends?.(u, low, high) ?? padded(low, high, panel) },
       },
       axes: [
         { ...axis, space: 64, size: last ? 26 : 4, label: last ? withUnit(spec.x.label, spec.x.unit) : null, labelSize: 20,
           values: (u, splits) => last ? tickLabels(splits) : splits.map(() => ""), ...logarithmic(spec.x.log),
           ...(spec.x.log && !last ? { values: (u, splits) => splits.map(() => "") } : {}), ...(spec.x.whole ? { incrs: [1, 2, 5, 10, 20, 50] } : {}) },
         { ...axis, space: panel.height < 120 ? 18 : 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: withUnit(panel.label, panel.axisUnit ?? panel.unit),
-          values: (u, splits) => tickLabels(splits), ...logarithmic(panel.log), ...(panel.steps ? { incrs: panel.steps } : {}) },
+          values: (u, splits) => tickLabels(splits), ...logarithmic(panel.log), ...(panel.steps ? { incrs: panel.steps } : {}), ...panel.ticks?.() },
       ],
       series: [{}, ...panel.curves.map(curve => ({
-        label: curve.id, stroke: colour(curve.style.colour), width: curve.style.width,
+        label: curve.id, show: !hidden.has(curve.id), stroke: colour(curve.style.colour), width: curve.style.width,
         dash: curve.style.dash, alpha: curve.style.points ? 0.45 : 1, points: { show: false },
-        ...(curve.chosen === undefined ? {} : { paths: () => null }),
+        ...(curve.chosen === undefined && !curve.draw ? {} : { paths: () => null }),
       }))],
       hooks: {
         drawClear: [u => { spec.shades?.forEach(band => shade(u, band)); if (spec.detail && !fills(u, spec.detail)) shade(u, spec.detail); }],
@@ -81,7 +85,9 @@ function stack(host, spec) {
           const curve = panel.curves[k - 1];
           if (curve?.style.points) scatter(u, curve);
           if (curve?.chosen !== undefined) stems(u, curve);
+          curve?.draw?.(u);
         }],
+        draw: [u => panel.over?.(u)],
         setScale: [(u, scale) => { if (scale === "x" && !linking) link(u); }],
         setCursor: [u => { if (u === plots?.[0]) tellWhere(u.cursor.left >= 0 ? u.posToVal(u.cursor.left, "x") : null); }],
       },
@@ -108,9 +114,7 @@ function stack(host, spec) {
 
   function reset() { zoom(xMin, xMax); }
 
-  function toggle(id) {
-    hidden.has(id) ? hidden.delete(id) : hidden.add(id);
-    values.get(id).button.setAttribute("aria-pressed", !hidden.has(id));
+  function toggled(id) {
     plots.forEach((plot, k) => spec.panels[k].curves.forEach((curve, i) => {
       if (curve.id === id) plot.setSeries(i + 1, { show: !hidden.has(id) }, false);
     }));
@@ -119,10 +123,10 @@ function stack(host, spec) {
 
   function tellWhere(x) {
     lastX = x;
-    where.textContent = x == null ? "" : `${spec.x.label} ${readOut(spec.x.whole ? Math.round(x) : x)} ${spec.x.unit}`;
-    for (const [id, { value }] of values) {
+    where.textContent = x == null ? "" : `${spec.x.label.length > 16 ? "" : spec.x.label} ${readOut(spec.x.whole ? Math.round(x) : x)} ${prettyUnit(spec.x.unit)}`;
+    for (const id of legend.ids) {
       const parts = x == null || hidden.has(id) ? [] : spec.panels.map((panel, k) => read(panel, plots[k], id)).filter(Boolean);
-      value.textContent = parts.join(", ");
+      legend.say(id, parts.join(", "));
     }
   }
 
@@ -151,12 +155,22 @@ function stack(host, spec) {
   }
 }
 
-function legendEntry(entry, values, toggle) {
-  const value = element("span", { class: "value" });
-  const button = element("button", { type: "button", "aria-pressed": true, title: "Show or hide", onclick: () => toggle(entry.id) },
-    element("span", { class: "swatch", html: swatch(entry.style) }), element("span", {}, entry.name), value);
-  values.set(entry.id, { value, button });
-  return button;
+// Names that read out and hide; whoever draws under them listens.
+function makeLegend(entries, hidden = new Set()) {
+  const listeners = [];
+  const items = new Map(entries.map(entry => {
+    const value = element("span", { class: "value" });
+    const button = element("button", { type: "button", "aria-pressed": !hidden.has(entry.id), title: "Show or hide", onclick: () => toggle(entry.id) },
+      element("span", { class: "swatch", html: entry.swatch ?? swatch(entry.style) }), element("span", {}, entry.name), value);
+    return [entry.id, { value, button }];
+  }));
+  function toggle(id) {
+    hidden.has(id) ? hidden.delete(id) : hidden.add(id);
+    items.get(id).button.setAttribute("aria-pressed", !hidden.has(id));
+    listeners.forEach(listener => listener(id));
+  }
+  const node = element("div", { class: "legend" }, ...[...items.values()].map(item => item.button));
+  return { node, hidden, listeners, ids: [...items.keys()], say(id, text) { items.get(id).value.textContent = text; } };
 }
 
 function extent(spec) {
@@ -167,6 +181,7 @@ function extent(spec) {
     }
   }
   if (spec.x.whole) return [low - 0.6, high + 0.6];
+  if (spec.view) [low, high] = [Math.min(low, spec.view[0]), Math.max(high, spec.view[1])];
   if (low === high) return [low - 0.5, high + 0.5];
   return low < high ? [low, high] : [0, 1];
 }
@@ -242,6 +257,7 @@ function frame(u, stroke) {
   u.ctx.save();
   u.ctx.strokeStyle = stroke;
   u.ctx.lineWidth = uPlot.pxRatio;
+  u.ctx.setLineDash([]);
   u.ctx.strokeRect(left, top, width, height);
   u.ctx.restore();
 }

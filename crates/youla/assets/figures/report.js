@@ -2,9 +2,6 @@
 
 const FADED = 0.6; // Coherence below which a point of the indirect response is said to carry little.
 
-for (const node of document.querySelectorAll("[data-method]")) node.style.setProperty("--c", `var(${methodOf(node.dataset.method).style.colour})`);
-for (const node of document.querySelectorAll("[data-swatch]")) node.innerHTML = swatch(methodOf(node.dataset.swatch).style);
-
 // Rows of a trace as seconds.
 function seconds(trace, clock) {
   let row = 0;
@@ -208,18 +205,3 @@ if (report.sample_time != null) {
     if (pole) row.lastElementChild.append(`, |z| = ${Math.hypot(...pole).toFixed(6)}`);
   });
 }
-
-const redrawAll = () => figures.forEach(figure => figure.draw());
-matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
-addEventListener("beforeprint", () => { document.documentElement.classList.add("printing"); redrawAll(); });
-addEventListener("afterprint", () => { document.documentElement.classList.remove("printing"); redrawAll(); });
-
-// The part in view is marked in the list of parts.
-const entries = new Map([...document.querySelectorAll("nav a")].map(link => [link.hash.slice(1), link]));
-const visible = new Set();
-const watcher = new IntersectionObserver(changes => {
-  for (const { target, isIntersecting } of changes) isIntersecting ? visible.add(target.id) : visible.delete(target.id);
-  const first = [...entries.keys()].find(id => visible.has(id));
-  for (const [id, link] of entries) id === first ? link.setAttribute("aria-current", "true") : link.removeAttribute("aria-current");
-}, { rootMargin: "-10% 0px -60% 0px" });
-for (const id of entries.keys()) watcher.observe(document.getElementById(id));

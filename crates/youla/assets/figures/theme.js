@@ -2,23 +2,26 @@
 
 const report = JSON.parse(document.getElementById("report-data").textContent);
 
-// Colour and line of each role; colours are custom properties of the style sheet, one per method throughout.
+// Colour and line of each role; colours are custom properties of the style sheet, one per method throughout. `marker` is drawn
+// by lines and stands in pole maps; `point` is filled and stands in clouds, where a cross means that there is no value.
 const ROLE_STYLES = {
-  nominal: { colour: "--nominal", dash: [3, 3], width: 1.6, marker: "diamond" },
-  direct: { colour: "--direct", dash: [9, 3, 2, 3], width: 1.7, marker: "square" },
-  hansen: { colour: "--hansen", dash: [], width: 1.9, marker: "cross" },
-  hansen_reduced: { colour: "--hansen-reduced", dash: [7, 4], width: 1.7, marker: "circle" },
+  nominal: { colour: "--nominal", dash: [3, 3], width: 1.6, marker: "diamond", point: "plus" },
+  pem: { colour: "--pem", dash: [11, 3], width: 1.7, marker: "triangle", point: "triangle" },
+  pem_multi_start: { colour: "--pem-multi-start", dash: [5, 2], width: 1.7, marker: "triangle-down", point: "triangle-down" },
+  direct: { colour: "--direct", dash: [9, 3, 2, 3], width: 1.7, marker: "square", point: "square" },
+  hansen: { colour: "--hansen", dash: [], width: 1.9, marker: "cross", point: "circle" },
+  hansen_reduced: { colour: "--hansen-reduced", dash: [7, 4], width: 1.7, marker: "circle", point: "diamond" },
 };
 const OTHER_STYLES = [
-  { colour: "--other-1", dash: [12, 3], width: 1.6, marker: "triangle" },
-  { colour: "--other-2", dash: [5, 2], width: 1.6, marker: "plus" },
-  { colour: "--other-3", dash: [2, 2], width: 1.6, marker: "triangle-down" },
-  { colour: "--other-4", dash: [10, 3, 2, 3, 2, 3], width: 1.6, marker: "star" },
+  { colour: "--other-1", dash: [12, 3], width: 1.6, marker: "plus", point: "plus" },
+  { colour: "--other-2", dash: [5, 2], width: 1.6, marker: "star", point: "circle" },
+  { colour: "--other-3", dash: [2, 2], width: 1.6, marker: "hourglass", point: "square" },
+  { colour: "--other-4", dash: [10, 3, 2, 3, 2, 3], width: 1.6, marker: "bar", point: "diamond" },
 ];
-const MEASURED = { colour: "--measured", dash: [], width: 1.3 };
+const MEASURED = { colour: "--measured", dash: [], width: 1.3, point: "circle" };
 const INDIRECT = { colour: "--indirect", dash: [], width: 0.8, points: true };
 
-const methods = new Map();
+const methods = new Map([["measured", { key: "measured", label: "measured", style: MEASURED }]]);
 {
   let others = 0;
   for (const method of report.methods) {
@@ -41,6 +44,8 @@ function markerPath(shape, x, y, r) {
     case "diamond": return `M${at(0, -1.3)}L${at(1.3, 0)}L${at(0, 1.3)}L${at(-1.3, 0)}Z`;
     case "triangle": return `M${at(0, -1.2)}L${at(1.1, 0.8)}L${at(-1.1, 0.8)}Z`;
     case "triangle-down": return `M${at(0, 1.2)}L${at(1.1, -0.8)}L${at(-1.1, -0.8)}Z`;
+    case "hourglass": return `M${at(-1, -1.1)}L${at(1, -1.1)}L${at(-1, 1.1)}L${at(1, 1.1)}Z`;
+    case "bar": return `M${at(0, -1.3)}L${at(0, 1.3)}`;
     default: return `M${at(-1.1, 0)}a${1.1 * r},${1.1 * r} 0 1 0 ${2.2 * r},0a${1.1 * r},${1.1 * r} 0 1 0 ${-2.2 * r},0Z`;
   }
 }
@@ -53,6 +58,17 @@ function swatch(style, withMarker = false) {
   const line = `<line x1="0" y1="5" x2="30" y2="5" stroke="var(${style.colour})" stroke-width="2" stroke-dasharray="${style.dash.join(" ")}"/>`;
   return `<svg width="30" height="10" aria-hidden="true">${style.points ? points : withMarker ? "" : line}${marker}</svg>`;
 }
+
+// Shapes that have an area are filled in clouds.
+const isFilled = shape => !["plus", "cross", "star", "bar"].includes(shape);
+
+// The same for a cloud of points and for an area.
+function pointSwatch({ colour, point }) {
+  const paint = isFilled(point) ? `fill="var(${colour})"` : `fill="none" stroke="var(${colour})" stroke-width="1.6"`;
+  return `<svg width="30" height="10" aria-hidden="true">${[6, 15, 24].map(x => `<path d="${markerPath(point, x, 5, 2.8)}" ${paint}/>`).join("")}</svg>`;
+}
+const keySwatch = style => `<svg width="30" height="10" aria-hidden="true">${swatch(style)}<path d="${markerPath(style.point, 15, 5, 3.4)}" fill="${isFilled(style.point) ? `var(${style.colour})` : "none"}" stroke="var(${style.colour})" stroke-width="1.4"/></svg>`;
+const areaSwatch = ({ colour }) => `<svg width="30" height="10" aria-hidden="true"><rect x="8" y="-1" width="14" height="12" rx="2" fill="var(${colour})" fill-opacity=".7"/></svg>`;
 
 const SUPERSCRIPTS = "⁰¹²³⁴⁵⁶⁷⁸⁹";
 const superscript = n => String(n).replace("-", "⁻").replace(/\d/g, d => SUPERSCRIPTS[d]);
@@ -105,6 +121,22 @@ function element(tag, attributes = {}, ...children) {
   }
   node.append(...children.filter(child => child != null));
   return node;
+}
+
+// Text beside the pointer, or beside what has the focus; positions count from the host's corner.
+function tooltip(host) {
+  const tip = element("div", { class: "tip", hidden: "" });
+  host.append(tip);
+  return {
+    show(text, x, y) {
+      tip.textContent = text;
+      tip.hidden = false;
+      const before = x + 16 + tip.offsetWidth > host.clientWidth && x > tip.offsetWidth;
+      tip.style.left = `${before ? x - 12 - tip.offsetWidth : x + 16}px`;
+      tip.style.top = `${y + 14}px`;
+    },
+    hide() { tip.hidden = true; },
+  };
 }
 
 // A choice among few as buttons, among many as a list. Calls `changed` with the place of the choice.

@@ -1,30 +1,16 @@
-//! One file: template, style, figures' code, plotting library and data.
-//!
-//! The file makes no request (its content security policy forbids it). Data stands in the file as JSON in which every `<`
-//! is written `\u003c`, so that no text of the user can end the script element or open a comment in it.
+//! A run as a page.
 
-use minijinja::syntax::SyntaxConfig;
 use minijinja::value::Serde;
-use minijinja::{Environment, Value, context};
+use minijinja::{Value, context};
 
 use super::data::{ReportData, Role};
+use super::page::{self, ALL_POINTS};
 use super::{phase, tables};
-use crate::{Error, Result};
+use crate::Result;
 
 const TEMPLATE: &str = include_str!("../../assets/report.html");
-const STYLE: &str = include_str!("../../assets/report.css");
-const FIGURES: [&str; 4] = [
-    include_str!("../../assets/figures/theme.js"),
-    include_str!("../../assets/figures/plot.js"),
-    include_str!("../../assets/figures/poles.js"),
-    include_str!("../../assets/figures/report.js"),
-];
-const UPLOT: &str = include_str!("../../assets/uplot/uPlot.iife.min.js");
-const UPLOT_STYLE: &str = include_str!("../../assets/uplot/uPlot.min.css");
-const UPLOT_LICENCE: &str = include_str!("../../assets/uplot/LICENSE");
-
-/// Most points of all time curves together; about 14 bytes each keep the file below 5 MB.
-const ALL_POINTS: usize = 260_000;
+const FIGURES: [&str; 2] =
+    [include_str!("../../assets/figures/poles.js"), include_str!("../../assets/figures/report.js")];
 
 /// Renders a report as one HTML file.
 ///
@@ -32,7 +18,7 @@ const ALL_POINTS: usize = 260_000;
 /// more points than a file of 5 MB takes, they are thinned further, again by minimum and maximum per bucket.
 ///
 /// # Errors
-/// [`Error::ReportData`] and [`Error::ReportTemplate`] where data or template cannot be written as text.
+/// [`crate::Error::ReportData`] and [`crate::Error::ReportTemplate`] where data or template cannot be written as text.
 ///
 /// ```
 /// use youla::report::{ReportData, html};
@@ -41,21 +27,13 @@ const ALL_POINTS: usize = 260_000;
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn html(data: &ReportData) -> Result<String> {
-    let drawn = prepared_for_drawing(data);
-    let json = serde_json::to_string(&drawn).map_err(|source| Error::ReportData { source })?;
-    let page = context! {
+    let content = context! {
         report => Serde(without_curves(data)),
         fits => Serde(tables::fit_rows(data)),
         modes => Serde(tables::mode_rows(data)),
         has => parts(data),
-        style => safe(format!("{UPLOT_STYLE}\n{STYLE}")),
-        library => safe(format!("/*!\nuPlot\n{UPLOT_LICENCE}*/\n{UPLOT}")),
-        figures => safe(FIGURES.concat()),
-        json => safe(json.replace('<', "\\u003c")),
     };
-    environment()
-        .and_then(|environment| environment.get_template("report.html")?.render(page))
-        .map_err(|source| Error::ReportTemplate { source })
+    page::render(TEMPLATE, content, &FIGURES, &prepared_for_drawing(data))
 }
 
 fn prepared_for_drawing(data: &ReportData) -> ReportData {
@@ -115,29 +93,4 @@ fn parts(data: &ReportData) -> Value {
         frequency => data.frequency.is_some(),
         indirect => data.frequency.as_ref().is_some_and(|response| !response.indirect.is_empty()),
     }
-}
-
-fn safe(text: String) -> Value {
-    Value::from_safe_string(text)
-}
-
-fn environment() -> Result<Environment<'static>, minijinja::Error> {
-    let mut environment = Environment::new();
-    environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
-    environment.add_filter("fixed", |value: f64, digits: usize| printed(format!("{value:.digits$}")));
-    environment.add_filter("scientific", |value: f64| printed(format!("{value:.1e}")));
-    environment.add_filter("significant", |value: f64| printed(significant(value)));
-    environment.add_template("report.html", TEMPLATE)?;
-    Ok(environment)
-}
-
-/// Four significant digits without an exponent.
-fn significant(value: f64) -> String {
-    let places = super::numbers::decimals(value, 4).clamp(0, 12) as usize;
-    format!("{value:.places$}")
-}
-
-/// Numbers in tables have a minus sign as wide as a digit.
-fn printed(number: String) -> String {
-    number.replace('-', "\u{2212}")
 }

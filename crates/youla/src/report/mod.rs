@@ -16,7 +16,10 @@
 //! | `story` | a page of text, tables and figures as data |
 //! | `paper` | the results of the whole paper as such a page |
 //! | `tables` | fits by record and output, modes by frequency |
-//! | `html` | template, data and library put into one file |
+//! | `page` | template, style, code, data and library put into one file |
+//! | `html` | a run as a page |
+//! | `thin` | figures with as many points as a page takes |
+//! | `story_html` | a story as a page |
 
 mod csv;
 pub mod data;
@@ -24,11 +27,14 @@ mod decimate;
 pub mod figure;
 mod html;
 mod numbers;
+mod page;
 mod paper;
 mod phase;
 pub mod story;
+mod story_html;
 mod svg;
 mod tables;
+mod thin;
 pub mod trace;
 
 pub use csv::{figure_csv, table_csv};
@@ -39,5 +45,6 @@ pub use paper::{
     Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
 };
 pub use story::Story;
+pub use story_html::story_html;
 pub use svg::svg;
 pub use trace::{Timeline, Trace};

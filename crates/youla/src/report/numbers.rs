@@ -44,6 +44,14 @@ pub(super) fn rounded(value: f64, decimals: i32) -> f64 {
     if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power }
 }
 
+/// Rounded to `digits` significant digits of themselves or of their range, whichever is finer.
+pub(super) fn for_drawing(values: impl Iterator<Item = f64> + Clone, digits: i32) -> Vec<f64> {
+    let finite = values.clone().filter(|value| value.is_finite());
+    let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let of_range = if high > low { decimals(high - low, digits) } else { i32::MIN };
+    values.map(|value| rounded(value, decimals(value, digits).max(of_range))).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

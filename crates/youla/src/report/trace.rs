@@ -112,15 +112,8 @@ impl Trace {
         let kept = decimate::min_max(points, clock.samples, &clock.detail, clock.bucket);
         let mut previous = 0;
         let steps = kept.iter().map(|&(row, _)| row - std::mem::replace(&mut previous, row)).collect();
-        Trace { steps, values: rounded_for_drawing(kept.iter().map(|point| point.1)) }
+        Trace { steps, values: numbers::for_drawing(kept.iter().map(|point| point.1), 6) }
     }
-}
-
-fn rounded_for_drawing(values: impl Iterator<Item = f64> + Clone) -> Vec<f64> {
-    let finite = values.clone().filter(|value| value.is_finite());
-    let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
-    let of_range = if high > low { numbers::decimals(high - low, 6) } else { i32::MIN };
-    values.map(|value| numbers::rounded(value, numbers::decimals(value, 6).max(of_range))).collect()
 }
 
 #[cfg(test)]

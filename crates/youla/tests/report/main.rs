@@ -3,6 +3,7 @@
 //! The pages are written to the folder of temporary files of the build, where a browser can open them.
 
 mod sample;
+mod story;
 
 use youla::report::data::{FrequencyResponse, Method, ReportData};
 use youla::report::html;

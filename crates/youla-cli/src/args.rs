@@ -2,6 +2,7 @@
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
+use youla::study::{Method, Shard};
 
 /// Identifies a machine while its controller keeps running.
 #[derive(Debug, Parser)]
@@ -20,6 +21,7 @@ pub(crate) struct Args {
 
 const EXAMPLES: &str = "\
 Examples:
+  youla paper                                  the whole paper: 500 models, three experiments, every figure
   youla demo                                   simulate the gas bearing of the paper and identify it
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
@@ -31,6 +33,15 @@ Exit codes: 0 done, 2 the input cannot be used, 3 the computation is impossible 
 /// The verbs.
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
+    /// Reproduce the paper: the study of 500 models, the experiments of Table 1, every figure, one page.
+    ///
+    /// Results stream to the folder as they are found. A run that was stopped, at whatever moment, goes on where it was when
+    /// the same command is given again.
+    #[command(after_help = PAPER_EXAMPLES)]
+    Paper(Box<PaperArgs>),
+    /// Put together a study that was computed in parts.
+    #[command(subcommand)]
+    Study(StudyCommand),
     /// Simulate the gas bearing in closed loop with a nominal model that is half wrong, and identify it.
     #[command(after_help = "Example:\n  youla demo --seed 7 --out demo-run")]
     Demo {
@@ -77,4 +88,66 @@ pub(crate) struct OutputFolder {
     /// Replace the run folder given by --out if it is one.
     #[arg(long, requires = "out")]
     pub(crate) force: bool,
+}
+
+const PAPER_EXAMPLES: &str = "\
+Examples:
+  youla paper                          runs/paper-seed-1-models-500, about half a minute
+  youla paper --models 20              a first look
+  youla paper --shard 1/2 --out part1  half of the loops, here; the other half elsewhere, then
+  youla study merge part1 part2        exactly what one run gives";
+
+/// What is asked of the paper.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct PaperArgs {
+    /// Settings instead of those that ship with the program.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) settings: Option<PathBuf>,
+    /// Parameters of the rig instead of those that ship with the program.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) rig: Option<PathBuf>,
+    /// Seed of everything random; the same seed gives the same results. 1 unless the settings say otherwise.
+    #[arg(long)]
+    pub(crate) seed: Option<u64>,
+    /// Number of nominal models of the study; fewer than 100 get a coarse map. 500 unless the settings say otherwise.
+    #[arg(long, value_name = "N")]
+    pub(crate) models: Option<usize>,
+    /// Methods that study and map compare, separated by commas.
+    #[arg(long, value_delimiter = ',', value_parser = method)]
+    pub(crate) methods: Option<Vec<Method>>,
+    /// Speed of the first experiment.
+    #[arg(long, allow_negative_numbers = true)]
+    pub(crate) rpm: Option<f64>,
+    /// Only this part of the loops of study and map, for example 2/4.
+    #[arg(long, value_name = "I/N")]
+    pub(crate) shard: Option<Shard>,
+    /// Results folder; runs/paper-seed-S-models-N by default.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+    /// Write the settings that ship with the program to standard output, to be copied and edited, and do nothing else.
+    #[arg(long, conflicts_with_all = ["settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
+    pub(crate) print_settings: bool,
+    /// The same for the parameters of the rig.
+    #[arg(long, conflicts_with_all = ["print_settings", "settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
+    pub(crate) print_rig: bool,
+}
+
+/// What is done with parts of a study.
+#[derive(Debug, Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Join the results folders of all shards and finish the paper from them.
+    #[command(after_help = "Example:\n  youla study merge part1 part2 --out whole")]
+    Merge {
+        /// The results folders of all shards, in any order.
+        #[arg(value_name = "PART", required = true)]
+        parts: Vec<PathBuf>,
+        /// Results folder; runs/paper-seed-S-models-N by default.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
+
+fn method(name: &str) -> Result<Method, String> {
+    let known: Vec<&str> = Method::ALL.iter().map(|method| method.key()).collect();
+    Method::of_key(name).ok_or_else(|| format!("there is no such method; known are {}", known.join(", ")))
 }

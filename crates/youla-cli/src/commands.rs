@@ -1,7 +1,8 @@
 //! What each verb does: read, call the library, print.
 
-use crate::args::{Args, Command, OutputFolder};
+use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::output::{Failure, Progress, say};
+use crate::paper;
 use crate::table;
 use std::path::{Path, PathBuf};
 use youla::run::{
@@ -22,6 +23,8 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         }
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Report { run } => report(args, run),
+        Command::Paper(asked) => paper::reproduce(args, asked),
+        Command::Study(StudyCommand::Merge { parts, out }) => paper::merge_parts(args, parts, out.as_deref()),
     }
 }
 

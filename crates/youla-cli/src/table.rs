@@ -2,7 +2,8 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use youla::run::{Identification, cautions};
+use youla::run::{Identification, WrittenPaper, cautions};
+use youla::study::Paper;
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
@@ -15,6 +16,25 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
         let _ = write!(text, "\ncaution: {caution}");
     }
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
+    text
+}
+
+/// Table 1, what became of the paper's claims, and where everything is.
+pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
+    let experiments = &paper.experiments.list;
+    let titles = experiments.iter().flat_map(|e| [e.case.title.clone(), String::new()]);
+    let mut rows = vec![std::iter::once("Table 1: fit (26), percent, H and V".to_owned()).chain(titles).collect()];
+    for (k, method) in experiments.iter().flat_map(|e| e.models.iter().map(|m| m.method)).enumerate() {
+        let Some(_) = experiments.first().filter(|e| k < e.models.len()) else { break };
+        let fits = experiments.iter().flat_map(|e| e.models[k].fit).map(|fit| format!("{fit:.1}"));
+        rows.push(std::iter::once(method.label().to_owned()).chain(fits).collect());
+    }
+    let mut text = aligned(&rows);
+    for claim in &written.claims {
+        let _ = write!(text, "\n{}", claim.text);
+    }
+    let folder = written.folder.display();
+    let _ = write!(text, "\nresults: {folder}\nreport:  {}", written.folder.join("report.html").display());
     text
 }
 

@@ -138,11 +138,11 @@ pub(super) fn run(
     let turning = matches!(case.fidelity, Fidelity::Rotating { .. });
     let settle = if turning { settings.experiments.settle } else { 0 };
     let data = data(settings, &design, start, [&estimation, &verification], settle, turning)?;
-    let starts = data.starts();
+    let single = timed(|| data.pem(1.0));
+    let starts = data.starts(&single.0);
     let pem = |(_, found): &(Start, GreyBoxModel)| found.model.clone();
     let hansen = timed(|| data.hansen());
     let reduced = timed(|| reduce(&hansen.0.as_ref().map_err(String::clone)?.plant, &settings.reduction).map_err(text));
-    let single = timed(|| data.pem(1.0));
     let best = starts.iter().min_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
     let models = vec![
         data.judge(Method::Nominal, Ok(design.factors.nominal().clone()), 0.0)?,
@@ -232,10 +232,10 @@ impl Data<'_> {
             .map_err(text)
     }
 
-    /// The prediction-error method from all starts, those that lead to a model.
-    fn starts(&self) -> Vec<(Start, GreyBoxModel)> {
+    /// The prediction-error method from all starts, those that lead to a model; `single` is that from the nominal model.
+    fn starts(&self, single: &Result<GreyBoxModel, String>) -> Vec<(Start, GreyBoxModel)> {
         let run = |factor: &f64| {
-            let found = self.pem(*factor).ok()?;
+            let found = if *factor == 1.0 { single.clone() } else { self.pem(*factor) }.ok()?;
             let (fit, _) = self.predict(&found.model).ok()?;
             let start = Start { factor: *factor, cost: found.cost, fit, steps: found.iterations, stop: found.stop };
             Some((start, found))

@@ -122,6 +122,8 @@ pub fn winner(rows: &[&Row]) -> Option<Winner> {
     let margin = match ranking.as_slice() {
         [] => return None,
         [_] => f64::INFINITY,
+        // Both may be minus infinity.
+        [first, second, ..] if first.1 == second.1 => 0.0,
         [first, second, ..] => first.1 - second.1,
     };
     Some(Winner { ranking, margin })

@@ -11,7 +11,6 @@
 use super::channels::{Channels, Signals};
 use crate::{Mat, MatRef};
 use faer::linalg::matmul::matmul;
-use faer::prelude::*;
 use faer::{Accum, Par, Side};
 use rayon::prelude::*;
 

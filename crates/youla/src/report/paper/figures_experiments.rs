@@ -2,10 +2,12 @@
 
 use super::figures::{axis, fit_axis, line, logarithmic, points, ranged};
 use super::words::{AXES, both, short};
+use crate::record::ExcitedChannel;
 use crate::report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, MEASURED, Panel};
 use crate::report::numbers::{decimals, rounded};
-use crate::study::{Experiment, ExperimentModel, Method, Start};
+use crate::study::{Experiment, ExperimentModel, Method, Paper, Start};
 use crate::{Mat, MatRef};
+use std::f64::consts::TAU;
 
 /// First view of a record, s.
 const VIEW: f64 = 0.2;
@@ -222,4 +224,33 @@ pub(super) fn starts_in_words(experiment: &Experiment, tried: usize) -> String {
         None => text.push_str("; none ends elsewhere."),
     }
     text
+}
+
+/// Power spectral density of alpha in the first experiment, both axes.
+pub(super) fn excitation(paper: &Paper) -> Figure {
+    let report = paper.experiments.list.first().map(|e| &e.excitation);
+    let hz: Vec<f64> = report.map_or_else(Vec::new, |r| r.omega.iter().map(|w| w / TAU).collect());
+    let channels = report.map_or(&[][..], |r| &r.channels);
+    // Zero frequency has no place on a logarithmic axis.
+    let curve = |(channel, name): (&ExcitedChannel, &&str)| Curve {
+        method: MEASURED.into(),
+        note: format!("alpha, {name}"),
+        drawn: Drawn::Line,
+        x: hz.iter().skip(1).copied().collect(),
+        y: channel.density.iter().skip(1).copied().collect(),
+    };
+    Figure {
+        key: "excitation-spectrum".into(),
+        title: "Spectrum of the excitation".into(),
+        caption: "Power spectral density of alpha in the estimation record of the first experiment; the others are \
+                  drawn from the same distribution."
+            .into(),
+        layout: Layout::Stacked,
+        panels: vec![Panel {
+            title: String::new(),
+            x: logarithmic("frequency", "Hz"),
+            y: logarithmic("density", "V^2/Hz"),
+            content: Content::Curves(channels.iter().zip(&AXES).map(curve).collect()),
+        }],
+    }
 }

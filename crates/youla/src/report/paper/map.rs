@@ -35,10 +35,15 @@ impl MapCell {
 
 /// The cells in the order of the items: by weight, noise and theta.
 pub(super) fn cells(paper: &Paper) -> Vec<MapCell> {
+    cells_among(paper, |_| true)
+}
+
+/// The cells with some of the methods only.
+fn cells_among(paper: &Paper, competes: impl Fn(Method) -> bool) -> Vec<MapCell> {
     let grid = &paper.settings.crossover;
     let rows_of = |[w, n, t]: [usize; 3]| {
         let item = ((w * grid.noise.len() + n) * grid.theta.len() + t) * grid.repetitions;
-        let inside = |r: &&Row| (item..item + grid.repetitions).contains(&r.item);
+        let inside = |r: &&Row| (item..item + grid.repetitions).contains(&r.item) && competes(r.method);
         (crossover(&paper.settings, item), paper.crossover.iter().filter(inside).collect::<Vec<_>>())
     };
     let mut cells = Vec::new();
@@ -67,9 +72,26 @@ pub(super) fn feedback(paper: &Paper, weight: usize) -> String {
     format!("{word}weight {}", short(weights[weight], 4))
 }
 
-/// One panel per weight of the command.
+/// All methods.
 pub(super) fn figure(paper: &Paper) -> Figure {
-    let (grid, cells) = (&paper.settings.crossover, cells(paper));
+    let caption = format!(
+        "Method with the highest median fit of the worse axis over noise and theta, one panel per weight of the command, with its \
+         lead over the second in percentage points; below {TIE} point it is a tie, and where no controller keeps the margin there \
+         is no loop."
+    );
+    drawn(paper, &cells(paper), "crossover-map", "Crossover map", caption)
+}
+
+/// Hansen against direct identification, as in Fig. 5: neither knows the structure of the plant.
+pub(super) fn figure_of_subspace(paper: &Paper) -> Figure {
+    let cells = cells_among(paper, |m| matches!(m, Method::Direct | Method::Hansen));
+    let caption = "The same between the two methods that know nothing of the structure of the plant.".into();
+    drawn(paper, &cells, "crossover-map-subspace", "Crossover map, Hansen against direct identification", caption)
+}
+
+/// One panel per weight of the command.
+fn drawn(paper: &Paper, cells: &[MapCell], key: &str, title: &str, caption: String) -> Figure {
+    let grid = &paper.settings.crossover;
     let labels = |values: &[f64]| values.iter().map(|v| short(*v, 4)).collect::<Vec<_>>();
     let panel = |weight: usize| Panel {
         title: feedback(paper, weight),
@@ -82,13 +104,9 @@ pub(super) fn figure(paper: &Paper) -> Figure {
         }),
     };
     Figure {
-        key: "crossover-map".into(),
-        title: "Crossover map".into(),
-        caption: format!(
-            "Method with the highest median fit of the worse axis over noise and theta, one panel per weight of the \
-             command, with its lead over the second in percentage points; below {TIE} point it is a tie, and where no \
-             controller keeps the margin there is no loop."
-        ),
+        key: key.into(),
+        title: title.into(),
+        caption,
         layout: Layout::Beside,
         panels: (0..grid.command_weights.len()).map(panel).collect(),
     }

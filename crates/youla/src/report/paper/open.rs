@@ -1,6 +1,6 @@
 //! What the paper leaves open, and what was chosen.
 
-use super::words::{and, count, percent, short};
+use super::words::{and, count, excitation, percent, short};
 use crate::identify::subspace::{Order, SubspaceOptions};
 use crate::reduce::ReducedOrder;
 use crate::study::Paper;
@@ -8,7 +8,6 @@ use crate::study::Paper;
 /// One sentence each.
 pub(super) fn choices(paper: &Paper) -> Vec<String> {
     let (rig, s) = (&paper.rig, &paper.settings);
-    let waves = &s.experiments.excitation;
     let subspace = |o: &SubspaceOptions| format!("{} and {} block rows", order(&o.order), o.horizon);
     let reduced = match s.reduction.order {
         ReducedOrder::Minimal => "the minimal order".into(),
@@ -23,11 +22,10 @@ pub(super) fn choices(paper: &Paper) -> Vec<String> {
             best_small(paper)
         ),
         format!(
-            "Excitation: square waves of {} V with holds of {} to {} samples, independent on both axes; the paper says a series of \
-             square waves.",
-            short(waves.amplitude, 3),
-            waves.hold_min,
-            waves.hold_max
+            "Excitation: in the study {}, in the experiments {}, independent on both axes; the paper says a series of square \
+             waves.",
+            excitation(&s.study.excitation),
+            excitation(&s.experiments.excitation)
         ),
         format!(
             "Lengths: {} and {} samples in the experiments, {} and {} in the study (identification and verification).",

@@ -3,7 +3,7 @@
 use super::order::{differences, lacking_in_words};
 use super::section_study::points;
 use super::story::section;
-use super::words::{both, count, short};
+use super::words::{both, count, excitation, short};
 use super::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
 use crate::Result;
 use crate::report::figure::Figure;
@@ -53,18 +53,17 @@ fn nominal_below(paper: &Paper, x: &Experiment) -> Option<String> {
     if x.case.a_factor > 0.9 || (0..2).all(|i| ours[i] > theirs[i] - 20.0) {
         return None;
     }
-    let (gain, waves) = (x.case.b_factor / x.case.a_factor, &paper.settings.experiments.excitation);
+    let gain = x.case.b_factor / x.case.a_factor;
     Some(format!(
         "{}: the nominal model fits {} here and {} in the paper. Its static gain is {} times that of the plant, so under a slow \
          excitation alone it would fit {} %, and less where its resonances are excited; the paper's value suggests square waves \
-         with longer holds than the {} to {} samples of these records.",
+         slower than these records have: {}.",
         x.case.title,
         both(ours),
         both(theirs),
         short(gain, 3),
         short(100.0 * (1.0 - (gain - 1.0).abs()), 3),
-        waves.hold_min,
-        waves.hold_max
+        excitation(&paper.settings.experiments.excitation)
     ))
 }
 

@@ -3,7 +3,7 @@
 use super::order::lacking_in_words;
 use super::story::section;
 use super::words::{and, both, count, percent, short};
-use super::{figures_study, tables_nominal, tables_rig};
+use super::{figures_experiments, figures_study, tables_nominal, tables_rig};
 use crate::Result;
 use crate::report::story::{Block, Section};
 use crate::study::{Method, Paper, Row, Status};
@@ -34,6 +34,7 @@ pub(super) fn rig(paper: &Paper) -> Section {
         Block::Text(turning),
         Block::Table(tables_rig::outcomes(paper)),
         Block::Table(tables_rig::excitation(paper)),
+        Block::Figure(figures_experiments::excitation(paper)),
         Block::Table(tables_rig::parameters(paper)),
     ];
     section("rig", "The rig", "Rig", blocks)

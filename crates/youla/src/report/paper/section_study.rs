@@ -89,6 +89,7 @@ pub(super) fn map(paper: &Paper) -> Section {
         Block::Text(text),
         Block::Figure(crossover::figure(paper)),
         Block::List(crossover::sentences(paper)),
+        Block::Figure(crossover::figure_of_subspace(paper)),
         Block::Table(crossover::table(paper)),
     ];
     section("map", "Which method under which conditions", "Crossover map", blocks)

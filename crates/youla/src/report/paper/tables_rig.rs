@@ -1,11 +1,13 @@
 //! The rig and what happened on it.
 
 use super::tables::{plain, row};
-use super::words::{count, short};
+use super::words::short;
+use crate::record::ExcitedChannel;
 use crate::report::story::{Row, Table};
 use crate::rig::{ExperimentRecord, Fidelity};
 use crate::study::{Experiment, Paper};
 use serde::Deserialize;
+use std::f64::consts::TAU;
 
 /// Every parameter with unit and basis, in the order of the file.
 pub(super) fn parameters(paper: &Paper) -> Table {
@@ -113,29 +115,32 @@ fn outcome(name: &str, record: &ExperimentRecord, settle: usize) -> Row {
     ])
 }
 
-/// The excitations. What they offer to identification belongs here: rms, crest, order of persistency.
+/// The excitations of the experiments, and what they offer to identification.
 pub(super) fn excitation(paper: &Paper) -> Table {
-    let settings = &paper.settings;
-    let ts = paper.rig.timing.sample_time.value;
-    let rows = [
-        ("study and map", &settings.study.excitation, settings.study.samples),
-        ("experiments", &settings.experiments.excitation, settings.experiments.samples),
-    ]
-    .map(|(name, waves, samples)| {
+    let rows = paper.experiments.list.iter().map(|e| {
+        let report = &e.excitation;
+        let per_axis = |f: &dyn Fn(&ExcitedChannel) -> f64| {
+            let [h, v] = [0, 1].map(|j| report.channels.get(j).map_or(f64::NAN, f));
+            format!("{} / {}", short(h, 3), short(v, 3))
+        };
+        let persistency = &report.persistency;
         row([
-            name.to_owned(),
-            "square waves, random hold".into(),
-            short(waves.amplitude, 4),
-            format!("{} to {}", waves.hold_min, count(waves.hold_max, "sample", "samples")),
-            samples.to_string(),
-            short(samples as f64 * ts, 4),
+            e.case.title.clone(),
+            short(e.estimation.alpha.nrows() as f64 * e.estimation.time.ts(), 4),
+            per_axis(&|c| c.rms),
+            per_axis(&|c| c.crest),
+            per_axis(&|c| c.band.omega_max / TAU),
+            format!("{} of {}", report.order, persistency.block_rows),
+            short(persistency.condition, 2),
         ])
     });
     plain(
         "excitation",
         "Excitation",
-        "The signal alpha of the estimation records, independent on both axes.",
-        &["records", "kind", "amplitude, V", "hold", "samples", "duration, s"],
-        rows.into(),
+        "The signal alpha of the estimation records, per axis: rms, crest, frequency below which 95 % of the power lies; order of \
+         persistent excitation of both axes together, of the number of block rows that the identification of S needs, and \
+         condition number of that block-Hankel matrix.",
+        &["experiment", "duration, s", "rms, V", "crest", "95 % below, Hz", "persistent order", "condition"],
+        rows.collect(),
     )
 }

@@ -37,7 +37,7 @@ fn row(item: usize, theta: f64, method: Method, fit: Option<f64>) -> Row {
         status: if fit.is_some() { Status::Stable } else { Status::Refused },
         fit: fit.map_or([f64::NAN; 2], |f| [f, f - 1.0]),
         steps: None,
-        reason: String::new(),
+        note: String::new(),
     }
 }
 

@@ -1,5 +1,7 @@
 //! Numbers and lists as text.
 
+use crate::record::{Excitation, RampedExcitation};
+use std::f64::consts::TAU;
 use std::fmt::Display;
 
 /// What stands where a method gave no model.
@@ -39,6 +41,39 @@ pub(super) fn both(fit: [f64; 2]) -> String {
 pub(super) fn short(value: f64, digits: usize) -> String {
     let rounded: f64 = format!("{value:.*e}", digits.saturating_sub(1)).parse().unwrap_or(value);
     if rounded != 0.0 && !(1e-4..1e5).contains(&rounded.abs()) { format!("{rounded:e}") } else { rounded.to_string() }
+}
+
+/// Kind, amplitude, what else defines it, and its ramps.
+pub(super) fn excitation(signal: &RampedExcitation) -> String {
+    let hz = |omega: f64| short(omega / TAU, 3);
+    let kind = match &signal.excitation {
+        Excitation::SquareWaves(o) => format!(
+            "square waves of {} V with random holds of {} to {} samples",
+            short(o.amplitude, 3),
+            o.hold_min,
+            o.hold_max
+        ),
+        Excitation::Prbs(o) => format!(
+            "a maximal-length PRBS of {} V, 2^{} - 1 values of {}",
+            short(o.amplitude, 3),
+            o.order,
+            count(o.hold, "sample", "samples")
+        ),
+        Excitation::Multisine(o) => format!(
+            "a multisine of {} V from {} Hz to {}, period {}",
+            short(o.amplitude, 3),
+            hz(o.omega_min),
+            o.omega_max.map_or_else(|| "the Nyquist frequency".into(), |omega| format!("{} Hz", hz(omega))),
+            count(o.period, "sample", "samples")
+        ),
+        Excitation::Chirp(o) => {
+            format!("a chirp of {} V from {} to {} Hz", short(o.amplitude, 3), hz(o.omega_start), hz(o.omega_end))
+        }
+    };
+    match signal.ramp {
+        0.0 => kind,
+        ramp => format!("{kind}, faded in and out over {} s", short(ramp, 3)),
+    }
 }
 
 /// `a, b and c`.

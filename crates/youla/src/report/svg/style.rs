@@ -10,7 +10,7 @@ const MEASURED_STYLE: Style = style("#16191d", 0.5, &[], Marker::Circle);
 const OTHER_STYLES: [Style; 4] = [
     style("#cc79a7", 0.8, &[6.0, 1.5], Marker::Plus),
     style("#56b4e9", 0.8, &[2.5, 1.0], Marker::Circle),
-    style("#8a7a00", 0.8, &[1.0, 1.0], Marker::Square),
+    style("#8c564b", 0.8, &[1.0, 1.0], Marker::Square),
     style("#6a51a3", 0.8, &[5.0, 1.5, 1.0, 1.5, 1.0, 1.5], Marker::Diamond),
 ];
 /// Dashes of further curves of one method, told apart by their notes.

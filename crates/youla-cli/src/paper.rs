@@ -1,0 +1,119 @@
+//! `youla paper` and `youla study merge`: settings from the arguments, progress with the remaining time, Table 1 at the end.
+
+use crate::args::{Args, PaperArgs};
+use crate::output::{Failure, say};
+use crate::table;
+use indicatif::{ProgressBar, ProgressStyle};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use youla::rig::RigParameters;
+use youla::run::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, paper};
+use youla::study::{PaperSettings, Shard};
+
+/// Reproduces the paper, or its part.
+pub(crate) fn reproduce(args: &Args, asked: &PaperArgs) -> Result<(), Failure> {
+    if asked.print_settings {
+        return say(PaperSettings::TOML.trim_end());
+    }
+    if asked.print_rig {
+        return say(RigParameters::TOML.trim_end());
+    }
+    let configuration = configuration(asked)?;
+    let target = asked.out.clone().unwrap_or_else(|| default_folder(&configuration));
+    finish(args, &configuration, &target)
+}
+
+/// Joins parts and draws the whole.
+pub(crate) fn merge_parts(args: &Args, parts: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
+    let target = match (out, parts.first()) {
+        (Some(out), _) => out.to_owned(),
+        (None, Some(part)) => {
+            let part = Configuration::read(part)?;
+            default_folder(&Configuration { shard: Shard::WHOLE, ..part })
+        }
+        (None, None) => PathBuf::new(),
+    };
+    let configuration = merge(parts, &target)?;
+    finish(args, &configuration, &target)
+}
+
+fn configuration(asked: &PaperArgs) -> Result<Configuration, Failure> {
+    let mut settings = asked.settings.as_deref().map_or_else(|| Ok(PaperSettings::shipped()), PaperSettings::read)?;
+    let rig = asked.rig.as_deref().map_or_else(|| Ok(RigParameters::shipped()), RigParameters::read)?;
+    settings.seed = asked.seed.unwrap_or(settings.seed);
+    settings.methods = asked.methods.clone().unwrap_or(settings.methods);
+    settings.experiments.rpm = asked.rpm.unwrap_or(settings.experiments.rpm);
+    if let Some(models) = asked.models {
+        settings = settings.with_models(models);
+    }
+    Ok(Configuration::new(settings, rig, asked.shard.unwrap_or(Shard::WHOLE)))
+}
+
+fn default_folder(configuration: &Configuration) -> PathBuf {
+    let (seed, models, shard) = (configuration.settings.seed, configuration.settings.study.models, configuration.shard);
+    let part = if shard.is_whole() { String::new() } else { format!("-shard-{}-of-{}", shard.index(), shard.count()) };
+    Path::new("runs").join(format!("paper-seed-{seed}-models-{models}{part}"))
+}
+
+fn finish(args: &Args, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
+    let bar = Bar::new(args.quiet || args.json);
+    let written = paper(configuration, target, &|progress| bar.tell(progress))?;
+    bar.0.finish_and_clear();
+    match &written.paper {
+        _ if args.quiet => Ok(()),
+        Some(_) if args.json => {
+            let path = target.join("summary.json");
+            say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end())
+        }
+        Some(paper) => say(&table::paper(paper, &written)),
+        None => say(&part_of(configuration.shard, &written)),
+    }
+}
+
+fn part_of(shard: Shard, written: &WrittenPaper) -> String {
+    let folder = written.folder.display();
+    format!("shard {shard} is complete: {folder}\nwhen all parts are: youla study merge PART... --out DIR")
+}
+
+/// One bar per stage, on a terminal only.
+struct Bar(ProgressBar);
+
+impl Bar {
+    fn new(hidden: bool) -> Self {
+        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
+        bar.enable_steady_tick(Duration::from_millis(100));
+        Bar(bar)
+    }
+
+    fn tell(&self, progress: PaperProgress<'_>) {
+        match progress {
+            PaperProgress::Begins(stage, loops) => self.begin(stage, loops),
+            PaperProgress::Done(loops) => self.0.set_position(loops as u64),
+            PaperProgress::Continued { path, loops, redone } => {
+                let path = path.display();
+                let damaged = if redone > 0 {
+                    format!(", {redone} damaged or incomplete rows are computed again")
+                } else {
+                    String::new()
+                };
+                self.0.println(format!("{path}: {loops} loops are there already{damaged}"));
+                // The remaining time is that of the loops of this call.
+                self.0.reset_eta();
+            }
+        }
+    }
+
+    fn begin(&self, stage: PaperStage, loops: usize) {
+        let template = if loops > 0 {
+            "{spinner} {msg} {wide_bar} {pos}/{len}, {elapsed} gone, {eta} left"
+        } else {
+            "{spinner} {msg} ({elapsed})"
+        };
+        if let Ok(style) = ProgressStyle::with_template(template) {
+            self.0.set_style(style);
+        }
+        self.0.reset();
+        self.0.set_length(loops as u64);
+        self.0.set_message(stage.name());
+    }
+}

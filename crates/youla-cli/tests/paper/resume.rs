@@ -1,0 +1,66 @@
+//! A run that was stopped goes on where it was, and ends with the same bytes.
+
+use crate::common::empty_folder;
+use crate::small::{LOOPS, assert_same, command, copy_of_whole, paper, whole};
+use std::fs;
+use std::process::Stdio;
+use std::time::Duration;
+
+/// Runs the small paper again on a copy whose study.csv was changed.
+fn finished_after(name: &str, change: impl Fn(&mut Vec<u8>)) {
+    let folder = copy_of_whole(name, &LOOPS);
+    let path = folder.join("copy/study.csv");
+    let mut bytes = fs::read(&path).expect("readable");
+    change(&mut bytes);
+    fs::write(&path, bytes).expect("written");
+    let done = paper(&folder, &["--out", "copy", "--quiet"]);
+    assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{name}");
+    LOOPS.iter().for_each(|file| assert_same(file, &folder.join("copy")));
+}
+
+#[test]
+fn a_file_cut_off_anywhere_is_completed() {
+    let length = fs::read(whole().join("study.csv")).expect("readable").len();
+    for (k, keep) in [0, 20, length / 2, length - 1].into_iter().enumerate() {
+        finished_after(&format!("paper-cut-{k}"), |bytes| bytes.truncate(keep));
+    }
+}
+
+#[test]
+fn a_damaged_last_row_is_computed_again() {
+    finished_after("paper-damaged", |bytes| {
+        // A digit of the last row, some characters before its check.
+        let at = bytes.len() - 40;
+        bytes[at] = if bytes[at] == b'1' { b'2' } else { b'1' };
+    });
+}
+
+#[test]
+fn a_killed_process_leaves_what_the_next_one_completes() {
+    let folder = empty_folder("paper-killed");
+    let rows = || fs::read_to_string(folder.join("killed/study.csv")).map_or(0, |text| text.lines().count());
+    let mut running = command(&folder, &["--out", "killed"]).stdout(Stdio::null()).spawn().expect("started");
+    while rows() < 6 && running.try_wait().expect("known").is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    // SIGKILL: nothing is cleaned up.
+    running.kill().expect("killed or finished");
+    running.wait().expect("reaped");
+    let done = paper(&folder, &["--out", "killed", "--quiet"]);
+    assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""));
+    LOOPS.iter().for_each(|file| assert_same(file, &folder.join("killed")));
+}
+
+#[test]
+fn the_number_of_threads_does_not_matter() {
+    let folder = empty_folder("paper-one-thread");
+    let done = command(&folder, &["--out", "one", "--quiet"]).env("RAYON_NUM_THREADS", "1").status().expect("run");
+    assert!(done.success());
+    let figures = fs::read_dir(whole().join("figures")).expect("figures");
+    let figures = figures.map(|f| format!("figures/{}", f.expect("entry").file_name().to_string_lossy()));
+    let files: Vec<String> = LOOPS.map(str::to_owned).into_iter().chain(figures).collect();
+    assert!(files.len() > 10, "{files:?}");
+    for file in files.iter().map(String::as_str).chain(["summary.json", "tables/table-1.csv"]) {
+        assert_same(file, &folder.join("one"));
+    }
+}

@@ -11,7 +11,7 @@ use crate::identify::greybox::{BearingStructure, GreyBoxModel, GreyBoxOptions, S
 use crate::identify::hansen::{HansenModel, hansen};
 use crate::identify::subspace::{self, InitialState, SubspaceOptions};
 use crate::lti::{Discrete, Mode, StateSpace, simulate};
-use crate::record::{ExcitationReport, ExcitationReportOptions, describe_excitation};
+use crate::record::{ExcitationReport, ExcitationReportOptions, Welch, describe_excitation};
 use crate::reduce::reduce;
 use crate::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, ObserverLoop, RigParameters, run_experiment};
 use crate::validate::{certify, fit, predict_open_loop};
@@ -161,7 +161,11 @@ pub(super) fn run(
 /// Persistency up to the block rows that the identification of S needs.
 fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
     let order = 2 * settings.hansen.horizon;
-    let options = ExcitationReportOptions { wanted_order: order, highest_order: order, ..Default::default() };
+    // At least eight half-overlapping windows, of a record of 20 000 samples those of the default.
+    let welch = Welch::default();
+    let window = welch.window.min(record.alpha.nrows() / 4).max(2);
+    let welch = Welch { window, ..welch };
+    let options = ExcitationReportOptions { wanted_order: order, highest_order: order, welch };
     describe_excitation(record.alpha.as_ref(), record.time, &options)
 }
 

@@ -161,6 +161,9 @@ fn spread(paper: &Paper) -> Claim {
     Claim { outcome: ClaimOutcome::of(&[found[0].0, found[1].0]), text, ..claim }
 }
 
+/// Share of the loops below which an exception leaves a claim true in part.
+const FEW: f64 = 0.05;
+
 fn stability(paper: &Paper) -> Claim {
     let claim = Claim {
         key: "s-stable",
@@ -182,5 +185,10 @@ fn stability(paper: &Paper) -> Claim {
         count(all.len(), "loop", "loops"),
         if unstable == 1 { "is" } else { "are" }
     );
-    Claim { outcome: ClaimOutcome::of(&[none == 0, reflected == 0]), text, ..claim }
+    let outcome = match (none + reflected, all.len()) {
+        (0, _) => ClaimOutcome::Holds,
+        (some, loops) if (some as f64) < FEW * loops as f64 => ClaimOutcome::Partly,
+        _ => ClaimOutcome::Fails,
+    };
+    Claim { outcome, text, ..claim }
 }

@@ -1,6 +1,7 @@
 //! The files of a results folder beside the rows of the loops: data first, then what is drawn from them.
 
 use super::super::folder::replace_file;
+use crate::report::story::{Block, Table};
 use crate::report::{
     figure_csv, paper_figures, paper_story, paper_summary, paper_tables, story_html, story_methods, svg, table_csv,
 };
@@ -22,7 +23,7 @@ pub(super) fn write_figures(paper: &Paper, target: &Path) -> Result<()> {
     }
     let methods = story_methods();
     for table in paper_tables(paper)? {
-        replace_file(&tables.join(format!("{}.csv", table.key)), &table_csv(&table))?;
+        write_table(&table, target)?;
     }
     let drawn = paper_figures(paper)?;
     for figure in &drawn {
@@ -34,10 +35,20 @@ pub(super) fn write_figures(paper: &Paper, target: &Path) -> Result<()> {
     Ok(())
 }
 
-/// `timing.json` and the page.
+/// `timing.json`, the tables of times, which [`paper_tables`] leaves out, and the page.
 pub(super) fn write_page(paper: &Paper, target: &Path) -> Result<()> {
     json(&target.join("timing.json"), &paper.timing)?;
-    replace_file(&target.join("report.html"), &story_html(&paper_story(paper)?)?)
+    let story = paper_story(paper)?;
+    for block in story.sections.iter().flat_map(|section| &section.blocks) {
+        if let Block::Table(table) = block {
+            write_table(table, target)?;
+        }
+    }
+    replace_file(&target.join("report.html"), &story_html(&story)?)
+}
+
+fn write_table(table: &Table, target: &Path) -> Result<()> {
+    replace_file(&target.join("tables").join(format!("{}.csv", table.key)), &table_csv(table))
 }
 
 fn json(path: &Path, value: &impl serde::Serialize) -> Result<()> {

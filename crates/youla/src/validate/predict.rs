@@ -1,7 +1,7 @@
 //! Prediction of a record by a model: from the measured input, or in closed loop from the excitations alone.
 
 use crate::control::closed_loop;
-use crate::linalg::{block, check_shape};
+use crate::linalg::{Triangle, block, check_shape};
 use crate::lti::{Discrete, Partitioned, StateSpace, simulate};
 use crate::{Mat, MatRef, Result};
 use faer::Scale;
@@ -62,26 +62,24 @@ fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec
     if n == 0 {
         return Vec::new();
     }
-    let mut powers = model.c().to_owned();
-    let floor = 1e-9 * powers.norm_max();
-    let mut r = Mat::<f64>::zeros(n, n + 1);
+    let mut powers = FreeResponse::new(model);
+    let floor = 1e-9 * powers.largest();
+    let mut triangle = Triangle::new(n + 1, CHUNK * p);
     let mut start = 0;
-    while start < residual.nrows() && powers.norm_max() > floor && powers.norm_max().is_finite() {
+    while start < residual.nrows() && powers.largest() > floor && powers.largest().is_finite() {
         let rows = CHUNK.min(residual.nrows() - start);
-        let mut stacked = Mat::<f64>::zeros(n + rows * p, n + 1);
-        stacked.as_mut().subrows_mut(0, n).copy_from(&r);
-        for k in 0..rows {
-            let top = n + k * p;
-            stacked.as_mut().submatrix_mut(top, 0, p, n).copy_from(&powers);
-            for i in 0..p {
-                stacked[(top + i, n)] = residual[(start + k, i)];
+        triangle.fold(rows * p, |mut piece| {
+            for k in 0..rows {
+                for (i, row) in powers.rows.chunks_exact(n).enumerate() {
+                    let values = row.iter().copied().chain([residual[(start + k, i)]]);
+                    piece.as_mut().row_mut(k * p + i).iter_mut().zip(values).for_each(|(entry, value)| *entry = value);
+                }
+                powers.advance();
             }
-            powers = &powers * model.a();
-        }
-        let factor = stacked.qr().R().to_owned();
-        r = Mat::from_fn(n, n + 1, |i, j| if i <= j && i < factor.nrows() { factor[(i, j)] } else { 0.0 });
+        });
         start += rows;
     }
+    let r = Mat::from_fn(n, n + 1, |i, j| if i < triangle.r().nrows() { triangle.r()[(i, j)] } else { 0.0 });
     // The singular value decomposition settles states that the outputs do not show: they stay zero.
     match r.subcols(0, n).thin_svd() {
         Ok(svd) => {
@@ -89,6 +87,38 @@ fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec
             (0..n).map(|i| x0[i]).collect()
         }
         Err(_) => vec![0.0; n],
+    }
+}
+
+/// `C A^k`, one contiguous row per output.
+struct FreeResponse {
+    /// Rows of A.
+    a: Vec<f64>,
+    rows: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl FreeResponse {
+    fn new(model: &StateSpace<Discrete>) -> Self {
+        let by_rows = |x: MatRef<'_, f64>| x.row_iter().flat_map(|row| row.iter().copied()).collect::<Vec<_>>();
+        FreeResponse { a: by_rows(model.a()), rows: by_rows(model.c()), next: vec![0.0; model.order()] }
+    }
+
+    /// NaN where an entry is not a number.
+    fn largest(&self) -> f64 {
+        self.rows.iter().fold(0.0, |largest, v| if v.abs() > largest || v.is_nan() { v.abs() } else { largest })
+    }
+
+    /// From `C A^k` to `C A^(k+1)`.
+    fn advance(&mut self) {
+        let n = self.next.len();
+        for row in self.rows.chunks_exact_mut(n) {
+            self.next.fill(0.0);
+            for (value, a) in row.iter().zip(self.a.chunks_exact(n)) {
+                self.next.iter_mut().zip(a).for_each(|(next, a)| *next += value * a);
+            }
+            row.copy_from_slice(&self.next);
+        }
     }
 }
 

@@ -14,6 +14,7 @@ mod channels;
 mod gram;
 mod hankel;
 mod innovation;
+mod modal;
 mod order;
 mod output_error;
 mod projection;

@@ -7,6 +7,7 @@
 
 use super::channels::{Channels, Signals};
 use super::innovation::observer_gain;
+use super::modal::Modes;
 use super::realisation::OutputPair;
 use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
 use super::stability::StabilityReport;
@@ -112,10 +113,18 @@ struct Part {
     initial_rank: usize,
 }
 
-/// One triangular factor per output, joined for each experiment.
+/// One triangular factor per output, joined for each experiment; in modal coordinates where A has them, else output by
+/// output.
 fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
     let targets: Vec<Mat<f64>> =
         data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
+    if let Some(modes) = Modes::of(predictor) {
+        let experiments: Vec<_> = data.experiments.iter().zip(&targets).collect();
+        return experiments
+            .par_iter()
+            .map(|(signals, targets)| join(&modes.condense(signals.u.as_ref(), targets.as_ref(), unknowns), unknowns))
+            .collect();
+    }
     let tasks: Vec<_> = (0..targets.len()).flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
     let triangles: Vec<Mat<f64>> = tasks
         .par_iter()

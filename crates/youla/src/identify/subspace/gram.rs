@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub(super) const LIMIT: f64 = 1e4;
 
 /// Steps of the inverse iteration for the condition number; each costs two triangular solutions.
-const STEPS: usize = 12;
+const STEPS: usize = 6;
 
 /// Samples of one channel in a frame times the channels: the rows of a product that fill the registers well.
 const FRAME: usize = 64;

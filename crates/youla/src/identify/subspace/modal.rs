@@ -76,7 +76,10 @@ impl Modes {
             .zip(&starts[1..])
             .map(|(start, end)| {
                 let begun = state.clone();
-                (*start..*end).for_each(|k| state.advance(u, k));
+                for piece in (*start..*end).step_by(PIECE) {
+                    (piece..(piece + PIECE).min(*end)).for_each(|k| state.advance(u, k));
+                    state.flush();
+                }
                 begun
             })
             .collect();
@@ -170,13 +173,18 @@ impl State {
     fn advance(&mut self, u: MatRef<'_, f64>, k: usize) {
         let driven = self.drive[self.free * self.modes..].chunks_exact_mut(self.modes);
         driven.enumerate().for_each(|(q, drive)| drive.fill(u[(k, q)]));
-        let flushed = |v: f64| if v.abs() < VANISHED { 0.0 } else { v };
         let numbers = self.re.iter_mut().zip(&mut self.im).zip(self.lambda_re.iter().zip(&self.lambda_im));
         for (((re, im), (a, b)), drive) in numbers.zip(&self.drive) {
             let (x, y) = (*re, *im);
-            *re = flushed(a * x - b * y + drive);
-            *im = flushed(b * x + a * y);
+            *re = a * x - b * y + drive;
+            *im = b * x + a * y;
         }
+    }
+
+    /// Sets what has decayed to zero.
+    fn flush(&mut self) {
+        let numbers = self.re.iter_mut().chain(&mut self.im);
+        numbers.filter(|v| v.abs() < VANISHED).for_each(|v| *v = 0.0);
     }
 
     /// Writes the rows of the samples from `start` on and moves on behind them.
@@ -208,6 +216,7 @@ impl State {
             }
             self.advance(u, start + k);
         }
+        self.flush();
     }
 }
 

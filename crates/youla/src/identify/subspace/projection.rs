@@ -34,7 +34,29 @@ pub(super) fn project(factor: &HankelFactor, weight: Weight) -> Result<Projectio
 
 /// Canonical correlations: cosines of the angles between past and future, freed of the future inputs.
 pub(super) fn canonical_correlations(factor: &HankelFactor) -> Result<Vec<f64>> {
-    Ok(canonical(factor)?.singular_values)
+    let mut values = Whitened::new(factor)?.past.singular_values().map_err(|_| no_convergence())?;
+    values.resize(factor.horizon * factor.outputs, 0.0);
+    Ok(values)
+}
+
+/// `[R32' R33'] = Uw Sw Vw'` and what the past says of the white future outputs.
+struct Whitened {
+    uw: Mat<f64>,
+    sw: Vec<f64>,
+    /// `Sw^-1 Uw' R32'`.
+    past: Mat<f64>,
+}
+
+impl Whitened {
+    fn new(factor: &HankelFactor) -> Result<Self> {
+        let (uw, mut sw) = left_singular(factor.future_beyond_inputs().transpose())?;
+        let rank = sw.iter().filter(|s| **s > WHITENING_TOLERANCE * sw[0]).count();
+        let uw = uw.subcols(0, rank).to_owned();
+        sw.truncate(rank);
+        let mut past = uw.transpose() * factor.future_by_past().transpose();
+        sw.iter().enumerate().for_each(|(i, s)| past.row_mut(i).iter_mut().for_each(|v| *v /= s));
+        Ok(Whitened { uw, sw, past })
+    }
 }
 
 /// `R32' = U S V'`, Gamma = U.
@@ -45,12 +67,9 @@ fn unweighted(factor: &HankelFactor) -> Result<Projection> {
 
 /// `[R32' R33'] = Uw Sw Vw'`, `Sw^-1 Uw' R32' = U S V'`, Gamma = orthonormalised `Uw Sw U`.
 fn canonical(factor: &HankelFactor) -> Result<Projection> {
-    let (uw, sw) = left_singular(factor.future_beyond_inputs().transpose())?;
-    let rank = sw.iter().filter(|s| **s > WHITENING_TOLERANCE * sw[0]).count();
-    let uw = uw.as_ref().subcols(0, rank);
-    let mut white = uw.transpose() * factor.future_by_past().transpose();
-    (0..rank).for_each(|i| white.row_mut(i).iter_mut().for_each(|v| *v /= sw[i]));
-    let (mut u, mut singular_values) = left_singular(white.as_ref())?;
+    let Whitened { uw, sw, past } = Whitened::new(factor)?;
+    let rank = sw.len();
+    let (mut u, mut singular_values) = left_singular(past.as_ref())?;
     (0..rank).for_each(|i| u.row_mut(i).iter_mut().for_each(|v| *v *= sw[i]));
     let count = factor.horizon * factor.outputs;
     singular_values.resize(count, 0.0);
@@ -75,10 +94,13 @@ fn orthonormal(a: MatRef<'_, f64>, count: usize) -> Mat<f64> {
 
 /// Left singular vectors (square) and as many singular values, zero beyond the columns of `a`.
 fn left_singular(a: MatRef<'_, f64>) -> Result<(Mat<f64>, Vec<f64>)> {
-    let failed =
-        |_| Error::NoConvergence { what: "the singular values of the projected outputs".into(), iterations: 0 };
-    let svd = a.svd().map_err(failed)?;
+    // The right vectors of a wide matrix would be most of the work.
+    let svd = if a.ncols() < a.nrows() { a.svd() } else { a.thin_svd() }.map_err(|_| no_convergence())?;
     let mut sigma: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     sigma.resize(a.nrows(), 0.0);
     Ok((svd.U().to_owned(), sigma))
+}
+
+fn no_convergence() -> Error {
+    Error::NoConvergence { what: "the singular values of the projected outputs".into(), iterations: 0 }
 }

@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 use youla::Result;
-use youla::identify::subspace::{Experiment, Order, SubspaceOptions, subspace};
+use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceOptions, subspace};
 use youla::linalg::{RiccatiProblem, Triangle, care, dare, discrete_lyapunov, eye, lyapunov};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::record::{Excitation, SquareWaves};
@@ -141,17 +141,20 @@ fn reduction() -> Result<()> {
     Ok(())
 }
 
-/// The call of a user, on records of the bearing with 20 dB of noise.
+/// The call of a user, on records of the bearing with 20 dB of noise; by the Gram matrix, and by QR where that is asked for.
 fn whole_identification(single: &rayon::ThreadPool) -> Result<()> {
-    title("subspace, 2 inputs, 2 outputs, order 6, horizon 20");
-    let options = SubspaceOptions { order: Order::Fixed(6), ..SubspaceOptions::default() };
+    title("subspace, 2 inputs, 2 outputs, order 6");
     let time = Discrete::new(TS)?;
-    for samples in [5_000, 100_000, 1_000_000] {
+    for (samples, horizon) in [(5_000, 20), (100_000, 20), (1_000_000, 20), (1_000_000, 40)] {
         let (_, u, y) = bearing_record(samples)?;
         let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let options = SubspaceOptions { order: Order::Fixed(6), horizon, ..SubspaceOptions::default() };
+        let by_qr = SubspaceOptions { factorisation: Factorisation::Qr, ..options.clone() };
         let call = || subspace(&experiments, time, &options);
-        let one = line(&format!("{samples} samples, one thread"), None, || single.install(call));
-        line(&format!("{samples} samples, {} threads", rayon::current_num_threads()), Some(one), call);
+        let name = format!("{samples} samples, horizon {horizon}");
+        let one = line(&format!("{name}, one thread"), None, || single.install(call));
+        line(&format!("{name}, {} threads", rayon::current_num_threads()), Some(one), call);
+        line(&format!("{name}, one thread, QR"), Some(one), || single.install(|| subspace(&experiments, time, &by_qr)));
     }
     Ok(())
 }
@@ -214,7 +217,7 @@ fn line<T>(name: &str, reference: Option<f64>, work: impl FnMut() -> T) -> f64 {
 
 fn print_line(name: &str, seconds: f64, ratio: Option<f64>) {
     let ratio = ratio.map_or(String::new(), |r| format!("{r:10.3} x"));
-    println!("  {name:<42} {:10.4} ms{ratio}", 1e3 * seconds);
+    println!("  {name:<46} {:10.4} ms{ratio}", 1e3 * seconds);
 }
 
 /// Median time in seconds of as many calls as fit into half a second, 3 to 1001 of them, after one to warm up.

@@ -504,9 +504,9 @@ pub enum Error {
     NotExciting {
         /// Numerical rank of the block-Hankel matrix of the inputs.
         rank: usize,
-        /// Number of its rows, 2 x horizon x inputs.
+        /// Number of its rows, (past + horizon) x inputs.
         needed: usize,
-        /// Block rows of the past and of the future.
+        /// Block rows of the future.
         horizon: usize,
     },
     /// A channel never changes, so that nothing can be learnt from it.
@@ -526,7 +526,7 @@ pub enum Error {
         order: usize,
         /// Largest order possible.
         largest: usize,
-        /// Block rows of the past and of the future.
+        /// Block rows of the future.
         horizon: usize,
     },
     // ---- report ------------------------------------------------------------------------------------------------

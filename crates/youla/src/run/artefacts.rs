@@ -301,6 +301,7 @@ fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
     serde_json::json!({
         "order": s.order.order,
         "horizon": s.horizon,
+        "past": s.past,
         "columns": s.columns,
         "singular_values": s.singular_values,
         "excitation_rcond": s.excitation_rcond,

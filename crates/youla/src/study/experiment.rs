@@ -160,7 +160,7 @@ pub(super) fn run(
 
 /// Persistency up to the block rows that the identification of S needs.
 fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
-    let order = 2 * settings.hansen.horizon;
+    let order = settings.hansen.horizon + settings.hansen.past();
     // At least eight half-overlapping windows, of a record of 20 000 samples those of the default.
     let welch = Welch::default();
     let window = welch.window.min(record.alpha.nrows() / 4).max(2);

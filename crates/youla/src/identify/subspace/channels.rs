@@ -24,7 +24,7 @@ pub(super) struct Channels {
 
 impl Channels {
     pub(super) fn new(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<Self> {
-        let (inputs, outputs) = check(experiments, options.horizon)?;
+        let (inputs, outputs) = check(experiments, options)?;
         let u: Vec<_> = experiments.iter().map(|e| e.u).collect();
         let y: Vec<_> = experiments.iter().map(|e| e.y).collect();
         let u_scale = scales("input", &u, options.scaling)?;
@@ -51,12 +51,14 @@ impl Channels {
 }
 
 /// Shapes, lengths and values; returns the numbers of inputs and outputs.
-fn check(experiments: &[Experiment<'_>], horizon: usize) -> Result<(usize, usize)> {
+fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(usize, usize)> {
+    let (past, horizon) = (options.past(), options.horizon);
     let at_least = |what: &str, value: usize, least: usize, must| {
         if value >= least { Ok(()) } else { Err(Error::OutOfRange { what: what.into(), value: value as f64, must }) }
     };
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
     at_least("the horizon", horizon, 2, "at least 2 block rows")?;
+    at_least("the past", past, 1, "at least 1 block row")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
     at_least("the number of inputs", m, 1, "at least 1")?;
     at_least("the number of outputs", p, 1, "at least 1")?;
@@ -66,9 +68,9 @@ fn check(experiments: &[Experiment<'_>], horizon: usize) -> Result<(usize, usize
         check_shape(&named("output"), *y, (u.nrows(), p))?;
         check_finite(&named("input"), *u)?;
         check_finite(&named("output"), *y)?;
-        if u.nrows() < 2 * horizon {
-            let what = format!("experiment {} with a horizon of {horizon} block rows", k + 1);
-            return Err(Error::TooFewSamples { what, found: u.nrows(), needed: 2 * horizon });
+        if u.nrows() < past + horizon {
+            let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
+            return Err(Error::TooFewSamples { what, found: u.nrows(), needed: past + horizon });
         }
     }
     Ok((m, p))

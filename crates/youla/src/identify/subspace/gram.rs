@@ -1,10 +1,10 @@
-//! The triangular factor of the block-Hankel data from their Gram matrix, which lag sums give.
+//! The triangular factor of block-Hankel data from their Gram matrix, which lag sums give.
 //!
-//! With `z(t) = [u(t); y(t)]`, q channels and T Hankel columns, block (i, j) of the Gram matrix is
+//! With `z(t) = [u(t); y(t)]`, q channels, b block rows and T Hankel columns, block (i, j) of the Gram matrix is
 //! ```text
 //! G(i, j) = sum_{t < T} z(t + i) z(t + j)',    G(i + 1, j + 1) = G(i, j) - z(i) z(j)' + z(T + i) z(T + j)'
 //! ```
-//! so the first block row gives all others: about 2 s times less work than the product of the Hankel matrix with itself
+//! so the first block row gives all others: about b times less work than the product of the Hankel matrix with itself
 //! (V. Sima, SLICOT working note 2000-4). The Cholesky factor squares the condition number k of the data: its relative error
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
@@ -33,11 +33,10 @@ pub(super) struct GramFactor {
     pub(super) condition: f64,
 }
 
-/// R of `[U_f; U_p; Y_p; Y_f]' = Q R` by Cholesky; `None` where the Gram matrix is not positive definite to working
-/// precision.
-pub(super) fn factor(data: &Channels, horizon: usize) -> Option<GramFactor> {
-    let gram = gram(data, horizon);
-    let order = order(data, horizon);
+/// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
+/// positive definite to working precision.
+pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<GramFactor> {
+    let gram = gram(data, blocks);
     let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
     let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
         let (a, b) = (order[i], order[j]);
@@ -50,22 +49,9 @@ pub(super) fn factor(data: &Channels, horizon: usize) -> Option<GramFactor> {
     Some(GramFactor { r, condition })
 }
 
-/// Place in the Gram matrix, (block, channel), of every column of `[U_f U_p Y_p Y_f]`.
-fn order(data: &Channels, horizon: usize) -> Vec<usize> {
-    let (m, p) = (data.inputs, data.outputs);
-    let block_rows = |first: usize, channels: std::ops::Range<usize>| {
-        (first..first + horizon).flat_map(move |i| channels.clone().map(move |c| i * (m + p) + c))
-    };
-    block_rows(horizon, 0..m)
-        .chain(block_rows(0, 0..m))
-        .chain(block_rows(0, m..m + p))
-        .chain(block_rows(horizon, m..m + p))
-        .collect()
-}
-
 /// The upper triangle of the Gram matrix of all experiments, by blocks of all channels.
-fn gram(data: &Channels, horizon: usize) -> Mat<f64> {
-    let (q, blocks) = (data.inputs + data.outputs, 2 * horizon);
+fn gram(data: &Channels, blocks: usize) -> Mat<f64> {
+    let q = data.inputs + data.outputs;
     let mut whole = Mat::zeros(q * blocks, q * blocks);
     for signals in &data.experiments {
         whole += of_experiment(signals, q, blocks);
@@ -112,7 +98,7 @@ impl Signals {
 /// `[L_0 L_1 ...]`, `L_j = sum_{t < columns} z(t) z(t + j)'`, q x q each.
 ///
 /// Frames of B samples stand as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
-/// memory; `X Y'` holds all products of samples up to 2 s - 1 apart.
+/// memory; `X Y'` holds all products of samples up to b - 1 apart.
 fn lag_sums(signals: &Signals, q: usize, blocks: usize, columns: usize) -> Mat<f64> {
     let frame = FRAME.div_ceil(q);
     let frames = columns.div_ceil(frame);

@@ -1,4 +1,4 @@
-//! The triangular factor of the block-Hankel data, `[U_f; U_p; Y_p; Y_f]' = Q R`.
+//! The triangular factor R of block-Hankel data, and `[U_f; U_p; Y_p; Y_f]' = Q R` for the open-loop methods.
 //!
 //! Only R is formed, from pieces of a few thousand rows (one row per Hankel column). The rows are dealt to a fixed number
 //! of lanes that depends on the data alone, so the result is the same on any number of threads.
@@ -10,6 +10,7 @@ use crate::linalg::{Triangle, leading_rank};
 use crate::{Error, Result};
 use faer::{Mat, MatMut, MatRef};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Rows folded in at a time: large enough for blocked QR, small enough for the cache.
 const PIECE: usize = 4000;
@@ -21,6 +22,8 @@ pub(super) struct HankelFactor {
     r: Mat<f64>,
     pub(super) inputs: usize,
     pub(super) outputs: usize,
+    /// Block rows of the past and of the future.
+    past: usize,
     pub(super) horizon: usize,
     /// Columns of the Hankel matrices.
     pub(super) columns: usize,
@@ -33,49 +36,23 @@ pub(super) struct HankelFactor {
 }
 
 impl HankelFactor {
-    pub(super) fn new(data: &Channels, horizon: usize, factorisation: Factorisation) -> Result<Self> {
-        let rows = RowMap::new(data, horizon);
-        let width = 2 * horizon * (data.inputs + data.outputs);
-        if rows.total < width {
-            let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
-            let needed = found + width - rows.total;
-            let what = format!("all experiments together, with a horizon of {horizon} block rows");
-            return Err(Error::TooFewSamples { what, found, needed });
-        }
-        let (r, report) = factor(data, &rows, width, factorisation)?;
+    pub(super) fn new(data: &Channels, past: usize, horizon: usize, factorisation: Factorisation) -> Result<Self> {
         let (inputs, outputs) = (data.inputs, data.outputs);
-        let past = horizon * (2 * inputs + outputs);
+        let DataTriangle { r, columns, report } =
+            factor(data, (past, horizon), &inputs_first(data, past, horizon), factorisation)?;
+        let all_inputs = (past + horizon) * inputs;
+        let before_future = all_inputs + past * outputs;
         let rank = |columns| leading_rank(r.as_ref(), columns);
-        let (input_rank, past_rank, present_rank) = (rank(2 * horizon * inputs), rank(past), rank(past + outputs));
-        Ok(HankelFactor {
-            inputs,
-            outputs,
-            horizon,
-            columns: rows.total,
-            input_rank,
-            past_rank,
-            present_rank,
-            r,
-            report,
-        })
+        let (input_rank, past_rank, present_rank) =
+            (rank(all_inputs), rank(before_future), rank(before_future + outputs));
+        Ok(HankelFactor { inputs, outputs, past, horizon, columns, input_rank, past_rank, present_rank, r, report })
     }
 
     /// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length.
     pub(super) fn require_excitation(&self) -> Result<f64> {
-        let needed = 2 * self.horizon * self.inputs;
+        let needed = (self.past + self.horizon) * self.inputs;
         let inputs = self.r.as_ref().submatrix(0, 0, needed.min(self.r.nrows()), needed);
-        let unit = Mat::from_fn(inputs.nrows(), needed, |i, j| {
-            inputs[(i, j)] / inputs.col(j).norm_l2().max(f64::MIN_POSITIVE)
-        });
-        let sigma = unit.singular_values().map_err(|_| Error::NoConvergence {
-            what: "the singular values of the input Hankel matrix".into(),
-            iterations: 0,
-        })?;
-        let rank = sigma.iter().filter(|s| **s > 1e-12 * sigma[0]).count();
-        if rank < needed {
-            return Err(Error::NotExciting { rank, needed, horizon: self.horizon });
-        }
-        Ok(sigma[needed - 1] / sigma[0])
+        require_excitation(inputs, self.horizon)
     }
 
     /// `R32`: what the past inputs and outputs tell about the future outputs beyond the future inputs, transposed.
@@ -120,30 +97,79 @@ impl HankelFactor {
     }
 }
 
-/// R by the way that was asked for; `Auto` takes the Gram matrix where it is well enough conditioned.
-fn factor(
+/// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length, from their columns of R.
+pub(super) fn require_excitation(inputs: MatRef<'_, f64>, horizon: usize) -> Result<f64> {
+    let needed = inputs.ncols();
+    let unit =
+        Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / inputs.col(j).norm_l2().max(f64::MIN_POSITIVE));
+    let sigma = unit.singular_values().map_err(|_| Error::NoConvergence {
+        what: "the singular values of the input Hankel matrix".into(),
+        iterations: 0,
+    })?;
+    let rank = sigma.iter().filter(|s| **s > 1e-12 * sigma[0]).count();
+    if rank < needed {
+        return Err(Error::NotExciting { rank, needed, horizon });
+    }
+    Ok(sigma[needed - 1] / sigma[0])
+}
+
+/// Columns `[U_f U_p Y_p Y_f]`, as places: (block row, channel of `[u; y]`) in one number.
+fn inputs_first(data: &Channels, past: usize, horizon: usize) -> Vec<usize> {
+    let (m, p) = (data.inputs, data.outputs);
+    let block_rows = |rows: Range<usize>, channels: Range<usize>| {
+        rows.flat_map(move |i| channels.clone().map(move |c| i * (m + p) + c))
+    };
+    let (before, after) = (0..past, past..past + horizon);
+    block_rows(after.clone(), 0..m)
+        .chain(block_rows(before.clone(), 0..m))
+        .chain(block_rows(before, m..m + p))
+        .chain(block_rows(after, m..m + p))
+        .collect()
+}
+
+/// R of block-Hankel data.
+pub(super) struct DataTriangle {
+    pub(super) r: Mat<f64>,
+    /// Columns of the Hankel matrix.
+    pub(super) columns: usize,
+    /// How R was found.
+    pub(super) report: DataFactor,
+}
+
+/// R of the Hankel data with so many block rows of past and future, its columns in the order of `places`, by the way that
+/// was asked for; `Auto` takes the Gram matrix where it is well enough conditioned.
+pub(super) fn factor(
     data: &Channels,
-    rows: &RowMap<'_>,
-    width: usize,
+    (past, horizon): (usize, usize),
+    places: &[usize],
     factorisation: Factorisation,
-) -> Result<(Mat<f64>, DataFactor)> {
+) -> Result<DataTriangle> {
+    let blocks = past + horizon;
+    let rows = RowMap::new(data, blocks, places);
+    let (columns, width) = (rows.total, places.len());
+    if columns < width {
+        let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
+        let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
+        return Err(Error::TooFewSamples { what, found, needed: found + width - columns });
+    }
     let by_gram = match factorisation {
         Factorisation::Qr => None,
-        _ => gram::factor(data, rows.horizon),
+        _ => gram::factor(data, blocks, places),
     };
     let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
     match by_gram {
         Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
-            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+            let report = DataFactor { by: Factorisation::Gram, condition: Some(condition) };
+            Ok(DataTriangle { r: found.r, columns, report })
         }
         None if factorisation == Factorisation::Gram => {
             let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
             Err(Error::Singular { what, rcond: 0.0 })
         }
-        found => Ok((
-            triangular_factor(rows, width),
-            DataFactor { by: Factorisation::Qr, condition: found.map(|found| found.condition) },
-        )),
+        found => {
+            let report = DataFactor { by: Factorisation::Qr, condition: found.map(|found| found.condition) };
+            Ok(DataTriangle { r: triangular_factor(&rows, width), columns, report })
+        }
     }
 }
 
@@ -172,21 +198,21 @@ fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat
 /// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.
 struct RowMap<'a> {
     data: &'a Channels,
-    horizon: usize,
+    places: &'a [usize],
     /// First row of each experiment.
     first: Vec<usize>,
     total: usize,
 }
 
 impl<'a> RowMap<'a> {
-    fn new(data: &'a Channels, horizon: usize) -> Self {
+    fn new(data: &'a Channels, blocks: usize, places: &'a [usize]) -> Self {
         let mut total = 0;
         let mut first = Vec::new();
         for experiment in &data.experiments {
             first.push(total);
-            total += experiment.u.nrows() + 1 - 2 * horizon;
+            total += experiment.u.nrows() + 1 - blocks;
         }
-        RowMap { data, horizon, first, total }
+        RowMap { data, places, first, total }
     }
 
     /// Writes the rows `start ..` into `piece`.
@@ -202,17 +228,13 @@ impl<'a> RowMap<'a> {
         }
     }
 
-    /// Writes `[U_f U_p Y_p Y_f]` for Hankel columns that begin at sample `time` of one experiment.
+    /// Writes the places of Hankel columns that begin at sample `time` of one experiment.
     fn fill_from(&self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, time: usize, mut part: MatMut<'_, f64>) {
-        let (s, count) = (self.horizon, part.nrows());
-        let mut column = 0;
-        for (record, lag) in [(u, s), (u, 0), (y, 0), (y, s)] {
-            for i in lag..lag + s {
-                for q in 0..record.ncols() {
-                    part.as_mut().col_mut(column).copy_from(record.col(q).subrows(time + i, count));
-                    column += 1;
-                }
-            }
+        let (count, inputs, channels) = (part.nrows(), u.ncols(), u.ncols() + y.ncols());
+        for (column, place) in self.places.iter().enumerate() {
+            let (block, channel) = (place / channels, place % channels);
+            let values = if channel < inputs { u.col(channel) } else { y.col(channel - inputs) };
+            part.as_mut().col_mut(column).copy_from(values.subrows(time + block, count));
         }
     }
 }
@@ -241,7 +263,7 @@ mod tests {
         let records = experiments(noise);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
         let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
-        HankelFactor::new(&data, horizon, by)
+        HankelFactor::new(&data, horizon, horizon, by)
     }
 
     /// Rows of R with a positive diagonal.

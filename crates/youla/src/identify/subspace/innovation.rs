@@ -7,7 +7,7 @@
 //! (Van Overschee and De Moor, section 3.4). The residuals are those of a filter that has seen s samples: the gain is biased
 //! where `(A - K C)^s` is not small. Where no stabilising solution exists this is said, and no gain is returned.
 
-use super::realisation::{OutputPair, StateSequences};
+use super::realisation::OutputPair;
 use crate::linalg::{RiccatiProblem, dare};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, Side};
@@ -90,10 +90,16 @@ struct Gain {
     residual: f64,
 }
 
-/// The innovation model, or why there is none.
-pub(super) fn identify(states: &StateSequences<'_>, pair: &OutputPair) -> Innovation {
+/// The innovation model from the residuals `[w v]` of the state and output equations and the outputs themselves, in the
+/// coordinates of a triangular factor of so many columns; or why there is none.
+pub(super) fn identify(
+    residuals: Result<Mat<f64>>,
+    outputs: MatRef<'_, f64>,
+    columns: usize,
+    pair: &OutputPair,
+) -> Innovation {
     let none = |reason| Innovation::None { reason };
-    let noise = match noise_model(states, pair) {
+    let noise = match residuals.and_then(|residuals| noise_model(residuals.as_ref(), outputs, columns)) {
         Ok(Some(noise)) => noise,
         Ok(None) => return none(NoInnovation::NoiseFree),
         Err(error) => return none(NoInnovation::NotSolvable(error.to_string())),
@@ -112,15 +118,15 @@ pub(super) fn observer_gain(pair: &OutputPair) -> Result<Mat<f64>> {
 }
 
 /// `None` where an output leaves no residual.
-fn noise_model(states: &StateSequences<'_>, pair: &OutputPair) -> Result<Option<NoiseModel>> {
-    let residuals = states.residuals(pair)?;
-    let (n, p, samples) = (pair.a.nrows(), pair.c.nrows(), states.columns as f64);
+fn noise_model(residuals: MatRef<'_, f64>, outputs: MatRef<'_, f64>, columns: usize) -> Result<Option<NoiseModel>> {
+    let (p, samples) = (outputs.ncols(), columns as f64);
+    let n = residuals.ncols() - p;
     let moments = |rows: MatRef<'_, f64>| {
         let gram = rows.transpose() * rows;
         Mat::from_fn(gram.nrows(), gram.ncols(), |i, j| 0.5 * (gram[(i, j)] + gram[(j, i)]) / samples)
     };
-    let all = moments(residuals.as_ref());
-    let power = moments(states.target.as_ref().subcols(n, p));
+    let all = moments(residuals);
+    let power = moments(outputs);
     let part = |i, j, rows, columns| all.as_ref().submatrix(i, j, rows, columns).to_owned();
     let noise = NoiseModel { q: part(0, 0, n, n), s: part(0, n, n, p), r: part(n, n, p, p) };
     let relative = Mat::from_fn(p, p, |i, j| noise.r[(i, j)] / (power[(i, i)] * power[(j, j)]).sqrt());

@@ -4,8 +4,9 @@
 //! and the observability matrix, from which A and C follow; the residuals of the same factor give the Kalman gain; B, D
 //! and the initial states are the least-squares solution of the simulated output.
 //!
-//! The estimate is consistent for inputs that do not depend on the noise. Measurements from a closed loop do not satisfy
-//! this: filter them by the coprime factors first, eq. (28), and identify S from alpha and beta, eq. (25).
+//! The estimates of MOESP, N4SID and CVA are consistent for inputs that do not depend on the noise. Measurements from a
+//! closed loop do not satisfy this: filter them by the coprime factors first, eq. (28), and identify S from alpha and beta,
+//! eq. (25); or take PBSIDopt, SSARX or PARSIM-S, which start from the one-step predictor (`varx.rs` and beside it).
 //!
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
@@ -15,14 +16,20 @@ mod gram;
 mod hankel;
 mod innovation;
 mod modal;
+mod open_loop;
 mod order;
 mod output_error;
+mod parsim;
+mod pbsid;
+mod predictor_form;
 mod projection;
 mod realisation;
 mod sensitivity;
+mod ssarx;
 mod stability;
 #[cfg(test)]
 mod tests;
+mod varx;
 
 pub use innovation::{Innovation, NoInnovation};
 pub use order::{OrderCandidate, OrderReport, OrderRule};
@@ -33,7 +40,7 @@ use crate::Result;
 use crate::lti::{Discrete, StateSpace};
 use channels::Channels;
 use faer::{MatRef, c64};
-use hankel::HankelFactor;
+use realisation::OutputPair;
 use serde::{Deserialize, Serialize};
 
 /// Records of one experiment: row k is time k.
@@ -57,8 +64,14 @@ pub struct Experiment<'a> {
 pub struct SubspaceOptions {
     /// Weight of the singular value decomposition, and with it the name of the method.
     pub weight: Weight,
-    /// Block rows s of the past and of the future. They should cover one to two periods of the slowest mode.
+    /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the
+    /// slowest mode.
     pub horizon: usize,
+    /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the
+    /// predictor and should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable
+    /// plant K is small, and this is the decay of the plant itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub past: Option<usize>,
     /// Order of the model.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
@@ -78,6 +91,7 @@ impl Default for SubspaceOptions {
         SubspaceOptions {
             weight: Weight::default(),
             horizon: 20,
+            past: None,
             order: Order::default(),
             feedthrough: Feedthrough::default(),
             factorisation: Factorisation::default(),
@@ -88,7 +102,20 @@ impl Default for SubspaceOptions {
     }
 }
 
-/// Weight `W1 O W2` of the oblique projection O of the future outputs, and the way to A and C.
+impl SubspaceOptions {
+    /// Block rows of the past.
+    pub fn past(&self) -> usize {
+        self.past.unwrap_or(self.horizon)
+    }
+}
+
+/// The method: weight `W1 O W2` of the projection O of the future outputs along the past, and the way to A and C.
+///
+/// [`Moesp`](Weight::Moesp), [`N4sid`](Weight::N4sid) and [`Cva`](Weight::Cva) are for inputs that do not depend on the
+/// noise. The others stay consistent when u contains fed-back noise, and need no knowledge of the controller: they regress
+/// on the past inputs and outputs of the one-step predictor, take A, C and K from the states, and B and D from the
+/// one-step predictions. They need a plant without D or a controller without direct path, and a past p with `(A - K C)^p`
+/// small; their parameters are many, so that for open-loop data the first three have less variance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weight {
@@ -101,6 +128,22 @@ pub enum Weight {
     /// Canonical variates: `W1` whitens the future outputs, so that the singular values do not depend on the units of the
     /// outputs; A from the shift of the observability matrix.
     Cva,
+    /// PBSIDopt: the outputs as the regression coefficients predict them from the past alone; `W2` the past signals. The
+    /// method of choice in closed loop, also for an unstable plant.
+    PbsidOpt,
+    /// SSARX: canonical variates of the past with the future outputs, freed of what the regression takes from the future
+    /// inputs and outputs. As PBSIDopt, independent of the units of the outputs also without scaling.
+    Ssarx,
+    /// PARSIM-S: the future outputs regressed block row by block row on the past and one input; `W2` the past signals. For
+    /// controllers that delay y by at least one sample.
+    ParsimS,
+}
+
+impl Weight {
+    /// Whether the method stays consistent when the inputs contain fed-back noise.
+    pub fn is_for_closed_loops(self) -> bool {
+        matches!(self, Weight::PbsidOpt | Weight::Ssarx | Weight::ParsimS)
+    }
 }
 
 /// How the order is found.
@@ -192,8 +235,9 @@ pub enum InitialState {
     Zero,
 }
 
-/// Result of [`subspace`]. The states are those in which the observability matrix over the horizon has orthonormal
-/// columns (with output scaling: of the scaled outputs).
+/// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon
+/// has orthonormal columns (with output scaling: of the scaled outputs); those of PBSIDopt and PARSIM-S those in which the
+/// leading singular vectors of the predicted outputs are their observability matrix; those of SSARX have unit variance.
 #[derive(Debug, Clone)]
 pub struct SubspaceModel {
     /// The deterministic part, n states, m inputs, p outputs.
@@ -202,8 +246,8 @@ pub struct SubspaceModel {
     pub innovation: Innovation,
     /// State at the first sample of each experiment, n numbers each.
     pub initial_states: Vec<Vec<f64>>,
-    /// Singular values of the weighted projection, horizon x p of them: unnormalised for MOESP and N4SID, cosines of
-    /// canonical angles for CVA.
+    /// Singular values of the weighted projection, horizon x p of them: cosines of canonical angles for CVA and SSARX, else
+    /// unnormalised.
     pub singular_values: Vec<f64>,
     /// The order and what other criteria would have proposed.
     pub order: OrderReport,
@@ -211,8 +255,10 @@ pub struct SubspaceModel {
     pub stability: StabilityReport,
     /// How B and D were found and how well the model reproduces the outputs.
     pub fit: OutputFit,
-    /// Block rows of the past and of the future.
+    /// Block rows of the future.
     pub horizon: usize,
+    /// Block rows of the past.
+    pub past: usize,
     /// Columns of the block-Hankel matrices, over all experiments.
     pub columns: usize,
     /// Smallest over largest singular value of the block-Hankel matrix of the inputs with rows of unit length.
@@ -237,6 +283,12 @@ impl SubspaceModel {
 /// K, Lambda : from the residuals of the state and output equations by a Riccati equation
 /// B, D, x0  : min sum |y - yhat|^2 over the simulated (for unstable A: one-step predicted) outputs
 /// ```
+/// for MOESP, N4SID and CVA, and for PBSIDopt, SSARX and PARSIM-S with `z = [u; y]` and a state T read from the past p
+/// ```text
+/// y(k) = sum_{i=1..p} Xi_i z(k-i) + D u(k) + e(k),   x(k) = T [z(k-p); ...; z(k-1)] by the method, and its shift x(k+1)
+/// C, e : y(k) on x(k), u(k);    A : x(k+1) on x(k), u(k), e(k);    K, Lambda : from the residuals by a Riccati equation
+/// B, D, x0 : min sum |y - yhat|^2 over the one-step predicted outputs
+/// ```
 /// Experiments are joined as columns, never across their boundaries; each has its own initial state.
 ///
 /// # Errors
@@ -246,7 +298,8 @@ impl SubspaceModel {
 /// [`crate::Error::Unstable`] unless unstable estimates are allowed.
 ///
 /// # Accuracy
-/// Noise-free records of random systems give their transfer function back to 1e-8 (`tests::recovery::recovers_random_systems`);
+/// Noise-free records of random systems give their transfer function back to 1e-8 (`tests::recovery::recovers_random_systems`,
+/// `tests::closed_loop::noise_free_systems_are_recovered`);
 /// the published figures of SLICOT on measured data hold to 0.5 % (`tests::measured::slicot_figures`). The result does not depend
 /// on the number of threads.
 ///
@@ -266,26 +319,35 @@ impl SubspaceModel {
 /// ```
 pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<SubspaceModel> {
     let data = Channels::new(experiments, options)?;
-    let factor = HankelFactor::new(&data, options.horizon, options.factorisation)?;
-    let excitation_rcond = factor.require_excitation()?;
-    let projection = projection::project(&factor, options.weight)?;
-    let order = order::choose(options.order, &factor, &projection)?;
-    let states = realisation::StateSequences::new(&factor, projection.observability(order.order))?;
-    let estimate = realisation::realise(options.weight, &states)?;
-    let (pair, stability) = stability::apply(options.stability, estimate, time)?;
-    let innovation = innovation::identify(&states, &pair);
-    let fitted = output_error::fit(&data, &pair, innovation.gain(), &stability, options)?;
+    let found = match options.weight.is_for_closed_loops() {
+        true => predictor_form::estimate(&data, options, time)?,
+        false => open_loop::estimate(&data, options, time)?,
+    };
+    let fitted = output_error::fit(&data, &found.pair, found.innovation.gain(), &found.stability, options)?;
     Ok(SubspaceModel {
-        model: data.unscale_model(pair, fitted.b, fitted.d, time)?,
-        innovation: innovation.unscale(&data.y_scale),
+        model: data.unscale_model(found.pair, fitted.b, fitted.d, time)?,
+        innovation: found.innovation.unscale(&data.y_scale),
         initial_states: fitted.initial_states,
-        singular_values: projection.singular_values,
-        order,
-        stability,
+        singular_values: found.singular_values,
+        order: found.order,
+        stability: found.stability,
         fit: fitted.quality,
         horizon: options.horizon,
-        columns: factor.columns,
-        excitation_rcond,
-        factor: factor.report,
+        past: options.past(),
+        columns: found.columns,
+        excitation_rcond: found.excitation_rcond,
+        factor: found.factor,
     })
+}
+
+/// What the data say about all but B, D and the initial states, in scaled units.
+struct Estimate {
+    pair: OutputPair,
+    stability: StabilityReport,
+    innovation: Innovation,
+    singular_values: Vec<f64>,
+    order: OrderReport,
+    columns: usize,
+    excitation_rcond: f64,
+    factor: DataFactor,
 }

@@ -1,6 +1,7 @@
 //! The order of the model: as given, or proposed from the canonical correlations.
 //!
-//! With T columns, canonical correlations `rho_1 >= rho_2 ...` and `d(n) = n (m + 2 p)` parameters,
+//! With T columns, canonical correlations `rho_1 >= rho_2 ...` (for the methods of closed loops those of SSARX) and
+//! `d(n) = n (m + 2 p)` parameters,
 //! ```text
 //! SVC(n) = rho_{n+1}^2 + d(n) log(T) / T          NIC(n) = sum_{k>n} rho_k^2 + d(n) log(T) / T
 //! ```
@@ -9,8 +10,6 @@
 //! first value.
 
 use super::Order;
-use super::hankel::HankelFactor;
-use super::projection::{Projection, canonical_correlations};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -50,9 +49,22 @@ pub struct OrderReport {
     pub canonical_correlations: Vec<f64>,
 }
 
+/// What the choice of the order depends on.
+pub(super) struct Evidence<'a> {
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+    pub(super) horizon: usize,
+    /// Columns of the Hankel matrices.
+    pub(super) columns: usize,
+    /// Of the chosen weight, descending.
+    pub(super) singular_values: &'a [f64],
+    pub(super) canonical_correlations: Vec<f64>,
+}
+
 /// The order and its report.
-pub(super) fn choose(choice: Order, factor: &HankelFactor, projection: &Projection) -> Result<OrderReport> {
-    let largest = (factor.horizon - 1) * factor.outputs;
+pub(super) fn choose(choice: Order, evidence: Evidence<'_>) -> Result<OrderReport> {
+    let Evidence { inputs, outputs, horizon, columns, singular_values: sigma, canonical_correlations } = evidence;
+    let largest = (horizon - 1) * outputs;
     let (asked, rule) = match choice {
         Order::Fixed(n) => (n, OrderRule::Fixed),
         Order::Auto { max } => (max, OrderRule::Svc),
@@ -61,22 +73,20 @@ pub(super) fn choose(choice: Order, factor: &HankelFactor, projection: &Projecti
         return Err(Error::OutOfRange { what: "the order of the model".into(), value: 0.0, must: "at least 1" });
     }
     if rule == OrderRule::Fixed && asked > largest {
-        return Err(Error::OrderBeyondHorizon { order: asked, largest, horizon: factor.horizon });
+        return Err(Error::OrderBeyondHorizon { order: asked, largest, horizon });
     }
     let max = if rule == OrderRule::Fixed { largest } else { asked.min(largest) };
-    let correlations = canonical_correlations(factor)?;
-    let penalty = (factor.inputs + 2 * factor.outputs) as f64 * (factor.columns as f64).ln() / factor.columns as f64;
-    let at = |k: usize| correlations.get(k).map_or(0.0, |r| r * r);
+    let penalty = (inputs + 2 * outputs) as f64 * (columns as f64).ln() / columns as f64;
+    let at = |k: usize| canonical_correlations.get(k).map_or(0.0, |r| r * r);
     let svc = least(max, |n| at(n) + n as f64 * penalty);
-    let nic = least(max, |n| (n..correlations.len()).map(at).sum::<f64>() + n as f64 * penalty);
-    let sigma = &projection.singular_values;
+    let nic = least(max, |n| (n..canonical_correlations.len()).map(at).sum::<f64>() + n as f64 * penalty);
     let gap = least(max, |n| sigma.get(n).map_or(0.0, |next| next / sigma[n - 1]));
     let candidates = [(OrderRule::Svc, svc), (OrderRule::Nic, nic), (OrderRule::Gap, gap)];
     Ok(OrderReport {
         order: if rule == OrderRule::Fixed { asked } else { svc },
         rule,
         candidates: candidates.map(|(rule, order)| OrderCandidate { rule, order }).to_vec(),
-        canonical_correlations: correlations,
+        canonical_correlations,
     })
 }
 

@@ -1,5 +1,5 @@
-//! B, D and the initial states for given A and C, by linear least squares on the simulated outputs; for an unstable A on
-//! the one-step predictions of the observer `A - K C`.
+//! B, D and the initial states for given A and C, by linear least squares on the simulated outputs; for an unstable A and
+//! for the methods of closed loops on the one-step predictions of the observer `A - K C`, whose errors no input contains.
 //!
 //! The regressors of each experiment are folded into a triangular factor `[R11 R12; 0 R22]` over `[x0 | B D y]`: `R22` holds
 //! all that an experiment says about B and D, so that any number of experiments costs no more than one
@@ -29,7 +29,8 @@ pub enum InputFit {
     Simulation,
     /// Predicted one step ahead with the Kalman gain.
     Prediction,
-    /// Predicted one step ahead with an observer gain of unit covariances, there being no Kalman gain.
+    /// Predicted one step ahead with an observer gain of unit covariances, there being no Kalman gain: exact
+    /// without noise, biased by noise that is fed back.
     Observer,
 }
 
@@ -64,7 +65,8 @@ pub(super) fn fit(
     stability: &StabilityReport,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
-    let (predictor, by) = predictor(pair, kalman_gain, stability)?;
+    let simulated = stability.stable && !options.weight.is_for_closed_loops();
+    let (predictor, by) = predictor(pair, kalman_gain, simulated)?;
     let unknowns = Unknowns {
         states: pair.a.nrows(),
         inputs: data.inputs,
@@ -90,14 +92,14 @@ pub(super) fn fit(
     Ok(Fitted { b, d, initial_states, quality })
 }
 
-/// The simulation of a stable model, else its one-step predictor.
+/// The simulation of the model or its one-step predictor.
 fn predictor(
     pair: &OutputPair,
     kalman_gain: Option<MatRef<'_, f64>>,
-    stability: &StabilityReport,
+    simulated: bool,
 ) -> Result<(Predictor, InputFit)> {
     let (k, by) = match kalman_gain {
-        _ if stability.stable => {
+        _ if simulated => {
             return Ok((Predictor { a: pair.a.clone(), c: pair.c.clone(), k: None }, InputFit::Simulation));
         }
         Some(gain) => (gain.to_owned(), InputFit::Prediction),

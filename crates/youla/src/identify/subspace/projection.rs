@@ -27,8 +27,8 @@ impl Projection {
 /// Singular values and observability matrix for a weight.
 pub(super) fn project(factor: &HankelFactor, weight: Weight) -> Result<Projection> {
     match weight {
-        Weight::Moesp | Weight::N4sid => unweighted(factor),
         Weight::Cva => canonical(factor),
+        _ => unweighted(factor),
     }
 }
 

@@ -28,8 +28,6 @@ pub(super) struct StateSequences<'a> {
     pub(super) u_future: MatRef<'a, f64>,
     /// Number of outputs.
     pub(super) outputs: usize,
-    /// Number of samples behind the directions.
-    pub(super) columns: usize,
 }
 
 impl<'a> StateSequences<'a> {
@@ -43,8 +41,12 @@ impl<'a> StateSequences<'a> {
         let later = factor.later_future_projected();
         let x_next = least_squares("the shortened observability matrix", shorter, later.transpose())?.x;
         let target = block(&[&[x_next.transpose(), present]]);
-        let (outputs, columns) = (factor.outputs, factor.columns);
-        Ok(StateSequences { gamma, x, target, u_future: factor.future_inputs(), outputs, columns })
+        Ok(StateSequences { gamma, x, target, u_future: factor.future_inputs(), outputs: factor.outputs })
+    }
+
+    /// Output now.
+    pub(super) fn present_outputs(&self) -> MatRef<'_, f64> {
+        self.target.as_ref().subcols(self.gamma.ncols(), self.outputs)
     }
 
     /// Residuals `[w v]` for given A and C, with the best share of the future inputs taken off.
@@ -59,8 +61,8 @@ impl<'a> StateSequences<'a> {
 /// A and C in the way of the weight.
 pub(super) fn realise(weight: Weight, states: &StateSequences<'_>) -> Result<OutputPair> {
     match weight {
-        Weight::Moesp | Weight::Cva => shift(states),
         Weight::N4sid => regression(states),
+        _ => shift(states),
     }
 }
 

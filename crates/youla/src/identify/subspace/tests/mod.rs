@@ -1,3 +1,4 @@
+mod closed_loop;
 mod measured;
 mod options;
 mod recovery;

@@ -4,6 +4,7 @@ use crate::args::{Args, PaperArgs};
 use crate::output::{Failure, say};
 use crate::table;
 use indicatif::{ProgressBar, ProgressStyle};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use youla::rig::RigParameters;
@@ -58,7 +59,7 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
 fn finish(args: &Args, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
     let bar = Bar::new(args.quiet || args.json);
     let written = paper(configuration, target, &|progress| bar.tell(progress))?;
-    bar.0.finish_and_clear();
+    bar.bar.finish_and_clear();
     match &written.paper {
         _ if args.quiet => Ok(()),
         Some(_) if args.json => {
@@ -76,19 +77,22 @@ fn part_of(shard: Shard, written: &WrittenPaper) -> String {
 }
 
 /// One bar per stage, on a terminal only.
-struct Bar(ProgressBar);
+struct Bar {
+    bar: ProgressBar,
+    quiet: bool,
+}
 
 impl Bar {
     fn new(hidden: bool) -> Self {
         let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
         bar.enable_steady_tick(Duration::from_millis(100));
-        Bar(bar)
+        Bar { bar, quiet: hidden }
     }
 
     fn tell(&self, progress: PaperProgress<'_>) {
         match progress {
             PaperProgress::Begins(stage, loops) => self.begin(stage, loops),
-            PaperProgress::Done(loops) => self.0.set_position(loops as u64),
+            PaperProgress::Done(loops) => self.bar.set_position(loops as u64),
             PaperProgress::Continued { path, loops, redone } => {
                 let path = path.display();
                 let damaged = if redone > 0 {
@@ -96,10 +100,20 @@ impl Bar {
                 } else {
                     String::new()
                 };
-                self.0.println(format!("{path}: {loops} loops are there already{damaged}"));
+                self.say(&format!("{path}: {loops} loops are there already{damaged}"));
                 // The remaining time is that of the loops of this call.
-                self.0.reset_eta();
+                self.bar.reset_eta();
             }
+        }
+    }
+
+    /// Above the bar, or on standard error where there is none to be seen.
+    fn say(&self, text: &str) {
+        if !self.quiet && self.bar.is_hidden() {
+            // Without standard error there is nobody to tell.
+            let _ = writeln!(std::io::stderr(), "{text}");
+        } else {
+            self.bar.println(text);
         }
     }
 
@@ -110,10 +124,10 @@ impl Bar {
             "{spinner} {msg} ({elapsed})"
         };
         if let Ok(style) = ProgressStyle::with_template(template) {
-            self.0.set_style(style);
+            self.bar.set_style(style);
         }
-        self.0.reset();
-        self.0.set_length(loops as u64);
-        self.0.set_message(stage.name());
+        self.bar.reset();
+        self.bar.set_length(loops as u64);
+        self.bar.set_message(stage.name());
     }
 }

@@ -17,6 +17,7 @@ mod hankel;
 mod innovation;
 mod modal;
 mod open_loop;
+mod options;
 mod order;
 mod output_error;
 mod parsim;
@@ -32,6 +33,9 @@ mod tests;
 mod varx;
 
 pub use innovation::{Innovation, NoInnovation};
+pub use options::{
+    ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, Stability, SubspaceOptions, Weight,
+};
 pub use order::{OrderCandidate, OrderReport, OrderRule};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
@@ -41,7 +45,6 @@ use crate::lti::{Discrete, StateSpace};
 use channels::Channels;
 use faer::{MatRef, c64};
 use realisation::OutputPair;
-use serde::{Deserialize, Serialize};
 
 /// Records of one experiment: row k is time k.
 #[derive(Debug, Clone, Copy)]
@@ -50,189 +53,6 @@ pub struct Experiment<'a> {
     pub u: MatRef<'a, f64>,
     /// Outputs, N x p.
     pub y: MatRef<'a, f64>,
-}
-
-/// Choices of [`subspace`].
-///
-/// ```
-/// use youla::identify::subspace::{Order, SubspaceOptions, Weight};
-/// let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(8), ..Default::default() };
-/// assert_eq!(options.horizon, 20);
-/// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct SubspaceOptions {
-    /// Weight of the singular value decomposition, and with it the name of the method.
-    pub weight: Weight,
-    /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the
-    /// slowest mode.
-    pub horizon: usize,
-    /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the
-    /// predictor and should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable
-    /// plant K is small, and this is the decay of the plant itself.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub past: Option<usize>,
-    /// Order of the model.
-    pub order: Order,
-    /// Whether there is a direct path from u to y in the same sample.
-    pub feedthrough: Feedthrough,
-    /// How the block-Hankel data are factored.
-    pub factorisation: Factorisation,
-    /// What to do with an unstable estimate.
-    pub stability: Stability,
-    /// Units in which the least-squares problems are posed. The model always comes in the units of the record.
-    pub scaling: ChannelScaling,
-    /// The state at the first sample of each experiment.
-    pub initial_state: InitialState,
-}
-
-impl Default for SubspaceOptions {
-    fn default() -> Self {
-        SubspaceOptions {
-            weight: Weight::default(),
-            horizon: 20,
-            past: None,
-            order: Order::default(),
-            feedthrough: Feedthrough::default(),
-            factorisation: Factorisation::default(),
-            stability: Stability::default(),
-            scaling: ChannelScaling::default(),
-            initial_state: InitialState::default(),
-        }
-    }
-}
-
-impl SubspaceOptions {
-    /// Block rows of the past.
-    pub fn past(&self) -> usize {
-        self.past.unwrap_or(self.horizon)
-    }
-}
-
-/// The method: weight `W1 O W2` of the projection O of the future outputs along the past, and the way to A and C.
-///
-/// [`Moesp`](Weight::Moesp), [`N4sid`](Weight::N4sid) and [`Cva`](Weight::Cva) are for inputs that do not depend on the
-/// noise. The others stay consistent when u contains fed-back noise, and need no knowledge of the controller: they regress
-/// on the past inputs and outputs of the one-step predictor, take A, C and K from the states, and B and D from the
-/// one-step predictions. They need a plant without D or a controller without direct path, and a past p with `(A - K C)^p`
-/// small; their parameters are many, so that for open-loop data the first three have less variance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Weight {
-    /// PO-MOESP: `W1 = I`, `W2` the projection onto the complement of the future inputs; A from the shift of the
-    /// observability matrix.
-    #[default]
-    Moesp,
-    /// Robust N4SID: the same weights; A and C by regression of the state sequence on its past.
-    N4sid,
-    /// Canonical variates: `W1` whitens the future outputs, so that the singular values do not depend on the units of the
-    /// outputs; A from the shift of the observability matrix.
-    Cva,
-    /// PBSIDopt: the outputs as the regression coefficients predict them from the past alone; `W2` the past signals. The
-    /// method of choice in closed loop, also for an unstable plant.
-    PbsidOpt,
-    /// SSARX: canonical variates of the past with the future outputs, freed of what the regression takes from the future
-    /// inputs and outputs. As PBSIDopt, independent of the units of the outputs also without scaling.
-    Ssarx,
-    /// PARSIM-S: the future outputs regressed block row by block row on the past and one input; `W2` the past signals. For
-    /// controllers that delay y by at least one sample.
-    ParsimS,
-}
-
-impl Weight {
-    /// Whether the method stays consistent when the inputs contain fed-back noise.
-    pub fn is_for_closed_loops(self) -> bool {
-        matches!(self, Weight::PbsidOpt | Weight::Ssarx | Weight::ParsimS)
-    }
-}
-
-/// How the order is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Order {
-    /// The order given.
-    Fixed(usize),
-    /// The order that the criterion of [`OrderRule::Svc`] proposes.
-    Auto {
-        /// Largest order to consider.
-        max: usize,
-    },
-}
-
-impl Default for Order {
-    fn default() -> Self {
-        Order::Auto { max: 12 }
-    }
-}
-
-/// Direct path from input to output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Feedthrough {
-    /// D = 0 exactly, as for a plant behind a zero-order hold.
-    #[default]
-    None,
-    /// D is estimated.
-    Estimated,
-}
-
-/// How the triangular factor of the block-Hankel data is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Factorisation {
-    /// From the Gram matrix where the condition number of the data allows it (up to 1e4 with columns of unit length), else
-    /// by QR.
-    #[default]
-    Auto,
-    /// Cholesky factor of the Gram matrix, which lag sums give: fast, with the square of the condition number.
-    Gram,
-    /// Orthogonal reduction of the data.
-    Qr,
-}
-
-/// How the block-Hankel data were factored.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct DataFactor {
-    /// [`Factorisation::Gram`] or [`Factorisation::Qr`].
-    pub by: Factorisation,
-    /// Condition number of the data, columns of unit length, as estimated from the Gram matrix; absent where that was not
-    /// tried or is not positive definite to working precision.
-    pub condition: Option<f64>,
-}
-
-/// What to do with an unstable estimate of A. A stable one is never touched, however lightly damped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stability {
-    /// Refuse it with its worst pole.
-    #[default]
-    Require,
-    /// Return it as it is; B and D then come from the one-step prediction instead of the simulation.
-    Allow,
-    /// Reflect its unstable poles at the unit circle, then estimate B and D for the changed A. Reported with the result.
-    Constrain,
-}
-
-/// Scaling of the channels inside of the method.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum ChannelScaling {
-    /// The units of the record.
-    None,
-    /// Every channel is divided by its root-mean-square value over all experiments.
-    #[default]
-    Rms,
-}
-
-/// The state at the first sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum InitialState {
-    /// Estimated, one per experiment.
-    #[default]
-    Estimated,
-    /// Zero: the system was at rest.
-    Zero,
 }
 
 /// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon

@@ -22,7 +22,7 @@ pub(super) fn estimate(data: &Channels, options: &SubspaceOptions, time: Discret
             horizon: factor.horizon,
             columns: factor.columns,
             singular_values: &projection.singular_values,
-            canonical_correlations: canonical_correlations(&factor)?,
+            canonical_correlations: canonical_correlations(&factor, &projection)?,
         },
     )?;
     let states = StateSequences::new(&factor, projection.observability(order.order))?;

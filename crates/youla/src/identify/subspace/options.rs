@@ -102,7 +102,7 @@ impl Weight {
 pub enum Order {
     /// The order given.
     Fixed(usize),
-    /// The order that the criterion of [`OrderRule::Svc`] proposes.
+    /// The order that the criterion of [`super::OrderRule::Svc`] proposes.
     Auto {
         /// Largest order to consider.
         max: usize,

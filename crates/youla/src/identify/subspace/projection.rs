@@ -13,6 +13,8 @@ const WHITENING_TOLERANCE: f64 = 1e-10;
 pub(super) struct Projection {
     /// Descending, one per row of the observability matrix.
     pub(super) singular_values: Vec<f64>,
+    /// Whether they are canonical correlations.
+    canonical: bool,
     /// Columns span the observability matrix in the order of the singular values, orthonormal.
     basis: Mat<f64>,
 }
@@ -32,8 +34,12 @@ pub(super) fn project(factor: &HankelFactor, weight: Weight) -> Result<Projectio
     }
 }
 
-/// Canonical correlations: cosines of the angles between past and future, freed of the future inputs.
-pub(super) fn canonical_correlations(factor: &HankelFactor) -> Result<Vec<f64>> {
+/// Canonical correlations: cosines of the angles between past and future, freed of the future inputs; those of the projection
+/// where it has them.
+pub(super) fn canonical_correlations(factor: &HankelFactor, projection: &Projection) -> Result<Vec<f64>> {
+    if projection.canonical {
+        return Ok(projection.singular_values.clone());
+    }
     let mut values = Whitened::new(factor)?.past.singular_values().map_err(|_| no_convergence())?;
     values.resize(factor.horizon * factor.outputs, 0.0);
     Ok(values)
@@ -62,7 +68,7 @@ impl Whitened {
 /// `R32' = U S V'`, Gamma = U.
 fn unweighted(factor: &HankelFactor) -> Result<Projection> {
     let (u, singular_values) = left_singular(factor.future_by_past().transpose())?;
-    Ok(Projection { singular_values, basis: u })
+    Ok(Projection { singular_values, canonical: false, basis: u })
 }
 
 /// `[R32' R33'] = Uw Sw Vw'`, `Sw^-1 Uw' R32' = U S V'`, Gamma = orthonormalised `Uw Sw U`.
@@ -77,7 +83,7 @@ fn canonical(factor: &HankelFactor) -> Result<Projection> {
     spanned.as_mut().subcols_mut(0, rank).copy_from(uw * u);
     // Keep the unused directions last, so that the basis is complete even where the data are free of noise.
     let basis = orthonormal(spanned.as_ref().subcols(0, rank), count);
-    Ok(Projection { singular_values, basis })
+    Ok(Projection { singular_values, canonical: true, basis })
 }
 
 /// Orthonormal columns, the first k of which span the first k columns of `a`.

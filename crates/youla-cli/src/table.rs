@@ -3,7 +3,7 @@
 use std::fmt::Write;
 use std::path::Path;
 use youla::run::{Identification, WrittenPaper, cautions};
-use youla::study::Paper;
+use youla::study::{Experiment, Method, Paper};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
@@ -22,16 +22,22 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
 /// Table 1, what became of the paper's claims, and where everything is.
 pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
     let experiments = &paper.experiments.list;
+    let row = |label: &str, fits: &dyn Fn(&Experiment) -> [f64; 2]| {
+        let cells = experiments.iter().flat_map(fits).map(|fit| format!("{fit:.1}"));
+        std::iter::once(label.to_owned()).chain(cells).collect()
+    };
     let titles = experiments.iter().flat_map(|e| [e.case.title.clone(), String::new()]);
     let mut rows = vec![std::iter::once("Table 1: fit (26), percent, H and V".to_owned()).chain(titles).collect()];
-    for (k, method) in experiments.iter().flat_map(|e| e.models.iter().map(|m| m.method)).enumerate() {
-        let Some(_) = experiments.first().filter(|e| k < e.models.len()) else { break };
-        let fits = experiments.iter().flat_map(|e| e.models[k].fit).map(|fit| format!("{fit:.1}"));
-        rows.push(std::iter::once(method.label().to_owned()).chain(fits).collect());
+    for (k, method) in experiments.first().into_iter().flat_map(|e| &e.models).map(|m| m.method).enumerate() {
+        rows.push(row(method.label(), &|e| e.models[k].fit));
+        let published = [Method::Nominal, Method::Pem, Method::Hansen, Method::HansenReduced];
+        if let Some(place) = published.iter().position(|m| *m == method) {
+            rows.push(row("  in the paper", &|e| e.case.published[place]));
+        }
     }
     let mut text = aligned(&rows);
     for claim in &written.claims {
-        let _ = write!(text, "\n{}", claim.text);
+        let _ = write!(text, "\n{} ({}): {}", claim.source, claim.outcome.words(), claim.text);
     }
     let folder = written.folder.display();
     let _ = write!(text, "\nresults: {folder}\nreport:  {}", written.folder.join("report.html").display());

@@ -137,6 +137,9 @@ pub(super) fn run(
     let (estimation, verification) = (record(0)?, record(1)?);
     let turning = matches!(case.fidelity, Fidelity::Rotating { .. });
     let settle = if turning { settings.experiments.settle } else { 0 };
+    for record in [&estimation, &verification] {
+        require_rest(record, settle)?;
+    }
     let data = data(settings, &design, start, [&estimation, &verification], settle, turning)?;
     let single = timed(|| data.pem(1.0));
     let starts = data.starts(&single.0);
@@ -156,6 +159,16 @@ pub(super) fn run(
     let beta = hansen.0.ok().map(|found| data.beta(&found)).transpose()?;
     let starts = starts.into_iter().map(|(start, _)| start).collect();
     Ok(Experiment { case, design, estimation, verification, excitation, settle, models, starts, reflected, beta })
+}
+
+/// Fails for a record that ended, because the rotor touched, before it can be used.
+fn require_rest(record: &ExperimentRecord, settle: usize) -> Result<()> {
+    let found = record.y.nrows();
+    if found > settle {
+        return Ok(());
+    }
+    let what = format!("the record, which ended where the rotor touched, with {settle} samples at its start not used");
+    Err(Error::TooFewSamples { what, found, needed: settle + 1 })
 }
 
 /// Persistency up to the block rows that the identification of S needs.
@@ -196,7 +209,7 @@ fn data<'a>(
     turning: bool,
 ) -> Result<Data<'a>> {
     let signals = design.factors.signals(estimation.u_applied.as_ref(), estimation.y.as_ref())?;
-    let later = |signal: &Mat<f64>| signal.subrows(settle, signal.nrows().saturating_sub(settle)).to_owned();
+    let later = |signal: &Mat<f64>| signal.subrows(settle, signal.nrows() - settle).to_owned();
     let clean = |signal: &Mat<f64>| {
         let later = later(signal);
         if !turning {

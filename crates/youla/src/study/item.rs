@@ -203,7 +203,7 @@ impl LoopData<'_> {
     /// The lowest criterion over all starts; a start from which nothing is found is left out.
     fn best_pem(&self, settings: &PaperSettings) -> Result<GreyBoxModel> {
         let mut best = self.pem(&self.start, settings);
-        for factor in &settings.experiments.start_factors {
+        for factor in settings.experiments.start_factors.iter().filter(|factor| **factor != 1.0) {
             let found = self.start.degraded(*factor, 1.0).and_then(|start| self.pem(&start, settings));
             let better = match (&found, &best) {
                 (Ok(found), Ok(best)) => found.cost < best.cost,

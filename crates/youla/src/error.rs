@@ -529,6 +529,9 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
+    /// Another scaling or factorisation than that of the factored data was asked for.
+    #[error("scaling and factorisation are part of the factored data; factor the records again to change them")]
+    Refactor,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]

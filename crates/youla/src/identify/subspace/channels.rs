@@ -53,12 +53,8 @@ impl Channels {
 /// Shapes, lengths and values; returns the numbers of inputs and outputs.
 fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(usize, usize)> {
     let (past, horizon) = (options.past(), options.horizon);
-    let at_least = |what: &str, value: usize, least: usize, must| {
-        if value >= least { Ok(()) } else { Err(Error::OutOfRange { what: what.into(), value: value as f64, must }) }
-    };
+    check_blocks(options)?;
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
-    at_least("the horizon", horizon, 2, "at least 2 block rows")?;
-    at_least("the past", past, 1, "at least 1 block row")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
     at_least("the number of inputs", m, 1, "at least 1")?;
     at_least("the number of outputs", p, 1, "at least 1")?;
@@ -74,6 +70,16 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         }
     }
     Ok((m, p))
+}
+
+/// Refuses a horizon or past without meaning.
+pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
+    at_least("the horizon", options.horizon, 2, "at least 2 block rows")?;
+    at_least("the past", options.past(), 1, "at least 1 block row")
+}
+
+fn at_least(what: &str, value: usize, least: usize, must: &'static str) -> Result<()> {
+    if value >= least { Ok(()) } else { Err(Error::OutOfRange { what: what.into(), value: value as f64, must }) }
 }
 
 /// The scale of each channel; refuses channels that are constant throughout.

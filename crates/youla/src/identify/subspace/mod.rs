@@ -12,6 +12,7 @@
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
 mod channels;
+mod factorisation;
 mod gram;
 mod hankel;
 mod innovation;
@@ -40,9 +41,10 @@ pub use order::{OrderCandidate, OrderReport, OrderRule};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
 
-use crate::Result;
 use crate::lti::{Discrete, StateSpace};
-use channels::Channels;
+use crate::{Error, Result};
+use channels::{Channels, check_blocks};
+use factorisation::{Arrangement, DataTriangle};
 use faer::{MatRef, c64};
 use realisation::OutputPair;
 
@@ -138,26 +140,84 @@ impl SubspaceModel {
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<SubspaceModel> {
-    let data = Channels::new(experiments, options)?;
-    let found = match options.weight.is_for_closed_loops() {
-        true => predictor_form::estimate(&data, options, time)?,
-        false => open_loop::estimate(&data, options, time)?,
-    };
-    let fitted = output_error::fit(&data, &found.pair, found.innovation.gain(), &found.stability, options)?;
-    Ok(SubspaceModel {
-        model: data.unscale_model(found.pair, fitted.b, fitted.d, time)?,
-        innovation: found.innovation.unscale(&data.y_scale),
-        initial_states: fitted.initial_states,
-        singular_values: found.singular_values,
-        order: found.order,
-        stability: found.stability,
-        fit: fitted.quality,
-        horizon: options.horizon,
-        past: options.past(),
-        columns: found.columns,
-        excitation_rcond: found.excitation_rcond,
-        factor: found.factor,
-    })
+    SubspaceData::new(experiments, time, options)?.identify(options)
+}
+
+/// Records with the triangular factor of their block-Hankel matrix: models of any weight and order and of any horizon and
+/// past up to those of the factor come from it without another pass over the Hankel data.
+///
+/// ```
+/// use youla::{Mat, lti::Discrete};
+/// use youla::identify::subspace::{Experiment, Order, SubspaceData, SubspaceOptions};
+/// let u = Mat::from_fn(300, 1, |k, _| ((k * k) as f64).sin());
+/// let mut y = Mat::zeros(300, 1);
+/// for k in 0..299 {
+///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
+/// }
+/// let options = SubspaceOptions { horizon: 5, ..Default::default() };
+/// let data = SubspaceData::new(&[Experiment { u: u.as_ref(), y: y.as_ref() }], Discrete::new(0.1)?, &options)?;
+/// for n in 1..3 {
+///     let found = data.identify(&SubspaceOptions { order: Order::Fixed(n), ..options.clone() })?;
+///     assert!(found.poles().iter().any(|pole| (pole.re - 0.5).abs() < 1e-9));
+/// }
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub struct SubspaceData {
+    channels: Channels,
+    triangle: DataTriangle,
+    time: Discrete,
+    factored: SubspaceOptions,
+}
+
+impl SubspaceData {
+    /// Checks, scales and factors the data for the horizon and past of `options`.
+    ///
+    /// # Errors
+    /// As [`subspace`], but for those of a model.
+    pub fn new(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
+        let channels = Channels::new(experiments, options)?;
+        let arrangement = match options.weight.is_for_closed_loops() {
+            true => Arrangement::Chronological,
+            false => Arrangement::InputsFirst,
+        };
+        let blocks = (options.past(), options.horizon);
+        let triangle = DataTriangle::new(&channels, blocks, arrangement, options.factorisation)?;
+        Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
+    }
+
+    /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
+    /// past at most those of the factor; scaling and factorisation are part of the factor.
+    ///
+    /// # Errors
+    /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Refactor`] for another
+    /// scaling or factorisation.
+    pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
+        let held = (self.factored.scaling, self.factored.factorisation);
+        if (options.scaling, options.factorisation) != held {
+            return Err(Error::Refactor);
+        }
+        check_blocks(options)?;
+        let found = match options.weight.is_for_closed_loops() {
+            true => predictor_form::estimate(&self.triangle, options, self.time)?,
+            false => open_loop::estimate(&self.triangle, options, self.time)?,
+        };
+        let fitted =
+            output_error::fit(&self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
+        Ok(SubspaceModel {
+            model: self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?,
+            innovation: found.innovation.unscale(&self.channels.y_scale),
+            initial_states: fitted.initial_states,
+            singular_values: found.singular_values,
+            order: found.order,
+            stability: found.stability,
+            fit: fitted.quality,
+            horizon: options.horizon,
+            past: options.past(),
+            columns: found.columns,
+            excitation_rcond: found.excitation_rcond,
+            factor: found.factor,
+        })
+    }
 }
 
 /// What the data say about all but B, D and the initial states, in scaled units.

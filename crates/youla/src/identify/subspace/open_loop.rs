@@ -1,6 +1,6 @@
 //! MOESP, N4SID and CVA: A and C from the projection of the future outputs along the past, beyond the future inputs.
 
-use super::channels::Channels;
+use super::factorisation::DataTriangle;
 use super::hankel::HankelFactor;
 use super::order::{Evidence, choose};
 use super::projection::{canonical_correlations, project};
@@ -10,8 +10,8 @@ use crate::Result;
 use crate::lti::Discrete;
 
 /// A, C and the innovations by the method that the weight names.
-pub(super) fn estimate(data: &Channels, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
-    let factor = HankelFactor::new(data, options.past(), options.horizon, options.factorisation)?;
+pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
+    let factor = HankelFactor::new(data, options.past(), options.horizon)?;
     let excitation_rcond = factor.require_excitation()?;
     let projection = project(&factor, options.weight)?;
     let order = choose(

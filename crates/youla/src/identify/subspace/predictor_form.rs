@@ -7,7 +7,7 @@
 //! u(k) does not bias it. K comes from the covariance of `[K e + rest; e]` by a Riccati equation: this is the K of the
 //! regression where A - K C is stable and the rest is small, and gives a stable predictor always.
 
-use super::channels::Channels;
+use super::factorisation::DataTriangle;
 use super::innovation::{self, Innovation};
 use super::order::{Evidence, choose};
 use super::realisation::OutputPair;
@@ -19,7 +19,7 @@ use crate::{Error, Result};
 use faer::{Mat, MatRef};
 
 /// A, C and the innovations by the method that the weight names.
-pub(super) fn estimate(data: &Channels, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
+pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
     let varx = Varx::new(data, options)?;
     let excitation_rcond = varx.require_excitation()?;
     let canonical = ssarx::states(&varx)?;

@@ -10,8 +10,8 @@
 //! regressed on the past needs the leading part of it, and a state `x(k) = T [z(k-p); ...; z(k-1)]` is known one sample
 //! later from the columns one block further on.
 
-use super::channels::Channels;
-use super::hankel::{DataTriangle, factor, require_excitation};
+use super::factorisation::{Arrangement, DataTriangle};
+use super::hankel::require_excitation;
 use super::{DataFactor, Factorisation, Feedthrough, SubspaceOptions};
 use crate::linalg::{leading_rank, least_squares};
 use crate::{Error, Result};
@@ -46,10 +46,10 @@ pub(super) struct StateMap {
 }
 
 impl Varx {
-    pub(super) fn new(data: &Channels, options: &SubspaceOptions) -> Result<Self> {
-        let (inputs, outputs, past, horizon) = (data.inputs, data.outputs, options.past(), options.horizon);
-        let places: Vec<usize> = (0..(past + horizon) * (inputs + outputs)).collect();
-        let DataTriangle { r, columns, report } = factor(data, (past, horizon), &places, options.factorisation)?;
+    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+        let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
+        let (past, horizon) = (options.past(), options.horizon);
+        let r = data.arranged(Arrangement::Chronological, past, horizon)?;
         let feedthrough = options.feedthrough == Feedthrough::Estimated;
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));
         let mut varx = Varx { r, inputs, outputs, past, horizon, columns, feedthrough, report, xi, d };

@@ -1,0 +1,281 @@
+//! The triangular factor R of block-Hankel data, from which every weight, order and shorter horizon starts.
+//!
+//! Only R is formed, from the Gram matrix or from pieces of a few thousand rows (one row per Hankel column). The rows are
+//! dealt to a fixed number of lanes that depends on the data alone, so the result is the same on any number of threads.
+
+use super::channels::Channels;
+use super::gram;
+use super::{DataFactor, Factorisation};
+use crate::linalg::Triangle;
+use crate::{Error, Result};
+use faer::{Mat, MatMut, MatRef};
+use rayon::prelude::*;
+use std::ops::Range;
+
+/// Rows folded in at a time: large enough for blocked QR, small enough for the cache.
+const PIECE: usize = 4000;
+/// Lanes that may run at the same time.
+const LANES: usize = 16;
+
+/// R of block-Hankel data.
+pub(super) struct DataTriangle {
+    r: Mat<f64>,
+    arrangement: Arrangement,
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+    /// Block rows of the past and of the future.
+    past: usize,
+    horizon: usize,
+    /// Columns of the Hankel matrix.
+    pub(super) columns: usize,
+    /// How R was found.
+    pub(super) report: DataFactor,
+}
+
+/// In which order the rows of the block-Hankel matrix stand.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Arrangement {
+    /// `[U_f U_p Y_p Y_f]`.
+    InputsFirst,
+    /// `[z(k-p) ... z(k) ... z(k+f-1)]`, `z = [u; y]`.
+    Chronological,
+}
+
+impl Arrangement {
+    /// Places of all rows, counted from the oldest sample: (block row, channel of `[u; y]`) in one number.
+    fn places(self, inputs: usize, outputs: usize, past: usize, horizon: usize) -> Vec<usize> {
+        let (m, q) = (inputs, inputs + outputs);
+        let block_rows = |rows: Range<usize>, channels: Range<usize>| {
+            rows.flat_map(move |i| channels.clone().map(move |c| i * q + c))
+        };
+        let (before, after) = (0..past, past..past + horizon);
+        match self {
+            Arrangement::Chronological => (0..(past + horizon) * q).collect(),
+            Arrangement::InputsFirst => block_rows(after.clone(), 0..m)
+                .chain(block_rows(before.clone(), 0..m))
+                .chain(block_rows(before, m..q))
+                .chain(block_rows(after, m..q))
+                .collect(),
+        }
+    }
+}
+
+impl DataTriangle {
+    /// R of the data with so many block rows of past and future, by the way that was asked for; `Auto` takes the Gram matrix
+    /// where it is well enough conditioned.
+    pub(super) fn new(
+        data: &Channels,
+        (past, horizon): (usize, usize),
+        arrangement: Arrangement,
+        factorisation: Factorisation,
+    ) -> Result<Self> {
+        let (inputs, outputs) = (data.inputs, data.outputs);
+        let places = arrangement.places(inputs, outputs, past, horizon);
+        let rows = RowMap::new(data, past + horizon, &places);
+        let (columns, width) = (rows.total, places.len());
+        if columns < width {
+            let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
+            let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
+            return Err(Error::TooFewSamples { what, found, needed: found + width - columns });
+        }
+        let (r, report) = factor(&rows, &places, past + horizon, factorisation)?;
+        Ok(DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report })
+    }
+
+    /// R of the rows that a past and a future no longer than those of the data take, in the given order; the Hankel columns
+    /// stay those of the data.
+    pub(super) fn arranged(&self, arrangement: Arrangement, past: usize, horizon: usize) -> Result<Mat<f64>> {
+        for (what, asked, held) in [("the past", past, self.past), ("the horizon", horizon, self.horizon)] {
+            if asked > held {
+                let must = "at most that with which the data were factored";
+                return Err(Error::OutOfRange { what: what.into(), value: asked as f64, must });
+            }
+        }
+        if (arrangement, past, horizon) == (self.arrangement, self.past, self.horizon) {
+            return Ok(self.r.clone());
+        }
+        let places =
+            |arrangement: Arrangement, past, horizon| arrangement.places(self.inputs, self.outputs, past, horizon);
+        let held = places(self.arrangement, self.past, self.horizon);
+        let mut column_of = vec![0; held.len()];
+        held.iter().enumerate().for_each(|(column, place)| column_of[*place] = column);
+        let oldest = (self.past - past) * (self.inputs + self.outputs);
+        let wanted: Vec<usize> =
+            places(arrangement, past, horizon).iter().map(|place| column_of[place + oldest]).collect();
+        let mut triangle = Triangle::new(wanted.len(), self.r.nrows());
+        triangle.fold(self.r.nrows(), |mut rows| {
+            wanted.iter().enumerate().for_each(|(j, column)| rows.as_mut().col_mut(j).copy_from(self.r.col(*column)));
+        });
+        Ok(triangle.r().to_owned())
+    }
+}
+
+fn factor(
+    rows: &RowMap<'_>,
+    places: &[usize],
+    blocks: usize,
+    factorisation: Factorisation,
+) -> Result<(Mat<f64>, DataFactor)> {
+    let by_gram = match factorisation {
+        Factorisation::Qr => None,
+        _ => gram::factor(rows.data, blocks, places),
+    };
+    let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
+    match by_gram {
+        Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
+            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+        }
+        None if factorisation == Factorisation::Gram => {
+            let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
+            Err(Error::Singular { what, rcond: 0.0 })
+        }
+        found => {
+            let condition = found.map(|found| found.condition);
+            Ok((triangular_factor(rows, places.len()), DataFactor { by: Factorisation::Qr, condition }))
+        }
+    }
+}
+
+/// R of all Hankel columns, by lanes and then over the lanes.
+fn triangular_factor(rows: &RowMap<'_>, width: usize) -> Mat<f64> {
+    let lanes = rows.total.div_ceil(PIECE).min(LANES);
+    let parts: Vec<Mat<f64>> = (0..lanes)
+        .into_par_iter()
+        .map(|lane| lane_factor(rows, width, lane * rows.total / lanes, (lane + 1) * rows.total / lanes))
+        .collect();
+    let mut whole = Triangle::new(width, width);
+    parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
+    whole.r().to_owned()
+}
+
+fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat<f64> {
+    let pieces = (end - start).div_ceil(PIECE);
+    let cut = |k: usize| start + k * (end - start) / pieces;
+    let mut triangle = Triangle::new(width, (end - start).div_ceil(pieces));
+    for k in 0..pieces {
+        triangle.fold(cut(k + 1) - cut(k), |piece| rows.fill(cut(k), piece));
+    }
+    triangle.r().to_owned()
+}
+
+/// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.
+struct RowMap<'a> {
+    data: &'a Channels,
+    places: &'a [usize],
+    /// First row of each experiment.
+    first: Vec<usize>,
+    total: usize,
+}
+
+impl<'a> RowMap<'a> {
+    fn new(data: &'a Channels, blocks: usize, places: &'a [usize]) -> Self {
+        let mut total = 0;
+        let mut first = Vec::new();
+        for experiment in &data.experiments {
+            first.push(total);
+            total += experiment.u.nrows() + 1 - blocks;
+        }
+        RowMap { data, places, first, total }
+    }
+
+    /// Writes the rows `start ..` into `piece`.
+    fn fill(&self, start: usize, mut piece: MatMut<'_, f64>) {
+        let end = start + piece.nrows();
+        for (e, signals) in self.data.experiments.iter().enumerate() {
+            let from = self.first[e].max(start);
+            let to = self.first.get(e + 1).copied().unwrap_or(self.total).min(end);
+            if from < to {
+                let part = piece.as_mut().subrows_mut(from - start, to - from);
+                self.fill_from(signals.u.as_ref(), signals.y.as_ref(), from - self.first[e], part);
+            }
+        }
+    }
+
+    /// Writes the places of Hankel columns that begin at sample `time` of one experiment.
+    fn fill_from(&self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, time: usize, mut part: MatMut<'_, f64>) {
+        let (count, inputs, channels) = (part.nrows(), u.ncols(), u.ncols() + y.ncols());
+        for (column, place) in self.places.iter().enumerate() {
+            let (block, channel) = (place / channels, place % channels);
+            let values = if channel < inputs { u.col(channel) } else { y.col(channel - inputs) };
+            part.as_mut().col_mut(column).copy_from(values.subrows(time + block, count));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::subspace::{Experiment, SubspaceOptions};
+
+    /// Two inputs and one output with noise, in experiments of unequal length.
+    fn experiments(noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
+        let wave = |k: usize, seed: usize| ((k * k * (seed + 2) + 7 * k) as f64 * 0.37).sin();
+        let experiment = |samples: usize, seed: usize| {
+            let u = Mat::from_fn(samples, 2, |k, j| wave(k, seed + 3 * j));
+            let mut y = Mat::zeros(samples, 1);
+            for k in 2..samples {
+                let clean = 1.6 * y[(k - 1, 0)] - 0.8 * y[(k - 2, 0)] + u[(k - 1, 0)] - 0.4 * u[(k - 2, 1)];
+                y[(k, 0)] = clean + noise * wave(k, seed + 11);
+            }
+            (u, y)
+        };
+        vec![experiment(9000, 1), experiment(700, 2)]
+    }
+
+    fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<DataTriangle> {
+        let records = experiments(noise);
+        let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+        let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
+        DataTriangle::new(&data, (horizon, horizon), Arrangement::InputsFirst, by)
+    }
+
+    /// Rows of R with a positive diagonal.
+    fn normal(r: &Mat<f64>) -> Mat<f64> {
+        Mat::from_fn(r.nrows(), r.ncols(), |i, j| r[(i, j)] * r[(i, i)].signum())
+    }
+
+    #[test]
+    fn gram_and_qr_give_the_same_factor() {
+        for horizon in [2, 7, 20] {
+            let [gram, qr] = [Factorisation::Auto, Factorisation::Qr].map(|by| factors(0.3, horizon, by).unwrap());
+            assert_eq!((gram.report.by, qr.report.by), (Factorisation::Gram, Factorisation::Qr));
+            let (one, other) = (normal(&gram.r), normal(&qr.r));
+            let error = (&one - &other).norm_max() / other.norm_max();
+            assert!(error < 1e-11, "horizon {horizon}: {error:.1e}");
+            let sigma = Mat::from_fn(qr.r.ncols(), qr.r.ncols(), |i, j| qr.r[(i, j)] / qr.r.col(j).norm_l2());
+            let sigma = sigma.singular_values().unwrap();
+            let ratio = gram.report.condition.unwrap() / (sigma[0] / sigma[sigma.len() - 1]);
+            assert!((0.5..1.0 + 1e-9).contains(&ratio), "horizon {horizon}: {ratio}");
+        }
+    }
+
+    #[test]
+    fn data_without_noise_are_left_to_qr() {
+        let found = factors(0.0, 7, Factorisation::Auto).unwrap();
+        assert_eq!(found.report.by, Factorisation::Qr);
+        let refused = factors(0.0, 7, Factorisation::Gram);
+        assert!(matches!(refused.err(), None | Some(Error::Singular { .. })));
+        let nearly = factors(1e-6, 7, Factorisation::Auto).unwrap();
+        assert_eq!(nearly.report.by, Factorisation::Qr);
+        assert!(nearly.report.condition.is_some_and(|condition| condition > gram::LIMIT));
+    }
+
+    #[test]
+    fn a_shorter_horizon_comes_from_the_same_factor() {
+        let records = experiments(0.3);
+        let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+        let data = Channels::new(&experiments, &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
+        let whole = DataTriangle::new(&data, (9, 9), Arrangement::InputsFirst, Factorisation::Qr).unwrap();
+        let r = whole.arranged(Arrangement::Chronological, 4, 3).unwrap();
+        // The Gram matrix of the same rows over the same columns.
+        let places = Arrangement::Chronological.places(2, 1, 4, 3);
+        let shifted: Vec<usize> = places.iter().map(|place| place + 5 * 3).collect();
+        let rows = RowMap::new(&data, 18, &shifted);
+        let mut hankel = Mat::zeros(rows.total, shifted.len());
+        rows.fill(0, hankel.as_mut());
+        let gram = hankel.transpose() * &hankel;
+        let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
+        assert!(error < 1e-13, "{error:.1e}");
+        assert!(whole.arranged(Arrangement::Chronological, 10, 3).is_err());
+    }
+}

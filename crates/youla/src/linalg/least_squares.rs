@@ -3,11 +3,16 @@
 //! The columns of A are brought to unit length first, so that units do not decide what counts as dependent; then the
 //! singular value decomposition is truncated (Golub, Van Loan, Matrix Computations, section 5.5).
 
+use super::triangular_condition;
 use crate::{Error, Result};
+use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, MatRef};
 
 /// Singular values below this share of the largest one count as zero.
 const RANK_TOLERANCE: f64 = 1e-12;
+
+/// Condition number, columns of unit length, up to which QR without pivoting is as good as the singular values.
+const WELL_CONDITIONED: f64 = 1e8;
 
 /// The solution of a least-squares problem and how well determined it is.
 #[derive(Debug, Clone)]
@@ -56,6 +61,26 @@ pub fn least_squares(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Resu
     Ok(LeastSquares { x, rank, rcond: if sigma[0] > 0.0 { determined / sigma[0] } else { 0.0 } })
 }
 
+/// The solution alone: by QR where the columns are far from dependent, else as [`least_squares`].
+///
+/// # Errors
+/// As [`least_squares`].
+pub(crate) fn regress(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    let columns = a.ncols();
+    if columns == 0 || a.nrows() < columns {
+        return Ok(least_squares(what, a, b)?.x);
+    }
+    let qr = a.qr();
+    let r = qr.thin_R();
+    let length: Vec<f64> = (0..columns).map(|j| r.col(j).norm_l2()).collect();
+    let lower = Mat::from_fn(columns, columns, |i, j| if i >= j { r[(j, i)] / length[i] } else { 0.0 });
+    // Not `>`: a zero column makes it NaN.
+    if !(triangular_condition(lower.as_ref()) < WELL_CONDITIONED) {
+        return Ok(least_squares(what, a, b)?.x);
+    }
+    Ok(qr.solve_lstsq(b))
+}
+
 fn positive_or_one(length: f64) -> f64 {
     if length > 0.0 { length } else { 1.0 }
 }
@@ -75,6 +100,21 @@ mod tests {
         }
         assert_eq!(solution.rank, 3);
         assert!(solution.rcond > 1e-2);
+    }
+
+    #[test]
+    fn both_ways_agree_and_dependent_columns_take_the_careful_one() {
+        let good = Mat::from_fn(9, 3, |i, j| ((i * i * (j + 2)) as f64 + 1.0).sin() * [1.0, 1e9, 1e-9][j]);
+        let twice = Mat::from_fn(9, 3, |i, j| good[(i, j.min(1))]);
+        let zero = Mat::from_fn(9, 3, |i, j| if j == 1 { 0.0 } else { good[(i, j)] });
+        let b = Mat::from_fn(9, 2, |i, j| ((2 * i + j) as f64).cos());
+        for a in [good, twice, zero] {
+            let (fast, careful) =
+                (regress("a test", a.as_ref(), b.as_ref()), least_squares("a test", a.as_ref(), b.as_ref()));
+            let (fast, careful) = (fast.unwrap(), careful.unwrap().x);
+            let error = (&a * (&fast - &careful)).norm_max();
+            assert!(error < 1e-13 && fast.norm_l2() < 1.001 * careful.norm_l2(), "{error:.1e}");
+        }
     }
 
     #[test]

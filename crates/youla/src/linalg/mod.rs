@@ -26,6 +26,7 @@ pub(crate) use definite::check_semidefinite;
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
 pub use hessenberg::{Hessenberg, hessenberg};
+pub(crate) use least_squares::regress;
 pub use least_squares::{LeastSquares, least_squares};
 pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
@@ -34,7 +35,7 @@ pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 pub use triangle::Triangle;
-pub(crate) use triangle::leading_rank;
+pub(crate) use triangle::{leading_rank, triangular_condition};
 
 use crate::{Error, Result};
 use faer::prelude::*;

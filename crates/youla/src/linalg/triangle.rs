@@ -8,6 +8,9 @@ use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::qr::no_pivoting::factor::{qr_in_place, qr_in_place_scratch, recommended_block_size};
 use faer::{Mat, MatMut, MatRef, Par};
 
+/// Steps of the inverse iteration for a condition number; each costs two triangular solutions.
+const STEPS: usize = 6;
+
 /// Accumulates the triangular factor of a matrix with `width` columns.
 ///
 /// ```
@@ -85,6 +88,32 @@ pub(crate) fn leading_rank(r: MatRef<'_, f64>, columns: usize) -> usize {
     let floor: Vec<f64> = (0..columns).map(|j| 1e-10 * leading.col(j).norm_l2()).collect();
     let significant = |i: &usize| (0..columns).any(|j| leading[(*i, j)].abs() > floor[j]);
     (0..r.nrows()).rev().find(significant).map_or(0, |last| last + 1)
+}
+
+/// Ratio of the largest to the smallest singular value of a lower triangular matrix whose rows have unit length, by inverse
+/// iteration: at most the true one, and close to it.
+pub(crate) fn triangular_condition(lower: MatRef<'_, f64>) -> f64 {
+    let n = lower.nrows();
+    let largest = largest_singular(n, |v| lower.transpose() * (lower * v));
+    let smallest = largest_singular(n, |mut v| {
+        lower.solve_lower_triangular_in_place(v.as_mut());
+        lower.transpose().solve_upper_triangular_in_place(v.as_mut());
+        v
+    });
+    largest * smallest
+}
+
+/// Square root of the largest eigenvalue of a symmetric positive definite map, by the power method from a fixed vector
+/// without structure.
+fn largest_singular(n: usize, map: impl Fn(Mat<f64>) -> Mat<f64>) -> f64 {
+    let mut v = Mat::from_fn(n, 1, |i, _| 1.0 + 0.5 * (1.7 * i as f64 + 0.3 * (i * i % 7) as f64).sin());
+    let mut value = 0.0;
+    for _ in 0..STEPS {
+        let length = v.norm_l2();
+        v = map(faer::Scale(1.0 / length) * v);
+        value = v.norm_l2();
+    }
+    value.sqrt()
 }
 
 #[cfg(test)]

@@ -9,6 +9,7 @@
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
 use super::channels::{Channels, Signals};
+use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par, Side};
@@ -16,9 +17,6 @@ use rayon::prelude::*;
 
 /// Largest condition number of the data, columns of unit length, with which the factor of the Gram matrix is taken.
 pub(super) const LIMIT: f64 = 1e4;
-
-/// Steps of the inverse iteration for the condition number; each costs two triangular solutions.
-const STEPS: usize = 6;
 
 /// Samples of one channel in a frame times the channels: the rows of a product that fill the registers well.
 const FRAME: usize = 64;
@@ -44,7 +42,7 @@ pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<
     });
     let cholesky = unit.llt(Side::Lower).ok()?;
     let lower = cholesky.L();
-    let condition = condition(lower);
+    let condition = triangular_condition(lower);
     let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
     Some(GramFactor { r, condition })
 }
@@ -151,30 +149,4 @@ impl Lane<'_> {
         }
         products
     }
-}
-
-/// Ratio of the largest to the smallest singular value of a lower triangular matrix whose rows have unit length, by inverse
-/// iteration: at most the true one, and close to it.
-fn condition(lower: MatRef<'_, f64>) -> f64 {
-    let n = lower.nrows();
-    let largest = largest_singular(n, |v| lower.transpose() * (lower * v));
-    let smallest = largest_singular(n, |mut v| {
-        lower.solve_lower_triangular_in_place(v.as_mut());
-        lower.transpose().solve_upper_triangular_in_place(v.as_mut());
-        v
-    });
-    largest * smallest
-}
-
-/// Square root of the largest eigenvalue of a symmetric positive definite map, by the power method from a fixed vector
-/// without structure.
-fn largest_singular(n: usize, map: impl Fn(Mat<f64>) -> Mat<f64>) -> f64 {
-    let mut v = Mat::from_fn(n, 1, |i, _| 1.0 + 0.5 * (1.7 * i as f64 + 0.3 * (i * i % 7) as f64).sin());
-    let mut value = 0.0;
-    for _ in 0..STEPS {
-        let length = v.norm_l2();
-        v = map(faer::Scale(1.0 / length) * v);
-        value = v.norm_l2();
-    }
-    value.sqrt()
 }

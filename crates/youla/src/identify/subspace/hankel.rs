@@ -2,9 +2,12 @@
 
 use super::DataFactor;
 use super::factorisation::{Arrangement, DataTriangle};
-use crate::linalg::leading_rank;
+use crate::linalg::{leading_rank, triangular_condition};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
+
+/// Condition number below which no exact one is needed to know that the inputs are exciting.
+pub(super) const FAR_FROM_DEPENDENT: f64 = 1e8;
 
 /// The factor R and where its blocks are.
 pub(super) struct HankelFactor {
@@ -85,11 +88,18 @@ impl HankelFactor {
     }
 }
 
-/// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length, from their columns of R.
+/// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length, from their columns of R: an estimate
+/// where they are far from dependent.
 pub(super) fn require_excitation(inputs: MatRef<'_, f64>, horizon: usize) -> Result<f64> {
     let needed = inputs.ncols();
     let unit =
         Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / inputs.col(j).norm_l2().max(f64::MIN_POSITIVE));
+    if unit.nrows() >= needed {
+        let condition = triangular_condition(unit.qr().thin_R().transpose());
+        if condition < FAR_FROM_DEPENDENT {
+            return Ok(1.0 / condition);
+        }
+    }
     let sigma = unit.singular_values().map_err(|_| Error::NoConvergence {
         what: "the singular values of the input Hankel matrix".into(),
         iterations: 0,

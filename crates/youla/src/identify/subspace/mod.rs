@@ -17,6 +17,7 @@ mod gram;
 mod hankel;
 mod innovation;
 mod modal;
+mod modal_sums;
 mod open_loop;
 mod options;
 mod order;

@@ -8,6 +8,7 @@
 //! two multiplications per number serves all outputs, where the recursion for one output alone takes n of them. It needs
 //! eigenvectors that are far from dependent; [`Modes::of`] says where they are not.
 
+use super::modal_sums;
 use super::sensitivity::{Predictor, Unknowns};
 use crate::linalg::Triangle;
 use crate::{Mat, MatRef, c64};
@@ -61,7 +62,8 @@ impl Modes {
 
     /// Per output, the triangular factor over `[x0 | B | its row of D | y]`.
     pub(super) fn condense(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>, unknowns: Unknowns) -> Vec<Mat<f64>> {
-        let shared = self.shared_factor(u, targets, unknowns);
+        let shared = modal_sums::factor(&self.lambda, u, targets, unknowns)
+            .unwrap_or_else(|| self.shared_factor(u, targets, unknowns));
         (0..unknowns.outputs).map(|i| self.of_output(shared.as_ref(), i, unknowns)).collect()
     }
 
@@ -259,6 +261,28 @@ mod tests {
                 assert!(error < 1e-12, "output {i}, {initial} initial states: {error:.1e}");
             }
         }
+    }
+
+    #[test]
+    fn sums_and_rows_give_the_same_factor() {
+        let modes = Modes::of(&predictor()).unwrap();
+        let (u, y) = (signal(5000, 3, 1), signal(5000, 2, 9));
+        for (initial, feedthrough) in [(7, true), (0, false)] {
+            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, feedthrough };
+            let rows = modes.shared_factor(u.as_ref(), y.as_ref(), unknowns);
+            let sums = modal_sums::factor(&modes.lambda, u.as_ref(), y.as_ref(), unknowns).unwrap();
+            let (one, other) = (sums.transpose() * &sums, rows.transpose() * &rows);
+            let error = (&one - &other).norm_max() / other.norm_max();
+            assert!(error < 1e-13, "{initial} initial states: {error:.1e}");
+        }
+    }
+
+    #[test]
+    fn outputs_without_noise_are_left_to_the_rows() {
+        let modes = Modes::of(&predictor()).unwrap();
+        let u = signal(3000, 1, 1);
+        let unknowns = Unknowns { states: 7, inputs: 1, outputs: 1, initial: 0, feedthrough: true };
+        assert!(modal_sums::factor(&modes.lambda, u.as_ref(), u.as_ref(), unknowns).is_none());
     }
 
     #[test]

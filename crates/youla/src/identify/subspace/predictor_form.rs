@@ -13,7 +13,7 @@ use super::order::{Evidence, choose};
 use super::realisation::OutputPair;
 use super::varx::{StateMap, Varx};
 use super::{Estimate, SubspaceOptions, Weight, parsim, pbsid, ssarx, stability};
-use crate::linalg::{block, least_squares};
+use crate::linalg::{block, regress};
 use crate::lti::Discrete;
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -87,10 +87,10 @@ impl<'a> Sequences<'a> {
         let n = self.x.ncols();
         let present =
             block(&[&[self.x.as_ref(), self.u.subcols(0, if self.feedthrough { self.u.ncols() } else { 0 })]]);
-        let output = least_squares("the states", present.as_ref(), self.y)?.x;
+        let output = regress("the states", present.as_ref(), self.y)?;
         let e = self.y - &present * &output;
         let regressors = block(&[&[self.x.as_ref(), self.u, e.as_ref()]]);
-        let state = least_squares("the states, inputs and innovations", regressors.as_ref(), self.x_next.as_ref())?.x;
+        let state = regress("the states, inputs and innovations", regressors.as_ref(), self.x_next.as_ref())?;
         let leading = |rows: &Mat<f64>| rows.as_ref().subrows(0, n).transpose().to_owned();
         Ok(OutputPair { a: leading(&state), c: leading(&output) })
     }
@@ -103,12 +103,12 @@ impl<'a> Sequences<'a> {
     fn residuals(&self, pair: &OutputPair) -> Result<Mat<f64>> {
         let mut e = self.y - &self.x * pair.c.transpose();
         if self.feedthrough {
-            let d = least_squares("the inputs", self.u, e.as_ref())?.x;
+            let d = regress("the inputs", self.u, e.as_ref())?;
             e -= self.u * d;
         }
         let w = &self.x_next - &self.x * pair.a.transpose();
         let beside = block(&[&[self.u, e.as_ref()]]);
-        let found = least_squares("the inputs and innovations", beside.as_ref(), w.as_ref())?.x;
+        let found = regress("the inputs and innovations", beside.as_ref(), w.as_ref())?;
         let w = w - self.u * found.as_ref().subrows(0, self.u.ncols());
         Ok(block(&[&[w.as_ref(), e.as_ref()]]))
     }

@@ -1,9 +1,13 @@
 //! The weighted projection of the future outputs along the past, its singular values and the observability matrix.
 
 use super::Weight;
-use super::hankel::HankelFactor;
+use super::hankel::{FAR_FROM_DEPENDENT, HankelFactor};
+use crate::linalg::triangular_condition;
 use crate::{Error, Result};
-use faer::{Mat, MatRef};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::svd::{ComputeSvdVectors, svd, svd_scratch};
+use faer::prelude::*;
+use faer::{Mat, MatRef, Par};
 
 /// Directions of the future outputs below this share of the largest are noise-free to working precision and cannot be
 /// whitened.
@@ -45,23 +49,37 @@ pub(super) fn canonical_correlations(factor: &HankelFactor, projection: &Project
     Ok(values)
 }
 
-/// `[R32' R33'] = Uw Sw Vw'` and what the past says of the white future outputs.
+/// `W W' = [R32' R33'] [R32' R33']'` and what the past says of the white future outputs.
 struct Whitened {
-    uw: Mat<f64>,
-    sw: Vec<f64>,
-    /// `Sw^-1 Uw' R32'`.
+    /// A square root W: a row per future output, a column per direction in which they vary.
+    root: Mat<f64>,
+    /// `W^+ R32'`.
     past: Mat<f64>,
 }
 
 impl Whitened {
+    /// By QR where the future outputs are far from dependent, else by their singular values, the zero ones left out.
     fn new(factor: &HankelFactor) -> Result<Self> {
-        let (uw, mut sw) = left_singular(factor.future_beyond_inputs().transpose())?;
+        let (future, by_past) = (factor.future_beyond_inputs(), factor.future_by_past());
+        if future.nrows() >= future.ncols() {
+            let qr = future.qr();
+            let root = qr.thin_R().transpose();
+            let unit = Mat::from_fn(root.nrows(), root.ncols(), |i, j| root[(i, j)] / root.row(i).norm_l2());
+            if triangular_condition(unit.as_ref()) < FAR_FROM_DEPENDENT {
+                let mut past = by_past.transpose().to_owned();
+                root.solve_lower_triangular_in_place(past.as_mut());
+                return Ok(Whitened { root: root.to_owned(), past });
+            }
+        }
+        let (mut root, sw) = left_singular(future.transpose())?;
         let rank = sw.iter().filter(|s| **s > WHITENING_TOLERANCE * sw[0]).count();
-        let uw = uw.subcols(0, rank).to_owned();
-        sw.truncate(rank);
-        let mut past = uw.transpose() * factor.future_by_past().transpose();
-        sw.iter().enumerate().for_each(|(i, s)| past.row_mut(i).iter_mut().for_each(|v| *v /= s));
-        Ok(Whitened { uw, sw, past })
+        root = root.subcols(0, rank).to_owned();
+        let mut past = root.transpose() * by_past.transpose();
+        for (i, s) in sw[..rank].iter().enumerate() {
+            past.row_mut(i).iter_mut().for_each(|v| *v /= s);
+            root.col_mut(i).iter_mut().for_each(|v| *v *= s);
+        }
+        Ok(Whitened { root, past })
     }
 }
 
@@ -71,18 +89,14 @@ fn unweighted(factor: &HankelFactor) -> Result<Projection> {
     Ok(Projection { singular_values, canonical: false, basis: u })
 }
 
-/// `[R32' R33'] = Uw Sw Vw'`, `Sw^-1 Uw' R32' = U S V'`, Gamma = orthonormalised `Uw Sw U`.
+/// `W^+ R32' = U S V'`, Gamma = orthonormalised `W U`.
 fn canonical(factor: &HankelFactor) -> Result<Projection> {
-    let Whitened { uw, sw, past } = Whitened::new(factor)?;
-    let rank = sw.len();
-    let (mut u, mut singular_values) = left_singular(past.as_ref())?;
-    (0..rank).for_each(|i| u.row_mut(i).iter_mut().for_each(|v| *v *= sw[i]));
+    let Whitened { root, past } = Whitened::new(factor)?;
+    let (u, mut singular_values) = left_singular(past.as_ref())?;
     let count = factor.horizon * factor.outputs;
     singular_values.resize(count, 0.0);
-    let mut spanned = Mat::zeros(count, count);
-    spanned.as_mut().subcols_mut(0, rank).copy_from(uw * u);
     // Keep the unused directions last, so that the basis is complete even where the data are free of noise.
-    let basis = orthonormal(spanned.as_ref().subcols(0, rank), count);
+    let basis = orthonormal((root * u).as_ref(), count);
     Ok(Projection { singular_values, canonical: true, basis })
 }
 
@@ -100,11 +114,19 @@ fn orthonormal(a: MatRef<'_, f64>, count: usize) -> Mat<f64> {
 
 /// Left singular vectors (square) and as many singular values, zero beyond the columns of `a`.
 fn left_singular(a: MatRef<'_, f64>) -> Result<(Mat<f64>, Vec<f64>)> {
-    // The right vectors of a wide matrix would be most of the work.
-    let svd = if a.ncols() < a.nrows() { a.svd() } else { a.thin_svd() }.map_err(|_| no_convergence())?;
-    let mut sigma: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    sigma.resize(a.nrows(), 0.0);
-    Ok((svd.U().to_owned(), sigma))
+    let rows = a.nrows();
+    if a.ncols() > rows {
+        // The right vectors of a wide matrix would be most of the work.
+        return left_singular(a.transpose().qr().thin_R().transpose());
+    }
+    let (mut u, mut sigma) = (Mat::zeros(rows, rows), vec![0.0; a.ncols()]);
+    let need = svd_scratch::<f64>(rows, a.ncols(), ComputeSvdVectors::Full, ComputeSvdVectors::No, Par::Seq, default());
+    let mut memory = MemBuffer::new(need);
+    let values = faer::diag::DiagMut::from_slice_mut(&mut sigma);
+    let vectors = Some(u.as_mut());
+    svd(a, values, vectors, None, Par::Seq, MemStack::new(&mut memory), default()).map_err(|_| no_convergence())?;
+    sigma.resize(rows, 0.0);
+    Ok((u, sigma))
 }
 
 fn no_convergence() -> Error {

@@ -5,7 +5,7 @@
 use super::Weight;
 use super::hankel::HankelFactor;
 use crate::Result;
-use crate::linalg::{block, least_squares};
+use crate::linalg::{block, regress};
 use faer::{Mat, MatRef};
 
 /// The matrices through which the states are seen.
@@ -39,7 +39,7 @@ impl<'a> StateSequences<'a> {
         let now = factor.future_projected();
         x.as_mut().subrows_mut(0, now.nrows()).copy_from(now * gamma);
         let later = factor.later_future_projected();
-        let x_next = least_squares("the shortened observability matrix", shorter, later.transpose())?.x;
+        let x_next = regress("the shortened observability matrix", shorter, later.transpose())?;
         let target = block(&[&[x_next.transpose(), present]]);
         Ok(StateSequences { gamma, x, target, u_future: factor.future_inputs(), outputs: factor.outputs })
     }
@@ -53,7 +53,7 @@ impl<'a> StateSequences<'a> {
     pub(super) fn residuals(&self, pair: &OutputPair) -> Result<Mat<f64>> {
         let explained = block(&[&[pair.a.transpose(), pair.c.transpose()]]);
         let rest = &self.target - &self.x * explained;
-        let by_inputs = least_squares("the future inputs", self.u_future, rest.as_ref())?.x;
+        let by_inputs = regress("the future inputs", self.u_future, rest.as_ref())?;
         Ok(rest - self.u_future * by_inputs)
     }
 }
@@ -70,7 +70,7 @@ pub(super) fn realise(weight: Weight, states: &StateSequences<'_>) -> Result<Out
 fn shift(states: &StateSequences<'_>) -> Result<OutputPair> {
     let (gamma, p) = (states.gamma, states.outputs);
     let rows = gamma.nrows() - p;
-    let a = least_squares("the observability matrix", gamma.subrows(0, rows), gamma.subrows(p, rows))?.x;
+    let a = regress("the observability matrix", gamma.subrows(0, rows), gamma.subrows(p, rows))?;
     Ok(OutputPair { a, c: gamma.subrows(0, p).to_owned() })
 }
 
@@ -78,7 +78,7 @@ fn shift(states: &StateSequences<'_>) -> Result<OutputPair> {
 fn regression(states: &StateSequences<'_>) -> Result<OutputPair> {
     let n = states.gamma.ncols();
     let regressors = block(&[&[states.x.as_ref(), states.u_future]]);
-    let found = least_squares("the state sequence", regressors.as_ref(), states.target.as_ref())?.x;
+    let found = regress("the state sequence", regressors.as_ref(), states.target.as_ref())?;
     let a = found.as_ref().submatrix(0, 0, n, n).transpose().to_owned();
     let c = found.as_ref().submatrix(0, n, n, states.outputs).transpose().to_owned();
     Ok(OutputPair { a, c })

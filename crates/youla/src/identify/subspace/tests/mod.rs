@@ -1,6 +1,7 @@
 mod closed_loop;
 mod measured;
 mod options;
+mod properties;
 mod recovery;
 
 use super::*;

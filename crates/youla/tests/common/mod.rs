@@ -1,6 +1,8 @@
 //! What the integration tests share: the bearing, random loops and distances between systems.
 #![allow(dead_code, missing_docs)]
 
+pub(crate) mod feedback;
+
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

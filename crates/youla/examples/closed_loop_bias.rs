@@ -1,0 +1,88 @@
+//! Error of the frequency response over the length of the record, under strong feedback and noise: the figure of
+//! docs/closed-loop.md. `cargo run --release -p youla --example closed_loop_bias` writes docs/images/closed-loop-bias.svg and
+//! .csv in a few seconds.
+
+#[path = "../tests/common/mod.rs"]
+mod common;
+
+use common::feedback::Loop;
+use rayon::prelude::*;
+use std::path::Path;
+use youla::identify::subspace::Weight;
+use youla::report::data::{Method, Role};
+use youla::report::figure::{Axis, Content, Curve, Drawn, Figure, Panel};
+use youla::report::{figure_csv, svg};
+use youla::{Mat, Result};
+
+/// Standard deviation of the white output noise, um; the output is 1.1 um in all.
+const NOISE: f64 = 1.0;
+const SAMPLES: [usize; 7] = [2_000, 4_000, 8_000, 16_000, 32_000, 64_000, 128_000];
+const SEEDS: u64 = 9;
+
+fn main() -> Result<()> {
+    let methods = [
+        Method::new("n4sid", "N4SID direct", Role::Direct),
+        Method::new("pbsid-opt", "PBSIDopt, p = 100", Role::HansenReduced),
+        Method::new("ssarx", "SSARX, p = 100", Role::Pem),
+        Method::new("hansen", "Hansen G(S)", Role::Hansen),
+        Method::new("rate", "1/sqrt(N)", Role::Nominal),
+    ];
+    let bearing = Loop::new(0.0);
+    let estimate = |method: &str, (u, y): &(Mat<f64>, Mat<f64>)| match method {
+        "n4sid" => bearing.identify(Weight::N4sid, u, y),
+        "pbsid-opt" => bearing.identify(Weight::PbsidOpt, u, y),
+        "ssarx" => bearing.identify(Weight::Ssarx, u, y),
+        _ => bearing.hansen(u, y),
+    };
+    let estimated = &methods[..4];
+    let mut errors = vec![Vec::new(); estimated.len()];
+    for samples in SAMPLES {
+        let by_seed: Vec<Vec<f64>> = (1..=SEEDS)
+            .into_par_iter()
+            .map(|seed| {
+                let record = bearing.record(samples, NOISE, seed);
+                estimated.iter().map(|method| bearing.error(&estimate(&method.key, &record))).collect()
+            })
+            .collect();
+        for (k, errors) in errors.iter_mut().enumerate() {
+            let mut values: Vec<f64> = by_seed.iter().map(|of_seed| of_seed[k]).collect();
+            values.sort_by(f64::total_cmp);
+            errors.push(values[values.len() / 2]);
+        }
+        let row: Vec<String> = errors.iter().map(|errors| format!("{:.4}", errors[errors.len() - 1])).collect();
+        println!("{samples:7} {}", row.join(" "));
+    }
+    let x = SAMPLES.map(|samples| samples as f64).to_vec();
+    let curve = |method: &Method, y: Vec<f64>| Curve {
+        method: method.key.clone(),
+        note: String::new(),
+        drawn: Drawn::Line,
+        x: x.clone(),
+        y,
+    };
+    let mut curves: Vec<Curve> = estimated.iter().zip(errors).map(|(method, errors)| curve(method, errors)).collect();
+    curves.push(curve(&methods[4], x.iter().map(|n| 0.15 * (16_000.0 / n).sqrt()).collect()));
+    let axis = |label: &str| Axis { label: label.into(), log: true, ..Axis::default() };
+    let figure = Figure {
+        key: "closed-loop-bias".into(),
+        title: "Closed-loop bias".into(),
+        caption: format!(
+            "Relative error of the frequency response, 20 to 600 Hz, medians of {SEEDS} records, under strong feedback and \
+             white output noise of {NOISE} um."
+        ),
+        panels: vec![Panel {
+            x: axis("samples N"),
+            y: axis("relative error"),
+            content: Content::Curves(curves),
+            ..Panel::default()
+        }],
+        ..Figure::default()
+    };
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/images");
+    let write = |name: &str, text: String| {
+        let path = folder.join(name);
+        std::fs::write(&path, text).map_err(|source| youla::Error::Io { path, source })
+    };
+    write("closed-loop-bias.svg", svg(&figure, &methods)?)?;
+    write("closed-loop-bias.csv", figure_csv(&figure, &methods))
+}

@@ -7,10 +7,10 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
-use super::subspace::{Experiment, SubspaceModel, SubspaceOptions, subspace};
-use crate::Result;
+use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace};
+use crate::{MatRef, Result};
 
 /// The identified deviation system and the plant that it stands for.
 #[derive(Debug, Clone)]
@@ -26,14 +26,30 @@ pub struct HansenModel {
 /// The controller stabilises G(S) exactly when S is stable.
 ///
 /// # Errors
-/// As [`subspace`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.
+/// As [`super::subspace::subspace`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.
 pub fn hansen(
     factors: &CoprimeFactors<Discrete>,
     signals: &[YoulaSignals],
     options: &SubspaceOptions,
 ) -> Result<HansenModel> {
+    hansen_disturbed(factors, signals, &[], options)
+}
+
+/// The same where the outputs carry disturbances of known shape, one matrix of known signals (samples x signals) for each
+/// experiment, or none at all. A disturbance d of y is one of beta, `(Mt + S Ut) d`: for lines of constant frequency, or of a
+/// speed that changes slowly against the loop, of the same shape and another size.
+///
+/// # Errors
+/// As [`hansen`]; shapes of the known signals.
+pub fn hansen_disturbed(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    disturbances: &[MatRef<'_, f64>],
+    options: &SubspaceOptions,
+) -> Result<HansenModel> {
     let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
-    let deviation = subspace(&experiments, factors.nominal().time(), options)?;
+    let data = SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)?;
+    let deviation = data.identify(options)?;
     let plant = factors.plant_of(&deviation.model)?;
     Ok(HansenModel { deviation, plant })
 }

@@ -74,11 +74,9 @@ pub(crate) fn regress(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Res
     let r = qr.thin_R();
     let length: Vec<f64> = (0..columns).map(|j| r.col(j).norm_l2()).collect();
     let lower = Mat::from_fn(columns, columns, |i, j| if i >= j { r[(j, i)] / length[i] } else { 0.0 });
-    // Not `>`: a zero column makes it NaN.
-    if !(triangular_condition(lower.as_ref()) < WELL_CONDITIONED) {
-        return Ok(least_squares(what, a, b)?.x);
-    }
-    Ok(qr.solve_lstsq(b))
+    // A zero column makes the condition NaN.
+    let well_conditioned = triangular_condition(lower.as_ref()) < WELL_CONDITIONED;
+    if well_conditioned { Ok(qr.solve_lstsq(b)) } else { Ok(least_squares(what, a, b)?.x) }
 }
 
 fn positive_or_one(length: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use super::realisation::OutputPair;
 use super::{ChannelScaling, Experiment, SubspaceOptions};
-use crate::linalg::{check_finite, check_shape};
+use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -11,6 +11,8 @@ use faer::{Mat, MatRef};
 pub(super) struct Signals {
     pub(super) u: Mat<f64>,
     pub(super) y: Mat<f64>,
+    /// Known signals of a disturbance of the outputs, of unit rms; no columns where none is known.
+    pub(super) w: Mat<f64>,
 }
 
 /// All experiments in scaled units.
@@ -20,18 +22,49 @@ pub(super) struct Channels {
     pub(super) outputs: usize,
     u_scale: Vec<f64>,
     pub(super) y_scale: Vec<f64>,
+    /// Per experiment, of each known signal of a disturbance.
+    w_scale: Vec<Vec<f64>>,
 }
 
 impl Channels {
-    pub(super) fn new(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<Self> {
+    pub(super) fn new(
+        experiments: &[Experiment<'_>],
+        disturbances: &[MatRef<'_, f64>],
+        options: &SubspaceOptions,
+    ) -> Result<Self> {
         let (inputs, outputs) = check(experiments, options)?;
+        check_disturbances(experiments, disturbances)?;
         let u: Vec<_> = experiments.iter().map(|e| e.u).collect();
         let y: Vec<_> = experiments.iter().map(|e| e.y).collect();
         let u_scale = scales("input", &u, options.scaling)?;
-        let y_scale = scales("output", &y, options.scaling)?;
-        let experiments =
-            u.iter().zip(&y).map(|(u, y)| Signals { u: divide(*u, &u_scale), y: divide(*y, &y_scale) }).collect();
-        Ok(Channels { experiments, inputs, outputs, u_scale, y_scale })
+        let y_scale = if disturbances.is_empty() {
+            scales("output", &y, options.scaling)?
+        } else {
+            let rest = beyond(&y, disturbances)?;
+            scales("output", &rest.iter().map(Mat::as_ref).collect::<Vec<_>>(), options.scaling)?
+        };
+        let of_signals = |w: &MatRef<'_, f64>| (0..w.ncols()).map(|j| rms_or_one(*w, j)).collect();
+        let w_scale: Vec<Vec<f64>> = disturbances.iter().map(of_signals).collect();
+        let signals = |e: usize| Signals {
+            u: divide(u[e], &u_scale),
+            y: divide(y[e], &y_scale),
+            w: disturbances.get(e).map_or_else(|| Mat::zeros(u[e].nrows(), 0), |w| divide(*w, &w_scale[e])),
+        };
+        let experiments = (0..experiments.len()).map(signals).collect();
+        Ok(Channels { experiments, inputs, outputs, u_scale, y_scale, w_scale })
+    }
+
+    /// Number of known signals of a disturbance.
+    pub(super) fn disturbances(&self) -> usize {
+        self.w_scale.first().map_or(0, Vec::len)
+    }
+
+    /// Puts the coefficients of the known signals (signals x outputs, per experiment) back into the units of the record.
+    pub(super) fn unscale_disturbances(&self, found: Vec<Mat<f64>>) -> Vec<Mat<f64>> {
+        let one = |(a, scale): (Mat<f64>, &Vec<f64>)| {
+            Mat::from_fn(a.nrows(), a.ncols(), |j, i| self.y_scale[i] * a[(j, i)] / scale[j])
+        };
+        found.into_iter().zip(&self.w_scale).map(one).collect()
     }
 
     /// Puts the four matrices back into the units of the record.
@@ -70,6 +103,32 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         }
     }
     Ok((m, p))
+}
+
+/// One matrix per experiment, or none at all; as many signals and finite values in each.
+fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_, f64>]) -> Result<()> {
+    let Some(first) = disturbances.first() else { return Ok(()) };
+    if disturbances.len() != experiments.len() {
+        let (value, must) = (disturbances.len() as f64, "one per experiment, or none");
+        return Err(Error::OutOfRange { what: "the number of known disturbances".into(), value, must });
+    }
+    for (k, (e, w)) in experiments.iter().zip(disturbances).enumerate() {
+        let what = format!("the known disturbance of experiment {}", k + 1);
+        check_shape(&what, *w, (e.u.nrows(), first.ncols()))?;
+        check_finite(&what, *w)?;
+    }
+    Ok(())
+}
+
+/// The outputs without what the known signals explain of them, so that the size of a disturbance does not weigh the outputs.
+fn beyond(y: &[MatRef<'_, f64>], disturbances: &[MatRef<'_, f64>]) -> Result<Vec<Mat<f64>>> {
+    let rest = |(y, w): (&MatRef<'_, f64>, &MatRef<'_, f64>)| Ok(y - w * regress("the known disturbances", *w, *y)?);
+    y.iter().zip(disturbances).map(rest).collect()
+}
+
+fn rms_or_one(record: MatRef<'_, f64>, j: usize) -> f64 {
+    let rms = record.col(j).norm_l2() / (record.nrows() as f64).sqrt();
+    if rms > 0.0 { rms } else { 1.0 }
 }
 
 /// Refuses a horizon or past without meaning.

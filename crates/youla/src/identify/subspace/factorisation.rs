@@ -3,12 +3,12 @@
 //! Only R is formed, from the Gram matrix or from pieces of a few thousand rows (one row per Hankel column). The rows are
 //! dealt to a fixed number of lanes that depends on the data alone, so the result is the same on any number of threads.
 
-use super::channels::Channels;
-use super::gram;
+use super::channels::{Channels, Signals};
 use super::{DataFactor, Factorisation};
-use crate::linalg::Triangle;
+use super::{disturbance, gram};
+use crate::linalg::{Triangle, leading_rank};
 use crate::{Error, Result};
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatMut};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -26,7 +26,7 @@ pub(super) struct DataTriangle {
     /// Block rows of the past and of the future.
     past: usize,
     horizon: usize,
-    /// Columns of the Hankel matrix.
+    /// Columns of the Hankel matrix, less the directions that known disturbances take.
     pub(super) columns: usize,
     /// How R was found.
     pub(super) report: DataFactor,
@@ -71,14 +71,18 @@ impl DataTriangle {
     ) -> Result<Self> {
         let (inputs, outputs) = (data.inputs, data.outputs);
         let places = arrangement.places(inputs, outputs, past, horizon);
-        let rows = RowMap::new(data, past + horizon, &places);
-        let (columns, width) = (rows.total, places.len());
-        if columns < width {
+        let rows = RowMap::new(&data.experiments, past + horizon, &places);
+        let width = places.len();
+        let require = |columns: usize| {
             let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
             let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
-            return Err(Error::TooFewSamples { what, found, needed: found + width - columns });
-        }
-        let (r, report) = factor(&rows, &places, past + horizon, factorisation)?;
+            let refused = || Error::TooFewSamples { what, found, needed: found + width - columns };
+            if columns < width { Err(refused()) } else { Ok(()) }
+        };
+        require(rows.total)?;
+        let (r, report, taken) = factor(data, &rows, past + horizon, factorisation)?;
+        let columns = rows.total - taken;
+        require(columns)?;
         Ok(DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report })
     }
 
@@ -110,20 +114,21 @@ impl DataTriangle {
     }
 }
 
+/// R, how it was found, and the directions that known disturbances took.
 fn factor(
+    data: &Channels,
     rows: &RowMap<'_>,
-    places: &[usize],
     blocks: usize,
     factorisation: Factorisation,
-) -> Result<(Mat<f64>, DataFactor)> {
+) -> Result<(Mat<f64>, DataFactor, usize)> {
     let by_gram = match factorisation {
         Factorisation::Qr => None,
-        _ => gram::factor(rows.data, blocks, places),
+        _ => gram::factor(data, blocks, rows.places),
     };
     let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
     match by_gram {
         Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
-            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }, found.taken))
         }
         None if factorisation == Factorisation::Gram => {
             let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
@@ -131,13 +136,35 @@ fn factor(
         }
         found => {
             let condition = found.map(|found| found.condition);
-            Ok((triangular_factor(rows, places.len()), DataFactor { by: Factorisation::Qr, condition }))
+            let report = DataFactor { by: Factorisation::Qr, condition };
+            if data.disturbances() == 0 {
+                return Ok((triangular_factor(rows), report, 0));
+            }
+            let (r, taken) = factor_beyond_disturbances(data, blocks, rows.places);
+            Ok((r, report, taken))
         }
     }
 }
 
+/// R of what the known disturbances leave, experiment by experiment because each has its own amplitudes; and the directions
+/// that they took.
+fn factor_beyond_disturbances(data: &Channels, blocks: usize, places: &[usize]) -> (Mat<f64>, usize) {
+    let mut whole = Triangle::new(places.len(), places.len());
+    let mut taken = 0;
+    for experiment in data.experiments.chunks(1) {
+        let span = disturbance::span(gram::of_disturbance(&experiment[0], blocks).as_ref());
+        let rows = RowMap { leading: span.basis, ..RowMap::new(experiment, blocks, places) };
+        let (r, leading) = (triangular_factor(&rows), rows.leading.ncols());
+        let rank = leading_rank(r.as_ref(), leading);
+        whole.fold_rows(r.as_ref().submatrix(rank, leading, r.nrows() - rank, places.len()));
+        taken += rank;
+    }
+    (whole.r().to_owned(), taken)
+}
+
 /// R of all Hankel columns, by lanes and then over the lanes.
-fn triangular_factor(rows: &RowMap<'_>, width: usize) -> Mat<f64> {
+fn triangular_factor(rows: &RowMap<'_>) -> Mat<f64> {
+    let width = rows.leading.ncols() + rows.places.len();
     let lanes = rows.total.div_ceil(PIECE).min(LANES);
     let parts: Vec<Mat<f64>> = (0..lanes)
         .into_par_iter()
@@ -160,7 +187,9 @@ fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat
 
 /// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.
 struct RowMap<'a> {
-    data: &'a Channels,
+    experiments: &'a [Signals],
+    /// Combinations of the known disturbances (block row, signal) that stand first.
+    leading: Mat<f64>,
     places: &'a [usize],
     /// First row of each experiment.
     first: Vec<usize>,
@@ -168,32 +197,39 @@ struct RowMap<'a> {
 }
 
 impl<'a> RowMap<'a> {
-    fn new(data: &'a Channels, blocks: usize, places: &'a [usize]) -> Self {
+    fn new(experiments: &'a [Signals], blocks: usize, places: &'a [usize]) -> Self {
         let mut total = 0;
         let mut first = Vec::new();
-        for experiment in &data.experiments {
+        for experiment in experiments {
             first.push(total);
             total += experiment.u.nrows() + 1 - blocks;
         }
-        RowMap { data, places, first, total }
+        RowMap { experiments, leading: Mat::zeros(0, 0), places, first, total }
     }
 
     /// Writes the rows `start ..` into `piece`.
     fn fill(&self, start: usize, mut piece: MatMut<'_, f64>) {
         let end = start + piece.nrows();
-        for (e, signals) in self.data.experiments.iter().enumerate() {
+        for (e, signals) in self.experiments.iter().enumerate() {
             let from = self.first[e].max(start);
             let to = self.first.get(e + 1).copied().unwrap_or(self.total).min(end);
             if from < to {
                 let part = piece.as_mut().subrows_mut(from - start, to - from);
-                self.fill_from(signals.u.as_ref(), signals.y.as_ref(), from - self.first[e], part);
+                self.fill_from(signals, from - self.first[e], part);
             }
         }
     }
 
     /// Writes the places of Hankel columns that begin at sample `time` of one experiment.
-    fn fill_from(&self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, time: usize, mut part: MatMut<'_, f64>) {
+    fn fill_from(&self, signals: &Signals, time: usize, mut part: MatMut<'_, f64>) {
+        let Signals { u, y, w } = signals;
         let (count, inputs, channels) = (part.nrows(), u.ncols(), u.ncols() + y.ncols());
+        if self.leading.ncols() > 0 {
+            let h = w.ncols();
+            let known = Mat::from_fn(count, self.leading.nrows(), |k, j| w[(time + k + j / h, j % h)]);
+            part.as_mut().subcols_mut(0, self.leading.ncols()).copy_from(known * &self.leading);
+        }
+        let mut part = part.subcols_mut(self.leading.ncols(), self.places.len());
         for (column, place) in self.places.iter().enumerate() {
             let (block, channel) = (place / channels, place % channels);
             let values = if channel < inputs { u.col(channel) } else { y.col(channel - inputs) };
@@ -225,7 +261,7 @@ mod tests {
     fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<DataTriangle> {
         let records = experiments(noise);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-        let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
+        let data = Channels::new(&experiments, &[], &SubspaceOptions { horizon, ..Default::default() })?;
         DataTriangle::new(&data, (horizon, horizon), Arrangement::InputsFirst, by)
     }
 
@@ -264,13 +300,13 @@ mod tests {
     fn a_shorter_horizon_comes_from_the_same_factor() {
         let records = experiments(0.3);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-        let data = Channels::new(&experiments, &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
+        let data = Channels::new(&experiments, &[], &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
         let whole = DataTriangle::new(&data, (9, 9), Arrangement::InputsFirst, Factorisation::Qr).unwrap();
         let r = whole.arranged(Arrangement::Chronological, 4, 3).unwrap();
         // The Gram matrix of the same rows over the same columns.
         let places = Arrangement::Chronological.places(2, 1, 4, 3);
         let shifted: Vec<usize> = places.iter().map(|place| place + 5 * 3).collect();
-        let rows = RowMap::new(&data, 18, &shifted);
+        let rows = RowMap::new(&data.experiments, 18, &shifted);
         let mut hankel = Mat::zeros(rows.total, shifted.len());
         rows.fill(0, hankel.as_mut());
         let gram = hankel.transpose() * &hankel;

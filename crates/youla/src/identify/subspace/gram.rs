@@ -1,6 +1,6 @@
 //! The triangular factor of block-Hankel data from their Gram matrix, which lag sums give.
 //!
-//! With `z(t) = [u(t); y(t)]`, q channels, b block rows and T Hankel columns, block (i, j) of the Gram matrix is
+//! With `z(t) = [u(t); y(t); w(t)]` (w: known disturbances, projected out in the end), q channels, b block rows and T Hankel columns, block (i, j) of the Gram matrix is
 //! ```text
 //! G(i, j) = sum_{t < T} z(t + i) z(t + j)',    G(i + 1, j + 1) = G(i, j) - z(i) z(j)' + z(T + i) z(T + j)'
 //! ```
@@ -9,6 +9,7 @@
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
 use super::channels::{Channels, Signals};
+use super::disturbance;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
 use faer::linalg::matmul::matmul;
@@ -28,13 +29,16 @@ const LANES: usize = 16;
 /// R and the condition number of the data behind it.
 pub(super) struct GramFactor {
     pub(super) r: Mat<f64>,
+    /// Known disturbances that were much larger than what they left count in it, by what their removal costs in digits.
     pub(super) condition: f64,
+    /// Directions of all Hankel columns that known disturbances took.
+    pub(super) taken: usize,
 }
 
 /// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
 /// positive definite to working precision.
 pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<GramFactor> {
-    let gram = gram(data, blocks);
+    let Gram { matrix: gram, taken, cancelled } = gram(data, blocks);
     let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
     let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
         let (a, b) = (order[i], order[j]);
@@ -42,19 +46,45 @@ pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<
     });
     let cholesky = unit.llt(Side::Lower).ok()?;
     let lower = cholesky.L();
-    let condition = triangular_condition(lower);
+    let condition = triangular_condition(lower) * cancelled.sqrt();
     let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
-    Some(GramFactor { r, condition })
+    Some(GramFactor { r, condition, taken })
 }
 
-/// The upper triangle of the Gram matrix of all experiments, by blocks of all channels.
-fn gram(data: &Channels, blocks: usize) -> Mat<f64> {
+/// The upper triangle of the Gram matrix of all experiments, by blocks of all channels, beyond the known disturbances.
+struct Gram {
+    matrix: Mat<f64>,
+    taken: usize,
+    /// Largest ratio of a squared length before and after the known disturbances were taken out, at least 1.
+    cancelled: f64,
+}
+
+fn gram(data: &Channels, blocks: usize) -> Gram {
     let q = data.inputs + data.outputs;
-    let mut whole = Mat::zeros(q * blocks, q * blocks);
+    let mut whole = Gram { matrix: Mat::zeros(q * blocks, q * blocks), taken: 0, cancelled: 1.0 };
+    let mut before = vec![0.0; q * blocks];
     for signals in &data.experiments {
-        whole += of_experiment(signals, q, blocks);
+        let all = of_experiment(signals, signals.channels(), blocks);
+        if signals.w.ncols() == 0 {
+            whole.matrix += all;
+        } else {
+            let beyond = disturbance::beyond(all.as_ref(), q, signals.w.ncols(), blocks);
+            before.iter_mut().zip(&beyond.before).for_each(|(sum, value)| *sum += value);
+            whole.matrix += beyond.gram;
+            whole.taken += beyond.taken;
+        }
+    }
+    for (i, before) in before.iter().enumerate() {
+        whole.cancelled = whole.cancelled.max(before / whole.matrix[(i, i)].max(f64::MIN_POSITIVE));
     }
     whole
+}
+
+/// The Gram matrix of the Hankel data of known disturbances alone.
+pub(super) fn of_disturbance(signals: &Signals, blocks: usize) -> Mat<f64> {
+    let alone =
+        Signals { u: Mat::zeros(signals.w.nrows(), 0), y: Mat::zeros(signals.w.nrows(), 0), w: signals.w.clone() };
+    of_experiment(&alone, alone.channels(), blocks)
 }
 
 fn of_experiment(signals: &Signals, q: usize, blocks: usize) -> Mat<f64> {
@@ -75,18 +105,27 @@ fn of_experiment(signals: &Signals, q: usize, blocks: usize) -> Mat<f64> {
 }
 
 impl Signals {
-    /// Channel c of `[u; y]`.
+    /// Number of channels of `[u; y; w]`.
+    fn channels(&self) -> usize {
+        self.u.ncols() + self.y.ncols() + self.w.ncols()
+    }
+
+    /// Channel c of `[u; y; w]`.
     fn value(&self, t: usize, c: usize) -> f64 {
-        let m = self.u.ncols();
-        if c < m { self.u[(t, c)] } else { self.y[(t, c - m)] }
+        let (m, q) = (self.u.ncols(), self.u.ncols() + self.y.ncols());
+        match c {
+            c if c < m => self.u[(t, c)],
+            c if c < q => self.y[(t, c - m)],
+            c => self.w[(t, c - q)],
+        }
     }
 
     /// Writes `z(t)` for `count` samples from `start` on, all channels of a sample together, zero from `end` on.
     fn interleave(&self, start: usize, count: usize, end: usize, z: &mut [f64]) {
-        let q = self.u.ncols() + self.y.ncols();
+        let q = self.channels();
         let filled = count.min(end.saturating_sub(start));
         z[filled * q..count * q].fill(0.0);
-        for (c, channel) in self.u.col_iter().chain(self.y.col_iter()).enumerate() {
+        for (c, channel) in self.u.col_iter().chain(self.y.col_iter()).chain(self.w.col_iter()).enumerate() {
             let values = channel.subrows(start.min(channel.nrows()), filled);
             z.iter_mut().skip(c).step_by(q).zip(values.iter()).for_each(|(z, value)| *z = *value);
         }

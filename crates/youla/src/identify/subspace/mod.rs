@@ -12,6 +12,7 @@
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
 mod channels;
+mod disturbance;
 mod factorisation;
 mod gram;
 mod hankel;
@@ -34,6 +35,7 @@ mod stability;
 mod tests;
 mod varx;
 
+pub use disturbance::{Line, amplitudes, harmonics, lines};
 pub use innovation::{Innovation, NoInnovation};
 pub use options::{
     ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, Stability, SubspaceOptions, Weight,
@@ -46,7 +48,7 @@ use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use channels::{Channels, check_blocks};
 use factorisation::{Arrangement, DataTriangle};
-use faer::{MatRef, c64};
+use faer::{Mat, MatRef, c64};
 use realisation::OutputPair;
 
 /// Records of one experiment: row k is time k.
@@ -69,6 +71,8 @@ pub struct SubspaceModel {
     pub innovation: Innovation,
     /// State at the first sample of each experiment, n numbers each.
     pub initial_states: Vec<Vec<f64>>,
+    /// Coefficients of the known disturbances per experiment, known signals x outputs; empty where none is known.
+    pub disturbances: Vec<Mat<f64>>,
     /// Singular values of the weighted projection, horizon x p of them: cosines of canonical angles for CVA and SSARX, else
     /// unnormalised.
     pub singular_values: Vec<f64>,
@@ -82,7 +86,7 @@ pub struct SubspaceModel {
     pub horizon: usize,
     /// Block rows of the past.
     pub past: usize,
-    /// Columns of the block-Hankel matrices, over all experiments.
+    /// Columns of the block-Hankel matrices, over all experiments, less the directions that known disturbances take.
     pub columns: usize,
     /// Smallest over largest singular value of the block-Hankel matrix of the inputs with rows of unit length.
     pub excitation_rcond: f64,
@@ -176,7 +180,22 @@ impl SubspaceData {
     /// # Errors
     /// As [`subspace`], but for those of a model.
     pub fn new(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
-        let channels = Channels::new(experiments, options)?;
+        Self::disturbed(experiments, &[], time, options)
+    }
+
+    /// The same for outputs with additive disturbances of known shape, one matrix of known signals (samples x signals) for
+    /// each experiment, or none at all: see [`lines`] and [`harmonics`]. They are projected out of the factor, and each model
+    /// has their coefficients, own for each experiment, in [`SubspaceModel::disturbances`].
+    ///
+    /// # Errors
+    /// As [`Self::new`]; [`Error::Shape`] and [`Error::NotFinite`] for the known signals.
+    pub fn disturbed(
+        experiments: &[Experiment<'_>],
+        disturbances: &[MatRef<'_, f64>],
+        time: Discrete,
+        options: &SubspaceOptions,
+    ) -> Result<Self> {
+        let channels = Channels::new(experiments, disturbances, options)?;
         let arrangement = match options.weight.is_for_closed_loops() {
             true => Arrangement::Chronological,
             false => Arrangement::InputsFirst,
@@ -208,6 +227,7 @@ impl SubspaceData {
             model: self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?,
             innovation: found.innovation.unscale(&self.channels.y_scale),
             initial_states: fitted.initial_states,
+            disturbances: self.channels.unscale_disturbances(fitted.disturbances),
             singular_values: found.singular_values,
             order: found.order,
             stability: found.stability,

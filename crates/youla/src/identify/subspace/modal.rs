@@ -8,9 +8,10 @@
 //! two multiplications per number serves all outputs, where the recursion for one output alone takes n of them. It needs
 //! eigenvectors that are far from dependent; [`Modes::of`] says where they are not.
 
+use super::disturbance::Regressors;
 use super::modal_sums;
 use super::sensitivity::{Predictor, Unknowns};
-use crate::linalg::Triangle;
+use crate::linalg::{Triangle, block};
 use crate::{Mat, MatRef, c64};
 use faer::prelude::*;
 use faer::{MatMut, RowRef};
@@ -60,15 +61,25 @@ impl Modes {
         Some(Modes { lambda: chosen.iter().map(|j| lambda[*j]).collect(), to_states })
     }
 
-    /// Per output, the triangular factor over `[x0 | B | its row of D | y]`.
-    pub(super) fn condense(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>, unknowns: Unknowns) -> Vec<Mat<f64>> {
-        let shared = modal_sums::factor(&self.lambda, u, targets, unknowns)
-            .unwrap_or_else(|| self.shared_factor(u, targets, unknowns));
-        (0..unknowns.outputs).map(|i| self.of_output(shared.as_ref(), i, unknowns)).collect()
+    /// Per output, the triangular factor over `[x0 | disturbances | B | its row of D | y]`.
+    pub(super) fn condense(
+        &self,
+        u: MatRef<'_, f64>,
+        targets: MatRef<'_, f64>,
+        known: &Regressors,
+        unknowns: &Unknowns,
+    ) -> Vec<Mat<f64>> {
+        let direct = unknowns.direct.iter().any(|inputs| !inputs.is_empty());
+        let through = u.subcols(0, if direct { u.ncols() } else { 0 });
+        let beside = block(&[&[through, known.signals.as_ref(), targets]]);
+        let shared = modal_sums::factor(&self.lambda, u, beside.as_ref(), unknowns.initial > 0)
+            .unwrap_or_else(|| self.shared_factor(u, beside.as_ref(), unknowns));
+        (0..unknowns.outputs).map(|i| self.of_output(shared.as_ref(), i, known, unknowns)).collect()
     }
 
-    /// Triangular factor over `[z of x0 | z of every input | u for D | all outputs]`, by lanes of samples.
-    fn shared_factor(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>, unknowns: Unknowns) -> Mat<f64> {
+    /// Triangular factor over `[z of x0 | z of every input | beside]`, by lanes of samples; `beside` holds u for D, the
+    /// regressors of disturbances, and all outputs.
+    fn shared_factor(&self, u: MatRef<'_, f64>, beside: MatRef<'_, f64>, unknowns: &Unknowns) -> Mat<f64> {
         let samples = u.nrows();
         let lanes = samples.div_ceil(PIECE).min(LANES);
         let starts: Vec<usize> = (0..=lanes).map(|l| l * samples / lanes).collect();
@@ -85,7 +96,7 @@ impl Modes {
                 begun
             })
             .collect();
-        let width = state.width() + unknowns.of_d_row() + unknowns.outputs;
+        let width = state.width() + beside.ncols();
         let parts: Vec<Mat<f64>> = begun
             .into_par_iter()
             .enumerate()
@@ -93,7 +104,7 @@ impl Modes {
                 let mut triangle = Triangle::new(width, PIECE);
                 for start in (starts[lane]..starts[lane + 1]).step_by(PIECE) {
                     let count = PIECE.min(starts[lane + 1] - start);
-                    triangle.fold(count, |piece| state.fill(u, targets, start, unknowns, piece));
+                    triangle.fold(count, |piece| state.fill(u, beside, start, piece));
                 }
                 triangle.r().to_owned()
             })
@@ -103,17 +114,27 @@ impl Modes {
         whole.r().to_owned()
     }
 
-    fn of_output(&self, shared: MatRef<'_, f64>, i: usize, unknowns: Unknowns) -> Mat<f64> {
-        let n = unknowns.states;
-        let groups = unknowns.inputs + usize::from(unknowns.initial > 0);
-        let of_d = unknowns.of_d_row();
-        let mut rows = Mat::zeros(shared.nrows(), unknowns.width_of_output());
+    fn of_output(&self, shared: MatRef<'_, f64>, i: usize, known: &Regressors, unknowns: &Unknowns) -> Mat<f64> {
+        let (n, free) = (unknowns.states, usize::from(unknowns.initial > 0));
+        let (groups, width) = (unknowns.inputs + free, unknowns.width_of_output(i));
+        let mut rows = Mat::zeros(shared.nrows(), width);
         for g in 0..groups {
-            rows.as_mut().subcols_mut(g * n, n).copy_from(shared.subcols(g * n, n) * &self.to_states[i]);
+            let place = g * n + if g < free { 0 } else { unknowns.disturbances };
+            rows.as_mut().subcols_mut(place, n).copy_from(shared.subcols(g * n, n) * &self.to_states[i]);
         }
-        rows.as_mut().subcols_mut(groups * n, of_d).copy_from(shared.subcols(groups * n, of_d));
-        rows.col_mut(groups * n + of_d).copy_from(shared.col(groups * n + of_d + i));
-        let mut triangle = Triangle::new(unknowns.width_of_output(), shared.nrows());
+        let of_targets = shared.ncols() - unknowns.outputs;
+        let of_known = of_targets - known.signals.ncols();
+        for j in 0..unknowns.disturbances {
+            if let Some(column) = known.column(i, j) {
+                rows.col_mut(unknowns.initial + j).copy_from(shared.col(of_known + column));
+            }
+        }
+        let of_d = unknowns.own() + unknowns.of_b();
+        for (j, q) in unknowns.direct[i].iter().enumerate() {
+            rows.col_mut(of_d + j).copy_from(shared.col(groups * n + q));
+        }
+        rows.col_mut(width - 1).copy_from(shared.col(of_targets + i));
+        let mut triangle = Triangle::new(width, shared.nrows());
         triangle.fold_rows(rows.as_ref());
         triangle.r().to_owned()
     }
@@ -151,7 +172,7 @@ struct State {
 }
 
 impl State {
-    fn new(lambda: &[c64], unknowns: Unknowns) -> Self {
+    fn new(lambda: &[c64], unknowns: &Unknowns) -> Self {
         let free = usize::from(unknowns.initial > 0);
         let (modes, groups) = (lambda.len(), unknowns.inputs + free);
         let repeated = |part: &dyn Fn(&c64) -> f64| (0..groups).flat_map(|_| lambda.iter().map(part)).collect();
@@ -190,14 +211,7 @@ impl State {
     }
 
     /// Writes the rows of the samples from `start` on and moves on behind them.
-    fn fill(
-        &mut self,
-        u: MatRef<'_, f64>,
-        targets: MatRef<'_, f64>,
-        start: usize,
-        unknowns: Unknowns,
-        mut piece: MatMut<'_, f64>,
-    ) {
+    fn fill(&mut self, u: MatRef<'_, f64>, beside: MatRef<'_, f64>, start: usize, mut piece: MatMut<'_, f64>) {
         for k in 0..piece.nrows() {
             let mut row = piece.as_mut().row_mut(k);
             let mut column = 0;
@@ -209,12 +223,8 @@ impl State {
                     column += 1;
                 }
             }
-            for q in 0..unknowns.of_d_row() {
-                row[column + q] = u[(start + k, q)];
-            }
-            column += unknowns.of_d_row();
-            for i in 0..unknowns.outputs {
-                row[column + i] = targets[(start + k, i)];
+            for i in 0..beside.ncols() {
+                row[column + i] = beside[(start + k, i)];
             }
             self.advance(u, start + k);
         }
@@ -248,14 +258,18 @@ mod tests {
     fn modal_and_direct_regressors_have_the_same_factor() {
         let predictor = predictor();
         let (u, y) = (signal(2500, 3, 1), signal(2500, 2, 9));
-        for (initial, feedthrough) in [(7, true), (0, false)] {
-            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, feedthrough };
-            let modal = Modes::of(&predictor).unwrap().condense(u.as_ref(), y.as_ref(), unknowns);
+        for (initial, direct, h) in
+            [(7, vec![vec![0, 1, 2]; 2], 0), (0, vec![vec![]; 2], 2), (7, vec![vec![2], vec![0, 1]], 2)]
+        {
+            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, disturbances: 2 * h, direct };
+            let known = Regressors { signals: signal(2500, h, 5), known: h, outputs: 2, crossed: false };
+            let modal = Modes::of(&predictor).unwrap().condense(u.as_ref(), y.as_ref(), &known, &unknowns);
             for (i, modal) in modal.iter().enumerate() {
                 let target: Vec<f64> = y.col(i).iter().copied().collect();
-                let mut triangle = Triangle::new(unknowns.width_of_output(), 2500);
-                let mut direct = Sensitivity::new(&predictor, i, unknowns);
-                triangle.fold(2500, |piece| direct.fill(u.as_ref(), &target, piece));
+                let mut triangle = Triangle::new(unknowns.width_of_output(i), 2500);
+                let mut direct = Sensitivity::new(&predictor, i, &unknowns);
+                let known = known.of_output(i);
+                triangle.fold(2500, |piece| direct.fill(u.as_ref(), known.as_ref(), &target, piece));
                 let (one, other) = (modal.transpose() * modal, triangle.r().transpose() * triangle.r());
                 let error = (&one - &other).norm_max() / other.norm_max();
                 assert!(error < 1e-12, "output {i}, {initial} initial states: {error:.1e}");
@@ -266,11 +280,12 @@ mod tests {
     #[test]
     fn sums_and_rows_give_the_same_factor() {
         let modes = Modes::of(&predictor()).unwrap();
-        let (u, y) = (signal(5000, 3, 1), signal(5000, 2, 9));
-        for (initial, feedthrough) in [(7, true), (0, false)] {
-            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, feedthrough };
-            let rows = modes.shared_factor(u.as_ref(), y.as_ref(), unknowns);
-            let sums = modal_sums::factor(&modes.lambda, u.as_ref(), y.as_ref(), unknowns).unwrap();
+        let (u, beside) = (signal(5000, 3, 1), signal(5000, 5, 9));
+        for initial in [7, 0] {
+            let direct = vec![vec![]; 2];
+            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, disturbances: 0, direct };
+            let rows = modes.shared_factor(u.as_ref(), beside.as_ref(), &unknowns);
+            let sums = modal_sums::factor(&modes.lambda, u.as_ref(), beside.as_ref(), initial > 0).unwrap();
             let (one, other) = (sums.transpose() * &sums, rows.transpose() * &rows);
             let error = (&one - &other).norm_max() / other.norm_max();
             assert!(error < 1e-13, "{initial} initial states: {error:.1e}");
@@ -281,8 +296,8 @@ mod tests {
     fn outputs_without_noise_are_left_to_the_rows() {
         let modes = Modes::of(&predictor()).unwrap();
         let u = signal(3000, 1, 1);
-        let unknowns = Unknowns { states: 7, inputs: 1, outputs: 1, initial: 0, feedthrough: true };
-        assert!(modal_sums::factor(&modes.lambda, u.as_ref(), u.as_ref(), unknowns).is_none());
+        let beside = block(&[&[u.as_ref(), u.as_ref()]]);
+        assert!(modal_sums::factor(&modes.lambda, u.as_ref(), beside.as_ref(), false).is_none());
     }
 
     #[test]

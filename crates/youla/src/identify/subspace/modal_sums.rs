@@ -12,7 +12,6 @@
 //! the lanes are joined.
 
 use super::gram::LIMIT;
-use super::sensitivity::Unknowns;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef, c64};
 use faer::linalg::matmul::matmul;
@@ -29,34 +28,27 @@ const DECAYING: f64 = 1e-7;
 /// Numbers below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
 
-/// R over `[z of x0 | z of every input | u for D | all outputs]`, pairs as real and imaginary part; `None` where the squared
-/// condition number would cost too many digits.
-pub(super) fn factor(
-    lambda: &[c64],
-    u: MatRef<'_, f64>,
-    targets: MatRef<'_, f64>,
-    unknowns: Unknowns,
-) -> Option<Mat<f64>> {
+/// R over `[z of x0 | z of every input | beside]`, pairs as real and imaginary part; `None` where the squared condition
+/// number would cost too many digits.
+pub(super) fn factor(lambda: &[c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>, initial: bool) -> Option<Mat<f64>> {
     if lambda.iter().any(|l| 1.0 - l.norm_sqr() < DECAYING) {
         return None;
     }
-    let sums = Sums::new(lambda, u, targets);
-    let gram = sums.gram(unknowns);
+    let sums = Sums::new(lambda, u, beside);
+    let gram = sums.gram(initial);
     let n = gram.nrows();
     let length: Vec<f64> = (0..n).map(|j| gram[(j, j)].sqrt()).collect();
     let unit = Mat::from_fn(n, n, |i, j| gram[(i, j)] / (length[i] * length[j]));
     let cholesky = unit.llt(Side::Lower).ok()?;
     let lower = cholesky.L();
-    if !(triangular_condition(lower) <= LIMIT) {
-        return None;
-    }
-    Some(Mat::from_fn(n, n, |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 }))
+    let well_conditioned = triangular_condition(lower) <= LIMIT;
+    well_conditioned.then(|| Mat::from_fn(n, n, |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 }))
 }
 
 /// What a lane that starts from zero leaves behind; group 0 starts from one and is not driven, group q + 1 is driven by
 /// input q. Complex numbers as real and imaginary rows.
 struct Lane {
-    /// `sum z w'`, `w = [u; targets]`.
+    /// `sum z w'`, `w = [u; beside]`.
     products: Mat<f64>,
     /// z behind the last sample.
     end: Vec<c64>,
@@ -69,14 +61,14 @@ struct Sums<'a> {
     /// First and last state of every group and mode.
     start: Vec<c64>,
     end: Vec<c64>,
-    /// `sum z w'`: a row per group and mode, a column per channel of `[u; targets]`.
+    /// `sum z w'`: a row per group and mode, a column per channel of `[u; beside]`.
     products: Mat<c64>,
     /// `sum w w'`.
     channels: Mat<f64>,
 }
 
 impl<'a> Sums<'a> {
-    fn new(lambda: &'a [c64], u: MatRef<'_, f64>, targets: MatRef<'_, f64>) -> Self {
+    fn new(lambda: &'a [c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>) -> Self {
         let (samples, inputs, modes) = (u.nrows(), u.ncols(), lambda.len());
         let lanes = samples.div_ceil(LANE);
         let cut = |l: usize| l * samples / lanes;
@@ -84,10 +76,10 @@ impl<'a> Sums<'a> {
             .into_par_iter()
             .map(|l| {
                 let (from, count) = (cut(l), cut(l + 1) - cut(l));
-                run_lane(lambda, u.subrows(from, count), targets.subrows(from, count))
+                run_lane(lambda, u.subrows(from, count), beside.subrows(from, count))
             })
             .collect();
-        let width = inputs + targets.ncols();
+        let width = inputs + beside.ncols();
         let count = (inputs + 1) * modes;
         let start: Vec<c64> =
             (0..count).map(|a| if a < modes { c64::new(1.0, 0.0) } else { c64::new(0.0, 0.0) }).collect();
@@ -107,8 +99,8 @@ impl<'a> Sums<'a> {
             }
         }
         let mut channels = Mat::zeros(width, width);
-        for (i, left) in u.col_iter().chain(targets.col_iter()).enumerate() {
-            for (j, right) in u.col_iter().chain(targets.col_iter()).enumerate().skip(i) {
+        for (i, left) in u.col_iter().chain(beside.col_iter()).enumerate() {
+            for (j, right) in u.col_iter().chain(beside.col_iter()).enumerate().skip(i) {
                 channels[(i, j)] = left.transpose() * right;
                 channels[(j, i)] = channels[(i, j)];
             }
@@ -117,15 +109,14 @@ impl<'a> Sums<'a> {
     }
 
     /// The real Gram matrix of the columns that are sought.
-    fn gram(&self, unknowns: Unknowns) -> Mat<f64> {
+    fn gram(&self, initial: bool) -> Mat<f64> {
         let modes = self.lambda.len();
-        let first = if unknowns.initial > 0 { 0 } else { modes };
+        let first = if initial { 0 } else { modes };
         let columns: Vec<Column> = (first..(self.inputs + 1) * modes)
             .flat_map(|a| {
                 let imaginary = (self.lambda[a % modes].im != 0.0).then_some(Column::Imaginary(a));
                 [Some(Column::Real(a)), imaginary].into_iter().flatten()
             })
-            .chain((0..unknowns.of_d_row()).map(Column::Channel))
             .chain((self.inputs..self.channels.ncols()).map(Column::Channel))
             .collect();
         let mut gram = Mat::zeros(columns.len(), columns.len());
@@ -182,11 +173,11 @@ enum Column {
     Real(usize),
     /// Its imaginary part.
     Imaginary(usize),
-    /// An input or an output.
+    /// A signal beside them.
     Channel(usize),
 }
 
-fn run_lane(lambda: &[c64], u: MatRef<'_, f64>, targets: MatRef<'_, f64>) -> Lane {
+fn run_lane(lambda: &[c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>) -> Lane {
     let (inputs, modes) = (u.ncols(), lambda.len());
     let count = (inputs + 1) * modes;
     let part = |of: fn(&c64) -> f64| -> Vec<f64> { lambda.iter().map(of).cycle().take(count).collect() };
@@ -195,7 +186,7 @@ fn run_lane(lambda: &[c64], u: MatRef<'_, f64>, targets: MatRef<'_, f64>) -> Lan
     let mut now = vec![0.0; 2 * count];
     now[..modes].fill(1.0);
     let mut held = vec![0.0; 2 * count * PIECE];
-    let mut products = Mat::zeros(2 * count, inputs + targets.ncols());
+    let mut products = Mat::zeros(2 * count, inputs + beside.ncols());
     for from in (0..u.nrows()).step_by(PIECE) {
         let samples = PIECE.min(u.nrows() - from);
         for (k, column) in held.chunks_exact_mut(2 * count).take(samples).enumerate() {
@@ -212,8 +203,8 @@ fn run_lane(lambda: &[c64], u: MatRef<'_, f64>, targets: MatRef<'_, f64>) -> Lan
         }
         now.iter_mut().filter(|v| v.abs() < VANISHED).for_each(|v| *v = 0.0);
         let z = MatRef::from_column_major_slice(&held[..2 * count * samples], 2 * count, samples);
-        let (into_u, into_targets) = products.as_mut().split_at_col_mut(inputs);
-        for (into, channels) in [(into_u, u), (into_targets, targets)] {
+        let (into_u, into_beside) = products.as_mut().split_at_col_mut(inputs);
+        for (into, channels) in [(into_u, u), (into_beside, beside)] {
             matmul(into, Accum::Add, z, channels.subrows(from, samples), 1.0, Par::Seq);
         }
     }

@@ -126,6 +126,16 @@ pub enum Feedthrough {
     Estimated,
 }
 
+impl Feedthrough {
+    /// Per output, the inputs whose entries of D are estimated.
+    pub(super) fn inputs_of_outputs(&self, inputs: usize, outputs: usize) -> Vec<Vec<usize>> {
+        match self {
+            Feedthrough::None => vec![Vec::new(); outputs],
+            Feedthrough::Estimated => vec![(0..inputs).collect(); outputs],
+        }
+    }
+}
+
 /// How the triangular factor of the block-Hankel data is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]

@@ -3,15 +3,16 @@
 //!
 //! The regressors of each experiment are folded into a triangular factor `[R11 R12; 0 R22]` over `[x0 | B D y]`: `R22` holds
 //! all that an experiment says about B and D, so that any number of experiments costs no more than one
-//! (SLICOT working note 2000-4, section 2.3, for one experiment).
+//! (SLICOT working note 2000-4, section 2.3, for one experiment). The coefficients of known disturbances stand beside x0.
 
 use super::channels::{Channels, Signals};
+use super::disturbance::Regressors;
 use super::innovation::observer_gain;
 use super::modal::Modes;
 use super::realisation::OutputPair;
 use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
 use super::stability::StabilityReport;
-use super::{Feedthrough, InitialState, SubspaceOptions};
+use super::{InitialState, SubspaceOptions};
 use crate::Result;
 use crate::linalg::{Triangle, block, leading_rank, least_squares};
 use faer::{Mat, MatRef};
@@ -54,6 +55,8 @@ pub(super) struct Fitted {
     pub(super) b: Mat<f64>,
     pub(super) d: Mat<f64>,
     pub(super) initial_states: Vec<Vec<f64>>,
+    /// Coefficients of the known disturbances per experiment, known signals x outputs.
+    pub(super) disturbances: Vec<Mat<f64>>,
     pub(super) quality: OutputFit,
 }
 
@@ -67,12 +70,13 @@ pub(super) fn fit(
 ) -> Result<Fitted> {
     let simulated = stability.stable && !options.weight.is_for_closed_loops();
     let (predictor, by) = predictor(pair, kalman_gain, simulated)?;
-    let unknowns = Unknowns {
+    let unknowns = &Unknowns {
         states: pair.a.nrows(),
         inputs: data.inputs,
         outputs: data.outputs,
         initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
-        feedthrough: options.feedthrough == Feedthrough::Estimated,
+        disturbances: data.disturbances() * data.outputs,
+        direct: options.feedthrough.inputs_of_outputs(data.inputs, data.outputs),
     };
     let parts = condense(data, &predictor, unknowns);
     let common = unknowns.common();
@@ -81,15 +85,16 @@ pub(super) fn fit(
     let r = whole.r();
     let solution = least_squares("the regressors of B and D", r.subcols(0, common), r.subcols(common, 1))?;
     let (driven, d) = unpack(solution.x.as_ref(), unknowns);
-    let initial_states =
-        parts.iter().map(|part| part.initial_state(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
-    let percent = fit_percent(data, &predictor, driven.as_ref(), d.as_ref(), &initial_states);
+    let own = parts.iter().map(|part| part.own(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
+    let (initial_states, disturbances): (Vec<_>, Vec<_>) = own.into_iter().unzip();
+    let outputs = data.experiments.iter().zip(&disturbances).map(|(e, a)| &e.y - &e.w * a).collect::<Vec<_>>();
+    let percent = fit_percent(data, &outputs, &predictor, [driven.as_ref(), d.as_ref()], &initial_states);
     let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
     let b = match &predictor.k {
         Some(k) => driven + k * &d,
         None => driven,
     };
-    Ok(Fitted { b, d, initial_states, quality })
+    Ok(Fitted { b, d, initial_states, disturbances, quality })
 }
 
 /// The simulation of the model or its one-step predictor.
@@ -108,122 +113,156 @@ fn predictor(
     Ok((Predictor { a: &pair.a - &k * &pair.c, c: pair.c.clone(), k: Some(k) }, by))
 }
 
-/// What one experiment says: the triangular factor over `[x0 | B D y]`, split behind the directions of x0.
+/// What one experiment says: the triangular factor over `[x0, disturbances | B D y]`, split behind the directions of its own
+/// unknowns.
 struct Part {
     r: Mat<f64>,
-    initial: usize,
-    initial_rank: usize,
+    own: usize,
+    own_rank: usize,
 }
 
 /// One triangular factor per output, joined for each experiment; in modal coordinates where A has them, else output by
 /// output.
-fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
-    let targets: Vec<Mat<f64>> =
-        data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
+fn condense(data: &Channels, predictor: &Predictor, unknowns: &Unknowns) -> Vec<Part> {
+    let prepared: Vec<_> = data
+        .experiments
+        .par_iter()
+        .map(|e| (e, without_known_share(&e.y, predictor), regressors(e, predictor)))
+        .collect();
     if let Some(modes) = Modes::of(predictor) {
-        let experiments: Vec<_> = data.experiments.iter().zip(&targets).collect();
-        return experiments
+        return prepared
             .par_iter()
-            .map(|(signals, targets)| join(&modes.condense(signals.u.as_ref(), targets.as_ref(), unknowns), unknowns))
+            .map(|(e, targets, known)| join(&modes.condense(e.u.as_ref(), targets.as_ref(), known, unknowns), unknowns))
             .collect();
     }
-    let tasks: Vec<_> = (0..targets.len()).flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
+    let tasks: Vec<_> = prepared.iter().flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
     let triangles: Vec<Mat<f64>> = tasks
         .par_iter()
-        .map(|&(e, i)| condense_output(&data.experiments[e].u, &targets[e], i, predictor, unknowns))
+        .map(|((e, targets, known), i)| condense_output(&e.u, targets, known, *i, predictor, unknowns))
         .collect();
     triangles.chunks(unknowns.outputs).map(|outputs| join(outputs, unknowns)).collect()
 }
 
-/// The outputs without what they drive themselves through K.
-fn without_known_share(signals: &Signals, predictor: &Predictor) -> Mat<f64> {
-    let Some(k) = &predictor.k else { return signals.y.clone() };
+/// The regressors of the disturbances' coefficients: the known signals, for a predictor each at each output as the predictor
+/// passes it on to all outputs.
+fn regressors(signals: &Signals, predictor: &Predictor) -> Regressors {
+    let (w, p) = (&signals.w, signals.y.ncols());
+    let plain = Regressors { signals: w.clone(), known: w.ncols(), outputs: p, crossed: false };
+    if predictor.k.is_none() || w.ncols() == 0 {
+        return plain;
+    }
+    let crossed: Vec<Mat<f64>> = (0..p * w.ncols())
+        .map(|a| {
+            let (l, j) = (a / w.ncols(), a % w.ncols());
+            let at_output = Mat::from_fn(w.nrows(), p, |k, i| if i == l { w[(k, j)] } else { 0.0 });
+            without_known_share(&at_output, predictor)
+        })
+        .collect();
+    let signals = Mat::from_fn(w.nrows(), crossed.len() * p, |k, c| crossed[c / p][(k, c % p)]);
+    Regressors { signals, crossed: true, ..plain }
+}
+
+/// Outputs without what they drive themselves through K.
+fn without_known_share(y: &Mat<f64>, predictor: &Predictor) -> Mat<f64> {
+    let Some(k) = &predictor.k else { return y.clone() };
     let (n, p) = (k.nrows(), k.ncols());
     let ak = block(&[&[predictor.a.as_ref(), k.as_ref()]]);
     let c0 = block(&[&[predictor.c.as_ref(), Mat::zeros(p, p).as_ref()]]);
-    &signals.y - simulate(ak.as_ref(), c0.as_ref(), &vec![0.0; n], signals.y.as_ref())
+    y - simulate(ak.as_ref(), c0.as_ref(), &vec![0.0; n], y.as_ref())
 }
 
-fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predictor, unknowns: Unknowns) -> Mat<f64> {
+fn condense_output(
+    u: &Mat<f64>,
+    targets: &Mat<f64>,
+    known: &Regressors,
+    i: usize,
+    predictor: &Predictor,
+    unknowns: &Unknowns,
+) -> Mat<f64> {
     let target: Vec<f64> = targets.col(i).iter().copied().collect();
+    let known = known.of_output(i);
     let piece = PIECE.min(u.nrows());
-    let mut triangle = Triangle::new(unknowns.width_of_output(), piece);
+    let mut triangle = Triangle::new(unknowns.width_of_output(i), piece);
     let mut sensitivity = Sensitivity::new(predictor, i, unknowns);
     for start in (0..u.nrows()).step_by(piece) {
         let count = piece.min(u.nrows() - start);
-        let (u, target) = (u.as_ref().subrows(start, count), &target[start..start + count]);
-        triangle.fold(count, |rows| sensitivity.fill(u, target, rows));
+        let (u, known) = (u.as_ref().subrows(start, count), known.as_ref().subrows(start, count));
+        let target = &target[start..start + count];
+        triangle.fold(count, |rows| sensitivity.fill(u, known, target, rows));
     }
     triangle.r().to_owned()
 }
 
 /// Puts the outputs of one experiment below each other, each with its own row of D.
-fn join(outputs: &[Mat<f64>], unknowns: Unknowns) -> Part {
-    let shared = unknowns.initial + unknowns.of_b();
-    let of_d = unknowns.of_d_row();
-    let mut whole = Triangle::new(unknowns.width(), unknowns.width_of_output());
+fn join(outputs: &[Mat<f64>], unknowns: &Unknowns) -> Part {
+    let shared = unknowns.own() + unknowns.of_b();
+    let mut whole = Triangle::new(unknowns.width(), shared + unknowns.inputs + 1);
     for (i, r) in outputs.iter().enumerate() {
+        let (of_d, above) = (unknowns.direct[i].len(), unknowns.of_d_above(i));
         whole.fold(r.nrows(), |mut rows| {
             rows.as_mut().subcols_mut(0, shared).copy_from(r.as_ref().subcols(0, shared));
-            rows.as_mut().subcols_mut(shared + i * of_d, of_d).copy_from(r.as_ref().subcols(shared, of_d));
+            rows.as_mut().subcols_mut(shared + above, of_d).copy_from(r.as_ref().subcols(shared, of_d));
             rows.col_mut(unknowns.width() - 1).copy_from(r.col(r.ncols() - 1));
         });
     }
-    let initial_rank = leading_rank(whole.r(), unknowns.initial);
-    Part { r: whole.r().to_owned(), initial: unknowns.initial, initial_rank }
+    let own_rank = leading_rank(whole.r(), unknowns.own());
+    Part { r: whole.r().to_owned(), own: unknowns.own(), own_rank }
 }
 
 impl Part {
     /// `R22`.
     fn common(&self) -> MatRef<'_, f64> {
-        let (skip, from) = (self.initial_rank, self.initial);
+        let (skip, from) = (self.own_rank, self.own);
         self.r.as_ref().submatrix(skip, from, self.r.nrows() - skip, self.r.ncols() - from)
     }
 
-    /// `R11 x0 = r1y - R12 [B; D]`.
-    fn initial_state(&self, solution: MatRef<'_, f64>, unknowns: Unknowns) -> Result<Vec<f64>> {
-        if self.initial == 0 {
-            return Ok(vec![0.0; unknowns.states]);
-        }
-        let top = self.r.as_ref().subrows(0, self.initial_rank);
-        let (r11, rest) = top.split_at_col(self.initial);
+    /// `R11 [x0; a] = r1y - R12 [B; D]`: the initial state and the coefficients of the disturbances.
+    fn own(&self, solution: MatRef<'_, f64>, unknowns: &Unknowns) -> Result<(Vec<f64>, Mat<f64>)> {
+        let top = self.r.as_ref().subrows(0, self.own_rank);
+        let (r11, rest) = top.split_at_col(self.own);
         let (r12, r1y) = rest.split_at_col(unknowns.common());
-        let x0 = least_squares("the regressors of an initial state", r11, (r1y - r12 * solution).as_ref())?.x;
-        Ok(x0.col(0).iter().copied().collect())
+        let found = least_squares("the regressors of an initial state", r11, (r1y - r12 * solution).as_ref())?.x;
+        let x0 = (0..unknowns.states).map(|k| if unknowns.initial > 0 { found[(k, 0)] } else { 0.0 }).collect();
+        let known = unknowns.disturbances / unknowns.outputs;
+        let a = Mat::from_fn(known, unknowns.outputs, |j, i| found[(unknowns.initial + i * known + j, 0)]);
+        Ok((x0, a))
     }
 }
 
 /// `B - K D` and D from the vector of unknowns.
-fn unpack(solution: MatRef<'_, f64>, unknowns: Unknowns) -> (Mat<f64>, Mat<f64>) {
-    let Unknowns { states: n, inputs: m, outputs: p, feedthrough, .. } = unknowns;
+fn unpack(solution: MatRef<'_, f64>, unknowns: &Unknowns) -> (Mat<f64>, Mat<f64>) {
+    let (n, m) = (unknowns.states, unknowns.inputs);
     let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
-    let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + i * m + q, 0)] } else { 0.0 });
+    let mut d = Mat::zeros(unknowns.outputs, m);
+    let entries = unknowns.direct.iter().enumerate().flat_map(|(i, inputs)| inputs.iter().map(move |q| (i, *q)));
+    entries.enumerate().for_each(|(place, (i, q))| d[(i, q)] = solution[(m * n + place, 0)]);
     (driven, d)
 }
 
+/// The fit of the outputs without what the known disturbances explain, so that these do not count as the model's merit.
 fn fit_percent(
     data: &Channels,
+    outputs: &[Mat<f64>],
     predictor: &Predictor,
-    driven: MatRef<'_, f64>,
-    d: MatRef<'_, f64>,
+    [driven, d]: [MatRef<'_, f64>; 2],
     initial_states: &[Vec<f64>],
 ) -> Vec<f64> {
     let none = Mat::zeros(predictor.a.nrows(), 0);
     let k = predictor.k.as_ref().unwrap_or(&none);
     let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
     let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
-    let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
+    let pairs: Vec<_> = data.experiments.iter().zip(outputs).zip(initial_states).collect();
     let errors: Vec<Mat<f64>> = pairs
         .par_iter()
-        .map(|(e, x0)| {
-            let driving = block(&[&[e.u.as_ref(), e.y.as_ref().subcols(0, k.ncols())]]);
-            &e.y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
+        .map(|((e, y), x0)| {
+            let driving = block(&[&[e.u.as_ref(), y.as_ref().subcols(0, k.ncols())]]);
+            *y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
         })
         .collect();
     let samples: usize = errors.iter().map(|e| e.nrows()).sum();
     (0..data.outputs)
         .map(|i| {
-            let outputs = || data.experiments.iter().flat_map(|e| e.y.col(i).iter());
+            let outputs = || outputs.iter().flat_map(|y| y.col(i).iter());
             let mean = outputs().sum::<f64>() / samples as f64;
             let spread = outputs().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt();
             let error = errors.iter().map(|e| e.col(i).norm_l2()).fold(0.0, f64::hypot);

@@ -24,15 +24,16 @@ pub(super) struct Predictor {
 }
 
 /// What is sought, and where it stands among the columns.
-#[derive(Clone, Copy)]
 pub(super) struct Unknowns {
     pub(super) states: usize,
     pub(super) inputs: usize,
     pub(super) outputs: usize,
     /// n, or 0 where the initial state is zero.
     pub(super) initial: usize,
-    /// Whether D is sought.
-    pub(super) feedthrough: bool,
+    /// Coefficients of known disturbances, known signals x outputs.
+    pub(super) disturbances: usize,
+    /// Per output, the inputs whose entries of D are sought.
+    pub(super) direct: Vec<Vec<usize>>,
 }
 
 impl Unknowns {
@@ -41,30 +42,37 @@ impl Unknowns {
         self.states * self.inputs
     }
 
-    /// Unknowns of one row of D.
-    pub(super) fn of_d_row(&self) -> usize {
-        if self.feedthrough { self.inputs } else { 0 }
+    /// Unknowns of the rows of D above the one of output i.
+    pub(super) fn of_d_above(&self, i: usize) -> usize {
+        self.direct[..i].iter().map(Vec::len).sum()
+    }
+
+    /// Unknowns of each experiment by itself: x0, then the coefficients of disturbances, known signal by known signal within
+    /// each output.
+    pub(super) fn own(&self) -> usize {
+        self.initial + self.disturbances
     }
 
     /// Unknowns that all experiments share: B by columns, then D by rows.
     pub(super) fn common(&self) -> usize {
-        self.of_b() + self.outputs * self.of_d_row()
+        self.of_b() + self.of_d_above(self.outputs)
     }
 
-    /// Columns of one output: `[x0 | B | its row of D | y]`.
-    pub(super) fn width_of_output(&self) -> usize {
-        self.initial + self.of_b() + self.of_d_row() + 1
+    /// Columns of output i: `[x0 | disturbances | B | its row of D | y]`.
+    pub(super) fn width_of_output(&self, i: usize) -> usize {
+        self.own() + self.of_b() + self.direct[i].len() + 1
     }
 
-    /// Columns of one experiment: `[x0 | B | D | y]`.
+    /// Columns of one experiment: `[x0 | disturbances | B | D | y]`.
     pub(super) fn width(&self) -> usize {
-        self.initial + self.common() + 1
+        self.own() + self.common() + 1
     }
 }
 
 /// The recursion for one output of one experiment.
-pub(super) struct Sensitivity {
-    unknowns: Unknowns,
+pub(super) struct Sensitivity<'a> {
+    unknowns: &'a Unknowns,
+    output: usize,
     /// Rows of A, contiguous.
     a: Vec<f64>,
     /// Row of C.
@@ -74,21 +82,32 @@ pub(super) struct Sensitivity {
     next: Vec<f64>,
 }
 
-impl Sensitivity {
-    pub(super) fn new(predictor: &Predictor, output: usize, unknowns: Unknowns) -> Self {
+impl<'a> Sensitivity<'a> {
+    pub(super) fn new(predictor: &Predictor, output: usize, unknowns: &'a Unknowns) -> Self {
         let n = unknowns.states;
         let c: Vec<f64> = predictor.c.row(output).iter().copied().collect();
         let mut rows = vec![0.0; (1 + unknowns.inputs) * n];
         rows[..n].copy_from_slice(&c);
-        Sensitivity { unknowns, a: by_rows(predictor.a.as_ref()), c, rows, next: vec![0.0; n] }
+        Sensitivity { unknowns, output, a: by_rows(predictor.a.as_ref()), c, rows, next: vec![0.0; n] }
     }
 
-    /// Writes the rows of the next samples and moves on behind them. The last column is `target`.
-    pub(super) fn fill(&mut self, u: MatRef<'_, f64>, target: &[f64], mut piece: MatMut<'_, f64>) {
-        let skipped = self.unknowns.states - self.unknowns.initial;
+    /// Writes the rows of the next samples and moves on behind them. `known` are the regressors of the disturbances'
+    /// coefficients; the last column is `target`.
+    pub(super) fn fill(
+        &mut self,
+        u: MatRef<'_, f64>,
+        known: MatRef<'_, f64>,
+        target: &[f64],
+        mut piece: MatMut<'_, f64>,
+    ) {
+        let n = self.unknowns.states;
+        let skipped = n - self.unknowns.initial;
         for k in 0..u.nrows() {
-            let of_d = (0..self.unknowns.of_d_row()).map(|q| u[(k, q)]);
-            let values = self.rows[skipped..].iter().copied().chain(of_d).chain([target[k]]);
+            let (of_x0, of_b) = (&self.rows[skipped..n], &self.rows[n..]);
+            let of_d = self.unknowns.direct[self.output].iter().map(|q| u[(k, *q)]);
+            let of_known = known.row(k).iter().copied();
+            let states = of_x0.iter().copied().chain(of_known).chain(of_b.iter().copied());
+            let values = states.chain(of_d).chain([target[k]]);
             piece.as_mut().row_mut(k).iter_mut().zip(values).for_each(|(entry, value)| *entry = value);
             self.advance(|input| u[(k, input)]);
         }

@@ -1,4 +1,5 @@
 mod closed_loop;
+mod disturbance;
 mod measured;
 mod options;
 mod properties;

@@ -10,8 +10,8 @@ use rand::RngExt;
 use youla::Mat;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
-use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, Weight, subspace};
+use youla::identify::hansen::{hansen, hansen_disturbed};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, Weight, lines, subspace};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::rig::degraded;
@@ -38,10 +38,15 @@ impl Loop {
 
     /// u and y with +-0.5 V on alpha, held for 8 samples, and white output noise.
     fn record(&self, samples: usize, noise: f64, seed: u64) -> (Mat<f64>, Mat<f64>) {
+        self.record_with(samples, noise, seed, &Mat::zeros(samples, 2))
+    }
+
+    /// The same with a disturbance of the measured displacements.
+    fn record_with(&self, samples: usize, noise: f64, seed: u64, disturbance: &Mat<f64>) -> (Mat<f64>, Mat<f64>) {
         let rng = &mut rng(seed);
         let levels = Mat::from_fn(samples.div_ceil(8), 2, |_, _| if rng.random::<bool>() { 0.5 } else { -0.5 });
         let alpha = Mat::from_fn(samples, 2, |k, j| levels[(k / 8, j)]);
-        let driving = block(&[&[alpha.as_ref(), (normal(rng, samples, 2) * Scale(noise)).as_ref()]]);
+        let driving = block(&[&[alpha.as_ref(), (normal(rng, samples, 2) * Scale(noise) + disturbance).as_ref()]]);
         let closed = closed_loop(&self.plant, &self.factors.j_k().unwrap()).unwrap();
         let z = simulate(&closed, driving.as_ref(), &vec![0.0; closed.order()]).unwrap();
         (z.subcols(0, 2).to_owned(), z.subcols(2, 2).to_owned())
@@ -127,5 +132,32 @@ fn an_unstable_bearing_is_found_unstable() {
             assert!(radius < 6e-4 && angle < 1.5e-3, "{weight:?}, seed {seed}: {radius:e}, {angle:e}");
         }
         assert_eq!(outside(&bearing.hansen(&u, &y)).len(), 1);
+    }
+}
+
+/// Unbalance and run-out at 2500 rpm, 1 um at the speed and 0.3 um at its double: without knowledge of them four states of S
+/// go to the lines; with it S of every order is what it would be without.
+#[test]
+fn known_unbalance_takes_no_states() {
+    let rig = Loop::new(0.0);
+    let w = lines(&[2500.0 / 60.0, 5000.0 / 60.0], 8000, rig.plant.time()).unwrap();
+    let amplitudes = [[1.0, 0.0], [0.0, 0.9], [0.2, -0.2], [-0.2, 0.2]];
+    let unbalance = &w * Mat::from_fn(4, 2, |j, i| amplitudes[j][i]);
+    for order in [6, 8, 10, 12] {
+        let errors = [1, 2, 3].map(|seed| {
+            let signals = |(u, y): (Mat<f64>, Mat<f64>)| rig.factors.signals(u.as_ref(), y.as_ref()).unwrap();
+            let clean = signals(rig.record(8000, 0.1, seed));
+            let disturbed = signals(rig.record_with(8000, 0.1, seed, &unbalance));
+            let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(order), ..options() };
+            let model = |signals: &youla::factor::YoulaSignals, known: &[youla::MatRef<'_, f64>]| {
+                rig.error(
+                    &hansen_disturbed(&rig.factors, std::slice::from_ref(signals), known, &options).unwrap().plant,
+                )
+            };
+            [model(&clean, &[]), model(&disturbed, &[w.as_ref()]), model(&disturbed, &[])]
+        });
+        let [clean, known, unknown] = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
+        assert!(known < 1.05 * clean, "order {order}: {known:.4} with known lines, {clean:.4} without lines");
+        assert!(unknown > 2.0 * clean, "order {order}: {unknown:.4} with unknown lines, {clean:.4} without lines");
     }
 }

@@ -5,7 +5,7 @@ use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::settings::RunSettings;
 use crate::factor::YoulaSignals;
-use crate::identify::subspace::SubspaceModel;
+use crate::identify::subspace::{SubspaceModel, amplitudes};
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{Packing, Value, Variable, write_mat};
 use crate::units::Channel;
@@ -145,6 +145,7 @@ impl Writer<'_> {
             ("input_excitation", record.input_excitation.as_ref()),
             ("reference", record.reference.as_ref()),
             ("alpha", record.alpha.as_ref()),
+            ("disturbance", record.disturbance.as_ref()),
         ];
         for (name, matrix) in groups {
             variables.extend(matrix.map(|m| array(name, m.as_ref())));
@@ -309,6 +310,8 @@ fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
         "stable": s.stability.stable,
         "moved_poles": s.stability.moved.iter().map(|m| [[m.from.re, m.from.im], [m.to.re, m.to.im]]).collect::<Vec<_>>(),
         "initial_states": s.initial_states,
+        "delays": s.delays,
+        "disturbances": s.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect::<Vec<_>>(),
     })
 }
 

@@ -116,6 +116,7 @@ fn simulated_record(closed: &StateSpace<Discrete>, time: Discrete, seed: u64, in
         input_excitation: None,
         reference: None,
         alpha: Some(alpha),
+        disturbance: None,
     })
 }
 
@@ -149,6 +150,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
             alpha: channels(["alpha_h", "alpha_v"], "alpha", "V"),
             csv: CsvOptions::default(),
             detrend: Detrend::None,
+            disturbance: None,
             estimation: vec![file(NAMES[0])],
             verification: vec![file(NAMES[1])],
         },

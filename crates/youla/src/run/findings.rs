@@ -2,6 +2,7 @@
 
 use super::pipeline::Identification;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::subspace::amplitudes;
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
 /// The answer to "can I trust it?", about five lines, each with its evidence.
@@ -42,6 +43,9 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             }
         }
     }
+    if let Some(text) = disturbance_note(found) {
+        add(Status::Info, text);
+    }
     let settle = found.signals.settle;
     if settle > 0 {
         let text = format!(
@@ -50,6 +54,24 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         add(Status::Info, text);
     }
     all
+}
+
+/// The known lines that were taken out of beta, with their amplitudes in each output, largest over the records.
+fn disturbance_note(found: &Identification) -> Option<String> {
+    let labels = found.settings.data.disturbance.as_ref()?.labels();
+    let all: Vec<_> = found.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
+    let of_line = |(j, label): (usize, &String)| {
+        let largest = |i: usize| all.iter().map(|lines| lines[j][i].amplitude).fold(0.0, f64::max);
+        let outputs = found.records.outputs.iter().enumerate();
+        let each: Vec<String> = outputs.map(|(i, c)| format!("{:.3} {} in {}", largest(i), c.unit, c.name)).collect();
+        format!("{label}: {}", each.join(", "))
+    };
+    let lines: Vec<String> = labels.iter().enumerate().map(of_line).collect();
+    Some(format!(
+        "Known lines were taken out before identification, and out of measured and predicted outputs alike before each fit; \
+         their amplitudes in beta, largest over the records: {}.",
+        lines.join("; ")
+    ))
 }
 
 fn direct(found: &Identification) -> Option<&crate::identify::subspace::SubspaceModel> {

@@ -2,6 +2,7 @@
 
 mod artefacts;
 mod demo;
+mod disturbance;
 mod explain;
 mod factorise;
 mod findings;
@@ -21,6 +22,7 @@ mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use demo::{Demo, demo};
+pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};

@@ -6,8 +6,8 @@ use super::response::{check_grid, indirect};
 use super::settings::RunSettings;
 use super::signals::{DeviationSignals, deviation_signals};
 use super::verdict::{Method, Verdict, verify};
-use crate::identify::direct::direct;
-use crate::identify::hansen::{HansenModel, hansen};
+use crate::identify::direct::direct_disturbed;
+use crate::identify::hansen::{HansenModel, hansen_disturbed};
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
@@ -180,10 +180,12 @@ pub fn identify(
     let factors = &factorisation.factors;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
+    let (experiments, lines, time) = (records.experiments(), records.disturbances(0), records.time);
+    let lines_settled = records.disturbances(signals.settle);
     let (hansen, direct) = clock.run(Stage::Identify, || {
         rayon::join(
-            || hansen(factors, &signals.experiments, &settings.hansen), // (25), (17)
-            || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
+            || hansen_disturbed(factors, &signals.experiments, &lines_settled, &settings.hansen), // (25), (17)
+            || settings.direct.as_ref().map(|options| direct_disturbed(&experiments, &lines, time, options)),
         )
     });
     let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;

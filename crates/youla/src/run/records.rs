@@ -1,11 +1,12 @@
 //! The records of a run: read, cut, detrended, and split by the meaning of their channels.
 
+use super::disturbance::DisturbanceSettings;
 use super::settings::{DataFile, DataSettings};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{ChannelSpec, Format, Record, Source, TimeSource, read, sha256};
 use crate::units::Channel;
-use crate::{Error, Mat, Result};
+use crate::{Error, Mat, MatRef, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -27,6 +28,8 @@ pub struct LoopRecord {
     pub reference: Option<Mat<f64>>,
     /// Known excitation alpha of Fig. 3, samples x m.
     pub alpha: Option<Mat<f64>>,
+    /// Cosine and sine of each known line in the outputs, samples x 2 per line.
+    pub disturbance: Option<Mat<f64>>,
 }
 
 /// A file that was read.
@@ -63,6 +66,12 @@ impl RunRecords {
     /// The estimation records as (u, y).
     pub fn experiments(&self) -> Vec<Experiment<'_>> {
         self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()
+    }
+
+    /// The known lines of the estimation records without their first samples; none where no record has any.
+    pub fn disturbances(&self, dropped: usize) -> Vec<MatRef<'_, f64>> {
+        let known = self.estimation.iter().filter_map(|r| r.disturbance.as_ref());
+        known.map(|w| w.as_ref().subrows(dropped, w.nrows().saturating_sub(dropped))).collect()
     }
 }
 
@@ -110,6 +119,7 @@ fn read_file(
     let path = folder.join(&file.file);
     let groups =
         [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
+    let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
     let source = Source {
         path: path.clone(),
         format: Format::Detect,
@@ -118,13 +128,15 @@ fn read_file(
             ts: settings.sample_time,
             tolerance: settings.time_tolerance,
         },
-        channels: groups.iter().flat_map(|g| g.iter().cloned()).collect(),
+        channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
         csv: settings.csv.clone(),
     };
-    let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
+    let record = read(&source)?.trim(file.skip, file.take)?;
+    let disturbance = settings.disturbance.as_ref().map(|d| d.signals(&record)).transpose()?;
+    let record = record.detrend(settings.detrend)?.record;
     let source =
         SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
-    Ok((LoopRecord::from_record(&record, file.label(), groups)?, source))
+    Ok((LoopRecord { disturbance, ..LoopRecord::from_record(&record, file.label(), groups)? }, source))
 }
 
 impl LoopRecord {
@@ -143,6 +155,7 @@ impl LoopRecord {
             input_excitation: optional(input_excitation)?,
             reference: optional(reference)?,
             alpha: optional(alpha)?,
+            disturbance: None,
         })
     }
 

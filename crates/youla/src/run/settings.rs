@@ -1,5 +1,6 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+use super::disturbance::DisturbanceSettings;
 use super::explain::{explain, problem_at};
 use super::models::{ControllerSettings, NominalModel};
 use crate::identify::subspace::SubspaceOptions;
@@ -78,6 +79,9 @@ pub struct DataSettings {
     /// What is removed from every channel before identification and verification.
     #[serde(default)]
     pub detrend: Detrend,
+    /// Lines of known frequency in the outputs, as of unbalance; none when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<DisturbanceSettings>,
     /// Records to identify from; several files are several experiments.
     pub estimation: Vec<DataFile>,
     /// Records to verify on; never used for identification.
@@ -281,6 +285,9 @@ impl RunSettings {
                 let found = channels.len();
                 return Some(format!("[data] {key} must list as many channels as {of} ({wanted}), but lists {found}"));
             }
+        }
+        if let Some(problem) = d.disturbance.as_ref().and_then(DisturbanceSettings::problem) {
+            return Some(problem.into());
         }
         let known = !(d.alpha.is_empty() && d.input_excitation.is_empty() && d.reference.is_empty());
         if self.verification.prediction == Prediction::ClosedLoop && !known {

@@ -3,6 +3,7 @@ mod disturbance;
 mod measured;
 mod options;
 mod recovery;
+mod structure;
 
 use super::*;
 use crate::Mat;

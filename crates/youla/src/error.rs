@@ -414,6 +414,12 @@ pub enum Error {
         /// The name.
         name: String,
     },
+    /// Two records of a run have the same name.
+    #[error("two records are named {name:?}; give one of their files another `name`")]
+    DuplicateRecord {
+        /// The name.
+        name: String,
+    },
     /// A value of a record is NaN or infinite.
     #[error("{what}: channel {channel:?} is not finite in row {row} (counted from 1)")]
     NotFiniteSample {

@@ -11,8 +11,9 @@ use youla::Mat;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::{hansen, hansen_disturbed};
+use youla::identify::innovation_form::{DeviationOptions, Settling, Structure, hansen_structured};
 use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, Weight, lines, subspace};
-use youla::linalg::{block, eye};
+use youla::linalg::{block, eye, least_squares};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::rig::degraded;
 
@@ -21,6 +22,8 @@ use youla::rig::degraded;
 struct Loop {
     plant: StateSpace<Discrete>,
     factors: CoprimeFactors<Discrete>,
+    f: Mat<f64>,
+    l: Mat<f64>,
 }
 
 impl Loop {
@@ -33,7 +36,7 @@ impl Loop {
         let noise = NoiseCovariance::at_inputs(&nominal, (eye(2) * Scale(0.25)).as_ref(), eye(2).as_ref()).unwrap();
         let l = kalman(&nominal, &noise).unwrap().l;
         let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref()).unwrap();
-        Loop { plant: sampled(&bearing(cross_coupling)), factors }
+        Loop { plant: sampled(&bearing(cross_coupling)), factors, f, l }
     }
 
     /// u and y with +-0.5 V on alpha, held for 8 samples, and white output noise.
@@ -65,6 +68,18 @@ impl Loop {
         let signals = self.factors.signals(u.as_ref(), y.as_ref()).unwrap();
         let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
         hansen(&self.factors, &[signals], &options).unwrap().plant
+    }
+
+    /// Errors of G(S) with S of twelve states, free and in innovation form.
+    fn free_and_innovation(&self, samples: usize, noise: f64, seed: u64) -> [f64; 2] {
+        let (u, y) = self.record(samples, noise, seed);
+        let signals = [self.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
+        let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+        [DeviationOptions::default(), innovation()].map(|deviation| {
+            let found = hansen_structured(&self.factors, &signals, &[], &options, &deviation).unwrap();
+            assert!(found.innovation_form.is_none_or(|form| form.stop == Settling::Settled));
+            self.error(&found.plant)
+        })
     }
 
     /// Root of the summed squared error of the frequency response from 20 to 600 Hz, relative.
@@ -160,4 +175,79 @@ fn known_unbalance_takes_no_states() {
         assert!(known < 1.05 * clean, "order {order}: {known:.4} with known lines, {clean:.4} without lines");
         assert!(unknown > 2.0 * clean, "order {order}: {unknown:.4} with unknown lines, {clean:.4} without lines");
     }
+}
+
+fn innovation() -> DeviationOptions {
+    DeviationOptions { structure: Structure::Innovation, ..DeviationOptions::default() }
+}
+
+/// For exact data the gain of S is `[0; -L]` in the coordinates of plant and observer, and refitting changes nothing.
+#[test]
+fn the_gain_of_the_exact_deviation_system() {
+    let rig = Loop::new(0.0);
+    let (u, y) = rig.record(4000, 0.0, 1);
+    let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
+    let options = SubspaceOptions { order: Order::Fixed(12), ..options() };
+    let found = hansen_structured(&rig.factors, &signals, &[], &options, &innovation()).unwrap();
+    let form = found.innovation_form.as_ref().unwrap();
+    // Theory: x+ = At x + Bt F xh, xh+ = -L Ct x + (A + B F + L C) xh; beta = Ct x - C xh.
+    let (g, g0) = (&rig.plant, rig.factors.nominal());
+    let a = block(&[
+        &[g.a(), (g.b() * &rig.f).as_ref()],
+        &[(-(&rig.l * g.c())).as_ref(), (g0.a() + g0.b() * &rig.f + &rig.l * g0.c()).as_ref()],
+    ]);
+    let c = block(&[&[g.c(), (-g0.c()).as_ref()]]);
+    let exact_gain = block(&[&[Mat::zeros(6, 2).as_ref()], &[(-&rig.l).as_ref()]]);
+    let observability = |a: &Mat<f64>, c: &Mat<f64>| {
+        let mut gamma = Mat::zeros(120, 12);
+        let mut row = c.clone();
+        for i in 0..60 {
+            gamma.as_mut().subrows_mut(2 * i, 2).copy_from(&row);
+            row = row * a;
+        }
+        gamma
+    };
+    let s = &found.deviation.model;
+    let (gamma, exact) = (observability(&s.a().to_owned(), &s.c().to_owned()), observability(&a, &c));
+    let t = least_squares("the similarity", gamma.as_ref(), exact.as_ref()).unwrap().x;
+    let expected = t * exact_gain;
+    let error = (&form.gain - &expected).norm_l2() / expected.norm_l2();
+    assert!(error < 1e-8, "{error:.1e}");
+    assert_eq!(form.stop, Settling::Settled);
+}
+
+/// The noise of beta is modelled as it is: less error than from the simulated beta, at any signal-to-noise ratio.
+#[test]
+fn innovation_form_is_better_in_noise() {
+    let rig = Loop::new(0.0);
+    for (samples, noise) in [(4000, 0.1), (4000, 1.0), (16_000, 1.0)] {
+        let errors = [1, 2, 3].map(|seed| rig.free_and_innovation(samples, noise, seed));
+        let [free, form] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
+        assert!(form < 0.9 * free, "{samples} samples, {noise} um: {form:.3}, free {free:.3}");
+    }
+}
+
+#[test]
+fn tmp_table() {
+    let rig = Loop::new(0.0);
+    for noise in [0.1, 1.0] {
+        for samples in [4000, 16_000, 64_000] {
+            let mut errors: Vec<[f64; 2]> = (1..10).map(|seed| rig.free_and_innovation(samples, noise, seed)).collect();
+            let mut median = |k: usize| {
+                errors.sort_by(|a, b| a[k].total_cmp(&b[k]));
+                errors[4][k]
+            };
+            println!("TABLE {noise} {samples} free {:.3} form {:.3}", median(0), median(1));
+        }
+    }
+}
+
+#[test]
+fn innovation_form_refuses_an_unstable_plant() {
+    let rig = Loop::new(0.25);
+    let (u, y) = rig.record(8000, 0.1, 1);
+    let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
+    let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+    let refused = hansen_structured(&rig.factors, &signals, &[], &options, &innovation()).unwrap_err().to_string();
+    assert!(refused.contains("A - K_s C of S"), "{refused}");
 }

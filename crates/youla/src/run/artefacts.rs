@@ -132,6 +132,7 @@ impl Writer<'_> {
             "outputs": records.outputs,
             "estimation": count(&records.estimation),
             "verification": count(&records.verification),
+            "segments": records.segments,
             "provenance": self.provenance,
         });
         self.folder.json("1-record/records.json", &index)
@@ -200,7 +201,15 @@ impl Writer<'_> {
             channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
         };
         let s = &found.hansen.deviation;
-        self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), subspace_details(s))?;
+        let mut details = subspace_details(s);
+        if let Some(form) = &found.hansen.innovation_form {
+            let gain: Vec<Vec<f64>> = form.gain.row_iter().map(|row| row.iter().copied().collect()).collect();
+            details["innovation_form"] = serde_json::json!({
+                "gain": gain, "iterations": form.iterations, "stop": form.stop, "change": form.change,
+                "misfit": form.misfit, "from_kalman": form.from_kalman,
+            });
+        }
+        self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), details)?;
         match &found.direct {
             Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, subspace_details(direct))?,
             Some(Err(e)) => self.folder.json("4-identify/direct.json", &refused(e))?,

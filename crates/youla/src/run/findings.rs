@@ -1,7 +1,9 @@
 //! What a run says in words: the answer to "can I trust it?" and the remarks besides.
 
 use super::pipeline::Identification;
+use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::innovation_form::Settling;
 use crate::identify::subspace::amplitudes;
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
@@ -42,6 +44,31 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
                 add(Status::Caution, format!("{} has no prediction of {}: {reason}.", v.method.label(), r.record));
             }
         }
+    }
+    if let Some(form) = &found.hansen.innovation_form {
+        let (status, settled) = match form.stop {
+            Settling::Settled => (Status::Info, "settled"),
+            Settling::Iterations => (Status::Caution, "had not settled"),
+        };
+        let kalman = form.from_kalman.map_or(String::new(), |x| {
+            format!(" It differs from the Kalman gain of the subspace method by {:.0} % of its size.", 100.0 * x)
+        });
+        let text = format!(
+            "S is in innovation form: its gain K_s {settled} after {} refits (last change {:.1e}) and misses the response of \
+             beta to output noise by {:.1} %.{kalman}",
+            form.iterations,
+            form.change,
+            100.0 * form.misfit
+        );
+        add(status, text);
+    }
+    if !found.records.segments.is_empty() {
+        let part = |s: &RecordSegment| format!("{} is rows {} to {} of {}", s.record, s.rows[0], s.rows[1], s.file);
+        let parts: Vec<String> = found.records.segments.iter().map(part).collect();
+        add(
+            Status::Info,
+            format!("Records that are parts of a file, each an experiment by itself: {}.", parts.join("; ")),
+        );
     }
     if let Some(text) = disturbance_note(found) {
         add(Status::Info, text);

@@ -14,6 +14,7 @@ mod pipeline;
 mod records;
 mod redraw;
 mod response;
+mod segments;
 mod settings;
 mod signals;
 mod summary;
@@ -32,6 +33,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
     VerificationSettings,

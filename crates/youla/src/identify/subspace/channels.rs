@@ -74,6 +74,18 @@ impl Channels {
         found.into_iter().zip(&self.w_scale).map(one).collect()
     }
 
+    /// A, C and a gain of a model without delays, in scaled units.
+    pub(super) fn scale_predictor(
+        &self,
+        model: &StateSpace<Discrete>,
+        gain: MatRef<'_, f64>,
+    ) -> (OutputPair, Mat<f64>) {
+        let (y, c) = (&self.y_scale, model.c());
+        let c = Mat::from_fn(c.nrows(), c.ncols(), |i, j| c[(i, j)] / y[i]);
+        let gain = Mat::from_fn(gain.nrows(), gain.ncols(), |i, j| gain[(i, j)] * y[j]);
+        (OutputPair { a: model.a().to_owned(), c }, gain)
+    }
+
     /// Puts the four matrices back into the units of the record.
     pub(super) fn unscale_model(
         &self,

@@ -250,6 +250,27 @@ impl SubspaceData {
     }
 }
 
+impl SubspaceData {
+    /// The model with B, D, initial states and disturbances from the one-step predictions with another gain (n x p); A, C
+    /// and the innovation stay. For models without delays.
+    pub(crate) fn refit(
+        &self,
+        model: SubspaceModel,
+        gain: MatRef<'_, f64>,
+        options: &SubspaceOptions,
+    ) -> Result<SubspaceModel> {
+        let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
+        let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
+        Ok(SubspaceModel {
+            model: self.channels.unscale_model(pair, fitted.b, fitted.d, self.time)?,
+            initial_states: fitted.initial_states,
+            disturbances: self.channels.unscale_disturbances(fitted.disturbances),
+            fit: fitted.quality,
+            ..model
+        })
+    }
+}
+
 /// What the data say about all but B, D and the initial states, in scaled units.
 struct Estimate {
     pair: OutputPair,

@@ -414,6 +414,12 @@ pub enum Error {
         /// The name.
         name: String,
     },
+    /// Two records of a run have the same name.
+    #[error("two records are named {name:?}; give one of their files another `name`")]
+    DuplicateRecord {
+        /// The name.
+        name: String,
+    },
     /// A value of a record is NaN or infinite.
     #[error("{what}: channel {channel:?} is not finite in row {row} (counted from 1)")]
     NotFiniteSample {
@@ -529,8 +535,8 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
-    /// Another scaling or factorisation than that of the factored data was asked for.
-    #[error("scaling and factorisation are part of the factored data; factor the records again to change them")]
+    /// Another scaling, factorisation or delays than those of the factored data was asked for.
+    #[error("scaling, factorisation and delays are part of the factored data; factor the records again to change them")]
     Refactor,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.

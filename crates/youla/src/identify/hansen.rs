@@ -7,7 +7,8 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
-use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
+use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
+use super::subspace::{SubspaceModel, SubspaceOptions};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace};
 use crate::{MatRef, Result};
@@ -19,6 +20,8 @@ pub struct HansenModel {
     pub deviation: SubspaceModel,
     /// `G(S) = F_u(J_G, S)`, of order n + n_S.
     pub plant: StateSpace<Discrete>,
+    /// The innovation form of S where it was asked for.
+    pub innovation_form: Option<InnovationForm>,
 }
 
 /// Identifies S from the signals of one or more experiments and recombines it to the plant G(S).
@@ -47,9 +50,5 @@ pub fn hansen_disturbed(
     disturbances: &[MatRef<'_, f64>],
     options: &SubspaceOptions,
 ) -> Result<HansenModel> {
-    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
-    let data = SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)?;
-    let deviation = data.identify(options)?;
-    let plant = factors.plant_of(&deviation.model)?;
-    Ok(HansenModel { deviation, plant })
+    hansen_structured(factors, signals, disturbances, options, &DeviationOptions::default())
 }

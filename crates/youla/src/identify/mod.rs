@@ -3,4 +3,5 @@
 pub mod direct;
 pub mod greybox;
 pub mod hansen;
+pub mod innovation_form;
 pub mod subspace;

@@ -78,7 +78,16 @@ pub fn read_csv(
     time: &TimeSource,
     options: &CsvOptions,
 ) -> Result<Record> {
-    let path = path.as_ref();
+    only(read_csv_parts(path.as_ref(), channels, time, options)?)
+}
+
+/// The same, with a record for each part without gaps.
+pub(super) fn read_csv_parts(
+    path: &Path,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Vec<Record>> {
     let mut lines = Lines::open(path)?;
     // What damage in a gzip file makes of its text is not the user's mistake.
     let (plan, columns) =
@@ -164,7 +173,7 @@ impl Plan {
         Ok(plan)
     }
 
-    fn assemble(self, path: &Path, time: &TimeSource, mut columns: Vec<Vec<f64>>) -> Result<Record> {
+    fn assemble(self, path: &Path, time: &TimeSource, mut columns: Vec<Vec<f64>>) -> Result<Vec<Record>> {
         let what = path.display().to_string();
         let times = if self.timed { columns.pop() } else { None };
         let clock = time.resolve(&what, times.as_deref())?;
@@ -172,8 +181,17 @@ impl Plan {
     }
 }
 
-/// The record of columns of equal length.
-pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>], clock: Clock) -> Result<Record> {
+/// The record of a file that must have no gaps.
+pub(super) fn only(mut parts: Vec<Record>) -> Result<Record> {
+    if let [first, second, ..] = &parts[..] {
+        let (what, row, ts) = (first.name().to_owned(), first.samples() + 1, first.time().ts());
+        return Err(Error::NonUniformTime { what, row, dt: second.start() - first.time_at(first.samples() - 1), ts });
+    }
+    Ok(parts.remove(0))
+}
+
+/// The records, one for each part without gaps, of columns of equal length.
+pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>], clock: Clock) -> Result<Vec<Record>> {
     let samples = columns.first().map_or(0, Vec::len);
     for (channel, column) in channels.iter().zip(columns) {
         if column.len() != samples {
@@ -181,11 +199,15 @@ pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>],
             return Err(Error::UnequalLength { what, channel, found, expected: samples });
         }
     }
-    let mut data = Mat::zeros(samples, columns.len());
-    for (j, column) in columns.iter().enumerate() {
-        data.col_as_slice_mut(j).copy_from_slice(column);
-    }
-    Record::new(what, channels, data, clock.time)?.starting_at(clock.start)
+    let ends = clock.parts.iter().skip(1).map(|part| part.0).chain([samples]);
+    let part = |(&(from, start), to): (&(usize, f64), usize)| {
+        let mut data = Mat::zeros(to - from, columns.len());
+        for (j, column) in columns.iter().enumerate() {
+            data.col_as_slice_mut(j).copy_from_slice(&column[from..to]);
+        }
+        Record::new(what, channels.clone(), data, clock.time)?.starting_at(start)
+    };
+    clock.parts.iter().zip(ends).map(part).collect()
 }
 
 #[cfg(test)]

@@ -32,9 +32,9 @@ pub use matfile::{Packing, read_mat, write_mat};
 pub use npz::read_npz;
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, Split};
-pub use source::{Format, Source, read, sha256};
+pub use source::{Format, Source, read, read_parts, sha256};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
-pub use time::TimeSource;
+pub use time::{Gaps, TimeSource};
 pub use values::{Value, Variable, Variables};
 
 use crate::{Error, Result};

@@ -1,6 +1,7 @@
 //! One description of a recorded file for the library, configuration files and the program.
 
-use super::{ChannelSpec, CsvOptions, Record, TimeSource, read_csv, read_mat, read_npz};
+use super::csv::{only, read_csv_parts};
+use super::{ChannelSpec, CsvOptions, Record, TimeSource, read_mat, read_npz};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -14,7 +15,7 @@ pub enum Format {
     /// By the first bytes of the file (MATLAB, HDF5, zip), else text.
     #[default]
     Detect,
-    /// Text, see [`read_csv`].
+    /// Text, see [`super::read_csv`].
     Csv,
     /// MATLAB version 5, see [`read_mat`].
     Mat,
@@ -60,16 +61,25 @@ pub struct Source {
 /// Reads a record as described.
 ///
 /// # Errors
-/// Those of [`read_csv`], [`read_mat`], [`read_npz`] and [`super::Variables::record`].
+/// Those of [`super::read_csv`], [`read_mat`], [`read_npz`] and [`super::Variables::record`].
 pub fn read(source: &Source) -> Result<Record> {
+    only(read_parts(source)?)
+}
+
+/// Reads a record as described, cut where its time column has gaps if [`super::Gaps::Split`] says so: together the records
+/// hold all rows of the file in order.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
     let variables = match resolve(source)? {
         Format::Mat => read_mat(&source.path)?,
         Format::Npz => read_npz(&source.path)?,
         Format::Csv | Format::Detect => {
-            return read_csv(&source.path, &source.channels, &source.time, &source.csv);
+            return read_csv_parts(&source.path, &source.channels, &source.time, &source.csv);
         }
     };
-    variables.record(&source.channels, &source.time)
+    variables.record_parts(&source.channels, &source.time)
 }
 
 /// SHA-256 of the bytes of a file in hexadecimal digits, by which a result names its input.

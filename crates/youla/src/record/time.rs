@@ -17,11 +17,24 @@ pub struct TimeSource {
     pub ts: Option<f64>,
     /// Greatest deviation of a step of the time column from the sample time, as a part of the sample time.
     pub tolerance: f64,
+    /// What to do where the time column has a gap.
+    pub gaps: Gaps,
+}
+
+/// What to do where samples are missing, by the time column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gaps {
+    /// Refuse the file and name the row.
+    #[default]
+    Refuse,
+    /// Cut it there into records of their own. Steps that are too short, or go back, are refused as before.
+    Split,
 }
 
 impl Default for TimeSource {
     fn default() -> Self {
-        TimeSource { column: None, ts: None, tolerance: 1e-3 }
+        TimeSource { column: None, ts: None, tolerance: 1e-3, gaps: Gaps::Refuse }
     }
 }
 
@@ -36,7 +49,7 @@ impl TimeSource {
         TimeSource { column: Some(column), ..Self::default() }
     }
 
-    /// The clock and the time of the first sample from the time column, which is there when `self.column` is set.
+    /// The clock and the parts without gaps from the time column, which is there when `self.column` is set.
     ///
     /// # Errors
     /// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`] with the first bad row, [`Error::SampleTimeMismatch`]
@@ -48,8 +61,8 @@ impl TimeSource {
         }
         match (column, self.ts) {
             (None, None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
-            (None, Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: 0.0 }),
-            (Some([start]), Some(ts)) => Ok(Clock { time: Discrete::new(ts)?, start: *start }),
+            (None, Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, 0.0)),
+            (Some([start]), Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, *start)),
             (Some([] | [_]), None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
             (Some(times), declared) => self.measured(what, times, declared),
         }
@@ -63,30 +76,43 @@ impl TimeSource {
                 let what = format!("{what}, declared sample time and time column");
                 return Err(Error::SampleTimeMismatch { what, left: ts, right: middle });
             }
-            self.check_steps(what, times, ts)?;
-            return Ok(Clock { time, start: times[0] });
+            return Ok(Clock { time, parts: self.parts(what, times, ts)? });
         }
-        self.check_steps(what, times, middle)?;
-        Ok(Clock { time: Discrete::new(mean_step(times))?, start: times[0] })
+        let parts = self.parts(what, times, middle)?;
+        let ends = parts.iter().skip(1).map(|part| part.0).chain([times.len()]);
+        let ranges = parts.iter().map(|part| part.0).zip(ends);
+        // The longest part knows the sample time best.
+        let (from, to) = ranges.fold((0, 0), |best, r| if r.1 - r.0 > best.1 - best.0 { r } else { best });
+        let ts = if to - from > 1 { mean_step(&times[from..to]) } else { middle };
+        Ok(Clock { time: Discrete::new(ts)?, parts })
     }
 
-    fn check_steps(&self, what: &str, times: &[f64], ts: f64) -> Result<()> {
-        let good = |step: &[f64]| (step[1] - step[0] - ts).abs() <= self.tolerance * ts;
-        match times.windows(2).position(|step| !good(step)) {
-            None => Ok(()),
-            Some(k) => {
-                let dt = times[k + 1] - times[k];
-                Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts })
+    /// First row (from 0) and time of each part without gaps.
+    fn parts(&self, what: &str, times: &[f64], ts: f64) -> Result<Vec<(usize, f64)>> {
+        let mut parts = vec![(0, times[0])];
+        for (k, step) in times.windows(2).enumerate() {
+            let dt = step[1] - step[0];
+            match (dt - ts).abs() <= self.tolerance * ts {
+                true => {}
+                false if self.gaps == Gaps::Split && dt > ts => parts.push((k + 1, step[1])),
+                false => return Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts }),
             }
         }
+        Ok(parts)
     }
 }
 
-/// Sample time and time of the first sample.
+/// Sample time, and first row (from 0) and time of each part without gaps.
 #[derive(Debug)]
 pub(super) struct Clock {
     pub(super) time: Discrete,
-    pub(super) start: f64,
+    pub(super) parts: Vec<(usize, f64)>,
+}
+
+impl Clock {
+    fn whole(time: Discrete, start: f64) -> Self {
+        Clock { time, parts: vec![(0, start)] }
+    }
 }
 
 /// The step in the middle of all steps, which a gap or a repeated row does not move.
@@ -121,6 +147,18 @@ mod tests {
         }
         let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
         assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_gap_splits_where_this_is_asked_for() {
+        let mut gap = times(100, 0.1);
+        gap.drain(60..63);
+        let split = TimeSource { gaps: Gaps::Split, ..TimeSource::default() };
+        let clock = split.resolve("t", Some(&gap)).unwrap();
+        assert_eq!((clock.parts, clock.time.ts()), (vec![(0, 0.3), (60, 0.3 + 63.0 * 0.1)], 0.1));
+        gap[70] = gap[69];
+        let error = split.resolve("t", Some(&gap)).unwrap_err();
+        assert!(matches!(error, Error::NonUniformTime { row: 71, .. }), "{error}");
     }
 
     #[test]

@@ -5,7 +5,7 @@ use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::settings::RunSettings;
 use crate::factor::YoulaSignals;
-use crate::identify::subspace::SubspaceModel;
+use crate::identify::subspace::{SubspaceModel, amplitudes};
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{Packing, Value, Variable, write_mat};
 use crate::units::Channel;
@@ -132,6 +132,7 @@ impl Writer<'_> {
             "outputs": records.outputs,
             "estimation": count(&records.estimation),
             "verification": count(&records.verification),
+            "segments": records.segments,
             "provenance": self.provenance,
         });
         self.folder.json("1-record/records.json", &index)
@@ -145,6 +146,7 @@ impl Writer<'_> {
             ("input_excitation", record.input_excitation.as_ref()),
             ("reference", record.reference.as_ref()),
             ("alpha", record.alpha.as_ref()),
+            ("disturbance", record.disturbance.as_ref()),
         ];
         for (name, matrix) in groups {
             variables.extend(matrix.map(|m| array(name, m.as_ref())));
@@ -199,7 +201,15 @@ impl Writer<'_> {
             channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
         };
         let s = &found.hansen.deviation;
-        self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), subspace_details(s))?;
+        let mut details = subspace_details(s);
+        if let Some(form) = &found.hansen.innovation_form {
+            let gain: Vec<Vec<f64>> = form.gain.row_iter().map(|row| row.iter().copied().collect()).collect();
+            details["innovation_form"] = serde_json::json!({
+                "gain": gain, "iterations": form.iterations, "stop": form.stop, "change": form.change,
+                "misfit": form.misfit, "from_kalman": form.from_kalman,
+            });
+        }
+        self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), details)?;
         match &found.direct {
             Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, subspace_details(direct))?,
             Some(Err(e)) => self.folder.json("4-identify/direct.json", &refused(e))?,
@@ -309,6 +319,8 @@ fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
         "stable": s.stability.stable,
         "moved_poles": s.stability.moved.iter().map(|m| [[m.from.re, m.from.im], [m.to.re, m.to.im]]).collect::<Vec<_>>(),
         "initial_states": s.initial_states,
+        "delays": s.delays,
+        "disturbances": s.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect::<Vec<_>>(),
     })
 }
 

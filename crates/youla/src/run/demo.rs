@@ -5,10 +5,11 @@ use super::records::{LoopRecord, RunRecords, SourceFile};
 use super::settings::{DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings};
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
+use crate::identify::innovation_form::DeviationOptions;
 use crate::identify::subspace::{Order, Stability, SubspaceOptions, Weight};
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
-use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, SquareWaves};
+use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, Gaps, SquareWaves};
 use crate::reduce::{ReducedOrder, ReductionOptions};
 use crate::rig::{Bearing, degraded};
 use crate::units::Channel;
@@ -74,6 +75,7 @@ pub fn demo(seed: u64) -> Result<Demo> {
             estimation: vec![record(0)?],
             verification: vec![record(1)?],
             sources,
+            segments: Vec::new(),
             true_plant: Some(plant),
         },
         settings,
@@ -116,6 +118,7 @@ fn simulated_record(closed: &StateSpace<Discrete>, time: Discrete, seed: u64, in
         input_excitation: None,
         reference: None,
         alpha: Some(alpha),
+        disturbance: None,
     })
 }
 
@@ -132,6 +135,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         file: format!("1-record/{name}-{name}.mat").into(),
         skip: 0,
         take: None,
+        segments: Vec::new(),
         name: Some(name.into()),
     };
     let subspace =
@@ -142,6 +146,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
             sample_time: Some(TS),
             time_column: None,
             time_tolerance: 1e-3,
+            gaps: Gaps::Refuse,
             inputs: channels(INPUTS, "u", "V"),
             outputs: channels(OUTPUTS, "y", "um"),
             input_excitation: Vec::new(),
@@ -149,6 +154,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
             alpha: channels(["alpha_h", "alpha_v"], "alpha", "V"),
             csv: CsvOptions::default(),
             detrend: Detrend::None,
+            disturbance: None,
             estimation: vec![file(NAMES[0])],
             verification: vec![file(NAMES[1])],
         },
@@ -161,6 +167,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         factors: FactorSettings { settle: Some(0), ..FactorSettings::default() },
         direct: Some(SubspaceOptions { order: Order::Fixed(6), stability: Stability::Allow, ..subspace.clone() }),
         hansen: subspace,
+        deviation: DeviationOptions::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },

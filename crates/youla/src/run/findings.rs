@@ -1,7 +1,10 @@
 //! What a run says in words: the answer to "can I trust it?" and the remarks besides.
 
 use super::pipeline::Identification;
+use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::innovation_form::Settling;
+use crate::identify::subspace::amplitudes;
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
 /// The answer to "can I trust it?", about five lines, each with its evidence.
@@ -42,6 +45,34 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             }
         }
     }
+    if let Some(form) = &found.hansen.innovation_form {
+        let (status, settled) = match form.stop {
+            Settling::Settled => (Status::Info, "settled"),
+            Settling::Iterations => (Status::Caution, "had not settled"),
+        };
+        let kalman = form.from_kalman.map_or(String::new(), |x| {
+            format!(" It differs from the Kalman gain of the subspace method by {:.0} % of its size.", 100.0 * x)
+        });
+        let text = format!(
+            "S is in innovation form: its gain K_s {settled} after {} refits (last change {:.1e}) and misses the response of \
+             beta to output noise by {:.1} %.{kalman}",
+            form.iterations,
+            form.change,
+            100.0 * form.misfit
+        );
+        add(status, text);
+    }
+    if !found.records.segments.is_empty() {
+        let part = |s: &RecordSegment| format!("{} is rows {} to {} of {}", s.record, s.rows[0], s.rows[1], s.file);
+        let parts: Vec<String> = found.records.segments.iter().map(part).collect();
+        add(
+            Status::Info,
+            format!("Records that are parts of a file, each an experiment by itself: {}.", parts.join("; ")),
+        );
+    }
+    if let Some(text) = disturbance_note(found) {
+        add(Status::Info, text);
+    }
     let settle = found.signals.settle;
     if settle > 0 {
         let text = format!(
@@ -50,6 +81,24 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         add(Status::Info, text);
     }
     all
+}
+
+/// The known lines that were taken out of beta, with their amplitudes in each output, largest over the records.
+fn disturbance_note(found: &Identification) -> Option<String> {
+    let labels = found.settings.data.disturbance.as_ref()?.labels();
+    let all: Vec<_> = found.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
+    let of_line = |(j, label): (usize, &String)| {
+        let largest = |i: usize| all.iter().map(|lines| lines[j][i].amplitude).fold(0.0, f64::max);
+        let outputs = found.records.outputs.iter().enumerate();
+        let each: Vec<String> = outputs.map(|(i, c)| format!("{:.3} {} in {}", largest(i), c.unit, c.name)).collect();
+        format!("{label}: {}", each.join(", "))
+    };
+    let lines: Vec<String> = labels.iter().enumerate().map(of_line).collect();
+    Some(format!(
+        "Known lines were taken out before identification, and out of measured and predicted outputs alike before each fit; \
+         their amplitudes in beta, largest over the records: {}.",
+        lines.join("; ")
+    ))
 }
 
 fn direct(found: &Identification) -> Option<&crate::identify::subspace::SubspaceModel> {

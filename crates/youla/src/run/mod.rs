@@ -2,6 +2,7 @@
 
 mod artefacts;
 mod demo;
+mod disturbance;
 mod explain;
 mod factorise;
 mod findings;
@@ -13,6 +14,7 @@ mod pipeline;
 mod records;
 mod redraw;
 mod response;
+mod segments;
 mod settings;
 mod signals;
 mod summary;
@@ -21,6 +23,7 @@ mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use demo::{Demo, demo};
+pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};
@@ -30,6 +33,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
     VerificationSettings,

@@ -6,9 +6,10 @@ use super::response::{check_grid, indirect};
 use super::settings::RunSettings;
 use super::signals::{DeviationSignals, deviation_signals};
 use super::verdict::{Method, Verdict, verify};
-use crate::identify::direct::direct;
-use crate::identify::hansen::{HansenModel, hansen};
-use crate::identify::subspace::SubspaceModel;
+use crate::identify::direct::direct_disturbed;
+use crate::identify::hansen::HansenModel;
+use crate::identify::innovation_form::hansen_structured;
+use crate::identify::subspace::{SubspaceModel, SubspaceOptions};
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
 use crate::reduce::{Reduction, reduce};
@@ -162,6 +163,25 @@ fn refusal<'a, T>(key: &'static str, what: &'static str, outcome: &'a Option<Res
     Some(Refusal { key, what, error })
 }
 
+/// Refuses a part of a file that is too short for the horizon, by its name.
+fn require_length(options: &SubspaceOptions, records: &RunRecords, settle: usize) -> Result<()> {
+    let (past, horizon) = (options.past(), options.horizon);
+    let delay = options.delays.iter().copied().max().unwrap_or(0);
+    let needed = [past, horizon, delay, settle].into_iter().fold(0, usize::saturating_add);
+    let of_file = |name: &str| records.segments.iter().any(|segment| segment.record == name);
+    match records.estimation.iter().find(|r| of_file(&r.name) && r.samples() < needed) {
+        None => Ok(()),
+        Some(record) => {
+            let what = format!(
+                "{}, a part of a file, with a horizon of {horizon} and a past of {past} block rows and {settle} samples of \
+                 settling (leave it out by `segments`)",
+                record.name
+            );
+            Err(Error::TooFewSamples { what, found: record.samples(), needed })
+        }
+    }
+}
+
 /// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
 ///
 /// A direct model, a reduction or an indirect response that is impossible does not end the run: the reason stands in its
@@ -180,10 +200,16 @@ pub fn identify(
     let factors = &factorisation.factors;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
+    require_length(&settings.hansen, &records, signals.settle)?;
+    let (experiments, lines, time) = (records.experiments(), records.disturbances(0), records.time);
+    let lines_settled = records.disturbances(signals.settle);
     let (hansen, direct) = clock.run(Stage::Identify, || {
         rayon::join(
-            || hansen(factors, &signals.experiments, &settings.hansen), // (25), (17)
-            || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
+            || {
+                let (experiments, options) = (&signals.experiments, &settings.hansen);
+                hansen_structured(factors, experiments, &lines_settled, options, &settings.deviation) // (25), (17)
+            },
+            || settings.direct.as_ref().map(|options| direct_disturbed(&experiments, &lines, time, options)),
         )
     });
     let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;

@@ -1,13 +1,16 @@
 //! The records of a run: read, cut, detrended, and split by the meaning of their channels.
 
+use super::disturbance::DisturbanceSettings;
+use super::segments::{Part, RecordSegment, parts};
 use super::settings::{DataFile, DataSettings};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
-use crate::record::{ChannelSpec, Format, Record, Source, TimeSource, read, sha256};
+use crate::record::{ChannelSpec, Format, Record, Source, TimeSource, read_parts, sha256};
 use crate::units::Channel;
-use crate::{Error, Mat, Result};
+use crate::{Error, Mat, MatRef, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
 use std::path::Path;
 
 /// One record of a machine under feedback, samples x channels each.
@@ -27,6 +30,8 @@ pub struct LoopRecord {
     pub reference: Option<Mat<f64>>,
     /// Known excitation alpha of Fig. 3, samples x m.
     pub alpha: Option<Mat<f64>>,
+    /// Cosine and sine of each known line in the outputs, samples x 2 per line.
+    pub disturbance: Option<Mat<f64>>,
 }
 
 /// A file that was read.
@@ -55,6 +60,8 @@ pub struct RunRecords {
     pub verification: Vec<LoopRecord>,
     /// Where they came from.
     pub sources: Vec<SourceFile>,
+    /// The records that are parts of a file, cut at gaps or as the settings say.
+    pub segments: Vec<RecordSegment>,
     /// The plant itself, known in simulations only.
     pub true_plant: Option<StateSpace<Discrete>>,
 }
@@ -63,6 +70,12 @@ impl RunRecords {
     /// The estimation records as (u, y).
     pub fn experiments(&self) -> Vec<Experiment<'_>> {
         self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()
+    }
+
+    /// The known lines of the estimation records without their first samples; none where no record has any.
+    pub fn disturbances(&self, dropped: usize) -> Vec<MatRef<'_, f64>> {
+        let known = self.estimation.iter().filter_map(|r| r.disturbance.as_ref());
+        known.map(|w| w.as_ref().subrows(dropped, w.nrows().saturating_sub(dropped))).collect()
     }
 }
 
@@ -74,22 +87,28 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
     let purposes = [("estimation", &settings.estimation), ("verification", &settings.verification)];
     let files: Vec<(&str, &DataFile)> =
         purposes.iter().flat_map(|(purpose, files)| files.iter().map(move |f| (*purpose, f))).collect();
-    let read: Vec<Result<(LoopRecord, SourceFile)>> =
+    let read: Vec<Result<FileRecords>> =
         files.par_iter().map(|(purpose, file)| read_file(settings, folder, purpose, file)).collect();
-    let (mut records, mut sources) = (Vec::new(), Vec::new());
-    for one in read {
-        let (record, source) = one?;
-        records.push(record);
-        sources.push(source);
-    }
-    let time = records[0].time;
-    for (record, source) in records.iter().zip(&sources) {
-        if (record.time.ts() / time.ts() - 1.0).abs() > settings.time_tolerance {
-            let what = format!("{} and {}", sources[0].path, source.path);
-            return Err(Error::SampleTimeMismatch { what, left: time.ts(), right: record.time.ts() });
+    let (mut records, mut sources, mut segments) = (Vec::new(), Vec::new(), Vec::new());
+    let mut of_estimation = 0;
+    for (k, one) in read.into_iter().enumerate() {
+        let file = one?;
+        of_estimation += if k < settings.estimation.len() { file.records.len() } else { 0 };
+        records.extend(file.records);
+        sources.push(file.source);
+        segments.extend(file.segments);
+        let (time, last): (Discrete, Discrete) = (records[0].time, records[records.len() - 1].time);
+        if (last.ts() / time.ts() - 1.0).abs() > settings.time_tolerance {
+            let what = format!("{} and {}", sources[0].path, sources[k].path);
+            return Err(Error::SampleTimeMismatch { what, left: time.ts(), right: last.ts() });
         }
     }
-    let verification = records.split_off(settings.estimation.len());
+    let mut names = HashSet::new();
+    if let Some(twice) = records.iter().find(|r| !names.insert(r.name.clone())) {
+        return Err(Error::DuplicateRecord { name: twice.name.clone() });
+    }
+    let time = records[0].time;
+    let verification = records.split_off(of_estimation);
     Ok(RunRecords {
         time,
         inputs: channels_of(&settings.inputs),
@@ -97,19 +116,23 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
         estimation: records,
         verification,
         sources,
+        segments,
         true_plant: None,
     })
 }
 
-fn read_file(
-    settings: &DataSettings,
-    folder: &Path,
-    purpose: &str,
-    file: &DataFile,
-) -> Result<(LoopRecord, SourceFile)> {
+/// What one file gave.
+struct FileRecords {
+    records: Vec<LoopRecord>,
+    source: SourceFile,
+    segments: Vec<RecordSegment>,
+}
+
+fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataFile) -> Result<FileRecords> {
     let path = folder.join(&file.file);
     let groups =
         [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
+    let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
     let source = Source {
         path: path.clone(),
         format: Format::Detect,
@@ -117,14 +140,23 @@ fn read_file(
             column: settings.time_column.clone(),
             ts: settings.sample_time,
             tolerance: settings.time_tolerance,
+            gaps: settings.gaps,
         },
-        channels: groups.iter().flat_map(|g| g.iter().cloned()).collect(),
+        channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
         csv: settings.csv.clone(),
     };
-    let record = read(&source)?.trim(file.skip, file.take)?.detrend(settings.detrend)?.record;
+    let (mut records, mut segments) = (Vec::new(), Vec::new());
+    for Part { record, name, rows, cut } in parts(file, read_parts(&source)?)? {
+        let disturbance = settings.disturbance.as_ref().map(|d| d.signals(&record)).transpose()?;
+        let record = record.detrend(settings.detrend)?.record;
+        if cut {
+            segments.push(RecordSegment { record: name.clone(), file: file.file.display().to_string(), rows });
+        }
+        records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, groups)? });
+    }
     let source =
         SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
-    Ok((LoopRecord::from_record(&record, file.label(), groups)?, source))
+    Ok(FileRecords { records, source, segments })
 }
 
 impl LoopRecord {
@@ -143,6 +175,7 @@ impl LoopRecord {
             input_excitation: optional(input_excitation)?,
             reference: optional(reference)?,
             alpha: optional(alpha)?,
+            disturbance: None,
         })
     }
 

@@ -1,9 +1,12 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+use super::disturbance::DisturbanceSettings;
 use super::explain::{explain, problem_at};
 use super::models::{ControllerSettings, NominalModel};
+use super::segments;
+use crate::identify::innovation_form::DeviationOptions;
 use crate::identify::subspace::SubspaceOptions;
-use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, open};
+use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Gaps, open};
 use crate::reduce::ReductionOptions;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -29,6 +32,9 @@ pub struct RunSettings {
     /// Identification of S from (alpha, beta).
     #[serde(default)]
     pub hansen: SubspaceOptions,
+    /// What is known of S beforehand.
+    #[serde(default)]
+    pub deviation: DeviationOptions,
     /// Direct identification from (u, y), for comparison; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direct: Option<SubspaceOptions>,
@@ -59,6 +65,9 @@ pub struct DataSettings {
     /// Greatest deviation of a time step, as a part of the sample time.
     #[serde(default = "default_tolerance")]
     pub time_tolerance: f64,
+    /// What to do with a file whose time column has gaps.
+    #[serde(default)]
+    pub gaps: Gaps,
     /// Plant inputs u as applied, after saturation.
     pub inputs: Vec<ChannelSpec>,
     /// Measured plant outputs y.
@@ -78,6 +87,9 @@ pub struct DataSettings {
     /// What is removed from every channel before identification and verification.
     #[serde(default)]
     pub detrend: Detrend,
+    /// Lines of known frequency in the outputs, as of unbalance; none when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<DisturbanceSettings>,
     /// Records to identify from; several files are several experiments.
     pub estimation: Vec<DataFile>,
     /// Records to verify on; never used for identification.
@@ -101,7 +113,10 @@ pub struct DataFile {
     /// Samples used after that; all when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub take: Option<usize>,
-    /// Name in reports; the file's name when absent.
+    /// First and last row (counted from 1) of each stretch to use, as records of their own; instead of `skip` and `take`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub segments: Vec<[usize; 2]>,
+    /// Name in reports; the file's name when absent. Several records of one file are numbered: `name-1`, `name-2`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub name: Option<String>,
 }
@@ -245,6 +260,12 @@ impl RunSettings {
         if d.estimation.is_empty() {
             return Some("[data] names no estimation record; add [[data.estimation]] with a file".into());
         }
+        if d.gaps == Gaps::Split && d.time_column.is_none() {
+            return Some("[data] gaps = \"split\" needs a time_column, which shows the gaps".into());
+        }
+        if let Some(problem) = d.estimation.iter().chain(&d.verification).find_map(segments::problem) {
+            return Some(problem);
+        }
         let mut labels = HashSet::new();
         for label in d.estimation.iter().chain(&d.verification).map(DataFile::label) {
             if label.is_empty() || label.contains(['/', '\\']) || label.contains(char::is_control) {
@@ -281,6 +302,9 @@ impl RunSettings {
                 let found = channels.len();
                 return Some(format!("[data] {key} must list as many channels as {of} ({wanted}), but lists {found}"));
             }
+        }
+        if let Some(problem) = d.disturbance.as_ref().and_then(DisturbanceSettings::problem) {
+            return Some(problem.into());
         }
         let known = !(d.alpha.is_empty() && d.input_excitation.is_empty() && d.reference.is_empty());
         if self.verification.prediction == Prediction::ClosedLoop && !known {

@@ -1,5 +1,6 @@
 //! The evidence on every model of a run: fit (26) on verification records, loop certificate, modes.
 
+use super::disturbance::without_lines;
 use super::factorise::Factorisation;
 use super::pipeline::Identification;
 use super::records::LoopRecord;
@@ -7,7 +8,7 @@ use super::settings::Prediction;
 use crate::control::with_input_port;
 use crate::lti::{Discrete, Mode, StateSpace};
 use crate::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
-use crate::{Error, Mat, Result, c64};
+use crate::{Error, Mat, MatRef, Result, c64};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -56,11 +57,11 @@ impl Method {
 pub struct RecordVerdict {
     /// Name of the record.
     pub record: String,
-    /// Predicted outputs, samples x p, or why there are none (a model that diverges).
+    /// Predicted outputs, samples x p, without known lines, or why there are none (a model that diverges).
     pub predicted: Result<Mat<f64>, String>,
-    /// Fit (26) per output, percent; NaN where there is no prediction.
+    /// Fit (26) per output, percent, where lines are known without the best of them on either side; NaN where there is no prediction.
     pub fit: Vec<f64>,
-    /// Variance accounted for per output, percent; NaN where there is no prediction.
+    /// Variance accounted for per output, percent, likewise; NaN where there is no prediction.
     pub vaf: Vec<f64>,
 }
 
@@ -129,8 +130,10 @@ fn verify_model(found: &Identification, method: Method, model: &StateSpace<Discr
 }
 
 fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &LoopRecord) -> Result<RecordVerdict> {
+    let lines = record.disturbance.as_ref().map(|w| w.as_ref());
+    let measured = without_lines(record.y.as_ref(), lines)?;
     let predicted = match found.settings.verification.prediction {
-        Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), record.y.as_ref()),
+        Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
         Prediction::ClosedLoop => {
             let Factorisation { factors, controller, .. } = &found.factorisation;
             let ports = if record.alpha.is_some() { factors.j_k()? } else { with_input_port(controller)? };
@@ -138,7 +141,7 @@ fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &
                 input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
                 reference: record.reference.as_ref().map(|r| r.as_ref()),
             };
-            predict_closed_loop(model, &ports, excitation, record.y.as_ref())
+            predict_closed_loop(model, &ports, excitation, measured.as_ref())
         }
     };
     let skip = found.settings.verification.skip;
@@ -149,8 +152,10 @@ fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &
     let record_name = record.name.clone();
     match predicted {
         Ok(predicted) => {
-            let counted = |m: &Mat<f64>| m.subrows(skip, m.nrows() - skip).to_owned();
-            let (y, yp) = (counted(&record.y), counted(&predicted));
+            let counted = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
+            let lines = lines.map(counted);
+            let rest = |m: &Mat<f64>| without_lines(counted(m.as_ref()).as_ref(), lines.as_ref().map(|w| w.as_ref()));
+            let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
             Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf })
         }

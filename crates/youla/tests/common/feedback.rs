@@ -17,6 +17,9 @@ use youla::rig::degraded;
 pub(crate) struct Loop {
     pub(crate) plant: StateSpace<Discrete>,
     pub(crate) factors: CoprimeFactors<Discrete>,
+    /// Gains of the controller's state feedback and observer.
+    pub(crate) f: Mat<f64>,
+    pub(crate) l: Mat<f64>,
 }
 
 impl Loop {
@@ -29,15 +32,26 @@ impl Loop {
         let noise = NoiseCovariance::at_inputs(&nominal, (eye(2) * Scale(0.25)).as_ref(), eye(2).as_ref()).unwrap();
         let l = kalman(&nominal, &noise).unwrap().l;
         let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref()).unwrap();
-        Loop { plant: sampled(&bearing(cross_coupling)), factors }
+        Loop { plant: sampled(&bearing(cross_coupling)), factors, f, l }
     }
 
     /// u and y with +-0.5 V on alpha, held for 8 samples, and white output noise.
     pub(crate) fn record(&self, samples: usize, noise: f64, seed: u64) -> (Mat<f64>, Mat<f64>) {
+        self.record_with(samples, noise, seed, &Mat::zeros(samples, 2))
+    }
+
+    /// The same with a disturbance of the measured displacements.
+    pub(crate) fn record_with(
+        &self,
+        samples: usize,
+        noise: f64,
+        seed: u64,
+        disturbance: &Mat<f64>,
+    ) -> (Mat<f64>, Mat<f64>) {
         let rng = &mut rng(seed);
         let levels = Mat::from_fn(samples.div_ceil(8), 2, |_, _| if rng.random::<bool>() { 0.5 } else { -0.5 });
         let alpha = Mat::from_fn(samples, 2, |k, j| levels[(k / 8, j)]);
-        let driving = block(&[&[alpha.as_ref(), (normal(rng, samples, 2) * Scale(noise)).as_ref()]]);
+        let driving = block(&[&[alpha.as_ref(), (normal(rng, samples, 2) * Scale(noise) + disturbance).as_ref()]]);
         let closed = closed_loop(&self.plant, &self.factors.j_k().unwrap()).unwrap();
         let z = simulate(&closed, driving.as_ref(), &vec![0.0; closed.order()]).unwrap();
         (z.subcols(0, 2).to_owned(), z.subcols(2, 2).to_owned())
@@ -69,6 +83,6 @@ impl Loop {
     }
 }
 
-fn options() -> SubspaceOptions {
+pub(crate) fn options() -> SubspaceOptions {
     SubspaceOptions { horizon: 30, stability: Stability::Allow, ..SubspaceOptions::default() }
 }

@@ -1,5 +1,6 @@
 //! Checked and scaled copies of the records.
 
+use super::delay::Delays;
 use super::realisation::OutputPair;
 use super::{ChannelScaling, Experiment, SubspaceOptions};
 use crate::linalg::{check_finite, check_shape, regress};
@@ -24,25 +25,31 @@ pub(super) struct Channels {
     pub(super) y_scale: Vec<f64>,
     /// Per experiment, of each known signal of a disturbance.
     w_scale: Vec<Vec<f64>>,
+    pub(super) delays: Delays,
+    /// Per experiment, the delay states at the first sample that is used, in the units of the record.
+    pub(super) delayed: Vec<Vec<f64>>,
 }
 
 impl Channels {
-    pub(super) fn new(
-        experiments: &[Experiment<'_>],
-        disturbances: &[MatRef<'_, f64>],
+    pub(super) fn new<'a>(
+        experiments: &[Experiment<'a>],
+        disturbances: &[MatRef<'a, f64>],
         options: &SubspaceOptions,
     ) -> Result<Self> {
         let (inputs, outputs) = check(experiments, options)?;
         check_disturbances(experiments, disturbances)?;
-        let u: Vec<_> = experiments.iter().map(|e| e.u).collect();
-        let y: Vec<_> = experiments.iter().map(|e| e.y).collect();
+        let delays = Delays::new(&options.delays, inputs)?;
+        let delayed = experiments.iter().map(|e| delays.states_at_start(e)).collect();
+        let from_start = |m: MatRef<'a, f64>| m.subrows(delays.longest(), m.nrows() - delays.longest());
+        let shifted: Vec<_> = experiments.iter().map(|e| delays.shift(e.u)).collect();
+        let u: Vec<_> = shifted.iter().map(|u| u.as_ref()).collect();
+        let y: Vec<_> = experiments.iter().map(|e| from_start(e.y)).collect();
+        let disturbances: Vec<_> = disturbances.iter().map(|w| from_start(*w)).collect();
         let u_scale = scales("input", &u, options.scaling)?;
-        let y_scale = if disturbances.is_empty() {
-            scales("output", &y, options.scaling)?
-        } else {
-            let rest = beyond(&y, disturbances)?;
-            scales("output", &rest.iter().map(Mat::as_ref).collect::<Vec<_>>(), options.scaling)?
-        };
+        // Lines larger than the rest must not set the weights of the outputs.
+        let quiet = y.iter().zip(&disturbances).map(|(y, w)| without(*y, *w)).collect::<Result<Vec<_>>>()?;
+        let quiet: Vec<_> = quiet.iter().map(|y| y.as_ref()).collect();
+        let y_scale = scales("output", if quiet.is_empty() { &y } else { &quiet }, options.scaling)?;
         let of_signals = |w: &MatRef<'_, f64>| (0..w.ncols()).map(|j| rms_or_one(*w, j)).collect();
         let w_scale: Vec<Vec<f64>> = disturbances.iter().map(of_signals).collect();
         let signals = |e: usize| Signals {
@@ -51,7 +58,7 @@ impl Channels {
             w: disturbances.get(e).map_or_else(|| Mat::zeros(u[e].nrows(), 0), |w| divide(*w, &w_scale[e])),
         };
         let experiments = (0..experiments.len()).map(signals).collect();
-        Ok(Channels { experiments, inputs, outputs, u_scale, y_scale, w_scale })
+        Ok(Channels { experiments, inputs, outputs, u_scale, y_scale, w_scale, delays, delayed })
     }
 
     /// Number of known signals of a disturbance.
@@ -65,6 +72,18 @@ impl Channels {
             Mat::from_fn(a.nrows(), a.ncols(), |j, i| self.y_scale[i] * a[(j, i)] / scale[j])
         };
         found.into_iter().zip(&self.w_scale).map(one).collect()
+    }
+
+    /// A, C and a gain of a model without delays, in scaled units.
+    pub(super) fn scale_predictor(
+        &self,
+        model: &StateSpace<Discrete>,
+        gain: MatRef<'_, f64>,
+    ) -> (OutputPair, Mat<f64>) {
+        let (y, c) = (&self.y_scale, model.c());
+        let c = Mat::from_fn(c.nrows(), c.ncols(), |i, j| c[(i, j)] / y[i]);
+        let gain = Mat::from_fn(gain.nrows(), gain.ncols(), |i, j| gain[(i, j)] * y[j]);
+        (OutputPair { a: model.a().to_owned(), c }, gain)
     }
 
     /// Puts the four matrices back into the units of the record.
@@ -97,9 +116,13 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         check_shape(&named("output"), *y, (u.nrows(), p))?;
         check_finite(&named("input"), *u)?;
         check_finite(&named("output"), *y)?;
-        if u.nrows() < past + horizon {
-            let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
-            return Err(Error::TooFewSamples { what, found: u.nrows(), needed: past + horizon });
+        let delay = options.delays.iter().copied().max().unwrap_or(0);
+        let needed = past.saturating_add(horizon).saturating_add(delay);
+        if u.nrows() < needed {
+            let delayed = if delay > 0 { format!(" after a delay of {delay} samples") } else { String::new() };
+            let what =
+                format!("experiment {} with a horizon of {horizon} and a past of {past} block rows{delayed}", k + 1);
+            return Err(Error::TooFewSamples { what, found: u.nrows(), needed });
         }
     }
     Ok((m, p))
@@ -120,10 +143,9 @@ fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_,
     Ok(())
 }
 
-/// The outputs without what the known signals explain of them, so that the size of a disturbance does not weigh the outputs.
-fn beyond(y: &[MatRef<'_, f64>], disturbances: &[MatRef<'_, f64>]) -> Result<Vec<Mat<f64>>> {
-    let rest = |(y, w): (&MatRef<'_, f64>, &MatRef<'_, f64>)| Ok(y - w * regress("the known disturbances", *w, *y)?);
-    y.iter().zip(disturbances).map(rest).collect()
+/// Outputs without what known signals explain of them.
+fn without(y: MatRef<'_, f64>, w: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    Ok(y - w * regress("the known disturbance", w, y)?)
 }
 
 fn rms_or_one(record: MatRef<'_, f64>, j: usize) -> f64 {

@@ -12,6 +12,7 @@
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
 mod channels;
+mod delay;
 mod disturbance;
 mod factorisation;
 mod gram;
@@ -69,15 +70,18 @@ pub struct SubspaceModel {
     pub model: StateSpace<Discrete>,
     /// Kalman gain and covariance of the innovations, or why there are none.
     pub innovation: Innovation,
-    /// State at the first sample of each experiment, n numbers each.
+    /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n
+    /// numbers each.
     pub initial_states: Vec<Vec<f64>>,
     /// Coefficients of the known disturbances per experiment, known signals x outputs; empty where none is known.
     pub disturbances: Vec<Mat<f64>>,
     /// Singular values of the weighted projection, horizon x p of them: cosines of canonical angles for CVA and SSARX, else
     /// unnormalised.
     pub singular_values: Vec<f64>,
-    /// The order and what other criteria would have proposed.
+    /// The order, without the states of delays, and what other criteria would have proposed.
     pub order: OrderReport,
+    /// Delay of each input in samples, as given; its states stand behind the others, input by input, newest first.
+    pub delays: Vec<usize>,
     /// The poles and what was done to them.
     pub stability: StabilityReport,
     /// How B and D were found and how well the model reproduces the outputs.
@@ -95,7 +99,7 @@ pub struct SubspaceModel {
 }
 
 impl SubspaceModel {
-    /// Poles of the model.
+    /// Poles of the model, those of delays at 0 last.
     pub fn poles(&self) -> &[c64] {
         &self.stability.poles
     }
@@ -206,37 +210,64 @@ impl SubspaceData {
     }
 
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
-    /// past at most those of the factor; scaling and factorisation are part of the factor.
+    /// past at most those of the factor; scaling, factorisation and delays are part of the factor.
     ///
     /// # Errors
     /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Refactor`] for another
-    /// scaling or factorisation.
+    /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
-        let held = (self.factored.scaling, self.factored.factorisation);
-        if (options.scaling, options.factorisation) != held {
+        let held = (self.factored.scaling, self.factored.factorisation, &self.factored.delays);
+        if (options.scaling, options.factorisation, &options.delays) != held {
             return Err(Error::Refactor);
         }
         check_blocks(options)?;
+        options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
         let found = match options.weight.is_for_closed_loops() {
             true => predictor_form::estimate(&self.triangle, options, self.time)?,
             false => open_loop::estimate(&self.triangle, options, self.time)?,
         };
         let fitted =
             output_error::fit(&self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
+        let (delays, delayed) = (&self.channels.delays, &self.channels.delayed);
+        let model = self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?;
+        let mut stability = found.stability;
+        stability.poles.extend(vec![c64::new(0.0, 0.0); delays.states()]);
         Ok(SubspaceModel {
-            model: self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?,
-            innovation: found.innovation.unscale(&self.channels.y_scale),
-            initial_states: fitted.initial_states,
+            model: delays.put_before(model)?,
+            innovation: delays.put_below(found.innovation.unscale(&self.channels.y_scale)),
+            initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
             singular_values: found.singular_values,
             order: found.order,
-            stability: found.stability,
+            delays: options.delays.clone(),
+            stability,
             fit: fitted.quality,
             horizon: options.horizon,
             past: options.past(),
             columns: found.columns,
             excitation_rcond: found.excitation_rcond,
             factor: found.factor,
+        })
+    }
+}
+
+impl SubspaceData {
+    /// The model with B, D, initial states and disturbances from the one-step predictions with another gain (n x p); A, C
+    /// and the innovation stay. For models without delays.
+    pub(crate) fn refit(
+        &self,
+        model: SubspaceModel,
+        gain: MatRef<'_, f64>,
+        options: &SubspaceOptions,
+    ) -> Result<SubspaceModel> {
+        let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
+        let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
+        Ok(SubspaceModel {
+            model: self.channels.unscale_model(pair, fitted.b, fitted.d, self.time)?,
+            initial_states: fitted.initial_states,
+            disturbances: self.channels.unscale_disturbances(fitted.disturbances),
+            fit: fitted.quality,
+            ..model
         })
     }
 }

@@ -1,5 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// Choices of [`super::subspace`].
@@ -26,6 +27,10 @@ pub struct SubspaceOptions {
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,
+    /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model
+    /// has them as states with poles at 0, after those of [`Self::order`].
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub delays: Vec<usize>,
     /// How the block-Hankel data are factored.
     pub factorisation: Factorisation,
     /// What to do with an unstable estimate.
@@ -44,6 +49,7 @@ impl Default for SubspaceOptions {
             past: None,
             order: Order::default(),
             feedthrough: Feedthrough::default(),
+            delays: Vec::new(),
             factorisation: Factorisation::default(),
             stability: Stability::default(),
             scaling: ChannelScaling::default(),
@@ -116,7 +122,7 @@ impl Default for Order {
 }
 
 /// Direct path from input to output.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Feedthrough {
     /// D = 0 exactly, as for a plant behind a zero-order hold.
@@ -124,14 +130,29 @@ pub enum Feedthrough {
     None,
     /// D is estimated.
     Estimated,
+    /// The marked entries of D are estimated, the others are 0: `[output][input]`. The methods of closed loops regress each
+    /// output on the past and on its own inputs of the same sample.
+    Entries(Vec<Vec<bool>>),
 }
 
 impl Feedthrough {
+    /// Refuses marks that do not fit D.
+    pub(super) fn check(&self, inputs: usize, outputs: usize) -> Result<()> {
+        let Feedthrough::Entries(rows) = self else { return Ok(()) };
+        let unfit = rows.iter().map(Vec::len).find(|columns| *columns != inputs);
+        if rows.len() == outputs && unfit.is_none() {
+            return Ok(());
+        }
+        let what = "the table of entries of D (feedthrough)".into();
+        Err(Error::Shape { what, expected: (outputs, inputs), found: (rows.len(), unfit.unwrap_or(inputs)) })
+    }
+
     /// Per output, the inputs whose entries of D are estimated.
     pub(super) fn inputs_of_outputs(&self, inputs: usize, outputs: usize) -> Vec<Vec<usize>> {
         match self {
             Feedthrough::None => vec![Vec::new(); outputs],
             Feedthrough::Estimated => vec![(0..inputs).collect(); outputs],
+            Feedthrough::Entries(rows) => rows.iter().map(|row| (0..inputs).filter(|j| row[*j]).collect()).collect(),
         }
     }
 }

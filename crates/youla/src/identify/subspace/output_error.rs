@@ -70,6 +70,27 @@ pub(super) fn fit(
 ) -> Result<Fitted> {
     let simulated = stability.stable && !options.weight.is_for_closed_loops();
     let (predictor, by) = predictor(pair, kalman_gain, simulated)?;
+    solve(data, pair, predictor, by, options)
+}
+
+/// The same by the predictions with a given gain, whatever the method.
+pub(super) fn fit_predictions(
+    data: &Channels,
+    pair: &OutputPair,
+    gain: MatRef<'_, f64>,
+    options: &SubspaceOptions,
+) -> Result<Fitted> {
+    let (predictor, by) = predictor(pair, Some(gain), false)?;
+    solve(data, pair, predictor, by, options)
+}
+
+fn solve(
+    data: &Channels,
+    pair: &OutputPair,
+    predictor: Predictor,
+    by: InputFit,
+    options: &SubspaceOptions,
+) -> Result<Fitted> {
     let unknowns = &Unknowns {
         states: pair.a.nrows(),
         inputs: data.inputs,

@@ -21,13 +21,15 @@ pub(super) fn states(varx: &Varx) -> Result<StateMap> {
     let (past, m, l) = (varx.past_signals(), varx.inputs, varx.outputs);
     let mut coefficients = Mat::zeros(past, varx.horizon * l);
     let mut markov: Vec<Mat<f64>> = Vec::new();
-    for i in 0..varx.horizon {
+    // The first row sees u(k) only through the entries of D that are sought.
+    let present = varx.present()?;
+    coefficients.as_mut().subcols_mut(0, l).copy_from(present.by_past);
+    markov.push(present.d);
+    for i in 1..varx.horizon {
         let rest = without_inputs(varx, &markov, i);
-        // Without D the first row does not see u(k).
-        let regressors = if i == 0 && !varx.feedthrough { past } else { past + m };
-        let found = varx.regress(regressors, rest.as_ref())?;
+        let found = varx.regress(past + m, rest.as_ref())?;
         coefficients.as_mut().subcols_mut(i * l, l).copy_from(found.as_ref().subrows(0, past));
-        markov.push(if regressors > past { found.subrows(past, m).to_owned() } else { Mat::zeros(m, l) });
+        markov.push(found.subrows(past, m).to_owned());
     }
     varx.states_of_prediction(coefficients.as_ref())
 }

@@ -61,7 +61,8 @@ struct Sequences<'a> {
     x_next: Mat<f64>,
     u: MatRef<'a, f64>,
     y: MatRef<'a, f64>,
-    feedthrough: bool,
+    /// Per output, the inputs whose entries of D are sought.
+    direct: &'a [Vec<usize>],
     columns: usize,
 }
 
@@ -77,7 +78,7 @@ impl<'a> Sequences<'a> {
             x_next: varx.past(1) * by_past,
             u: varx.inputs_at(0),
             y: varx.outputs_at(0),
-            feedthrough: varx.feedthrough,
+            direct: &varx.direct,
             columns: varx.columns,
         })
     }
@@ -85,14 +86,21 @@ impl<'a> Sequences<'a> {
     /// A and C.
     fn realise(&self) -> Result<OutputPair> {
         let n = self.x.ncols();
-        let present =
-            block(&[&[self.x.as_ref(), self.u.subcols(0, if self.feedthrough { self.u.ncols() } else { 0 })]]);
-        let output = regress("the states", present.as_ref(), self.y)?;
-        let e = self.y - &present * &output;
+        let (mut c, mut e) = (Mat::zeros(n, self.y.ncols()), self.y.to_owned());
+        for i in 0..self.y.ncols() {
+            let present = block(&[&[self.x.as_ref(), self.inputs_of(i).as_ref()]]);
+            let output = regress("the states", present.as_ref(), self.y.subcols(i, 1))?;
+            e.as_mut().subcols_mut(i, 1).copy_from(self.y.subcols(i, 1) - &present * &output);
+            c.as_mut().subcols_mut(i, 1).copy_from(output.subrows(0, n));
+        }
         let regressors = block(&[&[self.x.as_ref(), self.u, e.as_ref()]]);
         let state = regress("the states, inputs and innovations", regressors.as_ref(), self.x_next.as_ref())?;
-        let leading = |rows: &Mat<f64>| rows.as_ref().subrows(0, n).transpose().to_owned();
-        Ok(OutputPair { a: leading(&state), c: leading(&output) })
+        Ok(OutputPair { a: state.subrows(0, n).transpose().to_owned(), c: c.transpose().to_owned() })
+    }
+
+    /// The inputs that reach output i in the same sample.
+    fn inputs_of(&self, i: usize) -> Mat<f64> {
+        Mat::from_fn(self.u.nrows(), self.direct[i].len(), |k, j| self.u[(k, self.direct[i][j])])
     }
 
     fn innovation(&self, pair: &OutputPair) -> Innovation {
@@ -102,9 +110,11 @@ impl<'a> Sequences<'a> {
     /// `[K e + rest, e]` for given A and C.
     fn residuals(&self, pair: &OutputPair) -> Result<Mat<f64>> {
         let mut e = self.y - &self.x * pair.c.transpose();
-        if self.feedthrough {
-            let d = regress("the inputs", self.u, e.as_ref())?;
-            e -= self.u * d;
+        for i in 0..e.ncols() {
+            let u = self.inputs_of(i);
+            let d = regress("the inputs", u.as_ref(), e.as_ref().subcols(i, 1))?;
+            let mut rest = e.as_mut().subcols_mut(i, 1);
+            rest -= u * d;
         }
         let w = &self.x_next - &self.x * pair.a.transpose();
         let beside = block(&[&[self.u, e.as_ref()]]);

@@ -12,7 +12,7 @@
 
 use super::factorisation::{Arrangement, DataTriangle};
 use super::hankel::require_excitation;
-use super::{DataFactor, Factorisation, Feedthrough, SubspaceOptions};
+use super::{DataFactor, Factorisation, SubspaceOptions};
 use crate::linalg::{leading_rank, least_squares};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -27,14 +27,22 @@ pub(super) struct Varx {
     pub(super) horizon: usize,
     /// Columns of the Hankel matrix.
     pub(super) columns: usize,
-    /// Whether D is sought.
-    pub(super) feedthrough: bool,
+    /// Per output, the inputs whose entries of D are sought.
+    pub(super) direct: Vec<Vec<usize>>,
     /// How R was found.
     pub(super) report: DataFactor,
     /// `Xi_p ... Xi_1`, transposed: a row per past signal, oldest first.
     pub(super) xi: Mat<f64>,
     /// D transposed, zero where it is not sought.
     d: Mat<f64>,
+}
+
+/// The outputs as they follow from the past and the inputs of the same sample.
+pub(super) struct Present {
+    /// A row per past signal.
+    pub(super) by_past: Mat<f64>,
+    /// D transposed, zero where it is not sought.
+    pub(super) d: Mat<f64>,
 }
 
 /// How the state is read from the past, and the singular values it came with.
@@ -50,17 +58,29 @@ impl Varx {
         let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
         let (past, horizon) = (options.past(), options.horizon);
         let r = data.arranged(Arrangement::Chronological, past, horizon)?;
-        let feedthrough = options.feedthrough == Feedthrough::Estimated;
+        let direct = options.feedthrough.inputs_of_outputs(inputs, outputs);
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));
-        let mut varx = Varx { r, inputs, outputs, past, horizon, columns, feedthrough, report, xi, d };
-        let past_signals = varx.past_signals();
-        let regressors = past_signals + if feedthrough { inputs } else { 0 };
-        let found = varx.regress(regressors, varx.outputs_at(0))?;
-        varx.xi = found.subrows(0, past_signals).to_owned();
-        if feedthrough {
-            varx.d = found.subrows(past_signals, inputs).to_owned();
-        }
+        let mut varx = Varx { r, inputs, outputs, past, horizon, columns, direct, report, xi, d };
+        let present = varx.present()?;
+        (varx.xi, varx.d) = (present.by_past, present.d);
         Ok(varx)
+    }
+
+    /// `y(k)` on the past and, output by output, on those of the inputs `u(k)` that reach it: first D from what the past
+    /// leaves of both, then the rest from the past.
+    pub(super) fn present(&self) -> Result<Present> {
+        let past = self.past_signals();
+        let (u, y) = (self.inputs_at(0), self.outputs_at(0));
+        let (from, to) = (self.rank(past), self.rank(past + self.inputs));
+        let mut d = Mat::zeros(self.inputs, self.outputs);
+        for (i, inputs) in self.direct.iter().enumerate() {
+            let beyond = Mat::from_fn(to - from, inputs.len(), |row, j| u[(from + row, inputs[j])]);
+            let target = y.submatrix(from, i, to - from, 1);
+            let found = least_squares("the inputs beyond the past", beyond.as_ref(), target)?.x;
+            inputs.iter().enumerate().for_each(|(j, input)| d[(*input, i)] = found[(j, 0)]);
+        }
+        let by_past = self.regress(past, (y - u * &d).as_ref())?;
+        Ok(Present { by_past, d })
     }
 
     /// Number of past signals, p (m + l).

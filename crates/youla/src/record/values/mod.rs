@@ -2,7 +2,7 @@
 
 mod path;
 
-use super::csv::assemble;
+use super::csv::{assemble, only};
 use super::{ChannelRef, ChannelSpec, Record, TimeSource};
 use crate::units::Channel;
 use crate::{Error, Result};
@@ -98,6 +98,11 @@ impl Variables {
     /// # Ok::<(), youla::Error>(())
     /// ```
     pub fn record(&self, channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
+        only(self.record_parts(channels, time)?)
+    }
+
+    /// The same, with a record for each part without gaps.
+    pub(super) fn record_parts(&self, channels: &[ChannelSpec], time: &TimeSource) -> Result<Vec<Record>> {
         if channels.is_empty() {
             return Err(self.unknown(""));
         }

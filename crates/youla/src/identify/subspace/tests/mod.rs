@@ -4,6 +4,7 @@ mod measured;
 mod options;
 mod properties;
 mod recovery;
+mod structure;
 
 use super::*;
 use crate::Mat;

@@ -1,0 +1,177 @@
+//! S in innovation form: the Kalman gain of S from S itself, and B, D from the predictions with it.
+//!
+//! White output noise n reaches beta through `H = Mt + S Ut` (25), which shares A and C with S, is monic and, for a stable
+//! plant, has all its zeros inside of the unit circle: then H is the innovation form of the noise,
+//! ```text
+//! x+ = A x + B alpha + K_s n,   beta = C x + D alpha + n,   H_i = C A^(i-1) K_s,   K_s = Gamma^+ [H_1; H_2; ...]
+//! ```
+//! with the Markov parameters H_i of the current S. B, D and x0 are refitted to the one-step predictions with `A - K_s C`,
+//! whose errors are white where those of the simulation are not, and K_s is taken from the new S until it settles. Because
+//! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
+
+use super::hansen::HansenModel;
+use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
+use crate::factor::{CoprimeFactors, YoulaSignals};
+use crate::linalg::least_squares;
+use crate::lti::{Discrete, StateSpace, simulate};
+use crate::{Error, Mat, MatRef, Result};
+use serde::{Deserialize, Serialize};
+
+/// What is known of S before it is identified.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct DeviationOptions {
+    /// How the noise of beta is modelled.
+    pub structure: Structure,
+    /// Largest number of refits in the innovation form, at least 1.
+    pub iterations: usize,
+    /// Relative change of K_s below which it has settled.
+    pub tolerance: f64,
+}
+
+impl Default for DeviationOptions {
+    fn default() -> Self {
+        DeviationOptions { structure: Structure::Free, iterations: 20, tolerance: 1e-6 }
+    }
+}
+
+/// How the noise of beta is modelled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Structure {
+    /// Not at all for a stable S: B and D from the simulated beta.
+    #[default]
+    Free,
+    /// As white noise at the outputs of a stable plant, through S itself.
+    Innovation,
+}
+
+/// Why the refits ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Settling {
+    /// K_s changed by less than the tolerance.
+    Settled,
+    /// The largest number of refits was reached.
+    Iterations,
+}
+
+/// The innovation form of S.
+#[derive(Debug, Clone)]
+pub struct InnovationForm {
+    /// K_s, n x p, with which B and D were found.
+    pub gain: Mat<f64>,
+    /// Refits made.
+    pub iterations: usize,
+    /// Why they ended.
+    pub stop: Settling,
+    /// Last relative change of K_s.
+    pub change: f64,
+    /// What `Gamma K_s` misses of the Markov parameters of H, relative: A and C of S can be those of H only as far as this.
+    pub misfit: f64,
+    /// `|K_s - K| / |K_s|`, K the Kalman gain of the subspace method; `None` where there is none.
+    pub from_kalman: Option<f64>,
+}
+
+/// Identifies S with the structure asked for, and recombines it to G(S).
+///
+/// # Errors
+/// As [`super::hansen::hansen_disturbed`]; for the innovation form [`Error::Unstable`] where `A - K_s C` is not stable, as for
+/// an unstable plant, and [`Error::OutOfRange`] for delays, no refits or a tolerance below zero.
+pub fn hansen_structured(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    disturbances: &[MatRef<'_, f64>],
+    options: &SubspaceOptions,
+    deviation: &DeviationOptions,
+) -> Result<HansenModel> {
+    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
+    let data = SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)?;
+    let free = data.identify(options)?;
+    let (deviation, innovation_form) = match deviation.structure {
+        Structure::Free => (free, None),
+        Structure::Innovation => {
+            check(options, deviation)?;
+            let (model, form) = refit(factors, &data, free, options, deviation)?;
+            (model, Some(form))
+        }
+    };
+    let plant = factors.plant_of(&deviation.model)?;
+    Ok(HansenModel { deviation, plant, innovation_form })
+}
+
+fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
+    let refused = |what: &str, value: f64, must| Err(Error::OutOfRange { what: what.into(), value, must });
+    if let Some(delay) = options.delays.iter().find(|delay| **delay > 0) {
+        return refused("a delay with structure = \"innovation\"", *delay as f64, "0: take structure = \"free\"");
+    }
+    if deviation.iterations == 0 {
+        return refused("the number of iterations in [deviation]", 0.0, "at least 1");
+    }
+    let sensible = deviation.tolerance >= 0.0 && deviation.tolerance < 1.0;
+    if sensible { Ok(()) } else { refused("tolerance in [deviation]", deviation.tolerance, "at least 0 and below 1") }
+}
+
+/// K_s from S, S from K_s, until K_s settles.
+fn refit(
+    factors: &CoprimeFactors<Discrete>,
+    data: &SubspaceData,
+    mut model: SubspaceModel,
+    options: &SubspaceOptions,
+    deviation: &DeviationOptions,
+) -> Result<(SubspaceModel, InnovationForm)> {
+    let kalman = model.innovation.gain().map(|gain| gain.to_owned());
+    let mut now = gain_of(factors, &model)?;
+    let mut change = f64::INFINITY;
+    let mut iterations = 0;
+    while iterations < deviation.iterations && change > deviation.tolerance {
+        require_stable_predictor(&model.model, &now.gain)?;
+        model = data.refit(model, now.gain.as_ref(), options)?;
+        let next = gain_of(factors, &model)?;
+        change = (&next.gain - &now.gain).norm_l2() / next.gain.norm_l2();
+        now = next;
+        iterations += 1;
+    }
+    let stop = if change <= deviation.tolerance { Settling::Settled } else { Settling::Iterations };
+    let from_kalman = kalman.map(|kalman| (&now.gain - kalman).norm_l2() / now.gain.norm_l2());
+    let form = InnovationForm { gain: now.gain, iterations, stop, change, misfit: now.misfit, from_kalman };
+    Ok((model, form))
+}
+
+struct Gain {
+    gain: Mat<f64>,
+    misfit: f64,
+}
+
+/// `K_s = Gamma^+ [H_1; H_2; ...]` from the responses of beta to an impulse at each output.
+fn gain_of(factors: &CoprimeFactors<Discrete>, s: &SubspaceModel) -> Result<Gain> {
+    let (model, p, m) = (&s.model, factors.outputs(), factors.inputs());
+    let n = model.order();
+    let blocks = s.horizon.max(RESPONSE * n);
+    let noise = factors.residual_filter(model)?;
+    let mut markov = Mat::zeros(blocks * p, p);
+    for j in 0..p {
+        let impulse = Mat::from_fn(blocks + 1, m + p, |k, c| if (k, c) == (0, m + j) { 1.0 } else { 0.0 });
+        let response = simulate(&noise, impulse.as_ref(), &vec![0.0; noise.order()])?;
+        (0..blocks * p).for_each(|row| markov[(row, j)] = response[(1 + row / p, row % p)]);
+    }
+    let mut gamma = Mat::zeros(blocks * p, n);
+    let mut row = model.c().to_owned();
+    for i in 0..blocks {
+        gamma.as_mut().subrows_mut(i * p, p).copy_from(&row);
+        row = row * model.a();
+    }
+    let gain = least_squares("the observability matrix of S", gamma.as_ref(), markov.as_ref())?.x;
+    let misfit = (gamma * &gain - &markov).norm_l2() / markov.norm_l2();
+    Ok(Gain { gain, misfit })
+}
+
+/// Markov parameters per state.
+const RESPONSE: usize = 10;
+
+fn require_stable_predictor(s: &StateSpace<Discrete>, gain: &Mat<f64>) -> Result<()> {
+    let a = s.a() - gain * s.c();
+    let predictor = StateSpace::new(a, gain.clone(), s.c().to_owned(), Mat::zeros(s.outputs(), s.outputs()), s.time())?;
+    predictor
+        .require_stable("the predictor A - K_s C of S (its poles are those of the plant; take structure = \"free\")")
+}

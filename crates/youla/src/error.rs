@@ -529,8 +529,10 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
-    /// Another scaling or factorisation than that of the factored data was asked for.
-    #[error("scaling and factorisation are part of the factored data; factor the records again to change them")]
+    /// Another scaling, factorisation or automatic horizon than that of the factored data was asked for.
+    #[error(
+        "scaling, factorisation and automatic horizon are part of the factored data; factor the records again to change them"
+    )]
     Refactor,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.

@@ -34,6 +34,11 @@ impl Channels {
         Ok(Channels { experiments, inputs, outputs, u_scale, y_scale })
     }
 
+    /// Refuses experiments that are too short for so many block rows of past and future.
+    pub(super) fn check_lengths(&self, blocks: (usize, usize)) -> Result<()> {
+        self.experiments.iter().enumerate().try_for_each(|(k, e)| check_length(k, e.u.nrows(), blocks))
+    }
+
     /// Puts the four matrices back into the units of the record.
     pub(super) fn unscale_model(
         &self,
@@ -52,7 +57,10 @@ impl Channels {
 
 /// Shapes, lengths and values; returns the numbers of inputs and outputs.
 fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(usize, usize)> {
-    let (past, horizon) = (options.past(), options.horizon);
+    let (past, horizon) = match options.automatic_horizon {
+        Some(automatic) => (automatic.max, 1),
+        None => (options.past(), options.horizon),
+    };
     check_blocks(options)?;
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
@@ -64,16 +72,25 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         check_shape(&named("output"), *y, (u.nrows(), p))?;
         check_finite(&named("input"), *u)?;
         check_finite(&named("output"), *y)?;
-        if u.nrows() < past + horizon {
-            let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
-            return Err(Error::TooFewSamples { what, found: u.nrows(), needed: past + horizon });
-        }
+        check_length(k, u.nrows(), (past, horizon))?;
     }
     Ok((m, p))
 }
 
+/// Refuses an experiment without a Hankel column.
+fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize)) -> Result<()> {
+    if samples < past + horizon {
+        let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
+        return Err(Error::TooFewSamples { what, found: samples, needed: past + horizon });
+    }
+    Ok(())
+}
+
 /// Refuses a horizon or past without meaning.
 pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
+    if let Some(automatic) = options.automatic_horizon {
+        return at_least("the largest past", automatic.max, 1, "at least 1 block row");
+    }
     at_least("the horizon", options.horizon, 2, "at least 2 block rows")?;
     at_least("the past", options.past(), 1, "at least 1 block row")
 }

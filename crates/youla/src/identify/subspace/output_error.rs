@@ -201,6 +201,40 @@ fn unpack(solution: MatRef<'_, f64>, unknowns: Unknowns) -> (Mat<f64>, Mat<f64>)
     (driven, d)
 }
 
+/// One-step prediction errors of the observer with gain K, one record per experiment, in scaled units.
+pub(super) fn prediction_errors(
+    data: &Channels,
+    pair: &OutputPair,
+    gain: MatRef<'_, f64>,
+    fitted: &Fitted,
+) -> Vec<Mat<f64>> {
+    let predictor = Predictor { a: &pair.a - gain * &pair.c, c: pair.c.clone(), k: Some(gain.to_owned()) };
+    let driven = &fitted.b - gain * &fitted.d;
+    errors(data, &predictor, driven.as_ref(), fitted.d.as_ref(), &fitted.initial_states)
+}
+
+/// `y - yhat` of simulation or predictor, one record per experiment.
+fn errors(
+    data: &Channels,
+    predictor: &Predictor,
+    driven: MatRef<'_, f64>,
+    d: MatRef<'_, f64>,
+    initial_states: &[Vec<f64>],
+) -> Vec<Mat<f64>> {
+    let none = Mat::zeros(predictor.a.nrows(), 0);
+    let k = predictor.k.as_ref().unwrap_or(&none);
+    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
+    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
+    let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
+    pairs
+        .par_iter()
+        .map(|(e, x0)| {
+            let driving = block(&[&[e.u.as_ref(), e.y.as_ref().subcols(0, k.ncols())]]);
+            &e.y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
+        })
+        .collect()
+}
+
 fn fit_percent(
     data: &Channels,
     predictor: &Predictor,
@@ -208,18 +242,7 @@ fn fit_percent(
     d: MatRef<'_, f64>,
     initial_states: &[Vec<f64>],
 ) -> Vec<f64> {
-    let none = Mat::zeros(predictor.a.nrows(), 0);
-    let k = predictor.k.as_ref().unwrap_or(&none);
-    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
-    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
-    let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
-    let errors: Vec<Mat<f64>> = pairs
-        .par_iter()
-        .map(|(e, x0)| {
-            let driving = block(&[&[e.u.as_ref(), e.y.as_ref().subcols(0, k.ncols())]]);
-            &e.y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
-        })
-        .collect();
+    let errors = errors(data, predictor, driven, d, initial_states);
     let samples: usize = errors.iter().map(|e| e.nrows()).sum();
     (0..data.outputs)
         .map(|i| {

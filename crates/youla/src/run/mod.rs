@@ -15,6 +15,7 @@ mod redraw;
 mod response;
 mod settings;
 mod signals;
+mod stabilisation;
 mod summary;
 mod verdict;
 mod write;
@@ -32,9 +33,10 @@ pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
-    VerificationSettings,
+    StabilisationSettings, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
+pub use stabilisation::Diagrams;
 pub use summary::summary;
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

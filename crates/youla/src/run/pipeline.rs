@@ -3,12 +3,14 @@
 use super::factorise::{Factorisation, factorise_run};
 use super::records::RunRecords;
 use super::response::{check_grid, indirect};
-use super::settings::RunSettings;
+use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
+use super::stabilisation::{Diagrams, diagram};
 use super::verdict::{Method, Verdict, verify};
-use crate::identify::direct::direct;
-use crate::identify::hansen::{HansenModel, hansen};
-use crate::identify::subspace::SubspaceModel;
+use crate::factor::{CoprimeFactors, YoulaSignals};
+use crate::identify::hansen::{HansenModel, deviation_data, hansen_of};
+use crate::identify::subspace::stabilisation::StabilisationDiagram;
+use crate::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
 use crate::reduce::{Reduction, reduce};
@@ -110,6 +112,8 @@ pub struct Identification {
     pub reduction: Option<Result<Reduction<Discrete>>>,
     /// The direct model where it was asked for, or the reason why there is none.
     pub direct: Option<Result<SubspaceModel>>,
+    /// Stabilisation diagrams.
+    pub diagrams: Diagrams,
     /// The non-parametric response of the plant where an excitation is known, or the reason why there is none.
     pub indirect: Option<Result<IndirectResponse>>,
     /// Evidence on every model.
@@ -149,6 +153,8 @@ impl Identification {
         [
             refusal(Method::Direct.key(), "direct model", &self.direct),
             refusal(Method::HansenReduced.key(), "reduced model", &self.reduction),
+            refusal("stabilisation", "stabilisation diagram of S", &self.diagrams.deviation),
+            refusal("stabilisation_direct", "stabilisation diagram of the direct model", &self.diagrams.direct),
             refusal("indirect", "indirect frequency response", &self.indirect),
         ]
         .into_iter()
@@ -160,6 +166,30 @@ impl Identification {
 fn refusal<'a, T>(key: &'static str, what: &'static str, outcome: &'a Option<Result<T>>) -> Option<Refusal<'a>> {
     let error = outcome.as_ref()?.as_ref().err()?;
     Some(Refusal { key, what, error })
+}
+
+/// S, G(S) and the diagram of S.
+fn scheme(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    settings: &RunSettings,
+) -> Result<(HansenModel, Result<StabilisationDiagram>)> {
+    let data = deviation_data(factors, signals, &settings.hansen)?;
+    let found = hansen_of(factors, &data, &settings.hansen)?;
+    let diagram = diagram(&data, &found.deviation, &settings.hansen, &settings.stabilisation);
+    Ok((found, diagram))
+}
+
+/// The plant from u and y, and its diagram.
+fn direct(
+    records: &RunRecords,
+    options: &SubspaceOptions,
+    settings: &StabilisationSettings,
+) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
+    let data = SubspaceData::new(&records.experiments(), records.time, options)?;
+    let found = data.identify(options)?;
+    let diagram = diagram(&data, &found, options, settings);
+    Ok((found, diagram))
 }
 
 /// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
@@ -180,13 +210,19 @@ pub fn identify(
     let factors = &factorisation.factors;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
-    let (hansen, direct) = clock.run(Stage::Identify, || {
+    let (scheme, direct) = clock.run(Stage::Identify, || {
         rayon::join(
-            || hansen(factors, &signals.experiments, &settings.hansen), // (25), (17)
-            || settings.direct.as_ref().map(|options| direct(&records.experiments(), records.time, options)),
+            || scheme(factors, &signals.experiments, &settings), // (25), (17)
+            || settings.direct.as_ref().map(|options| direct(&records, options, &settings.stabilisation)),
         )
     });
-    let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;
+    let (hansen, deviation_diagram) = scheme.map_err(|e| e.within(deviation_context(&signals)))?;
+    let (direct, direct_diagram) = match direct {
+        Some(Ok((model, diagram))) => (Some(Ok(model)), Some(diagram)),
+        Some(Err(reason)) => (Some(Err(reason)), None),
+        None => (None, None),
+    };
+    let diagrams = Diagrams { deviation: Some(deviation_diagram), direct: direct_diagram };
     let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
     let mut found = Identification {
         verdict: Verdict::default(),
@@ -197,6 +233,7 @@ pub fn identify(
         hansen,
         reduction,
         direct,
+        diagrams,
         indirect: None,
     };
     // (26), the loop certificate and the response that rests on no model.

@@ -1,6 +1,6 @@
 // Stabilisation diagram: poles of the models of all orders over frequency, beneath them their damping ratios.
 
-const DIAGRAM = { width: 980, left: 62, right: 16, top: 24, orders: 330, gap: 18, damping: 190, bottom: 44 };
+const DIAGRAM = { width: 980, left: 62, right: 16, top: 36, orders: 330, gap: 18, damping: 190, bottom: 44 };
 const STANDINGS = [
   { key: "settled", name: "settled", marker: "circle", colour: null, filled: true, size: 3.6 },
   { key: "frequency", name: "frequency repeats", marker: "circle", colour: null, filled: false, size: 3.1 },
@@ -10,25 +10,25 @@ const STANDINGS = [
 
 // All diagrams of a run, one at a time.
 function stabilisation(host) {
-  const diagrams = report.stabilisation, body = element("div");
+  const diagrams = report.stabilisation, body = element("div"), range = element("span");
   const tables = [...document.querySelectorAll("[data-clusters]")];
   const show = k => {
-    drawDiagram(body, diagrams[k]);
+    drawDiagram(body, range, diagrams[k]);
     tables.forEach((table, i) => { table.hidden = i !== k; });
   };
-  if (diagrams.length > 1) host.append(element("div", { class: "controls" }, chooser("Poles of", diagrams.map(d => d.label), show)));
-  host.append(body);
+  const which = diagrams.length > 1 ? chooser("Poles of", diagrams.map(d => d.label), show) : null;
+  host.append(element("div", { class: "controls" }, which, range), body);
   show(0);
   addEventListener("beforeprint", () => tables.forEach(table => { table.hidden = false; }));
 }
 
-function drawDiagram(host, diagram) {
+function drawDiagram(host, range, diagram) {
   const { style } = methodOf(diagram.method);
   const nyquist = report.sample_time != null ? 0.5 / report.sample_time : Infinity;
   const poles = diagram.poles.filter(p => p.hz > 0 && p.hz <= nyquist * (1 + 1e-9)).map(p => ({ ...p, kind: p.stable ? p.standing : "unstable" }));
   const views = diagramViews(diagram, poles, nyquist);
   const hidden = new Set();
-  let view = views[0].view;
+  let preset = views[0], view = preset.view;
   const dampings = dampingRange(diagram, poles);
   const away = poles.filter(p => p.zeta < dampings[0] || p.zeta > dampings[1]).length;
   const inner = DIAGRAM.width - DIAGRAM.left - DIAGRAM.right;
@@ -53,17 +53,18 @@ function drawDiagram(host, diagram) {
     } }, element("span", { class: "swatch", html: `<svg width="30" height="10" aria-hidden="true">${mark(kind, 15, 5)}</svg>` }), element("span", {}, `${kind.name}, ${count}`));
     return button;
   }));
-  const zoomed = views.length > 1 ? chooser("Range", views.map(v => v.name), k => { view = views[k].view; draw(); }) : null;
-  host.replaceChildren(element("div", { class: "controls" }, zoomed), legend, map, element("p", { class: "caption" },
+  range.replaceChildren(...(views.length > 1 ? [chooser("Range", views.map(v => v.name), k => { preset = views[k]; view = preset.view; draw(); })] : []));
+  host.replaceChildren(legend, map, element("p", { class: "caption" },
     "Poles of the models of all orders. Settled: the next lower order has a pole of the same frequency, damping ratio and mode shape. " +
     `Bands: clusters that are settled at enough orders, with their frequency. Dashed: the order of the model, ${diagram.chosen}.` +
-    (away ? ` ${away} poles lie beyond the axis of damping ratios.` : "") + " Drag to zoom, double-click to return."));
+    (away ? ` ${away} poles lie beyond the axis of damping ratios.` : "") +
+    (diagram.method === "hansen" ? " The poles of S are those of the loop of the plant and the controller, not those of the plant alone." : "") + " Drag to zoom, double-click to return."));
   const tip = tooltip(map);
   draw();
   map.addEventListener("pointermove", hover);
   map.addEventListener("pointerleave", leave);
   map.addEventListener("pointerdown", drag);
-  map.addEventListener("dblclick", () => { view = views[0].view; draw(); });
+  map.addEventListener("dblclick", () => { view = preset.view; draw(); });
 
   function mark(kind, x, y, grow = 0) {
     const ink = `var(${kind.colour ?? style.colour})`;
@@ -91,14 +92,15 @@ function drawDiagram(host, diagram) {
     }).join("");
   }
 
-  // The frequency above each band, where there is room.
+  // The frequency above each band, in one of two rows, where there is room.
   function bandLabels() {
-    let free = -Infinity;
+    const free = [-Infinity, -Infinity];
     return diagram.clusters.filter(c => c.hz >= view[0] && c.hz <= view[1]).map(c => {
       const x = px(c.hz), text = `${readOut(c.hz)} Hz`, half = 3.3 * text.length;
-      if (x - half < free) return "";
-      free = x + half + 6;
-      return `<text x="${x.toFixed(1)}" y="${DIAGRAM.top - 10}" text-anchor="middle" dominant-baseline="middle" fill="var(--link)">${text}</text>`;
+      const row = free.findIndex(end => x - half >= end);
+      if (row < 0) return "";
+      free[row] = x + half + 6;
+      return `<text x="${x.toFixed(1)}" y="${DIAGRAM.top - 10 - 14 * row}" text-anchor="middle" dominant-baseline="middle" fill="var(--link)">${text}</text>`;
     }).join("");
   }
 
@@ -190,7 +192,7 @@ function drawDiagram(host, diagram) {
     const ratio = view[1] / view[0];
     const moved = part => view.map(hz => hz * ratio ** part), scaled = part => [view[0] * ratio ** part, view[1] / ratio ** part];
     const next = { ArrowLeft: () => moved(-0.1), ArrowRight: () => moved(0.1), "+": () => scaled(0.2), "=": () => scaled(0.2),
-      "-": () => scaled(-0.4), 0: () => views[0].view, Escape: () => views[0].view }[event.key];
+      "-": () => scaled(-0.4), 0: () => preset.view, Escape: () => preset.view }[event.key];
     if (next && !event.ctrlKey && !event.metaKey && !event.altKey) { view = next(); draw(); event.preventDefault(); }
   }
 }

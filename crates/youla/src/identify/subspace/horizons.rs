@@ -4,8 +4,8 @@
 //! ```text
 //! y(k) = sum_{i=1..p} Xi_i z(k-i) + [D u(k)] + e(k),    AIC(p) = log det (1/T sum e e') + 2 p (m + l) l / T,   p = 1 ... max
 //! ```
-//! (Chiuso, Automatica 43, 1034, 2007, section 5; the predictor then has as many lags as the data can tell from noise). The
-//! columns of ONE triangular factor stand in the order `[z(k-1), z(k-2), ..., z(k-max), y(k)]`: the residuals of order p are
+//! (on what this autoregression means for the methods: Chiuso, Automatica 43, 1034, 2007): as many lags as the data can tell
+//! from noise. The columns of ONE triangular factor stand in the order `[z(k-1), z(k-2), ..., z(k-max), y(k)]`: the residuals of order p are
 //! what R holds of y(k) below its first `p (m + l)` columns. The future is `s = max(p, n / l + 1)` block rows, rounded up, so
 //! that it is at least as long as the past and holds the largest order n asked for.
 

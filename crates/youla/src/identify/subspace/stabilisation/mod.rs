@@ -8,8 +8,9 @@
 //! has a modal assurance criterion `MAC = |a' b|^2 / (|a|^2 |b|^2)` above 0.95. Poles of the machine settle and stay; those
 //! that a model needs for noise move from order to order. What stays is collected by [`cluster`]: see there.
 //!
-//! References: van der Auweraer and Peeters, Shock and Vibration 11, 395 (2004), diagram; Allemang, Sound and Vibration 37,
-//! 14 (2003), MAC; Reynders, Houbrechts, De Roeck, Mech. Syst. Signal Process. 29, 228 (2012), distance of poles.
+//! References: Peeters, Van der Auweraer, Guillaume, Leuridan, Shock and Vibration 11, 395 (2004), diagram; Allemang, Sound
+//! and Vibration 37(8), 14 (2003), MAC; Reynders, Houbrechts, De Roeck, Mech. Syst. Signal Process. 29, 228 (2012), distance
+//! of poles.
 
 mod cluster;
 

@@ -4,7 +4,7 @@
 use super::*;
 
 /// Columns of a file of the shared data; `None`, said aloud, where the data are absent.
-pub(super) fn load(file: &str, inputs: usize) -> Option<(Mat<f64>, Mat<f64>)> {
+fn load(file: &str, inputs: usize) -> Option<(Mat<f64>, Mat<f64>)> {
     let text = std::fs::read_to_string(crate::record::scratch::data_folder()?.join(file)).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect()).collect();
@@ -15,7 +15,7 @@ pub(super) fn load(file: &str, inputs: usize) -> Option<(Mat<f64>, Mat<f64>)> {
 }
 
 /// Takes off the least-squares straight line of each column.
-pub(super) fn detrend(record: &Mat<f64>) -> Mat<f64> {
+fn detrend(record: &Mat<f64>) -> Mat<f64> {
     let line = Mat::from_fn(record.nrows(), 2, |k, j| (k as f64 / record.nrows() as f64).powi(j as i32));
     let fit = crate::linalg::least_squares("a line", line.as_ref(), record.as_ref()).unwrap().x;
     record - line * fit

@@ -69,23 +69,6 @@ fn clusters_find_the_modes_of_the_bearing() {
     }
 }
 
-/// The first resonance of the radial arm of a compact-disc player.
-#[test]
-fn clusters_of_the_player_arm() {
-    let Some((u, y)) = measured::load("cd_player_arm/CD_player_arm.dat", 2) else { return };
-    let (u, y) = (measured::detrend(&u), measured::detrend(&y));
-    let method = SubspaceOptions { weight: Weight::Cva, horizon: 20, ..Default::default() };
-    let data = SubspaceData::new(&one(&u, &y), clock(), &method).unwrap();
-    let orders: Vec<usize> = (1..=24).collect();
-    let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default()).unwrap();
-    for c in &diagram.clusters {
-        println!(
-            "  {:.5} +- {:.5} Hz, {:.4} +- {:.4}, {} orders, {} settled",
-            c.hz, c.hz_spread, c.zeta, c.zeta_spread, c.orders, c.settled
-        );
-    }
-}
-
 #[test]
 fn what_makes_no_diagram_is_refused() {
     let (u, y, time) = bearing_record(1000, 0.1, 1);

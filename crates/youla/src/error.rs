@@ -535,8 +535,10 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
-    /// Another scaling, factorisation or delays than those of the factored data was asked for.
-    #[error("scaling, factorisation and delays are part of the factored data; factor the records again to change them")]
+    /// Another scaling, factorisation, delays or automatic horizon than those of the factored data was asked for.
+    #[error(
+        "scaling, factorisation, delays and automatic horizon are part of the factored data; factor the records again to change them"
+    )]
     Refactor,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.

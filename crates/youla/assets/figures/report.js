@@ -195,7 +195,7 @@ function poles(host) {
 // A line of the verdict leads nowhere where the run has no such part.
 for (const link of document.querySelectorAll(".evidence")) if (!document.querySelector(link.hash)) link.remove();
 
-const BUILDERS = { data, signals, order, verification, frequency, poles, reduction };
+const BUILDERS = { data, signals, order, stabilisation, verification, frequency, poles, reduction };
 for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dataset.figure](host);
 
 // Worst closed-loop poles of discrete loops are judged by their magnitude.

@@ -8,7 +8,7 @@
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
 use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
-use super::subspace::{SubspaceModel, SubspaceOptions};
+use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace};
 use crate::{MatRef, Result};
@@ -50,5 +50,21 @@ pub fn hansen_disturbed(
     disturbances: &[MatRef<'_, f64>],
     options: &SubspaceOptions,
 ) -> Result<HansenModel> {
-    hansen_structured(factors, signals, disturbances, options, &DeviationOptions::default())
+    let data = deviation_data(factors, signals, disturbances, options)?;
+    hansen_structured(factors, &data, options, &DeviationOptions::default())
+}
+
+/// The signals of one or more experiments, factored for the method of `options`: for models of several orders, or what else
+/// [`SubspaceData`] serves.
+///
+/// # Errors
+/// As [`SubspaceData::disturbed`].
+pub fn deviation_data(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    disturbances: &[MatRef<'_, f64>],
+    options: &SubspaceOptions,
+) -> Result<SubspaceData> {
+    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
+    SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)
 }

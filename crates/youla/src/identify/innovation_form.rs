@@ -10,11 +10,11 @@
 //! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
 
 use super::hansen::HansenModel;
-use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
-use crate::factor::{CoprimeFactors, YoulaSignals};
+use super::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
+use crate::factor::CoprimeFactors;
 use crate::linalg::least_squares;
 use crate::lti::{Discrete, StateSpace, simulate};
-use crate::{Error, Mat, MatRef, Result};
+use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
 
 /// What is known of S before it is identified.
@@ -73,26 +73,23 @@ pub struct InnovationForm {
     pub from_kalman: Option<f64>,
 }
 
-/// Identifies S with the structure asked for, and recombines it to G(S).
+/// Identifies S with the structure asked for from [`super::hansen::deviation_data`], and recombines it to G(S).
 ///
 /// # Errors
 /// As [`super::hansen::hansen_disturbed`]; for the innovation form [`Error::Unstable`] where `A - K_s C` is not stable, as for
 /// an unstable plant, and [`Error::OutOfRange`] for delays, no refits or a tolerance below zero.
 pub fn hansen_structured(
     factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    disturbances: &[MatRef<'_, f64>],
+    data: &SubspaceData,
     options: &SubspaceOptions,
     deviation: &DeviationOptions,
 ) -> Result<HansenModel> {
-    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
-    let data = SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)?;
     let free = data.identify(options)?;
     let (deviation, innovation_form) = match deviation.structure {
         Structure::Free => (free, None),
         Structure::Innovation => {
             check(options, deviation)?;
-            let (model, form) = refit(factors, &data, free, options, deviation)?;
+            let (model, form) = refit(factors, data, free, options, deviation)?;
             (model, Some(form))
         }
     };

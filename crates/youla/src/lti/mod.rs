@@ -2,7 +2,7 @@
 
 mod connect;
 mod discretise;
-mod modes;
+pub(crate) mod modes;
 mod partitioned;
 mod response;
 mod scaling;

@@ -42,7 +42,8 @@ impl<T: TimeDomain> StateSpace<T> {
     }
 }
 
-fn mode<T: TimeDomain>(time: T, pole: c64) -> Mode {
+/// The mode of one pole.
+pub(crate) fn mode<T: TimeDomain>(time: T, pole: c64) -> Mode {
     let s = time.continuous_pole(pole);
     let size = s.re.hypot(s.im);
     let zeta = match size {

@@ -43,6 +43,9 @@ pub struct ReportData {
     pub experiments: Vec<Experiment>,
     /// How orders were chosen.
     pub orders: Vec<OrderChoice>,
+    /// Poles over orders.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub stabilisation: Vec<Stabilisation>,
     /// Measured against predicted.
     pub verification: Vec<Verification>,
     /// Frequency responses.
@@ -152,6 +155,8 @@ pub enum Evidence {
     Signals,
     /// Singular values.
     Order,
+    /// Stabilisation diagram.
+    Stabilisation,
     /// Measured against predicted.
     Verification,
     /// Frequency responses.
@@ -261,6 +266,75 @@ pub struct OrderChoice {
     pub values: Vec<f64>,
     /// The order that was taken.
     pub chosen: usize,
+}
+
+/// The stabilisation diagram of one method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stabilisation {
+    /// Key of the method.
+    pub method: String,
+    /// What was identified, for example "S from alpha to beta".
+    pub label: String,
+    /// The orders, rising.
+    pub orders: Vec<usize>,
+    /// The order of the model.
+    pub chosen: usize,
+    /// The poles by order.
+    pub poles: Vec<StabilisationPole>,
+    /// Clusters by frequency.
+    pub clusters: Vec<StabilisationCluster>,
+}
+
+/// One pole of a stabilisation diagram.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StabilisationPole {
+    /// Order of its model.
+    pub order: usize,
+    /// Natural frequency, Hz.
+    pub hz: f64,
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Standard deviation of the frequency, Hz, where it is known.
+    pub hz_deviation: Option<f64>,
+    /// Standard deviation of the damping ratio, where it is known.
+    pub zeta_deviation: Option<f64>,
+    /// Whether the pole is stable.
+    pub stable: bool,
+    /// What the next lower order says of it.
+    pub standing: PoleStanding,
+    /// Its cluster, by its place.
+    pub cluster: Option<usize>,
+}
+
+/// What the next lower order says of a pole.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PoleStanding {
+    /// It has none of this frequency.
+    New,
+    /// It has one of this frequency, with another damping ratio or mode shape.
+    Frequency,
+    /// It has one of this frequency, damping ratio and mode shape.
+    Settled,
+}
+
+/// Poles of many orders that are close to each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StabilisationCluster {
+    /// Median of the natural frequencies, Hz.
+    pub hz: f64,
+    /// Median of the damping ratios.
+    pub zeta: f64,
+    /// Half the distance of the quartiles of the frequencies, Hz.
+    pub hz_spread: f64,
+    /// Half the distance of the quartiles of the damping ratios.
+    pub zeta_spread: f64,
+    /// Number of orders at which it appears.
+    pub orders: usize,
+    /// Number of orders at which it is settled.
+    pub settled: usize,
+    /// Mode shape: magnitude and phase in degrees of each output.
+    pub shape: Vec<[f64; 2]>,
 }
 
 /// Measured against predicted on one record.

@@ -9,8 +9,11 @@ use super::{phase, tables};
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../../assets/report.html");
-const FIGURES: [&str; 2] =
-    [include_str!("../../assets/figures/poles.js"), include_str!("../../assets/figures/report.js")];
+const FIGURES: [&str; 3] = [
+    include_str!("../../assets/figures/poles.js"),
+    include_str!("../../assets/figures/stabilisation.js"),
+    include_str!("../../assets/figures/report.js"),
+];
 
 /// Renders a report as one HTML file.
 ///

@@ -4,7 +4,9 @@ use super::folder::RunFolder;
 use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::settings::RunSettings;
+use super::stabilisation::{as_csv, as_json};
 use crate::factor::YoulaSignals;
+use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceModel, amplitudes};
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{Packing, Value, Variable, write_mat};
@@ -215,6 +217,8 @@ impl Writer<'_> {
             Some(Err(e)) => self.folder.json("4-identify/direct.json", &refused(e))?,
             None => {}
         }
+        self.diagram("4-identify/stabilisation_deviation", found.diagrams.deviation.as_ref(), &named("beta", y))?;
+        self.diagram("4-identify/stabilisation_direct", found.diagrams.direct.as_ref(), y)?;
         self.model("5-recombine/hansen", &found.hansen.plant, serde_json::Value::Null)?;
         match &found.reduction {
             Some(Ok(r)) => {
@@ -224,6 +228,20 @@ impl Writer<'_> {
                 self.model("6-reduce/hansen_reduced", &r.model, details)
             }
             Some(Err(e)) => self.folder.json("6-reduce/hansen_reduced.json", &refused(e)),
+            None => Ok(()),
+        }
+    }
+
+    /// A stabilisation diagram, or why there is none.
+    fn diagram(&self, name: &str, diagram: Option<&Result<StabilisationDiagram>>, outputs: &[Channel]) -> Result<()> {
+        match diagram {
+            Some(Ok(diagram)) => {
+                let mut file = as_json(diagram, outputs);
+                file["provenance"] = serde_json::json!(self.provenance);
+                self.folder.json(&format!("{name}.json"), &file)?;
+                self.folder.text(&format!("{name}.csv"), &as_csv(diagram))
+            }
+            Some(Err(e)) => self.folder.json(&format!("{name}.json"), &refused(e)),
             None => Ok(()),
         }
     }
@@ -312,6 +330,8 @@ fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
         "order": s.order.order,
         "horizon": s.horizon,
         "past": s.past,
+        "automatic_horizon": s.automatic_horizon,
+        "order_choice": s.order,
         "columns": s.columns,
         "singular_values": s.singular_values,
         "excitation_rcond": s.excitation_rcond,

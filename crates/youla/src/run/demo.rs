@@ -2,7 +2,9 @@
 
 use super::models::{ControllerSettings, Feedback, NominalModel};
 use super::records::{LoopRecord, RunRecords, SourceFile};
-use super::settings::{DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings};
+use super::settings::{
+    DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, StabilisationSettings, VerificationSettings,
+};
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
 use crate::identify::innovation_form::DeviationOptions;
@@ -169,6 +171,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         hansen: subspace,
         deviation: DeviationOptions::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
+        stabilisation: StabilisationSettings::default(),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },
         seed: Some(seed),

@@ -17,6 +17,7 @@ mod response;
 mod segments;
 mod settings;
 mod signals;
+mod stabilisation;
 mod summary;
 mod verdict;
 mod write;
@@ -36,9 +37,10 @@ pub use redraw::redraw;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
-    VerificationSettings,
+    StabilisationSettings, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
+pub use stabilisation::Diagrams;
 pub use summary::summary;
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

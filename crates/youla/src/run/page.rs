@@ -6,6 +6,7 @@ use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::response::{decibel, log_grid, model_responses};
 use super::settings::Prediction;
+use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::FrequencyResponse;
@@ -36,6 +37,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         fits: fits(found),
         experiments: experiments(found)?,
         orders: orders(found),
+        stabilisation: diagrams(found),
         verification: found
             .records
             .verification
@@ -160,6 +162,19 @@ fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
     if let Some(Ok(direct)) = &found.direct {
         all.push(choice(Method::Direct, "plant from u to y", direct));
     }
+    all
+}
+
+fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
+    let scheme = found.diagrams.deviation.as_ref().and_then(|d| d.as_ref().ok());
+    let direct = found.diagrams.direct.as_ref().and_then(|d| d.as_ref().ok());
+    let order_of_direct = found.direct.as_ref().and_then(|d| d.as_ref().ok()).map(|d| d.order.order);
+    let mut all = Vec::new();
+    all.extend(
+        scheme.map(|d| drawn(d, Method::Hansen.key(), "S from alpha to beta", found.hansen.deviation.order.order)),
+    );
+    let direct = direct.zip(order_of_direct);
+    all.extend(direct.map(|(d, order)| drawn(d, Method::Direct.key(), "plant from u to y", order)));
     all
 }
 

@@ -3,13 +3,15 @@
 use super::factorise::{Factorisation, factorise_run};
 use super::records::RunRecords;
 use super::response::{check_grid, indirect};
-use super::settings::RunSettings;
+use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
+use super::stabilisation::{Diagrams, diagram};
 use super::verdict::{Method, Verdict, verify};
-use crate::identify::direct::direct_disturbed;
-use crate::identify::hansen::HansenModel;
+use crate::factor::CoprimeFactors;
+use crate::identify::hansen::{HansenModel, deviation_data};
 use crate::identify::innovation_form::hansen_structured;
-use crate::identify::subspace::{SubspaceModel, SubspaceOptions};
+use crate::identify::subspace::stabilisation::StabilisationDiagram;
+use crate::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
 use crate::reduce::{Reduction, reduce};
@@ -111,6 +113,8 @@ pub struct Identification {
     pub reduction: Option<Result<Reduction<Discrete>>>,
     /// The direct model where it was asked for, or the reason why there is none.
     pub direct: Option<Result<SubspaceModel>>,
+    /// Stabilisation diagrams.
+    pub diagrams: Diagrams,
     /// The non-parametric response of the plant where an excitation is known, or the reason why there is none.
     pub indirect: Option<Result<IndirectResponse>>,
     /// Evidence on every model.
@@ -150,6 +154,8 @@ impl Identification {
         [
             refusal(Method::Direct.key(), "direct model", &self.direct),
             refusal(Method::HansenReduced.key(), "reduced model", &self.reduction),
+            refusal("stabilisation", "stabilisation diagram of S", &self.diagrams.deviation),
+            refusal("stabilisation_direct", "stabilisation diagram of the direct model", &self.diagrams.direct),
             refusal("indirect", "indirect frequency response", &self.indirect),
         ]
         .into_iter()
@@ -182,6 +188,32 @@ fn require_length(options: &SubspaceOptions, records: &RunRecords, settle: usize
     }
 }
 
+/// S, G(S) and the diagram of S.
+fn scheme(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &DeviationSignals,
+    records: &RunRecords,
+    settings: &RunSettings,
+) -> Result<(HansenModel, Result<StabilisationDiagram>)> {
+    let lines = records.disturbances(signals.settle);
+    let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
+    let found = hansen_structured(factors, &data, &settings.hansen, &settings.deviation)?;
+    let diagram = diagram(&data, &found.deviation, &settings.hansen, &settings.stabilisation);
+    Ok((found, diagram))
+}
+
+/// The plant from u and y, and its diagram.
+fn direct(
+    records: &RunRecords,
+    options: &SubspaceOptions,
+    settings: &StabilisationSettings,
+) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
+    let data = SubspaceData::disturbed(&records.experiments(), &records.disturbances(0), records.time, options)?;
+    let found = data.identify(options)?;
+    let diagram = diagram(&data, &found, options, settings);
+    Ok((found, diagram))
+}
+
 /// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
 ///
 /// A direct model, a reduction or an indirect response that is impossible does not end the run: the reason stands in its
@@ -201,18 +233,19 @@ pub fn identify(
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
     require_length(&settings.hansen, &records, signals.settle)?;
-    let (experiments, lines, time) = (records.experiments(), records.disturbances(0), records.time);
-    let lines_settled = records.disturbances(signals.settle);
-    let (hansen, direct) = clock.run(Stage::Identify, || {
+    let (scheme, direct) = clock.run(Stage::Identify, || {
         rayon::join(
-            || {
-                let (experiments, options) = (&signals.experiments, &settings.hansen);
-                hansen_structured(factors, experiments, &lines_settled, options, &settings.deviation) // (25), (17)
-            },
-            || settings.direct.as_ref().map(|options| direct_disturbed(&experiments, &lines, time, options)),
+            || scheme(factors, &signals, &records, &settings), // (25), (17)
+            || settings.direct.as_ref().map(|options| direct(&records, options, &settings.stabilisation)),
         )
     });
-    let hansen = hansen.map_err(|e| e.within(deviation_context(&signals)))?;
+    let (hansen, deviation_diagram) = scheme.map_err(|e| e.within(deviation_context(&signals)))?;
+    let (direct, direct_diagram) = match direct {
+        Some(Ok((model, diagram))) => (Some(Ok(model)), Some(diagram)),
+        Some(Err(reason)) => (Some(Err(reason)), None),
+        None => (None, None),
+    };
+    let diagrams = Diagrams { deviation: Some(deviation_diagram), direct: direct_diagram };
     let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
     let mut found = Identification {
         verdict: Verdict::default(),
@@ -223,6 +256,7 @@ pub fn identify(
         hansen,
         reduction,
         direct,
+        diagrams,
         indirect: None,
     };
     // (26), the loop certificate and the response that rests on no model.

@@ -6,6 +6,7 @@ use super::models::{ControllerSettings, NominalModel};
 use super::segments;
 use crate::identify::innovation_form::DeviationOptions;
 use crate::identify::subspace::SubspaceOptions;
+use crate::identify::subspace::stabilisation::StabilisationOptions;
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Gaps, open};
 use crate::reduce::ReductionOptions;
 use crate::{Error, Result};
@@ -41,6 +42,9 @@ pub struct RunSettings {
     /// Reduction of G(S); left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionOptions>,
+    /// The stabilisation diagrams of S and of the direct model.
+    #[serde(default)]
+    pub stabilisation: StabilisationSettings,
     /// How models are held against the verification records.
     #[serde(default)]
     pub verification: VerificationSettings,
@@ -165,6 +169,17 @@ impl Default for FactorSettings {
     fn default() -> Self {
         FactorSettings { construction: Construction::default(), input_weight: 1.0, output_noise: 1.0, settle: None }
     }
+}
+
+/// Options of the stabilisation diagrams.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct StabilisationSettings {
+    /// Largest order; when absent, twice the order of the model and at least 20, as far as the horizon allows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub max_order: Option<usize>,
+    /// When poles of different orders count as the same.
+    pub criteria: StabilisationOptions,
 }
 
 /// How a model predicts a verification record.
@@ -333,6 +348,9 @@ impl RunSettings {
             ("[data] time_tolerance", self.data.time_tolerance, "at least 0 and below 1", part),
             ("[factors] input_weight", factors.input_weight, "positive", positive),
             ("[factors] output_noise", factors.output_noise, "positive", positive),
+            ("[stabilisation] max_order", given(self.stabilisation.max_order.map(|n| n as f64)), "at least 1", |x| {
+                x >= 1.0
+            }),
             ("[frequency_response] overlap", response.overlap, "at least 0 and below 1", part),
             ("[frequency_response] from_hz", given(response.from_hz), "a positive frequency", positive),
             ("[frequency_response] window", window as f64, "at least 4 samples", |x| x >= 4.0),

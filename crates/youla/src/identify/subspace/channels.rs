@@ -86,6 +86,11 @@ impl Channels {
         (OutputPair { a: model.a().to_owned(), c }, gain)
     }
 
+    /// Refuses experiments that are too short for so many block rows of past and future.
+    pub(super) fn check_lengths(&self, blocks: (usize, usize)) -> Result<()> {
+        self.experiments.iter().enumerate().try_for_each(|(k, e)| check_length(k, e.u.nrows(), blocks))
+    }
+
     /// Puts the four matrices back into the units of the record.
     pub(super) fn unscale_model(
         &self,
@@ -104,7 +109,10 @@ impl Channels {
 
 /// Shapes, lengths and values; returns the numbers of inputs and outputs.
 fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(usize, usize)> {
-    let (past, horizon) = (options.past(), options.horizon);
+    let (past, horizon) = match options.automatic_horizon {
+        Some(automatic) => (automatic.max, 1),
+        None => (options.past(), options.horizon),
+    };
     check_blocks(options)?;
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
@@ -117,13 +125,7 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         check_finite(&named("input"), *u)?;
         check_finite(&named("output"), *y)?;
         let delay = options.delays.iter().copied().max().unwrap_or(0);
-        let needed = past.saturating_add(horizon).saturating_add(delay);
-        if u.nrows() < needed {
-            let delayed = if delay > 0 { format!(" after a delay of {delay} samples") } else { String::new() };
-            let what =
-                format!("experiment {} with a horizon of {horizon} and a past of {past} block rows{delayed}", k + 1);
-            return Err(Error::TooFewSamples { what, found: u.nrows(), needed });
-        }
+        check_length(k, u.nrows().saturating_sub(delay), (past, horizon))?;
     }
     Ok((m, p))
 }
@@ -143,6 +145,15 @@ fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_,
     Ok(())
 }
 
+/// Refuses an experiment without a Hankel column.
+fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize)) -> Result<()> {
+    if samples < past + horizon {
+        let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
+        return Err(Error::TooFewSamples { what, found: samples, needed: past + horizon });
+    }
+    Ok(())
+}
+
 /// Outputs without what known signals explain of them.
 fn without(y: MatRef<'_, f64>, w: MatRef<'_, f64>) -> Result<Mat<f64>> {
     Ok(y - w * regress("the known disturbance", w, y)?)
@@ -155,6 +166,9 @@ fn rms_or_one(record: MatRef<'_, f64>, j: usize) -> f64 {
 
 /// Refuses a horizon or past without meaning.
 pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
+    if let Some(automatic) = options.automatic_horizon {
+        return at_least("the largest past", automatic.max, 1, "at least 1 block row");
+    }
     at_least("the horizon", options.horizon, 2, "at least 2 block rows")?;
     at_least("the past", options.past(), 1, "at least 1 block row")
 }

@@ -39,6 +39,11 @@ pub(super) enum Arrangement {
     InputsFirst,
     /// `[z(k-p) ... z(k) ... z(k+f-1)]`, `z = [u; y]`.
     Chronological,
+    /// `[z(k-1) ... z(k-p) y(k) u(k)]` for a future of one block row; with feedthrough u(k) first.
+    NewestFirst {
+        /// Whether u(k) is a regressor.
+        feedthrough: bool,
+    },
 }
 
 impl Arrangement {
@@ -51,6 +56,14 @@ impl Arrangement {
         let (before, after) = (0..past, past..past + horizon);
         match self {
             Arrangement::Chronological => (0..(past + horizon) * q).collect(),
+            Arrangement::NewestFirst { feedthrough } => {
+                let lags = before.rev().flat_map(|i| block_rows(i..i + 1, 0..q));
+                let (u, y) = (block_rows(after.clone(), 0..m), block_rows(after, m..q));
+                match feedthrough {
+                    true => u.chain(lags).chain(y).collect(),
+                    false => lags.chain(y).chain(u).collect(),
+                }
+            }
             Arrangement::InputsFirst => block_rows(after.clone(), 0..m)
                 .chain(block_rows(before.clone(), 0..m))
                 .chain(block_rows(before, m..q))

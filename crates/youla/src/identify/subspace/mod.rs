@@ -17,31 +17,37 @@ mod disturbance;
 mod factorisation;
 mod gram;
 mod hankel;
+mod horizons;
 mod innovation;
 mod modal;
 mod modal_sums;
 mod open_loop;
 mod options;
 mod order;
+mod order_models;
 mod output_error;
 mod parsim;
 mod pbsid;
 mod predictor_form;
+mod projected;
 mod projection;
 mod realisation;
 mod sensitivity;
 mod ssarx;
+pub mod stabilisation;
 mod stability;
 #[cfg(test)]
 mod tests;
 mod varx;
 
 pub use disturbance::{Line, amplitudes, harmonics, lines};
+pub use horizons::{AutomaticHorizon, HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
 pub use options::{
-    ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, Stability, SubspaceOptions, Weight,
+    AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
+    SubspaceOptions, Weight,
 };
-pub use order::{OrderCandidate, OrderReport, OrderRule};
+pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
 
@@ -50,7 +56,8 @@ use crate::{Error, Result};
 use channels::{Channels, check_blocks};
 use factorisation::{Arrangement, DataTriangle};
 use faer::{Mat, MatRef, c64};
-use realisation::OutputPair;
+use output_error::Fitted;
+use projected::{Estimate, Projected};
 
 /// Records of one experiment: row k is time k.
 #[derive(Debug, Clone, Copy)]
@@ -90,6 +97,8 @@ pub struct SubspaceModel {
     pub horizon: usize,
     /// Block rows of the past.
     pub past: usize,
+    /// How both were found, where that was asked for.
+    pub automatic_horizon: Option<HorizonReport>,
     /// Columns of the block-Hankel matrices, over all experiments, less the directions that known disturbances take.
     pub columns: usize,
     /// Smallest over largest singular value of the block-Hankel matrix of the inputs with rows of unit length.
@@ -175,7 +184,9 @@ pub struct SubspaceData {
     channels: Channels,
     triangle: DataTriangle,
     time: Discrete,
+    /// With the horizons that were found, where that was asked for.
     factored: SubspaceOptions,
+    automatic_horizon: Option<HorizonReport>,
 }
 
 impl SubspaceData {
@@ -204,9 +215,13 @@ impl SubspaceData {
             true => Arrangement::Chronological,
             false => Arrangement::InputsFirst,
         };
-        let blocks = (options.past(), options.horizon);
+        let automatic =
+            options.automatic_horizon.map(|choice| horizons::find(&channels, choice, options)).transpose()?;
+        let blocks = automatic.as_ref().map_or((options.past(), options.horizon), |found| (found.past, found.horizon));
+        channels.check_lengths(blocks)?;
         let triangle = DataTriangle::new(&channels, blocks, arrangement, options.factorisation)?;
-        Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
+        let factored = SubspaceOptions { past: Some(blocks.0), horizon: blocks.1, ..options.clone() };
+        Ok(SubspaceData { channels, triangle, time, factored, automatic_horizon: automatic })
     }
 
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
@@ -216,38 +231,66 @@ impl SubspaceData {
     /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Refactor`] for another
     /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
-        let held = (self.factored.scaling, self.factored.factorisation, &self.factored.delays);
-        if (options.scaling, options.factorisation, &options.delays) != held {
+        let options = self.checked(options)?;
+        self.model(&self.project(&options)?, &options)
+    }
+
+    /// Options that these data serve, with the horizons that were found where they ask for that.
+    fn checked(&self, options: &SubspaceOptions) -> Result<SubspaceOptions> {
+        let held = &self.factored;
+        let automatic = options.automatic_horizon.is_some();
+        if (options.scaling, options.factorisation, &options.delays) != (held.scaling, held.factorisation, &held.delays)
+            || automatic && options.automatic_horizon != held.automatic_horizon
+        {
             return Err(Error::Refactor);
         }
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
-        let found = match options.weight.is_for_closed_loops() {
-            true => predictor_form::estimate(&self.triangle, options, self.time)?,
-            false => open_loop::estimate(&self.triangle, options, self.time)?,
-        };
-        let fitted =
-            output_error::fit(&self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
+        Ok(match automatic {
+            true => SubspaceOptions { horizon: held.horizon, past: held.past, ..options.clone() },
+            false => options.clone(),
+        })
+    }
+
+    /// What all orders share.
+    fn project(&self, options: &SubspaceOptions) -> Result<Projected> {
+        Projected::new(&self.triangle, options)
+    }
+
+    fn model(&self, projected: &Projected, options: &SubspaceOptions) -> Result<SubspaceModel> {
+        let by_models = |auto: &AutoOrder, max| order_models::choose(self, projected, auto, max, options);
+        let order = order::choose(options.order, projected.evidence()?, by_models)?;
+        let ScaledModel { estimate, fitted } = self.scaled_model(projected, order.order, options)?;
+        let (factor, columns) = projected.data();
         let (delays, delayed) = (&self.channels.delays, &self.channels.delayed);
-        let model = self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?;
-        let mut stability = found.stability;
+        let model = self.channels.unscale_model(estimate.pair, fitted.b, fitted.d, self.time)?;
+        let mut stability = estimate.stability;
         stability.poles.extend(vec![c64::new(0.0, 0.0); delays.states()]);
         Ok(SubspaceModel {
             model: delays.put_before(model)?,
-            innovation: delays.put_below(found.innovation.unscale(&self.channels.y_scale)),
+            innovation: delays.put_below(estimate.innovation.unscale(&self.channels.y_scale)),
             initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
-            singular_values: found.singular_values,
-            order: found.order,
+            singular_values: projected.singular_values().to_vec(),
+            order,
             delays: options.delays.clone(),
             stability,
             fit: fitted.quality,
             horizon: options.horizon,
             past: options.past(),
-            columns: found.columns,
-            excitation_rcond: found.excitation_rcond,
-            factor: found.factor,
+            automatic_horizon: self.automatic_horizon.clone().filter(|_| options.automatic_horizon.is_some()),
+            columns,
+            excitation_rcond: projected.excitation_rcond(),
+            factor,
         })
+    }
+
+    /// The model of one order in scaled units.
+    fn scaled_model(&self, projected: &Projected, order: usize, options: &SubspaceOptions) -> Result<ScaledModel> {
+        let estimate = projected.estimate(order, options.stability, self.time)?;
+        let gain = estimate.innovation.gain();
+        let fitted = output_error::fit(&self.channels, &estimate.pair, gain, &estimate.stability, options)?;
+        Ok(ScaledModel { estimate, fitted })
     }
 }
 
@@ -272,14 +315,8 @@ impl SubspaceData {
     }
 }
 
-/// What the data say about all but B, D and the initial states, in scaled units.
-struct Estimate {
-    pair: OutputPair,
-    stability: StabilityReport,
-    innovation: Innovation,
-    singular_values: Vec<f64>,
-    order: OrderReport,
-    columns: usize,
-    excitation_rcond: f64,
-    factor: DataFactor,
+/// All of a model, in scaled units.
+struct ScaledModel {
+    estimate: Estimate,
+    fitted: Fitted,
 }

@@ -2,40 +2,60 @@
 
 use super::factorisation::DataTriangle;
 use super::hankel::HankelFactor;
-use super::order::{Evidence, choose};
-use super::projection::{canonical_correlations, project};
-use super::realisation::{StateSequences, realise};
-use super::{Estimate, SubspaceOptions, innovation, stability};
-use crate::Result;
-use crate::lti::Discrete;
+use super::innovation::{self, Innovation};
+use super::order::Evidence;
+use super::projection::{Projection, canonical_correlations, project};
+use super::realisation::{OutputPair, StateSequences, realise};
+use super::{SubspaceOptions, Weight};
+use crate::{Error, Result};
+use faer::MatRef;
 
-/// A, C and the innovations by the method that the weight names.
-pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
-    let factor = HankelFactor::new(data, options.past(), options.horizon)?;
-    let excitation_rcond = factor.require_excitation()?;
-    let projection = project(&factor, options.weight)?;
-    let order = choose(
-        options.order,
-        Evidence {
+/// The projection that the weight names.
+pub(super) struct OpenLoop {
+    pub(super) factor: HankelFactor,
+    pub(super) projection: Projection,
+    pub(super) excitation_rcond: f64,
+    weight: Weight,
+}
+
+impl OpenLoop {
+    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+        let factor = HankelFactor::new(data, options.past(), options.horizon)?;
+        let excitation_rcond = factor.require_excitation()?;
+        let projection = project(&factor, options.weight)?;
+        Ok(OpenLoop { factor, projection, excitation_rcond, weight: options.weight })
+    }
+
+    pub(super) fn evidence(&self) -> Result<Evidence<'_>> {
+        let factor = &self.factor;
+        Ok(Evidence {
             inputs: factor.inputs,
             outputs: factor.outputs,
             horizon: factor.horizon,
             columns: factor.columns,
-            singular_values: &projection.singular_values,
-            canonical_correlations: canonical_correlations(&factor, &projection)?,
-        },
-    )?;
-    let states = StateSequences::new(&factor, projection.observability(order.order))?;
-    let (pair, stability) = stability::apply(options.stability, realise(options.weight, &states)?, time)?;
-    let innovation = innovation::identify(states.residuals(&pair), states.present_outputs(), factor.columns, &pair);
-    Ok(Estimate {
-        pair,
-        stability,
-        innovation,
-        singular_values: projection.singular_values,
-        order,
-        columns: factor.columns,
-        excitation_rcond,
-        factor: factor.report,
-    })
+            singular_values: &self.projection.singular_values,
+            canonical_correlations: canonical_correlations(factor, &self.projection)?,
+        })
+    }
+
+    /// A and C.
+    pub(super) fn realise(&self, order: usize) -> Result<OutputPair> {
+        realise(self.weight, &self.factor, self.observability(order)?)
+    }
+
+    /// From the residuals of the state and output equations with given A and C.
+    pub(super) fn innovation(&self, pair: &OutputPair) -> Result<Innovation> {
+        let states = StateSequences::new(&self.factor, self.observability(pair.a.nrows())?)?;
+        let residuals = states.residuals(pair);
+        Ok(innovation::identify(residuals, states.present_outputs(), self.factor.columns, pair))
+    }
+
+    fn observability(&self, order: usize) -> Result<MatRef<'_, f64>> {
+        let (outputs, horizon) = (self.factor.outputs, self.factor.horizon);
+        let largest = (horizon - 1) * outputs;
+        if order > largest {
+            return Err(Error::OrderBeyondHorizon { order, largest, horizon });
+        }
+        Ok(self.projection.observability(order))
+    }
 }

@@ -1,5 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
+use super::AutomaticHorizon;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -23,6 +24,9 @@ pub struct SubspaceOptions {
     /// plant K is small, and this is the decay of the plant itself.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub past: Option<usize>,
+    /// Both from the data instead, by the order of a vector autoregression; `horizon` and `past` have no meaning then.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub automatic_horizon: Option<AutomaticHorizon>,
     /// Order of the model.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
@@ -47,6 +51,7 @@ impl Default for SubspaceOptions {
             weight: Weight::default(),
             horizon: 20,
             past: None,
+            automatic_horizon: None,
             order: Order::default(),
             feedthrough: Feedthrough::default(),
             delays: Vec::new(),
@@ -62,6 +67,14 @@ impl SubspaceOptions {
     /// Block rows of the past.
     pub fn past(&self) -> usize {
         self.past.unwrap_or(self.horizon)
+    }
+
+    /// Largest order that is asked for.
+    pub fn largest_order(&self) -> usize {
+        match self.order {
+            Order::Fixed(order) => order,
+            Order::Auto(auto) => auto.max,
+        }
     }
 }
 
@@ -103,21 +116,76 @@ impl Weight {
 }
 
 /// How the order is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+///
+/// ```
+/// use youla::identify::subspace::{AutoOrder, Order, OrderRule, SubspaceOptions};
+/// let aic = Order::Auto(AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(8) });
+/// assert_eq!(SubspaceOptions { order: aic, ..Default::default() }.order, aic);
+/// ```
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Order {
     /// The order given.
     Fixed(usize),
-    /// The order that the criterion of [`super::OrderRule::Svc`] proposes.
-    Auto {
-        /// Largest order to consider.
-        max: usize,
-    },
+    /// The order that a rule proposes.
+    Auto(AutoOrder),
 }
 
 impl Default for Order {
     fn default() -> Self {
-        Order::Auto { max: 12 }
+        Order::Auto(AutoOrder::default())
+    }
+}
+
+/// Choice of the order by a rule.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AutoOrder {
+    /// Largest order to consider; the horizon may allow less.
+    pub max: usize,
+    /// The rule.
+    pub rule: OrderRule,
+    /// Cross-validation only: part of each experiment, from its start, from which the models are found.
+    pub leading: f64,
+    /// Cross-validation only: the lowest order counts whose fit is below the best one by no more than this, percentage
+    /// points.
+    pub tolerance: f64,
+}
+
+impl Default for AutoOrder {
+    fn default() -> Self {
+        AutoOrder { max: 12, rule: OrderRule::default(), leading: 2.0 / 3.0, tolerance: 0.2 }
+    }
+}
+
+impl AutoOrder {
+    /// Orders up to `max`, all else as by default.
+    pub fn up_to(max: usize) -> Self {
+        AutoOrder { max, ..Self::default() }
+    }
+}
+
+/// A rule that proposes an order; the formulas stand in `order.rs` and `order_models.rs`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OrderRule {
+    /// Singular value criterion: the first canonical correlation that is left out, squared, and `d(n) log(T) / T`.
+    #[default]
+    Svc,
+    /// As SVC, with the sum over all canonical correlations that are left out.
+    Nic,
+    /// Largest ratio of neighbouring singular values of the chosen weight.
+    Gap,
+    /// Akaike's criterion of the one-step prediction errors of the models of all orders, `log det Lambda + 2 d(n) / N`.
+    Aic,
+    /// Models of all orders from the leading part of each experiment; the order with the best simulated fit on the rest.
+    CrossValidation,
+}
+
+impl OrderRule {
+    /// Whether the rule needs the models of all orders; the others need the singular values only.
+    pub fn needs_models(self) -> bool {
+        matches!(self, OrderRule::Aic | OrderRule::CrossValidation)
     }
 }
 

@@ -1,31 +1,16 @@
-//! The order of the model: as given, or proposed from the canonical correlations.
+//! The order of the model: as given, or proposed by a rule.
 //!
-//! With T columns, canonical correlations `rho_1 >= rho_2 ...` (for the methods of closed loops those of SSARX) and
-//! `d(n) = n (m + 2 p)` parameters,
+//! With T columns, canonical correlations `rho_1 >= rho_2 ...` (for the methods of closed loops those of SSARX), singular
+//! values `sigma_k` of the chosen weight and `d(n) = n (m + 2 p)` parameters, each rule takes the least n that minimises
 //! ```text
-//! SVC(n) = rho_{n+1}^2 + d(n) log(T) / T          NIC(n) = sum_{k>n} rho_k^2 + d(n) log(T) / T
+//! SVC(n) = rho_{n+1}^2 + d(n) log(T) / T    NIC(n) = sum_{k>n} rho_k^2 + d(n) log(T) / T    GAP(n) = sigma_{n+1} / sigma_n
 //! ```
-//! (Bauer, Automatica 37, 1561, 2001). The proposal is the least n that minimises SVC. The largest gap of the logarithmic
-//! singular values is reported beside it; alone it is unusable, since measured data often have their largest gap after the
-//! first value.
+//! (Bauer, Automatica 37, 1561, 2001), or what `order_models.rs` finds with the models of all orders. The gap alone is
+//! unusable where measured data have their largest gap after the first value, as they often do.
 
-use super::Order;
+use super::{AutoOrder, Order, OrderRule};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-
-/// How an order was found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum OrderRule {
-    /// Given by the caller.
-    Fixed,
-    /// Singular value criterion on the canonical correlations.
-    Svc,
-    /// As SVC, with the sum of all discarded values.
-    Nic,
-    /// Largest ratio of neighbouring singular values of the chosen weight.
-    Gap,
-}
 
 /// What one rule proposes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,15 +21,28 @@ pub struct OrderCandidate {
     pub order: usize,
 }
 
+/// What a rule makes of one order.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct OrderValue {
+    /// The order.
+    pub order: usize,
+    /// The criterion, to be minimised; for cross-validation the mean simulated fit on the held-out data, percent, to be
+    /// maximised. Absent where the model of this order is unstable or has no Kalman gain although the rule needs one.
+    pub value: Option<f64>,
+}
+
 /// The order of the model and its alternatives.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct OrderReport {
     /// Number of states.
     pub order: usize,
-    /// How it was found.
-    pub rule: OrderRule,
-    /// What each rule proposes, among the orders up to the largest allowed (for a fixed order: that the horizon allows).
+    /// How it was found; absent where it was given.
+    pub rule: Option<OrderRule>,
+    /// What each rule that needs no models proposes, and the one that was asked for, among the orders up to the largest
+    /// allowed (for a fixed order: that the horizon allows).
     pub candidates: Vec<OrderCandidate>,
+    /// The rule that was asked for, order by order; empty for a fixed order.
+    pub values: Vec<OrderValue>,
     /// Canonical correlations between past and future, descending.
     pub canonical_correlations: Vec<f64>,
 }
@@ -61,36 +59,77 @@ pub(super) struct Evidence<'a> {
     pub(super) canonical_correlations: Vec<f64>,
 }
 
-/// The order and its report.
-pub(super) fn choose(choice: Order, evidence: Evidence<'_>) -> Result<OrderReport> {
-    let Evidence { inputs, outputs, horizon, columns, singular_values: sigma, canonical_correlations } = evidence;
-    let largest = (horizon - 1) * outputs;
-    let (asked, rule) = match choice {
-        Order::Fixed(n) => (n, OrderRule::Fixed),
-        Order::Auto { max } => (max, OrderRule::Svc),
-    };
-    if asked == 0 {
-        return Err(Error::OutOfRange { what: "the order of the model".into(), value: 0.0, must: "at least 1" });
-    }
-    if rule == OrderRule::Fixed && asked > largest {
-        return Err(Error::OrderBeyondHorizon { order: asked, largest, horizon });
-    }
-    let max = if rule == OrderRule::Fixed { largest } else { asked.min(largest) };
-    let penalty = (inputs + 2 * outputs) as f64 * (columns as f64).ln() / columns as f64;
-    let at = |k: usize| canonical_correlations.get(k).map_or(0.0, |r| r * r);
-    let svc = least(max, |n| at(n) + n as f64 * penalty);
-    let nic = least(max, |n| (n..canonical_correlations.len()).map(at).sum::<f64>() + n as f64 * penalty);
-    let gap = least(max, |n| sigma.get(n).map_or(0.0, |next| next / sigma[n - 1]));
-    let candidates = [(OrderRule::Svc, svc), (OrderRule::Nic, nic), (OrderRule::Gap, gap)];
-    Ok(OrderReport {
-        order: if rule == OrderRule::Fixed { asked } else { svc },
-        rule,
-        candidates: candidates.map(|(rule, order)| OrderCandidate { rule, order }).to_vec(),
-        canonical_correlations,
-    })
+/// The order by a rule that needs the models of all orders, `1..=max` in turn.
+pub(super) struct ByModels {
+    pub(super) order: usize,
+    pub(super) values: Vec<OrderValue>,
 }
 
-/// The least n in 1..=max that minimises a criterion.
-fn least(max: usize, criterion: impl Fn(usize) -> f64) -> usize {
-    (1..=max).min_by(|a, b| criterion(*a).total_cmp(&criterion(*b))).unwrap_or(1)
+/// Parameters of a model of order n in a canonical form, but for D.
+pub(super) fn parameters(n: usize, inputs: usize, outputs: usize) -> f64 {
+    (n * (inputs + 2 * outputs)) as f64
+}
+
+/// The order and its report; `by_models` is asked for the largest order to consider where the rule needs it.
+pub(super) fn choose(
+    choice: Order,
+    evidence: Evidence<'_>,
+    by_models: impl FnOnce(&AutoOrder, usize) -> Result<ByModels>,
+) -> Result<OrderReport> {
+    let largest = (evidence.horizon - 1) * evidence.outputs;
+    let asked = match choice {
+        Order::Fixed(n) => n,
+        Order::Auto(auto) => auto.max,
+    };
+    check(asked)?;
+    let cheap = |rule, max| candidate(rule, values(rule, &evidence, max));
+    let rules = [OrderRule::Svc, OrderRule::Nic, OrderRule::Gap];
+    let (order, rule, max, values) = match choice {
+        Order::Fixed(order) if order > largest => {
+            return Err(Error::OrderBeyondHorizon { order, largest, horizon: evidence.horizon });
+        }
+        Order::Fixed(order) => (order, None, largest, Vec::new()),
+        Order::Auto(auto) if auto.rule.needs_models() => {
+            let found = by_models(&auto, auto.max.min(largest))?;
+            (found.order, Some(auto.rule), auto.max.min(largest), found.values)
+        }
+        Order::Auto(AutoOrder { max, rule, .. }) => {
+            let max = max.min(largest);
+            (cheap(rule, max).order, Some(rule), max, values(rule, &evidence, max))
+        }
+    };
+    let mut candidates: Vec<OrderCandidate> = rules.map(|rule| cheap(rule, max)).to_vec();
+    candidates.extend(rule.filter(|r| r.needs_models()).map(|rule| OrderCandidate { rule, order }));
+    Ok(OrderReport { order, rule, candidates, values, canonical_correlations: evidence.canonical_correlations })
+}
+
+/// Refuses a model without states.
+pub(super) fn check(order: usize) -> Result<()> {
+    match order {
+        0 => Err(Error::OutOfRange { what: "the order of the model".into(), value: 0.0, must: "at least 1" }),
+        _ => Ok(()),
+    }
+}
+
+fn candidate(rule: OrderRule, values: Vec<OrderValue>) -> OrderCandidate {
+    OrderCandidate { rule, order: least(&values).unwrap_or(1) }
+}
+
+/// A criterion of the singular values for all orders up to `max`.
+fn values(rule: OrderRule, evidence: &Evidence<'_>, max: usize) -> Vec<OrderValue> {
+    let Evidence { inputs, outputs, columns, singular_values: sigma, canonical_correlations: rho, .. } = evidence;
+    let penalty = |n| parameters(n, *inputs, *outputs) * (*columns as f64).ln() / *columns as f64;
+    let squared = |k: usize| rho.get(k).map_or(0.0, |r| r * r);
+    let value = |n: usize| match rule {
+        OrderRule::Gap => sigma.get(n).map_or(0.0, |next| next / sigma[n - 1]),
+        OrderRule::Nic => (n..rho.len()).map(squared).sum::<f64>() + penalty(n),
+        _ => squared(n) + penalty(n),
+    };
+    (1..=max).map(|order| OrderValue { order, value: Some(value(order)) }).collect()
+}
+
+/// The least order that minimises a criterion.
+pub(super) fn least(values: &[OrderValue]) -> Option<usize> {
+    let known = values.iter().filter_map(|v| Some((v.order, v.value.filter(|x| !x.is_nan())?)));
+    known.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(order, _)| order)
 }

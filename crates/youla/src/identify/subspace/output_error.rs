@@ -260,7 +260,46 @@ fn unpack(solution: MatRef<'_, f64>, unknowns: &Unknowns) -> (Mat<f64>, Mat<f64>
     (driven, d)
 }
 
-/// The fit of the outputs without what the known disturbances explain, so that these do not count as the model's merit.
+/// One-step prediction errors of the observer with gain K, one record per experiment, in scaled units.
+pub(super) fn prediction_errors(
+    data: &Channels,
+    pair: &OutputPair,
+    gain: MatRef<'_, f64>,
+    fitted: &Fitted,
+) -> Vec<Mat<f64>> {
+    let predictor = Predictor { a: &pair.a - gain * &pair.c, c: pair.c.clone(), k: Some(gain.to_owned()) };
+    let driven = &fitted.b - gain * &fitted.d;
+    let outputs = without_disturbances(data, &fitted.disturbances);
+    errors(data, &outputs, &predictor, [driven.as_ref(), fitted.d.as_ref()], &fitted.initial_states)
+}
+
+/// The outputs without what the known disturbances explain, so that these do not count as the model's merit.
+fn without_disturbances(data: &Channels, coefficients: &[Mat<f64>]) -> Vec<Mat<f64>> {
+    data.experiments.iter().zip(coefficients).map(|(e, a)| &e.y - &e.w * a).collect()
+}
+
+/// `y - yhat` of simulation or predictor, one record per experiment.
+fn errors(
+    data: &Channels,
+    outputs: &[Mat<f64>],
+    predictor: &Predictor,
+    [driven, d]: [MatRef<'_, f64>; 2],
+    initial_states: &[Vec<f64>],
+) -> Vec<Mat<f64>> {
+    let none = Mat::zeros(predictor.a.nrows(), 0);
+    let k = predictor.k.as_ref().unwrap_or(&none);
+    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
+    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
+    let pairs: Vec<_> = data.experiments.iter().zip(outputs).zip(initial_states).collect();
+    pairs
+        .par_iter()
+        .map(|((e, y), x0)| {
+            let driving = block(&[&[e.u.as_ref(), y.as_ref().subcols(0, k.ncols())]]);
+            *y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
+        })
+        .collect()
+}
+
 fn fit_percent(
     data: &Channels,
     outputs: &[Mat<f64>],
@@ -268,18 +307,7 @@ fn fit_percent(
     [driven, d]: [MatRef<'_, f64>; 2],
     initial_states: &[Vec<f64>],
 ) -> Vec<f64> {
-    let none = Mat::zeros(predictor.a.nrows(), 0);
-    let k = predictor.k.as_ref().unwrap_or(&none);
-    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
-    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
-    let pairs: Vec<_> = data.experiments.iter().zip(outputs).zip(initial_states).collect();
-    let errors: Vec<Mat<f64>> = pairs
-        .par_iter()
-        .map(|((e, y), x0)| {
-            let driving = block(&[&[e.u.as_ref(), y.as_ref().subcols(0, k.ncols())]]);
-            *y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
-        })
-        .collect();
+    let errors = errors(data, outputs, predictor, [driven, d], initial_states);
     let samples: usize = errors.iter().map(|e| e.nrows()).sum();
     (0..data.outputs)
         .map(|i| {

@@ -9,50 +9,57 @@
 
 use super::factorisation::DataTriangle;
 use super::innovation::{self, Innovation};
-use super::order::{Evidence, choose};
+use super::order::Evidence;
 use super::realisation::OutputPair;
 use super::varx::{StateMap, Varx};
-use super::{Estimate, SubspaceOptions, Weight, parsim, pbsid, ssarx, stability};
+use super::{SubspaceOptions, Weight, parsim, pbsid, ssarx};
 use crate::linalg::{block, regress};
-use crate::lti::Discrete;
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 
-/// A, C and the innovations by the method that the weight names.
-pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Discrete) -> Result<Estimate> {
-    let varx = Varx::new(data, options)?;
-    let excitation_rcond = varx.require_excitation()?;
-    let canonical = ssarx::states(&varx)?;
-    let canonical_correlations = canonical.singular_values.clone();
-    let map = match options.weight {
-        Weight::PbsidOpt => pbsid::states(&varx)?,
-        Weight::ParsimS => parsim::states(&varx)?,
-        _ => canonical,
-    };
-    let order = choose(
-        options.order,
+/// The states of the method that the weight names.
+pub(super) struct PredictorForm {
+    pub(super) varx: Varx,
+    pub(super) map: StateMap,
+    pub(super) excitation_rcond: f64,
+    canonical_correlations: Vec<f64>,
+}
+
+impl PredictorForm {
+    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+        let varx = Varx::new(data, options)?;
+        let excitation_rcond = varx.require_excitation()?;
+        let canonical = ssarx::states(&varx)?;
+        let canonical_correlations = canonical.singular_values.clone();
+        let map = match options.weight {
+            Weight::PbsidOpt => pbsid::states(&varx)?,
+            Weight::ParsimS => parsim::states(&varx)?,
+            _ => canonical,
+        };
+        Ok(PredictorForm { varx, map, excitation_rcond, canonical_correlations })
+    }
+
+    pub(super) fn evidence(&self) -> Evidence<'_> {
+        let varx = &self.varx;
         Evidence {
             inputs: varx.inputs,
             outputs: varx.outputs,
             horizon: varx.horizon,
             columns: varx.columns,
-            singular_values: &map.singular_values,
-            canonical_correlations,
-        },
-    )?;
-    let sequences = Sequences::new(&varx, &map, order.order)?;
-    let (pair, stability) = stability::apply(options.stability, sequences.realise()?, time)?;
-    let innovation = sequences.innovation(&pair);
-    Ok(Estimate {
-        pair,
-        stability,
-        innovation,
-        singular_values: map.singular_values,
-        order,
-        columns: varx.columns,
-        excitation_rcond,
-        factor: varx.report,
-    })
+            singular_values: &self.map.singular_values,
+            canonical_correlations: self.canonical_correlations.clone(),
+        }
+    }
+
+    /// A and C.
+    pub(super) fn realise(&self, order: usize) -> Result<OutputPair> {
+        Sequences::new(&self.varx, &self.map, order)?.realise()
+    }
+
+    /// From the residuals of both equations with given A and C.
+    pub(super) fn innovation(&self, pair: &OutputPair) -> Result<Innovation> {
+        Ok(Sequences::new(&self.varx, &self.map, pair.a.nrows())?.innovation(pair))
+    }
 }
 
 /// The sequences of the two equations in the coordinates of the triangular factor, transposed.

@@ -59,16 +59,15 @@ impl<'a> StateSequences<'a> {
 }
 
 /// A and C in the way of the weight.
-pub(super) fn realise(weight: Weight, states: &StateSequences<'_>) -> Result<OutputPair> {
+pub(super) fn realise(weight: Weight, factor: &HankelFactor, gamma: MatRef<'_, f64>) -> Result<OutputPair> {
     match weight {
-        Weight::N4sid => regression(states),
-        _ => shift(states),
+        Weight::N4sid => regression(&StateSequences::new(factor, gamma)?),
+        _ => shift(gamma, factor.outputs),
     }
 }
 
 /// `C = Gamma(1:p, :)`, `Gamma(1:end-p, :) A = Gamma(p+1:end, :)`.
-fn shift(states: &StateSequences<'_>) -> Result<OutputPair> {
-    let (gamma, p) = (states.gamma, states.outputs);
+fn shift(gamma: MatRef<'_, f64>, p: usize) -> Result<OutputPair> {
     let rows = gamma.nrows() - p;
     let a = regress("the observability matrix", gamma.subrows(0, rows), gamma.subrows(p, rows))?;
     Ok(OutputPair { a, c: gamma.subrows(0, p).to_owned() })

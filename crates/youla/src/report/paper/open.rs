@@ -57,7 +57,7 @@ pub(super) fn choices(paper: &Paper) -> Vec<String> {
 fn order(order: &Order) -> String {
     match order {
         Order::Fixed(n) => format!("order {n}"),
-        Order::Auto { max } => format!("an order of at most {max} chosen from the data"),
+        Order::Auto(auto) => format!("an order of at most {} chosen from the data", auto.max),
     }
 }
 

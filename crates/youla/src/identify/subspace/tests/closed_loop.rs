@@ -123,11 +123,11 @@ fn automatic_order_is_the_true_one_in_closed_loop() {
             weight,
             horizon: 10,
             past: Some(20),
-            order: Order::Auto { max: 8 },
+            order: Order::Auto(AutoOrder::up_to(8)),
             ..Default::default()
         };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
-        assert_eq!((found.order.order, found.order.rule), (2, OrderRule::Svc), "{:?}", found.order);
+        assert_eq!((found.order.order, found.order.rule), (2, Some(OrderRule::Svc)), "{:?}", found.order);
         let error = distance(&found.model, &plant);
         assert!(error < if weight == Weight::ParsimS { 0.25 } else { 0.1 }, "{weight:?}: {error}");
         assert_eq!(found.singular_values.len(), 10);

@@ -106,7 +106,7 @@ fn options_read_from_a_table_and_refuse_unknown_names() {
     assert_eq!(options, expected);
     assert_eq!(
         toml::from_str::<SubspaceOptions>("order = { auto = { max = 6 } }").unwrap().order,
-        Order::Auto { max: 6 }
+        Order::Auto(AutoOrder::up_to(6))
     );
     assert!(toml::from_str::<SubspaceOptions>("wieght = 'cva'").is_err());
     assert!(toml::from_str::<SubspaceOptions>("weight = 'cav'").is_err());

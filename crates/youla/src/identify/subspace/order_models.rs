@@ -1,0 +1,180 @@
+//! The order by rules that need the models of all orders.
+//!
+//! With the one-step prediction errors e of the model of order n over all N samples and its `d(n)` parameters,
+//! ```text
+//! AIC(n) = log det (1/N sum e e') + 2 d(n) / N
+//! ```
+//! (Akaike, IEEE Trans. Autom. Control 19, 716, 1974). Cross-validation identifies the models from the leading part of each
+//! experiment and simulates the rest with an estimated initial state; of the orders whose mean fit (26) is within a
+//! tolerance of the best one it takes the lowest. An unstable model has no simulation and is passed over.
+
+use super::order::{ByModels, OrderValue, least, parameters};
+use super::output_error::prediction_errors;
+use super::projected::Projected;
+use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
+use super::{AutoOrder, Experiment, Innovation, NoInnovation, Order, OrderRule, SubspaceData, SubspaceModel};
+use super::{SubspaceOptions, channels::Signals};
+use crate::linalg::{Triangle, block, least_squares};
+use crate::{Error, Result};
+use faer::{Mat, MatRef};
+use rayon::prelude::*;
+
+/// Samples folded in at a time.
+const PIECE: usize = 1000;
+
+/// The order up to `max` by the rule of `auto`.
+pub(super) fn choose(
+    data: &SubspaceData,
+    projected: &Projected,
+    auto: &AutoOrder,
+    max: usize,
+    options: &SubspaceOptions,
+) -> Result<ByModels> {
+    let values = match auto.rule {
+        OrderRule::CrossValidation => cross_validation(data, auto.leading, max, options)?,
+        _ => each_order(max, |n| akaike(data, projected, n, options))?,
+    };
+    let chosen = match auto.rule {
+        OrderRule::CrossValidation => lowest_within(auto.tolerance, &values),
+        _ => least(&values),
+    };
+    let order = chosen.ok_or_else(|| Error::NoSolution {
+        what: "the choice of the order".into(),
+        condition: format!("no model of an order up to {max} is stable and predicts"),
+        residual: f64::NAN,
+    })?;
+    Ok(ByModels { order, values })
+}
+
+/// The value of each order; absent where the model is unstable although stability is required.
+fn each_order(max: usize, value: impl Fn(usize) -> Result<Option<f64>> + Sync + Send) -> Result<Vec<OrderValue>> {
+    let found: Vec<Result<Option<f64>>> = (1..=max).into_par_iter().map(value).collect();
+    let entry = |(k, value): (usize, Result<Option<f64>>)| match value {
+        Ok(value) => Ok(OrderValue { order: k + 1, value }),
+        Err(Error::Unstable { .. }) => Ok(OrderValue { order: k + 1, value: None }),
+        Err(error) => Err(error),
+    };
+    found.into_iter().enumerate().map(entry).collect()
+}
+
+fn lowest_within(tolerance: f64, values: &[OrderValue]) -> Option<usize> {
+    let best = values.iter().filter_map(|v| v.value).fold(f64::NEG_INFINITY, f64::max);
+    values.iter().find(|v| v.value.is_some_and(|fit| fit >= best - tolerance)).map(|v| v.order)
+}
+
+/// `log det Lambda + 2 d(n) / N`; minus infinity where the model leaves no error.
+fn akaike(data: &SubspaceData, projected: &Projected, n: usize, options: &SubspaceOptions) -> Result<Option<f64>> {
+    let scaled = data.scaled_model(projected, n, options)?;
+    let gain = match &scaled.estimate.innovation {
+        Innovation::Found { gain, .. } => gain,
+        Innovation::None { reason: NoInnovation::NoiseFree } => return Ok(Some(f64::NEG_INFINITY)),
+        Innovation::None { .. } => return Ok(None),
+    };
+    let errors = prediction_errors(&data.channels, &scaled.estimate.pair, gain.as_ref(), &scaled.fitted);
+    let samples = errors.iter().map(|e| e.nrows()).sum::<usize>() as f64;
+    let l = data.channels.outputs;
+    let mut covariance = Mat::<f64>::zeros(l, l);
+    errors.iter().for_each(|e| covariance += e.transpose() * e);
+    covariance.col_iter_mut().for_each(|c| c.iter_mut().for_each(|v| *v /= samples));
+    let log_det = match covariance.llt(faer::Side::Lower) {
+        Ok(factor) => (0..l).map(|i| 2.0 * factor.L()[(i, i)].ln()).sum(),
+        Err(_) => f64::NEG_INFINITY,
+    };
+    Ok(Some(log_det + 2.0 * parameters(n, data.channels.inputs, l) / samples))
+}
+
+/// Mean fits on the rest of the experiments.
+fn cross_validation(
+    data: &SubspaceData,
+    leading: f64,
+    max: usize,
+    options: &SubspaceOptions,
+) -> Result<Vec<OrderValue>> {
+    if !(leading > 0.0 && leading < 1.0) {
+        let what = "the leading part of cross-validation".into();
+        return Err(Error::OutOfRange { what, value: leading, must: "between 0 and 1" });
+    }
+    // The horizons stay those of all data.
+    let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), ..options.clone() };
+    let parts: Vec<_> = data.channels.experiments.iter().map(|signals| split(signals, leading)).collect();
+    let first: Vec<Experiment<'_>> = parts.iter().map(|([u, y, _], _)| Experiment { u: *u, y: *y }).collect();
+    let known: Vec<_> = parts.iter().map(|([_, _, w], _)| *w).filter(|w| w.ncols() > 0).collect();
+    let leading_data = SubspaceData::disturbed(&first, &known, data.time, options);
+    let leading_data = leading_data.map_err(|e| e.within("cross-validation"))?;
+    let projected = leading_data.project(options)?;
+    each_order(max, |n| {
+        let found = leading_data.model(&projected, &SubspaceOptions { order: Order::Fixed(n), ..options.clone() })?;
+        if !found.stability.stable {
+            return Ok(None);
+        }
+        let outputs: Vec<Mat<f64>> = (0..parts.len()).map(|e| undisturbed(&found, e, parts[e].1)).collect();
+        let errors: Vec<Mat<f64>> = parts
+            .iter()
+            .zip(&outputs)
+            .map(|((_, [u, _, _]), y)| simulation_errors(&found, *u, y))
+            .collect::<Result<_>>()?;
+        Ok(Some(mean_fit(&outputs, &errors)))
+    })
+}
+
+/// Inputs, outputs and known disturbances of the leading part and of the rest.
+type Part<'a> = [MatRef<'a, f64>; 3];
+
+fn split(signals: &Signals, leading: f64) -> (Part<'_>, Part<'_>) {
+    let cut = (leading * signals.u.nrows() as f64) as usize;
+    let [(u1, u2), (y1, y2), (w1, w2)] = [&signals.u, &signals.y, &signals.w].map(|m| m.as_ref().split_at_row(cut));
+    ([u1, y1, w1], [u2, y2, w2])
+}
+
+/// The outputs of the rest without the disturbances as the leading part of their experiment tells them.
+fn undisturbed(found: &SubspaceModel, experiment: usize, [_, y, w]: Part<'_>) -> Mat<f64> {
+    match found.disturbances.get(experiment) {
+        Some(coefficients) => y - w * coefficients,
+        None => y.to_owned(),
+    }
+}
+
+/// `y - yhat` with the initial state that makes it least.
+fn simulation_errors(found: &SubspaceModel, u: MatRef<'_, f64>, y: &Mat<f64>) -> Result<Mat<f64>> {
+    let model = &found.model;
+    let ab = block(&[&[model.a(), model.b()]]);
+    let cd = block(&[&[model.c(), model.d()]]);
+    let forced = y - simulate(ab.as_ref(), cd.as_ref(), &vec![0.0; model.order()], u);
+    let x0 = initial_state(model.a(), model.c(), &forced)?;
+    Ok(y - simulate(ab.as_ref(), cd.as_ref(), &x0, u))
+}
+
+/// `min sum |y(k) - C A^k x0|^2`.
+fn initial_state(a: MatRef<'_, f64>, c: MatRef<'_, f64>, free: &Mat<f64>) -> Result<Vec<f64>> {
+    let (n, outputs) = (a.nrows(), c.nrows());
+    let predictor = Predictor { a: a.to_owned(), c: c.to_owned(), k: None };
+    let unknowns =
+        Unknowns { states: n, inputs: 0, outputs, initial: n, disturbances: 0, direct: vec![vec![]; outputs] };
+    let mut triangle = Triangle::new(n + 1, PIECE);
+    let none = Mat::<f64>::zeros(free.nrows(), 0);
+    for i in 0..outputs {
+        let mut sensitivity = Sensitivity::new(&predictor, i, &unknowns);
+        let target: Vec<f64> = free.col(i).iter().copied().collect();
+        for start in (0..free.nrows()).step_by(PIECE) {
+            let count = PIECE.min(free.nrows() - start);
+            let u = none.as_ref().subrows(start, count);
+            triangle.fold(count, |rows| sensitivity.fill(u, u, &target[start..start + count], rows));
+        }
+    }
+    let r = triangle.r();
+    let x0 = least_squares("the regressors of an initial state", r.subcols(0, n), r.subcols(n, 1))?.x;
+    Ok(x0.col(0).iter().copied().collect())
+}
+
+/// Mean of `100 (1 - |y - yhat| / |y - mean y|)` over the outputs.
+fn mean_fit(measured: &[Mat<f64>], errors: &[Mat<f64>]) -> f64 {
+    let outputs = measured[0].ncols();
+    let samples = measured.iter().map(|y| y.nrows()).sum::<usize>() as f64;
+    let fit = |i: usize| {
+        let mean = measured.iter().map(|y| y.col(i).sum()).sum::<f64>() / samples;
+        let spread = measured.iter().flat_map(|y| y.col(i).iter()).map(|v| (v - mean).powi(2)).sum::<f64>().sqrt();
+        let error = errors.iter().map(|e| e.col(i).norm_l2()).fold(0.0, f64::hypot);
+        100.0 * (1.0 - error / spread)
+    };
+    (0..outputs).map(fit).sum::<f64>() / outputs as f64
+}

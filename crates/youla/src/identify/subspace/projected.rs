@@ -1,0 +1,87 @@
+//! What all orders of one method share: the projection with its singular values, from which a model of any order follows.
+
+use super::factorisation::DataTriangle;
+use super::innovation::Innovation;
+use super::open_loop::OpenLoop;
+use super::order::Evidence;
+use super::predictor_form::PredictorForm;
+use super::realisation::OutputPair;
+use super::stability::{self, StabilityReport};
+use super::{DataFactor, Stability, SubspaceOptions};
+use crate::Result;
+use crate::lti::Discrete;
+
+/// The projection of one method.
+pub(super) enum Projected {
+    /// MOESP, N4SID, CVA.
+    OpenLoop(OpenLoop),
+    /// PBSIDopt, SSARX, PARSIM-S.
+    Predictor(PredictorForm),
+}
+
+/// A, C and the innovations of one order, in scaled units.
+pub(super) struct Estimate {
+    pub(super) pair: OutputPair,
+    pub(super) stability: StabilityReport,
+    pub(super) innovation: Innovation,
+}
+
+impl Projected {
+    /// The projection by the method, horizon and past of `options`.
+    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+        Ok(match options.weight.is_for_closed_loops() {
+            true => Projected::Predictor(PredictorForm::new(data, options)?),
+            false => Projected::OpenLoop(OpenLoop::new(data, options)?),
+        })
+    }
+
+    /// What the choice of the order depends on.
+    pub(super) fn evidence(&self) -> Result<Evidence<'_>> {
+        match self {
+            Projected::OpenLoop(shared) => shared.evidence(),
+            Projected::Predictor(shared) => Ok(shared.evidence()),
+        }
+    }
+
+    /// A and C of one order as they come out.
+    pub(super) fn realise(&self, order: usize) -> Result<OutputPair> {
+        match self {
+            Projected::OpenLoop(shared) => shared.realise(order),
+            Projected::Predictor(shared) => shared.realise(order),
+        }
+    }
+
+    /// A and C of one order with the choice on stability applied, and their innovations.
+    pub(super) fn estimate(&self, order: usize, choice: Stability, time: Discrete) -> Result<Estimate> {
+        let (pair, stability) = stability::apply(choice, self.realise(order)?, time)?;
+        let innovation = match self {
+            Projected::OpenLoop(shared) => shared.innovation(&pair)?,
+            Projected::Predictor(shared) => shared.innovation(&pair)?,
+        };
+        Ok(Estimate { pair, stability, innovation })
+    }
+
+    /// Descending, horizon x outputs of them.
+    pub(super) fn singular_values(&self) -> &[f64] {
+        match self {
+            Projected::OpenLoop(shared) => &shared.projection.singular_values,
+            Projected::Predictor(shared) => &shared.map.singular_values,
+        }
+    }
+
+    /// Smallest over largest singular value of the inputs' Hankel matrix.
+    pub(super) fn excitation_rcond(&self) -> f64 {
+        match self {
+            Projected::OpenLoop(shared) => shared.excitation_rcond,
+            Projected::Predictor(shared) => shared.excitation_rcond,
+        }
+    }
+
+    /// How the data were factored, and the number of columns.
+    pub(super) fn data(&self) -> (DataFactor, usize) {
+        match self {
+            Projected::OpenLoop(shared) => (shared.factor.report, shared.factor.columns),
+            Projected::Predictor(shared) => (shared.varx.report, shared.varx.columns),
+        }
+    }
+}

@@ -5,7 +5,7 @@ use super::records::{LoopRecord, RunRecords, SourceFile};
 use super::settings::{DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings};
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
-use crate::identify::subspace::{Order, Stability, SubspaceOptions, Weight};
+use crate::identify::subspace::{Order, Stability, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, Weight};
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, SquareWaves};
@@ -136,6 +136,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
     };
     let subspace =
         SubspaceOptions { weight: Weight::Cva, horizon: 40, order: Order::Fixed(10), ..SubspaceOptions::default() };
+    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
     RunSettings {
         name: "demo: gas bearing".into(),
         data: DataSettings {
@@ -160,7 +161,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         },
         factors: FactorSettings { settle: Some(0), ..FactorSettings::default() },
         direct: Some(SubspaceOptions { order: Order::Fixed(6), stability: Stability::Allow, ..subspace.clone() }),
-        hansen: subspace,
+        hansen: SubspaceOptions { uncertainty, ..subspace },
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },

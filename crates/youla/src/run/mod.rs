@@ -16,6 +16,7 @@ mod response;
 mod settings;
 mod signals;
 mod summary;
+mod uncertainty;
 mod verdict;
 mod write;
 
@@ -36,5 +37,6 @@ pub use settings::{
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use summary::summary;
+pub use uncertainty::{RunUncertainty, SystemUncertainty};
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

@@ -42,11 +42,25 @@ impl Channels {
         d: Mat<f64>,
         time: Discrete,
     ) -> Result<StateSpace<Discrete>> {
-        let (u, y) = (&self.u_scale, &self.y_scale);
-        let b = Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] / u[j]);
-        let c = Mat::from_fn(pair.c.nrows(), pair.c.ncols(), |i, j| y[i] * pair.c[(i, j)]);
-        let d = Mat::from_fn(d.nrows(), d.ncols(), |i, j| y[i] * d[(i, j)] / u[j]);
+        let (b, c, d) = self.unscale(b, pair.c, d);
         StateSpace::new(pair.a, b, c, d, time)
+    }
+
+    /// B, C and D in the units of the record.
+    pub(super) fn unscale(&self, b: Mat<f64>, c: Mat<f64>, d: Mat<f64>) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
+        let (u, y) = (&self.u_scale, &self.y_scale);
+        (
+            Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] / u[j]),
+            Mat::from_fn(c.nrows(), c.ncols(), |i, j| y[i] * c[(i, j)]),
+            Mat::from_fn(d.nrows(), d.ncols(), |i, j| y[i] * d[(i, j)] / u[j]),
+        )
+    }
+
+    /// The same inputs with other outputs, in scaled units.
+    pub(super) fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Channels {
+        let (u_scale, y_scale) = (self.u_scale.clone(), self.y_scale.clone());
+        let experiments = self.experiments.iter().zip(outputs).map(|(e, y)| Signals { u: e.u.clone(), y }).collect();
+        Channels { experiments, inputs: self.inputs, outputs: self.outputs, u_scale, y_scale }
     }
 }
 

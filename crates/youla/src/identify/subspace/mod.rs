@@ -31,6 +31,7 @@ mod ssarx;
 mod stability;
 #[cfg(test)]
 mod tests;
+pub(crate) mod uncertainty;
 mod varx;
 
 pub use innovation::{Innovation, NoInnovation};
@@ -40,6 +41,10 @@ pub use options::{
 pub use order::{OrderCandidate, OrderReport, OrderRule};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
+pub use uncertainty::{
+    BlockInfluence, Bootstrap, Delta, ModeBand, NoUncertainty, ResponseBand, Uncertainty, UncertaintyMethod,
+    UncertaintyOptions,
+};
 
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
@@ -87,6 +92,8 @@ pub struct SubspaceModel {
     pub excitation_rcond: f64,
     /// How the data were factored.
     pub factor: DataFactor,
+    /// What is known of the error of the model, where it was asked for.
+    pub uncertainty: Option<Uncertainty>,
 }
 
 impl SubspaceModel {
@@ -185,6 +192,15 @@ impl SubspaceData {
         Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
     }
 
+    /// The same inputs with other outputs, in scaled units, factored alike.
+    fn with_outputs(&self, outputs: Vec<crate::Mat<f64>>) -> Result<Self> {
+        let channels = self.channels.with_outputs(outputs);
+        let options = &self.factored;
+        let blocks = (options.past(), options.horizon);
+        let triangle = DataTriangle::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
+        Ok(SubspaceData { channels, triangle, time: self.time, factored: options.clone() })
+    }
+
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
     /// past at most those of the factor; scaling and factorisation are part of the factor.
     ///
@@ -197,14 +213,23 @@ impl SubspaceData {
             return Err(Error::Refactor);
         }
         check_blocks(options)?;
+        uncertainty::check(options)?;
         let found = match options.weight.is_for_closed_loops() {
             true => predictor_form::estimate(&self.triangle, options, self.time)?,
             false => open_loop::estimate(&self.triangle, options, self.time)?,
         };
         let fitted =
             output_error::fit(&self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
+        let base = || {
+            let gain = found.innovation.gain();
+            output_error::Base::new(&self.channels, &found.pair, gain, &found.stability, options, &fitted)
+        };
+        let (b, d) = (fitted.b.clone(), fitted.d.clone());
+        let model = self.channels.unscale_model(found.pair.clone(), b, d, self.time)?;
+        let uncertainty = uncertainty::find(self, options, base, &found.innovation, &model);
         Ok(SubspaceModel {
-            model: self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?,
+            model,
+            uncertainty,
             innovation: found.innovation.unscale(&self.channels.y_scale),
             initial_states: fitted.initial_states,
             singular_values: found.singular_values,

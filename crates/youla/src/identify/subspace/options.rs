@@ -1,5 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
+use super::UncertaintyOptions;
 use serde::{Deserialize, Serialize};
 
 /// Choices of [`super::subspace`].
@@ -34,6 +35,9 @@ pub struct SubspaceOptions {
     pub scaling: ChannelScaling,
     /// The state at the first sample of each experiment.
     pub initial_state: InitialState,
+    /// Whether and how the uncertainty of the estimate is found.
+    #[serde(skip_serializing_if = "UncertaintyOptions::is_default")]
+    pub uncertainty: UncertaintyOptions,
 }
 
 impl Default for SubspaceOptions {
@@ -48,6 +52,7 @@ impl Default for SubspaceOptions {
             stability: Stability::default(),
             scaling: ChannelScaling::default(),
             initial_state: InitialState::default(),
+            uncertainty: UncertaintyOptions::default(),
         }
     }
 }

@@ -65,22 +65,15 @@ pub(super) fn fit(
     stability: &StabilityReport,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
-    let simulated = stability.stable && !options.weight.is_for_closed_loops();
-    let (predictor, by) = predictor(pair, kalman_gain, simulated)?;
-    let unknowns = Unknowns {
-        states: pair.a.nrows(),
-        inputs: data.inputs,
-        outputs: data.outputs,
-        initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
-        feedthrough: options.feedthrough == Feedthrough::Estimated,
-    };
+    let (predictor, by) = predictor(pair, kalman_gain, is_simulated(stability, options))?;
+    let unknowns = unknowns(data, pair, options);
     let parts = condense(data, &predictor, unknowns);
     let common = unknowns.common();
     let mut whole = Triangle::new(common + 1, common + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
     let r = whole.r();
     let solution = least_squares("the regressors of B and D", r.subcols(0, common), r.subcols(common, 1))?;
-    let (driven, d) = unpack(solution.x.as_ref(), unknowns);
+    let (driven, d) = unknowns.unpack(solution.x.as_ref());
     let initial_states =
         parts.iter().map(|part| part.initial_state(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
     let percent = fit_percent(data, &predictor, driven.as_ref(), d.as_ref(), &initial_states);
@@ -92,8 +85,74 @@ pub(super) fn fit(
     Ok(Fitted { b, d, initial_states, quality })
 }
 
+fn is_simulated(stability: &StabilityReport, options: &SubspaceOptions) -> bool {
+    stability.stable && !options.weight.is_for_closed_loops()
+}
+
+fn unknowns(data: &Channels, pair: &OutputPair, options: &SubspaceOptions) -> Unknowns {
+    Unknowns {
+        states: pair.a.nrows(),
+        inputs: data.inputs,
+        outputs: data.outputs,
+        initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
+        feedthrough: options.feedthrough == Feedthrough::Estimated,
+    }
+}
+
+/// The estimate around which the data are weighted, in scaled units.
+pub(super) struct Base {
+    pub(super) pair: OutputPair,
+    pub(super) predictor: Predictor,
+    pub(super) unknowns: Unknowns,
+    /// `B - K D`.
+    pub(super) driven: Mat<f64>,
+    pub(super) d: Mat<f64>,
+    pub(super) initial_states: Vec<Vec<f64>>,
+    /// Whether the K of the predictor is the Kalman gain.
+    pub(super) innovation_gain: bool,
+    pub(super) poles_moved: bool,
+    pub(super) stable: bool,
+}
+
+impl Base {
+    /// From the result of [`fit`] with the same arguments.
+    pub(super) fn new(
+        data: &Channels,
+        pair: &OutputPair,
+        kalman_gain: Option<MatRef<'_, f64>>,
+        stability: &StabilityReport,
+        options: &SubspaceOptions,
+        fitted: &Fitted,
+    ) -> Result<Base> {
+        let (predictor, by) = predictor(pair, kalman_gain, is_simulated(stability, options))?;
+        let driven = match &predictor.k {
+            Some(k) => &fitted.b - k * &fitted.d,
+            None => fitted.b.clone(),
+        };
+        Ok(Base {
+            unknowns: unknowns(data, pair, options),
+            pair: pair.clone(),
+            predictor,
+            driven,
+            d: fitted.d.clone(),
+            initial_states: fitted.initial_states.clone(),
+            innovation_gain: by == InputFit::Prediction,
+            poles_moved: !stability.moved.is_empty(),
+            stable: stability.stable,
+        })
+    }
+
+    /// B.
+    pub(super) fn b(&self) -> Mat<f64> {
+        match &self.predictor.k {
+            Some(k) => &self.driven + k * &self.d,
+            None => self.driven.clone(),
+        }
+    }
+}
+
 /// The simulation of the model or its one-step predictor.
-fn predictor(
+pub(super) fn predictor(
     pair: &OutputPair,
     kalman_gain: Option<MatRef<'_, f64>>,
     simulated: bool,
@@ -109,7 +168,7 @@ fn predictor(
 }
 
 /// What one experiment says: the triangular factor over `[x0 | B D y]`, split behind the directions of x0.
-struct Part {
+pub(super) struct Part {
     r: Mat<f64>,
     initial: usize,
     initial_rank: usize,
@@ -117,7 +176,7 @@ struct Part {
 
 /// One triangular factor per output, joined for each experiment; in modal coordinates where A has them, else output by
 /// output.
-fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
+pub(super) fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
     let targets: Vec<Mat<f64>> =
         data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
     if let Some(modes) = Modes::of(predictor) {
@@ -175,9 +234,15 @@ fn join(outputs: &[Mat<f64>], unknowns: Unknowns) -> Part {
 
 impl Part {
     /// `R22`.
-    fn common(&self) -> MatRef<'_, f64> {
+    pub(super) fn common(&self) -> MatRef<'_, f64> {
         let (skip, from) = (self.initial_rank, self.initial);
         self.r.as_ref().submatrix(skip, from, self.r.nrows() - skip, self.r.ncols() - from)
+    }
+
+    /// `R11` and `R12`, over the initial state and over B and D.
+    pub(super) fn of_initial(&self) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+        let (r11, rest) = self.r.as_ref().subrows(0, self.initial_rank).split_at_col(self.initial);
+        (r11, rest.subcols(0, rest.ncols() - 1))
     }
 
     /// `R11 x0 = r1y - R12 [B; D]`.
@@ -191,14 +256,6 @@ impl Part {
         let x0 = least_squares("the regressors of an initial state", r11, (r1y - r12 * solution).as_ref())?.x;
         Ok(x0.col(0).iter().copied().collect())
     }
-}
-
-/// `B - K D` and D from the vector of unknowns.
-fn unpack(solution: MatRef<'_, f64>, unknowns: Unknowns) -> (Mat<f64>, Mat<f64>) {
-    let Unknowns { states: n, inputs: m, outputs: p, feedthrough, .. } = unknowns;
-    let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
-    let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + i * m + q, 0)] } else { 0.0 });
-    (driven, d)
 }
 
 fn fit_percent(

@@ -24,11 +24,7 @@ pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Dis
     let excitation_rcond = varx.require_excitation()?;
     let canonical = ssarx::states(&varx)?;
     let canonical_correlations = canonical.singular_values.clone();
-    let map = match options.weight {
-        Weight::PbsidOpt => pbsid::states(&varx)?,
-        Weight::ParsimS => parsim::states(&varx)?,
-        _ => canonical,
-    };
+    let map = if options.weight == Weight::Ssarx { canonical } else { states(&varx, options.weight)? };
     let order = choose(
         options.order,
         Evidence {
@@ -53,6 +49,28 @@ pub(super) fn estimate(data: &DataTriangle, options: &SubspaceOptions, time: Dis
         excitation_rcond,
         factor: varx.report,
     })
+}
+
+/// A and C alone for a given order, with the Kalman gain where it is asked for.
+pub(super) fn pair_and_gain(
+    data: &DataTriangle,
+    options: &SubspaceOptions,
+    order: usize,
+    with_gain: bool,
+) -> Result<(OutputPair, Option<Mat<f64>>)> {
+    let varx = Varx::new(data, options)?;
+    let sequences = Sequences::new(&varx, &states(&varx, options.weight)?, order)?;
+    let pair = sequences.realise()?;
+    let gain = if with_gain { sequences.innovation(&pair).gain().map(|gain| gain.to_owned()) } else { None };
+    Ok((pair, gain))
+}
+
+fn states(varx: &Varx, weight: Weight) -> Result<StateMap> {
+    match weight {
+        Weight::PbsidOpt => pbsid::states(varx),
+        Weight::ParsimS => parsim::states(varx),
+        _ => ssarx::states(varx),
+    }
 }
 
 /// The sequences of the two equations in the coordinates of the triangular factor, transposed.

@@ -56,6 +56,14 @@ impl Unknowns {
         self.initial + self.of_b() + self.of_d_row() + 1
     }
 
+    /// B (or `B - K D`) and D from the vector of common unknowns.
+    pub(super) fn unpack(&self, solution: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
+        let Unknowns { states: n, inputs: m, outputs: p, feedthrough, .. } = *self;
+        let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
+        let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + i * m + q, 0)] } else { 0.0 });
+        (driven, d)
+    }
+
     /// Columns of one experiment: `[x0 | B | D | y]`.
     pub(super) fn width(&self) -> usize {
         self.initial + self.common() + 1

@@ -9,6 +9,7 @@ use youla::study::{Experiment, Method, Paper};
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
     text += &aligned(&rows(found));
+    text += &modes(found);
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
@@ -16,6 +17,18 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
         let _ = write!(text, "\ncaution: {caution}");
     }
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
+    text
+}
+
+/// Modes of G(S) with their standard deviations, where these were asked for.
+fn modes(found: &Identification) -> String {
+    let mut text = String::new();
+    let Some(uncertainty) = &found.uncertainty else { return text };
+    for band in uncertainty.plant.modes.iter().filter(|band| band.mode.pole.im > 0.0) {
+        let (mode, hz, zeta) = (band.mode, band.hz_deviation, band.zeta_deviation);
+        let _ =
+            write!(text, "\nmode of G(S): {:.2} +- {hz:.2} Hz, damping ratio {:.4} +- {zeta:.4}", mode.hz, mode.zeta);
+    }
     text
 }
 

@@ -540,6 +540,11 @@ pub enum Error {
         "scaling, factorisation, delays and automatic horizon are part of the factored data; factor the records again to change them"
     )]
     Refactor,
+    /// The bootstrap was asked for with a method for closed loops.
+    #[error(
+        "the bootstrap keeps the inputs as they are, which measurements from a closed loop do not allow; take method = \"delta\""
+    )]
+    BootstrapOfClosedLoop,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]

@@ -137,7 +137,7 @@ function span(values) {
 }
 
 function frequency(host) {
-  const { hz, models, indirect } = report.frequency;
+  const { hz, models, indirect, bands } = report.frequency;
   const pairs = [];
   for (const { output, input } of [...models, ...indirect]) if (!pairs.some(p => p.output === output && p.input === input)) pairs.push({ output, input });
   pairs.sort((a, b) => a.output - b.output || a.input - b.input);
@@ -148,12 +148,12 @@ function frequency(host) {
   const plotHost = element("div"), caption = element("p", { class: "caption" });
   const tell = () => {
     const some = indirect.some(same);
-    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "");
+    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "") + (bands.some(same) ? ` Filled: where the magnitude of G(S) lies with a probability of ${readOut(100 * bands.find(same).level)} % at each frequency.` : "");
   };
   const controls = element("div", { class: "controls" });
   host.append(controls, plotHost, caption);
   const figure = mount(plotHost, () => {
-    const measured = indirect.filter(same), shown = models.filter(same);
+    const measured = indirect.filter(same), shown = models.filter(same), regions = bands.filter(same);
     const opacity = m => m.coherence.map(c => c == null ? 0.1 : 0.08 + 0.92 * Math.min(1, Math.max(0, (c - 0.2) / 0.7)) ** 2);
     const curves = part => [
       ...measured.map(m => ({ id: "indirect", x: m.hz, y: m[part], style: INDIRECT, opacity: opacity(m) })),
@@ -164,9 +164,9 @@ function frequency(host) {
     return stack(plotHost, {
       label: `Bode diagram, ${title(pair)}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
       x: { label: "Frequency", unit: "Hz", log: true }, shades: measured.flatMap(lowCoherence),
-      legend: [...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
+      legend: [...regions.map(b => ({ id: "band", name: `${methodOf(b.method).label}, ${readOut(100 * b.level)} %`, style: bandStyle(b) })), ...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
       panels: [
-        { label: "Magnitude", unit: "dB", axisUnit: `dB${gain}`, height: 280, curves: curves("magnitude_db") },
+        { label: "Magnitude", unit: "dB", axisUnit: `dB${gain}`, height: 280, curves: [...regions.map(band), ...curves("magnitude_db")] },
         { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
         ...(measured.length ? [{ label: "Coherence γ²", short: "γ²", unit: "", height: 84, fixed: [0, 1.04],
           curves: measured.map(m => ({ id: "indirect", x: m.hz, y: m.coherence, style: { ...INDIRECT, points: false, width: 1.2 } })) }] : []),
@@ -175,6 +175,22 @@ function frequency(host) {
   });
   if (pairs.length > 1) controls.append(chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); tell(); }));
   tell();
+}
+
+const bandStyle = b => ({ ...methodOf(b.method).style, width: 6, dash: [], points: false, colour: "--band" });
+
+// The region between the bounds of a magnitude, filled under the curves.
+function band(b) {
+  const { hz } = report.frequency;
+  return { id: "band", x: hz, y: b.high_db, style: bandStyle(b), draw: u => clipped(u, ctx => {
+    const at = (values, k) => [u.valToPos(hz[k], "x", true), u.valToPos(values[k], "y", true)];
+    const known = hz.map((_, k) => k).filter(k => b.low_db[k] != null && b.high_db[k] != null);
+    ctx.fillStyle = colour("--band");
+    ctx.beginPath();
+    known.forEach(k => ctx.lineTo(...at(b.high_db, k)));
+    known.reverse().forEach(k => ctx.lineTo(...at(b.low_db, k)));
+    ctx.fill();
+  }) };
 }
 
 // Bands of at least three neighbouring points of low coherence.

@@ -8,7 +8,7 @@
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
 use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
-use super::subspace::{Experiment, SubspaceData, SubspaceModel, SubspaceOptions};
+use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace};
 use crate::{MatRef, Result};
@@ -22,11 +22,20 @@ pub struct HansenModel {
     pub plant: StateSpace<Discrete>,
     /// The innovation form of S where it was asked for.
     pub innovation_form: Option<InnovationForm>,
+    /// That of G(S), where it was asked for; that of S is with `deviation`.
+    pub uncertainty: Option<Uncertainty>,
+    /// Whether the data contradict the nominal model, where an uncertainty was asked for.
+    pub evidence: Option<Result<Evidence, NoUncertainty>>,
 }
 
 /// Identifies S from the signals of one or more experiments and recombines it to the plant G(S).
 ///
 /// The controller stabilises G(S) exactly when S is stable.
+///
+/// The uncertainty of S carries over to the plant by the linear part of
+/// ```text
+/// G(S + dS) - G(S) = (Mt + (S + dS) Ut)^-1 dS (M + U S)^-1
+/// ```
 ///
 /// # Errors
 /// As [`super::subspace::subspace`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.

@@ -10,7 +10,7 @@
 //! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
 
 use super::hansen::HansenModel;
-use super::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
+use super::subspace::{NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
 use crate::factor::CoprimeFactors;
 use crate::linalg::least_squares;
 use crate::lti::{Discrete, StateSpace, simulate};
@@ -94,7 +94,10 @@ pub fn hansen_structured(
         }
     };
     let plant = factors.plant_of(&deviation.model)?;
-    Ok(HansenModel { deviation, plant, innovation_form })
+    let uncertainty = deviation.uncertainty.as_ref().map(|u| u.through(|s| factors.plant_of(s))).transpose()?;
+    let order = deviation.order.order;
+    let evidence = uncertainty.is_some().then(|| data.evidence(order, options));
+    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
 }
 
 fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
@@ -131,6 +134,8 @@ fn refit(
     }
     let stop = if change <= deviation.tolerance { Settling::Settled } else { Settling::Iterations };
     let from_kalman = kalman.map(|kalman| (&now.gain - kalman).norm_l2() / now.gain.norm_l2());
+    let reason = NoUncertainty::OtherFit;
+    model.uncertainty = model.uncertainty.map(|_| Uncertainty::Refused { reason });
     let form = InnovationForm { gain: now.gain, iterations, stop, change, misfit: now.misfit, from_kalman };
     Ok((model, form))
 }

@@ -383,6 +383,27 @@ pub struct FrequencyResponse {
     pub models: Vec<ModelResponse>,
     /// Non-parametric responses where the external excitation is known, per output and input.
     pub indirect: Vec<Indirect>,
+    /// Bounds of magnitudes on the grid of the models.
+    pub bands: Vec<Band>,
+}
+
+/// Bounds of the magnitude of one model from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Band {
+    /// Key of the method.
+    pub method: String,
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Probability with which the bounds should hold the truth, at each frequency.
+    pub level: f64,
+    /// Lower bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub low_db: Vec<f64>,
+    /// Upper bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub high_db: Vec<f64>,
 }
 
 /// Response of one model from one input to one output.
@@ -441,6 +462,9 @@ pub struct Mode {
     pub hz: f64,
     /// Damping ratio; negative where the mode is unstable.
     pub zeta: f64,
+    /// Standard deviations of both, where they are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<[f64; 2]>,
 }
 
 /// Hankel singular values of a model that was reduced.

@@ -90,7 +90,7 @@ mod tests {
     fn data() -> ReportData {
         let fit =
             |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
-        let mode = |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1 };
+        let mode = |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1, deviation: None };
         ReportData {
             methods: vec![Method::nominal(), Method::direct(), Method::hansen()],
             fits: vec![fit("b", "hansen", Some(90.0)), fit("b", "direct", None), fit("a", "hansen", Some(80.0))],

@@ -220,6 +220,14 @@ impl Writer<'_> {
         self.diagram("4-identify/stabilisation_deviation", found.diagrams.deviation.as_ref(), &named("beta", y))?;
         self.diagram("4-identify/stabilisation_direct", found.diagrams.direct.as_ref(), y)?;
         self.model("5-recombine/hansen", &found.hansen.plant, serde_json::Value::Null)?;
+        if let Some(u) = &found.uncertainty {
+            for (name, of) in [("4-identify", &u.deviation), ("5-recombine", &u.plant)] {
+                let mut file = of.json(&u.hz);
+                file["level"] = serde_json::json!(found.settings.hansen.uncertainty.level);
+                file["provenance"] = serde_json::json!(self.provenance);
+                self.folder.json(&format!("{name}/uncertainty.json"), &file)?;
+            }
+        }
         match &found.reduction {
             Some(Ok(r)) => {
                 let details = serde_json::json!({

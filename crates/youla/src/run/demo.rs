@@ -8,7 +8,7 @@ use super::settings::{
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
 use crate::identify::innovation_form::DeviationOptions;
-use crate::identify::subspace::{Order, Stability, SubspaceOptions, Weight};
+use crate::identify::subspace::{Order, Stability, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, Weight};
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, Gaps, SquareWaves};
@@ -142,6 +142,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
     };
     let subspace =
         SubspaceOptions { weight: Weight::Cva, horizon: 40, order: Order::Fixed(10), ..SubspaceOptions::default() };
+    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
     RunSettings {
         name: "demo: gas bearing".into(),
         data: DataSettings {
@@ -168,7 +169,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         },
         factors: FactorSettings { settle: Some(0), ..FactorSettings::default() },
         direct: Some(SubspaceOptions { order: Order::Fixed(6), stability: Stability::Allow, ..subspace.clone() }),
-        hansen: subspace,
+        hansen: SubspaceOptions { uncertainty, ..subspace },
         deviation: DeviationOptions::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         stabilisation: StabilisationSettings::default(),

@@ -4,15 +4,22 @@ use super::pipeline::Identification;
 use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
 use crate::identify::innovation_form::Settling;
-use crate::identify::subspace::amplitudes;
+use crate::identify::subspace::{Uncertainty, amplitudes};
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
 /// The answer to "can I trust it?", about five lines, each with its evidence.
 pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    [fit_line(found), loop_line(found), deviation_line(found), controller_line(found), factor_line(found)]
-        .into_iter()
-        .flatten()
-        .collect()
+    [
+        fit_line(found),
+        loop_line(found),
+        deviation_line(found),
+        evidence_line(found),
+        controller_line(found),
+        factor_line(found),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
 /// What speaks against the result or asks for a look, in sentences: for a terminal that shows no report.
@@ -28,6 +35,20 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let mut add = |status: Status, text: String| all.push(Note { status, text });
     for refusal in found.refusals() {
         add(Status::Info, format!("There is no {}: {}.", refusal.what, refusal.error));
+    }
+    let refused = found.hansen.uncertainty.as_ref().and_then(Uncertainty::refusal);
+    if let Some(reason) = refused {
+        add(Status::Caution, format!("There is no uncertainty of S and G(S): {reason}."));
+    }
+    if let Some(Err(reason)) = &found.hansen.evidence {
+        add(Status::Caution, format!("Nothing is said on S = 0: {reason}."));
+    }
+    if let Some(Uncertainty::Bootstrap(bootstrap)) = &found.hansen.deviation.uncertainty {
+        let (unstable, failed) = (bootstrap.unstable, bootstrap.failed);
+        if unstable + failed > 0 {
+            let text = format!("Of the resampled records {unstable} gave an unstable S and {failed} none.");
+            add(Status::Info, text);
+        }
     }
     for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
         let moved = model.map_or(0, |m| m.stability.moved.len());
@@ -151,6 +172,25 @@ fn deviation_line(found: &Identification) -> Option<Verdict> {
     );
     let status = if s.stability.stable { Status::Good } else { Status::Bad };
     Some(Verdict { status, text, evidence: Evidence::Order })
+}
+
+/// Whether S carries information, where its uncertainty was asked for.
+fn evidence_line(found: &Identification) -> Option<Verdict> {
+    let evidence = found.hansen.evidence.as_ref()?.as_ref().ok()?;
+    let figures =
+        format!("t = {:.1}, {:.1} at {:.0} %", evidence.statistic, evidence.threshold, 100.0 * evidence.level);
+    let (status, text) = if evidence.against_nominal() {
+        let text =
+            format!("S from each half of the data predicts the other half: the nominal model is refuted ({figures}).");
+        (Status::Good, text)
+    } else {
+        let text = format!(
+            "There is no evidence against the nominal model: S from each half of the data does not predict the other half \
+             ({figures}), so that S may be noise."
+        );
+        (Status::Caution, text)
+    };
+    Some(Verdict { status, text, evidence: Evidence::Frequency })
 }
 
 fn controller_line(found: &Identification) -> Option<Verdict> {

@@ -19,6 +19,7 @@ mod settings;
 mod signals;
 mod stabilisation;
 mod summary;
+mod uncertainty;
 mod verdict;
 mod write;
 
@@ -42,5 +43,6 @@ pub use settings::{
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stabilisation::Diagrams;
 pub use summary::summary;
+pub use uncertainty::{RunUncertainty, SystemUncertainty};
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

@@ -47,7 +47,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
             .collect::<Result<_>>()?,
         frequency: Some(frequency(found)?),
         poles: found.verdict.models.iter().map(poles).collect(),
-        modes: found.verdict.models.iter().flat_map(modes).collect(),
+        modes: found.verdict.models.iter().flat_map(|v| modes(found, v)).collect(),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
         bezout_residual: Some(found.factorisation.bezout_residual),
@@ -239,8 +239,30 @@ fn frequency(found: &Identification) -> Result<draw::FrequencyResponse> {
             ports(found).map(entry).collect()
         }
     };
-    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect })
+    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect, bands: bands(found) })
 }
+
+/// Bounds of the magnitude of G(S). A bound of zero is drawn far below the curve.
+fn bands(found: &Identification) -> Vec<draw::Band> {
+    let Some(uncertainty) = &found.uncertainty else { return Vec::new() };
+    let band = &uncertainty.plant.response;
+    let entry = |(output, input): (usize, usize)| {
+        let bounds: Vec<[f64; 2]> =
+            (0..uncertainty.hz.len()).map(|k| band.magnitude[band.place(k, output, input)]).collect();
+        draw::Band {
+            method: Method::Hansen.key().into(),
+            output,
+            input,
+            level: found.settings.hansen.uncertainty.level,
+            low_db: bounds.iter().map(|b| decibel(b[0].max(LEAST_BOUND * b[1]))).collect(),
+            high_db: bounds.iter().map(|b| decibel(b[1])).collect(),
+        }
+    };
+    ports(found).map(entry).collect()
+}
+
+/// Lowest bound that is drawn, over the upper one.
+const LEAST_BOUND: f64 = 1e-3;
 
 /// All pairs of output and input.
 fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> + use<> {
@@ -260,9 +282,18 @@ fn poles(v: &ModelVerdict) -> draw::Poles {
     draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles) }
 }
 
-fn modes(v: &ModelVerdict) -> Vec<draw::Mode> {
-    let mode = |m: &crate::lti::Mode| draw::Mode { method: v.method.key().into(), hz: m.hz, zeta: m.zeta };
-    v.modes.iter().map(mode).collect()
+fn modes(found: &Identification, v: &ModelVerdict) -> Vec<draw::Mode> {
+    let mode = |(k, m): (usize, &crate::lti::Mode)| {
+        let of_plant = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen);
+        let band = of_plant.and_then(|u| u.plant.modes.get(k));
+        draw::Mode {
+            method: v.method.key().into(),
+            hz: m.hz,
+            zeta: m.zeta,
+            deviation: band.map(|b| [b.hz_deviation, b.zeta_deviation]),
+        }
+    };
+    v.modes.iter().enumerate().map(mode).collect()
 }
 
 fn reduction(found: &Identification) -> Option<draw::Reduction> {

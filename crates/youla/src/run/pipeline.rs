@@ -6,6 +6,7 @@ use super::response::{check_grid, indirect};
 use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
 use super::stabilisation::{Diagrams, diagram};
+use super::uncertainty::{RunUncertainty, run_uncertainty};
 use super::verdict::{Method, Verdict, verify};
 use crate::factor::CoprimeFactors;
 use crate::identify::hansen::{HansenModel, deviation_data};
@@ -109,6 +110,8 @@ pub struct Identification {
     pub signals: DeviationSignals,
     /// S and G(S).
     pub hansen: HansenModel,
+    /// The uncertainty of S and G(S), where it was asked for and can be had.
+    pub uncertainty: Option<RunUncertainty>,
     /// `G_red(S)` where it was asked for, or the reason why there is none.
     pub reduction: Option<Result<Reduction<Discrete>>>,
     /// The direct model where it was asked for, or the reason why there is none.
@@ -254,11 +257,13 @@ pub fn identify(
         factorisation,
         signals,
         hansen,
+        uncertainty: None,
         reduction,
         direct,
         diagrams,
         indirect: None,
     };
+    found.uncertainty = run_uncertainty(&found)?;
     // (26), the loop certificate and the response that rests on no model.
     (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?;
     Ok(found)

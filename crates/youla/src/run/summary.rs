@@ -3,6 +3,7 @@
 use super::artefacts::{SCHEMA, pairs};
 use super::pipeline::{Identification, StageTimes};
 use super::response::{decibel, log_grid, model_responses};
+use super::uncertainty::{summary_entry, with_deviations};
 use super::verdict::{Method, ModelVerdict};
 use crate::Result;
 use crate::c64;
@@ -17,6 +18,7 @@ use std::f64::consts::TAU;
 ///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
 /// ```
 ///
+/// With an uncertainty there is `uncertainty`, and the modes of `hansen` have deviations and intervals.
 /// A method or an indirect response that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
 ///
 /// # Errors
@@ -46,6 +48,9 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     if let Some(v) = found.verdict.of(Method::TruePlant) {
         all["true_plant"] = json!({"fit": fits(v)});
     }
+    if found.hansen.uncertainty.is_some() {
+        all["uncertainty"] = summary_entry(found);
+    }
     Ok(all)
 }
 
@@ -57,6 +62,10 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Value {
         "modes": v.modes.iter().map(|m| json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
         "poles": pairs(&v.poles),
     });
+    if let Some(uncertainty) = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen) {
+        let modes = uncertainty.plant.modes.iter().map(|band| with_deviations(json!({}), band));
+        entry["modes"] = modes.collect::<Vec<_>>().into();
+    }
     if matches!(v.method, Method::Hansen | Method::HansenReduced) {
         entry["s_order"] = json!(found.hansen.deviation.model.order());
         entry["s_stable"] = json!(found.hansen.deviation.stability.stable);

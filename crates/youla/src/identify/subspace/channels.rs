@@ -7,8 +7,10 @@ use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
+use std::borrow::Cow;
 
 /// The records of one experiment in scaled units, one contiguous column per channel.
+#[derive(Clone)]
 pub(super) struct Signals {
     pub(super) u: Mat<f64>,
     pub(super) y: Mat<f64>,
@@ -17,6 +19,7 @@ pub(super) struct Signals {
 }
 
 /// All experiments in scaled units.
+#[derive(Clone)]
 pub(super) struct Channels {
     pub(super) experiments: Vec<Signals>,
     pub(super) inputs: usize,
@@ -88,22 +91,47 @@ impl Channels {
 
     /// Refuses experiments that are too short for so many block rows of past and future.
     pub(super) fn check_lengths(&self, blocks: (usize, usize)) -> Result<()> {
-        self.experiments.iter().enumerate().try_for_each(|(k, e)| check_length(k, e.u.nrows(), blocks))
+        self.experiments.iter().enumerate().try_for_each(|(k, e)| check_length(k, e.u.nrows(), blocks, 0))
     }
 
     /// Puts the four matrices back into the units of the record.
     pub(super) fn unscale_model(
         &self,
-        pair: OutputPair,
-        b: Mat<f64>,
-        d: Mat<f64>,
+        pair: &OutputPair,
+        b: &Mat<f64>,
+        d: &Mat<f64>,
         time: Discrete,
     ) -> Result<StateSpace<Discrete>> {
+        let (b, c, d) = self.unscale(b, &pair.c, d);
+        StateSpace::new(pair.a.clone(), b, c, d, time)
+    }
+
+    /// B, C and D in the units of the record.
+    pub(super) fn unscale(&self, b: &Mat<f64>, c: &Mat<f64>, d: &Mat<f64>) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
         let (u, y) = (&self.u_scale, &self.y_scale);
-        let b = Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] / u[j]);
-        let c = Mat::from_fn(pair.c.nrows(), pair.c.ncols(), |i, j| y[i] * pair.c[(i, j)]);
-        let d = Mat::from_fn(d.nrows(), d.ncols(), |i, j| y[i] * d[(i, j)] / u[j]);
-        StateSpace::new(pair.a, b, c, d, time)
+        (
+            Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] / u[j]),
+            Mat::from_fn(c.nrows(), c.ncols(), |i, j| y[i] * c[(i, j)]),
+            Mat::from_fn(d.nrows(), d.ncols(), |i, j| y[i] * d[(i, j)] / u[j]),
+        )
+    }
+
+    /// The same inputs with other outputs, in scaled units.
+    pub(super) fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Channels {
+        let signals = |(e, y): (&Signals, Mat<f64>)| Signals { y, ..e.clone() };
+        Channels { experiments: self.experiments.iter().zip(outputs).map(signals).collect(), ..self.clone() }
+    }
+
+    /// Inputs and outputs without what the known signals explain of them.
+    pub(super) fn beyond_disturbances(&self) -> Result<Cow<'_, [Signals]>> {
+        if self.disturbances() == 0 {
+            return Ok(Cow::Borrowed(&self.experiments));
+        }
+        let rest = |e: &Signals| {
+            let (u, y) = (without(e.u.as_ref(), e.w.as_ref())?, without(e.y.as_ref(), e.w.as_ref())?);
+            Ok(Signals { w: Mat::zeros(u.nrows(), 0), u, y })
+        };
+        Ok(Cow::Owned(self.experiments.iter().map(rest).collect::<Result<_>>()?))
     }
 }
 
@@ -125,7 +153,7 @@ fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(u
         check_finite(&named("input"), *u)?;
         check_finite(&named("output"), *y)?;
         let delay = options.delays.iter().copied().max().unwrap_or(0);
-        check_length(k, u.nrows().saturating_sub(delay), (past, horizon))?;
+        check_length(k, u.nrows(), (past, horizon), delay)?;
     }
     Ok((m, p))
 }
@@ -146,15 +174,17 @@ fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_,
 }
 
 /// Refuses an experiment without a Hankel column.
-fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize)) -> Result<()> {
-    if samples < past + horizon {
-        let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows", k + 1);
-        return Err(Error::TooFewSamples { what, found: samples, needed: past + horizon });
+fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize), delay: usize) -> Result<()> {
+    let needed = past.saturating_add(horizon).saturating_add(delay);
+    if samples >= needed {
+        return Ok(());
     }
-    Ok(())
+    let delayed = if delay > 0 { format!(" after a delay of {delay} samples") } else { String::new() };
+    let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows{delayed}", k + 1);
+    Err(Error::TooFewSamples { what, found: samples, needed })
 }
 
-/// Outputs without what known signals explain of them.
+/// What known signals do not explain of a record.
 fn without(y: MatRef<'_, f64>, w: MatRef<'_, f64>) -> Result<Mat<f64>> {
     Ok(y - w * regress("the known disturbance", w, y)?)
 }

@@ -10,6 +10,7 @@ use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, MatRef, Result};
 
 /// Delays per input, in samples.
+#[derive(Clone)]
 pub(super) struct Delays {
     samples: Vec<usize>,
 }

@@ -8,7 +8,8 @@ use super::{DataFactor, Factorisation};
 use super::{disturbance, gram};
 use crate::linalg::{Triangle, leading_rank};
 use crate::{Error, Result};
-use faer::{Mat, MatMut};
+use faer::linalg::matmul::matmul;
+use faer::{Accum, Mat, MatMut, Par, Side};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -99,6 +100,11 @@ impl DataTriangle {
         Ok(DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report })
     }
 
+    /// In which order the rows stand.
+    pub(super) fn arrangement(&self) -> Arrangement {
+        self.arrangement
+    }
+
     /// R of the rows that a past and a future no longer than those of the data take, in the given order; the Hankel columns
     /// stay those of the data.
     pub(super) fn arranged(&self, arrangement: Arrangement, past: usize, horizon: usize) -> Result<Mat<f64>> {
@@ -124,6 +130,56 @@ impl DataTriangle {
             wanted.iter().enumerate().for_each(|(j, column)| rows.as_mut().col_mut(j).copy_from(self.r.col(*column)));
         });
         Ok(triangle.r().to_owned())
+    }
+}
+
+/// The data with another weight on some of their Hankel columns.
+pub(super) struct BlockWeights<'a> {
+    data: &'a DataTriangle,
+    places: Vec<usize>,
+    /// `R' R`, where R came from the Gram matrix.
+    gram: Option<Mat<f64>>,
+}
+
+impl<'a> BlockWeights<'a> {
+    pub(super) fn new(data: &'a DataTriangle) -> Self {
+        let places = data.arrangement.places(data.inputs, data.outputs, data.past, data.horizon);
+        let gram = (data.report.by == Factorisation::Gram).then(|| data.r.transpose() * &data.r);
+        BlockWeights { data, places, gram }
+    }
+
+    /// The factor of `R' R + step H' H` with the given Hankel columns H of one experiment.
+    pub(super) fn raised(
+        &self,
+        experiments: &[Signals],
+        experiment: usize,
+        columns: Range<usize>,
+        step: f64,
+    ) -> Result<DataTriangle> {
+        let data = self.data;
+        let rows = RowMap::new(experiments, data.past + data.horizon, &self.places);
+        let first = rows.first[experiment] + columns.start;
+        let pieces = (0..columns.len()).step_by(PIECE).map(|start| {
+            let mut piece = Mat::zeros(PIECE.min(columns.len() - start), self.places.len());
+            rows.fill(first + start, piece.as_mut());
+            piece
+        });
+        let r = match &self.gram {
+            Some(gram) => {
+                let mut gram = gram.clone();
+                pieces.for_each(|h| matmul(gram.as_mut(), Accum::Add, h.transpose(), h.as_ref(), step, Par::Seq));
+                let what = || "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
+                let cholesky = gram.llt(Side::Lower).map_err(|_| Error::Singular { what: what(), rcond: 0.0 })?;
+                cholesky.L().transpose().to_owned()
+            }
+            None => {
+                let mut triangle = Triangle::new(self.places.len(), PIECE.min(columns.len()).max(data.r.nrows()));
+                triangle.fold_rows(data.r.as_ref());
+                pieces.for_each(|h| triangle.fold_rows((h * faer::Scale(step.sqrt())).as_ref()));
+                triangle.r().to_owned()
+            }
+        };
+        Ok(DataTriangle { r, ..*data })
     }
 }
 

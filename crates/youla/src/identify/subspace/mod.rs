@@ -38,6 +38,7 @@ pub mod stabilisation;
 mod stability;
 #[cfg(test)]
 mod tests;
+pub(crate) mod uncertainty;
 mod varx;
 
 pub use disturbance::{Line, amplitudes, harmonics, lines};
@@ -50,13 +51,17 @@ pub use options::{
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
+pub use uncertainty::{
+    BlockInfluence, Bootstrap, Delta, Evidence, ModeBand, NoUncertainty, ResponseBand, Uncertainty, UncertaintyMethod,
+    UncertaintyOptions,
+};
 
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use channels::{Channels, check_blocks};
 use factorisation::{Arrangement, DataTriangle};
 use faer::{Mat, MatRef, c64};
-use output_error::Fitted;
+use output_error::{Base, Fitted};
 use projected::{Estimate, Projected};
 
 /// Records of one experiment: row k is time k.
@@ -105,6 +110,8 @@ pub struct SubspaceModel {
     pub excitation_rcond: f64,
     /// How the data were factored.
     pub factor: DataFactor,
+    /// What is known of the error of the model, where it was asked for.
+    pub uncertainty: Option<Uncertainty>,
 }
 
 impl SubspaceModel {
@@ -224,6 +231,15 @@ impl SubspaceData {
         Ok(SubspaceData { channels, triangle, time, factored, automatic_horizon: automatic })
     }
 
+    /// The same inputs with other outputs, in scaled units, factored alike.
+    fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Result<Self> {
+        let channels = self.channels.with_outputs(outputs);
+        let options = &self.factored;
+        let blocks = (options.past(), options.horizon);
+        let triangle = DataTriangle::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
+        Ok(SubspaceData { channels, triangle, time: self.time, factored: options.clone(), automatic_horizon: None })
+    }
+
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
     /// past at most those of the factor; scaling, factorisation and delays are part of the factor.
     ///
@@ -246,6 +262,7 @@ impl SubspaceData {
         }
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
+        uncertainty::check(options)?;
         Ok(match automatic {
             true => SubspaceOptions { horizon: held.horizon, past: held.past, ..options.clone() },
             false => options.clone(),
@@ -262,12 +279,18 @@ impl SubspaceData {
         let order = order::choose(options.order, projected.evidence()?, by_models)?;
         let ScaledModel { estimate, fitted } = self.scaled_model(projected, order.order, options)?;
         let (factor, columns) = projected.data();
+        let base = || {
+            let gain = estimate.innovation.gain();
+            Base::new(&self.channels, &estimate.pair, gain, &estimate.stability, options, &fitted)
+        };
         let (delays, delayed) = (&self.channels.delays, &self.channels.delayed);
-        let model = self.channels.unscale_model(estimate.pair, fitted.b, fitted.d, self.time)?;
+        let model = self.channels.unscale_model(&estimate.pair, &fitted.b, &fitted.d, self.time)?;
+        let uncertainty = uncertainty::find(self, options, base, &estimate.innovation, &model);
         let mut stability = estimate.stability;
         stability.poles.extend(vec![c64::new(0.0, 0.0); delays.states()]);
         Ok(SubspaceModel {
             model: delays.put_before(model)?,
+            uncertainty,
             innovation: delays.put_below(estimate.innovation.unscale(&self.channels.y_scale)),
             initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
@@ -306,7 +329,7 @@ impl SubspaceData {
         let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
         let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
         Ok(SubspaceModel {
-            model: self.channels.unscale_model(pair, fitted.b, fitted.d, self.time)?,
+            model: self.channels.unscale_model(&pair, &fitted.b, &fitted.d, self.time)?,
             initial_states: fitted.initial_states,
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
             fit: fitted.quality,

@@ -1,6 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
-use super::AutomaticHorizon;
+use super::{AutomaticHorizon, UncertaintyOptions};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
@@ -43,6 +43,9 @@ pub struct SubspaceOptions {
     pub scaling: ChannelScaling,
     /// The state at the first sample of each experiment.
     pub initial_state: InitialState,
+    /// Whether and how the uncertainty of the estimate is found.
+    #[serde(skip_serializing_if = "UncertaintyOptions::is_default")]
+    pub uncertainty: UncertaintyOptions,
 }
 
 impl Default for SubspaceOptions {
@@ -59,6 +62,7 @@ impl Default for SubspaceOptions {
             stability: Stability::default(),
             scaling: ChannelScaling::default(),
             initial_state: InitialState::default(),
+            uncertainty: UncertaintyOptions::default(),
         }
     }
 }

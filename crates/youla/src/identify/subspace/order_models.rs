@@ -13,7 +13,7 @@ use super::output_error::prediction_errors;
 use super::projected::Projected;
 use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
 use super::{AutoOrder, Experiment, Innovation, NoInnovation, Order, OrderRule, SubspaceData, SubspaceModel};
-use super::{SubspaceOptions, channels::Signals};
+use super::{SubspaceOptions, UncertaintyOptions, channels::Signals};
 use crate::linalg::{Triangle, block, least_squares};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -95,7 +95,8 @@ fn cross_validation(
         return Err(Error::OutOfRange { what, value: leading, must: "between 0 and 1" });
     }
     // The horizons stay those of all data.
-    let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), ..options.clone() };
+    let uncertainty = UncertaintyOptions::default();
+    let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), uncertainty, ..options.clone() };
     let parts: Vec<_> = data.channels.experiments.iter().map(|signals| split(signals, leading)).collect();
     let first: Vec<Experiment<'_>> = parts.iter().map(|([u, y, _], _)| Experiment { u: *u, y: *y }).collect();
     let known: Vec<_> = parts.iter().map(|([_, _, w], _)| *w).filter(|w| w.ncols() > 0).collect();

@@ -68,8 +68,7 @@ pub(super) fn fit(
     stability: &StabilityReport,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
-    let simulated = stability.stable && !options.weight.is_for_closed_loops();
-    let (predictor, by) = predictor(pair, kalman_gain, simulated)?;
+    let (predictor, by) = predictor(pair, kalman_gain, is_simulated(stability, options))?;
     solve(data, pair, predictor, by, options)
 }
 
@@ -91,24 +90,17 @@ fn solve(
     by: InputFit,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
-    let unknowns = &Unknowns {
-        states: pair.a.nrows(),
-        inputs: data.inputs,
-        outputs: data.outputs,
-        initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
-        disturbances: data.disturbances() * data.outputs,
-        direct: options.feedthrough.inputs_of_outputs(data.inputs, data.outputs),
-    };
+    let unknowns = &unknowns(data, pair, options);
     let parts = condense(data, &predictor, unknowns);
     let common = unknowns.common();
     let mut whole = Triangle::new(common + 1, common + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
     let r = whole.r();
     let solution = least_squares("the regressors of B and D", r.subcols(0, common), r.subcols(common, 1))?;
-    let (driven, d) = unpack(solution.x.as_ref(), unknowns);
+    let (driven, d) = unknowns.unpack(solution.x.as_ref());
     let own = parts.iter().map(|part| part.own(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
     let (initial_states, disturbances): (Vec<_>, Vec<_>) = own.into_iter().unzip();
-    let outputs = data.experiments.iter().zip(&disturbances).map(|(e, a)| &e.y - &e.w * a).collect::<Vec<_>>();
+    let outputs = without_disturbances(data, &disturbances);
     let percent = fit_percent(data, &outputs, &predictor, [driven.as_ref(), d.as_ref()], &initial_states);
     let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
     let b = match &predictor.k {
@@ -118,8 +110,78 @@ fn solve(
     Ok(Fitted { b, d, initial_states, disturbances, quality })
 }
 
+fn is_simulated(stability: &StabilityReport, options: &SubspaceOptions) -> bool {
+    stability.stable && !options.weight.is_for_closed_loops()
+}
+
+fn unknowns(data: &Channels, pair: &OutputPair, options: &SubspaceOptions) -> Unknowns {
+    Unknowns {
+        states: pair.a.nrows(),
+        inputs: data.inputs,
+        outputs: data.outputs,
+        initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
+        disturbances: data.disturbances() * data.outputs,
+        direct: options.feedthrough.inputs_of_outputs(data.inputs, data.outputs),
+    }
+}
+
+/// The estimate around which the data are weighted, in scaled units.
+pub(super) struct Base {
+    pub(super) pair: OutputPair,
+    pub(super) predictor: Predictor,
+    pub(super) unknowns: Unknowns,
+    /// `B - K D`.
+    pub(super) driven: Mat<f64>,
+    pub(super) d: Mat<f64>,
+    pub(super) initial_states: Vec<Vec<f64>>,
+    /// Coefficients of the known disturbances per experiment, known signals x outputs.
+    pub(super) disturbances: Vec<Mat<f64>>,
+    /// Whether the K of the predictor is the Kalman gain.
+    pub(super) innovation_gain: bool,
+    pub(super) poles_moved: bool,
+    pub(super) stable: bool,
+}
+
+impl Base {
+    /// From the result of [`fit`] with the same arguments.
+    pub(super) fn new(
+        data: &Channels,
+        pair: &OutputPair,
+        kalman_gain: Option<MatRef<'_, f64>>,
+        stability: &StabilityReport,
+        options: &SubspaceOptions,
+        fitted: &Fitted,
+    ) -> Result<Base> {
+        let (predictor, by) = predictor(pair, kalman_gain, is_simulated(stability, options))?;
+        let driven = match &predictor.k {
+            Some(k) => &fitted.b - k * &fitted.d,
+            None => fitted.b.clone(),
+        };
+        Ok(Base {
+            unknowns: unknowns(data, pair, options),
+            pair: pair.clone(),
+            predictor,
+            driven,
+            d: fitted.d.clone(),
+            initial_states: fitted.initial_states.clone(),
+            disturbances: fitted.disturbances.clone(),
+            innovation_gain: by == InputFit::Prediction,
+            poles_moved: !stability.moved.is_empty(),
+            stable: stability.stable,
+        })
+    }
+
+    /// B.
+    pub(super) fn b(&self) -> Mat<f64> {
+        match &self.predictor.k {
+            Some(k) => &self.driven + k * &self.d,
+            None => self.driven.clone(),
+        }
+    }
+}
+
 /// The simulation of the model or its one-step predictor.
-fn predictor(
+pub(super) fn predictor(
     pair: &OutputPair,
     kalman_gain: Option<MatRef<'_, f64>>,
     simulated: bool,
@@ -136,7 +198,7 @@ fn predictor(
 
 /// What one experiment says: the triangular factor over `[x0, disturbances | B D y]`, split behind the directions of its own
 /// unknowns.
-struct Part {
+pub(super) struct Part {
     r: Mat<f64>,
     own: usize,
     own_rank: usize,
@@ -144,7 +206,7 @@ struct Part {
 
 /// One triangular factor per output, joined for each experiment; in modal coordinates where A has them, else output by
 /// output.
-fn condense(data: &Channels, predictor: &Predictor, unknowns: &Unknowns) -> Vec<Part> {
+pub(super) fn condense(data: &Channels, predictor: &Predictor, unknowns: &Unknowns) -> Vec<Part> {
     let prepared: Vec<_> = data
         .experiments
         .par_iter()
@@ -166,7 +228,7 @@ fn condense(data: &Channels, predictor: &Predictor, unknowns: &Unknowns) -> Vec<
 
 /// The regressors of the disturbances' coefficients: the known signals, for a predictor each at each output as the predictor
 /// passes it on to all outputs.
-fn regressors(signals: &Signals, predictor: &Predictor) -> Regressors {
+pub(super) fn regressors(signals: &Signals, predictor: &Predictor) -> Regressors {
     let (w, p) = (&signals.w, signals.y.ncols());
     let plain = Regressors { signals: w.clone(), known: w.ncols(), outputs: p, crossed: false };
     if predictor.k.is_none() || w.ncols() == 0 {
@@ -232,9 +294,15 @@ fn join(outputs: &[Mat<f64>], unknowns: &Unknowns) -> Part {
 
 impl Part {
     /// `R22`.
-    fn common(&self) -> MatRef<'_, f64> {
+    pub(super) fn common(&self) -> MatRef<'_, f64> {
         let (skip, from) = (self.own_rank, self.own);
         self.r.as_ref().submatrix(skip, from, self.r.nrows() - skip, self.r.ncols() - from)
+    }
+
+    /// `R11` and `R12`, over the unknowns of the experiment and over B and D.
+    pub(super) fn of_own(&self) -> (MatRef<'_, f64>, MatRef<'_, f64>) {
+        let (r11, rest) = self.r.as_ref().subrows(0, self.own_rank).split_at_col(self.own);
+        (r11, rest.subcols(0, rest.ncols() - 1))
     }
 
     /// `R11 [x0; a] = r1y - R12 [B; D]`: the initial state and the coefficients of the disturbances.
@@ -248,16 +316,6 @@ impl Part {
         let a = Mat::from_fn(known, unknowns.outputs, |j, i| found[(unknowns.initial + i * known + j, 0)]);
         Ok((x0, a))
     }
-}
-
-/// `B - K D` and D from the vector of unknowns.
-fn unpack(solution: MatRef<'_, f64>, unknowns: &Unknowns) -> (Mat<f64>, Mat<f64>) {
-    let (n, m) = (unknowns.states, unknowns.inputs);
-    let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
-    let mut d = Mat::zeros(unknowns.outputs, m);
-    let entries = unknowns.direct.iter().enumerate().flat_map(|(i, inputs)| inputs.iter().map(move |q| (i, *q)));
-    entries.enumerate().for_each(|(place, (i, q))| d[(i, q)] = solution[(m * n + place, 0)]);
-    (driven, d)
 }
 
 /// One-step prediction errors of the observer with gain K, one record per experiment, in scaled units.
@@ -274,7 +332,7 @@ pub(super) fn prediction_errors(
 }
 
 /// The outputs without what the known disturbances explain, so that these do not count as the model's merit.
-fn without_disturbances(data: &Channels, coefficients: &[Mat<f64>]) -> Vec<Mat<f64>> {
+pub(super) fn without_disturbances(data: &Channels, coefficients: &[Mat<f64>]) -> Vec<Mat<f64>> {
     data.experiments.iter().zip(coefficients).map(|(e, a)| &e.y - &e.w * a).collect()
 }
 

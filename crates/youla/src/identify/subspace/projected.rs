@@ -54,11 +54,16 @@ impl Projected {
     /// A and C of one order with the choice on stability applied, and their innovations.
     pub(super) fn estimate(&self, order: usize, choice: Stability, time: Discrete) -> Result<Estimate> {
         let (pair, stability) = stability::apply(choice, self.realise(order)?, time)?;
-        let innovation = match self {
-            Projected::OpenLoop(shared) => shared.innovation(&pair)?,
-            Projected::Predictor(shared) => shared.innovation(&pair)?,
-        };
+        let innovation = self.innovation(&pair)?;
         Ok(Estimate { pair, stability, innovation })
+    }
+
+    /// From the residuals of both equations with given A and C.
+    pub(super) fn innovation(&self, pair: &OutputPair) -> Result<Innovation> {
+        match self {
+            Projected::OpenLoop(shared) => shared.innovation(pair),
+            Projected::Predictor(shared) => shared.innovation(pair),
+        }
     }
 
     /// Descending, horizon x outputs of them.

@@ -9,6 +9,7 @@ use crate::linalg::{block, regress};
 use faer::{Mat, MatRef};
 
 /// The matrices through which the states are seen.
+#[derive(Clone)]
 pub(super) struct OutputPair {
     /// State matrix, n x n.
     pub(super) a: Mat<f64>,

@@ -63,6 +63,16 @@ impl Unknowns {
         self.own() + self.of_b() + self.direct[i].len() + 1
     }
 
+    /// B (or `B - K D`) and D from the vector of common unknowns.
+    pub(super) fn unpack(&self, solution: MatRef<'_, f64>) -> (Mat<f64>, Mat<f64>) {
+        let (n, m) = (self.states, self.inputs);
+        let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
+        let mut d = Mat::zeros(self.outputs, m);
+        let entries = self.direct.iter().enumerate().flat_map(|(i, inputs)| inputs.iter().map(move |q| (i, *q)));
+        entries.enumerate().for_each(|(place, (i, q))| d[(i, q)] = solution[(m * n + place, 0)]);
+        (driven, d)
+    }
+
     /// Columns of one experiment: `[x0 | disturbances | B | D | y]`.
     pub(super) fn width(&self) -> usize {
         self.own() + self.common() + 1

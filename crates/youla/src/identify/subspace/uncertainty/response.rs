@@ -1,0 +1,154 @@
+//! The delta method for frequency responses and modes.
+//!
+//! ```text
+//! dG = X (dA Y + dB) + dC Y + dD,   X = C (z I - A)^-1,   Y = (z I - A)^-1 B
+//! dlambda = w' dA v / (w' v)  for the left and right eigenvectors of a pole
+//! ```
+
+use super::band::{ModeBand, ResponseBand};
+use super::delta::{BlockInfluence, Delta};
+use crate::linalg::balance;
+use crate::lti::{Discrete, Mode, StateSpace, TimeDomain, frequency_response};
+use crate::{Error, Mat, MatRef, Result, c64};
+use faer::prelude::*;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+impl Delta {
+    /// The frequency response at the angular frequencies `omega`, rad/s, with its regions.
+    ///
+    /// # Errors
+    /// As [`frequency_response`].
+    pub fn response(&self, omega: &[f64]) -> Result<ResponseBand> {
+        let response = frequency_response(&self.model, omega)?;
+        let size = self.model.outputs() * self.model.inputs();
+        let covariance: Vec<[f64; 3]> = omega
+            .par_iter()
+            .flat_map_iter(|w| {
+                let changes = self.response_changes(*w);
+                (0..size).map(move |entry| {
+                    let parts: Vec<Vec<f64>> = changes.iter().map(|d| vec![d[entry].re, d[entry].im]).collect();
+                    let v = self.covariance(&parts);
+                    [v[(0, 0)], v[(0, 1)], v[(1, 1)]]
+                })
+            })
+            .collect();
+        let values = response.iter().flat_map(|at| at.col_iter().flat_map(|c| c.iter().copied()).collect::<Vec<_>>());
+        let student = self.student();
+        let magnitude = values.zip(&covariance).map(|(g, v)| magnitude_interval(g, v, student)).collect();
+        Ok(ResponseBand { response, covariance, magnitude, ellipse: self.ellipse() })
+    }
+
+    /// The change of the response with each block at one frequency, rad/s; p m numbers, column by column.
+    pub fn response_changes(&self, omega: f64) -> Vec<Vec<c64>> {
+        let z = self.model.time().boundary(omega);
+        let (n, m, p) = (self.model.order(), self.model.inputs(), self.model.outputs());
+        let a = self.model.a();
+        let pencil = Mat::from_fn(n, n, |i, j| if i == j { z - a[(i, j)] } else { c64::new(-a[(i, j)], 0.0) });
+        let lu = pencil.partial_piv_lu();
+        let y = lu.solve(complex(self.model.b()));
+        let x = lu.solve_transpose(complex(self.model.c()).transpose()).transpose().to_owned();
+        let change = |block: &BlockInfluence| {
+            let states = product(&block.a, &y) + complex(block.b.as_ref());
+            let d = &x * states + product(&block.c, &y) + complex(block.d.as_ref());
+            (0..m * p).map(|k| d[(k % p, k / p)]).collect()
+        };
+        self.blocks.iter().map(change).collect()
+    }
+
+    /// The modes in the order of [`StateSpace::modes`], with their intervals.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`] of the eigenvectors.
+    pub fn modes(&self) -> Result<Vec<ModeBand>> {
+        let modes = self.model.modes()?;
+        let eigen = Eigen::new(&self.model)?;
+        let student = self.student();
+        Ok(modes.into_iter().map(|mode| self.mode_band(mode, &eigen, student)).collect())
+    }
+
+    fn mode_band(&self, mode: Mode, eigen: &Eigen, student: f64) -> ModeBand {
+        let changes: Vec<Vec<f64>> = self
+            .blocks
+            .iter()
+            .map(|block| mode_change(&mode, eigen.change(mode.pole, &block.a), self.model.time()).to_vec())
+            .collect();
+        let v = self.covariance(&changes);
+        let [hz, zeta] = [v[(0, 0)].max(0.0).sqrt(), v[(1, 1)].max(0.0).sqrt()];
+        ModeBand {
+            mode,
+            hz_deviation: hz,
+            zeta_deviation: zeta,
+            hz: [(mode.hz - student * hz).max(0.0), mode.hz + student * hz],
+            zeta: [mode.zeta - student * zeta, mode.zeta + student * zeta],
+        }
+    }
+}
+
+/// `|g| -+ t sigma`, sigma that of the part of the error along g.
+fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
+    let size = g.norm();
+    let (r, i) = if size > 0.0 { (g.re / size, g.im / size) } else { (1.0, 0.0) };
+    let half = student * (r * r * v[0] + 2.0 * r * i * v[1] + i * i * v[2]).max(0.0).sqrt();
+    [(size - half).max(0.0), size + half]
+}
+
+/// Change of frequency and damping with the pole: `s = ln(z) / ts`.
+fn mode_change(mode: &Mode, dz: c64, time: Discrete) -> [f64; 2] {
+    let s = time.continuous_pole(mode.pole);
+    let size = s.norm();
+    if !size.is_finite() || size == 0.0 {
+        return [0.0; 2];
+    }
+    let ds = dz / mode.pole / time.ts();
+    let along = (s.re * ds.re + s.im * ds.im) / size;
+    let dzeta = if mode.pole.im == 0.0 && mode.pole.re > 0.0 { 0.0 } else { (s.re * along / size - ds.re) / size };
+    [along / TAU, dzeta]
+}
+
+/// Eigenvalues with left and right eigenvectors, scaled to `w' v = 1`, in balanced coordinates.
+struct Eigen {
+    poles: Vec<c64>,
+    scale: Vec<f64>,
+    right: Mat<c64>,
+    left: Mat<c64>,
+}
+
+impl Eigen {
+    fn new(model: &StateSpace<Discrete>) -> Result<Self> {
+        let scale = balance("the state matrix", model.a())?.scale;
+        let n = model.order();
+        let a = Mat::from_fn(n, n, |i, j| model.a()[(i, j)] * scale[j] / scale[i]);
+        let failed = |_| Error::NoConvergence { what: "the eigenvectors of the state matrix".into(), iterations: 0 };
+        let eigen = a.eigen().map_err(failed)?;
+        let right = eigen.U().to_owned();
+        let left = right.partial_piv_lu().solve(Mat::<c64>::identity(n, n));
+        let poles = eigen.S().column_vector().iter().copied().collect();
+        Ok(Eigen { poles, scale, right, left })
+    }
+
+    /// `w' dA v` for the pole nearest to the given one.
+    fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
+        let near = |k: &usize| (self.poles[*k] - pole).norm();
+        let Some(k) = (0..self.poles.len()).min_by(|a, b| near(a).total_cmp(&near(b))) else {
+            return c64::new(0.0, 0.0);
+        };
+        let n = self.scale.len();
+        let mut sum = c64::new(0.0, 0.0);
+        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+            sum += self.left[(k, i)] * self.right[(j, k)] * (da[(i, j)] * self.scale[j] / self.scale[i]);
+        }
+        sum
+    }
+}
+
+fn complex(m: MatRef<'_, f64>) -> Mat<c64> {
+    Mat::from_fn(m.nrows(), m.ncols(), |i, j| c64::new(m[(i, j)], 0.0))
+}
+
+/// A real times a complex matrix.
+fn product(a: &Mat<f64>, b: &Mat<c64>) -> Mat<c64> {
+    Mat::from_fn(a.nrows(), b.ncols(), |i, j| {
+        (0..a.ncols()).fold(c64::new(0.0, 0.0), |sum, k| sum + b[(k, j)] * a[(i, k)])
+    })
+}

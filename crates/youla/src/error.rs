@@ -529,6 +529,11 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
+    /// A stream gave other samples when it was read again.
+    #[error(
+        "the records have other lengths in the second pass over them than in the first; keep the files as they are"
+    )]
+    RecordChanged,
     /// Another scaling or factorisation than that of the factored data was asked for.
     #[error("scaling and factorisation are part of the factored data; factor the records again to change them")]
     Refactor,

@@ -55,6 +55,33 @@ impl TimeSource {
         }
     }
 
+    /// The same from a time column of any length, value by value; the steps are held against the median of the first 65536.
+    ///
+    /// # Errors
+    /// As [`TimeSource::resolve`].
+    pub(super) fn resolve_streamed(&self, what: &str, mut next: impl FnMut() -> Result<Option<f64>>) -> Result<Clock> {
+        let mut times = Vec::new();
+        while times.len() <= STEPS {
+            match next()? {
+                Some(time) => times.push(time),
+                None => return self.resolve(what, Some(&times)),
+            }
+        }
+        let clock = self.resolve(what, Some(&times))?;
+        let ts = self.ts.unwrap_or_else(|| median_step(&times));
+        let (first, mut last, mut count) = (times[0], times[STEPS], times.len());
+        while let Some(time) = next()? {
+            count += 1;
+            let dt = time - last;
+            if !self.is_step(dt, ts) {
+                return Err(Error::NonUniformTime { what: what.to_owned(), row: count, dt, ts });
+            }
+            last = time;
+        }
+        let time = if self.ts.is_some() { clock.time } else { Discrete::new(mean_step(first, last, count))? };
+        Ok(Clock { time, start: first })
+    }
+
     fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
         let middle = median_step(times);
         if let Some(ts) = declared {
@@ -67,12 +94,15 @@ impl TimeSource {
             return Ok(Clock { time, start: times[0] });
         }
         self.check_steps(what, times, middle)?;
-        Ok(Clock { time: Discrete::new(mean_step(times))?, start: times[0] })
+        Ok(Clock { time: Discrete::new(mean_step(times[0], times[times.len() - 1], times.len()))?, start: times[0] })
+    }
+
+    fn is_step(&self, dt: f64, ts: f64) -> bool {
+        (dt - ts).abs() <= self.tolerance * ts
     }
 
     fn check_steps(&self, what: &str, times: &[f64], ts: f64) -> Result<()> {
-        let good = |step: &[f64]| (step[1] - step[0] - ts).abs() <= self.tolerance * ts;
-        match times.windows(2).position(|step| !good(step)) {
+        match times.windows(2).position(|step| !self.is_step(step[1] - step[0], ts)) {
             None => Ok(()),
             Some(k) => {
                 let dt = times[k + 1] - times[k];
@@ -81,6 +111,9 @@ impl TimeSource {
         }
     }
 }
+
+/// Steps of a streamed time column of which the median is taken.
+const STEPS: usize = 1 << 16;
 
 /// Sample time and time of the first sample.
 #[derive(Debug)]
@@ -97,8 +130,8 @@ fn median_step(times: &[f64]) -> f64 {
 }
 
 /// The mean step, as the shortest decimal number within the rounding of the time column.
-fn mean_step(times: &[f64]) -> f64 {
-    let (first, last, steps) = (times[0], times[times.len() - 1], (times.len() - 1) as f64);
+fn mean_step(first: f64, last: f64, samples: usize) -> f64 {
+    let steps = (samples - 1) as f64;
     let mean = (last - first) / steps;
     let rounding = 2.0 * f64::EPSILON * (first.abs().max(last.abs()) / steps).max(mean.abs() / 2.0);
     let rounded = (0..17).filter_map(|digits| format!("{mean:.digits$e}").parse::<f64>().ok());
@@ -121,6 +154,26 @@ mod tests {
         }
         let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
         assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_streamed_column_gives_the_same_clock() {
+        for (n, ts) in [(1000, 2e-4), (STEPS + 1, 2e-4), (STEPS + 5000, 1.0 / 3.0)] {
+            let times = times(n, ts);
+            for source in [TimeSource::default(), TimeSource { ts: Some(ts), ..Default::default() }] {
+                let mut next = times.iter().copied();
+                let streamed = source.resolve_streamed("t", || Ok(next.next())).unwrap();
+                let whole = source.resolve("t", Some(&times)).unwrap();
+                assert_eq!((streamed.time, streamed.start), (whole.time, whole.start));
+            }
+        }
+        for row in [60, STEPS + 100] {
+            let mut gap = times(STEPS + 1000, 0.1);
+            gap.remove(row);
+            let mut next = gap.iter().copied();
+            let error = TimeSource::default().resolve_streamed("t", || Ok(next.next())).unwrap_err();
+            assert!(matches!(error, Error::NonUniformTime { row: found, .. } if found == row + 1), "{error}");
+        }
     }
 
     #[test]

@@ -1,21 +1,24 @@
 //! The triangular factor R of block-Hankel data, from which every weight, order and shorter horizon starts.
 //!
-//! Only R is formed, from the Gram matrix or from pieces of a few thousand rows (one row per Hankel column). The rows are
-//! dealt to a fixed number of lanes that depends on the data alone, so the result is the same on any number of threads.
+//! Only R is formed, from the Gram matrix or from pieces of a few thousand rows (one row per Hankel column), batch by batch.
+//! The rows of a batch are dealt to lanes whose number depends on the data alone, so the result is the same on any number of
+//! threads. R is found in the units of the record and scaled at the end: both ways give the same to rounding.
 
-use super::channels::Channels;
-use super::gram;
-use super::{DataFactor, Factorisation};
+use super::batch::{Batch, Pass, Segment, each_batch};
+use super::channels::{Channels, Statistics, check_blocks, check_ports};
+use super::gram::{self, GramSums};
+use super::{DataFactor, Factorisation, SubspaceOptions};
 use crate::linalg::Triangle;
+use crate::record::SampleStream;
 use crate::{Error, Result};
-use faer::{Mat, MatMut, MatRef};
+use faer::{Mat, MatMut};
 use rayon::prelude::*;
 use std::ops::Range;
 
 /// Rows folded in at a time: large enough for blocked QR, small enough for the cache.
 const PIECE: usize = 4000;
 /// Lanes that may run at the same time.
-const LANES: usize = 16;
+const LANES: usize = 8;
 
 /// R of block-Hankel data.
 pub(super) struct DataTriangle {
@@ -42,6 +45,14 @@ pub(super) enum Arrangement {
 }
 
 impl Arrangement {
+    /// The arrangement from which the method of the options starts.
+    fn of(options: &SubspaceOptions) -> Self {
+        match options.weight.is_for_closed_loops() {
+            true => Arrangement::Chronological,
+            false => Arrangement::InputsFirst,
+        }
+    }
+
     /// Places of all rows, counted from the oldest sample: (block row, channel of `[u; y]`) in one number.
     fn places(self, inputs: usize, outputs: usize, past: usize, horizon: usize) -> Vec<usize> {
         let (m, q) = (inputs, inputs + outputs);
@@ -61,25 +72,48 @@ impl Arrangement {
 }
 
 impl DataTriangle {
-    /// R of the data with so many block rows of past and future, by the way that was asked for; `Auto` takes the Gram matrix
-    /// where it is well enough conditioned.
-    pub(super) fn new(
-        data: &Channels,
-        (past, horizon): (usize, usize),
-        arrangement: Arrangement,
-        factorisation: Factorisation,
-    ) -> Result<Self> {
-        let (inputs, outputs) = (data.inputs, data.outputs);
-        let places = arrangement.places(inputs, outputs, past, horizon);
-        let rows = RowMap::new(data, past + horizon, &places);
-        let (columns, width) = (rows.total, places.len());
-        if columns < width {
-            let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
-            let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
-            return Err(Error::TooFewSamples { what, found, needed: found + width - columns });
+    /// R of the records for the past and horizon of the options, by the way that they ask for, and what the same passes tell
+    /// of the channels. `Auto` takes the Gram matrix where it is well enough conditioned, else QR by a second pass.
+    pub(super) fn new(stream: &mut dyn SampleStream, options: &SubspaceOptions) -> Result<(Self, Channels)> {
+        check_blocks(options)?;
+        let (inputs, outputs) = (stream.inputs(), stream.outputs());
+        check_ports(inputs, outputs)?;
+        let (past, horizon) = (options.past(), options.horizon);
+        let arrangement = Arrangement::of(options);
+        let shape = Shape { places: arrangement.places(inputs, outputs, past, horizon), blocks: past + horizon };
+        let mut statistics = Statistics::new(inputs, options);
+        let by_qr = options.factorisation == Factorisation::Qr;
+        let mut gram = GramSums::new(inputs + outputs, if by_qr { 1 } else { shape.blocks });
+        let mut qr = QrLanes::new(&shape);
+        let lengths = each_batch(stream, &shape.pass(None), |batch| {
+            statistics.add(batch)?;
+            if by_qr {
+                qr.add(batch)
+            } else {
+                gram.add(batch)
+            }
+            Ok(())
+        })?;
+        let channels = Channels::new(inputs, statistics, lengths, options.scaling)?;
+        let columns = shape.columns(&channels.lengths, options)?;
+        let by_gram = if by_qr { None } else { gram.factor(&shape.places) };
+        let (mut r, report) = match choose(by_gram, options.factorisation)? {
+            Choice::Gram(r, report) => (r, report),
+            Choice::Qr(report) => {
+                if !by_qr {
+                    each_batch(stream, &shape.pass(Some(&channels.lengths)), |batch| {
+                        qr.add(batch);
+                        Ok(())
+                    })?;
+                }
+                (qr.whole(), report)
+            }
+        };
+        for (column, place) in shape.places.iter().enumerate() {
+            let scale = channels.scale[place % (inputs + outputs)];
+            r.col_mut(column).iter_mut().for_each(|value| *value /= scale);
         }
-        let (r, report) = factor(&rows, &places, past + horizon, factorisation)?;
-        Ok(DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report })
+        Ok((DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report }, channels))
     }
 
     /// R of the rows that a past and a future no longer than those of the data take, in the given order; the Hankel columns
@@ -110,94 +144,131 @@ impl DataTriangle {
     }
 }
 
-fn factor(
-    rows: &RowMap<'_>,
-    places: &[usize],
-    blocks: usize,
-    factorisation: Factorisation,
-) -> Result<(Mat<f64>, DataFactor)> {
-    let by_gram = match factorisation {
-        Factorisation::Qr => None,
-        _ => gram::factor(rows.data, blocks, places),
-    };
+/// How R is to be had.
+enum Choice {
+    Gram(Mat<f64>, DataFactor),
+    Qr(DataFactor),
+}
+
+fn choose(by_gram: Option<gram::GramFactor>, factorisation: Factorisation) -> Result<Choice> {
     let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
     match by_gram {
         Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
-            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+            Ok(Choice::Gram(found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
         }
         None if factorisation == Factorisation::Gram => {
             let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
             Err(Error::Singular { what, rcond: 0.0 })
         }
-        found => {
-            let condition = found.map(|found| found.condition);
-            Ok((triangular_factor(rows, places.len()), DataFactor { by: Factorisation::Qr, condition }))
+        found => Ok(Choice::Qr(DataFactor { by: Factorisation::Qr, condition: found.map(|found| found.condition) })),
+    }
+}
+
+/// Which samples stand in a row of the transposed Hankel matrix.
+struct Shape {
+    places: Vec<usize>,
+    blocks: usize,
+}
+
+impl Shape {
+    fn pass<'a>(&self, lengths: Option<&'a [usize]>) -> Pass<'a> {
+        Pass { overlap: self.blocks - 1, scale: None, lengths }
+    }
+
+    /// Hankel columns of all experiments; refuses fewer than the rows.
+    fn columns(&self, lengths: &[usize], options: &SubspaceOptions) -> Result<usize> {
+        let (columns, width) = (lengths.iter().map(|n| n + 1 - self.blocks).sum(), self.places.len());
+        if columns < width {
+            let (horizon, past) = (options.horizon, options.past());
+            let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
+            let found: usize = lengths.iter().sum();
+            return Err(Error::TooFewSamples { what, found, needed: found + width - columns });
         }
+        Ok(columns)
     }
 }
 
-/// R of all Hankel columns, by lanes and then over the lanes.
-fn triangular_factor(rows: &RowMap<'_>, width: usize) -> Mat<f64> {
-    let lanes = rows.total.div_ceil(PIECE).min(LANES);
-    let parts: Vec<Mat<f64>> = (0..lanes)
-        .into_par_iter()
-        .map(|lane| lane_factor(rows, width, lane * rows.total / lanes, (lane + 1) * rows.total / lanes))
-        .collect();
-    let mut whole = Triangle::new(width, width);
-    parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
-    whole.r().to_owned()
+/// Accumulates R by QR, in lanes that are joined at the end.
+struct QrLanes<'a> {
+    shape: &'a Shape,
+    lanes: Vec<Triangle>,
 }
 
-fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat<f64> {
-    let pieces = (end - start).div_ceil(PIECE);
-    let cut = |k: usize| start + k * (end - start) / pieces;
-    let mut triangle = Triangle::new(width, (end - start).div_ceil(pieces));
-    for k in 0..pieces {
-        triangle.fold(cut(k + 1) - cut(k), |piece| rows.fill(cut(k), piece));
+impl<'a> QrLanes<'a> {
+    fn new(shape: &'a Shape) -> Self {
+        QrLanes { shape, lanes: Vec::new() }
     }
-    triangle.r().to_owned()
+
+    fn add(&mut self, batch: &Batch) {
+        let rows = RowMap::new(batch, self.shape);
+        let lanes = rows.total.div_ceil(PIECE).min(LANES);
+        let width = self.shape.places.len();
+        self.lanes.resize_with(lanes.max(self.lanes.len()), || Triangle::new(width, 1));
+        self.lanes[..lanes].par_iter_mut().enumerate().for_each(|(lane, triangle)| {
+            rows.fold(lane * rows.total / lanes..(lane + 1) * rows.total / lanes, triangle);
+        });
+    }
+
+    fn whole(&self) -> Mat<f64> {
+        let width = self.shape.places.len();
+        let mut whole = Triangle::new(width, width);
+        self.lanes.iter().for_each(|lane| whole.fold_rows(lane.r()));
+        whole.r().to_owned()
+    }
 }
 
-/// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.
+/// The transposed Hankel matrix of a batch as a map: which samples of which segment stand in which row.
 struct RowMap<'a> {
-    data: &'a Channels,
-    places: &'a [usize],
-    /// First row of each experiment.
+    batch: &'a Batch,
+    shape: &'a Shape,
+    /// First row of each segment.
     first: Vec<usize>,
     total: usize,
 }
 
 impl<'a> RowMap<'a> {
-    fn new(data: &'a Channels, blocks: usize, places: &'a [usize]) -> Self {
+    fn new(batch: &'a Batch, shape: &'a Shape) -> Self {
         let mut total = 0;
         let mut first = Vec::new();
-        for experiment in &data.experiments {
+        for segment in &batch.segments {
             first.push(total);
-            total += experiment.u.nrows() + 1 - blocks;
+            total += (segment.samples() + 1).saturating_sub(shape.blocks);
         }
-        RowMap { data, places, first, total }
+        RowMap { batch, shape, first, total }
+    }
+
+    /// Folds a range of rows into a factor, which has room for them only meanwhile.
+    fn fold(&self, range: Range<usize>, triangle: &mut Triangle) {
+        let pieces = range.len().div_ceil(PIECE);
+        let cut = |k: usize| range.start + k * range.len() / pieces;
+        triangle.make_room(range.len().div_ceil(pieces));
+        for k in 0..pieces {
+            triangle.fold(cut(k + 1) - cut(k), |piece| self.fill(cut(k), piece));
+        }
+        triangle.make_room(1);
     }
 
     /// Writes the rows `start ..` into `piece`.
     fn fill(&self, start: usize, mut piece: MatMut<'_, f64>) {
         let end = start + piece.nrows();
-        for (e, signals) in self.data.experiments.iter().enumerate() {
+        for (e, segment) in self.batch.segments.iter().enumerate() {
             let from = self.first[e].max(start);
             let to = self.first.get(e + 1).copied().unwrap_or(self.total).min(end);
             if from < to {
                 let part = piece.as_mut().subrows_mut(from - start, to - from);
-                self.fill_from(signals.u.as_ref(), signals.y.as_ref(), from - self.first[e], part);
+                self.fill_from(segment, from - self.first[e], part);
             }
         }
     }
 
-    /// Writes the places of Hankel columns that begin at sample `time` of one experiment.
-    fn fill_from(&self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, time: usize, mut part: MatMut<'_, f64>) {
-        let (count, inputs, channels) = (part.nrows(), u.ncols(), u.ncols() + y.ncols());
-        for (column, place) in self.places.iter().enumerate() {
+    /// Writes the places of Hankel columns that begin at sample `time` of a segment.
+    fn fill_from(&self, segment: &Segment, time: usize, mut part: MatMut<'_, f64>) {
+        let (count, channels) = (part.nrows(), self.batch.channels);
+        // By channels, so that the columns are copied without gaps.
+        let samples = self.batch.rows(segment).subrows(time, count + self.shape.blocks - 1).to_owned();
+        for (column, place) in self.shape.places.iter().enumerate() {
             let (block, channel) = (place / channels, place % channels);
-            let values = if channel < inputs { u.col(channel) } else { y.col(channel - inputs) };
-            part.as_mut().col_mut(column).copy_from(values.subrows(time + block, count));
+            part.as_mut().col_mut(column).copy_from(samples.col(channel).subrows(block, count));
         }
     }
 }
@@ -205,7 +276,7 @@ impl<'a> RowMap<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::subspace::{Experiment, SubspaceOptions};
+    use crate::identify::subspace::{Experiment, ExperimentStream};
 
     /// Two inputs and one output with noise, in experiments of unequal length.
     fn experiments(noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
@@ -225,8 +296,8 @@ mod tests {
     fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<DataTriangle> {
         let records = experiments(noise);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-        let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
-        DataTriangle::new(&data, (horizon, horizon), Arrangement::InputsFirst, by)
+        let options = SubspaceOptions { horizon, factorisation: by, ..Default::default() };
+        Ok(DataTriangle::new(&mut ExperimentStream::new(&experiments)?, &options)?.0)
     }
 
     /// Rows of R with a positive diagonal.
@@ -264,16 +335,21 @@ mod tests {
     fn a_shorter_horizon_comes_from_the_same_factor() {
         let records = experiments(0.3);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-        let data = Channels::new(&experiments, &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
-        let whole = DataTriangle::new(&data, (9, 9), Arrangement::InputsFirst, Factorisation::Qr).unwrap();
+        let options = SubspaceOptions { horizon: 9, factorisation: Factorisation::Qr, ..Default::default() };
+        let stream = &mut ExperimentStream::new(&experiments).unwrap();
+        let (whole, channels) = DataTriangle::new(stream, &options).unwrap();
         let r = whole.arranged(Arrangement::Chronological, 4, 3).unwrap();
         // The Gram matrix of the same rows over the same columns.
         let places = Arrangement::Chronological.places(2, 1, 4, 3);
-        let shifted: Vec<usize> = places.iter().map(|place| place + 5 * 3).collect();
-        let rows = RowMap::new(&data, 18, &shifted);
-        let mut hankel = Mat::zeros(rows.total, shifted.len());
-        rows.fill(0, hankel.as_mut());
-        let gram = hankel.transpose() * &hankel;
+        let hankel = records.iter().flat_map(|(u, y)| (0..u.nrows() - 17).map(move |t| (u, y, t)));
+        let mut gram = Mat::zeros(places.len(), places.len());
+        for (u, y, t) in hankel {
+            let row = Mat::from_fn(places.len(), 1, |j, _| {
+                let (time, c) = (t + 5 + places[j] / 3, places[j] % 3);
+                (if c < 2 { u[(time, c)] } else { y[(time, 0)] }) / channels.scale[c]
+            });
+            gram += &row * row.transpose();
+        }
         let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
         assert!(error < 1e-13, "{error:.1e}");
         assert!(whole.arranged(Arrangement::Chronological, 10, 3).is_err());

@@ -8,11 +8,12 @@
 //! (V. Sima, SLICOT working note 2000-4). The Cholesky factor squares the condition number k of the data: its relative error
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
-use super::channels::{Channels, Signals};
+use super::batch::{Batch, Segment};
 use crate::{Mat, MatRef};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par, Side};
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Largest condition number of the data, columns of unit length, with which the factor of the Gram matrix is taken.
 pub(super) const LIMIT: f64 = 1e4;
@@ -22,10 +23,8 @@ const STEPS: usize = 6;
 
 /// Samples of one channel in a frame times the channels: the rows of a product that fill the registers well.
 const FRAME: usize = 64;
-/// Samples copied at a time: frames and what they look ahead stay in the second-level cache.
-const CHUNK: usize = 4096;
-/// Lanes that may run at the same time; fixed, so that the result does not depend on the threads.
-const LANES: usize = 16;
+/// Samples of a piece: its products stay in the second-level cache.
+const PIECE: usize = 1 << 14;
 
 /// R and the condition number of the data behind it.
 pub(super) struct GramFactor {
@@ -33,124 +32,132 @@ pub(super) struct GramFactor {
     pub(super) condition: f64,
 }
 
-/// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
-/// positive definite to working precision.
-pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<GramFactor> {
-    let gram = gram(data, blocks);
-    let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
-    let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
-        let (a, b) = (order[i], order[j]);
-        gram[(a.min(b), a.max(b))] / (length[i] * length[j])
-    });
-    let cholesky = unit.llt(Side::Lower).ok()?;
-    let lower = cholesky.L();
-    let condition = condition(lower);
-    let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
-    Some(GramFactor { r, condition })
+/// Accumulates the Gram matrix of all experiments; of the samples it keeps the first of the current experiment alone.
+pub(super) struct GramSums {
+    channels: usize,
+    blocks: usize,
+    /// `[L_0 L_1 ...]` of the current experiment, `L_j = sum_{t < T} z(t) z(t + j)'`, q x q each.
+    lags: Mat<f64>,
+    /// The first b - 1 samples of the current experiment.
+    head: Vec<f64>,
+    /// Upper triangle by blocks, of the experiments that have ended.
+    whole: Mat<f64>,
 }
 
-/// The upper triangle of the Gram matrix of all experiments, by blocks of all channels.
-fn gram(data: &Channels, blocks: usize) -> Mat<f64> {
-    let q = data.inputs + data.outputs;
-    let mut whole = Mat::zeros(q * blocks, q * blocks);
-    for signals in &data.experiments {
-        whole += of_experiment(signals, q, blocks);
+impl GramSums {
+    pub(super) fn new(channels: usize, blocks: usize) -> Self {
+        let width = channels * blocks;
+        GramSums {
+            channels,
+            blocks,
+            lags: Mat::zeros(channels, width),
+            head: Vec::new(),
+            whole: Mat::zeros(width, width),
+        }
     }
-    whole
-}
 
-fn of_experiment(signals: &Signals, q: usize, blocks: usize) -> Mat<f64> {
-    let columns = signals.u.nrows() + 1 - blocks;
-    let mut gram = Mat::zeros(q * blocks, q * blocks);
-    gram.as_mut().subrows_mut(0, q).copy_from(lag_sums(signals, q, blocks, columns));
-    let value = |t: usize, c: usize| signals.value(t, c);
-    for i in 1..blocks {
-        for j in i..blocks {
-            for (a, b) in (0..q).flat_map(|a| (0..q).map(move |b| (a, b))) {
-                let left = value(i - 1, a) * value(j - 1, b);
-                let entered = value(columns + i - 1, a) * value(columns + j - 1, b);
-                gram[(i * q + a, j * q + b)] = gram[((i - 1) * q + a, (j - 1) * q + b)] - left + entered;
+    /// Takes in a batch, whose segments share b - 1 samples with the batch before.
+    pub(super) fn add(&mut self, batch: &Batch) {
+        let pieces: Vec<(usize, Range<usize>)> = batch
+            .segments
+            .iter()
+            .enumerate()
+            .flat_map(|(k, segment)| self.pieces(segment).map(move |r| (k, r)))
+            .collect();
+        let (q, blocks) = (self.channels, self.blocks);
+        let products: Vec<Mat<f64>> = pieces
+            .par_iter()
+            .map(|(k, range)| lag_sums(batch.values(&batch.segments[*k]), q, blocks, range.clone()))
+            .collect();
+        let mut products = pieces.iter().zip(&products).peekable();
+        for (k, segment) in batch.segments.iter().enumerate() {
+            let values = batch.values(segment);
+            if segment.begins {
+                self.lags.fill(0.0);
+                self.head = values[..values.len().min(q * (blocks - 1))].to_vec();
+            }
+            while let Some((_, product)) = products.next_if(|((owner, _), _)| *owner == k) {
+                self.lags += product;
+            }
+            if segment.ends {
+                self.end(&values[values.len() - self.head.len()..]);
             }
         }
     }
-    gram
-}
 
-impl Signals {
-    /// Channel c of `[u; y]`.
-    fn value(&self, t: usize, c: usize) -> f64 {
-        let m = self.u.ncols();
-        if c < m { self.u[(t, c)] } else { self.y[(t, c - m)] }
+    /// The columns of a segment, piece by piece, all but the last of whole frames.
+    fn pieces(&self, segment: &Segment) -> impl Iterator<Item = Range<usize>> + use<> {
+        let columns = (segment.samples() + 1).saturating_sub(self.blocks);
+        let frame = FRAME.div_ceil(self.channels);
+        let (pieces, frames) = (columns.div_ceil(PIECE), columns.div_ceil(frame));
+        let cut = move |k: usize| (k * frames / pieces * frame).min(columns);
+        (0..pieces).map(move |k| cut(k)..cut(k + 1))
     }
 
-    /// Writes `z(t)` for `count` samples from `start` on, all channels of a sample together, zero from `end` on.
-    fn interleave(&self, start: usize, count: usize, end: usize, z: &mut [f64]) {
-        let q = self.u.ncols() + self.y.ncols();
-        let filled = count.min(end.saturating_sub(start));
-        z[filled * q..count * q].fill(0.0);
-        for (c, channel) in self.u.col_iter().chain(self.y.col_iter()).enumerate() {
-            let values = channel.subrows(start.min(channel.nrows()), filled);
-            z.iter_mut().skip(c).step_by(q).zip(values.iter()).for_each(|(z, value)| *z = *value);
+    /// Adds the experiment that ends with the b - 1 samples `tail`.
+    fn end(&mut self, tail: &[f64]) {
+        let (q, blocks, head) = (self.channels, self.blocks, &self.head);
+        let mut gram: Mat<f64> = Mat::zeros(q * blocks, q * blocks);
+        gram.as_mut().subrows_mut(0, q).copy_from(&self.lags);
+        for i in 1..blocks {
+            for j in i..blocks {
+                for (a, b) in (0..q).flat_map(|a| (0..q).map(move |b| (a, b))) {
+                    let (row, column) = ((i - 1) * q + a, (j - 1) * q + b);
+                    let (left, entered) = (head[row] * head[column], tail[row] * tail[column]);
+                    gram[(i * q + a, j * q + b)] = gram[(row, column)] - left + entered;
+                }
+            }
         }
+        self.whole += gram;
+    }
+
+    /// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
+    /// positive definite to working precision.
+    pub(super) fn factor(&self, order: &[usize]) -> Option<GramFactor> {
+        let gram = &self.whole;
+        let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
+        if length.iter().any(|l| !l.is_normal()) {
+            return None;
+        }
+        let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
+            let (a, b) = (order[i], order[j]);
+            gram[(a.min(b), a.max(b))] / (length[i] * length[j])
+        });
+        let cholesky = unit.llt(Side::Lower).ok()?;
+        let lower = cholesky.L();
+        let condition = condition(lower);
+        let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
+        Some(GramFactor { r, condition })
     }
 }
 
-/// `[L_0 L_1 ...]`, `L_j = sum_{t < columns} z(t) z(t + j)'`, q x q each.
+/// `[L_0 L_1 ...]` of the samples t in `range`; `values` holds them and those after them.
 ///
-/// Frames of B samples stand as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
-/// memory; `X Y'` holds all products of samples up to b - 1 apart.
-fn lag_sums(signals: &Signals, q: usize, blocks: usize, columns: usize) -> Mat<f64> {
+/// Frames of B samples stand as columns of a matrix X, and with what they look ahead as columns of Y. Both are views of the
+/// samples, those of Y overlap; `X Y'` holds all products of samples up to b - 1 apart.
+fn lag_sums(values: &[f64], q: usize, blocks: usize, range: Range<usize>) -> Mat<f64> {
     let frame = FRAME.div_ceil(q);
-    let frames = columns.div_ceil(frame);
-    let lanes = LANES.min(columns.div_ceil(CHUNK));
-    let products: Vec<Mat<f64>> = (0..lanes)
-        .into_par_iter()
-        .map(|lane| {
-            let range = lane * frames / lanes..(lane + 1) * frames / lanes;
-            Lane { signals, q, frame, ahead: blocks - 1, columns }.products(range)
-        })
-        .collect();
+    let (height, seen) = (q * frame, q * (frame + blocks - 1));
+    let whole = range.len() / frame;
+    let values = &values[range.start * q..];
+    let mut products = Mat::zeros(height, seen);
+    if whole > 0 {
+        let x = MatRef::from_column_major_slice(&values[..whole * height], height, whole);
+        let y = MatRef::from_column_major_slice_with_stride(values, seen, whole, height);
+        matmul(products.as_mut(), Accum::Add, x, y.transpose(), 1.0, Par::Seq);
+    }
     let mut sums = Mat::zeros(q, q * blocks);
-    for product in &products {
-        for (r, column) in (0..frame).flat_map(|r| (0..q * blocks).map(move |column| (r, column))) {
-            for a in 0..q {
-                sums[(a, column)] += product[(r * q + a, r * q + column)];
-            }
+    for (r, column) in (0..frame).flat_map(|r| (0..q * blocks).map(move |column| (r, column))) {
+        for a in 0..q {
+            sums[(a, column)] += products[(r * q + a, r * q + column)];
         }
+    }
+    for t in whole * frame..range.len() {
+        let now = MatRef::from_column_major_slice(&values[t * q..(t + 1) * q], q, 1);
+        let ahead = MatRef::from_row_major_slice(&values[t * q..(t + blocks) * q], 1, q * blocks);
+        matmul(sums.as_mut(), Accum::Add, now, ahead, 1.0, Par::Seq);
     }
     sums
-}
-
-/// Some frames of one experiment.
-struct Lane<'a> {
-    signals: &'a Signals,
-    q: usize,
-    /// Samples per frame.
-    frame: usize,
-    /// Samples that a frame looks ahead.
-    ahead: usize,
-    columns: usize,
-}
-
-impl Lane<'_> {
-    /// `X Y'` over a range of frames.
-    fn products(&self, frames: std::ops::Range<usize>) -> Mat<f64> {
-        let (height, seen) = (self.q * self.frame, self.q * (self.frame + self.ahead));
-        let at_once = CHUNK.div_ceil(self.frame);
-        let mut x = vec![0.0; at_once * height];
-        let mut z = vec![0.0; at_once * height + self.q * self.ahead];
-        let mut products = Mat::zeros(height, seen);
-        for first in frames.clone().step_by(at_once) {
-            let count = at_once.min(frames.end - first);
-            let (start, samples) = (first * self.frame, count * self.frame);
-            self.signals.interleave(start, samples, self.columns, &mut x);
-            self.signals.interleave(start, samples + self.ahead, self.signals.u.nrows(), &mut z);
-            let x = MatRef::from_column_major_slice(&x[..count * height], height, count);
-            let y = MatRef::from_column_major_slice_with_stride(&z, seen, count, height);
-            matmul(products.as_mut(), Accum::Add, x, y.transpose(), 1.0, Par::Seq);
-        }
-        products
-    }
 }
 
 /// Ratio of the largest to the smallest singular value of a lower triangular matrix whose rows have unit length, by inverse

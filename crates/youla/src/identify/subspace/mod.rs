@@ -11,11 +11,13 @@
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
+mod batch;
 mod channels;
 mod factorisation;
 mod gram;
 mod hankel;
 mod innovation;
+mod memory;
 mod modal;
 mod open_loop;
 mod options;
@@ -34,6 +36,7 @@ mod tests;
 mod varx;
 
 pub use innovation::{Innovation, NoInnovation};
+pub use memory::ExperimentStream;
 pub use options::{
     ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, Stability, SubspaceOptions, Weight,
 };
@@ -42,9 +45,10 @@ pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
 
 use crate::lti::{Discrete, StateSpace};
+use crate::record::SampleStream;
 use crate::{Error, Result};
 use channels::{Channels, check_blocks};
-use factorisation::{Arrangement, DataTriangle};
+use factorisation::DataTriangle;
 use faer::{MatRef, c64};
 use realisation::OutputPair;
 
@@ -143,6 +147,32 @@ pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &Subspa
     SubspaceData::new(experiments, time, options)?.identify(options)
 }
 
+/// The same as [`subspace`] for records that need not fit into memory, by two passes over the stream: one for the channels and
+/// the Gram matrix (or R by QR where the options ask for it), one for B, D and the initial states. Where the condition number
+/// of the data does not allow the Gram matrix, a pass for QR comes between them.
+///
+/// The numbers are those of [`subspace`] to the last bit (`tests::stream::a_stream_gives_the_model_of_the_memory`), and
+/// memory does not depend on the length: two batches of 4 MB and, by QR, one piece of 4000 rows for each thread.
+///
+/// # Errors
+/// As [`subspace`], those of the stream, and [`crate::Error::RecordChanged`] where two passes give different lengths.
+///
+/// ```no_run
+/// use youla::identify::subspace::{SubspaceOptions, subspace_stream};
+/// use youla::{lti::Discrete, record::{ChannelRef, NpyStream}};
+/// let [u, y] = [1, 2].map(ChannelRef::Column);
+/// let mut stream = NpyStream::open("long.npy", &[u], &[y])?;
+/// let found = subspace_stream(&mut stream, Discrete::new(1e-4)?, &SubspaceOptions::default())?;
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn subspace_stream(
+    stream: &mut dyn SampleStream,
+    time: Discrete,
+    options: &SubspaceOptions,
+) -> Result<SubspaceModel> {
+    Factored::new(stream, time, options)?.identify(stream, options)
+}
+
 /// Records with the triangular factor of their block-Hankel matrix: models of any weight and order and of any horizon and
 /// past up to those of the factor come from it without another pass over the Hankel data.
 ///
@@ -162,27 +192,19 @@ pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &Subspa
 /// }
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub struct SubspaceData {
-    channels: Channels,
-    triangle: DataTriangle,
-    time: Discrete,
-    factored: SubspaceOptions,
+pub struct SubspaceData<'a> {
+    experiments: Vec<Experiment<'a>>,
+    factored: Factored,
 }
 
-impl SubspaceData {
-    /// Checks, scales and factors the data for the horizon and past of `options`.
+impl<'a> SubspaceData<'a> {
+    /// Checks, scales and factors the data for the horizon and past of `options`. The records themselves are not copied.
     ///
     /// # Errors
     /// As [`subspace`], but for those of a model.
-    pub fn new(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
-        let channels = Channels::new(experiments, options)?;
-        let arrangement = match options.weight.is_for_closed_loops() {
-            true => Arrangement::Chronological,
-            false => Arrangement::InputsFirst,
-        };
-        let blocks = (options.past(), options.horizon);
-        let triangle = DataTriangle::new(&channels, blocks, arrangement, options.factorisation)?;
-        Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
+    pub fn new(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
+        let factored = Factored::new(&mut ExperimentStream::new(experiments)?, time, options)?;
+        Ok(SubspaceData { experiments: experiments.to_vec(), factored })
     }
 
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
@@ -192,7 +214,27 @@ impl SubspaceData {
     /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Refactor`] for another
     /// scaling or factorisation.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
-        let held = (self.factored.scaling, self.factored.factorisation);
+        self.factored.identify(&mut ExperimentStream::new(&self.experiments)?, options)
+    }
+}
+
+/// What all models from the same records share.
+struct Factored {
+    channels: Channels,
+    triangle: DataTriangle,
+    time: Discrete,
+    options: SubspaceOptions,
+}
+
+impl Factored {
+    fn new(stream: &mut dyn SampleStream, time: Discrete, options: &SubspaceOptions) -> Result<Self> {
+        let (triangle, channels) = DataTriangle::new(stream, options)?;
+        Ok(Factored { channels, triangle, time, options: options.clone() })
+    }
+
+    /// A model, by one pass over the records from which it was factored.
+    fn identify(&self, stream: &mut dyn SampleStream, options: &SubspaceOptions) -> Result<SubspaceModel> {
+        let held = (self.options.scaling, self.options.factorisation);
         if (options.scaling, options.factorisation) != held {
             return Err(Error::Refactor);
         }
@@ -202,10 +244,10 @@ impl SubspaceData {
             false => open_loop::estimate(&self.triangle, options, self.time)?,
         };
         let fitted =
-            output_error::fit(&self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
+            output_error::fit(stream, &self.channels, &found.pair, found.innovation.gain(), &found.stability, options)?;
         Ok(SubspaceModel {
             model: self.channels.unscale_model(found.pair, fitted.b, fitted.d, self.time)?,
-            innovation: found.innovation.unscale(&self.channels.y_scale),
+            innovation: found.innovation.unscale(self.channels.y_scale()),
             initial_states: fitted.initial_states,
             singular_values: found.singular_values,
             order: found.order,

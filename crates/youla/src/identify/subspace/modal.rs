@@ -7,6 +7,10 @@
 //! (for x0: `z_j(k) = lambda_j^k`). The outputs share the z; each is the product of them with a small matrix. So one pass with
 //! two multiplications per number serves all outputs, where the recursion for one output alone takes n of them. It needs
 //! eigenvectors that are far from dependent; [`Modes::of`] says where they are not.
+//!
+//! The recursion of a long record is cut into lanes, each of which begins at `z = 0` with the free response `f_j(k) = lambda_j^k`
+//! beside it. What a lane would have begun with, s_j, is known when the lanes before it are done, and `z_j = z0_j + s_j f_j` is
+//! a combination of columns: it is made in the triangular factor of the lane, a few rows, and not in the record.
 
 use super::sensitivity::{Predictor, Unknowns};
 use crate::linalg::Triangle;
@@ -22,7 +26,8 @@ const INDEPENDENT: f64 = 1e-5;
 const VANISHED: f64 = 1e-150;
 /// Samples folded in at a time.
 const PIECE: usize = 1000;
-/// Lanes that may run at the same time; fixed, so that the result does not depend on the threads.
+/// Least samples of a lane, and lanes that may run at the same time; fixed, so that the result does not depend on the threads.
+const LANE: usize = 4000;
 const LANES: usize = 8;
 
 /// The modes of a predictor, one per real pole and one per pair.
@@ -59,46 +64,14 @@ impl Modes {
         Some(Modes { lambda: chosen.iter().map(|j| lambda[*j]).collect(), to_states })
     }
 
-    /// Per output, the triangular factor over `[x0 | B | its row of D | y]`.
-    pub(super) fn condense(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>, unknowns: Unknowns) -> Vec<Mat<f64>> {
-        let shared = self.shared_factor(u, targets, unknowns);
-        (0..unknowns.outputs).map(|i| self.of_output(shared.as_ref(), i, unknowns)).collect()
+    /// Real numbers in the z of one input.
+    fn width(&self) -> usize {
+        self.lambda.iter().map(|l| if l.im == 0.0 { 1 } else { 2 }).sum()
     }
 
-    /// Triangular factor over `[z of x0 | z of every input | u for D | all outputs]`, by lanes of samples.
-    fn shared_factor(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>, unknowns: Unknowns) -> Mat<f64> {
-        let samples = u.nrows();
-        let lanes = samples.div_ceil(PIECE).min(LANES);
-        let starts: Vec<usize> = (0..=lanes).map(|l| l * samples / lanes).collect();
-        let mut state = State::new(&self.lambda, unknowns);
-        let begun: Vec<State> = starts[..lanes]
-            .iter()
-            .zip(&starts[1..])
-            .map(|(start, end)| {
-                let begun = state.clone();
-                for piece in (*start..*end).step_by(PIECE) {
-                    (piece..(piece + PIECE).min(*end)).for_each(|k| state.advance(u, k));
-                    state.flush();
-                }
-                begun
-            })
-            .collect();
-        let width = state.width() + unknowns.of_d_row() + unknowns.outputs;
-        let parts: Vec<Mat<f64>> = begun
-            .into_par_iter()
-            .enumerate()
-            .map(|(lane, mut state)| {
-                let mut triangle = Triangle::new(width, PIECE);
-                for start in (starts[lane]..starts[lane + 1]).step_by(PIECE) {
-                    let count = PIECE.min(starts[lane + 1] - start);
-                    triangle.fold(count, |piece| state.fill(u, targets, start, unknowns, piece));
-                }
-                triangle.r().to_owned()
-            })
-            .collect();
-        let mut whole = Triangle::new(width, width);
-        parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
-        whole.r().to_owned()
+    /// Per output, the triangular factor over `[x0 | B | its row of D | y]`, from the shared factor of an experiment.
+    pub(super) fn by_outputs(&self, shared: MatRef<'_, f64>, unknowns: Unknowns) -> Vec<Mat<f64>> {
+        (0..unknowns.outputs).map(|i| self.of_output(shared, i, unknowns)).collect()
     }
 
     fn of_output(&self, shared: MatRef<'_, f64>, i: usize, unknowns: Unknowns) -> Mat<f64> {
@@ -114,6 +87,87 @@ impl Modes {
         let mut triangle = Triangle::new(unknowns.width_of_output(), shared.nrows());
         triangle.fold_rows(rows.as_ref());
         triangle.r().to_owned()
+    }
+}
+
+/// The regressors of an experiment, samples by samples.
+pub(super) struct ModalSums<'a> {
+    modes: &'a Modes,
+    unknowns: Unknowns,
+    /// All z, first of x0, behind the samples taken in.
+    z: Vec<c64>,
+    /// Triangular factor over `[z of x0 | z of every input | u for D | all outputs]`.
+    factor: Triangle,
+}
+
+impl<'a> ModalSums<'a> {
+    pub(super) fn new(modes: &'a Modes, unknowns: Unknowns) -> Self {
+        let count = modes.lambda.len();
+        let z = (0..(1 + unknowns.inputs) * count).map(|k| c64::new(f64::from(u8::from(k < count)), 0.0)).collect();
+        let free = usize::from(unknowns.initial > 0);
+        let width = (free + unknowns.inputs) * modes.width() + unknowns.of_d_row() + unknowns.outputs;
+        ModalSums { modes, unknowns, z, factor: Triangle::new(width, 2 * width + modes.width()) }
+    }
+
+    pub(super) fn factor(&self) -> MatRef<'_, f64> {
+        self.factor.r()
+    }
+
+    /// Takes in the next samples.
+    pub(super) fn add(&mut self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>) {
+        let samples = u.nrows();
+        let lanes = samples.div_ceil(LANE).min(LANES);
+        let parts: Vec<_> = (0..lanes)
+            .into_par_iter()
+            .map(|lane| {
+                let (start, end) = (lane * samples / lanes, (lane + 1) * samples / lanes);
+                let part = |m: MatRef<'_, f64>| m.subrows(start, end - start).to_owned();
+                self.lane(part(u).as_ref(), part(targets).as_ref())
+            })
+            .collect();
+        parts.into_iter().for_each(|(r, state)| self.join(r, &state));
+    }
+
+    /// Triangular factor over `[f | z0 of every input | u for D | all outputs]` and the z behind the lane.
+    fn lane(&self, u: MatRef<'_, f64>, targets: MatRef<'_, f64>) -> (Mat<f64>, State) {
+        let mut state = State::new(&self.modes.lambda, self.unknowns.inputs);
+        let width = state.width() + self.unknowns.of_d_row() + self.unknowns.outputs;
+        let mut triangle = Triangle::new(width, PIECE.min(u.nrows()));
+        for start in (0..u.nrows()).step_by(PIECE) {
+            let count = PIECE.min(u.nrows() - start);
+            triangle.fold(count, |piece| state.fill(u, targets, start, self.unknowns, piece));
+        }
+        (triangle.r().to_owned(), state)
+    }
+
+    /// Puts a lane behind the samples before it.
+    fn join(&mut self, mut r: Mat<f64>, end: &State) {
+        let count = self.modes.lambda.len();
+        let width = self.modes.width();
+        let mut column = 0;
+        for (j, lambda) in self.modes.lambda.iter().enumerate() {
+            let pair = lambda.im != 0.0;
+            for row in 0..r.nrows() {
+                let f = c64::new(r[(row, column)], if pair { r[(row, column + 1)] } else { 0.0 });
+                for group in (0..=self.unknowns.inputs).rev() {
+                    let (at, shift) = (group * width + column, self.z[group * count + j] * f);
+                    let kept = if group == 0 { 0.0 } else { 1.0 };
+                    r[(row, at)] = kept * r[(row, at)] + shift.re;
+                    if pair {
+                        r[(row, at + 1)] = kept * r[(row, at + 1)] + shift.im;
+                    }
+                }
+            }
+            column += if pair { 2 } else { 1 };
+        }
+        for (k, z) in self.z.iter_mut().enumerate() {
+            let (free, own) = (c64::new(end.re[k % count], end.im[k % count]), c64::new(end.re[k], end.im[k]));
+            *z = if k < count { *z * free } else { own + *z * free };
+            z.re = if z.re.abs() < VANISHED { 0.0 } else { z.re };
+            z.im = if z.im.abs() < VANISHED { 0.0 } else { z.im };
+        }
+        let skipped = if self.unknowns.initial > 0 { 0 } else { width };
+        self.factor.fold_rows(r.as_ref().subcols(skipped, r.ncols() - skipped));
     }
 }
 
@@ -135,8 +189,7 @@ fn rows_of(gamma: RowRef<'_, c64>, inverse: MatRef<'_, c64>, lambda: &[c64], cho
     rows
 }
 
-/// All z of one sample: groups (x0, then the inputs) of modes.
-#[derive(Clone)]
+/// All z of one sample: groups (free, then the inputs) of modes.
 struct State {
     re: Vec<f64>,
     im: Vec<f64>,
@@ -144,24 +197,20 @@ struct State {
     lambda_im: Vec<f64>,
     drive: Vec<f64>,
     modes: usize,
-    /// Groups that are not driven: 1 with unknown initial states.
-    free: usize,
 }
 
 impl State {
-    fn new(lambda: &[c64], unknowns: Unknowns) -> Self {
-        let free = usize::from(unknowns.initial > 0);
-        let (modes, groups) = (lambda.len(), unknowns.inputs + free);
+    /// At rest, the free responses at 1.
+    fn new(lambda: &[c64], inputs: usize) -> Self {
+        let (modes, groups) = (lambda.len(), 1 + inputs);
         let repeated = |part: &dyn Fn(&c64) -> f64| (0..groups).flat_map(|_| lambda.iter().map(part)).collect();
-        let re = (0..groups * modes).map(|k| if k < free * modes { 1.0 } else { 0.0 }).collect();
         State {
-            re,
+            re: (0..groups * modes).map(|k| if k < modes { 1.0 } else { 0.0 }).collect(),
             im: vec![0.0; groups * modes],
             lambda_re: repeated(&|l| l.re),
             lambda_im: repeated(&|l| l.im),
             drive: vec![0.0; groups * modes],
             modes,
-            free,
         }
     }
 
@@ -171,7 +220,7 @@ impl State {
     }
 
     fn advance(&mut self, u: MatRef<'_, f64>, k: usize) {
-        let driven = self.drive[self.free * self.modes..].chunks_exact_mut(self.modes);
+        let driven = self.drive[self.modes..].chunks_exact_mut(self.modes);
         driven.enumerate().for_each(|(q, drive)| drive.fill(u[(k, q)]));
         let numbers = self.re.iter_mut().zip(&mut self.im).zip(self.lambda_re.iter().zip(&self.lambda_im));
         for (((re, im), (a, b)), drive) in numbers.zip(&self.drive) {
@@ -242,18 +291,24 @@ mod tests {
         Predictor { a, c: signal(2, 7, 3), k: None }
     }
 
+    /// Several lanes, in parts.
+    const SAMPLES: usize = 2 * LANE + 2500;
+
     #[test]
     fn modal_and_direct_regressors_have_the_same_factor() {
         let predictor = predictor();
-        let (u, y) = (signal(2500, 3, 1), signal(2500, 2, 9));
+        let (u, y) = (signal(SAMPLES, 3, 1), signal(SAMPLES, 2, 9));
         for (initial, feedthrough) in [(7, true), (0, false)] {
             let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, feedthrough };
-            let modal = Modes::of(&predictor).unwrap().condense(u.as_ref(), y.as_ref(), unknowns);
-            for (i, modal) in modal.iter().enumerate() {
-                let target: Vec<f64> = y.col(i).iter().copied().collect();
-                let mut triangle = Triangle::new(unknowns.width_of_output(), 2500);
+            let modes = Modes::of(&predictor).unwrap();
+            let mut sums = ModalSums::new(&modes, unknowns);
+            for (start, count) in [(0, SAMPLES - 700), (SAMPLES - 700, 0), (SAMPLES - 700, 700)] {
+                sums.add(u.as_ref().subrows(start, count), y.as_ref().subrows(start, count));
+            }
+            for (i, modal) in modes.by_outputs(sums.factor(), unknowns).iter().enumerate() {
+                let mut triangle = Triangle::new(unknowns.width_of_output(), SAMPLES);
                 let mut direct = Sensitivity::new(&predictor, i, unknowns);
-                triangle.fold(2500, |piece| direct.fill(u.as_ref(), &target, piece));
+                triangle.fold(SAMPLES, |piece| direct.fill(u.as_ref(), y.col(i), piece));
                 let (one, other) = (modal.transpose() * modal, triangle.r().transpose() * triangle.r());
                 let error = (&one - &other).norm_max() / other.norm_max();
                 assert!(error < 1e-12, "output {i}, {initial} initial states: {error:.1e}");

@@ -3,18 +3,21 @@
 //!
 //! The regressors of each experiment are folded into a triangular factor `[R11 R12; 0 R22]` over `[x0 | B D y]`: `R22` holds
 //! all that an experiment says about B and D, so that any number of experiments costs no more than one
-//! (SLICOT working note 2000-4, section 2.3, for one experiment).
+//! (SLICOT working note 2000-4, section 2.3, for one experiment). One pass over the records is all: the length of the
+//! residual of an output, and with it the fit, is that of the same factor times `[x0; B; D; -1]`.
 
-use super::channels::{Channels, Signals};
+use super::batch::{Batch, Pass, Segment, each_batch};
+use super::channels::Channels;
 use super::innovation::observer_gain;
-use super::modal::Modes;
+use super::modal::{ModalSums, Modes};
 use super::realisation::OutputPair;
-use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
+use super::sensitivity::{KnownShare, Predictor, Sensitivity, Unknowns};
 use super::stability::StabilityReport;
 use super::{Feedthrough, InitialState, SubspaceOptions};
 use crate::Result;
-use crate::linalg::{Triangle, block, leading_rank, least_squares};
-use faer::{Mat, MatRef};
+use crate::linalg::{Triangle, leading_rank, least_squares};
+use crate::record::SampleStream;
+use faer::{ColRef, Mat, MatRef};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
@@ -59,6 +62,7 @@ pub(super) struct Fitted {
 
 /// Finds B, D and the initial states.
 pub(super) fn fit(
+    stream: &mut dyn SampleStream,
     data: &Channels,
     pair: &OutputPair,
     kalman_gain: Option<MatRef<'_, f64>>,
@@ -74,7 +78,8 @@ pub(super) fn fit(
         initial: if options.initial_state == InitialState::Estimated { pair.a.nrows() } else { 0 },
         feedthrough: options.feedthrough == Feedthrough::Estimated,
     };
-    let parts = condense(data, &predictor, unknowns);
+    let factors = condense(stream, data, &predictor, unknowns)?;
+    let parts: Vec<Part> = factors.iter().map(|outputs| join(outputs, unknowns)).collect();
     let common = unknowns.common();
     let mut whole = Triangle::new(common + 1, common + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
@@ -83,7 +88,15 @@ pub(super) fn fit(
     let (driven, d) = unpack(solution.x.as_ref(), unknowns);
     let initial_states =
         parts.iter().map(|part| part.initial_state(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
-    let percent = fit_percent(data, &predictor, driven.as_ref(), d.as_ref(), &initial_states);
+    let percent = (0..data.outputs)
+        .map(|i| {
+            let error = |(outputs, x0): (&Vec<Mat<f64>>, &Vec<f64>)| {
+                residual(outputs[i].as_ref(), i, x0, solution.x.as_ref(), unknowns)
+            };
+            let error = factors.iter().zip(&initial_states).map(error).fold(0.0, f64::hypot);
+            100.0 * (1.0 - error / data.spread[i])
+        })
+        .collect();
     let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
     let b = match &predictor.k {
         Some(k) => driven + k * &d,
@@ -115,46 +128,107 @@ struct Part {
     initial_rank: usize,
 }
 
-/// One triangular factor per output, joined for each experiment; in modal coordinates where A has them, else output by
-/// output.
-fn condense(data: &Channels, predictor: &Predictor, unknowns: Unknowns) -> Vec<Part> {
-    let targets: Vec<Mat<f64>> =
-        data.experiments.par_iter().map(|signals| without_known_share(signals, predictor)).collect();
-    if let Some(modes) = Modes::of(predictor) {
-        let experiments: Vec<_> = data.experiments.iter().zip(&targets).collect();
-        return experiments
-            .par_iter()
-            .map(|(signals, targets)| join(&modes.condense(signals.u.as_ref(), targets.as_ref(), unknowns), unknowns))
+/// One triangular factor per experiment and output over `[x0 | B | its row of D | y]`; in modal coordinates where A has them,
+/// else output by output.
+fn condense(
+    stream: &mut dyn SampleStream,
+    data: &Channels,
+    predictor: &Predictor,
+    unknowns: Unknowns,
+) -> Result<Vec<Vec<Mat<f64>>>> {
+    let modes = Modes::of(predictor);
+    let pass = Pass { overlap: 0, scale: Some(&data.scale), lengths: Some(&data.lengths) };
+    let mut factors = Vec::new();
+    let mut unfinished = None;
+    each_batch(stream, &pass, |batch| {
+        let begun: Vec<_> = batch
+            .segments
+            .iter()
+            .map(|segment| {
+                let carried = unfinished.take();
+                (segment, carried.unwrap_or_else(|| Regressors::new(predictor, modes.as_ref(), unknowns)))
+            })
             .collect();
+        let done: Vec<_> = begun
+            .into_par_iter()
+            .map(|(segment, mut regressors)| {
+                regressors.add(batch, segment);
+                if segment.ends { Ok(regressors.factors()) } else { Err(regressors) }
+            })
+            .collect();
+        for regressors in done {
+            match regressors {
+                Ok(outputs) => factors.push(outputs),
+                Err(ongoing) => unfinished = Some(ongoing),
+            }
+        }
+        Ok(())
+    })?;
+    Ok(factors)
+}
+
+/// The regressors of one experiment, as far as it has been read.
+struct Regressors<'a> {
+    unknowns: Unknowns,
+    known: Option<KnownShare>,
+    way: Way<'a>,
+}
+
+enum Way<'a> {
+    Modal(&'a Modes, Box<ModalSums<'a>>),
+    ByOutputs(Vec<(Sensitivity, Triangle)>),
+}
+
+impl<'a> Regressors<'a> {
+    fn new(predictor: &Predictor, modes: Option<&'a Modes>, unknowns: Unknowns) -> Self {
+        let output = |i| (Sensitivity::new(predictor, i, unknowns), Triangle::new(unknowns.width_of_output(), 1));
+        let way = match modes {
+            Some(modes) => Way::Modal(modes, Box::new(ModalSums::new(modes, unknowns))),
+            None => Way::ByOutputs((0..unknowns.outputs).map(output).collect()),
+        };
+        Regressors { unknowns, known: KnownShare::new(predictor), way }
     }
-    let tasks: Vec<_> = (0..targets.len()).flat_map(|e| (0..unknowns.outputs).map(move |i| (e, i))).collect();
-    let triangles: Vec<Mat<f64>> = tasks
-        .par_iter()
-        .map(|&(e, i)| condense_output(&data.experiments[e].u, &targets[e], i, predictor, unknowns))
-        .collect();
-    triangles.chunks(unknowns.outputs).map(|outputs| join(outputs, unknowns)).collect()
+
+    fn add(&mut self, batch: &Batch, segment: &Segment) {
+        let (u, y) = batch.rows(segment).split_at_col(self.unknowns.inputs);
+        let without = self.known.as_mut().map(|known| known.without(y));
+        let targets = without.as_ref().map_or(y, |without| without.as_ref());
+        match &mut self.way {
+            Way::Modal(_, sums) => sums.add(u, targets),
+            Way::ByOutputs(outputs) => outputs.par_iter_mut().enumerate().for_each(|(i, (sensitivity, triangle))| {
+                fold_output(sensitivity, triangle, u, targets.col(i));
+            }),
+        }
+    }
+
+    fn factors(&self) -> Vec<Mat<f64>> {
+        match &self.way {
+            Way::Modal(modes, sums) => modes.by_outputs(sums.factor(), self.unknowns),
+            Way::ByOutputs(outputs) => outputs.iter().map(|(_, triangle)| triangle.r().to_owned()).collect(),
+        }
+    }
 }
 
-/// The outputs without what they drive themselves through K.
-fn without_known_share(signals: &Signals, predictor: &Predictor) -> Mat<f64> {
-    let Some(k) = &predictor.k else { return signals.y.clone() };
-    let (n, p) = (k.nrows(), k.ncols());
-    let ak = block(&[&[predictor.a.as_ref(), k.as_ref()]]);
-    let c0 = block(&[&[predictor.c.as_ref(), Mat::zeros(p, p).as_ref()]]);
-    &signals.y - simulate(ak.as_ref(), c0.as_ref(), &vec![0.0; n], signals.y.as_ref())
-}
-
-fn condense_output(u: &Mat<f64>, targets: &Mat<f64>, i: usize, predictor: &Predictor, unknowns: Unknowns) -> Mat<f64> {
-    let target: Vec<f64> = targets.col(i).iter().copied().collect();
-    let piece = PIECE.min(u.nrows());
-    let mut triangle = Triangle::new(unknowns.width_of_output(), piece);
-    let mut sensitivity = Sensitivity::new(predictor, i, unknowns);
-    for start in (0..u.nrows()).step_by(piece) {
-        let count = piece.min(u.nrows() - start);
-        let (u, target) = (u.as_ref().subrows(start, count), &target[start..start + count]);
+fn fold_output(sensitivity: &mut Sensitivity, triangle: &mut Triangle, u: MatRef<'_, f64>, target: ColRef<'_, f64>) {
+    triangle.make_room(PIECE.min(u.nrows()));
+    for start in (0..u.nrows()).step_by(PIECE) {
+        let count = PIECE.min(u.nrows() - start);
+        let (u, target) = (u.subrows(start, count), target.subrows(start, count));
         triangle.fold(count, |rows| sensitivity.fill(u, target, rows));
     }
-    triangle.r().to_owned()
+    triangle.make_room(1);
+}
+
+/// Length of the residual of output i, from its factor.
+fn residual(r: MatRef<'_, f64>, i: usize, x0: &[f64], solution: MatRef<'_, f64>, unknowns: Unknowns) -> f64 {
+    let (initial, of_b, of_d) = (unknowns.initial, unknowns.of_b(), unknowns.of_d_row());
+    let regressors = r.subcols(0, r.ncols() - 1);
+    let by = Mat::from_fn(initial + of_b + of_d, 1, |k, _| match k {
+        k if k < initial => x0[k],
+        k if k < initial + of_b => solution[(k - initial, 0)],
+        k => solution[(of_b + i * of_d + k - initial - of_b, 0)],
+    });
+    (r.subcols(r.ncols() - 1, 1) - regressors * by).norm_l2()
 }
 
 /// Puts the outputs of one experiment below each other, each with its own row of D.
@@ -199,35 +273,4 @@ fn unpack(solution: MatRef<'_, f64>, unknowns: Unknowns) -> (Mat<f64>, Mat<f64>)
     let driven = Mat::from_fn(n, m, |l, q| solution[(q * n + l, 0)]);
     let d = Mat::from_fn(p, m, |i, q| if feedthrough { solution[(m * n + i * m + q, 0)] } else { 0.0 });
     (driven, d)
-}
-
-fn fit_percent(
-    data: &Channels,
-    predictor: &Predictor,
-    driven: MatRef<'_, f64>,
-    d: MatRef<'_, f64>,
-    initial_states: &[Vec<f64>],
-) -> Vec<f64> {
-    let none = Mat::zeros(predictor.a.nrows(), 0);
-    let k = predictor.k.as_ref().unwrap_or(&none);
-    let ab = block(&[&[predictor.a.as_ref(), driven, k.as_ref()]]);
-    let cd = block(&[&[predictor.c.as_ref(), d, Mat::zeros(d.nrows(), k.ncols()).as_ref()]]);
-    let pairs: Vec<_> = data.experiments.iter().zip(initial_states).collect();
-    let errors: Vec<Mat<f64>> = pairs
-        .par_iter()
-        .map(|(e, x0)| {
-            let driving = block(&[&[e.u.as_ref(), e.y.as_ref().subcols(0, k.ncols())]]);
-            &e.y - simulate(ab.as_ref(), cd.as_ref(), x0, driving.as_ref())
-        })
-        .collect();
-    let samples: usize = errors.iter().map(|e| e.nrows()).sum();
-    (0..data.outputs)
-        .map(|i| {
-            let outputs = || data.experiments.iter().flat_map(|e| e.y.col(i).iter());
-            let mean = outputs().sum::<f64>() / samples as f64;
-            let spread = outputs().map(|v| (v - mean).powi(2)).sum::<f64>().sqrt();
-            let error = errors.iter().map(|e| e.col(i).norm_l2()).fold(0.0, f64::hypot);
-            100.0 * (1.0 - error / spread)
-        })
-        .collect()
 }

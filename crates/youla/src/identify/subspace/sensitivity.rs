@@ -8,7 +8,8 @@
 //! so the sensitivities to the column b_q of B are a row of length n that obeys `g_q+ = g_q A + c u_q`: n numbers per input
 //! and output, instead of the n n of `(z I - A)^-1 u_q`.
 
-use faer::{Mat, MatMut, MatRef};
+use crate::linalg::block;
+use faer::{ColRef, Mat, MatMut, MatRef};
 
 /// Sensitivities below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
@@ -84,7 +85,7 @@ impl Sensitivity {
     }
 
     /// Writes the rows of the next samples and moves on behind them. The last column is `target`.
-    pub(super) fn fill(&mut self, u: MatRef<'_, f64>, target: &[f64], mut piece: MatMut<'_, f64>) {
+    pub(super) fn fill(&mut self, u: MatRef<'_, f64>, target: ColRef<'_, f64>, mut piece: MatMut<'_, f64>) {
         let skipped = self.unknowns.states - self.unknowns.initial;
         for k in 0..u.nrows() {
             let of_d = (0..self.unknowns.of_d_row()).map(|q| u[(k, q)]);
@@ -108,22 +109,41 @@ impl Sensitivity {
     }
 }
 
-/// Outputs of `x+ = A x + B w, y = C x + D w` from an initial state; `ab` is `[A B]`, `cd` is `[C D]`.
-pub(super) fn simulate(ab: MatRef<'_, f64>, cd: MatRef<'_, f64>, x0: &[f64], w: MatRef<'_, f64>) -> Mat<f64> {
-    let (n, width) = (x0.len(), ab.ncols());
-    let (state_rows, output_rows) = (by_rows(ab), by_rows(cd));
-    let mut joint = vec![0.0; width];
-    let mut next = x0.to_vec();
-    let mut y = Mat::zeros(w.nrows(), cd.nrows());
-    for k in 0..w.nrows() {
-        joint[..n].copy_from_slice(&next);
-        (n..width).for_each(|q| joint[q] = w[(k, q - n)]);
-        for (i, row) in output_rows.chunks_exact(width).enumerate() {
-            y[(k, i)] = dot(row, &joint);
-        }
-        next.iter_mut().zip(state_rows.chunks_exact(width)).for_each(|(x, row)| *x = dot(row, &joint));
+/// The outputs without what they drive themselves through K, in pieces of a record: the state goes from one to the next.
+#[derive(Clone)]
+pub(super) struct KnownShare {
+    /// Rows of `[A K]` and of C.
+    ak: Vec<f64>,
+    c: Vec<f64>,
+    /// `[x; y]`.
+    joint: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl KnownShare {
+    /// `None` for a simulation.
+    pub(super) fn new(predictor: &Predictor) -> Option<Self> {
+        let k = predictor.k.as_ref()?;
+        let (n, p) = (k.nrows(), k.ncols());
+        let ak = by_rows(block(&[&[predictor.a.as_ref(), k.as_ref()]]).as_ref());
+        Some(KnownShare { ak, c: by_rows(predictor.c.as_ref()), joint: vec![0.0; n + p], next: vec![0.0; n] })
     }
-    y
+
+    /// `y - C x` for the next samples.
+    pub(super) fn without(&mut self, y: MatRef<'_, f64>) -> Mat<f64> {
+        let (n, width) = (self.next.len(), self.joint.len());
+        let mut targets = Mat::zeros(y.nrows(), y.ncols());
+        for k in 0..y.nrows() {
+            self.joint[..n].copy_from_slice(&self.next);
+            (n..width).for_each(|i| self.joint[i] = y[(k, i - n)]);
+            for (i, row) in self.c.chunks_exact(n).enumerate() {
+                targets[(k, i)] = y[(k, i)] - dot(row, &self.joint[..n]);
+            }
+            let rows = self.ak.chunks_exact(width);
+            self.next.iter_mut().zip(rows).for_each(|(x, row)| *x = dot(row, &self.joint));
+        }
+        targets
+    }
 }
 
 /// The entries of a matrix, row after row.

@@ -2,6 +2,7 @@ mod closed_loop;
 mod measured;
 mod options;
 mod recovery;
+mod stream;
 
 use super::*;
 use crate::Mat;

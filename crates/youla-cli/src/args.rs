@@ -2,6 +2,7 @@
 
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
+use youla::record::ChannelRef;
 use youla::study::{Method, Shard};
 
 /// Identifies a machine while its controller keeps running.
@@ -26,6 +27,8 @@ Examples:
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
   youla signals run.toml --out signals         alpha and beta as CSV, to go on in another tool
+  youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
+                                               a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
 
 Exit codes: 0 done, 2 the input cannot be used, 3 the computation is impossible on this input.";
@@ -70,6 +73,11 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR", default_value = "signals")]
         out: PathBuf,
     },
+    /// Identify a model from u to y by subspace identification, straight from files of any length.
+    ///
+    /// The files are read in two passes, three where the data ask for QR, in memory that does not depend on their length.
+    #[command(after_help = SUBSPACE_EXAMPLES)]
+    Subspace(SubspaceArgs),
     /// Draw report.html of a run again from its report.json.
     #[command(after_help = "Example:\n  youla report runs/demo-gas-bearing-001")]
     Report {
@@ -77,6 +85,37 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+}
+
+const SUBSPACE_EXAMPLES: &str = "\
+Example:
+  youla subspace log.csv.gz --input u --output x,y --time t
+  youla subspace long.npy --input '#1,#2' --output '#3,#4' --sample-time 2e-4 --options options.toml --out model.json";
+
+/// Files, channels and clock of `subspace`.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct SubspaceArgs {
+    /// Text (plain or gzip) or NumPy .npy (samples x channels); several files are several experiments.
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Inputs, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", required = true, value_delimiter = ',')]
+    pub(crate) input: Vec<ChannelRef>,
+    /// Outputs, as the inputs.
+    #[arg(long, value_name = "NAME", required = true, value_delimiter = ',')]
+    pub(crate) output: Vec<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "S", required_unless_present = "time", allow_negative_numbers = true)]
+    pub(crate) sample_time: Option<f64>,
+    /// Column with the time in seconds, for text files; with --sample-time both must agree.
+    #[arg(long, value_name = "NAME")]
+    pub(crate) time: Option<ChannelRef>,
+    /// Options of the identification, as in [direct] of run.toml.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) options: Option<PathBuf>,
+    /// File for the model as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub(crate) out: Option<PathBuf>,
 }
 
 /// Where a run goes.

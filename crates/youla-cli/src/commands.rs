@@ -3,6 +3,7 @@
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::output::{Failure, Progress, say};
 use crate::paper;
+use crate::subspace;
 use crate::table;
 use std::path::{Path, PathBuf};
 use youla::run::{
@@ -22,6 +23,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
             identify_and_write(args, output, &folder, RunSettings::read(settings)?, |s| read_records(&s.data, &folder))
         }
         Command::Signals { settings, out } => signals(args, settings, out),
+        Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
         Command::Paper(asked) => paper::reproduce(args, asked),
         Command::Study(StudyCommand::Merge { parts, out }) => paper::merge_parts(args, parts, out.as_deref()),

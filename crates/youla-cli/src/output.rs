@@ -5,7 +5,7 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
-use youla::run::Stage;
+use youla::run::{ReadingProgress, Stage};
 use youla::{Error, ErrorKind};
 
 /// Why the program ends early.
@@ -70,6 +70,28 @@ impl Progress {
         let position = Stage::ALL.iter().position(|s| *s == stage).unwrap_or_default();
         self.0.set_position(position as u64 + 1);
         self.0.set_message(stage.name());
+    }
+
+    pub(crate) fn finish(&self) {
+        self.0.finish_and_clear();
+    }
+}
+
+/// Samples read so far, on a terminal only.
+pub(crate) struct Reading(ProgressBar);
+
+impl Reading {
+    pub(crate) fn new(hidden: bool) -> Self {
+        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
+        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {human_pos} samples ({elapsed})") {
+            bar.set_style(style);
+        }
+        Reading(bar)
+    }
+
+    pub(crate) fn at(&self, at: ReadingProgress) {
+        self.0.set_message(format!("pass {}:", at.pass));
+        self.0.set_position(at.samples);
     }
 
     pub(crate) fn finish(&self) {

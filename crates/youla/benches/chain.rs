@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 use youla::Result;
-use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceOptions, subspace};
+use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceData, SubspaceOptions, subspace};
 use youla::linalg::{RiccatiProblem, Triangle, care, dare, discrete_lyapunov, eye, lyapunov};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::record::{Excitation, SquareWaves};
@@ -34,6 +34,7 @@ fn main() -> Result<()> {
         equations()?;
         reduction()
     })?;
+    kernels(&single)?;
     whole_identification(&single)?;
     demonstration()
 }
@@ -139,6 +140,88 @@ fn reduction() -> Result<()> {
     let options = ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() };
     line("reduce, 46 states to 6", None, || reduce(&system, &options));
     Ok(())
+}
+
+/// Checking and factoring the records, by the lag sums of the Gram matrix and by QR, against what the machine can do: plain
+/// products of matrices that fill the cache, and a copy of the records. One core and two.
+fn kernels(single: &rayon::ThreadPool) -> Result<()> {
+    const SAMPLES: usize = 1_000_000;
+    let (horizon, channels) = (20, 4);
+    let (_, u, y) = bearing_record(SAMPLES)?;
+    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let width = 2 * horizon * channels;
+    let lag_sums = 2.0 * (SAMPLES * channels * width) as f64;
+    let by_qr = 2.0 * (SAMPLES * width * width) as f64;
+    let time = Discrete::new(TS)?;
+    let factor = |factorisation| {
+        let options = SubspaceOptions { horizon, factorisation, ..SubspaceOptions::default() };
+        SubspaceData::new(&experiments, time, &options).map(drop)
+    };
+    let double = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads can be had");
+    for (threads, pool) in [(1, single), (2, &double)] {
+        title(&format!(
+            "factoring {SAMPLES} x {channels} samples, horizon {horizon}, {threads} threads; ratio: rate of the products"
+        ));
+        let peak = pool.install(|| products(threads));
+        rate("Gram matrix by lag sums, with reading and checks", peak, lag_sums, || {
+            pool.install(|| factor(Factorisation::Gram))
+        });
+        rate("QR, with reading and checks", peak, by_qr, || pool.install(|| factor(Factorisation::Qr)));
+        let seconds = median(|| pool.install(|| copies(threads, &u, &y)));
+        let bytes = 2.0 * 8.0 * (SAMPLES * channels) as f64;
+        println!(
+            "  {:<46} {:10.4} ms  {:8.1} GB/s read and written",
+            "copy of the records",
+            1e3 * seconds,
+            1e-9 * bytes / seconds
+        );
+    }
+    Ok(())
+}
+
+/// Rate of products of 512 x 512 matrices, one at a time for each thread, in operations per second.
+fn products(threads: usize) -> f64 {
+    const SIZE: usize = 512;
+    const TIMES: usize = 20;
+    let (a, b) = (random(SIZE, SIZE, 8), random(SIZE, SIZE, 9));
+    let operations = 2.0 * (threads * TIMES * SIZE * SIZE * SIZE) as f64;
+    rate("products of 512 x 512 matrices", f64::NAN, operations, || {
+        each(threads, |_| {
+            let mut product = Mat::zeros(SIZE, SIZE);
+            for _ in 0..TIMES {
+                matmul(product.as_mut(), Accum::Replace, a.as_ref(), b.as_ref(), 1.0, Par::Seq);
+            }
+            black_box(&product);
+        });
+    })
+}
+
+fn copies(threads: usize, u: &Mat<f64>, y: &Mat<f64>) {
+    let rows = u.nrows() / threads;
+    each(threads, |k| {
+        let part = |m: &Mat<f64>| m.as_ref().subrows(k * rows, rows).to_owned();
+        black_box((part(u), part(y)));
+    });
+}
+
+/// Runs the same work on each thread of the pool.
+fn each(threads: usize, work: impl Fn(usize) + Sync) {
+    rayon::scope(|scope| {
+        for k in 1..threads {
+            let work = &work;
+            scope.spawn(move |_| work(k));
+        }
+        work(0);
+    });
+}
+
+/// Measures and prints the rate of `work`, and how many times slower than `peak` it is; returns the rate.
+fn rate<T>(name: &str, peak: f64, operations: f64, work: impl FnMut() -> T) -> f64 {
+    let seconds = median(work);
+    let rate = operations / seconds;
+    let ratio = if peak.is_nan() { String::new() } else { format!("{:8.2} x", peak / rate) };
+    println!("  {name:<50} {:10.4} ms  {:8.1} GFLOP/s {ratio}", 1e3 * seconds, 1e-9 * rate);
+    rate
 }
 
 /// The call of a user, on records of the bearing with 20 dB of noise; by the Gram matrix, and by QR where that is asked for.

@@ -535,6 +535,17 @@ pub enum Error {
         /// Block rows of the future.
         horizon: usize,
     },
+    /// A stream gave other samples when it was read again.
+    #[error(
+        "the records have other lengths in the second pass over them than in the first; keep the files as they are"
+    )]
+    RecordChanged,
+    /// What was asked for needs all samples at once.
+    #[error("{what} needs the records in memory: read them as a whole, or leave it out")]
+    NeedsMemory {
+        /// What was asked for.
+        what: &'static str,
+    },
     /// Another scaling, factorisation, delays or automatic horizon than those of the factored data was asked for.
     #[error(
         "scaling, factorisation, delays and automatic horizon are part of the factored data; factor the records again to change them"

@@ -6,4 +6,5 @@ mod bad_records;
 mod bad_settings;
 mod common;
 mod contract;
+mod subspace;
 mod verbs;

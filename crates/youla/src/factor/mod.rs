@@ -3,7 +3,9 @@
 mod bezout;
 mod coprime;
 mod signals;
+mod stream;
 mod youla;
 
 pub use coprime::CoprimeFactors;
 pub use signals::YoulaSignals;
+pub use stream::YoulaStream;

@@ -8,9 +8,11 @@
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
 use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
+use super::subspace::subspace_stream;
 use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
-use crate::factor::{CoprimeFactors, YoulaSignals};
+use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
 use crate::lti::{Discrete, StateSpace};
+use crate::record::SampleStream;
 use crate::{MatRef, Result};
 
 /// The identified deviation system and the plant that it stands for.
@@ -68,12 +70,76 @@ pub fn hansen_disturbed(
 ///
 /// # Errors
 /// As [`SubspaceData::disturbed`].
-pub fn deviation_data(
+pub fn deviation_data<'a>(
     factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    disturbances: &[MatRef<'_, f64>],
+    signals: &'a [YoulaSignals],
+    disturbances: &[MatRef<'a, f64>],
     options: &SubspaceOptions,
-) -> Result<SubspaceData> {
+) -> Result<SubspaceData<'a>> {
     let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
     SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)
+}
+
+/// The same as [`hansen`] from a stream of u and y that need not fit into memory; the first `settle` samples of each experiment
+/// are dropped behind the filter, for example [`CoprimeFactors::settling_samples`].
+///
+/// # Errors
+/// As [`subspace_stream`] and [`YoulaStream`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.
+pub fn hansen_stream(
+    factors: &CoprimeFactors<Discrete>,
+    measured: impl SampleStream,
+    settle: usize,
+    options: &SubspaceOptions,
+) -> Result<HansenModel> {
+    let mut signals = YoulaStream::new(factors, measured, settle)?;
+    let deviation = subspace_stream(&mut signals, factors.nominal().time(), options)?;
+    let plant = factors.plant_of(&deviation.model)?;
+    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::subspace::{ExperimentStream, Order};
+    use crate::lti::simulate;
+    use crate::{Error, Mat};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+
+    fn first_order(pole: f64) -> StateSpace<Discrete> {
+        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+        StateSpace::new(number(pole), number(1.0), number(1.0), number(0.0), Discrete::new(0.1).unwrap()).unwrap()
+    }
+
+    #[test]
+    fn a_stream_of_u_and_y_gives_the_same_deviation_system() {
+        let gain = Mat::from_fn(1, 1, |_, _| -0.5);
+        let factors = CoprimeFactors::observer(&first_order(0.9), gain.as_ref(), gain.as_ref()).unwrap();
+        let rng = &mut ChaCha8Rng::seed_from_u64(31);
+        let records = [6000, 900].map(|samples| {
+            let [u, noise] = [1.0, 0.1].map(|size| Mat::from_fn(samples, 1, |_, _| size * (rng.random::<f64>() - 0.5)));
+            let y = simulate(&first_order(0.8), u.as_ref(), &[0.0]).unwrap() + noise;
+            (u, y)
+        });
+        let experiments = [0, 1].map(|k| Experiment { u: records[k].0.as_ref(), y: records[k].1.as_ref() });
+        let options = SubspaceOptions { horizon: 5, order: Order::Fixed(2), ..Default::default() };
+        let settle = factors.settling_samples(1e-3).unwrap();
+        assert!(settle > 5);
+        let signals = [0, 1].map(|k| {
+            let all = factors.signals(experiments[k].u, experiments[k].y).unwrap();
+            let settled = |m: &Mat<f64>| m.as_ref().subrows(settle, m.nrows() - settle).to_owned();
+            YoulaSignals { alpha: settled(&all.alpha), beta: settled(&all.beta) }
+        });
+        let whole = hansen(&factors, &signals, &options).unwrap();
+        let stream = || ExperimentStream::new(&experiments).unwrap();
+        let streamed = hansen_stream(&factors, stream(), settle, &options).unwrap();
+        let gap = |a: &StateSpace<Discrete>, b: &StateSpace<Discrete>| {
+            let parts = [(a.a(), b.a()), (a.b(), b.b()), (a.c(), b.c()), (a.d(), b.d())];
+            parts.map(|(a, b)| (a - b).norm_max()).into_iter().fold(0.0, f64::max)
+        };
+        assert!(gap(&whole.plant, &streamed.plant) < 1e-10);
+        assert!(gap(&whole.deviation.model, &streamed.deviation.model) < 1e-10);
+        let short = hansen_stream(&factors, stream(), 900, &options);
+        assert!(matches!(short, Err(Error::TooShort { samples: 900, dropped: 900, .. })));
+    }
 }

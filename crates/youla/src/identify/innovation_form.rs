@@ -80,7 +80,7 @@ pub struct InnovationForm {
 /// an unstable plant, and [`Error::OutOfRange`] for delays, no refits or a tolerance below zero.
 pub fn hansen_structured(
     factors: &CoprimeFactors<Discrete>,
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     options: &SubspaceOptions,
     deviation: &DeviationOptions,
 ) -> Result<HansenModel> {
@@ -115,7 +115,7 @@ fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> 
 /// K_s from S, S from K_s, until K_s settles.
 fn refit(
     factors: &CoprimeFactors<Discrete>,
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     mut model: SubspaceModel,
     options: &SubspaceOptions,
     deviation: &DeviationOptions,

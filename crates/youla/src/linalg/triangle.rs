@@ -33,6 +33,13 @@ impl Triangle {
         Triangle { work: Mat::zeros(width + capacity.max(1), width), used: 0 }
     }
 
+    /// Takes up to `capacity` (at least 1) new rows at a time from now on; what is there stays.
+    pub(crate) fn make_room(&mut self, capacity: usize) {
+        let mut work = Mat::zeros(self.width() + capacity.max(1), self.width());
+        work.as_mut().subrows_mut(0, self.used).copy_from(self.r());
+        self.work = work;
+    }
+
     /// Number of columns.
     pub fn width(&self) -> usize {
         self.work.ncols()

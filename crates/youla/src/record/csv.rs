@@ -13,9 +13,11 @@ use std::path::Path;
 
 mod lines;
 mod parse;
+mod stream;
 
 use lines::Lines;
 use parse::{Fields, Selection};
+pub use stream::CsvStream;
 
 /// What stands between two cells.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -103,7 +105,7 @@ fn read_columns(
 ) -> Result<(Plan, Vec<Vec<f64>>)> {
     let fields = Fields::detect(lines, options)?;
     let plan = Plan::new(lines.path(), fields.names(), channels, time)?;
-    let columns = Selection::new(&fields, plan.columns.clone()).read(lines)?;
+    let columns = Selection::new(&fields, &plan.columns).read(&fields, lines)?;
     Ok((plan, columns))
 }
 

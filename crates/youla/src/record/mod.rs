@@ -18,11 +18,12 @@ mod record;
 pub(crate) mod scratch;
 mod source;
 mod spectrum;
+mod stream;
 mod time;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, Delimiter, HeaderLine, read_csv, write_csv};
+pub use csv::{CsvOptions, CsvStream, Delimiter, HeaderLine, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{
     Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,
@@ -34,6 +35,8 @@ pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, read_parts, sha256};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
+pub(crate) use stream::is_npy;
+pub use stream::{JoinedStreams, NpyStream, SampleStream};
 pub use time::{Gaps, TimeSource};
 pub use values::{Value, Variable, Variables};
 

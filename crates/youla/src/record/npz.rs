@@ -9,7 +9,7 @@ use std::io::{BufReader, Read};
 use std::path::Path;
 use zip::ZipArchive;
 
-const MAGIC: &[u8] = b"\x93NUMPY";
+pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
 /// The longest dictionary that is read; NumPy itself stops at 10000 bytes.
 const LONGEST_HEADER: usize = 1 << 16;
 
@@ -44,10 +44,10 @@ pub fn read_npz(path: impl AsRef<Path>) -> Result<Variables> {
 
 /// Type, order and shape of an array.
 #[derive(Debug, PartialEq)]
-struct Header {
-    descr: String,
-    fortran_order: bool,
-    shape: Vec<usize>,
+pub(super) struct Header {
+    pub(super) descr: String,
+    pub(super) fortran_order: bool,
+    pub(super) shape: Vec<usize>,
 }
 
 /// Reads an array; the error says what was expected.
@@ -73,7 +73,8 @@ fn array(reader: &mut impl Read) -> Result<Value, String> {
     Ok(Value::Real { dims: vec![rows, columns], data })
 }
 
-fn header(reader: &mut impl Read) -> Result<Header, String> {
+/// Reads what stands before the numbers; the error says what was expected.
+pub(super) fn header(reader: &mut impl Read) -> Result<Header, String> {
     let magic = body_part(reader, MAGIC.len() + 2)?;
     if !magic.starts_with(MAGIC) {
         return Err("the first bytes of a NumPy array".to_owned());
@@ -105,7 +106,7 @@ fn parse_header(text: &str) -> Option<Header> {
 }
 
 /// Bytes of one number; `None` for a type that is not read.
-fn element_size(descr: &str) -> Option<usize> {
+pub(super) fn element_size(descr: &str) -> Option<usize> {
     match descr.get(1..)? {
         "i1" | "u1" | "b1" => Some(1),
         "i2" | "u2" => Some(2),
@@ -116,7 +117,7 @@ fn element_size(descr: &str) -> Option<usize> {
 }
 
 /// One number of at most eight bytes.
-fn decode(descr: &str, bytes: &[u8]) -> f64 {
+pub(super) fn decode(descr: &str, bytes: &[u8]) -> f64 {
     let mut padded = [0; 8];
     padded[..bytes.len()].copy_from_slice(bytes);
     if descr.starts_with('>') {

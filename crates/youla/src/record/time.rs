@@ -68,6 +68,33 @@ impl TimeSource {
         }
     }
 
+    /// The same from a time column of any length, value by value; the steps are held against the median of the first 65536.
+    ///
+    /// # Errors
+    /// As [`TimeSource::resolve`].
+    pub(super) fn resolve_streamed(&self, what: &str, mut next: impl FnMut() -> Result<Option<f64>>) -> Result<Clock> {
+        let mut times = Vec::new();
+        while times.len() <= STEPS {
+            match next()? {
+                Some(time) => times.push(time),
+                None => return self.resolve(what, Some(&times)),
+            }
+        }
+        let clock = self.resolve(what, Some(&times))?;
+        let ts = self.ts.unwrap_or_else(|| median_step(&times));
+        let (first, mut last, mut count) = (times[0], times[STEPS], times.len());
+        while let Some(time) = next()? {
+            count += 1;
+            let dt = time - last;
+            if !self.is_step(dt, ts) {
+                return Err(Error::NonUniformTime { what: what.to_owned(), row: count, dt, ts });
+            }
+            last = time;
+        }
+        let time = if self.ts.is_some() { clock.time } else { Discrete::new(mean_step(first, last, count))? };
+        Ok(Clock { time, parts: vec![(0, first)] })
+    }
+
     fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
         let middle = median_step(times);
         if let Some(ts) = declared {
@@ -83,8 +110,12 @@ impl TimeSource {
         let ranges = parts.iter().map(|part| part.0).zip(ends);
         // The longest part knows the sample time best.
         let (from, to) = ranges.fold((0, 0), |best, r| if r.1 - r.0 > best.1 - best.0 { r } else { best });
-        let ts = if to - from > 1 { mean_step(&times[from..to]) } else { middle };
+        let ts = if to - from > 1 { mean_step(times[from], times[to - 1], to - from) } else { middle };
         Ok(Clock { time: Discrete::new(ts)?, parts })
+    }
+
+    fn is_step(&self, dt: f64, ts: f64) -> bool {
+        (dt - ts).abs() <= self.tolerance * ts
     }
 
     /// First row (from 0) and time of each part without gaps.
@@ -92,7 +123,7 @@ impl TimeSource {
         let mut parts = vec![(0, times[0])];
         for (k, step) in times.windows(2).enumerate() {
             let dt = step[1] - step[0];
-            match (dt - ts).abs() <= self.tolerance * ts {
+            match self.is_step(dt, ts) {
                 true => {}
                 false if self.gaps == Gaps::Split && dt > ts => parts.push((k + 1, step[1])),
                 false => return Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts }),
@@ -101,6 +132,9 @@ impl TimeSource {
         Ok(parts)
     }
 }
+
+/// Steps of a streamed time column of which the median is taken.
+const STEPS: usize = 1 << 16;
 
 /// Sample time, and first row (from 0) and time of each part without gaps.
 #[derive(Debug)]
@@ -123,8 +157,8 @@ fn median_step(times: &[f64]) -> f64 {
 }
 
 /// The mean step, as the shortest decimal number within the rounding of the time column.
-fn mean_step(times: &[f64]) -> f64 {
-    let (first, last, steps) = (times[0], times[times.len() - 1], (times.len() - 1) as f64);
+fn mean_step(first: f64, last: f64, samples: usize) -> f64 {
+    let steps = (samples - 1) as f64;
     let mean = (last - first) / steps;
     let rounding = 2.0 * f64::EPSILON * (first.abs().max(last.abs()) / steps).max(mean.abs() / 2.0);
     let rounded = (0..17).filter_map(|digits| format!("{mean:.digits$e}").parse::<f64>().ok());
@@ -159,6 +193,26 @@ mod tests {
         gap[70] = gap[69];
         let error = split.resolve("t", Some(&gap)).unwrap_err();
         assert!(matches!(error, Error::NonUniformTime { row: 71, .. }), "{error}");
+    }
+
+    #[test]
+    fn a_streamed_column_gives_the_same_clock() {
+        for (n, ts) in [(1000, 2e-4), (STEPS + 1, 2e-4), (STEPS + 5000, 1.0 / 3.0)] {
+            let times = times(n, ts);
+            for source in [TimeSource::default(), TimeSource { ts: Some(ts), ..Default::default() }] {
+                let mut next = times.iter().copied();
+                let streamed = source.resolve_streamed("t", || Ok(next.next())).unwrap();
+                let whole = source.resolve("t", Some(&times)).unwrap();
+                assert_eq!((streamed.time, streamed.parts), (whole.time, whole.parts));
+            }
+        }
+        for row in [60, STEPS + 100] {
+            let mut gap = times(STEPS + 1000, 0.1);
+            gap.remove(row);
+            let mut next = gap.iter().copied();
+            let error = TimeSource::default().resolve_streamed("t", || Ok(next.next())).unwrap_err();
+            assert!(matches!(error, Error::NonUniformTime { row: found, .. } if found == row + 1), "{error}");
+        }
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub const SCHEMA: u32 = 1;
 
 /// Where an artefact comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Provenance {
+pub struct Provenance<O = RunSettings> {
     /// Version of the layout.
     pub schema: u32,
     /// Program and version.
@@ -29,12 +29,12 @@ pub struct Provenance {
     /// Files that were read, with their SHA-256.
     pub sources: Vec<SourceFile>,
     /// All options of the run.
-    pub options: RunSettings,
+    pub options: O,
 }
 
 /// A discrete-time model as an artefact.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct ModelFile {
+pub struct ModelFile<O = RunSettings> {
     /// What the model is.
     pub name: String,
     /// Channels of its inputs.
@@ -56,10 +56,37 @@ pub struct ModelFile {
     /// Further results that belong to the model.
     pub details: serde_json::Value,
     /// Where it comes from.
-    pub provenance: Provenance,
+    pub provenance: Provenance<O>,
 }
 
-impl ModelFile {
+impl<O> ModelFile<O> {
+    /// Describes a model with its inputs and outputs.
+    ///
+    /// # Errors
+    /// [`crate::Error::NoConvergence`] of the poles.
+    pub fn new(
+        name: &str,
+        model: &StateSpace<Discrete>,
+        (inputs, outputs): (Vec<Channel>, Vec<Channel>),
+        details: serde_json::Value,
+        provenance: Provenance<O>,
+    ) -> Result<Self> {
+        let rows = |m: MatRef<'_, f64>| (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect();
+        Ok(ModelFile {
+            name: name.to_owned(),
+            inputs,
+            outputs,
+            ts: model.time().ts(),
+            a: rows(model.a()),
+            b: rows(model.b()),
+            c: rows(model.c()),
+            d: rows(model.d()),
+            poles: pairs(&model.poles()?),
+            details,
+            provenance,
+        })
+    }
+
     /// The model itself.
     ///
     /// # Errors
@@ -302,20 +329,8 @@ impl Writer<'_> {
         outputs: Vec<Channel>,
         details: serde_json::Value,
     ) -> Result<()> {
-        let rows = |m: MatRef<'_, f64>| (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect();
-        let file = ModelFile {
-            name: name.rsplit('/').next().unwrap_or(name).to_owned(),
-            inputs,
-            outputs,
-            ts: model.time().ts(),
-            a: rows(model.a()),
-            b: rows(model.b()),
-            c: rows(model.c()),
-            d: rows(model.d()),
-            poles: pairs(&model.poles()?),
-            details,
-            provenance: self.provenance.clone(),
-        };
+        let title = name.rsplit('/').next().unwrap_or(name);
+        let file = ModelFile::new(title, model, (inputs, outputs), details, self.provenance.clone())?;
         self.folder.json(&format!("{name}.json"), &file)?;
         let variables = [
             array("a", model.a()),
@@ -333,7 +348,7 @@ impl Writer<'_> {
     }
 }
 
-fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
+pub(super) fn subspace_details(s: &SubspaceModel) -> serde_json::Value {
     serde_json::json!({
         "order": s.order.order,
         "horizon": s.horizon,

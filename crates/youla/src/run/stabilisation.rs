@@ -22,7 +22,7 @@ pub struct Diagrams {
 
 /// The diagram beside a model from the same data.
 pub(super) fn diagram(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     found: &SubspaceModel,
     method: &SubspaceOptions,
     settings: &StabilisationSettings,

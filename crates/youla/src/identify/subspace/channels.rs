@@ -1,7 +1,9 @@
-//! Checked and scaled copies of the records.
+//! The records as the method sees them: views with the scale of each channel, and scaled copies where something was done to
+//! them or is to be done.
 
 use super::delay::Delays;
 use super::realisation::OutputPair;
+use super::statistics::Statistics;
 use super::{ChannelScaling, Experiment, SubspaceOptions};
 use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
@@ -9,59 +11,192 @@ use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use std::borrow::Cow;
 
+/// Views of the records of one experiment, or of a part of it.
+#[derive(Clone, Copy)]
+pub(super) struct View<'a> {
+    pub(super) u: MatRef<'a, f64>,
+    pub(super) y: MatRef<'a, f64>,
+    /// Known signals of a disturbance of the outputs; no columns where none is known.
+    pub(super) w: MatRef<'a, f64>,
+}
+
+impl<'a> View<'a> {
+    /// Without known disturbances.
+    pub(super) fn of(u: MatRef<'a, f64>, y: MatRef<'a, f64>) -> Self {
+        View { u, y, w: y.subcols(0, 0) }
+    }
+
+    pub(super) fn samples(&self) -> usize {
+        self.u.nrows()
+    }
+
+    pub(super) fn part(&self, start: usize, count: usize) -> View<'a> {
+        let part = |m: MatRef<'a, f64>| m.subrows(start, count);
+        View { u: part(self.u), y: part(self.y), w: part(self.w) }
+    }
+}
+
 /// The records of one experiment in scaled units, one contiguous column per channel.
 #[derive(Clone)]
 pub(super) struct Signals {
     pub(super) u: Mat<f64>,
     pub(super) y: Mat<f64>,
-    /// Known signals of a disturbance of the outputs, of unit rms; no columns where none is known.
+    /// Of unit rms.
     pub(super) w: Mat<f64>,
 }
 
-/// All experiments in scaled units.
+impl Signals {
+    pub(super) fn view(&self) -> View<'_> {
+        View { u: self.u.as_ref(), y: self.y.as_ref(), w: self.w.as_ref() }
+    }
+}
+
+/// Where the samples are.
 #[derive(Clone)]
-pub(super) struct Channels {
-    pub(super) experiments: Vec<Signals>,
+enum Held<'a> {
+    /// With the caller, in his units.
+    Given(Vec<View<'a>>),
+    /// Here, in scaled units.
+    Made(Vec<Signals>),
+}
+
+/// All experiments.
+#[derive(Clone)]
+pub(super) struct Channels<'a> {
+    held: Held<'a>,
     pub(super) inputs: usize,
     pub(super) outputs: usize,
-    u_scale: Vec<f64>,
-    pub(super) y_scale: Vec<f64>,
+    /// By which the channels of `[u; y]` are divided.
+    scale: Vec<f64>,
     /// Per experiment, of each known signal of a disturbance.
     w_scale: Vec<Vec<f64>>,
+    /// `sqrt(sum (y - mean y)^2)` of the scaled outputs over all experiments.
+    spread: Vec<f64>,
     pub(super) delays: Delays,
     /// Per experiment, the delay states at the first sample that is used, in the units of the record.
     pub(super) delayed: Vec<Vec<f64>>,
 }
 
-impl Channels {
-    pub(super) fn new<'a>(
+impl<'a> Channels<'a> {
+    pub(super) fn new(
         experiments: &[Experiment<'a>],
         disturbances: &[MatRef<'a, f64>],
         options: &SubspaceOptions,
     ) -> Result<Self> {
-        let (inputs, outputs) = check(experiments, options)?;
+        check_blocks(options)?;
+        let (inputs, _) = check_shapes(experiments)?;
         check_disturbances(experiments, disturbances)?;
         let delays = Delays::new(&options.delays, inputs)?;
+        let mut statistics = Statistics::new(inputs);
+        for (k, Experiment { u, y }) in experiments.iter().enumerate() {
+            check_length(k, u.nrows(), least_blocks(options), delays.longest())?;
+            statistics.add(View::of(*u, *y), k, 0)?;
+        }
+        let given: Vec<View<'a>> = experiments.iter().map(|e| View::of(e.u, e.y)).collect();
+        if disturbances.is_empty() && delays.longest() == 0 {
+            let channels = Channels::read(inputs, statistics, given.len(), options.scaling)?;
+            return Ok(Channels { held: Held::Given(given), ..channels });
+        }
+        Channels::made(experiments, disturbances, delays, options)
+    }
+
+    /// Of records that were read in passing and are not held.
+    pub(super) fn read(
+        inputs: usize,
+        statistics: Statistics,
+        experiments: usize,
+        scaling: ChannelScaling,
+    ) -> Result<Self> {
+        let channels = statistics.channels();
+        let scale = statistics.scales(scaling)?;
+        let spread = (inputs..channels).map(|j| statistics.spread(j) / scale[j]).collect();
+        let delays = Delays::new(&[], inputs)?;
+        let (held, outputs) = (Held::Given(Vec::new()), channels - inputs);
+        let (w_scale, delayed) = (Vec::new(), vec![Vec::new(); experiments]);
+        Ok(Channels { held, inputs, outputs, scale, w_scale, spread, delays, delayed })
+    }
+
+    /// Copies from which the delays are taken, with the known signals beside them.
+    fn made(
+        experiments: &[Experiment<'a>],
+        disturbances: &[MatRef<'a, f64>],
+        delays: Delays,
+        options: &SubspaceOptions,
+    ) -> Result<Self> {
+        let inputs = experiments[0].u.ncols();
         let delayed = experiments.iter().map(|e| delays.states_at_start(e)).collect();
         let from_start = |m: MatRef<'a, f64>| m.subrows(delays.longest(), m.nrows() - delays.longest());
-        let shifted: Vec<_> = experiments.iter().map(|e| delays.shift(e.u)).collect();
-        let u: Vec<_> = shifted.iter().map(|u| u.as_ref()).collect();
+        let u: Vec<_> = experiments.iter().map(|e| delays.shift(e.u)).collect();
         let y: Vec<_> = experiments.iter().map(|e| from_start(e.y)).collect();
-        let disturbances: Vec<_> = disturbances.iter().map(|w| from_start(*w)).collect();
-        let u_scale = scales("input", &u, options.scaling)?;
+        let w: Vec<_> = disturbances.iter().map(|w| from_start(*w)).collect();
         // Lines larger than the rest must not set the weights of the outputs.
-        let quiet = y.iter().zip(&disturbances).map(|(y, w)| without(*y, *w)).collect::<Result<Vec<_>>>()?;
-        let quiet: Vec<_> = quiet.iter().map(|y| y.as_ref()).collect();
-        let y_scale = scales("output", if quiet.is_empty() { &y } else { &quiet }, options.scaling)?;
-        let of_signals = |w: &MatRef<'_, f64>| (0..w.ncols()).map(|j| rms_or_one(*w, j)).collect();
-        let w_scale: Vec<Vec<f64>> = disturbances.iter().map(of_signals).collect();
+        let quiet = y.iter().zip(&w).map(|(y, w)| without(*y, *w)).collect::<Result<Vec<_>>>()?;
+        let mut statistics = Statistics::new(inputs);
+        for e in 0..y.len() {
+            statistics.add(View::of(u[e].as_ref(), quiet.get(e).map_or(y[e], |y| y.as_ref())), e, 0)?;
+        }
+        let channels = Channels::read(inputs, statistics, y.len(), options.scaling)?;
+        let w_scale: Vec<Vec<f64>> = w.iter().map(|w| (0..w.ncols()).map(|j| rms_or_one(*w, j)).collect()).collect();
+        let (u_scale, y_scale) = channels.scale.split_at(inputs);
         let signals = |e: usize| Signals {
-            u: divide(u[e], &u_scale),
-            y: divide(y[e], &y_scale),
-            w: disturbances.get(e).map_or_else(|| Mat::zeros(u[e].nrows(), 0), |w| divide(*w, &w_scale[e])),
+            u: divide(u[e].as_ref(), u_scale),
+            y: divide(y[e], y_scale),
+            w: w.get(e).map_or_else(|| Mat::zeros(y[e].nrows(), 0), |w| divide(*w, &w_scale[e])),
         };
-        let experiments = (0..experiments.len()).map(signals).collect();
-        Ok(Channels { experiments, inputs, outputs, u_scale, y_scale, w_scale, delays, delayed })
+        let held = Held::Made((0..y.len()).map(signals).collect());
+        Ok(Channels { held, w_scale, delays, delayed, ..channels })
+    }
+
+    /// All samples, divided by [`Self::scale_of_views`] still.
+    pub(super) fn views(&self) -> Vec<View<'_>> {
+        match &self.held {
+            Held::Given(given) => given.clone(),
+            Held::Made(made) => made.iter().map(Signals::view).collect(),
+        }
+    }
+
+    /// By what the channels of the views are larger than those of the scaled records.
+    pub(super) fn scale_of_views(&self) -> Vec<f64> {
+        match &self.held {
+            Held::Given(_) => self.scale.clone(),
+            Held::Made(_) => vec![1.0; self.scale.len()],
+        }
+    }
+
+    /// Scaled copies of all samples.
+    pub(super) fn scaled(&self) -> Cow<'_, [Signals]> {
+        match &self.held {
+            Held::Made(made) => Cow::Borrowed(made),
+            Held::Given(given) => {
+                let (u_scale, y_scale) = self.scale.split_at(self.inputs);
+                let copy =
+                    |v: &View<'_>| Signals { u: divide(v.u, u_scale), y: divide(v.y, y_scale), w: v.w.to_owned() };
+                Cow::Owned(given.iter().map(copy).collect())
+            }
+        }
+    }
+
+    /// Scales of inputs and outputs.
+    pub(super) fn scale(&self) -> &[f64] {
+        &self.scale
+    }
+
+    /// Scales of the outputs.
+    pub(super) fn y_scale(&self) -> &[f64] {
+        &self.scale[self.inputs..]
+    }
+
+    /// `sqrt(sum (y - mean y)^2)` of each scaled output without disturbances of these coefficients, so that they do not count
+    /// as the model's merit.
+    pub(super) fn spread(&self, disturbances: &[Mat<f64>]) -> Result<Vec<f64>> {
+        if self.disturbances() == 0 {
+            return Ok(self.spread.clone());
+        }
+        let mut statistics = Statistics::new(self.inputs);
+        for (e, (signals, a)) in self.scaled().iter().zip(disturbances).enumerate() {
+            statistics.add(View::of(signals.u.as_ref(), (&signals.y - &signals.w * a).as_ref()), e, 0)?;
+        }
+        Ok((self.inputs..self.scale.len()).map(|j| statistics.spread(j)).collect())
     }
 
     /// Number of known signals of a disturbance.
@@ -72,7 +207,7 @@ impl Channels {
     /// Puts the coefficients of the known signals (signals x outputs, per experiment) back into the units of the record.
     pub(super) fn unscale_disturbances(&self, found: Vec<Mat<f64>>) -> Vec<Mat<f64>> {
         let one = |(a, scale): (Mat<f64>, &Vec<f64>)| {
-            Mat::from_fn(a.nrows(), a.ncols(), |j, i| self.y_scale[i] * a[(j, i)] / scale[j])
+            Mat::from_fn(a.nrows(), a.ncols(), |j, i| self.y_scale()[i] * a[(j, i)] / scale[j])
         };
         found.into_iter().zip(&self.w_scale).map(one).collect()
     }
@@ -83,7 +218,7 @@ impl Channels {
         model: &StateSpace<Discrete>,
         gain: MatRef<'_, f64>,
     ) -> (OutputPair, Mat<f64>) {
-        let (y, c) = (&self.y_scale, model.c());
+        let (y, c) = (self.y_scale(), model.c());
         let c = Mat::from_fn(c.nrows(), c.ncols(), |i, j| c[(i, j)] / y[i]);
         let gain = Mat::from_fn(gain.nrows(), gain.ncols(), |i, j| gain[(i, j)] * y[j]);
         (OutputPair { a: model.a().to_owned(), c }, gain)
@@ -91,7 +226,7 @@ impl Channels {
 
     /// Refuses experiments that are too short for so many block rows of past and future.
     pub(super) fn check_lengths(&self, blocks: (usize, usize)) -> Result<()> {
-        self.experiments.iter().enumerate().try_for_each(|(k, e)| check_length(k, e.u.nrows(), blocks, 0))
+        self.views().iter().enumerate().try_for_each(|(k, v)| check_length(k, v.samples(), blocks, 0))
     }
 
     /// Puts the four matrices back into the units of the record.
@@ -108,7 +243,7 @@ impl Channels {
 
     /// B, C and D in the units of the record.
     pub(super) fn unscale(&self, b: &Mat<f64>, c: &Mat<f64>, d: &Mat<f64>) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
-        let (u, y) = (&self.u_scale, &self.y_scale);
+        let (u, y) = self.scale.split_at(self.inputs);
         (
             Mat::from_fn(b.nrows(), b.ncols(), |i, j| b[(i, j)] / u[j]),
             Mat::from_fn(c.nrows(), c.ncols(), |i, j| y[i] * c[(i, j)]),
@@ -117,45 +252,58 @@ impl Channels {
     }
 
     /// The same inputs with other outputs, in scaled units.
-    pub(super) fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Channels {
+    pub(super) fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Channels<'a> {
         let signals = |(e, y): (&Signals, Mat<f64>)| Signals { y, ..e.clone() };
-        Channels { experiments: self.experiments.iter().zip(outputs).map(signals).collect(), ..self.clone() }
+        let made: Vec<Signals> = self.scaled().iter().zip(outputs).map(signals).collect();
+        Channels { held: Held::Made(made), ..self.clone() }
     }
 
-    /// Inputs and outputs without what the known signals explain of them.
+    /// Scaled inputs and outputs without what the known signals explain of them.
     pub(super) fn beyond_disturbances(&self) -> Result<Cow<'_, [Signals]>> {
         if self.disturbances() == 0 {
-            return Ok(Cow::Borrowed(&self.experiments));
+            return Ok(self.scaled());
         }
         let rest = |e: &Signals| {
             let (u, y) = (without(e.u.as_ref(), e.w.as_ref())?, without(e.y.as_ref(), e.w.as_ref())?);
             Ok(Signals { w: Mat::zeros(u.nrows(), 0), u, y })
         };
-        Ok(Cow::Owned(self.experiments.iter().map(rest).collect::<Result<_>>()?))
+        Ok(Cow::Owned(self.scaled().iter().map(rest).collect::<Result<_>>()?))
     }
 }
 
-/// Shapes, lengths and values; returns the numbers of inputs and outputs.
-fn check(experiments: &[Experiment<'_>], options: &SubspaceOptions) -> Result<(usize, usize)> {
-    let (past, horizon) = match options.automatic_horizon {
-        Some(automatic) => (automatic.max, 1),
-        None => (options.past(), options.horizon),
-    };
-    check_blocks(options)?;
+/// Numbers of inputs and outputs of records in memory, which must not differ between them.
+pub(super) fn check_shapes(experiments: &[Experiment<'_>]) -> Result<(usize, usize)> {
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
-    at_least("the number of inputs", m, 1, "at least 1")?;
-    at_least("the number of outputs", p, 1, "at least 1")?;
+    check_ports(m, p)?;
     for (k, Experiment { u, y }) in experiments.iter().enumerate() {
         let named = |what: &str| format!("the {what} record of experiment {}", k + 1);
         check_shape(&named("input"), *u, (u.nrows(), m))?;
         check_shape(&named("output"), *y, (u.nrows(), p))?;
-        check_finite(&named("input"), *u)?;
-        check_finite(&named("output"), *y)?;
-        let delay = options.delays.iter().copied().max().unwrap_or(0);
-        check_length(k, u.nrows(), (past, horizon), delay)?;
     }
     Ok((m, p))
+}
+
+/// Refuses records without inputs or outputs.
+pub(super) fn check_ports(inputs: usize, outputs: usize) -> Result<()> {
+    at_least("the number of inputs", inputs, 1, "at least 1")?;
+    at_least("the number of outputs", outputs, 1, "at least 1")
+}
+
+/// Block rows that each experiment must hold, whatever horizon is found.
+pub(super) fn least_blocks(options: &SubspaceOptions) -> (usize, usize) {
+    options.automatic_horizon.map_or((options.past(), options.horizon), |automatic| (automatic.max, 1))
+}
+
+/// Refuses an experiment without a Hankel column.
+pub(super) fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize), delay: usize) -> Result<()> {
+    let needed = past.saturating_add(horizon).saturating_add(delay);
+    if samples >= needed {
+        return Ok(());
+    }
+    let delayed = if delay > 0 { format!(" after a delay of {delay} samples") } else { String::new() };
+    let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows{delayed}", k + 1);
+    Err(Error::TooFewSamples { what, found: samples, needed })
 }
 
 /// One matrix per experiment, or none at all; as many signals and finite values in each.
@@ -171,17 +319,6 @@ fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_,
         check_finite(&what, *w)?;
     }
     Ok(())
-}
-
-/// Refuses an experiment without a Hankel column.
-fn check_length(k: usize, samples: usize, (past, horizon): (usize, usize), delay: usize) -> Result<()> {
-    let needed = past.saturating_add(horizon).saturating_add(delay);
-    if samples >= needed {
-        return Ok(());
-    }
-    let delayed = if delay > 0 { format!(" after a delay of {delay} samples") } else { String::new() };
-    let what = format!("experiment {} with a horizon of {horizon} and a past of {past} block rows{delayed}", k + 1);
-    Err(Error::TooFewSamples { what, found: samples, needed })
 }
 
 /// What known signals do not explain of a record.
@@ -205,26 +342,6 @@ pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
 
 fn at_least(what: &str, value: usize, least: usize, must: &'static str) -> Result<()> {
     if value >= least { Ok(()) } else { Err(Error::OutOfRange { what: what.into(), value: value as f64, must }) }
-}
-
-/// The scale of each channel; refuses channels that are constant throughout.
-fn scales(kind: &str, records: &[MatRef<'_, f64>], scaling: ChannelScaling) -> Result<Vec<f64>> {
-    (0..records[0].ncols())
-        .map(|j| {
-            let columns = || records.iter().map(|r| r.col(j));
-            let constant = |record: faer::ColRef<'_, f64>| record.iter().all(|v| *v == record[0]);
-            if columns().all(constant) {
-                let what = format!("{kind} channel {}", j + 1);
-                return Err(Error::ConstantChannel { what, value: records[0][(0, j)] });
-            }
-            let samples: usize = records.iter().map(|r| r.nrows()).sum();
-            let rms = columns().map(|c| c.norm_l2()).fold(0.0, f64::hypot) / (samples as f64).sqrt();
-            Ok(match scaling {
-                ChannelScaling::None => 1.0,
-                ChannelScaling::Rms => rms,
-            })
-        })
-        .collect()
 }
 
 fn divide(record: MatRef<'_, f64>, scale: &[f64]) -> Mat<f64> {

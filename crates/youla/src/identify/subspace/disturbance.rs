@@ -87,9 +87,9 @@ pub fn amplitudes(coefficients: MatRef<'_, f64>) -> Vec<Vec<Line>> {
     (0..coefficients.nrows() / 2).map(|j| (0..coefficients.ncols()).map(|i| line(j, i)).collect()).collect()
 }
 
-/// The regressors of the coefficients of disturbances, in columns that the outputs share.
-pub(super) struct Regressors {
-    pub(super) signals: Mat<f64>,
+/// In which columns the regressors of the coefficients of disturbances stand.
+#[derive(Clone, Copy)]
+pub(super) struct KnownColumns {
     /// Known signals.
     pub(super) known: usize,
     pub(super) outputs: usize,
@@ -97,7 +97,7 @@ pub(super) struct Regressors {
     pub(super) crossed: bool,
 }
 
-impl Regressors {
+impl KnownColumns {
     /// The column through which output i depends on a coefficient, if it does.
     pub(super) fn column(&self, i: usize, coefficient: usize) -> Option<usize> {
         if self.crossed {
@@ -106,10 +106,23 @@ impl Regressors {
         (coefficient / self.known == i).then_some(coefficient % self.known)
     }
 
+    /// Number of columns.
+    pub(super) fn columns(&self) -> usize {
+        if self.crossed { self.known * self.outputs * self.outputs } else { self.known }
+    }
+}
+
+/// The regressors of the coefficients of disturbances, in columns that the outputs share.
+pub(super) struct Regressors {
+    pub(super) signals: Mat<f64>,
+    pub(super) columns: KnownColumns,
+}
+
+impl Regressors {
     /// All regressors of output i.
     pub(super) fn of_output(&self, i: usize) -> Mat<f64> {
-        let value = |k: usize, j: usize| self.column(i, j).map_or(0.0, |column| self.signals[(k, column)]);
-        Mat::from_fn(self.signals.nrows(), self.known * self.outputs, value)
+        let value = |k: usize, j: usize| self.columns.column(i, j).map_or(0.0, |column| self.signals[(k, column)]);
+        Mat::from_fn(self.signals.nrows(), self.columns.known * self.columns.outputs, value)
     }
 }
 

@@ -3,9 +3,10 @@
 //! Only R is formed, from the Gram matrix or from pieces of a few thousand rows (one row per Hankel column). The rows are
 //! dealt to a fixed number of lanes that depends on the data alone, so the result is the same on any number of threads.
 
-use super::channels::{Channels, Signals};
-use super::{DataFactor, Factorisation};
-use super::{disturbance, gram};
+use super::channels::{Channels, Signals, View};
+use super::disturbance;
+use super::gram::{self, Gram, GramFactor};
+use super::{DataFactor, Factorisation, SubspaceOptions};
 use crate::linalg::{Triangle, leading_rank};
 use crate::{Error, Result};
 use faer::linalg::matmul::matmul;
@@ -48,6 +49,14 @@ pub(super) enum Arrangement {
 }
 
 impl Arrangement {
+    /// From which the method of the options starts.
+    pub(super) fn of(options: &SubspaceOptions) -> Self {
+        match options.weight.is_for_closed_loops() {
+            true => Arrangement::Chronological,
+            false => Arrangement::InputsFirst,
+        }
+    }
+
     /// Places of all rows, counted from the oldest sample: (block row, channel of `[u; y]`) in one number.
     fn places(self, inputs: usize, outputs: usize, past: usize, horizon: usize) -> Vec<usize> {
         let (m, q) = (inputs, inputs + outputs);
@@ -74,30 +83,69 @@ impl Arrangement {
     }
 }
 
+/// What stands in a column of the block-Hankel matrix.
+pub(super) struct Frame {
+    arrangement: Arrangement,
+    inputs: usize,
+    outputs: usize,
+    past: usize,
+    horizon: usize,
+    pub(super) places: Vec<usize>,
+}
+
+impl Frame {
+    pub(super) fn new(
+        (inputs, outputs): (usize, usize),
+        (past, horizon): (usize, usize),
+        arrangement: Arrangement,
+    ) -> Self {
+        let places = arrangement.places(inputs, outputs, past, horizon);
+        Frame { arrangement, inputs, outputs, past, horizon, places }
+    }
+
+    /// Block rows.
+    pub(super) fn blocks(&self) -> usize {
+        self.past + self.horizon
+    }
+
+    /// Refuses fewer Hankel columns than rows.
+    pub(super) fn require(&self, samples: usize, columns: usize) -> Result<()> {
+        let (horizon, past, width) = (self.horizon, self.past, self.places.len());
+        if columns >= width {
+            return Ok(());
+        }
+        let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
+        Err(Error::TooFewSamples { what, found: samples, needed: samples + width - columns })
+    }
+
+    /// R with the channels of `[u; y]` divided by `scale`.
+    pub(super) fn triangle(self, mut r: Mat<f64>, scale: &[f64], columns: usize, report: DataFactor) -> DataTriangle {
+        let Frame { arrangement, inputs, outputs, past, horizon, places } = self;
+        for (column, place) in places.iter().enumerate() {
+            let inverse = 1.0 / scale[place % (inputs + outputs)];
+            r.col_mut(column).iter_mut().for_each(|value| *value *= inverse);
+        }
+        DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report }
+    }
+}
+
 impl DataTriangle {
     /// R of the data with so many block rows of past and future, by the way that was asked for; `Auto` takes the Gram matrix
     /// where it is well enough conditioned.
     pub(super) fn new(
-        data: &Channels,
-        (past, horizon): (usize, usize),
+        data: &Channels<'_>,
+        blocks: (usize, usize),
         arrangement: Arrangement,
         factorisation: Factorisation,
     ) -> Result<Self> {
-        let (inputs, outputs) = (data.inputs, data.outputs);
-        let places = arrangement.places(inputs, outputs, past, horizon);
-        let rows = RowMap::new(&data.experiments, past + horizon, &places);
-        let width = places.len();
-        let require = |columns: usize| {
-            let found = data.experiments.iter().map(|e| e.u.nrows()).sum();
-            let what = format!("all experiments together, with a horizon of {horizon} and a past of {past} block rows");
-            let refused = || Error::TooFewSamples { what, found, needed: found + width - columns };
-            if columns < width { Err(refused()) } else { Ok(()) }
-        };
-        require(rows.total)?;
-        let (r, report, taken) = factor(data, &rows, past + horizon, factorisation)?;
-        let columns = rows.total - taken;
-        require(columns)?;
-        Ok(DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report })
+        let frame = Frame::new((data.inputs, data.outputs), blocks, arrangement);
+        let views = data.views();
+        let samples = views.iter().map(View::samples).sum();
+        let total = views.iter().map(|v| v.samples() + 1 - frame.blocks()).sum();
+        frame.require(samples, total)?;
+        let (r, report, taken) = factor(&views, &frame, factorisation)?;
+        frame.require(samples, total - taken)?;
+        Ok(frame.triangle(r, &data.scale_of_views(), total - taken, report))
     }
 
     /// In which order the rows stand.
@@ -157,7 +205,7 @@ impl<'a> BlockWeights<'a> {
         step: f64,
     ) -> Result<DataTriangle> {
         let data = self.data;
-        let rows = RowMap::new(experiments, data.past + data.horizon, &self.places);
+        let rows = RowMap::new(experiments.iter().map(Signals::view).collect(), data.past + data.horizon, &self.places);
         let first = rows.first[experiment] + columns.start;
         let pieces = (0..columns.len()).step_by(PIECE).map(|start| {
             let mut piece = Mat::zeros(PIECE.min(columns.len() - start), self.places.len());
@@ -184,79 +232,100 @@ impl<'a> BlockWeights<'a> {
 }
 
 /// R, how it was found, and the directions that known disturbances took.
-fn factor(
-    data: &Channels,
-    rows: &RowMap<'_>,
-    blocks: usize,
-    factorisation: Factorisation,
-) -> Result<(Mat<f64>, DataFactor, usize)> {
+fn factor(views: &[View<'_>], frame: &Frame, factorisation: Factorisation) -> Result<(Mat<f64>, DataFactor, usize)> {
     let by_gram = match factorisation {
         Factorisation::Qr => None,
-        _ => gram::factor(data, blocks, rows.places),
+        _ => {
+            let mut gram = Gram::new(frame.inputs + frame.outputs, frame.blocks());
+            views.iter().for_each(|view| gram.add(*view, frame.blocks()));
+            gram.factor(&frame.places)
+        }
     };
-    let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
-    match by_gram {
-        Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
-            Ok((found.r, DataFactor { by: Factorisation::Gram, condition: Some(condition) }, found.taken))
+    match choose(by_gram, factorisation)? {
+        Choice::Gram(found, report) => Ok((found.r, report, found.taken)),
+        Choice::Qr(report) if views.iter().all(|view| view.w.ncols() == 0) => {
+            let rows = RowMap::new(views.to_vec(), frame.blocks(), &frame.places);
+            let mut lanes = QrLanes::new(frame.places.len());
+            lanes.add(&rows);
+            Ok((lanes.whole(), report, 0))
         }
-        None if factorisation == Factorisation::Gram => {
-            let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
-            Err(Error::Singular { what, rcond: 0.0 })
-        }
-        found => {
-            let condition = found.map(|found| found.condition);
-            let report = DataFactor { by: Factorisation::Qr, condition };
-            if data.disturbances() == 0 {
-                return Ok((triangular_factor(rows), report, 0));
-            }
-            let (r, taken) = factor_beyond_disturbances(data, blocks, rows.places);
+        Choice::Qr(report) => {
+            let (r, taken) = factor_beyond_disturbances(views, frame);
             Ok((r, report, taken))
         }
     }
 }
 
+/// How R is to be had.
+pub(super) enum Choice {
+    Gram(GramFactor, DataFactor),
+    Qr(DataFactor),
+}
+
+/// The Gram matrix where its condition allows it, or what was asked for.
+pub(super) fn choose(by_gram: Option<GramFactor>, factorisation: Factorisation) -> Result<Choice> {
+    let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
+    match by_gram {
+        Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
+            Ok(Choice::Gram(found, DataFactor { by: Factorisation::Gram, condition: Some(condition) }))
+        }
+        None if factorisation == Factorisation::Gram => {
+            let what = "the Gram matrix of the block-Hankel data (take factorisation = \"qr\")".into();
+            Err(Error::Singular { what, rcond: 0.0 })
+        }
+        found => Ok(Choice::Qr(DataFactor { by: Factorisation::Qr, condition: found.map(|found| found.condition) })),
+    }
+}
+
 /// R of what the known disturbances leave, experiment by experiment because each has its own amplitudes; and the directions
 /// that they took.
-fn factor_beyond_disturbances(data: &Channels, blocks: usize, places: &[usize]) -> (Mat<f64>, usize) {
-    let mut whole = Triangle::new(places.len(), places.len());
+fn factor_beyond_disturbances(views: &[View<'_>], frame: &Frame) -> (Mat<f64>, usize) {
+    let (blocks, width) = (frame.blocks(), frame.places.len());
+    let mut whole = Triangle::new(width, width);
     let mut taken = 0;
-    for experiment in data.experiments.chunks(1) {
-        let span = disturbance::span(gram::of_disturbance(&experiment[0], blocks).as_ref());
-        let rows = RowMap { leading: span.basis, ..RowMap::new(experiment, blocks, places) };
-        let (r, leading) = (triangular_factor(&rows), rows.leading.ncols());
+    for view in views {
+        let span = disturbance::span(gram::of_disturbance(*view, blocks).as_ref());
+        let rows = RowMap { leading: span.basis, ..RowMap::new(vec![*view], blocks, &frame.places) };
+        let leading = rows.leading.ncols();
+        let mut lanes = QrLanes::new(leading + width);
+        lanes.add(&rows);
+        let r = lanes.whole();
         let rank = leading_rank(r.as_ref(), leading);
-        whole.fold_rows(r.as_ref().submatrix(rank, leading, r.nrows() - rank, places.len()));
+        whole.fold_rows(r.as_ref().submatrix(rank, leading, r.nrows() - rank, width));
         taken += rank;
     }
     (whole.r().to_owned(), taken)
 }
 
-/// R of all Hankel columns, by lanes and then over the lanes.
-fn triangular_factor(rows: &RowMap<'_>) -> Mat<f64> {
-    let width = rows.leading.ncols() + rows.places.len();
-    let lanes = rows.total.div_ceil(PIECE).min(LANES);
-    let parts: Vec<Mat<f64>> = (0..lanes)
-        .into_par_iter()
-        .map(|lane| lane_factor(rows, width, lane * rows.total / lanes, (lane + 1) * rows.total / lanes))
-        .collect();
-    let mut whole = Triangle::new(width, width);
-    parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
-    whole.r().to_owned()
+/// Accumulates R by QR, in lanes that are joined at the end.
+pub(super) struct QrLanes {
+    width: usize,
+    lanes: Vec<Triangle>,
 }
 
-fn lane_factor(rows: &RowMap<'_>, width: usize, start: usize, end: usize) -> Mat<f64> {
-    let pieces = (end - start).div_ceil(PIECE);
-    let cut = |k: usize| start + k * (end - start) / pieces;
-    let mut triangle = Triangle::new(width, (end - start).div_ceil(pieces));
-    for k in 0..pieces {
-        triangle.fold(cut(k + 1) - cut(k), |piece| rows.fill(cut(k), piece));
+impl QrLanes {
+    pub(super) fn new(width: usize) -> Self {
+        QrLanes { width, lanes: Vec::new() }
     }
-    triangle.r().to_owned()
+
+    pub(super) fn add(&mut self, rows: &RowMap<'_>) {
+        let lanes = rows.total.div_ceil(PIECE).min(LANES);
+        self.lanes.resize_with(lanes.max(self.lanes.len()), || Triangle::new(self.width, 1));
+        self.lanes[..lanes].par_iter_mut().enumerate().for_each(|(lane, triangle)| {
+            rows.fold(lane * rows.total / lanes..(lane + 1) * rows.total / lanes, triangle);
+        });
+    }
+
+    pub(super) fn whole(&self) -> Mat<f64> {
+        let mut whole = Triangle::new(self.width, self.width);
+        self.lanes.iter().for_each(|lane| whole.fold_rows(lane.r()));
+        whole.r().to_owned()
+    }
 }
 
-/// The transposed Hankel matrix as a map: which samples of which experiment stand in which row.
-struct RowMap<'a> {
-    experiments: &'a [Signals],
+/// The transposed Hankel matrix as a map: which samples of which experiment, or part of it, stand in which row.
+pub(super) struct RowMap<'a> {
+    views: Vec<View<'a>>,
     /// Combinations of the known disturbances (block row, signal) that stand first.
     leading: Mat<f64>,
     places: &'a [usize],
@@ -266,32 +335,43 @@ struct RowMap<'a> {
 }
 
 impl<'a> RowMap<'a> {
-    fn new(experiments: &'a [Signals], blocks: usize, places: &'a [usize]) -> Self {
+    pub(super) fn new(views: Vec<View<'a>>, blocks: usize, places: &'a [usize]) -> Self {
         let mut total = 0;
         let mut first = Vec::new();
-        for experiment in experiments {
+        for view in &views {
             first.push(total);
-            total += experiment.u.nrows() + 1 - blocks;
+            total += (view.samples() + 1).saturating_sub(blocks);
         }
-        RowMap { experiments, leading: Mat::zeros(0, 0), places, first, total }
+        RowMap { views, leading: Mat::zeros(0, 0), places, first, total }
+    }
+
+    /// Folds a range of rows into a factor, which has room for them only meanwhile.
+    fn fold(&self, range: Range<usize>, triangle: &mut Triangle) {
+        let pieces = range.len().div_ceil(PIECE);
+        let cut = |k: usize| range.start + k * range.len() / pieces;
+        triangle.make_room(range.len().div_ceil(pieces));
+        for k in 0..pieces {
+            triangle.fold(cut(k + 1) - cut(k), |piece| self.fill(cut(k), piece));
+        }
+        triangle.make_room(1);
     }
 
     /// Writes the rows `start ..` into `piece`.
     fn fill(&self, start: usize, mut piece: MatMut<'_, f64>) {
         let end = start + piece.nrows();
-        for (e, signals) in self.experiments.iter().enumerate() {
+        for (e, view) in self.views.iter().enumerate() {
             let from = self.first[e].max(start);
             let to = self.first.get(e + 1).copied().unwrap_or(self.total).min(end);
             if from < to {
                 let part = piece.as_mut().subrows_mut(from - start, to - from);
-                self.fill_from(signals, from - self.first[e], part);
+                self.fill_from(*view, from - self.first[e], part);
             }
         }
     }
 
     /// Writes the places of Hankel columns that begin at sample `time` of one experiment.
-    fn fill_from(&self, signals: &Signals, time: usize, mut part: MatMut<'_, f64>) {
-        let Signals { u, y, w } = signals;
+    fn fill_from(&self, view: View<'_>, time: usize, mut part: MatMut<'_, f64>) {
+        let View { u, y, w } = view;
         let (count, inputs, channels) = (part.nrows(), u.ncols(), u.ncols() + y.ncols());
         if self.leading.ncols() > 0 {
             let h = w.ncols();
@@ -310,7 +390,7 @@ impl<'a> RowMap<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::identify::subspace::{Experiment, SubspaceOptions};
+    use crate::identify::subspace::Experiment;
 
     /// Two inputs and one output with noise, in experiments of unequal length.
     fn experiments(noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
@@ -375,7 +455,8 @@ mod tests {
         // The Gram matrix of the same rows over the same columns.
         let places = Arrangement::Chronological.places(2, 1, 4, 3);
         let shifted: Vec<usize> = places.iter().map(|place| place + 5 * 3).collect();
-        let rows = RowMap::new(&data.experiments, 18, &shifted);
+        let scaled = data.scaled();
+        let rows = RowMap::new(scaled.iter().map(Signals::view).collect(), 18, &shifted);
         let mut hankel = Mat::zeros(rows.total, shifted.len());
         rows.fill(0, hankel.as_mut());
         let gram = hankel.transpose() * &hankel;

@@ -1,6 +1,7 @@
 //! The triangular factor of block-Hankel data from their Gram matrix, which lag sums give.
 //!
-//! With `z(t) = [u(t); y(t); w(t)]` (w: known disturbances, projected out in the end), q channels, b block rows and T Hankel columns, block (i, j) of the Gram matrix is
+//! With `z(t) = [u(t); y(t); w(t)]` (w: known disturbances, projected out in the end), q channels, b block rows and T Hankel
+//! columns, block (i, j) of the Gram matrix is
 //! ```text
 //! G(i, j) = sum_{t < T} z(t + i) z(t + j)',    G(i + 1, j + 1) = G(i, j) - z(i) z(j)' + z(T + i) z(T + j)'
 //! ```
@@ -8,7 +9,7 @@
 //! (V. Sima, SLICOT working note 2000-4). The Cholesky factor squares the condition number k of the data: its relative error
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
-use super::channels::{Channels, Signals};
+use super::channels::View;
 use super::disturbance;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
@@ -35,89 +36,102 @@ pub(super) struct GramFactor {
     pub(super) taken: usize,
 }
 
-/// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
-/// positive definite to working precision.
-pub(super) fn factor(data: &Channels, blocks: usize, order: &[usize]) -> Option<GramFactor> {
-    let Gram { matrix: gram, taken, cancelled } = gram(data, blocks);
-    let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
-    let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
-        let (a, b) = (order[i], order[j]);
-        gram[(a.min(b), a.max(b))] / (length[i] * length[j])
-    });
-    let cholesky = unit.llt(Side::Lower).ok()?;
-    let lower = cholesky.L();
-    let condition = triangular_condition(lower) * cancelled.sqrt();
-    let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
-    Some(GramFactor { r, condition, taken })
-}
-
 /// The upper triangle of the Gram matrix of all experiments, by blocks of all channels, beyond the known disturbances.
-struct Gram {
+pub(super) struct Gram {
     matrix: Mat<f64>,
+    /// The diagonal before disturbances were taken out.
+    before: Vec<f64>,
     taken: usize,
-    /// Largest ratio of a squared length before and after the known disturbances were taken out, at least 1.
-    cancelled: f64,
 }
 
-fn gram(data: &Channels, blocks: usize) -> Gram {
-    let q = data.inputs + data.outputs;
-    let mut whole = Gram { matrix: Mat::zeros(q * blocks, q * blocks), taken: 0, cancelled: 1.0 };
-    let mut before = vec![0.0; q * blocks];
-    for signals in &data.experiments {
-        let all = of_experiment(signals, signals.channels(), blocks);
-        if signals.w.ncols() == 0 {
-            whole.matrix += all;
-        } else {
-            let beyond = disturbance::beyond(all.as_ref(), q, signals.w.ncols(), blocks);
-            before.iter_mut().zip(&beyond.before).for_each(|(sum, value)| *sum += value);
-            whole.matrix += beyond.gram;
-            whole.taken += beyond.taken;
+impl Gram {
+    /// That of nothing yet, for `channels` channels of `[u; y]`.
+    pub(super) fn new(channels: usize, blocks: usize) -> Self {
+        let width = channels * blocks;
+        Gram { matrix: Mat::zeros(width, width), before: vec![0.0; width], taken: 0 }
+    }
+
+    /// Adds a whole experiment.
+    pub(super) fn add(&mut self, view: View<'_>, blocks: usize) {
+        let (q, h) = (view.u.ncols() + view.y.ncols(), view.w.ncols());
+        let all = of_experiment(view, blocks);
+        if h == 0 {
+            self.add_matrix(all);
+            return;
         }
+        let beyond = disturbance::beyond(all.as_ref(), q, h, blocks);
+        self.before.iter_mut().zip(&beyond.before).for_each(|(sum, value)| *sum += value);
+        self.matrix += beyond.gram;
+        self.taken += beyond.taken;
     }
-    for (i, before) in before.iter().enumerate() {
-        whole.cancelled = whole.cancelled.max(before / whole.matrix[(i, i)].max(f64::MIN_POSITIVE));
+
+    /// Adds the Gram matrix of an experiment without known disturbances.
+    pub(super) fn add_matrix(&mut self, gram: Mat<f64>) {
+        (0..gram.nrows()).for_each(|i| self.before[i] += gram[(i, i)]);
+        self.matrix += gram;
     }
-    whole
+
+    /// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
+    /// positive definite to working precision.
+    pub(super) fn factor(&self, order: &[usize]) -> Option<GramFactor> {
+        let gram = &self.matrix;
+        let length: Vec<f64> = order.iter().map(|&c| gram[(c, c)].sqrt()).collect();
+        if length.iter().any(|l| !l.is_normal()) {
+            return None;
+        }
+        let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
+            let (a, b) = (order[i], order[j]);
+            gram[(a.min(b), a.max(b))] / (length[i] * length[j])
+        });
+        let cholesky = unit.llt(Side::Lower).ok()?;
+        let lower = cholesky.L();
+        let cancelled = |i: usize| self.before[i] / gram[(i, i)].max(f64::MIN_POSITIVE);
+        let cancelled = (0..self.before.len()).map(cancelled).fold(1.0, f64::max);
+        let condition = triangular_condition(lower) * cancelled.sqrt();
+        let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
+        Some(GramFactor { r, condition, taken: self.taken })
+    }
 }
 
 /// The Gram matrix of the Hankel data of known disturbances alone.
-pub(super) fn of_disturbance(signals: &Signals, blocks: usize) -> Mat<f64> {
-    let alone =
-        Signals { u: Mat::zeros(signals.w.nrows(), 0), y: Mat::zeros(signals.w.nrows(), 0), w: signals.w.clone() };
-    of_experiment(&alone, alone.channels(), blocks)
+pub(super) fn of_disturbance(view: View<'_>, blocks: usize) -> Mat<f64> {
+    of_experiment(View { u: view.w.subcols(0, 0), y: view.w.subcols(0, 0), w: view.w }, blocks)
 }
 
-fn of_experiment(signals: &Signals, q: usize, blocks: usize) -> Mat<f64> {
-    let columns = signals.u.nrows() + 1 - blocks;
+fn of_experiment(view: View<'_>, blocks: usize) -> Mat<f64> {
+    let columns = view.samples() + 1 - blocks;
+    let edge = |start: usize| interleaved(view.part(start, blocks - 1));
+    from_lags(lag_sums(view, blocks, columns), &edge(0), &edge(columns), blocks)
+}
+
+/// The samples with all channels of each together.
+pub(super) fn interleaved(view: View<'_>) -> Vec<f64> {
+    let mut values = vec![0.0; view.channels() * view.samples()];
+    view.interleave(0, view.samples(), view.samples(), &mut values);
+    values
+}
+
+/// The upper triangle of the Gram matrix from `[L_0 L_1 ...]` and the first and last b - 1 samples.
+pub(super) fn from_lags(lags: Mat<f64>, head: &[f64], tail: &[f64], blocks: usize) -> Mat<f64> {
+    let q = lags.nrows();
     let mut gram = Mat::zeros(q * blocks, q * blocks);
-    gram.as_mut().subrows_mut(0, q).copy_from(lag_sums(signals, q, blocks, columns));
-    let value = |t: usize, c: usize| signals.value(t, c);
-    for i in 1..blocks {
-        for j in i..blocks {
-            for (a, b) in (0..q).flat_map(|a| (0..q).map(move |b| (a, b))) {
-                let left = value(i - 1, a) * value(j - 1, b);
-                let entered = value(columns + i - 1, a) * value(columns + j - 1, b);
-                gram[(i * q + a, j * q + b)] = gram[((i - 1) * q + a, (j - 1) * q + b)] - left + entered;
-            }
+    gram.as_mut().subrows_mut(0, q).copy_from(lags);
+    for column in q..q * blocks {
+        let (left, entered) = (head[column - q], tail[column - q]);
+        let (before, mut here) = gram.as_mut().split_at_col_mut(column);
+        let before = before.col(column - q);
+        let mut here = here.as_mut().col_mut(0);
+        for row in q..(column / q + 1) * q {
+            here[row] = before[row - q] - head[row - q] * left + tail[row - q] * entered;
         }
     }
     gram
 }
 
-impl Signals {
+impl View<'_> {
     /// Number of channels of `[u; y; w]`.
     fn channels(&self) -> usize {
         self.u.ncols() + self.y.ncols() + self.w.ncols()
-    }
-
-    /// Channel c of `[u; y; w]`.
-    fn value(&self, t: usize, c: usize) -> f64 {
-        let (m, q) = (self.u.ncols(), self.u.ncols() + self.y.ncols());
-        match c {
-            c if c < m => self.u[(t, c)],
-            c if c < q => self.y[(t, c - m)],
-            c => self.w[(t, c - q)],
-        }
     }
 
     /// Writes `z(t)` for `count` samples from `start` on, all channels of a sample together, zero from `end` on.
@@ -136,7 +150,8 @@ impl Signals {
 ///
 /// Frames of B samples stand as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
 /// memory; `X Y'` holds all products of samples up to b - 1 apart.
-fn lag_sums(signals: &Signals, q: usize, blocks: usize, columns: usize) -> Mat<f64> {
+pub(super) fn lag_sums(view: View<'_>, blocks: usize, columns: usize) -> Mat<f64> {
+    let q = view.channels();
     let frame = FRAME.div_ceil(q);
     let frames = columns.div_ceil(frame);
     let lanes = LANES.min(columns.div_ceil(CHUNK));
@@ -144,7 +159,7 @@ fn lag_sums(signals: &Signals, q: usize, blocks: usize, columns: usize) -> Mat<f
         .into_par_iter()
         .map(|lane| {
             let range = lane * frames / lanes..(lane + 1) * frames / lanes;
-            Lane { signals, q, frame, ahead: blocks - 1, columns }.products(range)
+            Lane { view, q, frame, ahead: blocks - 1, columns }.products(range)
         })
         .collect();
     let mut sums = Mat::zeros(q, q * blocks);
@@ -158,9 +173,9 @@ fn lag_sums(signals: &Signals, q: usize, blocks: usize, columns: usize) -> Mat<f
     sums
 }
 
-/// Some frames of one experiment.
+/// Some frames of one experiment, or of a part of it.
 struct Lane<'a> {
-    signals: &'a Signals,
+    view: View<'a>,
     q: usize,
     /// Samples per frame.
     frame: usize,
@@ -180,8 +195,8 @@ impl Lane<'_> {
         for first in frames.clone().step_by(at_once) {
             let count = at_once.min(frames.end - first);
             let (start, samples) = (first * self.frame, count * self.frame);
-            self.signals.interleave(start, samples, self.columns, &mut x);
-            self.signals.interleave(start, samples + self.ahead, self.signals.u.nrows(), &mut z);
+            self.view.interleave(start, samples, self.columns, &mut x);
+            self.view.interleave(start, samples + self.ahead, self.view.samples(), &mut z);
             let x = MatRef::from_column_major_slice(&x[..count * height], height, count);
             let y = MatRef::from_column_major_slice_with_stride(&z, seen, count, height);
             matmul(products.as_mut(), Accum::Add, x, y.transpose(), 1.0, Par::Seq);

@@ -43,7 +43,11 @@ pub struct HorizonReport {
 }
 
 /// Past and future for the largest order that `options` ask for.
-pub(super) fn find(data: &Channels, automatic: AutomaticHorizon, options: &SubspaceOptions) -> Result<HorizonReport> {
+pub(super) fn find(
+    data: &Channels<'_>,
+    automatic: AutomaticHorizon,
+    options: &SubspaceOptions,
+) -> Result<HorizonReport> {
     let feedthrough = options.feedthrough != Feedthrough::None;
     let arrangement = Arrangement::NewestFirst { feedthrough };
     let triangle = DataTriangle::new(data, (automatic.max, 1), arrangement, options.factorisation)?;
@@ -88,7 +92,7 @@ pub struct ScannedModel {
     pub model: Result<SubspaceModel>,
 }
 
-impl SubspaceData {
+impl SubspaceData<'_> {
     /// Models over several horizons and orders from this one factorisation, to see what depends on the choice: horizon by
     /// horizon, each with all orders, for which one projection serves. The past is that of `options` or, where it is absent,
     /// as long as the future.

@@ -11,7 +11,9 @@
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
+mod batch;
 mod channels;
+mod condense;
 mod delay;
 mod disturbance;
 mod factorisation;
@@ -19,6 +21,7 @@ mod gram;
 mod hankel;
 mod horizons;
 mod innovation;
+mod memory;
 mod modal;
 mod modal_sums;
 mod open_loop;
@@ -36,6 +39,8 @@ mod sensitivity;
 mod ssarx;
 pub mod stabilisation;
 mod stability;
+mod statistics;
+mod stream;
 #[cfg(test)]
 mod tests;
 pub(crate) mod uncertainty;
@@ -44,6 +49,7 @@ mod varx;
 pub use disturbance::{Line, amplitudes, harmonics, lines};
 pub use horizons::{AutomaticHorizon, HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
+pub use memory::ExperimentStream;
 pub use options::{
     AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
     SubspaceOptions, Weight,
@@ -51,6 +57,7 @@ pub use options::{
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
+pub use stream::subspace_stream;
 pub use uncertainty::{
     BlockInfluence, Bootstrap, Delta, Evidence, ModeBand, NoUncertainty, ResponseBand, Uncertainty, UncertaintyMethod,
     UncertaintyOptions,
@@ -61,7 +68,7 @@ use crate::{Error, Result};
 use channels::{Channels, check_blocks};
 use factorisation::{Arrangement, DataTriangle};
 use faer::{Mat, MatRef, c64};
-use output_error::{Base, Fitted};
+use output_error::{Base, Condense, Fitted};
 use projected::{Estimate, Projected};
 
 /// Records of one experiment: row k is time k.
@@ -187,8 +194,8 @@ pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &Subspa
 /// }
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub struct SubspaceData {
-    channels: Channels,
+pub struct SubspaceData<'a> {
+    channels: Channels<'a>,
     triangle: DataTriangle,
     time: Discrete,
     /// With the horizons that were found, where that was asked for.
@@ -196,12 +203,13 @@ pub struct SubspaceData {
     automatic_horizon: Option<HorizonReport>,
 }
 
-impl SubspaceData {
-    /// Checks, scales and factors the data for the horizon and past of `options`.
+impl<'a> SubspaceData<'a> {
+    /// Checks and factors the data for the horizon and past of `options`. The records are not copied, but where delays or
+    /// disturbances are taken out of them.
     ///
     /// # Errors
     /// As [`subspace`], but for those of a model.
-    pub fn new(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
+    pub fn new(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
         Self::disturbed(experiments, &[], time, options)
     }
 
@@ -212,16 +220,13 @@ impl SubspaceData {
     /// # Errors
     /// As [`Self::new`]; [`Error::Shape`] and [`Error::NotFinite`] for the known signals.
     pub fn disturbed(
-        experiments: &[Experiment<'_>],
-        disturbances: &[MatRef<'_, f64>],
+        experiments: &[Experiment<'a>],
+        disturbances: &[MatRef<'a, f64>],
         time: Discrete,
         options: &SubspaceOptions,
     ) -> Result<Self> {
         let channels = Channels::new(experiments, disturbances, options)?;
-        let arrangement = match options.weight.is_for_closed_loops() {
-            true => Arrangement::Chronological,
-            false => Arrangement::InputsFirst,
-        };
+        let arrangement = Arrangement::of(options);
         let automatic =
             options.automatic_horizon.map(|choice| horizons::find(&channels, choice, options)).transpose()?;
         let blocks = automatic.as_ref().map_or((options.past(), options.horizon), |found| (found.past, found.horizon));
@@ -232,7 +237,7 @@ impl SubspaceData {
     }
 
     /// The same inputs with other outputs, in scaled units, factored alike.
-    fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Result<Self> {
+    fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Result<SubspaceData<'_>> {
         let channels = self.channels.with_outputs(outputs);
         let options = &self.factored;
         let blocks = (options.past(), options.horizon);
@@ -277,7 +282,19 @@ impl SubspaceData {
     fn model(&self, projected: &Projected, options: &SubspaceOptions) -> Result<SubspaceModel> {
         let by_models = |auto: &AutoOrder, max| order_models::choose(self, projected, auto, max, options);
         let order = order::choose(options.order, projected.evidence()?, by_models)?;
-        let ScaledModel { estimate, fitted } = self.scaled_model(projected, order.order, options)?;
+        let scaled = self.scaled_model(projected, order.order, options)?;
+        self.finished(projected, order, scaled, options)
+    }
+
+    /// The model in the units of the record, with all that is known of it.
+    fn finished(
+        &self,
+        projected: &Projected,
+        order: OrderReport,
+        scaled: ScaledModel,
+        options: &SubspaceOptions,
+    ) -> Result<SubspaceModel> {
+        let ScaledModel { estimate, fitted } = scaled;
         let (factor, columns) = projected.data();
         let base = || {
             let gain = estimate.innovation.gain();
@@ -291,7 +308,7 @@ impl SubspaceData {
         Ok(SubspaceModel {
             model: delays.put_before(model)?,
             uncertainty,
-            innovation: delays.put_below(estimate.innovation.unscale(&self.channels.y_scale)),
+            innovation: delays.put_below(estimate.innovation.unscale(self.channels.y_scale())),
             initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
             singular_values: projected.singular_values().to_vec(),
@@ -310,14 +327,25 @@ impl SubspaceData {
 
     /// The model of one order in scaled units.
     fn scaled_model(&self, projected: &Projected, order: usize, options: &SubspaceOptions) -> Result<ScaledModel> {
+        self.scaled_model_by(&mut |p, u| Ok(condense::condense(&self.channels, p, u)), projected, order, options)
+    }
+
+    /// The same from records that are condensed in another way.
+    fn scaled_model_by(
+        &self,
+        condense: &mut Condense<'_>,
+        projected: &Projected,
+        order: usize,
+        options: &SubspaceOptions,
+    ) -> Result<ScaledModel> {
         let estimate = projected.estimate(order, options.stability, self.time)?;
         let gain = estimate.innovation.gain();
-        let fitted = output_error::fit(&self.channels, &estimate.pair, gain, &estimate.stability, options)?;
+        let fitted = output_error::fit(&self.channels, condense, &estimate.pair, gain, &estimate.stability, options)?;
         Ok(ScaledModel { estimate, fitted })
     }
 }
 
-impl SubspaceData {
+impl SubspaceData<'_> {
     /// The model with B, D, initial states and disturbances from the one-step predictions with another gain (n x p); A, C
     /// and the innovation stay. For models without delays.
     pub(crate) fn refit(
@@ -327,7 +355,8 @@ impl SubspaceData {
         options: &SubspaceOptions,
     ) -> Result<SubspaceModel> {
         let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
-        let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
+        let condense = &mut |p: &_, u: &_| Ok(condense::condense(&self.channels, p, u));
+        let fitted = output_error::fit_predictions(&self.channels, condense, &pair, gain.as_ref(), options)?;
         Ok(SubspaceModel {
             model: self.channels.unscale_model(&pair, &fitted.b, &fitted.d, self.time)?,
             initial_states: fitted.initial_states,

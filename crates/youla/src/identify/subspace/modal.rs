@@ -8,10 +8,9 @@
 //! two multiplications per number serves all outputs, where the recursion for one output alone takes n of them. It needs
 //! eigenvectors that are far from dependent; [`Modes::of`] says where they are not.
 
-use super::disturbance::Regressors;
-use super::modal_sums;
+use super::disturbance::KnownColumns;
 use super::sensitivity::{Predictor, Unknowns};
-use crate::linalg::{Triangle, block};
+use crate::linalg::Triangle;
 use crate::{Mat, MatRef, c64};
 use faer::prelude::*;
 use faer::{MatMut, RowRef};
@@ -61,60 +60,45 @@ impl Modes {
         Some(Modes { lambda: chosen.iter().map(|j| lambda[*j]).collect(), to_states })
     }
 
-    /// Per output, the triangular factor over `[x0 | disturbances | B | its row of D | y]`.
-    pub(super) fn condense(
+    /// One per real pole and one per pair.
+    pub(super) fn lambda(&self) -> &[c64] {
+        &self.lambda
+    }
+
+    /// Real numbers in the z of one input.
+    fn width(&self) -> usize {
+        self.lambda.iter().map(|l| if l.im == 0.0 { 1 } else { 2 }).sum()
+    }
+
+    /// Per output, the triangular factor over `[x0 | disturbances | B | its row of D | y]`, from that over `[z of x0 | z of
+    /// every input | u for D, regressors of disturbances, outputs]`. The channels of the shared factor are divided by `scale`,
+    /// first those of the inputs.
+    pub(super) fn by_outputs(
         &self,
-        u: MatRef<'_, f64>,
-        targets: MatRef<'_, f64>,
-        known: &Regressors,
+        mut shared: Mat<f64>,
+        known: &KnownColumns,
         unknowns: &Unknowns,
+        scale: &[f64],
     ) -> Vec<Mat<f64>> {
-        let direct = unknowns.direct.iter().any(|inputs| !inputs.is_empty());
-        let through = u.subcols(0, if direct { u.ncols() } else { 0 });
-        let beside = block(&[&[through, known.signals.as_ref(), targets]]);
-        let shared = modal_sums::factor(&self.lambda, u, beside.as_ref(), unknowns.initial > 0)
-            .unwrap_or_else(|| self.shared_factor(u, beside.as_ref(), unknowns));
+        let (n, free) = (unknowns.states, usize::from(unknowns.initial > 0));
+        let driven = (free + unknowns.inputs) * n;
+        let (inputs, outputs) = scale.split_at(unknowns.inputs);
+        let width = shared.ncols();
+        let of_channel = |column: usize| match column {
+            c if c < free * n => 1.0,
+            c if c < driven => inputs[c / n - free],
+            c if c < driven + unknowns.through() => inputs[c - driven],
+            c if c >= width - outputs.len() => outputs[c + outputs.len() - width],
+            _ => 1.0,
+        };
+        for c in 0..width {
+            let inverse = 1.0 / of_channel(c);
+            shared.col_mut(c).iter_mut().for_each(|value| *value *= inverse);
+        }
         (0..unknowns.outputs).map(|i| self.of_output(shared.as_ref(), i, known, unknowns)).collect()
     }
 
-    /// Triangular factor over `[z of x0 | z of every input | beside]`, by lanes of samples; `beside` holds u for D, the
-    /// regressors of disturbances, and all outputs.
-    fn shared_factor(&self, u: MatRef<'_, f64>, beside: MatRef<'_, f64>, unknowns: &Unknowns) -> Mat<f64> {
-        let samples = u.nrows();
-        let lanes = samples.div_ceil(PIECE).min(LANES);
-        let starts: Vec<usize> = (0..=lanes).map(|l| l * samples / lanes).collect();
-        let mut state = State::new(&self.lambda, unknowns);
-        let begun: Vec<State> = starts[..lanes]
-            .iter()
-            .zip(&starts[1..])
-            .map(|(start, end)| {
-                let begun = state.clone();
-                for piece in (*start..*end).step_by(PIECE) {
-                    (piece..(piece + PIECE).min(*end)).for_each(|k| state.advance(u, k));
-                    state.flush();
-                }
-                begun
-            })
-            .collect();
-        let width = state.width() + beside.ncols();
-        let parts: Vec<Mat<f64>> = begun
-            .into_par_iter()
-            .enumerate()
-            .map(|(lane, mut state)| {
-                let mut triangle = Triangle::new(width, PIECE);
-                for start in (starts[lane]..starts[lane + 1]).step_by(PIECE) {
-                    let count = PIECE.min(starts[lane + 1] - start);
-                    triangle.fold(count, |piece| state.fill(u, beside, start, piece));
-                }
-                triangle.r().to_owned()
-            })
-            .collect();
-        let mut whole = Triangle::new(width, width);
-        parts.iter().for_each(|part| whole.fold_rows(part.as_ref()));
-        whole.r().to_owned()
-    }
-
-    fn of_output(&self, shared: MatRef<'_, f64>, i: usize, known: &Regressors, unknowns: &Unknowns) -> Mat<f64> {
+    fn of_output(&self, shared: MatRef<'_, f64>, i: usize, known: &KnownColumns, unknowns: &Unknowns) -> Mat<f64> {
         let (n, free) = (unknowns.states, usize::from(unknowns.initial > 0));
         let (groups, width) = (unknowns.inputs + free, unknowns.width_of_output(i));
         let mut rows = Mat::zeros(shared.nrows(), width);
@@ -123,7 +107,7 @@ impl Modes {
             rows.as_mut().subcols_mut(place, n).copy_from(shared.subcols(g * n, n) * &self.to_states[i]);
         }
         let of_targets = shared.ncols() - unknowns.outputs;
-        let of_known = of_targets - known.signals.ncols();
+        let of_known = of_targets - known.columns();
         for j in 0..unknowns.disturbances {
             if let Some(column) = known.column(i, j) {
                 rows.col_mut(unknowns.initial + j).copy_from(shared.col(of_known + column));
@@ -158,6 +142,59 @@ fn rows_of(gamma: RowRef<'_, c64>, inverse: MatRef<'_, c64>, lambda: &[c64], cho
     rows
 }
 
+/// The triangular factor over `[z of x0 | z of every input | beside]` by QR of its rows, which lanes of samples take in.
+pub(super) struct Rows {
+    state: State,
+    triangle: Triangle,
+}
+
+impl Rows {
+    /// Of no samples, for a number of columns beside.
+    pub(super) fn new(modes: &Modes, unknowns: &Unknowns, beside: usize) -> Self {
+        let groups = unknowns.inputs + usize::from(unknowns.initial > 0);
+        let width = groups * modes.width() + beside;
+        Rows { state: State::new(&modes.lambda, unknowns), triangle: Triangle::new(width, width) }
+    }
+
+    /// Takes in the next samples.
+    pub(super) fn add(&mut self, u: MatRef<'_, f64>, beside: MatRef<'_, f64>) {
+        let samples = u.nrows();
+        let lanes = samples.div_ceil(PIECE).min(LANES);
+        let starts: Vec<usize> = (0..=lanes).map(|l| l * samples / lanes).collect();
+        let state = &mut self.state;
+        let begun: Vec<State> = starts[..lanes]
+            .iter()
+            .zip(&starts[1..])
+            .map(|(start, end)| {
+                let begun = state.clone();
+                for piece in (*start..*end).step_by(PIECE) {
+                    (piece..(piece + PIECE).min(*end)).for_each(|k| state.advance(u, k));
+                    state.flush();
+                }
+                begun
+            })
+            .collect();
+        let width = self.triangle.width();
+        let parts: Vec<Mat<f64>> = begun
+            .into_par_iter()
+            .enumerate()
+            .map(|(lane, mut state)| {
+                let mut triangle = Triangle::new(width, PIECE);
+                for start in (starts[lane]..starts[lane + 1]).step_by(PIECE) {
+                    let count = PIECE.min(starts[lane + 1] - start);
+                    triangle.fold(count, |piece| state.fill(u, beside, start, piece));
+                }
+                triangle.r().to_owned()
+            })
+            .collect();
+        parts.iter().for_each(|part| self.triangle.fold_rows(part.as_ref()));
+    }
+
+    pub(super) fn factor(&self) -> Mat<f64> {
+        self.triangle.r().to_owned()
+    }
+}
+
 /// All z of one sample: groups (x0, then the inputs) of modes.
 #[derive(Clone)]
 struct State {
@@ -186,11 +223,6 @@ impl State {
             modes,
             free,
         }
-    }
-
-    /// Real numbers in a sample.
-    fn width(&self) -> usize {
-        self.lambda_im.iter().map(|im| if *im == 0.0 { 1 } else { 2 }).sum()
     }
 
     fn advance(&mut self, u: MatRef<'_, f64>, k: usize) {
@@ -234,8 +266,11 @@ impl State {
 
 #[cfg(test)]
 mod tests {
+    use super::super::disturbance::Regressors;
+    use super::super::modal_sums::Sums;
     use super::super::sensitivity::Sensitivity;
     use super::*;
+    use crate::linalg::block;
 
     fn signal(samples: usize, channels: usize, seed: usize) -> Mat<f64> {
         Mat::from_fn(samples, channels, |k, j| ((k * k * (j + seed) + 5 * k) as f64 * 0.31).sin())
@@ -254,17 +289,31 @@ mod tests {
         Predictor { a, c: signal(2, 7, 3), k: None }
     }
 
+    fn unknowns(initial: usize, disturbances: usize, direct: Vec<Vec<usize>>) -> Unknowns {
+        Unknowns { states: 7, inputs: 3, outputs: 2, initial, disturbances, direct }
+    }
+
     #[test]
     fn modal_and_direct_regressors_have_the_same_factor() {
         let predictor = predictor();
+        let modes = Modes::of(&predictor).unwrap();
         let (u, y) = (signal(2500, 3, 1), signal(2500, 2, 9));
         for (initial, direct, h) in
             [(7, vec![vec![0, 1, 2]; 2], 0), (0, vec![vec![]; 2], 2), (7, vec![vec![2], vec![0, 1]], 2)]
         {
-            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, disturbances: 2 * h, direct };
-            let known = Regressors { signals: signal(2500, h, 5), known: h, outputs: 2, crossed: false };
-            let modal = Modes::of(&predictor).unwrap().condense(u.as_ref(), y.as_ref(), &known, &unknowns);
-            for (i, modal) in modal.iter().enumerate() {
+            let unknowns = unknowns(initial, 2 * h, direct);
+            let known = Regressors {
+                signals: signal(2500, h, 5),
+                columns: KnownColumns { known: h, outputs: 2, crossed: false },
+            };
+            let through = u.subcols(0, unknowns.through());
+            let beside = block(&[&[through, known.signals.as_ref(), y.as_ref()]]);
+            let mut rows = Rows::new(&modes, &unknowns, beside.ncols());
+            // In two parts, the state goes from one to the other.
+            rows.add(u.subrows(0, 900), beside.subrows(0, 900));
+            rows.add(u.subrows(900, 1600), beside.subrows(900, 1600));
+            let by_modes = modes.by_outputs(rows.factor(), &known.columns, &unknowns, &[1.0; 5]);
+            for (i, modal) in by_modes.iter().enumerate() {
                 let target: Vec<f64> = y.col(i).iter().copied().collect();
                 let mut triangle = Triangle::new(unknowns.width_of_output(i), 2500);
                 let mut direct = Sensitivity::new(&predictor, i, &unknowns);
@@ -282,13 +331,19 @@ mod tests {
         let modes = Modes::of(&predictor()).unwrap();
         let (u, beside) = (signal(5000, 3, 1), signal(5000, 5, 9));
         for initial in [7, 0] {
-            let direct = vec![vec![]; 2];
-            let unknowns = Unknowns { states: 7, inputs: 3, outputs: 2, initial, disturbances: 0, direct };
-            let rows = modes.shared_factor(u.as_ref(), beside.as_ref(), &unknowns);
-            let sums = modal_sums::factor(&modes.lambda, u.as_ref(), beside.as_ref(), initial > 0).unwrap();
-            let (one, other) = (sums.transpose() * &sums, rows.transpose() * &rows);
-            let error = (&one - &other).norm_max() / other.norm_max();
-            assert!(error < 1e-13, "{initial} initial states: {error:.1e}");
+            let unknowns = unknowns(initial, 0, vec![vec![]; 2]);
+            let mut rows = Rows::new(&modes, &unknowns, 5);
+            rows.add(u.as_ref(), beside.as_ref());
+            let rows = rows.factor();
+            for cut in [0, 1, 3333] {
+                let mut sums = Sums::new(modes.lambda(), 3, 5).unwrap();
+                sums.add(u.subrows(0, cut), beside.subrows(0, cut));
+                sums.add(u.subrows(cut, 5000 - cut), beside.subrows(cut, 5000 - cut));
+                let sums = sums.factor(initial > 0).unwrap();
+                let (one, other) = (sums.transpose() * &sums, rows.transpose() * &rows);
+                let error = (&one - &other).norm_max() / other.norm_max();
+                assert!(error < 1e-13, "{initial} initial states, cut at {cut}: {error:.1e}");
+            }
         }
     }
 
@@ -297,7 +352,9 @@ mod tests {
         let modes = Modes::of(&predictor()).unwrap();
         let u = signal(3000, 1, 1);
         let beside = block(&[&[u.as_ref(), u.as_ref()]]);
-        assert!(modal_sums::factor(&modes.lambda, u.as_ref(), beside.as_ref(), false).is_none());
+        let mut sums = Sums::new(modes.lambda(), 1, 2).unwrap();
+        sums.add(u.as_ref(), beside.as_ref());
+        assert!(sums.factor(false).is_none());
     }
 
     #[test]

@@ -6,7 +6,7 @@
 //! P - Lambda P Lambda^H = z(0) z(0)^H - z(N) z(N)^H + Lambda C + C^H Lambda^H + U        (entry by entry; also with z z')
 //! ```
 //! A sample costs two multiplications per mode and one per mode and channel, where the factor of the rows costs the square
-//! of their number. Like every Gram matrix this one squares the condition number: [`factor`] says where that is too much.
+//! of their number. Like every Gram matrix this one squares the condition number: [`Sums::factor`] says where that is too much.
 //!
 //! The samples are dealt to lanes that start from zero; what a lane's true start adds is linear in it, and is added when
 //! the lanes are joined.
@@ -28,23 +28,6 @@ const DECAYING: f64 = 1e-7;
 /// Numbers below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
 
-/// R over `[z of x0 | z of every input | beside]`, pairs as real and imaginary part; `None` where the squared condition
-/// number would cost too many digits.
-pub(super) fn factor(lambda: &[c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>, initial: bool) -> Option<Mat<f64>> {
-    if lambda.iter().any(|l| 1.0 - l.norm_sqr() < DECAYING) {
-        return None;
-    }
-    let sums = Sums::new(lambda, u, beside);
-    let gram = sums.gram(initial);
-    let n = gram.nrows();
-    let length: Vec<f64> = (0..n).map(|j| gram[(j, j)].sqrt()).collect();
-    let unit = Mat::from_fn(n, n, |i, j| gram[(i, j)] / (length[i] * length[j]));
-    let cholesky = unit.llt(Side::Lower).ok()?;
-    let lower = cholesky.L();
-    let well_conditioned = triangular_condition(lower) <= LIMIT;
-    well_conditioned.then(|| Mat::from_fn(n, n, |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 }))
-}
-
 /// What a lane that starts from zero leaves behind; group 0 starts from one and is not driven, group q + 1 is driven by
 /// input q. Complex numbers as real and imaginary rows.
 struct Lane {
@@ -54,11 +37,11 @@ struct Lane {
     end: Vec<c64>,
 }
 
-/// The same for the whole record.
-struct Sums<'a> {
+/// Sums over the samples taken in.
+pub(super) struct Sums<'a> {
     lambda: &'a [c64],
     inputs: usize,
-    /// First and last state of every group and mode.
+    /// State of every group and mode at the first sample, and behind the last one taken in.
     start: Vec<c64>,
     end: Vec<c64>,
     /// `sum z w'`: a row per group and mode, a column per channel of `[u; beside]`.
@@ -68,23 +51,31 @@ struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
-    fn new(lambda: &'a [c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>) -> Self {
-        let (samples, inputs, modes) = (u.nrows(), u.ncols(), lambda.len());
+    /// Of no samples; `None` where a mode decays too slowly.
+    pub(super) fn new(lambda: &'a [c64], inputs: usize, beside: usize) -> Option<Self> {
+        if lambda.iter().any(|l| 1.0 - l.norm_sqr() < DECAYING) {
+            return None;
+        }
+        let (width, modes) = (inputs + beside, lambda.len());
+        let count = (inputs + 1) * modes;
+        let start: Vec<c64> = (0..count).map(|a| c64::new(f64::from(u8::from(a < modes)), 0.0)).collect();
+        let (products, channels) = (Mat::zeros(count, width), Mat::zeros(width, width));
+        Some(Sums { lambda, inputs, end: start.clone(), start, products, channels })
+    }
+
+    /// Takes in the next samples.
+    pub(super) fn add(&mut self, u: MatRef<'_, f64>, beside: MatRef<'_, f64>) {
+        let (samples, modes) = (u.nrows(), self.lambda.len());
         let lanes = samples.div_ceil(LANE);
         let cut = |l: usize| l * samples / lanes;
         let parts: Vec<Lane> = (0..lanes)
             .into_par_iter()
             .map(|l| {
                 let (from, count) = (cut(l), cut(l + 1) - cut(l));
-                run_lane(lambda, u.subrows(from, count), beside.subrows(from, count))
+                run_lane(self.lambda, u.subrows(from, count), beside.subrows(from, count))
             })
             .collect();
-        let width = inputs + beside.ncols();
-        let count = (inputs + 1) * modes;
-        let start: Vec<c64> =
-            (0..count).map(|a| if a < modes { c64::new(1.0, 0.0) } else { c64::new(0.0, 0.0) }).collect();
-        let mut now = start.clone();
-        let mut products = Mat::<c64>::zeros(count, width);
+        let (count, width) = (self.start.len(), self.channels.ncols());
         for (l, part) in parts.iter().enumerate() {
             let sum = |a: usize, w: usize| c64::new(part.products[(a, w)], part.products[(count + a, w)]);
             let steps = (cut(l + 1) - cut(l)) as i32;
@@ -92,20 +83,31 @@ impl<'a> Sums<'a> {
                 let driven = a >= modes;
                 for w in 0..width {
                     let own = if driven { sum(a, w) } else { c64::new(0.0, 0.0) };
-                    products[(a, w)] += own + now[a] * sum(a % modes, w);
+                    self.products[(a, w)] += own + self.end[a] * sum(a % modes, w);
                 }
                 let own = if driven { part.end[a] } else { c64::new(0.0, 0.0) };
-                now[a] = own + lambda[a % modes].powi(steps) * now[a];
+                self.end[a] = own + self.lambda[a % modes].powi(steps) * self.end[a];
             }
         }
-        let mut channels = Mat::zeros(width, width);
         for (i, left) in u.col_iter().chain(beside.col_iter()).enumerate() {
             for (j, right) in u.col_iter().chain(beside.col_iter()).enumerate().skip(i) {
-                channels[(i, j)] = left.transpose() * right;
-                channels[(j, i)] = channels[(i, j)];
+                self.channels[(i, j)] += left.transpose() * right;
+                self.channels[(j, i)] = self.channels[(i, j)];
             }
         }
-        Sums { lambda, inputs, start, end: now, products, channels }
+    }
+
+    /// R over `[z of x0 | z of every input | beside]`, pairs as real and imaginary part; `None` where the squared condition
+    /// number would cost too many digits.
+    pub(super) fn factor(&self, initial: bool) -> Option<Mat<f64>> {
+        let gram = self.gram(initial);
+        let n = gram.nrows();
+        let length: Vec<f64> = (0..n).map(|j| gram[(j, j)].sqrt()).collect();
+        let unit = Mat::from_fn(n, n, |i, j| gram[(i, j)] / (length[i] * length[j]));
+        let cholesky = unit.llt(Side::Lower).ok()?;
+        let lower = cholesky.L();
+        let well_conditioned = triangular_condition(lower) <= LIMIT;
+        well_conditioned.then(|| Mat::from_fn(n, n, |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 }))
     }
 
     /// The real Gram matrix of the columns that are sought.

@@ -24,7 +24,7 @@ const PIECE: usize = 1000;
 
 /// The order up to `max` by the rule of `auto`.
 pub(super) fn choose(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     projected: &Projected,
     auto: &AutoOrder,
     max: usize,
@@ -32,7 +32,10 @@ pub(super) fn choose(
 ) -> Result<ByModels> {
     let values = match auto.rule {
         OrderRule::CrossValidation => cross_validation(data, auto.leading, max, options)?,
-        _ => each_order(max, |n| akaike(data, projected, n, options))?,
+        _ => {
+            let experiments = data.channels.scaled();
+            each_order(max, |n| akaike(data, &experiments, projected, n, options))?
+        }
     };
     let chosen = match auto.rule {
         OrderRule::CrossValidation => lowest_within(auto.tolerance, &values),
@@ -63,14 +66,20 @@ fn lowest_within(tolerance: f64, values: &[OrderValue]) -> Option<usize> {
 }
 
 /// `log det Lambda + 2 d(n) / N`; minus infinity where the model leaves no error.
-fn akaike(data: &SubspaceData, projected: &Projected, n: usize, options: &SubspaceOptions) -> Result<Option<f64>> {
+fn akaike(
+    data: &SubspaceData<'_>,
+    experiments: &[Signals],
+    projected: &Projected,
+    n: usize,
+    options: &SubspaceOptions,
+) -> Result<Option<f64>> {
     let scaled = data.scaled_model(projected, n, options)?;
     let gain = match &scaled.estimate.innovation {
         Innovation::Found { gain, .. } => gain,
         Innovation::None { reason: NoInnovation::NoiseFree } => return Ok(Some(f64::NEG_INFINITY)),
         Innovation::None { .. } => return Ok(None),
     };
-    let errors = prediction_errors(&data.channels, &scaled.estimate.pair, gain.as_ref(), &scaled.fitted);
+    let errors = prediction_errors(experiments, &scaled.estimate.pair, gain.as_ref(), &scaled.fitted);
     let samples = errors.iter().map(|e| e.nrows()).sum::<usize>() as f64;
     let l = data.channels.outputs;
     let mut covariance = Mat::<f64>::zeros(l, l);
@@ -85,7 +94,7 @@ fn akaike(data: &SubspaceData, projected: &Projected, n: usize, options: &Subspa
 
 /// Mean fits on the rest of the experiments.
 fn cross_validation(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     leading: f64,
     max: usize,
     options: &SubspaceOptions,
@@ -97,7 +106,8 @@ fn cross_validation(
     // The horizons stay those of all data.
     let uncertainty = UncertaintyOptions::default();
     let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), uncertainty, ..options.clone() };
-    let parts: Vec<_> = data.channels.experiments.iter().map(|signals| split(signals, leading)).collect();
+    let experiments = data.channels.scaled();
+    let parts: Vec<_> = experiments.iter().map(|signals| split(signals, leading)).collect();
     let first: Vec<Experiment<'_>> = parts.iter().map(|([u, y, _], _)| Experiment { u: *u, y: *y }).collect();
     let known: Vec<_> = parts.iter().map(|([_, _, w], _)| *w).filter(|w| w.ncols() > 0).collect();
     let leading_data = SubspaceData::disturbed(&first, &known, data.time, options);

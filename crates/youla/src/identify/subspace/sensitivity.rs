@@ -8,6 +8,7 @@
 //! so the sensitivities to the column b_q of B are a row of length n that obeys `g_q+ = g_q A + c u_q`: n numbers per input
 //! and output, instead of the n n of `(z I - A)^-1 u_q`.
 
+use crate::linalg::block;
 use faer::{Mat, MatMut, MatRef};
 
 /// Sensitivities below this are zero; it keeps decaying modes out of the slow subnormal range.
@@ -56,6 +57,11 @@ impl Unknowns {
     /// Unknowns that all experiments share: B by columns, then D by rows.
     pub(super) fn common(&self) -> usize {
         self.of_b() + self.of_d_above(self.outputs)
+    }
+
+    /// Inputs that stand beside the modes for the sake of D: all or none.
+    pub(super) fn through(&self) -> usize {
+        if self.direct.iter().any(|inputs| !inputs.is_empty()) { self.inputs } else { 0 }
     }
 
     /// Columns of output i: `[x0 | disturbances | B | its row of D | y]`.
@@ -134,6 +140,43 @@ impl<'a> Sensitivity<'a> {
             }
             row.iter_mut().zip(&self.next).for_each(|(v, new)| *v = if new.abs() < VANISHED { 0.0 } else { *new });
         }
+    }
+}
+
+/// The outputs without what they drive themselves through K, in pieces of a record: the state goes from one to the next.
+#[derive(Clone)]
+pub(super) struct KnownShare {
+    /// Rows of `[A K]` and of C.
+    ak: Vec<f64>,
+    c: Vec<f64>,
+    /// `[x; y]`.
+    joint: Vec<f64>,
+    next: Vec<f64>,
+}
+
+impl KnownShare {
+    /// `None` for a simulation.
+    pub(super) fn new(predictor: &Predictor) -> Option<Self> {
+        let k = predictor.k.as_ref()?;
+        let (n, p) = (k.nrows(), k.ncols());
+        let ak = by_rows(block(&[&[predictor.a.as_ref(), k.as_ref()]]).as_ref());
+        Some(KnownShare { ak, c: by_rows(predictor.c.as_ref()), joint: vec![0.0; n + p], next: vec![0.0; n] })
+    }
+
+    /// `y - C x` for the next samples.
+    pub(super) fn without(&mut self, y: MatRef<'_, f64>) -> Mat<f64> {
+        let (n, width) = (self.next.len(), self.joint.len());
+        let mut targets = Mat::zeros(y.nrows(), y.ncols());
+        for k in 0..y.nrows() {
+            self.joint[..n].copy_from_slice(&self.next);
+            (n..width).for_each(|i| self.joint[i] = y[(k, i - n)]);
+            for (i, row) in self.c.chunks_exact(n).enumerate() {
+                targets[(k, i)] = y[(k, i)] - dot(row, &self.joint[..n]);
+            }
+            let rows = self.ak.chunks_exact(width);
+            self.next.iter_mut().zip(rows).for_each(|(x, row)| *x = dot(row, &self.joint));
+        }
+        targets
     }
 }
 

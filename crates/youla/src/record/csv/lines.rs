@@ -12,7 +12,7 @@ const BUFFER: usize = 1 << 17;
 /// Reads line by line, so that a file that unpacks to more than the memory is met by its first bad line.
 pub(super) struct Lines {
     path: PathBuf,
-    reader: Box<dyn BufRead>,
+    reader: Box<dyn BufRead + Send>,
     gzip: bool,
     line: Vec<u8>,
     number: usize,
@@ -87,7 +87,7 @@ impl Lines {
     }
 }
 
-fn unpacked(file: BufReader<File>, gzip: bool) -> Box<dyn BufRead> {
+fn unpacked(file: BufReader<File>, gzip: bool) -> Box<dyn BufRead + Send> {
     if gzip { Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file))) } else { Box::new(file) }
 }
 

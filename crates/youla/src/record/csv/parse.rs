@@ -51,54 +51,62 @@ impl Fields {
 }
 
 /// The columns to read as numbers.
-pub(super) struct Selection<'a> {
-    fields: &'a Fields,
-    columns: Vec<usize>,
+pub(super) struct Selection {
+    /// How many.
+    columns: usize,
     /// The positions in `columns` that each column of the file goes to.
     targets: Vec<Vec<usize>>,
 }
 
-impl<'a> Selection<'a> {
-    pub(super) fn new(fields: &'a Fields, columns: Vec<usize>) -> Self {
+impl Selection {
+    pub(super) fn new(fields: &Fields, columns: &[usize]) -> Self {
         let mut targets = vec![Vec::new(); fields.names.len()];
         for (position, &column) in columns.iter().enumerate() {
             targets[column].push(position);
         }
-        Selection { fields, columns, targets }
+        Selection { columns: columns.len(), targets }
     }
 
     /// Reads all remaining lines; one vector for each chosen column.
-    pub(super) fn read(&self, lines: &mut Lines) -> Result<Vec<Vec<f64>>> {
-        let mut out = vec![Vec::new(); self.columns.len()];
-        while lines.advance()? {
-            let found = match self.fields.delimiter {
-                Some(delimiter) => self.row(lines, lines.current().split(|&b| b == delimiter), &mut out)?,
-                None => {
-                    let cells = lines.current().split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty());
-                    self.row(lines, cells, &mut out)?
-                }
-            };
-            if found != self.targets.len() {
-                let (path, line) = (lines.path().to_owned(), lines.number());
-                return Err(Error::RaggedRow { path, line, found, expected: self.targets.len() });
-            }
-        }
+    pub(super) fn read(&self, fields: &Fields, lines: &mut Lines) -> Result<Vec<Vec<f64>>> {
+        let mut out = vec![Vec::new(); self.columns];
+        while self.next(fields, lines, |position, value| out[position].push(value))? {}
         if out.iter().all(Vec::is_empty) { Err(no_rows(lines)) } else { Ok(out) }
+    }
+
+    /// Reads one line, each number with its position among the chosen columns; false at the end.
+    pub(super) fn next(&self, fields: &Fields, lines: &mut Lines, put: impl FnMut(usize, f64)) -> Result<bool> {
+        if !lines.advance()? {
+            return Ok(false);
+        }
+        let found = match fields.delimiter {
+            Some(delimiter) => self.row(fields, lines, lines.current().split(|&b| b == delimiter), put)?,
+            None => {
+                let cells = lines.current().split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty());
+                self.row(fields, lines, cells, put)?
+            }
+        };
+        if found != self.targets.len() {
+            let (path, line) = (lines.path().to_owned(), lines.number());
+            return Err(Error::RaggedRow { path, line, found, expected: self.targets.len() });
+        }
+        Ok(true)
     }
 
     /// Reads the cells of one line and returns their number.
     fn row<'b>(
         &self,
+        fields: &Fields,
         lines: &Lines,
         cells: impl Iterator<Item = &'b [u8]> + Clone,
-        out: &mut [Vec<f64>],
+        mut put: impl FnMut(usize, f64),
     ) -> Result<usize> {
         let mut found = 0;
         for cell in cells.clone() {
             for &position in self.targets.get(found).into_iter().flatten() {
                 match number(cell) {
-                    Some(value) => out[position].push(value),
-                    None => return Err(self.bad_cell(lines, cells.count(), found, cell)),
+                    Some(value) => put(position, value),
+                    None => return Err(self.bad_cell(fields, lines, cells.count(), found, cell)),
                 }
             }
             found += 1;
@@ -107,13 +115,13 @@ impl<'a> Selection<'a> {
     }
 
     /// A line with a field too many or too few is reported as that, not as the cell that moved.
-    fn bad_cell(&self, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
+    fn bad_cell(&self, fields: &Fields, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
         let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.targets.len());
         if found != expected {
             return Error::RaggedRow { path, line, found, expected };
         }
         let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
-        Error::Cell { path, line, column: self.fields.names[column].clone(), text }
+        Error::Cell { path, line, column: fields.names[column].clone(), text }
     }
 }
 
@@ -165,6 +173,6 @@ fn number(cell: &[u8]) -> Option<f64> {
     std::str::from_utf8(cell).ok()?.trim().parse().ok().filter(|x: &f64| x.is_finite())
 }
 
-fn no_rows(lines: &Lines) -> Error {
+pub(super) fn no_rows(lines: &Lines) -> Error {
     Error::NoData { path: lines.path().to_owned(), problem: "there is no line with data" }
 }

@@ -143,7 +143,7 @@ pub struct StabilisationDiagram {
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn stabilisation(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     orders: &[usize],
     method: &SubspaceOptions,
     options: &StabilisationOptions,
@@ -194,7 +194,7 @@ fn check(orders: &[usize], options: &StabilisationOptions) -> Result<()> {
 }
 
 /// The poles of one order by frequency, all new.
-fn poles(data: &SubspaceData, projected: &Projected, order: usize) -> Result<Vec<DiagramPole>> {
+fn poles(data: &SubspaceData<'_>, projected: &Projected, order: usize) -> Result<Vec<DiagramPole>> {
     super::order::check(order)?;
     let pair = projected.realise(order)?;
     let failed = |_| Error::NoConvergence { what: format!("the poles of order {order}"), iterations: 0 };
@@ -211,7 +211,7 @@ fn poles(data: &SubspaceData, projected: &Projected, order: usize) -> Result<Vec
                 zeta: mode.zeta,
                 hz_deviation: None,
                 zeta_deviation: None,
-                shape: shape(&pair.c, eigen.U(), j, &data.channels.y_scale),
+                shape: shape(&pair.c, eigen.U(), j, data.channels.y_scale()),
                 standing: Standing::New,
                 cluster: None,
             }

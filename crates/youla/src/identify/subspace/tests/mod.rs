@@ -7,6 +7,7 @@ mod orders;
 mod properties;
 mod recovery;
 mod stabilisation;
+mod stream;
 mod structure;
 
 use super::*;

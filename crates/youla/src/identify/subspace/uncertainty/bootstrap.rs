@@ -7,6 +7,7 @@
 //! Intervals are percentiles over the records so simulated (Efron, Tibshirani, An introduction to the bootstrap, 1993,
 //! chapters 8 and 13). Each record has a random stream of its own, so that the result does not depend on the threads.
 
+use super::super::channels::Signals;
 use super::super::output_error::{Base, without_disturbances};
 use super::super::sensitivity::simulate;
 use super::super::{Order, Stability, SubspaceData, SubspaceOptions};
@@ -19,6 +20,7 @@ use crate::{Mat, Result, c64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
+use std::borrow::Cow;
 
 /// Models of resampled records.
 #[derive(Debug, Clone)]
@@ -36,7 +38,7 @@ pub struct Bootstrap {
 }
 
 pub(super) fn run(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     options: &SubspaceOptions,
     base: &Base,
     gain: &Mat<f64>,
@@ -76,7 +78,7 @@ pub(super) fn run(
 
 /// The innovation model in scaled units with its residuals.
 struct Generator<'a> {
-    data: &'a SubspaceData,
+    experiments: Cow<'a, [Signals]>,
     base: &'a Base,
     ab: Mat<f64>,
     cd: Mat<f64>,
@@ -85,15 +87,14 @@ struct Generator<'a> {
 }
 
 impl<'a> Generator<'a> {
-    fn new(data: &'a SubspaceData, base: &'a Base, gain: &Mat<f64>) -> Self {
+    fn new(data: &'a SubspaceData<'_>, base: &'a Base, gain: &Mat<f64>) -> Self {
         let (pair, p) = (&base.pair, base.pair.c.nrows());
         let b = base.b();
         let predictor = block(&[&[(&pair.a - gain * &pair.c).as_ref(), (&b - gain * &base.d).as_ref(), gain.as_ref()]]);
         let seen = block(&[&[pair.c.as_ref(), base.d.as_ref(), Mat::zeros(p, p).as_ref()]]);
-        let outputs = without_disturbances(&data.channels, &base.disturbances);
-        let parts: Vec<Mat<f64>> = data
-            .channels
-            .experiments
+        let experiments = data.channels.scaled();
+        let outputs = without_disturbances(&experiments, &base.disturbances);
+        let parts: Vec<Mat<f64>> = experiments
             .iter()
             .zip(&outputs)
             .zip(&base.initial_states)
@@ -111,13 +112,14 @@ impl<'a> Generator<'a> {
         }
         let ab = block(&[&[pair.a.as_ref(), b.as_ref(), gain.as_ref()]]);
         let cd = block(&[&[pair.c.as_ref(), base.d.as_ref(), Mat::<f64>::identity(p, p).as_ref()]]);
-        Generator { data, base, ab, cd, residuals }
+        Generator { experiments, base, ab, cd, residuals }
     }
 
     /// Outputs of every experiment with fresh noise; without disturbances, which the method takes out again in any case.
     fn outputs(&self, rng: &mut ChaCha8Rng) -> Vec<Mat<f64>> {
-        let experiments = self.data.channels.experiments.iter().zip(&self.base.initial_states);
-        experiments
+        self.experiments
+            .iter()
+            .zip(&self.base.initial_states)
             .map(|(e, x0)| {
                 let drawn: Vec<usize> = (0..e.u.nrows()).map(|_| rng.random_range(0..self.residuals.nrows())).collect();
                 let noise = Mat::from_fn(drawn.len(), e.y.ncols(), |k, i| self.residuals[(drawn[k], i)]);

@@ -42,7 +42,7 @@ impl Evidence {
     }
 }
 
-impl SubspaceData {
+impl SubspaceData<'_> {
     /// Tests whether the outputs depend on the inputs, with the order of a model found from these data by `options`. For alpha
     /// and beta: whether S = 0, the nominal model.
     ///

@@ -37,7 +37,7 @@ pub(super) struct PairChange {
 
 /// The changes for all blocks; blocks in parallel.
 pub(super) fn pair_changes(
-    channels: &Channels,
+    channels: &Channels<'_>,
     triangle: &DataTriangle,
     blocks: &[TimeBlock],
     base: &Base,

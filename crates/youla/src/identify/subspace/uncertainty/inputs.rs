@@ -10,7 +10,8 @@
 //! all blocks run through the record side by side.
 
 use super::super::channels::Channels;
-use super::super::output_error::{Base, Part, condense, regressors, without_disturbances};
+use super::super::condense::{condense, regressors};
+use super::super::output_error::{Base, Part, join, without_disturbances};
 use super::super::sensitivity::Sensitivity;
 use super::blocks::TimeBlock;
 use super::influence::PairChange;
@@ -24,19 +25,21 @@ const PIECE: usize = 256;
 
 /// The right-hand sides of all blocks, one column each, for the common unknowns.
 pub(super) fn input_changes(
-    channels: &Channels,
+    channels: &Channels<'_>,
     blocks: &[TimeBlock],
     changes: &[PairChange],
     base: &Base,
 ) -> Result<Mat<f64>> {
-    let parts = condense(channels, &base.predictor, &base.unknowns);
+    let factors = condense(channels, &base.predictor, &base.unknowns);
+    let parts: Vec<Part> = factors.iter().map(|f| join(f, &base.unknowns)).collect();
     let stacked = Stacked::new(changes);
-    let outputs = without_disturbances(channels, &base.disturbances);
+    let experiments = channels.scaled();
+    let outputs = without_disturbances(&experiments, &base.disturbances);
     let sums: Vec<Result<Mat<f64>>> = (0..parts.len())
         .into_par_iter()
         .map(|e| {
-            let signals = &channels.experiments[e];
-            let known = regressors(signals, &base.predictor);
+            let signals = &experiments[e];
+            let known = regressors(signals.view(), &base.predictor);
             let known = (0..base.unknowns.outputs).map(|i| known.of_output(i)).collect();
             let (x0, y) = (&base.initial_states[e], &outputs[e]);
             let of_experiment = OfExperiment { u: &signals.u, y, known, x0, base };

@@ -20,6 +20,7 @@ pub use delta::{BlockInfluence, Delta};
 pub use evidence::Evidence;
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 
+use super::channels::View;
 use super::innovation::{Innovation, NoInnovation};
 use super::output_error::Base;
 use super::{SubspaceData, SubspaceOptions};
@@ -117,7 +118,7 @@ pub(super) fn check(options: &SubspaceOptions) -> Result<()> {
 /// The uncertainty that the options ask for. `innovation` is in scaled units, `model` in those of the record, without the
 /// states of delays.
 pub(super) fn find(
-    data: &SubspaceData,
+    data: &SubspaceData<'_>,
     options: &SubspaceOptions,
     base: impl FnOnce() -> Result<Base>,
     innovation: &Innovation,
@@ -143,8 +144,13 @@ pub(super) fn find(
 }
 
 /// The influence of each block on the model.
-fn delta(data: &SubspaceData, options: &SubspaceOptions, base: &Base, model: &StateSpace<Discrete>) -> Result<Delta> {
-    let samples: Vec<usize> = data.channels.experiments.iter().map(|e| e.u.nrows()).collect();
+fn delta(
+    data: &SubspaceData<'_>,
+    options: &SubspaceOptions,
+    base: &Base,
+    model: &StateSpace<Discrete>,
+) -> Result<Delta> {
+    let samples: Vec<usize> = data.channels.views().iter().map(View::samples).collect();
     let held = (data.factored.past(), data.factored.horizon);
     let blocks = blocks::cut(&samples, held.0, held.1, options.uncertainty.blocks)?;
     let pairs = influence::pair_changes(&data.channels, &data.triangle, &blocks, base, options, data.time)?;

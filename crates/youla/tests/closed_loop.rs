@@ -168,19 +168,22 @@ fn innovation_form_refuses_an_unstable_plant() {
 }
 
 /// The horizons from the data: with noise of 1 um fed back and 16000 samples the predictor gets more than 30 lags, and the
-/// models are within 1.3 times the error of those with 100 lags, chosen by someone who knows the plant.
+/// models are within 1.4 times the error of those with 100 lags, chosen by someone who knows the plant (means of 5 seeds).
 #[test]
-fn automatic_horizons_do_as_well_as_known_ones() {
+fn automatic_horizons_do_nearly_as_well_as_known_ones() {
     let bearing = Loop::new(0.0);
-    let (u, y) = bearing.record(16_000, 1.0, 1);
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
     for weight in [Weight::PbsidOpt, Weight::Ssarx] {
         let automatic_horizon = Some(AutomaticHorizon { max: 150 });
         let options = SubspaceOptions { weight, automatic_horizon, order: Order::Fixed(6), ..options() };
-        let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
-        let (automatic, known) = (bearing.error(&found.model), bearing.error(&bearing.identify(weight, &u, &y)));
-        println!("{weight:?}: p = {}, s = {}, {automatic:.3} against {known:.3}", found.past, found.horizon);
-        assert!(found.past > 30, "{weight:?}: {}", found.past);
-        assert!(automatic < 1.3 * known, "{weight:?}: {automatic} against {known}");
+        let errors = [1, 2, 3, 4, 5].map(|seed| {
+            let (u, y) = bearing.record(16_000, 1.0, seed);
+            let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+            let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
+            assert!(found.past > 30, "{weight:?}: {}", found.past);
+            [bearing.error(&found.model), bearing.error(&bearing.identify(weight, &u, &y))]
+        });
+        let [automatic, known] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 5.0);
+        println!("{weight:?}: {automatic:.3} against {known:.3}");
+        assert!(automatic < 1.4 * known, "{weight:?}: {automatic:.3} against {known:.3}");
     }
 }

@@ -83,6 +83,7 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
         let diagrams = [(&found.diagrams.deviation, &truth.certificate.poles), (&found.diagrams.direct, &truth.poles)];
         for (diagram, poles) in diagrams {
             let clusters = &diagram.as_ref().unwrap().as_ref().unwrap().clusters;
+            let clusters: Vec<_> = clusters.iter().filter(|cluster| cluster.zeta < 0.3).collect();
             let expected = light(poles);
             assert_eq!((clusters.len(), expected.len()), (2, 2), "seed {seed}: {clusters:?}");
             for (cluster, (hz, zeta)) in clusters.iter().zip(expected) {

@@ -25,7 +25,7 @@ fn summary_has_the_documented_structure() {
     let summary = json(&demo().join("summary.json"));
     let mut expected =
         ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
-    expected.extend(["controller_mismatch", "seconds", "true_plant"]);
+    expected.extend(["controller_mismatch", "seconds", "true_plant", "uncertainty"]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
     assert_eq!(summary["schema"], 1);
@@ -36,6 +36,8 @@ fn summary_has_the_documented_structure() {
     }
     assert!(summary["bezout_residual"].as_f64().expect("a number") < 1e-12);
     assert!(summary["controller_mismatch"].as_f64().expect("a number") < 1e-9);
+    assert_eq!(keys(&summary["uncertainty"]), ["blocks", "evidence", "level", "method"]);
+    assert_eq!(summary["uncertainty"]["evidence"]["against_nominal"], true);
     let stages = ["factor", "identify", "record", "reduce", "report", "signals", "validate", "write"];
     assert_eq!(keys(&summary["seconds"]), stages);
     assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
@@ -59,7 +61,9 @@ fn summary_describes_every_method() {
         assert_eq!(poles.len(), order);
         assert!(poles.iter().all(|p| numbers(p).len() == 2));
         let modes = method["modes"].as_array().expect("an array");
-        assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == ["hz", "zeta"]));
+        let with_deviations = ["hz", "hz_deviation", "hz_interval", "zeta", "zeta_deviation", "zeta_interval"];
+        let of_mode = if name == "hansen" { &with_deviations[..] } else { &["hz", "zeta"] };
+        assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == of_mode), "{name}");
     }
     assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
     assert_eq!(summary["methods"]["hansen"]["s_stable"], true);

@@ -114,7 +114,7 @@ impl SubspaceData<'_> {
     /// for found in data.scan(&[4, 8, 12], &[2], &options)? {
     ///     let modes = found.model?.model.modes()?;
     ///     println!("s = {}: {:.2} Hz, damping ratio {:.3}", found.horizon, modes[0].hz, modes[0].zeta);
-    ///     assert!((modes[0].hz - 12.38).abs() < 0.01);
+    ///     assert!((modes[0].hz - 12.60).abs() < 0.01);
     /// }
     /// # Ok::<(), youla::Error>(())
     /// ```

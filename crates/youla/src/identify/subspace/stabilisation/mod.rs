@@ -128,7 +128,7 @@ pub struct StabilisationDiagram {
 /// use youla::{Mat, lti::Discrete};
 /// use youla::identify::subspace::stabilisation::{StabilisationOptions, stabilisation};
 /// use youla::identify::subspace::{Experiment, SubspaceData, SubspaceOptions};
-/// // 1.2 y(k) - 0.7 y(k-1): a mode of 12.38 Hz at 100 Hz sampling, under a little noise.
+/// // 1.2 y(k) - 0.7 y(k-1): a mode of 12.60 Hz at 100 Hz sampling, under a little noise.
 /// let u = Mat::from_fn(900, 1, |k, _| ((k * k) as f64).sin());
 /// let mut y = Mat::zeros(900, 1);
 /// for k in 1..899 {
@@ -139,7 +139,7 @@ pub struct StabilisationDiagram {
 /// let orders: Vec<usize> = (1..=8).collect();
 /// let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default())?;
 /// assert_eq!(diagram.clusters.len(), 1);
-/// assert!((diagram.clusters[0].hz - 12.38).abs() < 0.05);
+/// assert!((diagram.clusters[0].hz - 12.60).abs() < 0.05);
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn stabilisation(

@@ -13,8 +13,10 @@ use super::channels::View;
 use super::disturbance;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::llt::factor::{cholesky_in_place, cholesky_in_place_scratch};
 use faer::linalg::matmul::matmul;
-use faer::{Accum, Par, Side};
+use faer::{Accum, Par};
 use rayon::prelude::*;
 
 /// Largest condition number of the data, columns of unit length, with which the factor of the Gram matrix is taken.
@@ -23,7 +25,7 @@ pub(super) const LIMIT: f64 = 1e4;
 /// Samples of one channel in a frame times the channels: the rows of a product that fill the registers well.
 const FRAME: usize = 64;
 /// Samples copied at a time: frames and what they look ahead stay in the second-level cache.
-const CHUNK: usize = 4096;
+const CHUNK: usize = 2048;
 /// Lanes that may run at the same time; fixed, so that the result does not depend on the threads.
 const LANES: usize = 16;
 
@@ -38,6 +40,7 @@ pub(super) struct GramFactor {
 
 /// The upper triangle of the Gram matrix of all experiments, by blocks of all channels, beyond the known disturbances.
 pub(super) struct Gram {
+    /// Without rows before the first experiment.
     matrix: Mat<f64>,
     /// The diagonal before disturbances were taken out.
     before: Vec<f64>,
@@ -48,7 +51,7 @@ impl Gram {
     /// That of nothing yet, for `channels` channels of `[u; y]`.
     pub(super) fn new(channels: usize, blocks: usize) -> Self {
         let width = channels * blocks;
-        Gram { matrix: Mat::zeros(width, width), before: vec![0.0; width], taken: 0 }
+        Gram { matrix: Mat::zeros(0, 0), before: vec![0.0; width], taken: 0 }
     }
 
     /// Adds a whole experiment.
@@ -61,14 +64,20 @@ impl Gram {
         }
         let beyond = disturbance::beyond(all.as_ref(), q, h, blocks);
         self.before.iter_mut().zip(&beyond.before).for_each(|(sum, value)| *sum += value);
-        self.matrix += beyond.gram;
+        match self.matrix.nrows() {
+            0 => self.matrix = beyond.gram,
+            _ => self.matrix += beyond.gram,
+        }
         self.taken += beyond.taken;
     }
 
     /// Adds the Gram matrix of an experiment without known disturbances.
     pub(super) fn add_matrix(&mut self, gram: Mat<f64>) {
         (0..gram.nrows()).for_each(|i| self.before[i] += gram[(i, i)]);
-        self.matrix += gram;
+        match self.matrix.nrows() {
+            0 => self.matrix = gram,
+            _ => self.matrix += gram,
+        }
     }
 
     /// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
@@ -79,18 +88,28 @@ impl Gram {
         if length.iter().any(|l| !l.is_normal()) {
             return None;
         }
-        let unit = Mat::from_fn(order.len(), order.len(), |i, j| {
-            let (a, b) = (order[i], order[j]);
-            gram[(a.min(b), a.max(b))] / (length[i] * length[j])
-        });
-        let cholesky = unit.llt(Side::Lower).ok()?;
-        let lower = cholesky.L();
+        let mut unit = Mat::zeros(order.len(), order.len());
+        for (j, &b) in order.iter().enumerate() {
+            for (i, &a) in order.iter().enumerate().skip(j) {
+                unit[(i, j)] = gram[(a.min(b), a.max(b))] / (length[i] * length[j]);
+            }
+        }
+        let lower = cholesky(unit)?;
+        let lower = lower.as_ref();
         let cancelled = |i: usize| self.before[i] / gram[(i, i)].max(f64::MIN_POSITIVE);
         let cancelled = (0..self.before.len()).map(cancelled).fold(1.0, f64::max);
         let condition = triangular_condition(lower) * cancelled.sqrt();
         let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
         Some(GramFactor { r, condition, taken: self.taken })
     }
+}
+
+/// L of a positive definite matrix given by its lower triangle, in its place; what stands above the diagonal has no meaning.
+fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
+    let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, Default::default()));
+    let stack = MemStack::new(&mut memory);
+    cholesky_in_place(a.as_mut(), Default::default(), Par::Seq, stack, Default::default()).ok()?;
+    Some(a)
 }
 
 /// The Gram matrix of the Hankel data of known disturbances alone.

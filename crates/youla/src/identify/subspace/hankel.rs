@@ -92,10 +92,14 @@ impl HankelFactor {
 /// where they are far from dependent.
 pub(super) fn require_excitation(inputs: MatRef<'_, f64>, horizon: usize) -> Result<f64> {
     let needed = inputs.ncols();
-    let unit =
-        Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / inputs.col(j).norm_l2().max(f64::MIN_POSITIVE));
+    let length: Vec<f64> = inputs.col_iter().map(|column| column.norm_l2().max(f64::MIN_POSITIVE)).collect();
+    let unit = Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / length[j]);
     if unit.nrows() >= needed {
-        let condition = triangular_condition(unit.qr().thin_R().transpose());
+        let is_triangle = unit.col_iter().enumerate().all(|(j, column)| column.iter().skip(j + 1).all(|v| *v == 0.0));
+        let condition = match is_triangle {
+            true => triangular_condition(unit.subrows(0, needed).transpose()),
+            false => triangular_condition(unit.qr().thin_R().transpose()),
+        };
         if condition < FAR_FROM_DEPENDENT {
             return Ok(1.0 / condition);
         }

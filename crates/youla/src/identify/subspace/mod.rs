@@ -172,7 +172,12 @@ impl SubspaceModel {
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn subspace(experiments: &[Experiment<'_>], time: Discrete, options: &SubspaceOptions) -> Result<SubspaceModel> {
-    SubspaceData::new(experiments, time, options)?.identify(options)
+    in_pool(|| SubspaceData::new(experiments, time, options)?.identify(options))
+}
+
+/// Runs on a thread of the pool, so that the parallel steps within need not wake it one by one.
+fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
 }
 
 /// Records with the triangular factor of their block-Hankel matrix: models of any weight and order and of any horizon and
@@ -225,6 +230,15 @@ impl<'a> SubspaceData<'a> {
         time: Discrete,
         options: &SubspaceOptions,
     ) -> Result<Self> {
+        in_pool(|| Self::factored(experiments, disturbances, time, options))
+    }
+
+    fn factored(
+        experiments: &[Experiment<'a>],
+        disturbances: &[MatRef<'a, f64>],
+        time: Discrete,
+        options: &SubspaceOptions,
+    ) -> Result<Self> {
         let channels = Channels::new(experiments, disturbances, options)?;
         let arrangement = Arrangement::of(options);
         let automatic =
@@ -253,7 +267,7 @@ impl<'a> SubspaceData<'a> {
     /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
         let options = self.checked(options)?;
-        self.model(&self.project(&options)?, &options)
+        in_pool(|| self.model(&self.project(&options)?, &options))
     }
 
     /// Options that these data serve, with the horizons that were found where they ask for that.
@@ -281,9 +295,15 @@ impl<'a> SubspaceData<'a> {
 
     fn model(&self, projected: &Projected, options: &SubspaceOptions) -> Result<SubspaceModel> {
         let by_models = |auto: &AutoOrder, max| order_models::choose(self, projected, auto, max, options);
-        let order = order::choose(options.order, projected.evidence()?, by_models)?;
-        let scaled = self.scaled_model(projected, order.order, options)?;
-        self.finished(projected, order, scaled, options)
+        let Order::Fixed(order) = options.order else {
+            let order = order::choose(options.order, projected.evidence()?, by_models)?;
+            let scaled = self.scaled_model(projected, order.order, options)?;
+            return self.finished(projected, order, scaled, options);
+        };
+        order::check(order)?;
+        let (evidence, scaled) = rayon::join(|| projected.evidence(), || self.scaled_model(projected, order, options));
+        let order = order::choose(options.order, evidence?, by_models)?;
+        self.finished(projected, order, scaled?, options)
     }
 
     /// The model in the units of the record, with all that is known of it.

@@ -77,11 +77,10 @@ pub(super) fn choose(
     by_models: impl FnOnce(&AutoOrder, usize) -> Result<ByModels>,
 ) -> Result<OrderReport> {
     let largest = (evidence.horizon - 1) * evidence.outputs;
-    let asked = match choice {
+    check(match choice {
         Order::Fixed(n) => n,
         Order::Auto(auto) => auto.max,
-    };
-    check(asked)?;
+    })?;
     let cheap = |rule, max| candidate(rule, values(rule, &evidence, max));
     let rules = [OrderRule::Svc, OrderRule::Nic, OrderRule::Gap];
     let (order, rule, max, values) = match choice {

@@ -57,6 +57,7 @@ function drawDiagram(host, range, diagram) {
   host.replaceChildren(legend, map, element("p", { class: "caption" },
     "Poles of the models of all orders. Settled: the next lower order has a pole of the same frequency, damping ratio and mode shape. " +
     `Bands: clusters that are settled at enough orders, with their frequency. Dashed: the order of the model, ${diagram.chosen}.` +
+    (poles.some(p => p.hz_deviation != null) ? " Lines through settled poles: two standard deviations to either side." : "") +
     (away ? ` ${away} poles lie beyond the axis of damping ratios.` : "") +
     (diagram.method === "hansen" ? " The poles of S are those of the loop of the plant and the controller, not those of the plant alone." : "") + " Drag to zoom, double-click to return."));
   const tip = tooltip(map);
@@ -74,6 +75,7 @@ function drawDiagram(host, range, diagram) {
   function draw() {
     const clip = panel => `<clipPath id="clip-${panel === upper ? "orders" : "damping"}"><rect x="${DIAGRAM.left}" y="${panel.y}" width="${inner}" height="${panel.h}"/></clipPath>`;
     const bodyOf = (panel, value, name) => `<g clip-path="url(#clip-${name})">${bands(panel)}${panel === upper ? orderLine() : zeroLine()}` +
+      whiskers(panel, value) +
       [...STANDINGS].reverse().map(kind => poles.filter(p => p.kind === kind.key && seen(p)).map(p => mark(kind, px(p.hz), py(panel, value(p)))).join("")).join("") + "</g>" +
       `<rect x="${DIAGRAM.left}" y="${panel.y}" width="${inner}" height="${panel.h}" fill="none" stroke="var(--soft)"/>`;
     const svg = `<svg viewBox="0 0 ${DIAGRAM.width} ${height}" aria-hidden="true"><defs>${clip(upper)}${clip(lower)}</defs>${grid()}` +
@@ -82,6 +84,15 @@ function drawDiagram(host, range, diagram) {
     map.querySelector("svg")?.remove();
     map.insertAdjacentHTML("afterbegin", svg);
     tip.hide();
+  }
+
+  // Two standard deviations to either side, of the frequency above, of the damping ratio below, where they are known.
+  function whiskers(panel, value) {
+    const shown = poles.filter(p => p.kind === "settled" && seen(p) && (panel === upper ? p.hz_deviation : p.zeta_deviation) != null);
+    const ends = p => panel === upper
+      ? `M${px(Math.max(p.hz - 2 * p.hz_deviation, view[0] * 1e-3)).toFixed(1)} ${py(panel, value(p)).toFixed(1)}H${px(p.hz + 2 * p.hz_deviation).toFixed(1)}`
+      : `M${px(p.hz).toFixed(1)} ${py(panel, p.zeta - 2 * p.zeta_deviation).toFixed(1)}V${py(panel, p.zeta + 2 * p.zeta_deviation).toFixed(1)}`;
+    return `<path d="${shown.map(ends).join("")}" stroke="var(${style.colour})" stroke-width="1.2" stroke-opacity=".45" fill="none"/>`;
   }
 
   function bands(panel) {

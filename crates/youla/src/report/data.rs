@@ -329,6 +329,10 @@ pub struct StabilisationCluster {
     pub hz_spread: f64,
     /// Half the distance of the quartiles of the damping ratios.
     pub zeta_spread: f64,
+    /// Median of the standard deviations of the frequencies, Hz, where they are known.
+    pub hz_deviation: Option<f64>,
+    /// Median of the standard deviations of the damping ratios, where they are known.
+    pub zeta_deviation: Option<f64>,
     /// Number of orders at which it appears.
     pub orders: usize,
     /// Number of orders at which it is settled.

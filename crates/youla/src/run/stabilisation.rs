@@ -103,6 +103,8 @@ pub(super) fn drawn(diagram: &StabilisationDiagram, method: &str, label: &str, c
         zeta: c.zeta,
         hz_spread: c.hz_spread,
         zeta_spread: c.zeta_spread,
+        hz_deviation: c.hz_deviation,
+        zeta_deviation: c.zeta_deviation,
         orders: c.orders,
         settled: c.settled,
         shape: c.shape.iter().map(|x| [x.norm(), x.im.atan2(x.re).to_degrees()]).collect(),

@@ -98,9 +98,10 @@ impl Gram {
         let lower = lower.as_ref();
         let cancelled = |i: usize| self.before[i] / gram[(i, i)].max(f64::MIN_POSITIVE);
         let cancelled = (0..self.before.len()).map(cancelled).fold(1.0, f64::max);
-        let condition = triangular_condition(lower) * cancelled.sqrt();
-        let r = Mat::from_fn(order.len(), order.len(), |i, j| if i <= j { lower[(j, i)] * length[j] } else { 0.0 });
-        Some(GramFactor { r, condition, taken: self.taken })
+        let upper = |i: usize, j: usize| if i <= j { lower[(j, i)] * length[j] } else { 0.0 };
+        let (condition, r) =
+            rayon::join(|| triangular_condition(lower), || Mat::from_fn(order.len(), order.len(), upper));
+        Some(GramFactor { r, condition: condition * cancelled.sqrt(), taken: self.taken })
     }
 }
 
@@ -204,21 +205,31 @@ struct Lane<'a> {
 }
 
 impl Lane<'_> {
-    /// `X Y'` over a range of frames.
+    /// `X Y'` over a range of frames, all but the last of which end within the columns.
     fn products(&self, frames: std::ops::Range<usize>) -> Mat<f64> {
         let (height, seen) = (self.q * self.frame, self.q * (self.frame + self.ahead));
         let at_once = CHUNK.div_ceil(self.frame);
-        let mut x = vec![0.0; at_once * height];
         let mut z = vec![0.0; at_once * height + self.q * self.ahead];
         let mut products = Mat::zeros(height, seen);
+        let mut add = |x: &[f64], z: &[f64], count: usize| {
+            if count > 0 {
+                let x = MatRef::from_column_major_slice(&x[..count * height], height, count);
+                let y = MatRef::from_column_major_slice_with_stride(z, seen, count, height);
+                matmul(products.as_mut(), Accum::Add, x, y.transpose(), 1.0, Par::Seq);
+            }
+        };
         for first in frames.clone().step_by(at_once) {
             let count = at_once.min(frames.end - first);
             let (start, samples) = (first * self.frame, count * self.frame);
-            self.view.interleave(start, samples, self.columns, &mut x);
             self.view.interleave(start, samples + self.ahead, self.view.samples(), &mut z);
-            let x = MatRef::from_column_major_slice(&x[..count * height], height, count);
-            let y = MatRef::from_column_major_slice_with_stride(&z, seen, count, height);
-            matmul(products.as_mut(), Accum::Add, x, y.transpose(), 1.0, Par::Seq);
+            let whole = count.min(self.columns / self.frame - first);
+            add(&z, &z, whole);
+            if whole < count {
+                let rest = &z[whole * height..];
+                let mut last = rest[..height].to_vec();
+                last[(self.columns % self.frame) * self.q..].fill(0.0);
+                add(&last, rest, 1);
+            }
         }
         products
     }

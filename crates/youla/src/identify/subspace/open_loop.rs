@@ -21,8 +21,9 @@ pub(super) struct OpenLoop {
 impl OpenLoop {
     pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
         let factor = HankelFactor::new(data, options.past(), options.horizon)?;
-        let excitation_rcond = factor.require_excitation()?;
-        let projection = project(&factor, options.weight)?;
+        let (excitation_rcond, projection) =
+            rayon::join(|| factor.require_excitation(), || project(&factor, options.weight));
+        let (excitation_rcond, projection) = (excitation_rcond?, projection?);
         Ok(OpenLoop { factor, projection, excitation_rcond, weight: options.weight })
     }
 

@@ -21,9 +21,9 @@ pub struct ModeCluster {
     pub hz_spread: f64,
     /// Half the distance of the quartiles of the damping ratios over the orders.
     pub zeta_spread: f64,
-    /// Standard deviation of the frequency, Hz, where it was computed.
+    /// Median of the standard deviations of the frequencies, Hz, where they were computed.
     pub hz_deviation: Option<f64>,
-    /// Standard deviation of the damping ratio, where it was computed.
+    /// Median of the standard deviations of the damping ratios, where they were computed.
     pub zeta_deviation: Option<f64>,
     /// Number of orders at which it appears.
     pub orders: usize,
@@ -133,6 +133,11 @@ fn summary(poles: &[DiagramPole], members: &[usize], shape: Vec<c64>) -> ModeClu
         [0.25, 0.5, 0.75].map(|part| quantile(&values, part))
     };
     let (hz, zeta) = (quartiles(|p| p.hz), quartiles(|p| p.zeta));
+    let deviation = |value: fn(&DiagramPole) -> Option<f64>| {
+        let mut values = members.iter().map(|k| value(&poles[*k])).collect::<Option<Vec<f64>>>()?;
+        values.sort_by(f64::total_cmp);
+        Some(quantile(&values, 0.5))
+    };
     let count = |counts: &dyn Fn(&DiagramPole) -> bool| {
         let mut orders: Vec<usize> =
             members.iter().map(|k| &poles[*k]).filter(|p| counts(p)).map(|p| p.order).collect();
@@ -145,8 +150,8 @@ fn summary(poles: &[DiagramPole], members: &[usize], shape: Vec<c64>) -> ModeClu
         zeta: zeta[1],
         hz_spread: 0.5 * (hz[2] - hz[0]),
         zeta_spread: 0.5 * (zeta[2] - zeta[0]),
-        hz_deviation: None,
-        zeta_deviation: None,
+        hz_deviation: deviation(|p| p.hz_deviation),
+        zeta_deviation: deviation(|p| p.zeta_deviation),
         orders: count(&|_| true),
         settled: count(&|p| p.standing == Standing::Settled),
         shape,

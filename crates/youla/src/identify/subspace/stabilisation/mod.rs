@@ -17,7 +17,8 @@ mod cluster;
 pub use cluster::ModeCluster;
 
 use super::projected::Projected;
-use super::{SubspaceData, SubspaceOptions};
+use super::uncertainty::pole_deviations;
+use super::{SubspaceData, SubspaceOptions, UncertaintyMethod};
 use crate::lti::modes::mode;
 use crate::{Error, Mat, MatRef, Result, c64};
 use rayon::prelude::*;
@@ -88,9 +89,9 @@ pub struct DiagramPole {
     pub hz: f64,
     /// Damping ratio; negative where the mode grows.
     pub zeta: f64,
-    /// Standard deviation of the frequency, Hz, where it was computed.
+    /// Standard deviation of the frequency, Hz, where the method asks for the uncertainty by the delta method.
     pub hz_deviation: Option<f64>,
-    /// Standard deviation of the damping ratio, where it was computed.
+    /// Standard deviation of the damping ratio, likewise.
     pub zeta_deviation: Option<f64>,
     /// C v, one number per output, the largest of them 1.
     pub shape: Vec<c64>,
@@ -149,10 +150,14 @@ pub fn stabilisation(
     options: &StabilisationOptions,
 ) -> Result<StabilisationDiagram> {
     check(orders, options)?;
-    let projected = data.project(&data.checked(method)?)?;
+    let method = &data.checked(method)?;
+    let projected = data.project(method)?;
     let by_order: Vec<Result<Vec<DiagramPole>>> =
         orders.par_iter().map(|order| poles(data, &projected, *order)).collect();
     let mut by_order = by_order.into_iter().collect::<Result<Vec<_>>>()?;
+    if method.uncertainty.method == UncertaintyMethod::Delta {
+        add_deviations(&mut by_order, data, method, orders)?;
+    }
     for k in 1..by_order.len() {
         let (lower, higher) = by_order.split_at_mut(k);
         higher[0].iter_mut().for_each(|pole| pole.standing = standing(pole, &lower[k - 1], options));
@@ -160,6 +165,20 @@ pub fn stabilisation(
     let mut poles: Vec<DiagramPole> = by_order.into_iter().flatten().collect();
     let clusters = cluster::find(&mut poles, orders, data.time, options);
     Ok(StabilisationDiagram { orders: orders.to_vec(), poles, clusters })
+}
+
+fn add_deviations(
+    by_order: &mut [Vec<DiagramPole>],
+    data: &SubspaceData<'_>,
+    method: &SubspaceOptions,
+    orders: &[usize],
+) -> Result<()> {
+    let poles: Vec<Vec<c64>> = by_order.iter().map(|poles| poles.iter().map(|p| p.pole).collect()).collect();
+    let deviations = pole_deviations(data, method, orders, &poles)?;
+    for (pole, [hz, zeta]) in by_order.iter_mut().flatten().zip(deviations.into_iter().flatten()) {
+        (pole.hz_deviation, pole.zeta_deviation) = (Some(hz), Some(zeta));
+    }
+    Ok(())
 }
 
 /// `|a' b|^2 / (|a|^2 |b|^2)`: 1 for equal mode shapes, 0 for orthogonal ones and where one is zero.

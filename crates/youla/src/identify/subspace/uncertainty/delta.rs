@@ -60,6 +60,20 @@ pub struct Delta {
     pub level: f64,
 }
 
+/// Covariance of a vector from its changes with each block, given the experiment of each.
+pub(super) fn covariance(changes: &[Vec<f64>], experiments: &[usize]) -> Mat<f64> {
+    let size = changes.first().map_or(0, Vec::len);
+    let mut sum = Mat::<f64>::zeros(size, size);
+    for (j, d) in changes.iter().enumerate() {
+        let next = changes.get(j + 1).filter(|_| experiments[j] == experiments[j + 1]);
+        for (r, c) in (0..size).flat_map(|r| (0..size).map(move |c| (r, c))) {
+            sum[(r, c)] += d[r] * d[c] + next.map_or(0.0, |next| 0.5 * (d[r] * next[c] + next[r] * d[c]));
+        }
+    }
+    let count = changes.len() as f64;
+    sum * Scale(count / (count - 1.0))
+}
+
 impl Delta {
     /// Degrees of freedom of a variance.
     pub fn degrees_of_freedom(&self) -> f64 {
@@ -78,16 +92,7 @@ impl Delta {
 
     /// Covariance of a vector from its changes, one row per block.
     pub fn covariance(&self, changes: &[Vec<f64>]) -> Mat<f64> {
-        let size = changes.first().map_or(0, Vec::len);
-        let mut sum = Mat::<f64>::zeros(size, size);
-        for (j, d) in changes.iter().enumerate() {
-            let next = changes.get(j + 1).filter(|_| self.blocks[j].experiment == self.blocks[j + 1].experiment);
-            for (r, c) in (0..size).flat_map(|r| (0..size).map(move |c| (r, c))) {
-                sum[(r, c)] += d[r] * d[c] + next.map_or(0.0, |next| 0.5 * (d[r] * next[c] + next[r] * d[c]));
-            }
-        }
-        let count = changes.len() as f64;
-        sum * Scale(count / (count - 1.0))
+        covariance(changes, &self.blocks.iter().map(|block| block.experiment).collect::<Vec<_>>())
     }
 
     /// The same for a system that is made from this one, for example `G(S)` from S; `map` must keep the coordinates of its

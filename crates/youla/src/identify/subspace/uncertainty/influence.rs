@@ -23,7 +23,7 @@ use rayon::prelude::*;
 
 /// Share by which the weight of a block is raised: the error of the difference quotient is of this size over the number of
 /// blocks, and rounding is magnified by its inverse.
-const STEP: f64 = 0.02;
+pub(super) const STEP: f64 = 0.02;
 
 /// The change of the predictor's matrices for twice the weight of a block, to first order.
 pub(super) struct PairChange {

@@ -9,6 +9,7 @@ mod evidence;
 mod influence;
 mod inputs;
 mod options;
+mod poles;
 mod response;
 mod student;
 #[cfg(test)]
@@ -19,6 +20,7 @@ pub use bootstrap::Bootstrap;
 pub use delta::{BlockInfluence, Delta};
 pub use evidence::Evidence;
 pub use options::{UncertaintyMethod, UncertaintyOptions};
+pub(super) use poles::pole_deviations;
 
 use super::channels::View;
 use super::innovation::{Innovation, NoInnovation};

@@ -71,7 +71,7 @@ impl Delta {
         let changes: Vec<Vec<f64>> = self
             .blocks
             .iter()
-            .map(|block| mode_change(&mode, eigen.change(mode.pole, &block.a), self.model.time()).to_vec())
+            .map(|block| mode_change(mode.pole, eigen.change(mode.pole, &block.a), self.model.time()).to_vec())
             .collect();
         let v = self.covariance(&changes);
         let [hz, zeta] = [v[(0, 0)].max(0.0).sqrt(), v[(1, 1)].max(0.0).sqrt()];
@@ -94,15 +94,15 @@ fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
 }
 
 /// Change of frequency and damping with the pole: `s = ln(z) / ts`.
-fn mode_change(mode: &Mode, dz: c64, time: Discrete) -> [f64; 2] {
-    let s = time.continuous_pole(mode.pole);
+pub(super) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
+    let s = time.continuous_pole(pole);
     let size = s.norm();
     if !size.is_finite() || size == 0.0 {
         return [0.0; 2];
     }
-    let ds = dz / mode.pole / time.ts();
+    let ds = dz / pole / time.ts();
     let along = (s.re * ds.re + s.im * ds.im) / size;
-    let dzeta = if mode.pole.im == 0.0 && mode.pole.re > 0.0 { 0.0 } else { (s.re * along / size - ds.re) / size };
+    let dzeta = if pole.im == 0.0 && pole.re > 0.0 { 0.0 } else { (s.re * along / size - ds.re) / size };
     [along / TAU, dzeta]
 }
 

@@ -189,3 +189,70 @@ fn refusals() {
         assert!(matches!(check(&options), Err(crate::Error::OutOfRange { .. })), "{text}");
     }
 }
+
+/// A delay shifts the influences with the response: they are those of the record that was shifted by hand.
+#[test]
+fn delays_turn_the_influences() {
+    let (u, y) = record(3000, 8);
+    let late = 3;
+    let y = Mat::from_fn(3000, 2, |k, i| if k < late { 0.0 } else { y[(k - late, i)] });
+    for weight in [Weight::Cva, Weight::PbsidOpt] {
+        let delayed = SubspaceOptions { delays: vec![late], ..options(weight) };
+        let delayed = identify(&[(u.as_ref(), y.as_ref())], &delayed);
+        let by_hand = (u.subrows(0, 3000 - late), y.subrows(late, 3000 - late));
+        let plain = identify(&[by_hand], &options(weight));
+        assert_eq!((delayed.model.order(), plain.model.order()), (5, 2));
+        for j in [0, 30, 59] {
+            let turned = changes(delta(&plain), j).into_iter().enumerate();
+            let turned = turned.map(|(k, d)| d * c64::from_polar(1.0, -OMEGA[k / 2] * late as f64));
+            let found = changes(delta(&delayed), j);
+            let miss = norm(turned.zip(&found).map(|(a, b)| a - *b)) / norm(found.iter().copied());
+            assert!(miss < 1e-9, "{weight:?}, block {j}: {miss:e}");
+        }
+    }
+}
+
+/// Lines of twenty times the noise that are known change the deviations by no more than their few degrees of freedom do.
+#[test]
+fn known_lines_leave_the_deviations_as_they_are() {
+    let (u, y) = record(4000, 9);
+    let time = Discrete::new(1.0).unwrap();
+    let w = lines(&[0.11, 0.22], 4000, time).unwrap();
+    let disturbed = &y + &w * Mat::from_fn(4, 2, |j, i| 6.0 - (j + 3 * i) as f64);
+    for weight in [Weight::Cva, Weight::PbsidOpt] {
+        let trace = |found: &SubspaceModel| -> f64 {
+            delta(found).response(&OMEGA).unwrap().covariance.iter().map(|v| v[0] + v[2]).sum()
+        };
+        let clean = identify(&[(u.as_ref(), y.as_ref())], &options(weight));
+        let experiment = [Experiment { u: u.as_ref(), y: disturbed.as_ref() }];
+        let data = SubspaceData::disturbed(&experiment, &[w.as_ref()], time, &options(weight)).unwrap();
+        let known = data.identify(&options(weight)).unwrap();
+        let ratio = trace(&known) / trace(&clean);
+        assert!((ratio - 1.0).abs() < 0.05, "{weight:?}: {ratio}");
+    }
+}
+
+/// The deviations in the stabilisation diagram at the order of the model are those of its modes, but for the step.
+#[test]
+fn the_diagram_knows_the_deviations_of_the_modes() {
+    let (u, y) = record(4000, 10);
+    for weight in [Weight::Moesp, Weight::Ssarx] {
+        let options = options(weight);
+        let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let data = SubspaceData::new(&experiment, Discrete::new(1.0).unwrap(), &options).unwrap();
+        let mode = delta(&data.identify(&options).unwrap()).modes().unwrap()[0];
+        let diagram = stabilisation::stabilisation(
+            &data,
+            &[1, 2, 3, 4],
+            &options,
+            &stabilisation::StabilisationOptions::default(),
+        )
+        .unwrap();
+        let pole = diagram.poles.iter().find(|p| p.order == 2).unwrap();
+        assert!((pole.hz / mode.mode.hz - 1.0).abs() < 1e-9);
+        for (one, other) in [(pole.hz_deviation, mode.hz_deviation), (pole.zeta_deviation, mode.zeta_deviation)] {
+            assert!((one.unwrap() / other - 1.0).abs() < 1e-3, "{weight:?}: {one:?} {other}");
+        }
+        assert!(diagram.clusters.iter().all(|cluster| cluster.hz_deviation.is_some()));
+    }
+}

@@ -92,7 +92,7 @@ fn beside_each_other(case: Case) -> Result<()> {
     let ours = found[..2].iter().filter_map(|all| median(all, 0)).fold(f64::INFINITY, f64::min);
     for ((name, _, _), all) in programs.iter().zip(&found) {
         match median(all, 0) {
-            None => println!("  {name:<32}         not there"),
+            None => println!("  {name:<32}{:>12}", "absent or failed"),
             Some(seconds) => {
                 let [fit, memory] = [1, 2].map(|k| median(all, k).unwrap_or(f64::NAN));
                 println!("  {name:<32}{:>12.2}{:>10.2}{fit:>10.3}{memory:>10.1}", 1e3 * seconds, seconds / ours);
@@ -121,20 +121,20 @@ fn programs(case: Case, folder: &Path, order: usize) -> Vec<Program> {
     let mut all = Vec::new();
     for threads in ["1", "2"] {
         let command = with("RAYON_NUM_THREADS", threads, words(format!("{ours} --one {folder} {s} {order}")));
-        all.push((format!("youla, {threads} threads"), ROUNDS, command));
+        all.push((format!("youla, threads: {threads}"), ROUNDS, command));
     }
     for threads in ["1", "2"] {
         for algorithm in ["C", "F"] {
             let command = words(format!("{python} {peers}/slicot.py {folder} {s} {order} {algorithm}"));
             let command = with("OPENBLAS_NUM_THREADS", threads, command);
-            all.push((format!("SLICOT, ctrlsys {algorithm}, {threads} threads"), ROUNDS, command));
+            all.push((format!("SLICOT, ctrlsys {algorithm}, threads: {threads}"), ROUNDS, command));
         }
     }
     let command =
         with("OPENBLAS_NUM_THREADS", "2", words(format!("{python} {peers}/slicot.py {folder} {s} {order} Q")));
-    all.push(("SLICOT, ctrlsys QR, 2 threads".into(), rounds, command));
+    all.push(("SLICOT, ctrlsys QR, threads: 2".into(), rounds, command));
     for (algorithm, name) in
-        [("C", "Octave, Cholesky, 2 threads"), ("F", "Octave, fast QR, 2 threads"), ("Q", "Octave, QR, 2 threads")]
+        [("C", "Octave, Cholesky, threads: 2"), ("F", "Octave, fast QR, threads: 2"), ("Q", "Octave, QR, threads: 2")]
     {
         let mut command = words(format!("{octave} {peers}/octave.m"));
         let settings = [("FOLDER", folder.to_string()), ("HORIZON", s.to_string()), ("ORDER", order.to_string())];
@@ -146,7 +146,7 @@ fn programs(case: Case, folder: &Path, order: usize) -> Vec<Program> {
     }
     if short || case.horizon == 20 && !case.large && case.samples == 100_000 {
         let command = words(format!("{python} {peers}/sippy.py {folder} {s} {order}"));
-        all.push(("SIPPY, 2 threads".into(), rounds, command));
+        all.push(("SIPPY, threads: 2".into(), rounds, command));
     }
     all
 }

@@ -91,7 +91,7 @@ impl DisturbanceSettings {
         found.map_err(|e| e.within("[data.disturbance]"))
     }
 
-    /// Each line in words, as the columns of [`Self::signals`] have them.
+    /// Each line in words, as the columns of the known signals stand.
     pub fn labels(&self) -> Vec<String> {
         match &self.tacho {
             None => self.frequencies_hz.iter().map(|hz| format!("{hz} Hz")).collect(),

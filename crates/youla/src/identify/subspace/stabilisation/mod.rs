@@ -6,7 +6,7 @@
 //! ```
 //! and settles at an order where the next lower one has a pole within 1 % in frequency and 5 % in damping whose shape
 //! has a modal assurance criterion `MAC = |a' b|^2 / (|a|^2 |b|^2)` above 0.95. Poles of the machine settle and stay; those
-//! that a model needs for noise move from order to order. What stays is collected by [`cluster`]: see there.
+//! that a model needs for noise move from order to order. What stays is collected by `cluster.rs`: see there.
 //!
 //! References: Peeters, Van der Auweraer, Guillaume, Leuridan, Shock and Vibration 11, 395 (2004), diagram; Allemang, Sound
 //! and Vibration 37(8), 14 (2003), MAC; Reynders, Houbrechts, De Roeck, Mech. Syst. Signal Process. 29, 228 (2012), distance

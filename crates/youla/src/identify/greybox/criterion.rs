@@ -8,6 +8,7 @@
 //! gradient of V is exactly `-R22' r2`, and `R22` is the Jacobian in Kaufman's approximation (L. Kaufman, BIT 15 (1975),
 //! 49), the one that belongs to the covariance of theta alone.
 
+use super::closure::{Closure, with_scaled_outputs, with_scaled_slopes};
 use super::sampled::{Coordinates, sampled_slopes};
 use super::sensitivity::{Samples, condense, sum_of_squares};
 use super::structure::Structure;
@@ -22,6 +23,10 @@ pub(super) struct Criterion<'a> {
     structure: &'a dyn Structure,
     experiments: Vec<Samples>,
     coordinates: Coordinates,
+    /// The controller around the model, where the loop is simulated.
+    closure: Option<Closure<'a>>,
+    /// Of the noise of each output that is compared.
+    deviations: Vec<f64>,
     time: Discrete,
     /// n where initial states are estimated, else 0.
     initial: usize,
@@ -40,6 +45,8 @@ pub(super) struct Point {
     pub(super) cost: f64,
     /// In the coordinates of the criterion.
     continuous: StateSpace<Continuous>,
+    plant: StateSpace<Discrete>,
+    /// What is simulated: the plant, or the loop around it, its outputs divided by the deviations.
     sampled: StateSpace<Discrete>,
     initial_states: Vec<Vec<f64>>,
 }
@@ -55,6 +62,7 @@ impl<'a> Criterion<'a> {
         start: &[f64],
         experiments: &[Experiment<'_>],
         time: Discrete,
+        closure: Option<Closure<'a>>,
         initial_state: InitialState,
         deviations: &[f64],
     ) -> Result<Self> {
@@ -63,12 +71,14 @@ impl<'a> Criterion<'a> {
         check_shape("the start vector of the parameters", theta, (parameters, 1))?;
         check_finite("the start vector of the parameters", theta)?;
         let model = structure.model(start)?;
-        let outputs = checked_deviations(deviations, model.outputs())?;
-        let initial = if initial_state == InitialState::Estimated { model.order() } else { 0 };
+        let deviations = checked_deviations(deviations, model.outputs())?;
+        let order = model.order() + closure.as_ref().map_or(0, Closure::order);
+        let inputs = closure.as_ref().map_or(model.inputs(), Closure::inputs);
+        let initial = if initial_state == InitialState::Estimated { order } else { 0 };
         let mut rows = 0;
         for (k, Experiment { u, y }) in experiments.iter().enumerate() {
             let named = |what: &str| format!("the {what} record of experiment {}", k + 1);
-            check_shape(&named("input"), *u, (u.nrows(), model.inputs()))?;
+            check_shape(&named("input"), *u, (u.nrows(), inputs))?;
             check_shape(&named("output"), *y, (u.nrows(), model.outputs()))?;
             check_finite(&named("input"), *u)?;
             check_finite(&named("output"), *y)?;
@@ -79,17 +89,30 @@ impl<'a> Criterion<'a> {
             let what = format!("the output records ({unknowns} unknowns)");
             return Err(Error::TooFewSamples { what, found: rows, needed: unknowns + 1 });
         }
-        let coordinates = Coordinates { states: model.state_scales()?, outputs };
-        let experiments: Vec<Samples> = experiments.iter().map(|e| interleave(e, &coordinates.outputs)).collect();
+        let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
+        let experiments: Vec<Samples> = experiments.iter().map(|e| interleave(e, &deviations)).collect();
         let energy = experiments.iter().flat_map(|e| &e.y).map(|y| y * y).sum();
         let degrees_of_freedom = rows - unknowns;
-        Ok(Criterion { structure, experiments, coordinates, time, initial, parameters, degrees_of_freedom, energy })
+        Ok(Criterion {
+            structure,
+            experiments,
+            coordinates,
+            closure,
+            deviations,
+            time,
+            initial,
+            parameters,
+            degrees_of_freedom,
+            energy,
+        })
     }
 
     /// The value of the criterion, with the best initial states.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
         let continuous = self.coordinates.apply(&self.structure.model(theta)?)?;
-        let sampled = continuous.zoh(self.time)?;
+        let plant = continuous.zoh(self.time)?;
+        let closed = self.closure.as_ref().map(|closure| closure.close(&plant)).transpose()?;
+        let sampled = with_scaled_outputs(closed.as_ref().unwrap_or(&plant), &self.deviations)?;
         let mut initial_states = Vec::with_capacity(self.experiments.len());
         let mut sum = 0.0;
         for samples in &self.experiments {
@@ -106,12 +129,17 @@ impl<'a> Criterion<'a> {
                 sum += left * left;
             }
         }
-        Ok(Point { theta: theta.to_vec(), cost: 0.5 * sum, continuous, sampled, initial_states })
+        Ok(Point { theta: theta.to_vec(), cost: 0.5 * sum, continuous, plant, sampled, initial_states })
     }
 
     /// Residual and Jacobian at a point.
     pub(super) fn linearise(&self, point: &Point) -> Result<Linearisation> {
         let slopes = sampled_slopes(self.structure, &point.theta, &point.continuous, &self.coordinates, self.time)?;
+        let slopes = match &self.closure {
+            Some(closure) => closure.slopes(&point.plant, slopes),
+            None => slopes,
+        };
+        let slopes = with_scaled_slopes(slopes, &self.deviations);
         let mut whole = Triangle::new(self.parameters + 1, self.initial + self.parameters + 1);
         for (samples, x0) in self.experiments.iter().zip(&point.initial_states) {
             let factor = condense(samples, &point.sampled, &slopes, x0, self.initial)?;
@@ -121,10 +149,15 @@ impl<'a> Criterion<'a> {
         Ok(Linearisation { factor: whole.r().to_owned() })
     }
 
-    /// The initial states of a point in the coordinates of the structure.
+    /// The initial states of a point in the coordinates of the structure, those of a controller behind them.
     pub(super) fn initial_states(&self, point: &Point) -> Vec<Vec<f64>> {
-        let scales = &self.coordinates.states;
-        point.initial_states.iter().map(|x0| x0.iter().zip(scales).map(|(z, t)| z * t).collect()).collect()
+        let scales = || self.coordinates.states.iter().copied().chain(std::iter::repeat(1.0));
+        point.initial_states.iter().map(|x0| x0.iter().zip(scales()).map(|(z, t)| z * t).collect()).collect()
+    }
+
+    /// What is simulated with a sampled model, in the units of the data.
+    pub(super) fn simulated(&self, model: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+        self.closure.as_ref().map_or_else(|| Ok(model.clone()), |closure| closure.close(model))
     }
 }
 

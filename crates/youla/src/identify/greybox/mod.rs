@@ -15,6 +15,7 @@
 //! Levenberg-Marquardt (`levenberg.rs`), the covariance (`uncertainty.rs`).
 
 mod bearing;
+mod closure;
 mod criterion;
 mod levenberg;
 mod narrow;
@@ -26,11 +27,13 @@ mod tests;
 mod uncertainty;
 
 pub use bearing::BearingStructure;
+pub use closure::LoopOutput;
 pub use structure::{Matrix, Slope, Structure};
 
 use super::subspace::{Experiment, InitialState};
-use crate::lti::{Continuous, Discrete, StateSpace, simulate};
+use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
 use crate::{Error, Result};
+use closure::Closure;
 use criterion::Criterion;
 use faer::{Mat, Scale};
 use levenberg::minimise;
@@ -172,9 +175,53 @@ pub fn greybox(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
+    estimate(structure, start, experiments, time, None, options)
+}
+
+/// The same through the loop: the model is simulated under the controller that ran, from the external signal w alone, and
+/// compared with y, or with beta. Needs no stable plant, only a loop that is stable with the start model and does not let the
+/// model's own instability into the residual; a trial point with an unstable loop that diverges is rejected.
+///
+/// `controller` is `J_K` from `(y, w)` to `(u, beta)`, for example [`crate::factor::CoprimeFactors::j_k`] with `w = alpha`, or a
+/// plain controller [`crate::control::with_input_port`]; the inputs of the experiments are w. Initial states are those of the
+/// plant, then those of the controller; [`GreyBoxModel::fit`] is that of the simulated loop.
+///
+/// White output noise passes the loop, so that the residuals are coloured: the estimate is consistent whatever the noise,
+/// because w does not depend on it, but the covariance is that of white residuals and too optimistic or pessimistic by their
+/// colour. For a stable plant [`greybox`] on (u, y) is efficient.
+///
+/// # Errors
+/// As [`greybox`]; [`Error::Ports`] where the controller does not fit, [`Error::OutOfRange`] for a structure with a direct path.
+pub fn greybox_in_loop(
+    structure: &dyn Structure,
+    start: &[f64],
+    controller: &Partitioned<Discrete>,
+    output: LoopOutput,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    options: &GreyBoxOptions,
+) -> Result<GreyBoxModel> {
+    estimate(structure, start, experiments, time, Some(Closure::new(controller, output)), options)
+}
+
+fn estimate(
+    structure: &dyn Structure,
+    start: &[f64],
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    closure: Option<Closure<'_>>,
+    options: &GreyBoxOptions,
+) -> Result<GreyBoxModel> {
     check(options)?;
-    let criterion =
-        Criterion::new(structure, start, experiments, time, options.initial_state, &options.output_deviations)?;
+    let criterion = Criterion::new(
+        structure,
+        start,
+        experiments,
+        time,
+        closure,
+        options.initial_state,
+        &options.output_deviations,
+    )?;
     let outcome = minimise(&criterion, start, options)?;
     let information = Information::new(&outcome.linearisation);
     let point = &outcome.point;
@@ -182,7 +229,7 @@ pub fn greybox(
     let continuous = structure.model(&point.theta)?;
     let model = continuous.zoh(time)?;
     let initial_states = criterion.initial_states(point);
-    let outputs = outputs(experiments, &model, &initial_states)?;
+    let outputs = outputs(experiments, &criterion.simulated(&model)?, &initial_states)?;
     Ok(GreyBoxModel {
         covariance: information.inverse.map(|inverse| Scale(variance) * inverse),
         stable: model.is_stable()?,

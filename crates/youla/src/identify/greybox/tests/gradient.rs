@@ -16,7 +16,7 @@ fn difference(value: impl Fn(f64) -> f64, at: f64, h: f64) -> f64 {
     (8.0 * pair(1.0) - pair(2.0)) / (12.0 * h)
 }
 
-fn gradient_error(structure: &dyn Structure, theta: &[f64], criterion: &Criterion<'_>, h: f64) -> f64 {
+pub(super) fn gradient_error(structure: &dyn Structure, theta: &[f64], criterion: &Criterion<'_>, h: f64) -> f64 {
     let here = criterion.linearise(&criterion.evaluate(theta).unwrap()).unwrap();
     let gradient = here.jacobian().transpose() * here.residual();
     let error = |j: usize| {
@@ -37,7 +37,8 @@ fn gradient_is_that_of_the_criterion() {
     let theta = off(&truth(), 0.1, 2);
     for initial in [InitialState::Zero, InitialState::Estimated] {
         let experiments = [data.experiment(), data.experiment()];
-        let criterion = Criterion::new(&BearingStructure, &theta, &experiments, time(), initial, &[0.5, 2.0]).unwrap();
+        let criterion =
+            Criterion::new(&BearingStructure, &theta, &experiments, time(), None, initial, &[0.5, 2.0]).unwrap();
         let point = criterion.evaluate(&theta).unwrap();
         let here = criterion.linearise(&point).unwrap();
         assert!((0.5 * here.residual().squared_norm_l2() / point.cost - 1.0).abs() < 1e-11);
@@ -78,7 +79,8 @@ fn every_matrix_may_move() {
     let theta = [1.3, 0.7, -0.4, 0.2, 0.9];
     let experiment = super::super::Experiment { u: u.as_ref(), y: y.as_ref() };
     let time = crate::lti::Discrete::new(0.2).unwrap();
-    let criterion = Criterion::new(&Everything, &theta, &[experiment], time, InitialState::Estimated, &[]).unwrap();
+    let criterion =
+        Criterion::new(&Everything, &theta, &[experiment], time, None, InitialState::Estimated, &[]).unwrap();
     let error = gradient_error(&Everything, &theta, &criterion, 1e-3);
     assert!(error < 1e-9, "{error:.1e}");
 }

@@ -1,3 +1,4 @@
+mod closure;
 mod estimates;
 mod gradient;
 mod limits;

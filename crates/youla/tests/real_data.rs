@@ -11,7 +11,7 @@ use youla::run::{
 
 /// The example's settings file, if its data are there.
 fn example(name: &str, data: &str) -> Option<PathBuf> {
-    let root = Path::new("/tmp/lay/proj").to_owned();
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     if root.join("../shared/data").join(data).is_dir() {
         return Some(root.join("examples").join(name).join("run.toml"));
     }

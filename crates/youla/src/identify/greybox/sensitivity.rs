@@ -11,14 +11,14 @@
 
 use super::narrow::NarrowTriangle;
 use super::sampled::SampledSlope;
-use crate::lti::{Discrete, Simulator, StateSpace};
+use crate::lti::{Discrete, SimulationState, Simulator, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 
 /// Columns that are advanced together.
 const LANES: usize = 8;
-/// Samples folded in at a time; small enough to stay in the cache.
-const PIECE: usize = 128;
+/// Samples folded in at a time, while the next ones are computed; small enough to stay in the cache.
+const PIECE: usize = 256;
 /// Sensitivities below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
 
@@ -43,34 +43,70 @@ pub(super) fn condense(
     x0: &[f64],
     initial: usize,
 ) -> Result<Mat<f64>> {
-    let (n, m, p) = (system.order(), system.inputs(), system.outputs());
-    let columns = initial + slopes.len();
-    let simulator = Simulator::new(system);
-    let mut state = simulator.start(x0)?;
-    let mut bank = Bank::new(system, slopes, initial);
-    let mut triangle = NarrowTriangle::new(columns + 1);
-    let mut piece = vec![0.0; PIECE * p * (columns + 1)];
-    let mut signals = vec![0.0; n + m];
-    for first in (0..samples.count).step_by(PIECE) {
-        let count = PIECE.min(samples.count - first);
+    let mut rows = Rows::new(samples, system, slopes, x0, initial)?;
+    let mut triangle = NarrowTriangle::new(rows.columns + 1);
+    let (mut now, mut next) = (Vec::new(), Vec::new());
+    let mut count = rows.fill(&mut now)?;
+    while count > 0 {
+        let (filled, ()) = rayon::join(|| rows.fill(&mut next), || triangle.fold(&mut now, count));
+        count = filled?;
+        std::mem::swap(&mut now, &mut next);
+    }
+    Ok(triangle.into_factor())
+}
+
+/// The rows `[y_0 y_theta e]`, piece by piece.
+struct Rows<'a> {
+    samples: &'a Samples,
+    system: &'a StateSpace<Discrete>,
+    simulator: Simulator,
+    state: SimulationState,
+    bank: Bank,
+    /// Without that of e.
+    columns: usize,
+    signals: Vec<f64>,
+    next: usize,
+}
+
+impl<'a> Rows<'a> {
+    fn new(
+        samples: &'a Samples,
+        system: &'a StateSpace<Discrete>,
+        slopes: &[SampledSlope],
+        x0: &[f64],
+        initial: usize,
+    ) -> Result<Self> {
+        let simulator = Simulator::new(system);
+        let state = simulator.start(x0)?;
+        let (bank, columns) = (Bank::new(system, slopes, initial), initial + slopes.len());
+        let signals = vec![0.0; system.order() + system.inputs()];
+        Ok(Rows { samples, system, simulator, state, bank, columns, signals, next: 0 })
+    }
+
+    /// Writes the rows of the next samples, column by column; returns how many, 0 at the end.
+    fn fill(&mut self, piece: &mut Vec<f64>) -> Result<usize> {
+        let (n, m, p) = (self.system.order(), self.system.inputs(), self.system.outputs());
+        let (first, columns) = (self.next, self.columns);
+        let count = PIECE.min(self.samples.count - first);
         let rows = count * p;
+        piece.resize(rows * (columns + 1), 0.0);
         for k in 0..count {
-            let u = &samples.u[(first + k) * m..][..m];
-            let y = &samples.y[(first + k) * p..][..p];
-            signals[..n].copy_from_slice(state.x());
-            signals[n..].copy_from_slice(u);
-            bank.step(&signals, |i, column, value| piece[column * rows + k * p + i] = value);
-            for (i, (y, model)) in y.iter().zip(simulator.step(&mut state, u)).enumerate() {
+            let u = &self.samples.u[(first + k) * m..][..m];
+            let y = &self.samples.y[(first + k) * p..][..p];
+            self.signals[..n].copy_from_slice(self.state.x());
+            self.signals[n..].copy_from_slice(u);
+            self.bank.step(&self.signals, |i, column, value| piece[column * rows + k * p + i] = value);
+            for (i, (y, model)) in y.iter().zip(self.simulator.step(&mut self.state, u)).enumerate() {
                 piece[columns * rows + k * p + i] = y - model;
             }
         }
-        if !piece[..rows * (columns + 1)].iter().fold(0.0, |sum, v| sum + v * v).is_finite() {
-            return Err(diverged(first + 1, system));
+        if !piece.iter().fold(0.0, |sum, v| sum + v * v).is_finite() {
+            return Err(diverged(first + 1, self.system));
         }
-        bank.forget_the_vanished();
-        triangle.fold(&mut piece[..rows * (columns + 1)], rows);
+        self.bank.forget_the_vanished();
+        self.next += count;
+        Ok(rows)
     }
-    Ok(triangle.into_factor())
 }
 
 /// The sum of squares of the residual of the model started from rest.

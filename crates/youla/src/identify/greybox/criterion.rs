@@ -31,6 +31,8 @@ pub(super) struct Criterion<'a> {
     pub(super) degrees_of_freedom: usize,
     /// Sum of squares of the scaled outputs.
     pub(super) energy: f64,
+    /// Typical sizes of the parameters.
+    pub(super) scales: Vec<f64>,
 }
 
 /// The criterion at one parameter vector.
@@ -45,6 +47,7 @@ pub(super) struct Point {
 }
 
 /// The linearised criterion `1/2 |r - J step|^2` as the triangular factor of `[J r]`.
+#[derive(Clone)]
 pub(super) struct Linearisation {
     factor: Mat<f64>,
 }
@@ -62,6 +65,7 @@ impl<'a> Criterion<'a> {
         let theta = MatRef::from_column_major_slice(start, start.len(), 1);
         check_shape("the start vector of the parameters", theta, (parameters, 1))?;
         check_finite("the start vector of the parameters", theta)?;
+        let scales = checked_scales(structure.scales(), parameters)?;
         let model = structure.model(start)?;
         let outputs = checked_deviations(deviations, model.outputs())?;
         let initial = if initial_state == InitialState::Estimated { model.order() } else { 0 };
@@ -83,7 +87,17 @@ impl<'a> Criterion<'a> {
         let experiments: Vec<Samples> = experiments.iter().map(|e| interleave(e, &coordinates.outputs)).collect();
         let energy = experiments.iter().flat_map(|e| &e.y).map(|y| y * y).sum();
         let degrees_of_freedom = rows - unknowns;
-        Ok(Criterion { structure, experiments, coordinates, time, initial, parameters, degrees_of_freedom, energy })
+        Ok(Criterion {
+            structure,
+            experiments,
+            coordinates,
+            time,
+            initial,
+            parameters,
+            degrees_of_freedom,
+            energy,
+            scales,
+        })
     }
 
     /// The value of the criterion, with the best initial states.
@@ -143,6 +157,18 @@ impl Linearisation {
         self.factor.ncols() - 1
     }
 
+    /// The same where only these parameters move.
+    pub(super) fn along(&self, parameters: &[usize]) -> Linearisation {
+        let (rows, count) = (self.factor.nrows(), parameters.len());
+        if count == self.parameters() {
+            return self.clone();
+        }
+        let column = |j: usize| parameters.get(j).copied().unwrap_or(self.parameters());
+        let mut whole = Triangle::new(count + 1, rows);
+        whole.fold_rows(Mat::from_fn(rows, count + 1, |i, j| self.factor[(i, column(j))]).as_ref());
+        Linearisation { factor: whole.r().to_owned() }
+    }
+
     /// Length of the part of r that J can remove, over the length of the rest, each by its degrees of freedom: the
     /// distance to the minimum in units of the radius of the confidence region.
     pub(super) fn relative_offset(&self, degrees_of_freedom: usize) -> f64 {
@@ -151,6 +177,21 @@ impl Linearisation {
         let per_freedom = |r: MatRef<'_, f64>, freedom: usize| r.norm_l2() / (freedom.max(1) as f64).sqrt();
         let (offset, radius) = (per_freedom(removable, rank), per_freedom(rest, degrees_of_freedom));
         if offset == 0.0 { 0.0 } else { offset / radius }
+    }
+}
+
+/// One positive size for each parameter.
+fn checked_scales(scales: Vec<f64>, parameters: usize) -> Result<Vec<f64>> {
+    if scales.len() != parameters {
+        let what = "the number of typical sizes of the structure".into();
+        return Err(Error::Ports { what, expected: parameters, found: scales.len() });
+    }
+    match scales.iter().find(|size| !(**size > 0.0 && size.is_finite())) {
+        Some(bad) => {
+            let what = "a typical size of a parameter".into();
+            Err(Error::OutOfRange { what, value: *bad, must: "a positive number" })
+        }
+        None => Ok(scales),
     }
 }
 

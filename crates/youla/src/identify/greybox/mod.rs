@@ -12,10 +12,14 @@
 //!
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
 //! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
-//! Levenberg-Marquardt (`levenberg.rs`), the covariance (`uncertainty.rs`).
+//! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
+//! data do not determine (`identifiability.rs`). Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bearing;
+mod bounds;
 mod criterion;
+mod declared;
+mod identifiability;
 mod levenberg;
 mod narrow;
 mod sampled;
@@ -26,16 +30,22 @@ mod tests;
 mod uncertainty;
 
 pub use bearing::BearingStructure;
+pub use bounds::{AtBound, Side};
+pub use declared::{
+    Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
+};
+pub use identifiability::{Combination, Part, Undetermined};
 pub use structure::{Matrix, Slope, Structure};
 
 use super::subspace::{Experiment, InitialState};
 use crate::lti::{Continuous, Discrete, StateSpace, simulate};
 use crate::{Error, Result};
+use bounds::Bounds;
 use criterion::Criterion;
 use faer::{Mat, Scale};
 use levenberg::minimise;
 use serde::{Deserialize, Serialize};
-use uncertainty::Information;
+use uncertainty::{Information, spread};
 
 /// Choices of [`greybox`].
 ///
@@ -95,7 +105,8 @@ pub enum Stop {
 pub struct GreyBoxModel {
     /// Estimated parameters, in the order of [`Structure::names`].
     pub parameters: Vec<f64>,
-    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all.
+    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
+    /// bound holds back count as known: their rows and columns are zero.
     pub covariance: Option<Mat<f64>>,
     /// The continuous-time model.
     pub continuous: StateSpace<Continuous>,
@@ -125,6 +136,10 @@ pub struct GreyBoxModel {
     pub rank: usize,
     /// Reciprocal condition number of that Jacobian.
     pub rcond: f64,
+    /// Which parameters those are that the data do not determine.
+    pub undetermined: Undetermined,
+    /// Parameters that ended at a bound.
+    pub at_bounds: Vec<AtBound>,
 }
 
 impl GreyBoxModel {
@@ -138,12 +153,12 @@ impl GreyBoxModel {
 
 /// Estimates the parameters of a structure from one or more experiments by the output-error method.
 ///
-/// The criterion is minimised by Levenberg-Marquardt from `start`. A trial point whose simulation is not finite is rejected
-/// and counted. Nothing keeps the parameters in a range; an unstable result is returned and marked.
+/// The criterion is minimised by Levenberg-Marquardt from `start`, within the bounds of the structure where it has any. A
+/// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
 ///
 /// # Errors
 /// [`Error::Shape`], [`Error::NotFinite`], [`Error::Ports`], [`Error::OutOfRange`] for data, start or options that do not
-/// fit; [`Error::TooFewSamples`]; [`Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
+/// fit; [`Error::EmptyBounds`], [`Error::OutsideBounds`]; [`Error::TooFewSamples`]; [`Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
 /// errors of the structure at `start`.
 ///
 /// # Accuracy
@@ -173,18 +188,29 @@ pub fn greybox(
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
     check(options)?;
+    if structure.names().is_empty() {
+        let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
+        return Err(Error::OutOfRange { what, value: 0.0, must });
+    }
     let criterion =
         Criterion::new(structure, start, experiments, time, options.initial_state, &options.output_deviations)?;
-    let outcome = minimise(&criterion, start, options)?;
-    let information = Information::new(&outcome.linearisation);
+    let bounds = Bounds::new(structure, start)?;
+    let outcome = minimise(&criterion, &bounds, start, options)?;
     let point = &outcome.point;
+    let names = structure.names();
+    let sizes: Vec<f64> =
+        point.theta.iter().zip(&criterion.scales).map(|(v, scale)| if *v == 0.0 { *scale } else { v.abs() }).collect();
+    let information = Information::new(&outcome.linearisation, &sizes, criterion.energy.sqrt());
+    let free = &outcome.face.free;
+    let free_sizes: Vec<f64> = free.iter().map(|j| sizes[*j]).collect();
+    let inverse = Information::new(&outcome.face.here, &free_sizes, criterion.energy.sqrt()).inverse;
     let variance = 2.0 * point.cost / criterion.degrees_of_freedom as f64;
     let continuous = structure.model(&point.theta)?;
     let model = continuous.zoh(time)?;
     let initial_states = criterion.initial_states(point);
     let outputs = outputs(experiments, &model, &initial_states)?;
     Ok(GreyBoxModel {
-        covariance: information.inverse.map(|inverse| Scale(variance) * inverse),
+        covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
         stable: model.is_stable()?,
         continuous,
         model,
@@ -193,12 +219,14 @@ pub fn greybox(
         fit: outputs.iter().map(|o| o.fit).collect(),
         residual: outputs.iter().map(|o| o.residual).collect(),
         stop: outcome.stop,
-        relative_offset: outcome.linearisation.relative_offset(criterion.degrees_of_freedom),
+        relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
         iterations: outcome.work.iterations,
         evaluations: outcome.work.evaluations,
         diverged: outcome.work.diverged,
         rank: information.rank,
         rcond: information.rcond,
+        undetermined: information.undetermined(&names, &sizes),
+        at_bounds: bounds.touched(&point.theta),
         parameters: outcome.point.theta,
     })
 }

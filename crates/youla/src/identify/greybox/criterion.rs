@@ -9,7 +9,7 @@
 //! 49), the one that belongs to the covariance of theta alone.
 
 use super::sampled::{Coordinates, sampled_slopes};
-use super::sensitivity::{Samples, condense, sum_of_squares};
+use super::sensitivity::{Samples, condense, residuals, sum_of_squares};
 use super::structure::Structure;
 use crate::identify::subspace::{Experiment, InitialState};
 use crate::linalg::{Triangle, check_finite, check_shape, leading_rank, least_squares};
@@ -135,6 +135,28 @@ impl<'a> Criterion<'a> {
         Ok(Linearisation { factor: whole.r().to_owned() })
     }
 
+    /// The residuals of each experiment, sample after sample, divided by the deviations of the outputs, without weights.
+    pub(super) fn residuals(&self, point: &Point) -> Result<Vec<Vec<f64>>> {
+        let pairs = self.experiments.iter().zip(&point.initial_states);
+        pairs.map(|(samples, x0)| residuals(samples, &point.sampled, x0)).collect()
+    }
+
+    /// Takes square roots of weights, in the order of the residuals; none for weights of 1.
+    pub(super) fn reweigh(&mut self, roots: Vec<Vec<f64>>) {
+        let mut roots = roots.into_iter();
+        self.experiments.iter_mut().for_each(|samples| samples.roots = roots.next().unwrap_or_default());
+    }
+
+    /// Number of outputs p.
+    pub(super) fn outputs(&self) -> usize {
+        self.coordinates.outputs.len()
+    }
+
+    /// One number per output, back in its units.
+    pub(super) fn in_units_of_outputs(&self, scaled: &[f64]) -> Vec<f64> {
+        scaled.iter().zip(&self.coordinates.outputs).map(|(value, deviation)| value * deviation).collect()
+    }
+
     /// The initial states of a point in the coordinates of the structure.
     pub(super) fn initial_states(&self, point: &Point) -> Vec<Vec<f64>> {
         let scales = &self.coordinates.states;
@@ -216,5 +238,5 @@ fn interleave(experiment: &Experiment<'_>, deviations: &[f64]) -> Samples {
     let Experiment { u, y } = experiment;
     let u: Vec<f64> = u.row_iter().flat_map(|row| row.iter().copied()).collect();
     let y = y.row_iter().flat_map(|row| row.iter().zip(deviations).map(|(y, d)| y / d)).collect();
-    Samples { u, y, count: experiment.u.nrows() }
+    Samples { u, y, count: experiment.u.nrows(), roots: Vec::new() }
 }

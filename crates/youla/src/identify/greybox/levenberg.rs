@@ -38,6 +38,17 @@ pub(super) struct Work {
     pub(super) diverged: usize,
 }
 
+impl Work {
+    /// Both together.
+    pub(super) fn and(&self, more: &Work) -> Work {
+        Work {
+            iterations: self.iterations + more.iterations,
+            evaluations: self.evaluations + more.evaluations,
+            diverged: self.diverged + more.diverged,
+        }
+    }
+}
+
 /// The parameters that no bound holds back, and the linearised criterion where only they move.
 pub(super) struct Face {
     pub(super) free: Vec<usize>,

@@ -13,15 +13,18 @@
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
 //! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
 //! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
-//! data do not determine (`identifiability.rs`). Structures are programmed (`structure.rs`) or declared (`declared/`).
+//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
+//! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bearing;
 mod bounds;
 mod criterion;
 mod declared;
+mod delays;
 mod identifiability;
 mod levenberg;
 mod narrow;
+mod robust;
 mod sampled;
 mod sensitivity;
 mod structure;
@@ -35,6 +38,7 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
 use super::subspace::{Experiment, InitialState};
@@ -42,8 +46,10 @@ use crate::lti::{Continuous, Discrete, StateSpace, simulate};
 use crate::{Error, Result};
 use bounds::Bounds;
 use criterion::Criterion;
+use delays::Shifted;
 use faer::{Mat, Scale};
 use levenberg::minimise;
+use robust::reweighted;
 use serde::{Deserialize, Serialize};
 use uncertainty::{Information, spread};
 
@@ -71,6 +77,10 @@ pub struct GreyBoxOptions {
     pub initial_state: InitialState,
     /// Standard deviation of the noise of each output, of which only the ratios count; empty where all are equal.
     pub output_deviations: Vec<f64>,
+    /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
+    pub delays: Vec<usize>,
+    /// How residuals count.
+    pub loss: Loss,
 }
 
 impl Default for GreyBoxOptions {
@@ -82,6 +92,8 @@ impl Default for GreyBoxOptions {
             damping: 1e-3,
             initial_state: InitialState::default(),
             output_deviations: Vec::new(),
+            delays: Vec::new(),
+            loss: Loss::default(),
         }
     }
 }
@@ -108,15 +120,17 @@ pub struct GreyBoxModel {
     /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
     /// bound holds back count as known: their rows and columns are zero.
     pub covariance: Option<Mat<f64>>,
-    /// The continuous-time model.
+    /// The continuous-time model, without delays.
     pub continuous: StateSpace<Continuous>,
-    /// The same behind a zero-order hold.
+    /// The same behind a zero-order hold, with the delays of the inputs as further states behind its own.
     pub model: StateSpace<Discrete>,
     /// Whether it is stable.
     pub stable: bool,
-    /// State at the first sample of each experiment, n numbers each.
+    /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
+    /// and those of the delays each.
     pub initial_states: Vec<Vec<f64>>,
-    /// Half the sum of squares of the residuals, each divided by the deviation of its output.
+    /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
+    /// loss of Huber.
     pub cost: f64,
     /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26).
     pub fit: Vec<f64>,
@@ -140,6 +154,8 @@ pub struct GreyBoxModel {
     pub undetermined: Undetermined,
     /// Parameters that ended at a bound.
     pub at_bounds: Vec<AtBound>,
+    /// Weights of the residuals, `None` where all count by their square.
+    pub robust: Option<RobustReport>,
 }
 
 impl GreyBoxModel {
@@ -192,10 +208,20 @@ pub fn greybox(
         let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
         return Err(Error::OutOfRange { what, value: 0.0, must });
     }
-    let criterion =
+    let shifted = Shifted::new(experiments, &options.delays)?;
+    let experiments = &shifted.experiments();
+    let mut criterion =
         Criterion::new(structure, start, experiments, time, options.initial_state, &options.output_deviations)?;
     let bounds = Bounds::new(structure, start)?;
-    let outcome = minimise(&criterion, &bounds, start, options)?;
+    let mut outcome = minimise(&criterion, &bounds, start, options)?;
+    let mut variance = 2.0 * outcome.point.cost / criterion.degrees_of_freedom as f64;
+    let mut unweighted = outcome.face.here.clone();
+    let mut report = None;
+    if options.loss == Loss::Huber {
+        let robust = reweighted(&mut criterion, &bounds, options, outcome)?;
+        (outcome, variance, report) = (robust.outcome, robust.variance, Some(robust.report));
+        unweighted = criterion.linearise(&outcome.point)?.along(&outcome.face.free);
+    }
     let point = &outcome.point;
     let names = structure.names();
     let sizes: Vec<f64> =
@@ -203,8 +229,7 @@ pub fn greybox(
     let information = Information::new(&outcome.linearisation, &sizes, criterion.energy.sqrt());
     let free = &outcome.face.free;
     let free_sizes: Vec<f64> = free.iter().map(|j| sizes[*j]).collect();
-    let inverse = Information::new(&outcome.face.here, &free_sizes, criterion.energy.sqrt()).inverse;
-    let variance = 2.0 * point.cost / criterion.degrees_of_freedom as f64;
+    let inverse = Information::new(&unweighted, &free_sizes, criterion.energy.sqrt()).inverse;
     let continuous = structure.model(&point.theta)?;
     let model = continuous.zoh(time)?;
     let initial_states = criterion.initial_states(point);
@@ -213,8 +238,8 @@ pub fn greybox(
         covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
         stable: model.is_stable()?,
         continuous,
-        model,
-        initial_states,
+        model: shifted.delays.put_before(model)?,
+        initial_states: shifted.initial_states(initial_states),
         cost: point.cost,
         fit: outputs.iter().map(|o| o.fit).collect(),
         residual: outputs.iter().map(|o| o.residual).collect(),
@@ -227,6 +252,7 @@ pub fn greybox(
         rcond: information.rcond,
         undetermined: information.undetermined(&names, &sizes),
         at_bounds: bounds.touched(&point.theta),
+        robust: report,
         parameters: outcome.point.theta,
     })
 }

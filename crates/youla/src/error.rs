@@ -556,6 +556,103 @@ pub enum Error {
         "the bootstrap keeps the inputs as they are, which measurements from a closed loop do not allow; take method = \"delta\""
     )]
     BootstrapOfClosedLoop,
+    // ---- grey-box structures -----------------------------------------------------------------------------------
+    /// A structure lacks a matrix.
+    #[error("the structure has no matrix {matrix}; give a, b and c, or a template")]
+    MissingMatrix {
+        /// The matrix.
+        matrix: &'static str,
+    },
+    /// A text is not an expression.
+    #[error("{place} is {text:?}: {problem} (character {column})")]
+    Expression {
+        /// Matrix, row and column, or the derived quantity.
+        place: String,
+        /// The text.
+        text: String,
+        /// The character, counted from 1.
+        column: usize,
+        /// What is wrong there.
+        problem: String,
+    },
+    /// An expression uses a name that is not declared.
+    #[error("{place} is {text:?}, but {name:?} is not declared{}; declared: {}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default(), Names(known))]
+    UnknownName {
+        /// Matrix, row and column, or the derived quantity.
+        place: String,
+        /// The expression.
+        text: String,
+        /// The name.
+        name: String,
+        /// The names there are.
+        known: Vec<String>,
+        /// The most similar of them, where one is similar.
+        nearest: Option<String>,
+    },
+    /// A name that cannot be used.
+    #[error("the name {name:?} {problem}")]
+    BadName {
+        /// The name.
+        name: String,
+        /// What is wrong with it.
+        problem: &'static str,
+    },
+    /// Derived quantities that stand on each other in a circle.
+    #[error("these derived quantities need each other in a circle, or one that does: {}", Names(names))]
+    CircularDefinition {
+        /// Their names.
+        names: Vec<String>,
+    },
+    /// A parameter without an initial value.
+    #[error("the parameter {name:?} has no initial value")]
+    NoInitialValue {
+        /// The parameter.
+        name: String,
+    },
+    /// Bounds that leave no room.
+    #[error(
+        "the parameter {name:?} has the bounds {min} and {max}, but the lower one must be below the upper one; a known parameter is fixed instead"
+    )]
+    EmptyBounds {
+        /// The parameter.
+        name: String,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// A parameter starts outside of its bounds.
+    #[error("the parameter {name:?} starts at {value}, but must lie from {min} to {max}")]
+    OutsideBounds {
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// Lower bound.
+        min: f64,
+        /// Upper bound.
+        max: f64,
+    },
+    /// A parameter that moves nothing.
+    #[error("no entry of a, b, c and d depends on the parameter {name:?}{}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default())]
+    UnusedParameter {
+        /// The parameter.
+        name: String,
+        /// The most similar parameter that moves something, where one is similar.
+        nearest: Option<String>,
+    },
+    /// An entry or derived quantity is not finite.
+    #[error("{place} is {text:?}, {} {value}, which is not finite", match parameter { Some(name) => format!("whose derivative with respect to {name:?} is"), None => "whose value is".into() })]
+    EntryNotFinite {
+        /// Matrix, row and column, or the derived quantity.
+        place: String,
+        /// The expression.
+        text: String,
+        /// The value or derivative.
+        value: f64,
+        /// The parameter of the derivative, `None` for the value itself.
+        parameter: Option<String>,
+    },
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]

@@ -10,7 +10,7 @@
 
 use super::closure::{Closure, with_scaled_outputs, with_scaled_slopes};
 use super::sampled::{Coordinates, sampled_slopes};
-use super::sensitivity::{Samples, condense, sum_of_squares};
+use super::sensitivity::{Samples, condense, residuals, sum_of_squares};
 use super::structure::Structure;
 use crate::identify::subspace::{Experiment, InitialState};
 use crate::linalg::{Triangle, check_finite, check_shape, leading_rank, least_squares};
@@ -36,6 +36,8 @@ pub(super) struct Criterion<'a> {
     pub(super) degrees_of_freedom: usize,
     /// Sum of squares of the scaled outputs.
     pub(super) energy: f64,
+    /// Typical sizes of the parameters.
+    pub(super) scales: Vec<f64>,
 }
 
 /// The criterion at one parameter vector.
@@ -52,6 +54,7 @@ pub(super) struct Point {
 }
 
 /// The linearised criterion `1/2 |r - J step|^2` as the triangular factor of `[J r]`.
+#[derive(Clone)]
 pub(super) struct Linearisation {
     factor: Mat<f64>,
 }
@@ -70,6 +73,7 @@ impl<'a> Criterion<'a> {
         let theta = MatRef::from_column_major_slice(start, start.len(), 1);
         check_shape("the start vector of the parameters", theta, (parameters, 1))?;
         check_finite("the start vector of the parameters", theta)?;
+        let scales = checked_scales(structure.scales(), parameters)?;
         let model = structure.model(start)?;
         let deviations = checked_deviations(deviations, model.outputs())?;
         let order = model.order() + closure.as_ref().map_or(0, Closure::order);
@@ -104,6 +108,7 @@ impl<'a> Criterion<'a> {
             parameters,
             degrees_of_freedom,
             energy,
+            scales,
         })
     }
 
@@ -149,6 +154,28 @@ impl<'a> Criterion<'a> {
         Ok(Linearisation { factor: whole.r().to_owned() })
     }
 
+    /// The residuals of each experiment, sample after sample, divided by the deviations of the outputs, without weights.
+    pub(super) fn residuals(&self, point: &Point) -> Result<Vec<Vec<f64>>> {
+        let pairs = self.experiments.iter().zip(&point.initial_states);
+        pairs.map(|(samples, x0)| residuals(samples, &point.sampled, x0)).collect()
+    }
+
+    /// Takes square roots of weights, in the order of the residuals; none for weights of 1.
+    pub(super) fn reweigh(&mut self, roots: Vec<Vec<f64>>) {
+        let mut roots = roots.into_iter();
+        self.experiments.iter_mut().for_each(|samples| samples.roots = roots.next().unwrap_or_default());
+    }
+
+    /// Number of outputs p.
+    pub(super) fn outputs(&self) -> usize {
+        self.coordinates.outputs.len()
+    }
+
+    /// One number per output, back in its units.
+    pub(super) fn in_units_of_outputs(&self, scaled: &[f64]) -> Vec<f64> {
+        scaled.iter().zip(&self.deviations).map(|(value, deviation)| value * deviation).collect()
+    }
+
     /// The initial states of a point in the coordinates of the structure, those of a controller behind them.
     pub(super) fn initial_states(&self, point: &Point) -> Vec<Vec<f64>> {
         let scales = || self.coordinates.states.iter().copied().chain(std::iter::repeat(1.0));
@@ -176,6 +203,18 @@ impl Linearisation {
         self.factor.ncols() - 1
     }
 
+    /// The same where only these parameters move.
+    pub(super) fn along(&self, parameters: &[usize]) -> Linearisation {
+        let (rows, count) = (self.factor.nrows(), parameters.len());
+        if count == self.parameters() {
+            return self.clone();
+        }
+        let column = |j: usize| parameters.get(j).copied().unwrap_or(self.parameters());
+        let mut whole = Triangle::new(count + 1, rows);
+        whole.fold_rows(Mat::from_fn(rows, count + 1, |i, j| self.factor[(i, column(j))]).as_ref());
+        Linearisation { factor: whole.r().to_owned() }
+    }
+
     /// Length of the part of r that J can remove, over the length of the rest, each by its degrees of freedom: the
     /// distance to the minimum in units of the radius of the confidence region.
     pub(super) fn relative_offset(&self, degrees_of_freedom: usize) -> f64 {
@@ -184,6 +223,21 @@ impl Linearisation {
         let per_freedom = |r: MatRef<'_, f64>, freedom: usize| r.norm_l2() / (freedom.max(1) as f64).sqrt();
         let (offset, radius) = (per_freedom(removable, rank), per_freedom(rest, degrees_of_freedom));
         if offset == 0.0 { 0.0 } else { offset / radius }
+    }
+}
+
+/// One positive size for each parameter.
+fn checked_scales(scales: Vec<f64>, parameters: usize) -> Result<Vec<f64>> {
+    if scales.len() != parameters {
+        let what = "the number of typical sizes of the structure".into();
+        return Err(Error::Ports { what, expected: parameters, found: scales.len() });
+    }
+    match scales.iter().find(|size| !(**size > 0.0 && size.is_finite())) {
+        Some(bad) => {
+            let what = "a typical size of a parameter".into();
+            Err(Error::OutOfRange { what, value: *bad, must: "a positive number" })
+        }
+        None => Ok(scales),
     }
 }
 
@@ -208,5 +262,5 @@ fn interleave(experiment: &Experiment<'_>, deviations: &[f64]) -> Samples {
     let Experiment { u, y } = experiment;
     let u: Vec<f64> = u.row_iter().flat_map(|row| row.iter().copied()).collect();
     let y = y.row_iter().flat_map(|row| row.iter().zip(deviations).map(|(y, d)| y / d)).collect();
-    Samples { u, y, count: experiment.u.nrows() }
+    Samples { u, y, count: experiment.u.nrows(), roots: Vec::new() }
 }

@@ -4,7 +4,11 @@
 //! lengths of the columns of J (their largest so far), so that units of parameters do not matter (J. J. More, in Numerical
 //! Analysis, Lecture Notes in Mathematics 630 (1978), 105). The damping follows the ratio of the actual to the predicted
 //! decrease (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05, Technical University of Denmark).
+//!
+//! A parameter that its bound holds back stays for the step (`bounds.rs`); one that the step would take beyond a bound goes
+//! to that bound, and the others take the step that is best with it there.
 
+use super::bounds::Bounds;
 use super::criterion::{Criterion, Linearisation, Point};
 use super::{GreyBoxOptions, Stop};
 use crate::Result;
@@ -18,6 +22,7 @@ const ROUNDING: f64 = 1e-12;
 pub(super) struct Outcome {
     pub(super) point: Point,
     pub(super) linearisation: Linearisation,
+    pub(super) face: Face,
     pub(super) stop: Stop,
     pub(super) work: Work,
 }
@@ -33,23 +38,50 @@ pub(super) struct Work {
     pub(super) diverged: usize,
 }
 
-/// Minimises the criterion from `start`.
-pub(super) fn minimise(criterion: &Criterion<'_>, start: &[f64], options: &GreyBoxOptions) -> Result<Outcome> {
+impl Work {
+    /// Both together.
+    pub(super) fn and(&self, more: &Work) -> Work {
+        Work {
+            iterations: self.iterations + more.iterations,
+            evaluations: self.evaluations + more.evaluations,
+            diverged: self.diverged + more.diverged,
+        }
+    }
+}
+
+/// The parameters that no bound holds back, and the linearised criterion where only they move.
+pub(super) struct Face {
+    pub(super) free: Vec<usize>,
+    pub(super) here: Linearisation,
+}
+
+/// Minimises the criterion within the bounds from `start`.
+pub(super) fn minimise(
+    criterion: &Criterion<'_>,
+    bounds: &Bounds,
+    start: &[f64],
+    options: &GreyBoxOptions,
+) -> Result<Outcome> {
     let mut work = Work { evaluations: 1, ..Work::default() };
     let mut point = criterion.evaluate(start)?;
     let mut scale = vec![0.0; criterion.parameters];
     let mut damping = Damping { value: options.damping, growth: 2.0 };
     loop {
         let linearisation = criterion.linearise(&point)?;
-        enlarge(&mut scale, &linearisation);
-        let next = match terminal(criterion, &point, &linearisation, options) {
+        enlarge(&mut scale, &linearisation, &criterion.scales);
+        let free = bounds.free(&point.theta, &linearisation);
+        let face = Face { here: linearisation.along(&free), free };
+        let next = match terminal(criterion, &point, &face.here, options) {
             Some(stop) => Err(stop),
             None if work.iterations == options.max_iterations => Err(Stop::Iterations),
-            None => descend(criterion, &point, &linearisation, &scale, options, &mut damping, &mut work),
+            None => {
+                let search = Search { criterion, bounds, point: &point, face: &face, scale: &scale, options };
+                search.descend(&mut damping, &mut work)
+            }
         };
         match next {
             Ok(better) => (point, work.iterations) = (better, work.iterations + 1),
-            Err(stop) => return Ok(Outcome { point, linearisation, stop, work }),
+            Err(stop) => return Ok(Outcome { point, linearisation, face, stop, work }),
         }
     }
 }
@@ -65,32 +97,81 @@ fn terminal(criterion: &Criterion<'_>, point: &Point, here: &Linearisation, opti
     }
 }
 
-/// The next point with a lower criterion, with more damping after each trial that has none.
-fn descend(
-    criterion: &Criterion<'_>,
-    point: &Point,
-    here: &Linearisation,
-    scale: &[f64],
-    options: &GreyBoxOptions,
-    damping: &mut Damping,
-    work: &mut Work,
-) -> Result<Point, Stop> {
-    loop {
-        let step = Step::new(here, scale, damping.value);
-        if step.length(scale) <= options.step_tolerance * length(&point.theta, scale) {
-            return Err(Stop::StepTooSmall);
-        }
-        let theta: Vec<f64> = point.theta.iter().zip(&step.step).map(|(theta, step)| theta + step).collect();
-        work.evaluations += 1;
-        match criterion.evaluate(&theta) {
-            Ok(trial) if trial.cost < point.cost => {
-                damping.relax((point.cost - trial.cost) / step.predicted);
-                return Ok(trial);
+/// Everything that a step starts from.
+struct Search<'a> {
+    criterion: &'a Criterion<'a>,
+    bounds: &'a Bounds,
+    point: &'a Point,
+    face: &'a Face,
+    scale: &'a [f64],
+    options: &'a GreyBoxOptions,
+}
+
+impl Search<'_> {
+    /// The next point with a lower criterion, with more damping after each trial that has none.
+    fn descend(&self, damping: &mut Damping, work: &mut Work) -> Result<Point, Stop> {
+        let theta = &self.point.theta;
+        loop {
+            let step = self.step_within_bounds(damping.value);
+            if length(&step.step, self.scale) <= self.options.step_tolerance * length(theta, self.scale) {
+                return Err(Stop::StepTooSmall);
             }
-            Ok(_) => {}
-            Err(_) => work.diverged += 1,
+            work.evaluations += 1;
+            match self.criterion.evaluate(&step.theta) {
+                Ok(trial) if trial.cost < self.point.cost => {
+                    damping.relax((self.point.cost - trial.cost) / step.predicted);
+                    return Ok(trial);
+                }
+                Ok(_) => {}
+                Err(_) => work.diverged += 1,
+            }
+            damping.tighten();
         }
-        damping.tighten();
+    }
+
+    /// The damped step; parameters that it takes beyond a bound go there, until none is left that does.
+    fn step_within_bounds(&self, damping: f64) -> Step {
+        let mut landed = vec![None; self.face.free.len()];
+        loop {
+            let step = self.step(damping, &landed);
+            let mut inside = true;
+            for (landed, parameter) in landed.iter_mut().zip(&self.face.free) {
+                if landed.is_none() {
+                    *landed = self.bounds.crossed(*parameter, step.theta[*parameter]);
+                    inside &= landed.is_none();
+                }
+            }
+            if inside {
+                return step;
+            }
+        }
+    }
+
+    /// The damped Gauss-Newton step of the free parameters with those that have landed at a bound.
+    fn step(&self, damping: f64, landed: &[Option<f64>]) -> Step {
+        let (jacobian, residual) = (self.face.here.jacobian(), self.face.here.residual());
+        let (rows, free, theta) = (jacobian.nrows(), &self.face.free, &self.point.theta);
+        let mut step = Mat::from_fn(free.len(), 1, |k, _| landed[k].map_or(0.0, |bound| bound - theta[free[k]]));
+        let moving: Vec<usize> = (0..free.len()).filter(|k| landed[*k].is_none()).collect();
+        if !moving.is_empty() {
+            let damped = Mat::from_fn(rows + moving.len(), moving.len(), |i, j| match i.checked_sub(rows) {
+                None => jacobian[(i, moving[j])],
+                Some(k) if k == j => damping.sqrt() * self.scale[free[moving[j]]],
+                Some(_) => 0.0,
+            });
+            let wanted = if moving.len() == free.len() { residual.to_owned() } else { residual - jacobian * &step };
+            let target = Mat::from_fn(rows + moving.len(), 1, |i, _| if i < rows { wanted[(i, 0)] } else { 0.0 });
+            let solved = damped.qr().solve_lstsq(&target);
+            moving.iter().enumerate().for_each(|(j, k)| step[(*k, 0)] = solved[(j, 0)]);
+        }
+        let left = residual - jacobian * &step;
+        let predicted = 0.5 * (residual.squared_norm_l2() - left.squared_norm_l2());
+        let mut found = Step { step: vec![0.0; theta.len()], theta: theta.clone(), predicted };
+        for (k, parameter) in free.iter().enumerate() {
+            found.step[*parameter] = step[(k, 0)];
+            found.theta[*parameter] = landed[k].unwrap_or(theta[*parameter] + step[(k, 0)]);
+        }
+        found
     }
 }
 
@@ -117,29 +198,10 @@ impl Damping {
 /// A damped Gauss-Newton step.
 struct Step {
     step: Vec<f64>,
+    /// Where it leads.
+    theta: Vec<f64>,
     /// Decrease of the linearised criterion.
     predicted: f64,
-}
-
-impl Step {
-    fn new(here: &Linearisation, scale: &[f64], damping: f64) -> Self {
-        let (jacobian, residual) = (here.jacobian(), here.residual());
-        let (rows, q) = (jacobian.nrows(), jacobian.ncols());
-        let damped = Mat::from_fn(rows + q, q, |i, j| match i.checked_sub(rows) {
-            None => jacobian[(i, j)],
-            Some(k) if k == j => damping.sqrt() * scale[j],
-            Some(_) => 0.0,
-        });
-        let target = Mat::from_fn(rows + q, 1, |i, _| if i < rows { residual[(i, 0)] } else { 0.0 });
-        let step = damped.qr().solve_lstsq(&target);
-        let left = residual - jacobian * &step;
-        let predicted = 0.5 * (residual.squared_norm_l2() - left.squared_norm_l2());
-        Step { step: step.col(0).iter().copied().collect(), predicted }
-    }
-
-    fn length(&self, scale: &[f64]) -> f64 {
-        length(&self.step, scale)
-    }
 }
 
 /// `|D theta|`.
@@ -147,12 +209,13 @@ fn length(theta: &[f64], scale: &[f64]) -> f64 {
     theta.iter().zip(scale).map(|(theta, scale)| (theta * scale).powi(2)).sum::<f64>().sqrt()
 }
 
-/// The lengths of the columns of J where they exceed those before; 1 for a parameter that has no effect so far.
-fn enlarge(scale: &mut [f64], here: &Linearisation) {
-    for (scale, column) in scale.iter_mut().zip(here.jacobian().col_iter()) {
+/// The lengths of the columns of J where they exceed those before; one over the typical size of a parameter that has no
+/// effect so far.
+fn enlarge(scale: &mut [f64], here: &Linearisation, typical: &[f64]) {
+    for ((scale, column), typical) in scale.iter_mut().zip(here.jacobian().col_iter()).zip(typical) {
         *scale = scale.max(column.norm_l2());
         if *scale == 0.0 {
-            *scale = 1.0;
+            *scale = 1.0 / typical;
         }
     }
 }

@@ -12,13 +12,20 @@
 //!
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
 //! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
-//! Levenberg-Marquardt (`levenberg.rs`), the covariance (`uncertainty.rs`).
+//! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
+//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
+//! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bearing;
+mod bounds;
 mod closure;
 mod criterion;
+mod declared;
+mod delays;
+mod identifiability;
 mod levenberg;
 mod narrow;
+mod robust;
 mod sampled;
 mod sensitivity;
 mod structure;
@@ -27,18 +34,27 @@ mod tests;
 mod uncertainty;
 
 pub use bearing::BearingStructure;
+pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
+pub use declared::{
+    Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
+};
+pub use identifiability::{Combination, Part, Undetermined};
+pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
 use super::subspace::{Experiment, InitialState};
 use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
 use crate::{Error, Result};
+use bounds::Bounds;
 use closure::Closure;
 use criterion::Criterion;
+use delays::Shifted;
 use faer::{Mat, Scale};
 use levenberg::minimise;
+use robust::reweighted;
 use serde::{Deserialize, Serialize};
-use uncertainty::Information;
+use uncertainty::{Information, spread};
 
 /// Choices of [`greybox`].
 ///
@@ -64,6 +80,10 @@ pub struct GreyBoxOptions {
     pub initial_state: InitialState,
     /// Standard deviation of the noise of each output, of which only the ratios count; empty where all are equal.
     pub output_deviations: Vec<f64>,
+    /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
+    pub delays: Vec<usize>,
+    /// How residuals count.
+    pub loss: Loss,
 }
 
 impl Default for GreyBoxOptions {
@@ -75,6 +95,8 @@ impl Default for GreyBoxOptions {
             damping: 1e-3,
             initial_state: InitialState::default(),
             output_deviations: Vec::new(),
+            delays: Vec::new(),
+            loss: Loss::default(),
         }
     }
 }
@@ -98,17 +120,20 @@ pub enum Stop {
 pub struct GreyBoxModel {
     /// Estimated parameters, in the order of [`Structure::names`].
     pub parameters: Vec<f64>,
-    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all.
+    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
+    /// bound holds back count as known: their rows and columns are zero.
     pub covariance: Option<Mat<f64>>,
-    /// The continuous-time model.
+    /// The continuous-time model, without delays.
     pub continuous: StateSpace<Continuous>,
-    /// The same behind a zero-order hold.
+    /// The same behind a zero-order hold, with the delays of the inputs as further states behind its own.
     pub model: StateSpace<Discrete>,
     /// Whether it is stable.
     pub stable: bool,
-    /// State at the first sample of each experiment, n numbers each.
+    /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
+    /// and those of the delays each.
     pub initial_states: Vec<Vec<f64>>,
-    /// Half the sum of squares of the residuals, each divided by the deviation of its output.
+    /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
+    /// loss of Huber.
     pub cost: f64,
     /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26).
     pub fit: Vec<f64>,
@@ -128,6 +153,12 @@ pub struct GreyBoxModel {
     pub rank: usize,
     /// Reciprocal condition number of that Jacobian.
     pub rcond: f64,
+    /// Which parameters those are that the data do not determine.
+    pub undetermined: Undetermined,
+    /// Parameters that ended at a bound.
+    pub at_bounds: Vec<AtBound>,
+    /// Weights of the residuals, `None` where all count by their square.
+    pub robust: Option<RobustReport>,
 }
 
 impl GreyBoxModel {
@@ -141,12 +172,12 @@ impl GreyBoxModel {
 
 /// Estimates the parameters of a structure from one or more experiments by the output-error method.
 ///
-/// The criterion is minimised by Levenberg-Marquardt from `start`. A trial point whose simulation is not finite is rejected
-/// and counted. Nothing keeps the parameters in a range; an unstable result is returned and marked.
+/// The criterion is minimised by Levenberg-Marquardt from `start`, within the bounds of the structure where it has any. A
+/// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
 ///
 /// # Errors
 /// [`Error::Shape`], [`Error::NotFinite`], [`Error::Ports`], [`Error::OutOfRange`] for data, start or options that do not
-/// fit; [`Error::TooFewSamples`]; [`Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
+/// fit; [`Error::EmptyBounds`], [`Error::OutsideBounds`]; [`Error::TooFewSamples`]; [`Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
 /// errors of the structure at `start`.
 ///
 /// # Accuracy
@@ -215,7 +246,17 @@ fn estimate(
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
     check(options)?;
-    let criterion = Criterion::new(
+    if structure.names().is_empty() {
+        let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
+        return Err(Error::OutOfRange { what, value: 0.0, must });
+    }
+    if closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
+        let (what, must) = ("the delay of an input inside of the loop".into(), "0: put it into the controller");
+        return Err(Error::OutOfRange { what, value: 1.0, must });
+    }
+    let shifted = Shifted::new(experiments, &options.delays)?;
+    let experiments = &shifted.experiments();
+    let mut criterion = Criterion::new(
         structure,
         start,
         experiments,
@@ -224,30 +265,47 @@ fn estimate(
         options.initial_state,
         &options.output_deviations,
     )?;
-    let outcome = minimise(&criterion, start, options)?;
-    let information = Information::new(&outcome.linearisation);
+    let bounds = Bounds::new(structure, start)?;
+    let mut outcome = minimise(&criterion, &bounds, start, options)?;
+    let mut variance = 2.0 * outcome.point.cost / criterion.degrees_of_freedom as f64;
+    let mut unweighted = outcome.face.here.clone();
+    let mut report = None;
+    if options.loss == Loss::Huber {
+        let robust = reweighted(&mut criterion, &bounds, options, outcome)?;
+        (outcome, variance, report) = (robust.outcome, robust.variance, Some(robust.report));
+        unweighted = criterion.linearise(&outcome.point)?.along(&outcome.face.free);
+    }
     let point = &outcome.point;
-    let variance = 2.0 * point.cost / criterion.degrees_of_freedom as f64;
+    let names = structure.names();
+    let sizes: Vec<f64> =
+        point.theta.iter().zip(&criterion.scales).map(|(v, scale)| if *v == 0.0 { *scale } else { v.abs() }).collect();
+    let information = Information::new(&outcome.linearisation, &sizes, criterion.energy.sqrt());
+    let free = &outcome.face.free;
+    let free_sizes: Vec<f64> = free.iter().map(|j| sizes[*j]).collect();
+    let inverse = Information::new(&unweighted, &free_sizes, criterion.energy.sqrt()).inverse;
     let continuous = structure.model(&point.theta)?;
     let model = continuous.zoh(time)?;
     let initial_states = criterion.initial_states(point);
     let outputs = outputs(experiments, &criterion.simulated(&model)?, &initial_states)?;
     Ok(GreyBoxModel {
-        covariance: information.inverse.map(|inverse| Scale(variance) * inverse),
+        covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
         stable: model.is_stable()?,
         continuous,
-        model,
-        initial_states,
+        model: shifted.delays.put_before(model)?,
+        initial_states: shifted.initial_states(initial_states),
         cost: point.cost,
         fit: outputs.iter().map(|o| o.fit).collect(),
         residual: outputs.iter().map(|o| o.residual).collect(),
         stop: outcome.stop,
-        relative_offset: outcome.linearisation.relative_offset(criterion.degrees_of_freedom),
+        relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
         iterations: outcome.work.iterations,
         evaluations: outcome.work.evaluations,
         diverged: outcome.work.diverged,
         rank: information.rank,
         rcond: information.rcond,
+        undetermined: information.undetermined(&names, &sizes),
+        at_bounds: bounds.touched(&point.theta),
+        robust: report,
         parameters: outcome.point.theta,
     })
 }

@@ -29,6 +29,8 @@ pub(super) struct Samples {
     /// p values per sample.
     pub(super) y: Vec<f64>,
     pub(super) count: usize,
+    /// Square root of the weight of each residual, in the order of `y`; empty where all are 1.
+    pub(super) roots: Vec<f64>,
 }
 
 /// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the model started at `x0`.
@@ -100,6 +102,11 @@ impl<'a> Rows<'a> {
                 piece[columns * rows + k * p + i] = y - model;
             }
         }
+        if let Some(roots) = self.samples.roots.get(first * p..first * p + rows) {
+            for column in piece.chunks_exact_mut(rows) {
+                column.iter_mut().zip(roots).for_each(|(value, root)| *value *= root);
+            }
+        }
         if !piece.iter().fold(0.0, |sum, v| sum + v * v).is_finite() {
             return Err(diverged(first + 1, self.system));
         }
@@ -109,7 +116,7 @@ impl<'a> Rows<'a> {
     }
 }
 
-/// The sum of squares of the residual of the model started from rest.
+/// The sum of squares of the weighted residual of the model started from rest.
 ///
 /// # Errors
 /// [`Error::Diverged`] where the simulation leaves the range of the numbers.
@@ -120,12 +127,35 @@ pub(super) fn sum_of_squares(samples: &Samples, system: &StateSpace<Discrete>) -
     let mut sum = 0.0;
     for k in 0..samples.count {
         let model = simulator.step(&mut state, &samples.u[k * m..][..m]);
-        sum += samples.y[k * p..][..p].iter().zip(model).map(|(y, model)| (y - model).powi(2)).sum::<f64>();
+        let residuals = samples.y[k * p..][..p].iter().zip(model).map(|(y, model)| y - model);
+        sum += match samples.roots.get(k * p..(k + 1) * p) {
+            None => residuals.map(|e| e.powi(2)).sum::<f64>(),
+            Some(roots) => residuals.zip(roots).map(|(e, root)| (root * e).powi(2)).sum::<f64>(),
+        };
         if !sum.is_finite() {
             return Err(diverged(k + 1, system));
         }
     }
     Ok(sum)
+}
+
+/// The residual of the model started at `x0`, without weights, sample after sample.
+///
+/// # Errors
+/// [`Error::Diverged`] where the simulation leaves the range of the numbers.
+pub(super) fn residuals(samples: &Samples, system: &StateSpace<Discrete>, x0: &[f64]) -> Result<Vec<f64>> {
+    let (m, p) = (system.inputs(), system.outputs());
+    let simulator = Simulator::new(system);
+    let mut state = simulator.start(x0)?;
+    let mut residuals = Vec::with_capacity(samples.y.len());
+    for k in 0..samples.count {
+        let model = simulator.step(&mut state, &samples.u[k * m..][..m]);
+        residuals.extend(samples.y[k * p..][..p].iter().zip(model).map(|(y, model)| y - model));
+    }
+    match residuals.iter().position(|e| !e.is_finite()) {
+        Some(bad) => Err(diverged(bad / p + 1, system)),
+        None => Ok(residuals),
+    }
 }
 
 fn diverged(sample: usize, system: &StateSpace<Discrete>) -> Error {

@@ -68,4 +68,16 @@ pub trait Structure: Sync {
 
     /// Derivatives of the entries with respect to parameter `parameter` (counted from 0) at `theta`.
     fn slopes(&self, theta: &[f64], parameter: usize) -> Vec<Slope>;
+
+    /// Smallest and largest value of each parameter; infinite where there is none, as for all where this is not
+    /// implemented.
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        vec![(f64::NEG_INFINITY, f64::INFINITY); self.names().len()]
+    }
+
+    /// Typical size of each parameter, positive; 1 where this is not implemented. The search measures a parameter by its
+    /// effect on the outputs, and by its typical size only as long as it has none.
+    fn scales(&self) -> Vec<f64> {
+        vec![1.0; self.names().len()]
+    }
 }

@@ -7,10 +7,11 @@
 //! 9.4), where the noise is white, Gaussian, and of the stated ratio between the outputs.
 
 use super::criterion::Linearisation;
+use super::identifiability::{RANK_TOLERANCE, Undetermined};
 use faer::{Mat, MatRef};
 
-/// Directions in which the scaled Jacobian is shorter than this share of its longest one are not determined.
-const RANK_TOLERANCE: f64 = 1e-10;
+/// A parameter whose change by its own size moves the outputs by less than this share of themselves has no effect.
+const NO_EFFECT: f64 = 1e-10;
 
 /// How well the parameters are determined.
 pub(super) struct Information {
@@ -20,27 +21,49 @@ pub(super) struct Information {
     pub(super) rcond: f64,
     /// `(J' J)^-1`, `None` where J lacks rank.
     pub(super) inverse: Option<Mat<f64>>,
+    /// J with columns of unit length; zero where a parameter has no effect.
+    unit: Mat<f64>,
+    lengths: Vec<f64>,
 }
 
 impl Information {
-    pub(super) fn new(here: &Linearisation) -> Self {
+    /// `sizes` of the parameters, `outputs` the length of the scaled outputs.
+    pub(super) fn new(here: &Linearisation, sizes: &[f64], outputs: f64) -> Self {
         let (jacobian, q) = (here.jacobian(), here.parameters());
         let lengths: Vec<f64> = jacobian.col_iter().map(|column| column.norm_l2()).collect();
-        let unit =
-            Mat::from_fn(
-                jacobian.nrows(),
-                q,
-                |i, j| {
-                    if lengths[j] > 0.0 { jacobian[(i, j)] / lengths[j] } else { 0.0 }
-                },
-            );
+        let effect = |j: usize| lengths[j] > 0.0 && lengths[j] * sizes[j] >= NO_EFFECT * outputs;
+        let entry = |i: usize, j: usize| if effect(j) { jacobian[(i, j)] / lengths[j] } else { 0.0 };
+        let unit = Mat::from_fn(jacobian.nrows(), q, entry);
         let sigma = unit.singular_values().unwrap_or_default();
         let largest = sigma.first().copied().unwrap_or(0.0);
         let rank = sigma.iter().filter(|s| **s > RANK_TOLERANCE * largest).count();
-        let rcond = if q > sigma.len() || largest == 0.0 { 0.0 } else { sigma[q - 1] / largest };
+        let rcond = match q {
+            0 => 1.0,
+            _ if q > sigma.len() || largest == 0.0 => 0.0,
+            _ => sigma[q - 1] / largest,
+        };
         let inverse = (rank == q).then(|| inverse_gram(unit.as_ref(), &lengths));
-        Information { rank, rcond, inverse }
+        Information { rank, rcond, inverse, unit, lengths }
     }
+
+    /// What is not determined, by name.
+    pub(super) fn undetermined(&self, names: &[String], sizes: &[f64]) -> Undetermined {
+        let changes: Vec<f64> = self.lengths.iter().zip(sizes).map(|(length, size)| 1.0 / (length * size)).collect();
+        if self.rank == names.len() {
+            Undetermined::default()
+        } else {
+            Undetermined::new(self.unit.as_ref(), names, &changes)
+        }
+    }
+}
+
+/// A matrix over some of `count` parameters as one over all, with zeros for the others.
+pub(super) fn spread(matrix: MatRef<'_, f64>, parameters: &[usize], count: usize) -> Mat<f64> {
+    let mut whole = Mat::zeros(count, count);
+    for (i, row) in parameters.iter().enumerate() {
+        parameters.iter().enumerate().for_each(|(j, column)| whole[(*row, *column)] = matrix[(i, j)]);
+    }
+    whole
 }
 
 /// `(J' J)^-1` from the triangular J of full rank with columns of unit length.

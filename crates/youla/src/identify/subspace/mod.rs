@@ -14,7 +14,7 @@
 mod batch;
 mod channels;
 mod condense;
-mod delay;
+pub(in crate::identify) mod delay;
 mod disturbance;
 mod factorisation;
 mod gram;

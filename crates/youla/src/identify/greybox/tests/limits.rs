@@ -80,6 +80,41 @@ fn parameters_that_cannot_be_told_apart_have_no_covariance() {
     let found = greybox(&Product, &[1.0, 1.0], &[experiment], time, &GreyBoxOptions::default()).unwrap();
     assert!((found.parameters[0] * found.parameters[1] - 6.0).abs() < 1e-9, "{:?}", found.parameters);
     assert_eq!((found.rank, found.covariance.is_none(), found.stop), (1, true, Stop::Exact));
+    let parts: Vec<&str> = found.undetermined.combinations[0].parts.iter().map(|p| p.parameter.as_str()).collect();
+    assert_eq!(parts, ["first", "second"]);
+}
+
+/// The product with bounds that may be bad.
+struct Bounded(Vec<(f64, f64)>);
+
+impl Structure for Bounded {
+    fn names(&self) -> Vec<String> {
+        Product.names()
+    }
+    fn model(&self, t: &[f64]) -> Result<StateSpace<Continuous>> {
+        Product.model(t)
+    }
+    fn slopes(&self, t: &[f64], parameter: usize) -> Vec<Slope> {
+        Product.slopes(t, parameter)
+    }
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.0.clone()
+    }
+}
+
+#[test]
+fn bounds_that_do_not_fit_are_refused() {
+    let u = Mat::from_fn(200, 1, |k, _| ((k * k) as f64 * 0.37).sin());
+    let experiment = Experiment { u: u.as_ref(), y: u.as_ref() };
+    let time = crate::lti::Discrete::new(0.2).unwrap();
+    let refused = |bounds: &[(f64, f64)]| {
+        let structure = Bounded(bounds.to_vec());
+        greybox(&structure, &[1.0, 1.0], &[experiment], time, &GreyBoxOptions::default()).unwrap_err()
+    };
+    assert!(matches!(refused(&[(0.0, 2.0)]), Error::Ports { expected: 2, found: 1, .. }));
+    assert!(matches!(refused(&[(0.0, 2.0), (3.0, 2.0)]), Error::EmptyBounds { .. }));
+    assert!(matches!(refused(&[(0.0, 2.0), (f64::NAN, 2.0)]), Error::EmptyBounds { .. }));
+    assert!(matches!(refused(&[(0.0, 2.0), (2.0, 3.0)]), Error::OutsideBounds { value: 1.0, .. }));
 }
 
 #[test]

@@ -44,7 +44,7 @@ fn open_loop(samples: usize, deviation: [f64; 2], x0: &[f64; 6], seed: u64) -> O
 }
 
 /// Every parameter off by up to `share` of itself, in either direction.
-fn off(theta: &[f64], share: f64, seed: u64) -> Vec<f64> {
+pub(super) fn off(theta: &[f64], share: f64, seed: u64) -> Vec<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     theta.iter().map(|v| v * (1.0 + share * (2.0 * rng.random::<f64>() - 1.0))).collect()
 }

@@ -90,6 +90,9 @@ impl<'a> Rows<'a> {
         let (n, m, p) = (self.system.order(), self.system.inputs(), self.system.outputs());
         let (first, columns) = (self.next, self.columns);
         let count = PIECE.min(self.samples.count - first);
+        if count == 0 {
+            return Ok(0);
+        }
         let rows = count * p;
         piece.resize(rows * (columns + 1), 0.0);
         for k in 0..count {

@@ -556,6 +556,11 @@ pub enum Error {
         "the bootstrap keeps the inputs as they are, which measurements from a closed loop do not allow; take method = \"delta\""
     )]
     BootstrapOfClosedLoop,
+    /// There is nothing to start a projection from.
+    #[error(
+        "the structure is not linear in its parameters and no start gives a model; give a parameter vector to start from"
+    )]
+    NoStart,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]

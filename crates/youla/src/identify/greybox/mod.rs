@@ -15,9 +15,11 @@
 //! Levenberg-Marquardt (`levenberg.rs`), the covariance (`uncertainty.rs`).
 
 mod bearing;
+mod cost;
 mod criterion;
 mod levenberg;
 mod narrow;
+mod projection;
 mod sampled;
 mod sensitivity;
 mod structure;
@@ -26,6 +28,8 @@ mod tests;
 mod uncertainty;
 
 pub use bearing::BearingStructure;
+pub use cost::greybox_cost;
+pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
 pub use structure::{Matrix, Slope, Structure};
 
 use super::subspace::{Experiment, InitialState};

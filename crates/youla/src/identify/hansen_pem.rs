@@ -2,24 +2,29 @@
 //!
 //! ```text
 //! alpha, beta -> S -> G(S)                                 unbiased in closed loop, (25), of order n + n_S
-//! theta_0 = arg min sum_k |W_k (G(S) - G_theta)|^2         projection on the structure, no start needed
+//! theta_0 = arg min sum_k |((N + V S) - G_theta (M + U S)) W_k|^2        projection on the structure, no start needed
 //! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    prediction error from theta_0
 //! ```
 //! For white output noise the last line is the maximum-likelihood estimate, in closed loop too; its only weakness, local
-//! minima, is what the lines before it are for. They need not be accurate, only in the valley of the global minimum. The
-//! weight makes the projection a quadrature of the criterion that follows: `W_ij^2 = Phi_u,jj domega / deviation_i^2`, since
-//! for a long record `sum_k |y - yhat|^2` grows as the integral of `|G - G_theta|^2 Phi_u`, and the error of G(S) is smallest
-//! where Phi_u is largest (L. Ljung, System Identification: Theory for the User, 2nd ed., 1999, sections 8.5 and 9.4).
+//! minima, is what the lines before it are for. They need not be accurate, only in the valley of the global minimum.
+//!
+//! The projection compares what alpha makes of y by S, `(N + V S) alpha`, with what the structure makes of the u that alpha
+//! causes, `(M + U S) alpha`: it is `|(G(S) - G_theta) u|^2` without a division by `M + U S`, whose zeros next to poles are the
+//! lightly damped ghosts of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
+//! S errs by `(Mt + S Ut) n / alpha`, the error has the same size at all frequencies.
+
+#[cfg(test)]
+mod tests;
 
 use super::greybox::{
-    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, greybox, greybox_cost,
-    logarithmic_grid, projections,
+    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed, greybox,
+    greybox_cost, logarithmic_grid, projections,
 };
 use super::hansen::{HansenModel, hansen};
 use super::subspace::{Experiment, InitialState, SubspaceOptions};
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::linalg::least_squares;
-use crate::lti::{Discrete, StateSpace, simulate};
+use crate::lti::{Discrete, StateSpace, frequency_response, simulate};
 use crate::record::{Welch, cross_spectrum};
 use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
@@ -41,8 +46,11 @@ pub struct HansenPemOptions {
     pub hansen: SubspaceOptions,
     /// Number of frequencies of the projection, from `1 / (window ts)` Hz to 0.9 of the Nyquist frequency, equal ratios.
     pub frequencies: usize,
-    /// Samples of a segment of the spectrum of u; at most a quarter of the shortest record is taken.
+    /// Samples of a segment of the spectrum of alpha; at most a quarter of the shortest record is taken.
     pub window: usize,
+    /// Time constants that the shortest record is long, of the decay under which responses are compared: ghosts of S that
+    /// live longer than the record are flat then. The modes of the plant should decay faster.
+    pub decay: f64,
     /// The projection.
     pub projection: ProjectionOptions,
     /// The prediction-error method.
@@ -55,6 +63,7 @@ impl Default for HansenPemOptions {
             hansen: SubspaceOptions::default(),
             frequencies: 120,
             window: 1024,
+            decay: 10.0,
             projection: ProjectionOptions::default(),
             pem: GreyBoxOptions::default(),
         }
@@ -126,8 +135,24 @@ pub fn hansen_pem(
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
     let found = hansen(factors, signals, &options.hansen)?;
+    pem_from_hansen(found, factors, signals, experiments, structure, nominal, options)
+}
+
+/// The same from a result of [`hansen`] or one of its siblings for the same factors and signals.
+///
+/// # Errors
+/// As [`hansen_pem`].
+pub fn pem_from_hansen(
+    found: HansenModel,
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    experiments: &[Experiment<'_>],
+    structure: &dyn Structure,
+    nominal: Option<&[f64]>,
+    options: &HansenPemOptions,
+) -> Result<HansenPem> {
     let time = factors.nominal().time();
-    let target = projection_target(&found.plant, experiments, options)?;
+    let target = projection_target(factors, &found.deviation.model, signals, options)?;
     let starts: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
     let projections = projections(structure, &target, &starts, &options.projection)?;
     let cost = |theta: &[f64]| greybox_cost(structure, theta, experiments, time, &options.pem).unwrap_or(f64::INFINITY);
@@ -160,50 +185,54 @@ fn first_error(runs: Vec<PemRun>) -> Error {
     first.unwrap_or(Error::NoStart).within("the prediction-error method from the projection of G(S)")
 }
 
-/// A model on the grid with the weights of the criterion of the records.
+/// What alpha makes of u and y by S on the grid, with the weights of the criterion of the records.
 ///
 /// # Errors
-/// Shapes; [`Error::TooFewSamples`] for a record that is too short for a spectrum; [`Error::PoleOnBoundary`].
+/// Ports; [`Error::TooFewSamples`] for a record that is too short for a spectrum; [`Error::PoleOnBoundary`].
 pub fn projection_target(
-    plant: &StateSpace<Discrete>,
-    experiments: &[Experiment<'_>],
+    factors: &CoprimeFactors<Discrete>,
+    s: &StateSpace<Discrete>,
+    signals: &[YoulaSignals],
     options: &HansenPemOptions,
 ) -> Result<FrequencyTarget> {
-    let time = plant.time();
-    let shortest = experiments.iter().map(|e| e.u.nrows()).min().unwrap_or(0);
+    let (p, m, time) = (factors.outputs(), factors.inputs(), s.time());
+    let shortest = signals.iter().map(|s| s.alpha.nrows()).min().unwrap_or(0);
     let window = options.window.min(shortest / 4);
     if window < SHORTEST_WINDOW {
-        let what = "the shortest record, for the spectrum of u".into();
+        let what = "the shortest record, for the spectrum of alpha".into();
         return Err(Error::TooFewSamples { what, found: shortest, needed: 4 * SHORTEST_WINDOW });
     }
     let spacing = 2.0 * PI / (window as f64 * time.ts());
     let omega = logarithmic_grid([spacing, 0.9 * PI / time.ts()], options.frequencies)?;
-    let spectrum = input_spectrum(experiments, time, window)?;
-    let (p, m) = (plant.outputs(), plant.inputs());
-    let deviation = |i: usize| options.pem.output_deviations.get(i).copied().unwrap_or(1.0);
-    let weight = |k: usize| {
+    let spectrum = alpha_spectrum(signals, time, window)?;
+    let size = |k: usize, j: usize| {
         let (before, after) = (omega[k.saturating_sub(1)], omega[(k + 1).min(omega.len() - 1)]);
-        let width = 0.5 * (after - before);
         let bin = ((omega[k] / spacing).round() as usize).min(spectrum.nrows() - 1);
-        Mat::from_fn(p, m, |i, j| (spectrum[(bin, j)] * width).sqrt() / deviation(i))
+        (spectrum[(bin, j)] * 0.5 * (after - before)).sqrt()
     };
+    let deviation = |i: usize| options.pem.output_deviations.get(i).copied().unwrap_or(1.0);
+    let weight = |k: usize| Mat::from_fn(p, m, |i, j| size(k, j) / deviation(i));
+    let decay = options.decay / (shortest as f64 * time.ts());
+    let response = frequency_response(&decayed(&factors.right_factors_of(s)?, decay)?, &omega)?;
+    let part = |first: usize, count: usize| response.iter().map(|g| g.subrows(first, count).to_owned()).collect();
     let weights = (0..omega.len()).map(weight).collect();
-    FrequencyTarget::of_model(plant, &omega)?.weighted(weights)
+    FrequencyTarget::of_excitation(&omega, part(0, m), part(m, p), time)?.weighted(weights)?.decaying(decay)
 }
 
-/// Shortest segment of the spectrum of u.
+/// Shortest segment of the spectrum of alpha.
 const SHORTEST_WINDOW: usize = 16;
 
-/// Power of each input per Hz, frequencies x m, averaged over the records by their length.
-fn input_spectrum(experiments: &[Experiment<'_>], time: Discrete, window: usize) -> Result<Mat<f64>> {
+/// Power of each alpha per Hz, frequencies x m, averaged over the records by their length.
+fn alpha_spectrum(signals: &[YoulaSignals], time: Discrete, window: usize) -> Result<Mat<f64>> {
     let welch = Welch { window, remove_mean: false, ..Welch::default() };
-    let inputs = experiments.first().map_or(0, |e| e.u.ncols());
+    let inputs = signals.first().map_or(0, |s| s.alpha.ncols());
     let mut sum = Mat::zeros(window / 2 + 1, inputs);
-    for e in experiments {
-        let spectrum = cross_spectrum(e.u, e.u, time, &welch)?;
+    for s in signals {
+        let alpha = s.alpha.as_ref();
+        let spectrum = cross_spectrum(alpha, alpha, time, &welch)?;
         for (k, density) in spectrum.density.iter().enumerate() {
             for j in 0..inputs.min(density.ncols()) {
-                sum[(k, j)] += density[(j, j)].re.max(0.0) * e.u.nrows() as f64;
+                sum[(k, j)] += density[(j, j)].re.max(0.0) * alpha.nrows() as f64;
             }
         }
     }

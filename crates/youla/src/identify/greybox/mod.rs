@@ -29,6 +29,7 @@ mod uncertainty;
 
 pub use bearing::BearingStructure;
 pub use cost::greybox_cost;
+pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
 pub use structure::{Matrix, Slope, Structure};
 

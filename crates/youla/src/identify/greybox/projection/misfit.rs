@@ -1,8 +1,8 @@
 //! The weighted misfit of a structure to a frequency response, and its slopes.
 //!
-//! On the sampled model, with `X = (zI - Ad)^-1 Bd`, `Y = C (zI - Ad)^-1` and `z = exp(j omega ts)`,
+//! On the sampled model, with `X = (zI - Ad)^-1 Bd U`, `R = C (zI - Ad)^-1` and `z = exp(s ts)`,
 //! ```text
-//! G_theta = C X + D,     dG_theta = Y (dAd X + dBd) + dC X + dD
+//! G_theta U = C X + D U,     d(G_theta U) = R (dAd X + dBd U) + dC X + dD U
 //! ```
 //! with the exact derivatives of the zero-order hold (`../sampled.rs`).
 
@@ -11,7 +11,7 @@ use super::super::sampled::{Coordinates, SampledSlope, sampled_slopes};
 use super::super::structure::Structure;
 use super::target::FrequencyTarget;
 use crate::linalg::check_shape;
-use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};
+use crate::lti::{Continuous, Discrete, FrequencyResponse, StateSpace};
 use crate::{Error, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, c64};
@@ -21,18 +21,20 @@ pub(super) struct Misfit<'a> {
     pub(super) structure: &'a dyn Structure,
     pub(super) target: &'a FrequencyTarget,
     pub(super) parameters: usize,
-    /// `|W G|`.
+    /// `|W Y|`.
     pub(super) size: f64,
 }
 
 /// The misfit at one parameter vector.
 pub(super) struct Point {
     pub(super) theta: Vec<f64>,
-    /// `sum |W (G - G_theta)|^2`.
+    /// `sum |W (Y - G_theta U)|^2`.
     pub(super) cost: f64,
     coordinates: Coordinates,
     continuous: StateSpace<Continuous>,
-    pub(super) sampled: StateSpace<Discrete>,
+    sampled: StateSpace<Discrete>,
+    /// `G_theta` on the grid.
+    pub(super) response: FrequencyResponse,
 }
 
 impl<'a> Misfit<'a> {
@@ -48,49 +50,57 @@ impl<'a> Misfit<'a> {
         let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
         let continuous = coordinates.apply(&model)?;
         let sampled = continuous.zoh(self.target.time())?;
-        let cost = self.entries(&sampled)?.col_iter().flat_map(|column| column.iter()).sum();
-        let point = Point { theta: theta.to_vec(), cost, coordinates, continuous, sampled };
-        if point.cost.is_finite() { Ok(point) } else { Err(Error::PoleOnBoundary { omega: self.target.omega()[0] }) }
+        let response = self.target.response(&sampled)?;
+        let cost: f64 = self.entries(&response).col_iter().flat_map(|column| column.iter()).sum();
+        if !cost.is_finite() {
+            return Err(Error::PoleOnBoundary { omega: self.target.omega()[0] });
+        }
+        Ok(Point { theta: theta.to_vec(), cost, coordinates, continuous, sampled, response })
     }
 
-    /// `sum_k |W (G - G_theta)|^2` for each entry, p x m.
-    pub(super) fn entries(&self, sampled: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-        let response = frequency_response(sampled, self.target.omega())?;
-        let mut sums = Mat::zeros(self.target.outputs(), self.target.inputs());
+    /// `sum_k |W (Y - G_theta U)|^2` for each entry, p x r.
+    pub(super) fn entries(&self, response: &FrequencyResponse) -> Mat<f64> {
+        let mut sums = Mat::zeros(self.target.outputs(), self.target.columns());
         for (k, model) in response.iter().enumerate() {
-            let (g, w) = (self.target.value(k), self.target.weight(k));
+            let (y, u, w) = (self.target.value(k), self.target.excited(k), self.target.weight(k));
             for j in 0..sums.ncols() {
                 for i in 0..sums.nrows() {
-                    sums[(i, j)] += (g[(i, j)] - model[(i, j)]).norm_sqr() * w[(i, j)].powi(2);
+                    let error = (0..u.nrows()).fold(y[(i, j)], |error, l| error - model[(i, l)] * u[(l, j)]);
+                    sums[(i, j)] += error.norm_sqr() * w[(i, j)].powi(2);
                 }
             }
         }
-        Ok(sums)
+        sums
     }
 
     /// The triangular factor of `[J r]`, J the slopes of the weighted model, r the weighted misfit, real and imaginary parts.
     pub(super) fn linearise(&self, point: &Point) -> Result<Mat<f64>> {
         let slopes =
             sampled_slopes(self.structure, &point.theta, &point.continuous, &point.coordinates, self.target.time())?;
-        let (p, m, q) = (self.target.outputs(), self.target.inputs(), self.parameters);
-        let each = 2 * p * m;
+        let (p, r, q) = (self.target.outputs(), self.target.columns(), self.parameters);
+        let each = 2 * p * r;
         let count = each * self.target.omega().len();
         let mut rows = vec![0.0; count * (q + 1)];
+        let mut values = vec![c64::new(0.0, 0.0); p * r];
         for k in 0..self.target.omega().len() {
-            let here = Resolvent::new(&point.sampled, self.target.omega()[k]);
-            let (g, w) = (self.target.value(k), self.target.weight(k));
-            let mut write = |column: usize, value: &dyn Fn(usize, usize) -> c64| {
+            let mut here = Resolvent::new(&point.sampled, self.target.s(k), self.target.excited(k));
+            let (y, w) = (self.target.value(k), self.target.weight(k));
+            let mut write = |column: usize, values: &[c64]| {
                 let rows = &mut rows[column * count + k * each..][..each];
-                for (pair, (i, j)) in rows.chunks_exact_mut(2).zip((0..m).flat_map(|j| (0..p).map(move |i| (i, j)))) {
-                    let value = value(i, j) * w[(i, j)];
+                for (entry, (pair, value)) in rows.chunks_exact_mut(2).zip(values).enumerate() {
+                    let value = value * w[(entry % p, entry / p)];
                     pair.copy_from_slice(&[value.re, value.im]);
                 }
             };
             for (column, slope) in slopes.iter().enumerate() {
-                let slope = here.slope(slope);
-                write(column, &|i, j| slope[(i, j)]);
+                here.slope(slope, &mut values);
+                write(column, &values);
             }
-            write(q, &|i, j| g[(i, j)] - here.value[(i, j)]);
+            for (entry, value) in values.iter_mut().enumerate() {
+                let (i, j) = (entry % p, entry / p);
+                *value = y[(i, j)] - here.value(&point.sampled, i, j);
+            }
+            write(q, &values);
         }
         let mut triangle = NarrowTriangle::new(q + 1);
         triangle.fold(&mut rows, count);
@@ -100,48 +110,57 @@ impl<'a> Misfit<'a> {
 
 /// A sampled model at one frequency.
 struct Resolvent {
-    /// `[X; I]`, (n + m) x m.
+    /// `[X; U]`, (n + m) x r.
     signals: Mat<c64>,
-    /// Y, p x n.
+    /// R, p x n.
     outputs: Mat<c64>,
-    /// `G_theta`, p x m.
-    value: Mat<c64>,
+    /// What a slope moves in the states, n x r, column by column.
+    moved: Vec<c64>,
 }
 
 impl Resolvent {
-    fn new(model: &StateSpace<Discrete>, omega: f64) -> Self {
-        let (n, m) = (model.order(), model.inputs());
-        let z = model.time().boundary(omega);
+    fn new(model: &StateSpace<Discrete>, s: c64, excited: MatRef<'_, c64>) -> Self {
+        let (n, m, r) = (model.order(), model.inputs(), excited.ncols());
+        let z = (s * model.time().ts()).exp();
         let pencil =
             Mat::from_fn(n, n, |i, j| if i == j { z - model.a()[(i, j)] } else { (-model.a()[(i, j)]).into() });
         let lu = pencil.partial_piv_lu();
-        let states = lu.solve(complex(model.b()));
+        let states = lu.solve(complex(model.b()) * excited);
         let outputs = lu.solve_transpose(complex(model.c().transpose())).transpose().to_owned();
-        let value = complex(model.c()) * &states + complex(model.d());
-        let one = |held: bool| c64::new(if held { 1.0 } else { 0.0 }, 0.0);
-        let signals = Mat::from_fn(n + m, m, |i, j| if i < n { states[(i, j)] } else { one(i - n == j) });
-        Resolvent { signals, outputs, value }
+        let signals = Mat::from_fn(n + m, r, |i, j| if i < n { states[(i, j)] } else { excited[(i - n, j)] });
+        Resolvent { signals, outputs, moved: vec![c64::new(0.0, 0.0); n * r] }
     }
 
-    /// `dG_theta` with respect to one parameter, p x m.
-    fn slope(&self, slope: &SampledSlope) -> Mat<c64> {
-        let moved = times(slope.states.as_ref(), &self.signals);
-        let direct = times(slope.outputs.as_ref(), &self.signals);
-        &self.outputs * moved + direct
+    /// One entry of `G_theta U`.
+    fn value(&self, model: &StateSpace<Discrete>, i: usize, j: usize) -> c64 {
+        let n = model.order();
+        let row = |l: usize| if l < n { model.c()[(i, l)] } else { model.d()[(i, l - n)] };
+        (0..self.signals.nrows()).fold(c64::new(0.0, 0.0), |sum, l| sum + self.signals[(l, j)] * row(l))
+    }
+
+    /// `d(G_theta U)` with respect to one parameter, p x r, column by column.
+    fn slope(&mut self, slope: &SampledSlope, values: &mut [c64]) {
+        let (n, p) = (self.outputs.ncols(), self.outputs.nrows());
+        times(slope.states.as_ref(), &self.signals, &mut self.moved);
+        times(slope.outputs.as_ref(), &self.signals, values);
+        for (entry, value) in values.iter_mut().enumerate() {
+            let moved = &self.moved[entry / p * n..][..n];
+            *value +=
+                moved.iter().enumerate().fold(c64::new(0.0, 0.0), |sum, (l, x)| sum + self.outputs[(entry % p, l)] * x);
+        }
     }
 }
 
-/// A real matrix times a complex one.
-fn times(real: MatRef<'_, f64>, complex: &Mat<c64>) -> Mat<c64> {
-    let mut product = Mat::zeros(real.nrows(), complex.ncols());
-    for (b, column) in real.col_iter().enumerate() {
-        for (i, value) in column.iter().enumerate().filter(|(_, value)| **value != 0.0) {
-            for j in 0..complex.ncols() {
-                product[(i, j)] += complex[(b, j)] * *value;
-            }
+/// A real matrix times a complex one, column by column.
+fn times(real: MatRef<'_, f64>, complex: &Mat<c64>, product: &mut [c64]) {
+    let rows = real.nrows();
+    product.fill(c64::new(0.0, 0.0));
+    for (j, product) in product.chunks_exact_mut(rows).enumerate() {
+        for (l, column) in real.col_iter().enumerate() {
+            let factor = complex[(l, j)];
+            product.iter_mut().zip(column.iter()).for_each(|(sum, value)| *sum += factor * *value);
         }
     }
-    product
 }
 
 /// A real matrix as a complex one.

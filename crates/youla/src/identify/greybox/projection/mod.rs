@@ -1,9 +1,9 @@
 //! Projection of a black-box model, or of a measured frequency response, on a physical structure.
 //!
 //! ```text
-//! theta = arg min sum_k |W_k (G(e^(j omega_k ts)) - G_theta(e^(j omega_k ts)))|^2      entry by entry
+//! theta = arg min sum_k |W_k (Y_k - G_theta(e^(j omega_k ts)) U_k)|^2      entry by entry
 //! ```
-//! with `G_theta` the structure behind its zero-order hold: a weighted nonlinear least squares in the frequency domain (R.
+//! with the responses U and Y of inputs and outputs to the same excitations, `U = I` and `Y = G` for a plain response, and `G_theta` the structure behind its zero-order hold: a weighted nonlinear least squares in the frequency domain (R.
 //! Pintelon and J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed., 2012, chapter 9). Unlike a search
 //! in records it costs the same for any number of samples, and it forgets all states that the structure does not have.
 //!
@@ -20,6 +20,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use target::decayed;
 pub use target::{FrequencyTarget, logarithmic_grid};
 
 use super::{Stop, Structure};
@@ -37,7 +38,7 @@ use serde::{Deserialize, Serialize};
 ///
 /// ```
 /// let options = youla::identify::greybox::ProjectionOptions { polished: 1, ..Default::default() };
-/// assert_eq!(options.max_iterations, 50);
+/// assert_eq!(options.max_iterations, 30);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -59,11 +60,11 @@ pub struct ProjectionOptions {
 impl Default for ProjectionOptions {
     fn default() -> Self {
         ProjectionOptions {
-            reweightings: 8,
-            coarse: 50,
-            polished: 3,
-            max_iterations: 50,
-            tolerance: 1e-6,
+            reweightings: 4,
+            coarse: 30,
+            polished: 2,
+            max_iterations: 30,
+            tolerance: 1e-3,
             step_tolerance: 1e-12,
         }
     }
@@ -88,9 +89,9 @@ pub struct Projection {
     pub parameters: Vec<f64>,
     /// The structure at these behind a zero-order hold.
     pub model: StateSpace<Discrete>,
-    /// `sqrt(sum |W (G - G_theta)|^2 / sum |W G|^2)`.
+    /// `sqrt(sum |W (Y - G_theta U)|^2 / sum |W Y|^2)`.
     pub misfit: f64,
-    /// The same of each entry by itself, p x m; NaN for one without weight.
+    /// The same of each entry by itself, p x r; NaN for one without weight.
     pub entries: Mat<f64>,
     /// Steps of the search.
     pub iterations: usize,
@@ -104,6 +105,8 @@ pub struct Projection {
 
 /// Projects a response on a structure. `starts` are parameter vectors to start from besides; none is needed for a structure
 /// that is linear in most parameters.
+///
+/// The entries of G, or of Y = G U, are compared behind the zero-order hold of the structure.
 ///
 /// # Errors
 /// [`Error::NoStart`] where neither the starts nor the linear least squares give a model; [`Error::Shape`],
@@ -207,7 +210,7 @@ fn linear(misfit: &Misfit<'_>, starts: &[Vec<f64>], options: &ProjectionOptions)
 
 fn describe(misfit: &Misfit<'_>, outcome: Outcome, origin: Origin, starts: usize) -> Result<Projection> {
     let Outcome { point, stop, iterations } = outcome;
-    let sums = misfit.entries(&point.sampled)?;
+    let sums = misfit.entries(&point.response);
     let sizes = misfit.target.entries();
     Ok(Projection {
         model: misfit.structure.model(&point.theta)?.zoh(misfit.target.time())?,

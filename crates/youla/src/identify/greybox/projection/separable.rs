@@ -2,14 +2,15 @@
 //! equation is multiplied out.
 //!
 //! Take p rows r of `s X = A X + B` out of the equations of the state response X. Where what is left and the measurement
-//! `C X = G - D` determine X at each frequency, the rows r are linear in the parameters that stand in them:
+//! `C X = Y - D U` determine X at each frequency, the rows r are linear in the parameters that stand in them:
 //! ```text
-//! [ (sI - A) without r ]     [ B without r ]
-//! [ C                  ] X = [ G - D       ],        s X_r = A_r(theta) X + B_r(theta)
+//! [ (sI - A) without r ]     [ (B without r) U ]
+//! [ C                  ] X = [ Y - D U         ],        s X_r = A_r(theta) X + B_r(theta) U
 //! ```
 //! For the bearing (3)-(6) this is `s^2 l = K l + D s l + B m, m = P/(s + P)`, linear in K, D, B for given actuator poles P. An
 //! error e of the rows r is one of `C (sI - A)^-1 e_r` in G: with theta of the iteration before as the weight the misfit
-//! counts where it is seen (C. K. Sanathanan and J. Koerner, IEEE Trans. Autom. Control 8 (1963), 56). The parameters that
+//! counts where it is seen; before the first, A without its rows r and `s + shift`, the shift in the middle of the band, so that low
+//! frequencies do not count alone (C. K. Sanathanan and J. Koerner, IEEE Trans. Autom. Control 8 (1963), 56). The parameters that
 //! stand elsewhere, for the bearing P, run over a grid.
 //!
 //! The equation is that of continuous time, the response that of the sampled model, `G_d = sum_k h(s_k) G(s_k)` with
@@ -17,12 +18,11 @@
 
 use super::super::structure::{Matrix, Slope, Structure};
 use super::design::{Range, design};
-use super::misfit::{Misfit, Point, complex};
+use super::misfit::{Misfit, Point};
 use crate::Result;
 use crate::linalg::regress;
-use crate::lti::{Continuous, StateSpace, frequency_response};
-use faer::linalg::solvers::Solve;
-use faer::{Mat, c64};
+use crate::lti::{Continuous, StateSpace};
+use faer::{Mat, MatRef, c64};
 
 /// Relative change of the misfit below which the weights have settled.
 const SETTLED: f64 = 1e-3;
@@ -61,12 +61,13 @@ impl Separation {
     pub(super) fn candidates(&self, misfit: &Misfit<'_>, probe: &[f64], reweightings: usize) -> Vec<Point> {
         let band = misfit.target.band(0.02);
         let ranges: Vec<Range> = self.outer.iter().map(|j| Range::of(misfit.structure, probe, *j, band)).collect();
+        let shift = (band[0] * band[1]).sqrt();
         let mut found: Vec<Point> = design(&ranges)
             .into_iter()
             .filter_map(|values| {
                 let mut theta = probe.to_vec();
                 self.outer.iter().zip(&values).for_each(|(j, value)| theta[*j] = *value);
-                self.fit(misfit, theta, reweightings)
+                self.fit(misfit, theta, reweightings, shift)
             })
             .collect();
         found.sort_by(|a, b| a.cost.total_cmp(&b.cost));
@@ -74,66 +75,79 @@ impl Separation {
     }
 
     /// The linear parameters for given outer ones, by iterative reweighting; the best of all iterations.
-    pub(super) fn fit(&self, misfit: &Misfit<'_>, mut theta: Vec<f64>, reweightings: usize) -> Option<Point> {
-        let mut best: Option<Point> = None;
-        let mut before: Option<Point> = None;
+    pub(super) fn fit(
+        &self,
+        misfit: &Misfit<'_>,
+        mut theta: Vec<f64>,
+        reweightings: usize,
+        shift: f64,
+    ) -> Option<Point> {
+        let mut found: Vec<Point> = Vec::new();
         for _ in 0..reweightings.max(1) {
-            let linear = self.solve(misfit, &theta, before.as_ref()).ok()?;
+            let linear = self.solve(misfit, &theta, found.last(), shift).ok()?;
             self.linear.iter().zip(&linear).for_each(|((j, _), value)| theta[*j] = *value);
             let Ok(point) = misfit.evaluate(&theta) else { break };
-            let settled = before.as_ref().is_some_and(|b| (b.cost - point.cost).abs() <= SETTLED * point.cost);
-            if best.as_ref().is_none_or(|b| point.cost < b.cost) {
-                best = misfit.evaluate(&theta).ok();
-            }
-            before = Some(point);
+            let settled = found.last().is_some_and(|b| (b.cost - point.cost).abs() <= SETTLED * point.cost);
+            found.push(point);
             if settled {
                 break;
             }
         }
-        best
+        found.into_iter().min_by(|a, b| a.cost.total_cmp(&b.cost))
     }
 
     /// One weighted linear least squares around `theta`; weights and aliases are those of `before`.
-    fn solve(&self, misfit: &Misfit<'_>, theta: &[f64], before: Option<&Point>) -> Result<Vec<f64>> {
+    fn solve(&self, misfit: &Misfit<'_>, theta: &[f64], before: Option<&Point>, shift: f64) -> Result<Vec<f64>> {
         let model = misfit.structure.model(theta)?;
+        let base = self.without_linear(&model, theta)?;
         let target = misfit.target;
-        let (p, m, ts) = (target.outputs(), target.inputs(), target.time().ts());
-        let sampled = before.map(|point| frequency_response(&point.sampled, target.omega())).transpose()?;
+        let (p, r, ts) = (target.outputs(), target.columns(), target.time().ts());
         let weighing = if before.is_some() { model.clone() } else { self.without_rows(&model)? };
-        let (each, columns) = (2 * p * m, self.linear.len());
+        let (each, columns) = (2 * p * r, self.linear.len());
         let count = each * target.omega().len();
         let mut regressors = Mat::zeros(count, columns);
         let mut targets = Mat::zeros(count, 1);
-        for (k, omega) in target.omega().iter().enumerate() {
-            let s = c64::new(0.0, *omega);
+        for k in 0..target.omega().len() {
+            let s = target.s(k);
             let hold = (c64::new(1.0, 0.0) - (-s * ts).exp()) / (s * ts);
-            let (through, continuous) = self.weigh(&weighing, s);
-            let aliases = |i: usize, j: usize| match &sampled {
-                Some(sampled) => sampled.at(k)[(i, j)] - hold * continuous[(i, j)],
-                None => c64::new(0.0, 0.0),
+            let (excited, weights) = (target.excited(k), target.weight(k));
+            let (through, continuous) = self.weigh(&weighing, if before.is_some() { s } else { s + shift });
+            let mut response = target.value(k).to_owned();
+            if let Some(before) = before {
+                let sampled = before.response.at(k);
+                let aliases = Mat::from_fn(p, excited.nrows(), |i, l| sampled[(i, l)] - hold * continuous[(i, l)]);
+                response -= aliases * excited;
+            }
+            let response = Mat::from_fn(p, r, |i, j| response[(i, j)] / hold);
+            let signals = self.signals(&model, s, &response, excited);
+            let sums = |row: MatRef<'_, f64>, offset: usize, j: usize| {
+                let terms = row.row(0).iter().enumerate().filter(|(_, value)| **value != 0.0);
+                terms.fold(c64::new(0.0, 0.0), |sum, (l, value)| sum + signals[(offset + l, j)] * *value)
             };
-            let measured = target.value(k);
-            let response = Mat::from_fn(p, m, |i, j| (measured[(i, j)] - aliases(i, j)) / hold - model.d()[(i, j)]);
-            let states = self.state_response(&model, s, &response);
-            let signal = |b: usize, j: usize, slope: &Slope| match slope.matrix {
-                Matrix::A => states[(b, j)] * slope.value,
-                _ => c64::new(if b == j { slope.value } else { 0.0 }, 0.0),
-            };
-            for j in 0..m {
+            let n = model.order();
+            for j in 0..r {
+                let left: Vec<c64> = self
+                    .rows
+                    .iter()
+                    .map(|row| {
+                        let known = sums(base.a().subrows(*row, 1), 0, j) + sums(base.b().subrows(*row, 1), n, j);
+                        s * signals[(*row, j)] - known
+                    })
+                    .collect();
                 for i in 0..p {
-                    let weight = hold * target.weight(k)[(i, j)];
+                    let weight = hold * weights[(i, j)];
                     let row = k * each + 2 * (i + j * p);
                     for (column, (_, slopes)) in self.linear.iter().enumerate() {
-                        let sum = slopes.iter().fold(c64::new(0.0, 0.0), |sum, slope| {
-                            sum + through[(i, self.place(slope.row))] * signal(slope.column, j, slope)
+                        let value = slopes.iter().fold(c64::new(0.0, 0.0), |sum, slope| {
+                            let offset = if slope.matrix == Matrix::A { 0 } else { n };
+                            let signal = signals[(offset + slope.column, j)] * slope.value;
+                            sum + through[(i, self.place(slope.row))] * signal
                         });
-                        let value = weight * sum;
+                        let value = weight * value;
                         (regressors[(row, column)], regressors[(row + 1, column)]) = (value.re, value.im);
                     }
-                    let left = (0..self.rows.len()).fold(c64::new(0.0, 0.0), |sum, r| {
-                        sum + through[(i, r)] * self.left(&model, theta, r, s, &states, j)
-                    });
-                    let value = weight * left;
+                    let sum = left.iter().enumerate().fold(c64::new(0.0, 0.0), |sum, (e, x)| sum + through[(i, e)] * x);
+                    let value = weight * sum;
                     (targets[(row, 0)], targets[(row + 1, 0)]) = (value.re, value.im);
                 }
             }
@@ -142,24 +156,16 @@ impl Separation {
         Ok(x.col(0).iter().copied().collect())
     }
 
-    /// `s X_r - A_r X - B_r` for input j without the terms of the linear parameters.
-    fn left(&self, model: &StateSpace<Continuous>, theta: &[f64], r: usize, s: c64, x: &Mat<c64>, j: usize) -> c64 {
-        let row = self.rows[r];
-        let mut sum = s * x[(row, j)] - model.b()[(row, j)];
-        for b in 0..model.order() {
-            sum -= x[(b, j)] * model.a()[(row, b)];
-        }
+    /// The model without the terms of the linear parameters.
+    fn without_linear(&self, model: &StateSpace<Continuous>, theta: &[f64]) -> Result<StateSpace<Continuous>> {
+        let (mut a, mut b) = (model.a().to_owned(), model.b().to_owned());
         for (parameter, slopes) in &self.linear {
-            for slope in slopes.iter().filter(|slope| slope.row == row) {
-                let value = slope.value * theta[*parameter];
-                match slope.matrix {
-                    Matrix::A => sum += x[(slope.column, j)] * value,
-                    _ if slope.column == j => sum += value,
-                    _ => {}
-                }
+            for slope in slopes {
+                let entry = if slope.matrix == Matrix::A { &mut a } else { &mut b };
+                entry[(slope.row, slope.column)] -= slope.value * theta[*parameter];
             }
         }
-        sum
+        StateSpace::new(a, b, model.c().to_owned(), model.d().to_owned(), Continuous)
     }
 
     /// Place of a state among the rows r.
@@ -169,31 +175,85 @@ impl Separation {
 
     /// `C (sI - A)^-1` at the rows r, p x p, and `G(s)`, p x m.
     fn weigh(&self, model: &StateSpace<Continuous>, s: c64) -> (Mat<c64>, Mat<c64>) {
-        let n = model.order();
-        let pencil =
-            Mat::from_fn(n, n, |i, j| if i == j { s - model.a()[(i, j)] } else { (-model.a()[(i, j)]).into() });
-        let outputs = pencil.partial_piv_lu().solve_transpose(complex(model.c().transpose()));
-        let through = Mat::from_fn(model.outputs(), self.rows.len(), |i, r| outputs[(self.rows[r], i)]);
-        let value = outputs.transpose() * complex(model.b()) + complex(model.d());
+        let (n, m, p) = (model.order(), model.inputs(), model.outputs());
+        let width = n + p;
+        let mut work = vec![c64::new(0.0, 0.0); n * width];
+        for (i, row) in work.chunks_exact_mut(width).enumerate() {
+            (0..n).for_each(|j| row[j] = (-model.a()[(j, i)]).into());
+            row[i] += s;
+            (0..p).for_each(|j| row[n + j] = model.c()[(j, i)].into());
+        }
+        solve_in_place(&mut work, n, width);
+        let outputs = |i: usize, state: usize| work[state * width + n + i];
+        let through = Mat::from_fn(p, self.rows.len(), |i, r| outputs(i, self.rows[r]));
+        let value = Mat::from_fn(p, m, |i, j| {
+            (0..n).fold(c64::new(model.d()[(i, j)], 0.0), |sum, l| sum + outputs(i, l) * model.b()[(l, j)])
+        });
         (through, value)
     }
 
-    /// The model with the rows r of A empty, for weights before anything is known: the chain of integrators.
+    /// The model with the rows r of A empty, for weights before anything is known: a chain of integrators, which is taken at
+    /// `s + shift` with a shift in the middle of the band, so that low frequencies do not count alone.
     fn without_rows(&self, model: &StateSpace<Continuous>) -> Result<StateSpace<Continuous>> {
         let n = model.order();
         let a = Mat::from_fn(n, n, |i, j| if self.rows.contains(&i) { 0.0 } else { model.a()[(i, j)] });
         StateSpace::new(a, model.b().to_owned(), model.c().to_owned(), model.d().to_owned(), Continuous)
     }
 
-    /// X, n x m, from the response of the outputs and the equations without the rows r.
-    fn state_response(&self, model: &StateSpace<Continuous>, s: c64, response: &Mat<c64>) -> Mat<c64> {
-        let kept: Vec<usize> = (0..model.order()).filter(|row| !self.rows.contains(row)).collect();
-        let equations = equations(model, &kept, s);
-        let right = Mat::from_fn(model.order(), model.inputs(), |i, j| match kept.get(i) {
-            Some(row) => c64::new(model.b()[(*row, j)], 0.0),
-            None => response[(i - kept.len(), j)],
-        });
-        equations.partial_piv_lu().solve(right)
+    /// `[X; U]`, (n + m) x r, X from the response of the outputs and the equations without the rows r.
+    fn signals(
+        &self,
+        model: &StateSpace<Continuous>,
+        s: c64,
+        response: &Mat<c64>,
+        excited: MatRef<'_, c64>,
+    ) -> Mat<c64> {
+        let (n, m, r) = (model.order(), model.inputs(), excited.ncols());
+        let width = n + r;
+        let kept: Vec<usize> = (0..n).filter(|row| !self.rows.contains(row)).collect();
+        let left = equations(model, &kept, s);
+        let through = |gain: MatRef<'_, f64>, i: usize, j: usize| {
+            (0..m).fold(c64::new(0.0, 0.0), |sum, l| sum + excited[(l, j)] * gain[(i, l)])
+        };
+        let mut work = vec![c64::new(0.0, 0.0); n * width];
+        for (i, row) in work.chunks_exact_mut(width).enumerate() {
+            (0..n).for_each(|j| row[j] = left[(i, j)]);
+            (0..r).for_each(|j| {
+                row[n + j] = match kept.get(i) {
+                    Some(state) => through(model.b(), *state, j),
+                    None => response[(i - kept.len(), j)] - through(model.d(), i - kept.len(), j),
+                }
+            });
+        }
+        solve_in_place(&mut work, n, width);
+        Mat::from_fn(n + m, r, |i, j| if i < n { work[i * width + n + j] } else { excited[(i - n, j)] })
+    }
+}
+
+/// Solves `[M, B]` (row after row, n rows) for `M^-1 B` by elimination with partial pivoting. A singular M gives values that are
+/// not finite.
+fn solve_in_place(work: &mut [c64], n: usize, width: usize) {
+    for k in 0..n {
+        let size = |row: usize| work[row * width + k].norm_sqr();
+        let pivot = (k..n).fold(k, |best, row| if size(row) > size(best) { row } else { best });
+        let (upper, lower) = work.split_at_mut((k + 1) * width);
+        let top = &mut upper[k * width..];
+        if pivot > k {
+            top.swap_with_slice(&mut lower[(pivot - k - 1) * width..][..width]);
+        }
+        for row in lower.chunks_exact_mut(width) {
+            let factor = row[k] / top[k];
+            row[k..].iter_mut().zip(&top[k..]).for_each(|(value, top)| *value -= factor * top);
+        }
+    }
+    for k in (0..n).rev() {
+        let (above, row) = work.split_at_mut(k * width);
+        let pivot = row[k];
+        row[n..width].iter_mut().for_each(|value| *value /= pivot);
+        for other in above.chunks_exact_mut(width) {
+            let factor = other[k];
+            other[n..].iter_mut().zip(&row[n..width]).for_each(|(value, x)| *value -= factor * x);
+        }
     }
 }
 

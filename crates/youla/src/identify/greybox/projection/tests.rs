@@ -38,7 +38,7 @@ fn linear_least_squares_is_exact_at_the_true_poles() {
     let mut probe = vec![1.0; 14];
     probe[12..].copy_from_slice(&truth[12..]);
     let separation = Separation::of(&BearingStructure, &probe, c64::new(0.0, 1000.0)).unwrap().unwrap();
-    let found = separation.fit(&misfit, probe, 60).unwrap();
+    let found = separation.fit(&misfit, probe, 60, 1000.0).unwrap();
     assert!(error(&found.theta, &truth) < 1e-3, "{:.1e}", error(&found.theta, &truth));
     assert!(found.cost.sqrt() < 1e-4 * misfit.size, "{:.1e}", found.cost.sqrt() / misfit.size);
 }

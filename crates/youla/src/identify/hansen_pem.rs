@@ -109,10 +109,10 @@ pub struct HansenPem {
 }
 
 impl HansenPem {
-    /// Whether the structure stays behind G(S) by more than [`LOST_POINTS`] on an output: the search is lost, or the
-    /// structure does not describe the plant.
+    /// Whether the structure stays behind G(S), or behind a constant, by more than [`LOST_POINTS`] on an output: the search is
+    /// lost, or the structure does not describe the plant.
     pub fn lost(&self) -> bool {
-        self.model.fit.iter().zip(&self.fit_of_plant).any(|(fit, plant)| *fit < plant - LOST_POINTS)
+        self.model.fit.iter().zip(&self.fit_of_plant).any(|(fit, plant)| *fit < plant.max(0.0) - LOST_POINTS)
     }
 }
 

@@ -653,6 +653,11 @@ pub enum Error {
         /// The parameter of the derivative, `None` for the value itself.
         parameter: Option<String>,
     },
+    /// There is nothing to start a projection from.
+    #[error(
+        "the structure is not linear in its parameters and no start gives a model; give a parameter vector to start from"
+    )]
+    NoStart,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]

@@ -10,6 +10,7 @@ const ROLE_STYLES = {
   pem_multi_start: { colour: "--pem-multi-start", dash: [5, 2], width: 1.7, marker: "triangle-down", point: "triangle-down" },
   direct: { colour: "--direct", dash: [9, 3, 2, 3], width: 1.7, marker: "square", point: "square" },
   hansen: { colour: "--hansen", dash: [], width: 1.9, marker: "cross", point: "circle" },
+  hansen_pem: { colour: "--hansen-pem", dash: [14, 2, 2, 2], width: 1.8, marker: "hourglass", point: "diamond" },
   hansen_reduced: { colour: "--hansen-reduced", dash: [7, 4], width: 1.7, marker: "circle", point: "diamond" },
 };
 const OTHER_STYLES = [

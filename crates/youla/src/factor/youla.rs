@@ -66,11 +66,20 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     /// # Errors
     /// Ports, sample times, or `M + U S` without invertible feedthrough.
     pub fn plant_of_right(&self, s: &StateSpace<T>) -> Result<StateSpace<T>> {
+        self.right_factors_of(s)?.divide_by_first_outputs(self.inputs())
+    }
+
+    /// The right factors `[M + U S; N + V S]` of G(S): from alpha to the parts of (u, y) that alpha causes. Always stable for
+    /// a stable S, whatever the plant.
+    ///
+    /// # Errors
+    /// Ports or sample times.
+    pub fn right_factors_of(&self, s: &StateSpace<T>) -> Result<StateSpace<T>> {
         let m = self.inputs();
         let c = block(&[&[Mat::zeros(m, s.order()).as_ref()], &[s.c()]]);
         let d = block(&[&[eye(m).as_ref()], &[s.d()]]);
         let column = StateSpace::new(s.a().to_owned(), s.b().to_owned(), c, d, s.time())?;
-        column.then(self.right().system())?.divide_by_first_outputs(m)
+        column.then(self.right().system())
     }
 
     /// `G(S) = (Mt + S Ut)^-1 (Nt + S Vt)` of (17), from the left factors.

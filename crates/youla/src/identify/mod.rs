@@ -3,5 +3,6 @@
 pub mod direct;
 pub mod greybox;
 pub mod hansen;
+pub mod hansen_pem;
 pub mod innovation_form;
 pub mod subspace;

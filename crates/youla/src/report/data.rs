@@ -91,6 +91,8 @@ pub enum Role {
     Hansen,
     /// The Hansen model after reduction.
     HansenReduced,
+    /// Prediction error from the projection of the Hansen model.
+    HansenPem,
     /// Any further method; colours are taken from the rest of the palette.
     Other,
 }
@@ -140,6 +142,11 @@ impl Method {
     /// `hansen_reduced`: the same after reduction.
     pub fn hansen_reduced() -> Self {
         Self::new("hansen_reduced", "Hansen reduced G_red(S)", Role::HansenReduced)
+    }
+
+    /// `hansen_pem`: prediction error, started at the projection of the Hansen model.
+    pub fn hansen_pem() -> Self {
+        Self::new("hansen_pem", "PEM from Hansen", Role::HansenPem)
     }
 }
 

@@ -8,6 +8,7 @@ use crate::control::closed_loop;
 use crate::identify::direct::direct;
 use crate::identify::greybox::{BearingStructure, GreyBoxModel, greybox};
 use crate::identify::hansen::{HansenModel, hansen};
+use crate::identify::hansen_pem::{HansenPemOptions, pem_from_hansen};
 use crate::identify::subspace;
 use crate::linalg::block;
 use crate::lti::{Discrete, StateSpace, simulate};
@@ -191,6 +192,7 @@ impl LoopData<'_> {
                 let found = self.hansen(settings)?;
                 Ok(from_s(reduce(&found.plant, &settings.reduction)?.model, &found))
             }
+            Method::HansenPem => self.hansen_pem(settings),
         }
     }
 
@@ -219,6 +221,20 @@ impl LoopData<'_> {
     fn hansen(&self, settings: &PaperSettings) -> Result<HansenModel> {
         let signals = self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref())?;
         hansen(&self.design.factors, &[signals], &settings.hansen)
+    }
+
+    /// The prediction-error method from the projection of G(S) and from the nominal model, the lower criterion of both.
+    fn hansen_pem(&self, settings: &PaperSettings) -> Result<Found> {
+        let signals = [self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref())?];
+        let found = hansen(&self.design.factors, &signals, &settings.hansen)?;
+        let note = reflected(&found);
+        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
+        let options = HansenPemOptions { pem: settings.pem.clone(), ..Default::default() };
+        let factors = &self.design.factors;
+        let nominal = BearingStructure::parameters(&self.start);
+        let nominal = Some(nominal.as_slice());
+        let model = pem_from_hansen(found, factors, &signals, &experiment, &BearingStructure, nominal, &options)?.model;
+        Ok(Found { model: model.model, steps: Some(model.iterations), note })
     }
 
     /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.

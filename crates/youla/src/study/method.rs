@@ -18,12 +18,21 @@ pub enum Method {
     Hansen,
     /// `G_red(S)` of eq. (29).
     HansenReduced,
+    /// Grey-box prediction error, started at the projection of G(S).
+    HansenPem,
 }
 
 impl Method {
     /// All methods in the order in which they are listed.
-    pub const ALL: [Method; 6] =
-        [Method::Nominal, Method::Pem, Method::PemMultiStart, Method::Direct, Method::Hansen, Method::HansenReduced];
+    pub const ALL: [Method; 7] = [
+        Method::Nominal,
+        Method::Pem,
+        Method::PemMultiStart,
+        Method::Direct,
+        Method::Hansen,
+        Method::HansenReduced,
+        Method::HansenPem,
+    ];
 
     /// Key in files.
     pub fn key(self) -> &'static str {
@@ -34,6 +43,7 @@ impl Method {
             Method::Direct => "direct",
             Method::Hansen => "hansen",
             Method::HansenReduced => "hansen_reduced",
+            Method::HansenPem => "hansen_pem",
         }
     }
 
@@ -46,6 +56,7 @@ impl Method {
             Method::Direct => "direct N4SID",
             Method::Hansen => "Hansen G(S)",
             Method::HansenReduced => "Hansen reduced G_red(S)",
+            Method::HansenPem => "PEM from Hansen",
         }
     }
 

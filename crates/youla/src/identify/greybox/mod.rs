@@ -19,12 +19,14 @@
 mod bearing;
 mod bounds;
 mod closure;
+mod cost;
 mod criterion;
 mod declared;
 mod delays;
 mod identifiability;
 mod levenberg;
 mod narrow;
+mod projection;
 mod robust;
 mod sampled;
 mod sensitivity;
@@ -36,10 +38,13 @@ mod uncertainty;
 pub use bearing::BearingStructure;
 pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
+pub use cost::greybox_cost;
 pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub(crate) use projection::decayed;
+pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 

@@ -38,15 +38,17 @@ pub(super) fn controllers(paper: &Paper) -> Figure {
 /// Fit over theta for PEM and Hansen.
 pub(super) fn figure_4(paper: &Paper) -> Figure {
     let panels = AXES.iter().enumerate().map(|(i, name)| {
-        let curves = [Method::Pem, Method::Hansen].into_iter().flat_map(|m| [cloud(paper, m, i), medians(paper, m, i)]);
+        let curves = [Method::Pem, Method::Hansen, Method::HansenPem]
+            .into_iter()
+            .flat_map(|m| [cloud(paper, m, i), medians(paper, m, i)]);
         panel(paper, name, fit_axis(name), curves.filter(|c| !c.x.is_empty()).collect())
     });
     Figure {
         key: "figure-4".into(),
         title: "Figure 4".into(),
         caption:
-            "Fit (26) on the record without noise over theta for PEM and the Hansen scheme, one point per nominal \
-                  model, with the medians of the tenths of theta as lines; points at the lower edge lie below it, and \
+            "Fit (26) on the record without noise over theta for PEM, the Hansen scheme and PEM started at its result, \
+                  one point per nominal model, with the medians of the tenths of theta as lines; points at the lower edge lie below it, and \
                   those of their own shape have no model."
                 .into(),
         layout: Layout::Stacked,
@@ -57,7 +59,7 @@ pub(super) fn figure_4(paper: &Paper) -> Figure {
 /// Boxes of the fit, direct identification against Hansen.
 pub(super) fn figure_5(paper: &Paper) -> Figure {
     let values = |m: Method, i: usize| of(paper, m).iter().map(|r| r.fit[i]).collect::<Vec<_>>();
-    let compared = [Method::Direct, Method::Hansen];
+    let compared = [Method::Direct, Method::Hansen, Method::HansenPem];
     let lowest = compared.iter().flat_map(|m| [0, 1].map(|i| whisker(&values(*m, i)))).fold(90.0, f64::min);
     let view = [((lowest / 10.0).floor() * 10.0).clamp(-20.0, 90.0), 100.0];
     let panels = AXES.iter().enumerate().map(|(i, name)| {
@@ -74,7 +76,7 @@ pub(super) fn figure_5(paper: &Paper) -> Figure {
         key: "figure-5".into(),
         title: "Figure 5".into(),
         caption: "Fit (26) on the record without noise of all nominal models, direct subspace identification against \
-                  the Hansen scheme; loops without a model count as the lowest, points at the lower edge lie below it."
+                  the Hansen scheme, and PEM started at its result; loops without a model count as the lowest, points at the lower edge lie below it."
             .into(),
         layout: Layout::Beside,
         panels: panels.collect(),

@@ -60,7 +60,7 @@ fn where_pem_arrives(paper: &Paper) -> Option<String> {
     let usable: Vec<&Row> = paper.study.iter().filter(|r| r.method == Method::Pem && !r.failed()).collect();
     let rivals = |p: &Row| {
         let other =
-            |r: &&Row| r.item == p.item && !matches!(r.method, Method::Nominal | Method::Pem | Method::PemMultiStart);
+            |r: &&Row| r.item == p.item && matches!(r.method, Method::Direct | Method::Hansen | Method::HansenReduced);
         paper.study.iter().filter(other).map(Row::worse_fit).fold(f64::NEG_INFINITY, f64::max)
     };
     let best = usable.iter().filter(|p| p.worse_fit() >= rivals(p)).count();

@@ -26,6 +26,7 @@ fn drawn(method: Method) -> data::Method {
         Method::Direct => data::Method::direct(),
         Method::Hansen => data::Method::hansen(),
         Method::HansenReduced => data::Method::hansen_reduced(),
+        Method::HansenPem => data::Method::hansen_pem(),
     }
 }
 

@@ -10,12 +10,13 @@ use crate::rig::BearingRig;
 use crate::study::{Method, Paper};
 
 /// The methods of Table 1, each with its row of the paper's table.
-pub(super) const TABLE_1: [(Method, Option<usize>); 5] = [
+pub(super) const TABLE_1: [(Method, Option<usize>); 6] = [
     (Method::Nominal, Some(0)),
     (Method::Pem, Some(1)),
     (Method::PemMultiStart, None),
     (Method::Hansen, Some(2)),
     (Method::HansenReduced, Some(3)),
+    (Method::HansenPem, None),
 ];
 
 /// Table 1, the paper's numbers beneath ours.

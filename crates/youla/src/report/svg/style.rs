@@ -68,6 +68,7 @@ impl<'a> Styles<'a> {
             Role::Direct => style("#d55e00", 0.85, &[4.5, 1.5, 1.0, 1.5], Marker::Square),
             Role::Hansen => style("#0072b2", 0.95, &[], Marker::Circle),
             Role::HansenReduced => style("#009e73", 0.85, &[3.5, 2.0], Marker::Diamond),
+            Role::HansenPem => style("#5b2ca0", 0.9, &[8.0, 1.2, 1.2, 1.2], Marker::Cross),
             Role::Other => OTHER_STYLES[others % OTHER_STYLES.len()],
         }
     }

@@ -93,3 +93,33 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
         }
     }
 }
+
+/// A declared structure in a run: from a nominal model with half of A and without any initial value in use, the projection of
+/// G(S) and the prediction-error method reach the fit of the plant itself, and its 14 parameters within four deviations.
+#[test]
+fn a_declared_structure_is_estimated_from_the_scheme_on() {
+    use youla::identify::greybox::{BearingStructure, Declaration, GreyBoxOptions, Template};
+    use youla::identify::hansen_pem::PemStart;
+    use youla::run::GreyBoxSettings;
+    let mut demo = demo(2).unwrap();
+    let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };
+    let pem = GreyBoxOptions::default();
+    demo.settings.grey_box = Some(GreyBoxSettings { structure, start_from_initial: false, pem });
+    let mut silent = |_| ();
+    let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap();
+    let run = found.grey_box.as_ref().unwrap().as_ref().unwrap();
+    assert!(run.found.won == PemStart::Projection && !run.found.lost());
+    let fit = |method: Method| found.verdict.of(method).unwrap().records[0].fit.clone();
+    for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
+        assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");
+    }
+    let truth = BearingStructure::parameters(&youla::rig::Bearing::default());
+    let deviations = run.found.model.standard_deviations().unwrap();
+    for ((value, deviation), truth) in run.found.model.parameters.iter().zip(deviations).zip(truth) {
+        assert!((value - truth).abs() < 4.0 * deviation, "{value} against {truth}, deviation {deviation}");
+    }
+    let folder = std::env::temp_dir().join(format!("youla-grey-box-{}", std::process::id()));
+    let written = youla::run::write_run(&found, &folder, false, &mut StageClock::new(&mut |_| ()));
+    std::fs::remove_dir_all(&folder).ok();
+    written.unwrap();
+}

@@ -54,6 +54,9 @@ pub struct ReportData {
     pub poles: Vec<Poles>,
     /// Modes of each model.
     pub modes: Vec<Mode>,
+    /// Parameters of a physical structure, estimated and derived ones; empty without one.
+    #[serde(default)]
+    pub parameters: Vec<PhysicalParameter>,
     /// Hankel singular values of the reduction.
     pub reduction: Option<Reduction>,
     /// Loop certificate of each model.
@@ -273,6 +276,23 @@ pub struct OrderChoice {
     pub values: Vec<f64>,
     /// The order that was taken.
     pub chosen: usize,
+}
+
+/// A parameter of a physical structure.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PhysicalParameter {
+    /// Name.
+    pub name: String,
+    /// Unit, empty where none is declared.
+    pub unit: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation, where it is known.
+    pub deviation: Option<f64>,
+    /// Whether it ended at a bound.
+    pub at_bound: bool,
+    /// Whether it follows from the others.
+    pub derived: bool,
 }
 
 /// The stabilisation diagram of one method.

@@ -255,6 +255,11 @@ impl Writer<'_> {
                 self.folder.json(&format!("{name}/uncertainty.json"), &file)?;
             }
         }
+        match &found.grey_box {
+            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, run.details()?)?,
+            Some(Err(e)) => self.folder.json("4-identify/grey_box.json", &refused(e))?,
+            None => {}
+        }
         match &found.reduction {
             Some(Ok(r)) => {
                 let details = serde_json::json!({

@@ -172,6 +172,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         hansen: SubspaceOptions { uncertainty, ..subspace },
         deviation: DeviationOptions::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
+        grey_box: None,
         stabilisation: StabilisationSettings::default(),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },

@@ -3,6 +3,7 @@
 use super::pipeline::Identification;
 use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::hansen_pem::PemStart;
 use crate::identify::innovation_form::Settling;
 use crate::identify::subspace::{Uncertainty, amplitudes};
 use crate::report::data::{Evidence, Note, Status, Verdict};
@@ -14,6 +15,7 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
         loop_line(found),
         deviation_line(found),
         evidence_line(found),
+        grey_box_line(found),
         controller_line(found),
         factor_line(found),
     ]
@@ -48,6 +50,15 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         if unstable + failed > 0 {
             let text = format!("Of the resampled records {unstable} gave an unstable S and {failed} none.");
             add(Status::Info, text);
+        }
+    }
+    if let Some(Ok(run)) = &found.grey_box {
+        let model = &run.found.model;
+        for sentence in model.undetermined.sentences() {
+            add(Status::Caution, format!("Grey box: {sentence}."));
+        }
+        for bound in &model.at_bounds {
+            add(Status::Caution, format!("Grey box: {} ended at its bound {}.", bound.parameter, bound.value));
         }
     }
     for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
@@ -191,6 +202,28 @@ fn evidence_line(found: &Identification) -> Option<Verdict> {
         (Status::Caution, text)
     };
     Some(Verdict { status, text, evidence: Evidence::Frequency })
+}
+
+/// Whether the physical structure explains what G(S) explains.
+fn grey_box_line(found: &Identification) -> Option<Verdict> {
+    let run = found.grey_box.as_ref()?.as_ref().ok()?;
+    let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
+    let (model, plant) = (fit(&run.found.model.fit), fit(&run.found.fit_of_plant));
+    let start = match run.found.won {
+        PemStart::Projection => "the projection of G(S)",
+        PemStart::Nominal => "its initial values",
+    };
+    let text = format!(
+        "The physical structure explains the estimation records with a fit of {model} per output, G(S) {plant} (found from {start})."
+    );
+    let (status, text) = match run.found.lost() {
+        true => (
+            Status::Caution,
+            text + " It stays behind: the search is lost, or the structure does not describe the plant.",
+        ),
+        false => (Status::Good, text),
+    };
+    Some(Verdict { status, text, evidence: Evidence::Fits })
 }
 
 fn controller_line(found: &Identification) -> Option<Verdict> {

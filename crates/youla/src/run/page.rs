@@ -2,6 +2,7 @@
 
 use super::artefacts::pairs;
 use super::findings::{notes, verdict_lines};
+use super::grey_box::ParameterRow;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::response::{decibel, log_grid, model_responses};
@@ -48,6 +49,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         frequency: Some(frequency(found)?),
         poles: found.verdict.models.iter().map(poles).collect(),
         modes: found.verdict.models.iter().flat_map(|v| modes(found, v)).collect(),
+        parameters: parameters(found)?,
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
         bezout_residual: Some(found.factorisation.bezout_residual),
@@ -89,6 +91,7 @@ fn method(method: Method) -> draw::Method {
         Method::Direct => Role::Direct,
         Method::Hansen => Role::Hansen,
         Method::HansenReduced => Role::HansenReduced,
+        Method::GreyBox => Role::HansenPem,
         Method::TruePlant => Role::Other,
     };
     draw::Method::new(method.key(), method.label(), role)
@@ -294,6 +297,20 @@ fn modes(found: &Identification, v: &ModelVerdict) -> Vec<draw::Mode> {
         }
     };
     v.modes.iter().enumerate().map(mode).collect()
+}
+
+/// The parameters of the physical structure; empty without one.
+fn parameters(found: &Identification) -> Result<Vec<draw::PhysicalParameter>> {
+    let Some(Ok(run)) = &found.grey_box else { return Ok(Vec::new()) };
+    let row = |row: ParameterRow| draw::PhysicalParameter {
+        name: row.name,
+        unit: row.unit,
+        value: row.value,
+        deviation: row.deviation,
+        at_bound: row.at_bound.is_some(),
+        derived: row.derived,
+    };
+    Ok(run.rows()?.into_iter().map(row).collect())
 }
 
 fn reduction(found: &Identification) -> Option<draw::Reduction> {

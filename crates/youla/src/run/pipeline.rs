@@ -1,6 +1,7 @@
 //! The driver: from records, nominal model and controller to models with evidence. Read this file first.
 
 use super::factorise::{Factorisation, factorise_run};
+use super::grey_box::{GreyBoxRun, grey_box};
 use super::records::RunRecords;
 use super::response::{check_grid, indirect};
 use super::settings::{RunSettings, StabilisationSettings};
@@ -116,6 +117,8 @@ pub struct Identification {
     pub reduction: Option<Result<Reduction<Discrete>>>,
     /// The direct model where it was asked for, or the reason why there is none.
     pub direct: Option<Result<SubspaceModel>>,
+    /// The physical structure where one was declared, or the reason why it has no estimate.
+    pub grey_box: Option<Result<GreyBoxRun>>,
     /// Stabilisation diagrams.
     pub diagrams: Diagrams,
     /// The non-parametric response of the plant where an excitation is known, or the reason why there is none.
@@ -157,6 +160,7 @@ impl Identification {
         [
             refusal(Method::Direct.key(), "direct model", &self.direct),
             refusal(Method::HansenReduced.key(), "reduced model", &self.reduction),
+            refusal(Method::GreyBox.key(), "grey-box model", &self.grey_box),
             refusal("stabilisation", "stabilisation diagram of S", &self.diagrams.deviation),
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", &self.diagrams.direct),
             refusal("indirect", "indirect frequency response", &self.indirect),
@@ -236,11 +240,14 @@ pub fn identify(
     let signals =
         clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
     require_length(&settings.hansen, &records, signals.settle)?;
-    let (scheme, direct) = clock.run(Stage::Identify, || {
-        rayon::join(
+    let (scheme, direct, grey_box) = clock.run(Stage::Identify, || {
+        let (scheme, direct) = rayon::join(
             || scheme(factors, &signals, &records, &settings), // (25), (17)
             || settings.direct.as_ref().map(|options| direct(&records, options, &settings.stabilisation)),
-        )
+        );
+        let hansen = scheme.as_ref().ok().map(|(hansen, _)| hansen);
+        let grey_box = hansen.and_then(|hansen| grey_box(factors, &signals, &records, hansen, &settings));
+        (scheme, direct, grey_box)
     });
     let (hansen, deviation_diagram) = scheme.map_err(|e| e.within(deviation_context(&signals)))?;
     let (direct, direct_diagram) = match direct {
@@ -260,6 +267,7 @@ pub fn identify(
         uncertainty: None,
         reduction,
         direct,
+        grey_box,
         diagrams,
         indirect: None,
     };

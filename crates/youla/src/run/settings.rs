@@ -2,6 +2,7 @@
 
 use super::disturbance::DisturbanceSettings;
 use super::explain::{explain, problem_at};
+use super::grey_box::GreyBoxSettings;
 use super::models::{ControllerSettings, NominalModel};
 use super::segments;
 use crate::identify::innovation_form::DeviationOptions;
@@ -42,6 +43,9 @@ pub struct RunSettings {
     /// Reduction of G(S); left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionOptions>,
+    /// A physical structure, estimated from the result of the scheme on; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grey_box: Option<GreyBoxSettings>,
     /// The stabilisation diagrams of S and of the direct model.
     #[serde(default)]
     pub stabilisation: StabilisationSettings,

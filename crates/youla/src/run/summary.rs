@@ -66,6 +66,10 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Value {
         let modes = uncertainty.plant.modes.iter().map(|band| with_deviations(json!({}), band));
         entry["modes"] = modes.collect::<Vec<_>>().into();
     }
+    if let (Method::GreyBox, Some(Ok(run))) = (v.method, &found.grey_box) {
+        entry["parameters"] = json!(run.rows().unwrap_or_default());
+        entry["lost"] = json!(run.found.lost());
+    }
     if matches!(v.method, Method::Hansen | Method::HansenReduced) {
         entry["s_order"] = json!(found.hansen.deviation.model.order());
         entry["s_stable"] = json!(found.hansen.deviation.stability.stable);

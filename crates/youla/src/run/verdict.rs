@@ -24,6 +24,8 @@ pub enum Method {
     Hansen,
     /// `G_red(S)`.
     HansenReduced,
+    /// The physical structure, by the prediction-error method.
+    GreyBox,
     /// The simulated plant itself; in simulations only.
     TruePlant,
 }
@@ -36,6 +38,7 @@ impl Method {
             Method::Direct => "direct",
             Method::Hansen => "hansen",
             Method::HansenReduced => "hansen_reduced",
+            Method::GreyBox => "grey_box",
             Method::TruePlant => "true_plant",
         }
     }
@@ -47,6 +50,7 @@ impl Method {
             Method::Direct => "direct N4SID",
             Method::Hansen => "Hansen G(S)",
             Method::HansenReduced => "reduced G_red(S)",
+            Method::GreyBox => "grey-box PEM",
             Method::TruePlant => "true plant",
         }
     }
@@ -82,7 +86,7 @@ pub struct ModelVerdict {
     pub records: Vec<RecordVerdict>,
 }
 
-/// The evidence on all models, in the order nominal, direct, Hansen, reduced.
+/// The evidence on all models, in the order nominal, direct, Hansen, reduced, grey box.
 #[derive(Debug, Clone, Default)]
 pub struct Verdict {
     /// One entry per model that exists.
@@ -108,6 +112,9 @@ pub(super) fn verify(found: &Identification) -> Result<Verdict> {
     models.push((Method::Hansen, &found.hansen.plant));
     if let Some(Ok(reduction)) = &found.reduction {
         models.push((Method::HansenReduced, &reduction.model));
+    }
+    if let Some(Ok(grey_box)) = &found.grey_box {
+        models.push((Method::GreyBox, &grey_box.found.model.model));
     }
     if let Some(plant) = &found.records.true_plant {
         models.push((Method::TruePlant, plant));

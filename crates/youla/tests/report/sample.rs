@@ -160,6 +160,16 @@ fn report(plan: &Plan) -> ReportData {
         stages: [("read", 0.412), ("factor", 0.003), ("signals", 0.061), ("identify", 0.743), ("validate", 0.218)]
             .map(|(name, seconds)| Stage { name: name.into(), seconds })
             .into(),
+        parameters: ["stiffness", "damping"]
+            .map(|name| PhysicalParameter {
+                name: name.into(),
+                unit: "1/s".into(),
+                value: 1.7e6,
+                deviation: (name == "damping").then_some(2e3),
+                at_bound: name == "stiffness",
+                derived: false,
+            })
+            .into(),
         reduction: Some(Reduction {
             label: "G(S) of order 12 by balanced truncation".into(),
             hankel: vec![31.0, 29.5, 12.1, 11.4, 0.21, 0.12, 0.03, 0.01, 2e-3, 1e-3, 3e-4, 1e-6],

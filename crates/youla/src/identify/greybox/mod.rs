@@ -211,8 +211,7 @@ pub fn greybox(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    // On a thread of the pool, which the steps within need not wake then.
-    rayon::scope(|_| estimate(structure, start, experiments, time, None, options))
+    estimate(structure, start, experiments, time, None, options)
 }
 
 /// The same through the loop: the model is simulated under the controller that ran, from the external signal w alone, and
@@ -238,8 +237,7 @@ pub fn greybox_in_loop(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    let closure = Some(Closure::new(controller, output));
-    rayon::scope(|_| estimate(structure, start, experiments, time, closure, options))
+    estimate(structure, start, experiments, time, Some(Closure::new(controller, output)), options)
 }
 
 fn estimate(

@@ -17,8 +17,8 @@ use faer::{Mat, MatRef};
 
 /// Columns that are advanced together.
 const LANES: usize = 8;
-/// Samples folded in at a time, while the next ones are computed; small enough to stay in the cache.
-const PIECE: usize = 256;
+/// Samples folded in at a time; small enough to stay in the cache.
+const PIECE: usize = 128;
 /// Sensitivities below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
 
@@ -47,12 +47,9 @@ pub(super) fn condense(
 ) -> Result<Mat<f64>> {
     let mut rows = Rows::new(samples, system, slopes, x0, initial)?;
     let mut triangle = NarrowTriangle::new(rows.columns + 1);
-    let (mut now, mut next) = (Vec::new(), Vec::new());
-    let mut count = rows.fill(&mut now)?;
-    while count > 0 {
-        let (filled, ()) = rayon::join(|| rows.fill(&mut next), || triangle.fold(&mut now, count));
-        count = filled?;
-        std::mem::swap(&mut now, &mut next);
+    let mut piece = Vec::new();
+    while let count @ 1.. = rows.fill(&mut piece)? {
+        triangle.fold(&mut piece, count);
     }
     Ok(triangle.into_factor())
 }

@@ -74,6 +74,7 @@ pub mod factor;
 pub mod identify;
 pub mod linalg;
 pub mod lti;
+mod quantile;
 pub mod record;
 pub mod reduce;
 pub mod report;

@@ -22,11 +22,7 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     let number = |v: &f64| if v.is_nan() { f64::NEG_INFINITY } else { *v };
     let mut sorted: Vec<f64> = values.iter().map(number).collect();
     sorted.sort_by(f64::total_cmp);
-    let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
-    let place = share * last as f64;
-    let (below, part) = (place.floor() as usize, place.fract());
-    let low = sorted[below];
-    if part == 0.0 || low.is_infinite() { low } else { low + part * (sorted[below + 1] - low) }
+    crate::quantile::quantile(&sorted, share)
 }
 
 /// The middle value.

@@ -1,9 +1,10 @@
 //! What a box shows of a sample.
 
+use crate::quantile::quantile;
+
 /// Median, quartiles, whiskers and what lies beyond them.
 ///
-/// Quartiles are interpolated linearly between the sorted values (definition 7 of Hyndman and Fan 1996). A whisker reaches
-/// to the last value within 1.5 quartile ranges of its quartile. NaN is counted and takes no part.
+/// A whisker reaches to the last value within 1.5 quartile ranges of its quartile. NaN is counted and takes no part.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Spread {
     pub(super) median: f64,
@@ -28,13 +29,6 @@ impl Spread {
         let last = inside.last().map_or(high, |value| value.max(high));
         Some(Spread { median, quartiles: [low, high], whiskers: [first, last], beyond })
     }
-}
-
-fn quantile(sorted: &[f64], share: f64) -> f64 {
-    let place = share * (sorted.len() - 1) as f64;
-    let (below, rest) = (place as usize, place.fract());
-    // Infinite values are allowed, and infinity times zero is not a number.
-    if rest == 0.0 { sorted[below] } else { sorted[below] * (1.0 - rest) + sorted[below + 1] * rest }
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 
 use super::{DiagramPole, Linkage, StabilisationOptions, Standing, modal_assurance};
 use crate::lti::{Discrete, TimeDomain};
+use crate::quantile::quantile;
 use crate::{Mat, c64};
 
 /// Poles of many orders that are close in frequency, damping ratio and mode shape: a mode of what was identified, as far as
@@ -158,14 +159,6 @@ fn summary(poles: &[DiagramPole], members: &[usize], shape: Vec<c64>) -> ModeClu
     }
 }
 
-/// Of sorted values, linear between them.
-fn quantile(sorted: &[f64], part: f64) -> f64 {
-    let place = part * (sorted.len() - 1) as f64;
-    let (low, rest) = (place.floor() as usize, place.fract());
-    let high = (low + 1).min(sorted.len() - 1);
-    sorted[low] + rest * (sorted[high] - sorted[low])
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -213,11 +206,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn quartiles_are_linear_between_values() {
-        assert_eq!([0.25, 0.5, 0.75].map(|p| quantile(&[1.0, 2.0, 4.0, 8.0], p)), [1.75, 3.0, 5.0]);
-        assert_eq!(quantile(&[3.0], 0.75), 3.0);
     }
 }

@@ -16,6 +16,7 @@ use super::student::ellipse;
 use super::{NoUncertainty, UncertaintyOptions};
 use crate::linalg::block;
 use crate::lti::{Discrete, FrequencyResponse, Mode, StateSpace, frequency_response};
+use crate::quantile::quantile;
 use crate::{Mat, Result, c64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -218,17 +219,8 @@ fn deviation(values: &[f64]) -> f64 {
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt()
 }
 
-/// Percentiles, linear between neighbours.
+/// Percentiles.
 fn interval(mut values: Vec<f64>, level: f64) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
-    let last = values.len() as f64 - 1.0;
-    [0.5 * (1.0 - level), 0.5 * (1.0 + level)].map(|share| {
-        let place = (share * last).max(0.0);
-        let (below, part) = (place.floor() as usize, place.fract());
-        match (values.get(below), values.get(below + 1)) {
-            (Some(low), Some(high)) => low + part * (high - low),
-            (Some(low), None) => *low,
-            _ => f64::NAN,
-        }
-    })
+    [0.5 * (1.0 - level), 0.5 * (1.0 + level)].map(|share| quantile(&values, share))
 }

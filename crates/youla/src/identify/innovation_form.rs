@@ -10,9 +10,12 @@
 //! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
 
 use super::hansen::HansenModel;
-use super::subspace::{NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
+use super::subspace::{
+    NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty, UncertaintyMethod, UncertaintyOptions,
+    check_uncertainty,
+};
 use crate::factor::CoprimeFactors;
-use crate::linalg::least_squares;
+use crate::linalg::{least_squares, observability};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
@@ -84,12 +87,11 @@ pub fn hansen_structured(
     options: &SubspaceOptions,
     deviation: &DeviationOptions,
 ) -> Result<HansenModel> {
-    let free = data.identify(options)?;
     let (deviation, innovation_form) = match deviation.structure {
-        Structure::Free => (free, None),
+        Structure::Free => (data.identify(options)?, None),
         Structure::Innovation => {
             check(options, deviation)?;
-            let (model, form) = refit(factors, data, free, options, deviation)?;
+            let (model, form) = refit(factors, data, options, deviation)?;
             (model, Some(form))
         }
     };
@@ -101,6 +103,7 @@ pub fn hansen_structured(
 }
 
 fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
+    check_uncertainty(options)?;
     let refused = |what: &str, value: f64, must| Err(Error::OutOfRange { what: what.into(), value, must });
     if let Some(delay) = options.delays.iter().find(|delay| **delay > 0) {
         return refused("a delay with structure = \"innovation\"", *delay as f64, "0: take structure = \"free\"");
@@ -112,14 +115,15 @@ fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> 
     if sensible { Ok(()) } else { refused("tolerance in [deviation]", deviation.tolerance, "at least 0 and below 1") }
 }
 
-/// K_s from S, S from K_s, until K_s settles.
+/// K_s from S, S from K_s, until K_s settles. The uncertainty is not computed, since it would be that of another fit.
 fn refit(
     factors: &CoprimeFactors<Discrete>,
     data: &SubspaceData<'_>,
-    mut model: SubspaceModel,
     options: &SubspaceOptions,
     deviation: &DeviationOptions,
 ) -> Result<(SubspaceModel, InnovationForm)> {
+    let without = SubspaceOptions { uncertainty: UncertaintyOptions::default(), ..options.clone() };
+    let mut model = data.identify(&without)?;
     let kalman = model.innovation.gain().map(|gain| gain.to_owned());
     let mut now = gain_of(factors, &model)?;
     let mut change = f64::INFINITY;
@@ -134,8 +138,8 @@ fn refit(
     }
     let stop = if change <= deviation.tolerance { Settling::Settled } else { Settling::Iterations };
     let from_kalman = kalman.map(|kalman| (&now.gain - kalman).norm_l2() / now.gain.norm_l2());
-    let reason = NoUncertainty::OtherFit;
-    model.uncertainty = model.uncertainty.map(|_| Uncertainty::Refused { reason });
+    let asked = options.uncertainty.method != UncertaintyMethod::None;
+    model.uncertainty = asked.then_some(Uncertainty::Refused { reason: NoUncertainty::OtherFit });
     let form = InnovationForm { gain: now.gain, iterations, stop, change, misfit: now.misfit, from_kalman };
     Ok((model, form))
 }
@@ -148,8 +152,7 @@ struct Gain {
 /// `K_s = Gamma^+ [H_1; H_2; ...]` from the responses of beta to an impulse at each output.
 fn gain_of(factors: &CoprimeFactors<Discrete>, s: &SubspaceModel) -> Result<Gain> {
     let (model, p, m) = (&s.model, factors.outputs(), factors.inputs());
-    let n = model.order();
-    let blocks = s.horizon.max(RESPONSE * n);
+    let blocks = s.horizon.max(RESPONSE * model.order());
     let noise = factors.residual_filter(model)?;
     let mut markov = Mat::zeros(blocks * p, p);
     for j in 0..p {
@@ -157,12 +160,7 @@ fn gain_of(factors: &CoprimeFactors<Discrete>, s: &SubspaceModel) -> Result<Gain
         let response = simulate(&noise, impulse.as_ref(), &vec![0.0; noise.order()])?;
         (0..blocks * p).for_each(|row| markov[(row, j)] = response[(1 + row / p, row % p)]);
     }
-    let mut gamma = Mat::zeros(blocks * p, n);
-    let mut row = model.c().to_owned();
-    for i in 0..blocks {
-        gamma.as_mut().subrows_mut(i * p, p).copy_from(&row);
-        row = row * model.a();
-    }
+    let gamma = observability(model.a(), model.c(), blocks);
     let gain = least_squares("the observability matrix of S", gamma.as_ref(), markov.as_ref())?.x;
     let misfit = (gamma * &gain - &markov).norm_l2() / markov.norm_l2();
     Ok(Gain { gain, misfit })

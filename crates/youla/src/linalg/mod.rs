@@ -126,6 +126,18 @@ pub fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
     a.eigenvalues().map_err(|_| Error::NoConvergence { what: format!("the eigenvalues of {what}"), iterations: 0 })
 }
 
+/// `[C; C A; ...; C A^(blocks-1)]`.
+pub(crate) fn observability(a: MatRef<'_, f64>, c: MatRef<'_, f64>, blocks: usize) -> Mat<f64> {
+    let p = c.nrows();
+    let mut gamma = Mat::zeros(p * blocks, a.nrows());
+    let mut row = c.to_owned();
+    for i in 0..blocks {
+        gamma.as_mut().subrows_mut(i * p, p).copy_from(&row);
+        row = &row * a;
+    }
+    gamma
+}
+
 /// Fails with the position of the first entry that is NaN or infinite.
 ///
 /// # Errors

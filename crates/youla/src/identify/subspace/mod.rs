@@ -58,6 +58,7 @@ pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
 pub use stream::subspace_stream;
+pub(crate) use uncertainty::check as check_uncertainty;
 pub use uncertainty::{
     BlockInfluence, Bootstrap, Delta, Evidence, ModeBand, NoUncertainty, ResponseBand, Uncertainty, UncertaintyMethod,
     UncertaintyOptions,
@@ -281,7 +282,7 @@ impl<'a> SubspaceData<'a> {
         }
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
-        uncertainty::check(options)?;
+        check_uncertainty(options)?;
         Ok(match automatic {
             true => SubspaceOptions { horizon: held.horizon, past: held.past, ..options.clone() },
             false => options.clone(),

@@ -15,7 +15,7 @@ use super::super::projected::Projected;
 use super::super::realisation::OutputPair;
 use super::super::{Stability, SubspaceOptions, output_error, stability};
 use super::blocks::TimeBlock;
-use crate::linalg::{least_squares, solve};
+use crate::linalg::{least_squares, observability, solve};
 use crate::lti::Discrete;
 use crate::{Mat, Result};
 use faer::Scale;
@@ -45,7 +45,7 @@ pub(super) fn pair_changes(
     time: Discrete,
 ) -> Result<Vec<PairChange>> {
     let weights = BlockWeights::new(triangle);
-    let gamma = observability(&base.pair, options.horizon);
+    let gamma = observability(base.pair.a.as_ref(), base.pair.c.as_ref(), options.horizon);
     // The directions that known disturbances take are the same for all blocks but for ends of the size of the horizon.
     let experiments = channels.beyond_disturbances()?;
     let changes: Vec<Result<PairChange>> = blocks
@@ -72,8 +72,8 @@ fn change(
     let gain = if with_gain { projected.innovation(&pair)?.gain().map(|gain| gain.to_owned()) } else { None };
     let choice = if base.poles_moved { Stability::Constrain } else { Stability::Allow };
     let (pair, _) = stability::apply(choice, pair, time)?;
-    let turn =
-        least_squares("an observability matrix", observability(&pair, options.horizon).as_ref(), gamma.as_ref())?;
+    let of_pair = observability(pair.a.as_ref(), pair.c.as_ref(), options.horizon);
+    let turn = least_squares("an observability matrix", of_pair.as_ref(), gamma.as_ref())?;
     let back = |m: &Mat<f64>| solve("the change of states", turn.x.as_ref(), m.as_ref());
     let pair = OutputPair { a: back(&(&pair.a * &turn.x))?, c: &pair.c * &turn.x };
     let gain = gain.map(|k| back(&k)).transpose()?;
@@ -84,16 +84,4 @@ fn change(
         _ => Mat::zeros(n, 0),
     };
     Ok(PairChange { a: quotient(&predictor.a, &base.predictor.a), c: quotient(&predictor.c, &base.predictor.c), k })
-}
-
-/// `[C; C A; ...; C A^(s-1)]`.
-fn observability(pair: &OutputPair, horizon: usize) -> Mat<f64> {
-    let p = pair.c.nrows();
-    let mut gamma = Mat::zeros(p * horizon, pair.a.nrows());
-    let mut row = pair.c.clone();
-    for i in 0..horizon {
-        gamma.as_mut().subrows_mut(i * p, p).copy_from(&row);
-        row = &row * &pair.a;
-    }
-    gamma
 }

@@ -111,7 +111,7 @@ impl Uncertainty {
 }
 
 /// Refuses options that cannot be had from any record.
-pub(super) fn check(options: &SubspaceOptions) -> Result<()> {
+pub(crate) fn check(options: &SubspaceOptions) -> Result<()> {
     options.uncertainty.check()?;
     let bootstrap = options.uncertainty.method == UncertaintyMethod::Bootstrap;
     if bootstrap && options.weight.is_for_closed_loops() { Err(Error::BootstrapOfClosedLoop) } else { Ok(()) }

@@ -16,6 +16,7 @@
 #[cfg(test)]
 mod tests;
 
+use super::fit::reproduction;
 use super::greybox::{
     FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed, greybox,
     greybox_cost, logarithmic_grid, projections,
@@ -23,8 +24,7 @@ use super::greybox::{
 use super::hansen::{HansenModel, hansen};
 use super::subspace::{Experiment, InitialState, SubspaceOptions};
 use crate::factor::{CoprimeFactors, YoulaSignals};
-use crate::linalg::least_squares;
-use crate::lti::{Discrete, StateSpace, frequency_response, simulate};
+use crate::lti::{Discrete, StateSpace, frequency_response, simulate, simulate_best};
 use crate::record::{Welch, cross_spectrum};
 use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
@@ -249,30 +249,15 @@ fn fit_of(model: &StateSpace<Discrete>, experiments: &[Experiment<'_>], initial:
             Err(other) => return Err(other),
         }
     }
-    let samples: f64 = experiments.iter().map(|e| e.y.nrows() as f64).sum();
-    let fit = |i: usize| {
-        let measured = || experiments.iter().flat_map(|e| e.y.col(i).iter());
-        let mean = measured().sum::<f64>() / samples;
-        let spread = measured().map(|y| (y - mean).powi(2)).sum::<f64>().sqrt();
-        100.0 * (1.0 - errors.iter().map(|error| error.col(i).norm_l2()).fold(0.0, f64::hypot) / spread)
-    };
-    Ok((0..model.outputs()).map(fit).collect())
+    let measured: Vec<_> = experiments.iter().map(|e| e.y).collect();
+    Ok(reproduction(&measured, &errors).iter().map(|output| output.fit).collect())
 }
 
 /// `y - yhat`, from rest or from the initial state that fits best.
 fn simulated_error(model: &StateSpace<Discrete>, e: &Experiment<'_>, initial: InitialState) -> Result<Mat<f64>> {
-    let (n, p) = (model.order(), model.outputs());
-    let error = e.y - simulate(model, e.u, &vec![0.0; n])?;
-    if initial == InitialState::Zero || n == 0 {
-        return Ok(error);
-    }
-    let stacked = |m: &Mat<f64>| Mat::from_fn(m.nrows() * p, 1, |row, _| m[(row / p, row % p)]);
-    let still = Mat::zeros(e.u.nrows(), model.inputs());
-    let mut free = Mat::zeros(e.y.nrows() * p, n);
-    for state in 0..n {
-        let x0: Vec<f64> = (0..n).map(|i| if i == state { 1.0 } else { 0.0 }).collect();
-        free.as_mut().subcols_mut(state, 1).copy_from(stacked(&simulate(model, still.as_ref(), &x0)?));
-    }
-    let x0 = least_squares("the response to the initial state", free.as_ref(), stacked(&error).as_ref())?.x;
-    Ok(e.y - simulate(model, e.u, &x0.col(0).iter().copied().collect::<Vec<_>>())?)
+    let simulated = match initial {
+        InitialState::Zero => simulate(model, e.u, &vec![0.0; model.order()])?,
+        InitialState::Estimated => simulate_best(model, e.u, e.y)?,
+    };
+    Ok(e.y - simulated)
 }

@@ -1,6 +1,7 @@
 //! Identification methods: the subspace family, and what is built on it.
 
 pub mod direct;
+mod fit;
 pub mod greybox;
 pub mod hansen;
 pub mod hansen_pem;

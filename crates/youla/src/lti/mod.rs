@@ -2,6 +2,7 @@
 
 mod connect;
 mod discretise;
+mod initial;
 pub(crate) mod modes;
 mod partitioned;
 mod response;
@@ -12,6 +13,7 @@ mod time;
 mod transfer;
 mod zeros;
 
+pub(crate) use initial::simulate_best;
 pub use modes::Mode;
 pub use partitioned::Partitioned;
 pub use response::{FrequencyResponse, frequency_response};

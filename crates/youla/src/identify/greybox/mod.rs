@@ -48,6 +48,7 @@ pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, log
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
+use super::fit::reproduction;
 use super::subspace::{Experiment, InitialState};
 use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
 use crate::{Error, Result};
@@ -289,7 +290,8 @@ fn estimate(
     let continuous = structure.model(&point.theta)?;
     let model = continuous.zoh(time)?;
     let initial_states = criterion.initial_states(point);
-    let outputs = outputs(experiments, &criterion.simulated(&model)?, &initial_states)?;
+    let measured: Vec<_> = experiments.iter().map(|e| e.y).collect();
+    let outputs = reproduction(&measured, &errors(experiments, &criterion.simulated(&model)?, &initial_states)?);
     Ok(GreyBoxModel {
         covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
         stable: model.is_stable()?,
@@ -325,26 +327,11 @@ fn check(options: &GreyBoxOptions) -> Result<()> {
     }
 }
 
-/// How well one output is reproduced.
-struct Output {
-    fit: f64,
-    residual: f64,
-}
-
-fn outputs(
+fn errors(
     experiments: &[Experiment<'_>],
     model: &StateSpace<Discrete>,
     initial_states: &[Vec<f64>],
-) -> Result<Vec<Output>> {
-    let simulated = |(e, x0): (&Experiment<'_>, &Vec<f64>)| simulate(model, e.u, x0).map(|model| e.y - model);
-    let errors: Vec<Mat<f64>> = experiments.iter().zip(initial_states).map(simulated).collect::<Result<_>>()?;
-    let samples = errors.iter().map(|e| e.nrows()).sum::<usize>() as f64;
-    let output = |i: usize| {
-        let measured = || experiments.iter().flat_map(|e| e.y.col(i).iter());
-        let mean = measured().sum::<f64>() / samples;
-        let spread = measured().map(|y| (y - mean).powi(2)).sum::<f64>().sqrt();
-        let error = errors.iter().map(|e| e.col(i).norm_l2()).fold(0.0, f64::hypot);
-        Output { fit: 100.0 * (1.0 - error / spread), residual: error / samples.sqrt() }
-    };
-    Ok((0..model.outputs()).map(output).collect())
+) -> Result<Vec<Mat<f64>>> {
+    let error = |(e, x0): (&Experiment<'_>, &Vec<f64>)| simulate(model, e.u, x0).map(|simulated| e.y - simulated);
+    experiments.iter().zip(initial_states).map(error).collect()
 }

@@ -11,16 +11,13 @@
 use super::order::{ByModels, OrderValue, least, parameters};
 use super::output_error::prediction_errors;
 use super::projected::Projected;
-use super::sensitivity::{Predictor, Sensitivity, Unknowns, simulate};
 use super::{AutoOrder, Experiment, Innovation, NoInnovation, Order, OrderRule, SubspaceData, SubspaceModel};
 use super::{SubspaceOptions, UncertaintyOptions, channels::Signals};
-use crate::linalg::{Triangle, block, least_squares};
+use crate::identify::fit::reproduction;
+use crate::lti::simulate_best;
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-
-/// Samples folded in at a time.
-const PIECE: usize = 1000;
 
 /// The order up to `max` by the rule of `auto`.
 pub(super) fn choose(
@@ -122,9 +119,11 @@ fn cross_validation(
         let errors: Vec<Mat<f64>> = parts
             .iter()
             .zip(&outputs)
-            .map(|((_, [u, _, _]), y)| simulation_errors(&found, *u, y))
+            .map(|((_, [u, _, _]), y)| Ok(y - simulate_best(&found.model, *u, y.as_ref())?))
             .collect::<Result<_>>()?;
-        Ok(Some(mean_fit(&outputs, &errors)))
+        let measured: Vec<_> = outputs.iter().map(|y| y.as_ref()).collect();
+        let fits = reproduction(&measured, &errors);
+        Ok(Some(fits.iter().map(|output| output.fit).sum::<f64>() / fits.len() as f64))
     })
 }
 
@@ -143,49 +142,4 @@ fn undisturbed(found: &SubspaceModel, experiment: usize, [_, y, w]: Part<'_>) ->
         Some(coefficients) => y - w * coefficients,
         None => y.to_owned(),
     }
-}
-
-/// `y - yhat` with the initial state that makes it least.
-fn simulation_errors(found: &SubspaceModel, u: MatRef<'_, f64>, y: &Mat<f64>) -> Result<Mat<f64>> {
-    let model = &found.model;
-    let ab = block(&[&[model.a(), model.b()]]);
-    let cd = block(&[&[model.c(), model.d()]]);
-    let forced = y - simulate(ab.as_ref(), cd.as_ref(), &vec![0.0; model.order()], u);
-    let x0 = initial_state(model.a(), model.c(), &forced)?;
-    Ok(y - simulate(ab.as_ref(), cd.as_ref(), &x0, u))
-}
-
-/// `min sum |y(k) - C A^k x0|^2`.
-fn initial_state(a: MatRef<'_, f64>, c: MatRef<'_, f64>, free: &Mat<f64>) -> Result<Vec<f64>> {
-    let (n, outputs) = (a.nrows(), c.nrows());
-    let predictor = Predictor { a: a.to_owned(), c: c.to_owned(), k: None };
-    let unknowns =
-        Unknowns { states: n, inputs: 0, outputs, initial: n, disturbances: 0, direct: vec![vec![]; outputs] };
-    let mut triangle = Triangle::new(n + 1, PIECE);
-    let none = Mat::<f64>::zeros(free.nrows(), 0);
-    for i in 0..outputs {
-        let mut sensitivity = Sensitivity::new(&predictor, i, &unknowns);
-        let target: Vec<f64> = free.col(i).iter().copied().collect();
-        for start in (0..free.nrows()).step_by(PIECE) {
-            let count = PIECE.min(free.nrows() - start);
-            let u = none.as_ref().subrows(start, count);
-            triangle.fold(count, |rows| sensitivity.fill(u, u, &target[start..start + count], rows));
-        }
-    }
-    let r = triangle.r();
-    let x0 = least_squares("the regressors of an initial state", r.subcols(0, n), r.subcols(n, 1))?.x;
-    Ok(x0.col(0).iter().copied().collect())
-}
-
-/// Mean of `100 (1 - |y - yhat| / |y - mean y|)` over the outputs.
-fn mean_fit(measured: &[Mat<f64>], errors: &[Mat<f64>]) -> f64 {
-    let outputs = measured[0].ncols();
-    let samples = measured.iter().map(|y| y.nrows()).sum::<usize>() as f64;
-    let fit = |i: usize| {
-        let mean = measured.iter().map(|y| y.col(i).sum()).sum::<f64>() / samples;
-        let spread = measured.iter().flat_map(|y| y.col(i).iter()).map(|v| (v - mean).powi(2)).sum::<f64>().sqrt();
-        let error = errors.iter().map(|e| e.col(i).norm_l2()).fold(0.0, f64::hypot);
-        100.0 * (1.0 - error / spread)
-    };
-    (0..outputs).map(fit).sum::<f64>() / outputs as f64
 }

@@ -1,7 +1,7 @@
 //! One experiment of Table 1: closed-loop records of the digital twin, and the models of all methods.
 
 use super::controller::{Design, design_with};
-use super::item::{excitation, generator};
+use super::item::{excitation, generator, lower, text};
 use super::method::Method;
 use super::settings::PaperSettings;
 use super::synchronous::without_harmonics;
@@ -9,7 +9,7 @@ use crate::control::real_time_controller;
 use crate::factor::YoulaSignals;
 use crate::identify::greybox::{BearingStructure, GreyBoxModel, GreyBoxOptions, Stop, greybox};
 use crate::identify::hansen::{HansenModel, hansen};
-use crate::identify::hansen_pem::{HansenPem, HansenPemOptions, pem_from_hansen};
+use crate::identify::hansen_pem::{HansenPemOptions, pem_from_hansen};
 use crate::identify::subspace::{self, InitialState, SubspaceOptions};
 use crate::lti::{Discrete, Mode, StateSpace, simulate};
 use crate::record::{ExcitationReport, ExcitationReportOptions, Welch, describe_excitation};
@@ -147,7 +147,7 @@ pub(super) fn run(
     let pem = |(_, found): &(Start, GreyBoxModel)| found.model.clone();
     let hansen = timed(|| data.hansen());
     let reduced = timed(|| reduce(&hansen.0.as_ref().map_err(String::clone)?.plant, &settings.reduction).map_err(text));
-    let projected = timed(|| data.hansen_pem(hansen.0.as_ref().map_err(String::clone)?.clone()));
+    let projected = timed(|| data.hansen_pem(hansen.0.as_ref().map_err(String::clone)?.clone(), &single.0));
     let best = starts.iter().min_by(|a, b| a.0.cost.total_cmp(&b.0.cost));
     let models = vec![
         data.judge(Method::Nominal, Ok(design.factors.nominal().clone()), 0.0)?,
@@ -155,7 +155,7 @@ pub(super) fn run(
         data.judge(Method::PemMultiStart, best.map(pem).ok_or_else(|| "no start led to a model".into()), 0.0)?,
         data.judge(Method::Hansen, hansen.0.as_ref().map(|h| h.plant.clone()).map_err(String::clone), hansen.1)?,
         data.judge(Method::HansenReduced, reduced.0.map(|r| r.model), reduced.1)?,
-        data.judge(Method::HansenPem, projected.0.map(|found| found.model.model), hansen.1 + projected.1)?,
+        data.judge(Method::HansenPem, projected.0.map(|found| found.model), single.1 + hansen.1 + projected.1)?,
     ];
     let excitation = described(&estimation, settings)?;
     let reflected = hansen.0.as_ref().map_or(0, |found| found.deviation.stability.moved.len());
@@ -252,15 +252,15 @@ impl Data<'_> {
             .map_err(text)
     }
 
-    /// From the projection of G(S) and from the nominal model.
-    fn hansen_pem(&self, found: HansenModel) -> Result<HansenPem, String> {
+    /// From the projection of G(S), or that from the nominal model, `single`, where its criterion is lower.
+    fn hansen_pem(&self, found: HansenModel, single: &Result<GreyBoxModel, String>) -> Result<GreyBoxModel, String> {
         let experiment = [subspace::Experiment { u: self.u.as_ref(), y: self.y.as_ref() }];
         let signals = std::slice::from_ref(&self.signals);
         let pem = GreyBoxOptions { initial_state: self.initial_state, ..self.settings.pem.clone() };
         let options = HansenPemOptions { pem, ..Default::default() };
-        let nominal = BearingStructure::parameters(&self.start);
         let factors = &self.design.factors;
-        pem_from_hansen(found, factors, signals, &experiment, &BearingStructure, Some(&nominal), &options).map_err(text)
+        let projected = pem_from_hansen(found, factors, signals, &experiment, &BearingStructure, None, &options);
+        lower(projected.map(|found| found.model).map_err(text), single.clone())
     }
 
     /// The prediction-error method from all starts, those that lead to a model; `single` is that from the nominal model.
@@ -325,8 +325,4 @@ fn timed<T>(work: impl FnOnce() -> T) -> (T, f64) {
     let start = Instant::now();
     let result = work();
     (result, start.elapsed().as_secs_f64())
-}
-
-fn text(error: Error) -> String {
-    error.to_string()
 }

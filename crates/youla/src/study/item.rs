@@ -5,6 +5,7 @@ use super::method::Method;
 use super::row::{Row, Status};
 use super::settings::PaperSettings;
 use crate::control::closed_loop;
+use crate::factor::YoulaSignals;
 use crate::identify::direct::direct;
 use crate::identify::greybox::{BearingStructure, GreyBoxModel, greybox};
 use crate::identify::hansen::{HansenModel, hansen};
@@ -20,6 +21,7 @@ use crate::{Error, Mat, Result};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use std::cell::OnceCell;
 use std::time::{Duration, Instant};
 
 /// What distinguishes one loop from another.
@@ -65,7 +67,9 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
     let estimation = record(&design, &plant, samples, item.noise, settings, item.stream)?;
     let verification = record(&design, &plant, verification_samples, 0.0, settings, item.stream + 1)?;
     clock.lap();
-    let loop_data = LoopData { design: &design, estimation, verification, start: truth.degraded(a_factor, 1.0)? };
+    let start = truth.degraded(a_factor, 1.0)?;
+    let (single, hansen) = (OnceCell::new(), OnceCell::new());
+    let loop_data = LoopData { design: &design, estimation, verification, start, single, hansen };
     let methods =
         [Method::Nominal].into_iter().chain(settings.methods.iter().copied().filter(|m| *m != Method::Nominal));
     let rows = methods
@@ -142,6 +146,10 @@ struct LoopData<'a> {
     estimation: LoopRecord,
     verification: LoopRecord,
     start: Bearing,
+    /// The search from the nominal model, which several methods take part in.
+    single: OnceCell<Result<GreyBoxModel, String>>,
+    /// S and G(S), on which several methods stand.
+    hansen: OnceCell<Result<HansenModel, String>>,
 }
 
 /// A model, the steps of the search that led to it, and what was done to it.
@@ -153,14 +161,10 @@ struct Found {
 
 impl LoopData<'_> {
     fn row(&self, item: &Item, method: Method, settings: &PaperSettings) -> Row {
-        let judged = self.identify(method, settings).and_then(|found| {
-            let stable = found.model.is_stable()?;
-            let status = if stable { Status::Stable } else { Status::Unstable };
-            Ok((status, self.fit_of(&found.model)?, found.steps, found.note))
-        });
+        let judged = self.identify(method, settings).and_then(|found| self.judge(found).map_err(text));
         let (status, fit, steps, note) = match judged {
             Ok(outcome) => outcome,
-            Err(e) => (Status::Refused, [f64::NAN; 2], None, e.to_string()),
+            Err(reason) => (Status::Refused, [f64::NAN; 2], None, reason),
         };
         Row {
             item: item.index,
@@ -177,64 +181,77 @@ impl LoopData<'_> {
         }
     }
 
-    fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found> {
-        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
-        let time = self.design.factors.nominal().time();
+    fn judge(&self, found: Found) -> Result<(Status, [f64; 2], Option<usize>, String)> {
+        let status = if found.model.is_stable()? { Status::Stable } else { Status::Unstable };
+        Ok((status, self.fit_of(&found.model)?, found.steps, found.note))
+    }
+
+    fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found, String> {
         let black_box = |model| Found { model, steps: None, note: String::new() };
         let from_s = |model, hansen: &HansenModel| Found { model, steps: None, note: reflected(hansen) };
         match method {
             Method::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
-            Method::Pem => self.pem(&self.start, settings).map(grey_box),
-            Method::PemMultiStart => self.best_pem(settings).map(grey_box),
-            Method::Direct => Ok(black_box(direct(&experiment, time, &settings.direct)?.model)),
-            Method::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), &found)),
+            Method::Pem => self.single(settings).map(grey_box),
+            Method::PemMultiStart => self.best_pem(settings).map(|found| grey_box(&found)),
+            Method::Direct => direct(&self.experiment(), self.time(), &settings.direct)
+                .map(|found| black_box(found.model))
+                .map_err(text),
+            Method::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), found)),
             Method::HansenReduced => {
                 let found = self.hansen(settings)?;
-                Ok(from_s(reduce(&found.plant, &settings.reduction)?.model, &found))
+                let reduced = reduce(&found.plant, &settings.reduction).map_err(text)?;
+                Ok(from_s(reduced.model, found))
             }
             Method::HansenPem => self.hansen_pem(settings),
         }
     }
 
-    fn pem(&self, start: &Bearing, settings: &PaperSettings) -> Result<GreyBoxModel> {
-        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
-        let time = self.design.factors.nominal().time();
-        greybox(&BearingStructure, &BearingStructure::parameters(start), &experiment, time, &settings.pem)
+    fn time(&self) -> Discrete {
+        self.design.factors.nominal().time()
+    }
+
+    fn experiment(&self) -> [subspace::Experiment<'_>; 1] {
+        [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }]
+    }
+
+    fn pem(&self, start: &Bearing, settings: &PaperSettings) -> Result<GreyBoxModel, String> {
+        let start = BearingStructure::parameters(start);
+        greybox(&BearingStructure, &start, &self.experiment(), self.time(), &settings.pem).map_err(text)
+    }
+
+    fn single(&self, settings: &PaperSettings) -> Result<&GreyBoxModel, String> {
+        self.single.get_or_init(|| self.pem(&self.start, settings)).as_ref().map_err(String::clone)
     }
 
     /// The lowest criterion over all starts; a start from which nothing is found is left out.
-    fn best_pem(&self, settings: &PaperSettings) -> Result<GreyBoxModel> {
-        let mut best = self.pem(&self.start, settings);
+    fn best_pem(&self, settings: &PaperSettings) -> Result<GreyBoxModel, String> {
+        let mut best = self.single(settings).cloned();
         for factor in settings.experiments.start_factors.iter().filter(|factor| **factor != 1.0) {
-            let found = self.start.degraded(*factor, 1.0).and_then(|start| self.pem(&start, settings));
-            let better = match (&found, &best) {
-                (Ok(found), Ok(best)) => found.cost < best.cost,
-                (found, _) => found.is_ok(),
-            };
-            if better {
-                best = found;
-            }
+            let start = self.start.degraded(*factor, 1.0).map_err(text);
+            best = lower(start.and_then(|start| self.pem(&start, settings)), best);
         }
         best
     }
 
-    fn hansen(&self, settings: &PaperSettings) -> Result<HansenModel> {
-        let signals = self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref())?;
-        hansen(&self.design.factors, &[signals], &settings.hansen)
+    fn signals(&self) -> Result<YoulaSignals, String> {
+        self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref()).map_err(text)
+    }
+
+    fn hansen(&self, settings: &PaperSettings) -> Result<&HansenModel, String> {
+        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen).map_err(text);
+        self.hansen.get_or_init(found).as_ref().map_err(String::clone)
     }
 
     /// The prediction-error method from the projection of G(S) and from the nominal model, the lower criterion of both.
-    fn hansen_pem(&self, settings: &PaperSettings) -> Result<Found> {
-        let signals = [self.design.factors.signals(self.estimation.u.as_ref(), self.estimation.y.as_ref())?];
-        let found = hansen(&self.design.factors, &signals, &settings.hansen)?;
-        let note = reflected(&found);
-        let experiment = [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }];
+    fn hansen_pem(&self, settings: &PaperSettings) -> Result<Found, String> {
+        let found = self.hansen(settings)?;
+        let note = reflected(found);
         let options = HansenPemOptions { pem: settings.pem.clone(), ..Default::default() };
-        let factors = &self.design.factors;
-        let nominal = BearingStructure::parameters(&self.start);
-        let nominal = Some(nominal.as_slice());
-        let model = pem_from_hansen(found, factors, &signals, &experiment, &BearingStructure, nominal, &options)?.model;
-        Ok(Found { model: model.model, steps: Some(model.iterations), note })
+        let (factors, signals) = (&self.design.factors, [self.signals()?]);
+        let from_projection =
+            pem_from_hansen(found.clone(), factors, &signals, &self.experiment(), &BearingStructure, None, &options);
+        let model = lower(from_projection.map(|found| found.model).map_err(text), self.single(settings).cloned())?;
+        Ok(Found { note, ..grey_box(&model) })
     }
 
     /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
@@ -251,8 +268,24 @@ impl LoopData<'_> {
     }
 }
 
-fn grey_box(found: GreyBoxModel) -> Found {
-    Found { model: found.model, steps: Some(found.iterations), note: String::new() }
+/// The one with the lower criterion; one that there is rather than none.
+pub(super) fn lower(
+    one: Result<GreyBoxModel, String>,
+    other: Result<GreyBoxModel, String>,
+) -> Result<GreyBoxModel, String> {
+    match (&one, &other) {
+        (Ok(a), Ok(b)) if a.cost < b.cost => one,
+        (Ok(_), Err(_)) => one,
+        _ => other,
+    }
+}
+
+pub(super) fn text(error: Error) -> String {
+    error.to_string()
+}
+
+fn grey_box(found: &GreyBoxModel) -> Found {
+    Found { model: found.model.clone(), steps: Some(found.iterations), note: String::new() }
 }
 
 /// What was done to the poles of S.

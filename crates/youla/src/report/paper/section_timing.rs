@@ -27,7 +27,10 @@ pub(super) fn timing(paper: &Paper, key: &str) -> Section {
     let loops = plain(
         "loop-timing",
         "One loop of study and map",
-        format!("Mean processor time per part, over {} of this call.", count(t.loops, "loop", "loops")),
+        format!(
+            "Mean processor time per part, over {} of this call. What a method shares with one above it counts there.",
+            count(t.loops, "loop", "loops")
+        ),
         &["part", "ms"],
         std::iter::once(design).chain(methods).collect(),
     );

@@ -10,6 +10,7 @@ use super::{Discrete, StateSpace};
 use crate::linalg::{check_finite, check_shape};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
+use pulp::{Arch, NullaryFnOnce};
 use std::mem::swap;
 use std::ops::Range;
 
@@ -95,6 +96,7 @@ impl Simulator {
     ///
     /// # Panics
     /// If `u` has not m values or the state belongs to a system of another size.
+    #[inline(always)]
     pub fn step<'a>(&self, state: &'a mut SimulationState, u: &[f64]) -> &'a [f64] {
         state.now[..self.inputs].copy_from_slice(u);
         self.multiply(&state.now, &mut state.next);
@@ -109,7 +111,7 @@ impl Simulator {
     }
 
     /// `[x(k+1); y(k)] = [B A; D C] [u(k); x(k)]`.
-    #[inline]
+    #[inline(always)]
     fn multiply(&self, now: &[f64], next: &mut [f64]) {
         let width = self.inputs + self.states;
         if width == 0 {
@@ -162,7 +164,7 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
     let simulator = Simulator::new(system);
     let mut state = simulator.start(x0)?;
     let mut y = Mat::zeros(samples, system.outputs());
-    run(&simulator, &mut state, u, &mut y);
+    Arch::new().dispatch(Run { simulator: &simulator, state: &mut state, u, y: &mut y });
     if is_finite(&state, &y) {
         return Ok(y);
     }
@@ -171,30 +173,43 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
     Err(Error::Diverged { what: "the simulation".into(), sample: sample + 1, pole: system.worst_pole()? })
 }
 
-/// The loop over the samples, on contiguous columns.
-fn run(simulator: &Simulator, state: &mut SimulationState, u: MatRef<'_, f64>, y: &mut Mat<f64>) {
-    let copy = if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() };
-    let inputs: Vec<&[f64]> = match u.try_as_col_major() {
-        Some(u) => u.col_iter().map(|c| c.as_slice()).collect(),
-        None => (0..copy.ncols()).map(|j| copy.col_as_slice(j)).collect(),
-    };
-    let samples = y.nrows();
-    let mut outputs: Vec<&mut [f64]> =
-        y.col_iter_mut().filter_map(|c| c.try_as_col_major_mut()).map(|c| c.as_slice_mut()).collect();
-    // Slices change places in registers; vectors would do so in memory, at the price of a third of the step.
-    let (mut now, mut next) = (&mut state.now[..], &mut state.next[..]);
-    for k in 0..samples {
-        for (value, column) in now.iter_mut().zip(&inputs) {
-            *value = column[k];
+/// The loop over the samples, on contiguous columns, for the widest registers of the processor.
+struct Run<'a> {
+    simulator: &'a Simulator,
+    state: &'a mut SimulationState,
+    u: MatRef<'a, f64>,
+    y: &'a mut Mat<f64>,
+}
+
+impl NullaryFnOnce for Run<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        let Run { simulator, state, u, y } = self;
+        let copy = if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() };
+        let inputs: Vec<&[f64]> = match u.try_as_col_major() {
+            Some(u) => u.col_iter().map(|c| c.as_slice()).collect(),
+            None => (0..copy.ncols()).map(|j| copy.col_as_slice(j)).collect(),
+        };
+        let samples = y.nrows();
+        let mut outputs: Vec<&mut [f64]> =
+            y.col_iter_mut().filter_map(|c| c.try_as_col_major_mut()).map(|c| c.as_slice_mut()).collect();
+        // Slices change places in registers; vectors would do so in memory, at the price of a third of the step.
+        let (mut now, mut next) = (&mut state.now[..], &mut state.next[..]);
+        for k in 0..samples {
+            for (value, column) in now.iter_mut().zip(&inputs) {
+                *value = column[k];
+            }
+            simulator.multiply(now, next);
+            for (column, value) in outputs.iter_mut().zip(&next[simulator.output_range()]) {
+                column[k] = *value;
+            }
+            swap(&mut now, &mut next);
         }
-        simulator.multiply(now, next);
-        for (column, value) in outputs.iter_mut().zip(&next[simulator.output_range()]) {
-            column[k] = *value;
+        if samples % 2 == 1 {
+            swap(&mut state.now, &mut state.next);
         }
-        swap(&mut now, &mut next);
-    }
-    if samples % 2 == 1 {
-        swap(&mut state.now, &mut state.next);
     }
 }
 

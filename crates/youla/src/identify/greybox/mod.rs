@@ -16,6 +16,7 @@
 //! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
+mod bank;
 mod bearing;
 mod bounds;
 mod closure;

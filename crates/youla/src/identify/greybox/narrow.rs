@@ -25,6 +25,7 @@ impl NarrowTriangle {
     }
 
     /// Folds in `count` rows, given by columns, which are used up.
+    #[inline(always)]
     pub(super) fn fold(&mut self, rows: &mut [f64], count: usize) {
         for j in 0..self.r.ncols() {
             let (done, later) = rows.split_at_mut((j + 1) * count);
@@ -49,7 +50,8 @@ impl NarrowTriangle {
 }
 
 /// Inner product with eight running sums, which the compiler vectorises.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+#[inline(always)]
+pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut sums = [0.0; LANES];
     let (a, b) = (a.chunks_exact(LANES), b.chunks_exact(LANES));
     let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();

@@ -16,6 +16,7 @@ use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef, c64};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Par, Side};
+use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 
 /// Samples whose modes are held at a time: they stay in the first- or second-level cache.
@@ -72,7 +73,8 @@ impl<'a> Sums<'a> {
             .into_par_iter()
             .map(|l| {
                 let (from, count) = (cut(l), cut(l + 1) - cut(l));
-                run_lane(self.lambda, u.subrows(from, count), beside.subrows(from, count))
+                let (u, beside) = (u.subrows(from, count), beside.subrows(from, count));
+                Arch::new().dispatch(LaneOf { lambda: self.lambda, u, beside })
             })
             .collect();
         let (count, width) = (self.start.len(), self.channels.ncols());
@@ -179,36 +181,49 @@ enum Column {
     Channel(usize),
 }
 
-fn run_lane(lambda: &[c64], u: MatRef<'_, f64>, beside: MatRef<'_, f64>) -> Lane {
-    let (inputs, modes) = (u.ncols(), lambda.len());
-    let count = (inputs + 1) * modes;
-    let part = |of: fn(&c64) -> f64| -> Vec<f64> { lambda.iter().map(of).cycle().take(count).collect() };
-    let (lambda_re, lambda_im) = (part(|l| l.re), part(|l| l.im));
-    let mut drive = vec![0.0; count];
-    let mut now = vec![0.0; 2 * count];
-    now[..modes].fill(1.0);
-    let mut held = vec![0.0; 2 * count * PIECE];
-    let mut products = Mat::zeros(2 * count, inputs + beside.ncols());
-    for from in (0..u.nrows()).step_by(PIECE) {
-        let samples = PIECE.min(u.nrows() - from);
-        for (k, column) in held.chunks_exact_mut(2 * count).take(samples).enumerate() {
-            column.copy_from_slice(&now);
-            for (q, drive) in drive[modes..].chunks_exact_mut(modes).enumerate() {
-                drive.fill(u[(from + k, q)]);
+/// The samples of a lane, for the widest registers of the processor.
+struct LaneOf<'a> {
+    lambda: &'a [c64],
+    u: MatRef<'a, f64>,
+    beside: MatRef<'a, f64>,
+}
+
+impl NullaryFnOnce for LaneOf<'_> {
+    type Output = Lane;
+
+    #[inline(always)]
+    fn call(self) -> Lane {
+        let LaneOf { lambda, u, beside } = self;
+        let (inputs, modes) = (u.ncols(), lambda.len());
+        let count = (inputs + 1) * modes;
+        let part = |of: fn(&c64) -> f64| -> Vec<f64> { lambda.iter().map(of).cycle().take(count).collect() };
+        let (lambda_re, lambda_im) = (part(|l| l.re), part(|l| l.im));
+        let mut drive = vec![0.0; count];
+        let mut now = vec![0.0; 2 * count];
+        now[..modes].fill(1.0);
+        let mut held = vec![0.0; 2 * count * PIECE];
+        let mut products = Mat::zeros(2 * count, inputs + beside.ncols());
+        for from in (0..u.nrows()).step_by(PIECE) {
+            let samples = PIECE.min(u.nrows() - from);
+            for (k, column) in held.chunks_exact_mut(2 * count).take(samples).enumerate() {
+                column.copy_from_slice(&now);
+                for (q, drive) in drive[modes..].chunks_exact_mut(modes).enumerate() {
+                    drive.fill(u[(from + k, q)]);
+                }
+                let (re, im) = now.split_at_mut(count);
+                for a in 0..count {
+                    let (x, y) = (re[a], im[a]);
+                    re[a] = lambda_re[a] * x - lambda_im[a] * y + drive[a];
+                    im[a] = lambda_im[a] * x + lambda_re[a] * y;
+                }
             }
-            let (re, im) = now.split_at_mut(count);
-            for a in 0..count {
-                let (x, y) = (re[a], im[a]);
-                re[a] = lambda_re[a] * x - lambda_im[a] * y + drive[a];
-                im[a] = lambda_im[a] * x + lambda_re[a] * y;
+            now.iter_mut().filter(|v| v.abs() < VANISHED).for_each(|v| *v = 0.0);
+            let z = MatRef::from_column_major_slice(&held[..2 * count * samples], 2 * count, samples);
+            let (into_u, into_beside) = products.as_mut().split_at_col_mut(inputs);
+            for (into, channels) in [(into_u, u), (into_beside, beside)] {
+                matmul(into, Accum::Add, z, channels.subrows(from, samples), 1.0, Par::Seq);
             }
         }
-        now.iter_mut().filter(|v| v.abs() < VANISHED).for_each(|v| *v = 0.0);
-        let z = MatRef::from_column_major_slice(&held[..2 * count * samples], 2 * count, samples);
-        let (into_u, into_beside) = products.as_mut().split_at_col_mut(inputs);
-        for (into, channels) in [(into_u, u), (into_beside, beside)] {
-            matmul(into, Accum::Add, z, channels.subrows(from, samples), 1.0, Par::Seq);
-        }
+        Lane { products, end: (0..count).map(|a| c64::new(now[a], now[count + a])).collect() }
     }
-    Lane { products, end: (0..count).map(|a| c64::new(now[a], now[count + a])).collect() }
 }

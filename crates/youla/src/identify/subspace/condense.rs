@@ -46,7 +46,10 @@ impl<'a> Regression<'a> {
 
     /// The way that comes first.
     pub(super) fn first_way(&self) -> Way {
-        if self.modes.is_some() { Way::Sums } else { Way::ByOutputs }
+        match &self.modes {
+            Some(modes) if Sums::can_be_of(modes.lambda()) => Way::Sums,
+            _ => self.safe_way(),
+        }
     }
 
     /// The way that works where [`Way::Sums`] loses too many digits.
@@ -104,7 +107,7 @@ pub(super) struct Condenser<'a> {
 }
 
 enum State<'a> {
-    Sums(&'a Modes, Option<Sums<'a>>),
+    Sums(&'a Modes, Sums<'a>),
     Rows(&'a Modes, Box<Rows>),
     ByOutputs(Vec<(Sensitivity<'a>, Triangle)>),
 }
@@ -133,8 +136,7 @@ impl<'a> Condenser<'a> {
         let targets = targets.as_ref().map_or(y, |targets| targets.as_ref());
         let beside = || block(&[&[u.subcols(0, unknowns.through()), known, targets]]);
         match &mut self.state {
-            State::Sums(_, None) => {}
-            State::Sums(_, Some(sums)) => sums.add(u, beside().as_ref()),
+            State::Sums(_, sums) => sums.add(u, beside().as_ref()),
             State::Rows(_, rows) => rows.add(u, beside().as_ref()),
             State::ByOutputs(outputs) => {
                 let u = scaled(u, u_scale);
@@ -142,7 +144,7 @@ impl<'a> Condenser<'a> {
                 outputs.par_iter_mut().enumerate().for_each(|(i, (sensitivity, triangle))| {
                     let scale = if unscaled { y_scale[i] } else { 1.0 };
                     let target: Vec<f64> = targets.col(i).iter().map(|y| y / scale).collect();
-                    let known = Regressors { signals: known.to_owned(), columns: self.known }.of_output(i);
+                    let known = self.known.of_output(known, i);
                     for start in (0..target.len()).step_by(PIECE) {
                         let count = PIECE.min(target.len() - start);
                         let (u, known) = (u.as_ref().subrows(start, count), known.as_ref().subrows(start, count));
@@ -163,7 +165,7 @@ impl<'a> Condenser<'a> {
         }
         let by_outputs = |modes: &Modes, shared: Mat<f64>| modes.by_outputs(shared, &self.known, unknowns, &scale);
         match &self.state {
-            State::Sums(modes, sums) => Some(by_outputs(modes, sums.as_ref()?.factor(unknowns.initial > 0)?)),
+            State::Sums(modes, sums) => Some(by_outputs(modes, sums.factor(unknowns.initial > 0)?)),
             State::Rows(modes, rows) => Some(by_outputs(modes, rows.factor())),
             State::ByOutputs(outputs) => Some(outputs.iter().map(|(_, triangle)| triangle.r().to_owned()).collect()),
         }

@@ -110,20 +110,18 @@ impl KnownColumns {
     pub(super) fn columns(&self) -> usize {
         if self.crossed { self.known * self.outputs * self.outputs } else { self.known }
     }
+
+    /// All regressors of output i, out of the shared columns.
+    pub(super) fn of_output(&self, known: MatRef<'_, f64>, i: usize) -> Mat<f64> {
+        let value = |k: usize, j: usize| self.column(i, j).map_or(0.0, |column| known[(k, column)]);
+        Mat::from_fn(known.nrows(), self.known * self.outputs, value)
+    }
 }
 
 /// The regressors of the coefficients of disturbances, in columns that the outputs share.
 pub(super) struct Regressors {
     pub(super) signals: Mat<f64>,
     pub(super) columns: KnownColumns,
-}
-
-impl Regressors {
-    /// All regressors of output i.
-    pub(super) fn of_output(&self, i: usize) -> Mat<f64> {
-        let value = |k: usize, j: usize| self.columns.column(i, j).map_or(0.0, |column| self.signals[(k, column)]);
-        Mat::from_fn(self.signals.nrows(), self.columns.known * self.columns.outputs, value)
-    }
 }
 
 /// What the block rows of the disturbances span.

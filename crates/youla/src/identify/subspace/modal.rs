@@ -317,7 +317,7 @@ mod tests {
                 let target: Vec<f64> = y.col(i).iter().copied().collect();
                 let mut triangle = Triangle::new(unknowns.width_of_output(i), 2500);
                 let mut direct = Sensitivity::new(&predictor, i, &unknowns);
-                let known = known.of_output(i);
+                let known = known.columns.of_output(known.signals.as_ref(), i);
                 triangle.fold(2500, |piece| direct.fill(u.as_ref(), known.as_ref(), &target, piece));
                 let (one, other) = (modal.transpose() * modal, triangle.r().transpose() * triangle.r());
                 let error = (&one - &other).norm_max() / other.norm_max();
@@ -336,7 +336,7 @@ mod tests {
             rows.add(u.as_ref(), beside.as_ref());
             let rows = rows.factor();
             for cut in [0, 1, 3333] {
-                let mut sums = Sums::new(modes.lambda(), 3, 5).unwrap();
+                let mut sums = Sums::new(modes.lambda(), 3, 5);
                 sums.add(u.subrows(0, cut), beside.subrows(0, cut));
                 sums.add(u.subrows(cut, 5000 - cut), beside.subrows(cut, 5000 - cut));
                 let sums = sums.factor(initial > 0).unwrap();
@@ -352,7 +352,7 @@ mod tests {
         let modes = Modes::of(&predictor()).unwrap();
         let u = signal(3000, 1, 1);
         let beside = block(&[&[u.as_ref(), u.as_ref()]]);
-        let mut sums = Sums::new(modes.lambda(), 1, 2).unwrap();
+        let mut sums = Sums::new(modes.lambda(), 1, 2);
         sums.add(u.as_ref(), beside.as_ref());
         assert!(sums.factor(false).is_none());
     }

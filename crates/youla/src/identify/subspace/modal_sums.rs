@@ -52,16 +52,18 @@ pub(super) struct Sums<'a> {
 }
 
 impl<'a> Sums<'a> {
-    /// Of no samples; `None` where a mode decays too slowly.
-    pub(super) fn new(lambda: &'a [c64], inputs: usize, beside: usize) -> Option<Self> {
-        if lambda.iter().any(|l| 1.0 - l.norm_sqr() < DECAYING) {
-            return None;
-        }
+    /// Whether all modes decay fast enough.
+    pub(super) fn can_be_of(lambda: &[c64]) -> bool {
+        lambda.iter().all(|l| 1.0 - l.norm_sqr() >= DECAYING)
+    }
+
+    /// Of no samples.
+    pub(super) fn new(lambda: &'a [c64], inputs: usize, beside: usize) -> Self {
         let (width, modes) = (inputs + beside, lambda.len());
         let count = (inputs + 1) * modes;
         let start: Vec<c64> = (0..count).map(|a| c64::new(f64::from(u8::from(a < modes)), 0.0)).collect();
         let (products, channels) = (Mat::zeros(count, width), Mat::zeros(width, width));
-        Some(Sums { lambda, inputs, end: start.clone(), start, products, channels })
+        Sums { lambda, inputs, end: start.clone(), start, products, channels }
     }
 
     /// Takes in the next samples.

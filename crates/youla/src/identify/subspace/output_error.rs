@@ -95,21 +95,22 @@ fn solve(
     let unknowns = &unknowns(data, pair, options);
     let factors = condense(&predictor, unknowns)?;
     let parts: Vec<Part> = factors.iter().map(|f| join(f, unknowns)).collect();
-    let common = unknowns.common();
-    let mut whole = Triangle::new(common + 1, common + 1);
+    let count = unknowns.common();
+    let mut whole = Triangle::new(count + 1, count + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
     let r = whole.r();
-    let solution = least_squares("the regressors of B and D", r.subcols(0, common), r.subcols(common, 1))?;
-    let (driven, d) = unknowns.unpack(solution.x.as_ref());
-    let own = parts.iter().map(|part| part.own(solution.x.as_ref(), unknowns)).collect::<Result<Vec<_>>>()?;
-    let (initial_states, disturbances): (Vec<_>, Vec<_>) = own.into_iter().unzip();
+    let solution = least_squares("the regressors of B and D", r.subcols(0, count), r.subcols(count, 1))?;
+    let common = solution.x.as_ref();
+    let (driven, d) = unknowns.unpack(common);
+    let own = parts.iter().map(|part| part.own(common, unknowns)).collect::<Result<Vec<_>>>()?;
+    let (initial_states, disturbances): (Vec<_>, Vec<_>) = own.iter().map(|own| split(own, unknowns)).unzip();
     let left = |i: usize| {
-        let own = parts.iter().zip(&factors).map(|(part, f)| part.residual(f, i, solution.x.as_ref(), unknowns));
-        own.collect::<Result<Vec<f64>>>().map(|all| all.into_iter().fold(0.0, f64::hypot))
+        let pairs = factors.iter().zip(&own);
+        pairs.map(|(f, own)| residual(&f[i], i, own, common, unknowns)).fold(0.0, f64::hypot)
     };
     let spread = data.spread(&disturbances)?;
-    let percent = (0..data.outputs).map(|i| Ok(100.0 * (1.0 - left(i)? / spread[i]))).collect::<Result<_>>()?;
-    let quality = OutputFit { by, percent, unknowns: common, rank: solution.rank, rcond: solution.rcond };
+    let percent = (0..data.outputs).map(|i| 100.0 * (1.0 - left(i) / spread[i])).collect();
+    let quality = OutputFit { by, percent, unknowns: count, rank: solution.rank, rcond: solution.rcond };
     let b = match &predictor.k {
         Some(k) => driven + k * &d,
         None => driven,
@@ -240,35 +241,32 @@ impl Part {
         (r11, rest.subcols(0, rest.ncols() - 1))
     }
 
-    /// `R11 [x0; a] = r1y - R12 [B; D]`: the initial state and the coefficients of the disturbances.
-    fn own(&self, solution: MatRef<'_, f64>, unknowns: &Unknowns) -> Result<(Vec<f64>, Mat<f64>)> {
-        let found = self.own_unknowns(solution, unknowns)?;
-        let x0 = (0..unknowns.states).map(|k| if unknowns.initial > 0 { found[(k, 0)] } else { 0.0 }).collect();
-        let known = unknowns.disturbances / unknowns.outputs;
-        let a = Mat::from_fn(known, unknowns.outputs, |j, i| found[(unknowns.initial + i * known + j, 0)]);
-        Ok((x0, a))
-    }
-
-    fn own_unknowns(&self, solution: MatRef<'_, f64>, unknowns: &Unknowns) -> Result<Mat<f64>> {
+    /// `R11 [x0; a] = r1y - R12 [B; D]`: the unknowns of the experiment.
+    fn own(&self, common: MatRef<'_, f64>, unknowns: &Unknowns) -> Result<Mat<f64>> {
         let top = self.r.as_ref().subrows(0, self.own_rank);
         let (r11, rest) = top.split_at_col(self.own);
         let (r12, r1y) = rest.split_at_col(unknowns.common());
-        Ok(least_squares("the regressors of an initial state", r11, (r1y - r12 * solution).as_ref())?.x)
+        Ok(least_squares("the regressors of an initial state", r11, (r1y - r12 * common).as_ref())?.x)
     }
+}
 
-    /// Length of the residual of output i over the experiment, from its factor.
-    fn residual(&self, factors: &Factors, i: usize, solution: MatRef<'_, f64>, unknowns: &Unknowns) -> Result<f64> {
-        let own = self.own_unknowns(solution, unknowns)?;
-        let (shared, of_b) = (unknowns.own() + unknowns.of_b(), unknowns.of_b());
-        let r = &factors[i];
-        let by = Mat::from_fn(r.ncols() - 1, 1, |k, _| match k {
-            k if k < unknowns.own() => own[(k, 0)],
-            k if k < shared => solution[(k - unknowns.own(), 0)],
-            k => solution[(of_b + unknowns.of_d_above(i) + k - shared, 0)],
-        });
-        let (regressors, target) = r.as_ref().split_at_col(r.ncols() - 1);
-        Ok((target - regressors * by).norm_l2())
-    }
+/// The initial state and the coefficients of the disturbances among the unknowns of an experiment.
+fn split(own: &Mat<f64>, unknowns: &Unknowns) -> (Vec<f64>, Mat<f64>) {
+    let x0 = (0..unknowns.states).map(|k| if unknowns.initial > 0 { own[(k, 0)] } else { 0.0 }).collect();
+    let known = unknowns.disturbances / unknowns.outputs;
+    (x0, Mat::from_fn(known, unknowns.outputs, |j, i| own[(unknowns.initial + i * known + j, 0)]))
+}
+
+/// Length of the residual of output i over an experiment, from its factor.
+fn residual(r: &Mat<f64>, i: usize, own: &Mat<f64>, common: MatRef<'_, f64>, unknowns: &Unknowns) -> f64 {
+    let (shared, of_b) = (unknowns.own() + unknowns.of_b(), unknowns.of_b());
+    let by = Mat::from_fn(r.ncols() - 1, 1, |k, _| match k {
+        k if k < unknowns.own() => own[(k, 0)],
+        k if k < shared => common[(k - unknowns.own(), 0)],
+        k => common[(of_b + unknowns.of_d_above(i) + k - shared, 0)],
+    });
+    let (regressors, target) = r.as_ref().split_at_col(r.ncols() - 1);
+    (target - regressors * by).norm_l2()
 }
 
 /// One-step prediction errors of the observer with gain K, one record per experiment, in scaled units.

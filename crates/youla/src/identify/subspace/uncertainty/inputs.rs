@@ -40,7 +40,8 @@ pub(super) fn input_changes(
         .map(|e| {
             let signals = &experiments[e];
             let known = regressors(signals.view(), &base.predictor);
-            let known = (0..base.unknowns.outputs).map(|i| known.of_output(i)).collect();
+            let known =
+                (0..base.unknowns.outputs).map(|i| known.columns.of_output(known.signals.as_ref(), i)).collect();
             let (x0, y) = (&base.initial_states[e], &outputs[e]);
             let of_experiment = OfExperiment { u: &signals.u, y, known, x0, base };
             reduced(&parts[e], of_experiment.sums(e, blocks, &stacked).as_ref(), base.unknowns.own())

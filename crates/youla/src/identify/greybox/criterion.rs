@@ -93,7 +93,7 @@ impl<'a> Criterion<'a> {
             let what = format!("the output records ({unknowns} unknowns)");
             return Err(Error::TooFewSamples { what, found: rows, needed: unknowns + 1 });
         }
-        let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
+        let coordinates = Coordinates { states: model.state_scales()? };
         let experiments: Vec<Samples> = experiments.iter().map(|e| interleave(e, &deviations)).collect();
         let energy = experiments.iter().flat_map(|e| &e.y).map(|y| y * y).sum();
         let degrees_of_freedom = rows - unknowns;
@@ -114,7 +114,7 @@ impl<'a> Criterion<'a> {
 
     /// The value of the criterion, with the best initial states.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
-        let continuous = self.coordinates.apply(&self.structure.model(theta)?)?;
+        let continuous = self.coordinates.apply(&self.structure.model(theta)?, self.outputs())?;
         let plant = continuous.zoh(self.time)?;
         let closed = self.closure.as_ref().map(|closure| closure.close(&plant)).transpose()?;
         let sampled = with_scaled_outputs(closed.as_ref().unwrap_or(&plant), &self.deviations)?;
@@ -168,7 +168,7 @@ impl<'a> Criterion<'a> {
 
     /// Number of outputs p.
     pub(super) fn outputs(&self) -> usize {
-        self.coordinates.outputs.len()
+        self.deviations.len()
     }
 
     /// One number per output, back in its units.

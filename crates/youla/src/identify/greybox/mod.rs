@@ -21,12 +21,15 @@ mod bounds;
 mod closure;
 mod cost;
 mod criterion;
+mod damped;
 mod declared;
 mod delays;
 mod identifiability;
 mod levenberg;
 mod narrow;
+mod options;
 mod projection;
+mod result;
 mod robust;
 mod sampled;
 mod sensitivity;
@@ -43,14 +46,16 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use options::GreyBoxOptions;
 pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
+pub use result::{GreyBoxModel, Stop};
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
 use super::fit::reproduction;
-use super::subspace::{Experiment, InitialState};
-use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
+use super::subspace::Experiment;
+use crate::lti::{Discrete, Partitioned, StateSpace, simulate};
 use crate::{Error, Result};
 use bounds::Bounds;
 use closure::Closure;
@@ -59,122 +64,7 @@ use delays::Shifted;
 use faer::{Mat, Scale};
 use levenberg::minimise;
 use robust::reweighted;
-use serde::{Deserialize, Serialize};
 use uncertainty::{Information, spread};
-
-/// Choices of [`greybox`].
-///
-/// ```
-/// use youla::identify::{greybox::GreyBoxOptions, subspace::InitialState};
-/// let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
-/// assert_eq!(options.max_iterations, 50);
-/// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GreyBoxOptions {
-    /// Largest number of steps. From nominal models of the bearing that are up to 60 % wrong the search takes 5 to 20; one
-    /// that is lost creeps on to the limit.
-    pub max_iterations: usize,
-    /// Converged where the distance to the minimum of the linearised criterion is below this share of the radius of the
-    /// confidence region: the relative offset (D. M. Bates and D. G. Watts, Technometrics 23 (1981), 179).
-    pub offset_tolerance: f64,
-    /// Smallest step, relative to the parameters, both in units of their effect on the output.
-    pub step_tolerance: f64,
-    /// Damping of the first step, relative to the squared lengths of the columns of the Jacobian.
-    pub damping: f64,
-    /// The state at the first sample of each experiment.
-    pub initial_state: InitialState,
-    /// Standard deviation of the noise of each output, of which only the ratios count; empty where all are equal.
-    pub output_deviations: Vec<f64>,
-    /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
-    pub delays: Vec<usize>,
-    /// How residuals count.
-    pub loss: Loss,
-}
-
-impl Default for GreyBoxOptions {
-    fn default() -> Self {
-        GreyBoxOptions {
-            max_iterations: 50,
-            offset_tolerance: 1e-4,
-            step_tolerance: 1e-10,
-            damping: 1e-3,
-            initial_state: InitialState::default(),
-            output_deviations: Vec::new(),
-            delays: Vec::new(),
-            loss: Loss::default(),
-        }
-    }
-}
-
-/// Why the search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stop {
-    /// At a minimum, as exactly as the noise lets it be known.
-    Converged,
-    /// The model reproduces the data to rounding.
-    Exact,
-    /// No step that is longer than the tolerance lowers the criterion.
-    StepTooSmall,
-    /// The limit of iterations was reached.
-    Iterations,
-}
-
-/// Result of [`greybox`].
-#[derive(Debug, Clone)]
-pub struct GreyBoxModel {
-    /// Estimated parameters, in the order of [`Structure::names`].
-    pub parameters: Vec<f64>,
-    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
-    /// bound holds back count as known: their rows and columns are zero.
-    pub covariance: Option<Mat<f64>>,
-    /// The continuous-time model, without delays.
-    pub continuous: StateSpace<Continuous>,
-    /// The same behind a zero-order hold, with the delays of the inputs as further states behind its own.
-    pub model: StateSpace<Discrete>,
-    /// Whether it is stable.
-    pub stable: bool,
-    /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
-    /// and those of the delays each.
-    pub initial_states: Vec<Vec<f64>>,
-    /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
-    /// loss of Huber.
-    pub cost: f64,
-    /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26).
-    pub fit: Vec<f64>,
-    /// Root-mean-square residual per output, in its units.
-    pub residual: Vec<f64>,
-    /// Why the search ended.
-    pub stop: Stop,
-    /// Distance to the minimum of the linearised criterion over the radius of the confidence region.
-    pub relative_offset: f64,
-    /// Steps that lowered the criterion; there is one linearisation more.
-    pub iterations: usize,
-    /// Simulations of all records for the value of the criterion, those of rejected trial points included.
-    pub evaluations: usize,
-    /// Trial points that were rejected because the model could not be computed or its simulation was not finite.
-    pub diverged: usize,
-    /// Number of parameters (in combination) that the data determine: rank of the Jacobian, columns of unit length.
-    pub rank: usize,
-    /// Reciprocal condition number of that Jacobian.
-    pub rcond: f64,
-    /// Which parameters those are that the data do not determine.
-    pub undetermined: Undetermined,
-    /// Parameters that ended at a bound.
-    pub at_bounds: Vec<AtBound>,
-    /// Weights of the residuals, `None` where all count by their square.
-    pub robust: Option<RobustReport>,
-}
-
-impl GreyBoxModel {
-    /// Standard deviations of the parameters, `None` where the data do not determine them all.
-    pub fn standard_deviations(&self) -> Option<Vec<f64>> {
-        self.covariance
-            .as_ref()
-            .map(|covariance| covariance.diagonal().column_vector().iter().map(|v| v.sqrt()).collect())
-    }
-}
 
 /// Estimates the parameters of a structure from one or more experiments by the output-error method.
 ///
@@ -249,7 +139,7 @@ fn estimate(
     closure: Option<Closure<'_>>,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    check(options)?;
+    options.check()?;
     if structure.names().is_empty() {
         let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
         return Err(Error::OutOfRange { what, value: 0.0, must });
@@ -313,18 +203,6 @@ fn estimate(
         robust: report,
         parameters: outcome.point.theta,
     })
-}
-
-fn check(options: &GreyBoxOptions) -> Result<()> {
-    let positive = [
-        ("the offset tolerance", options.offset_tolerance),
-        ("the step tolerance", options.step_tolerance),
-        ("the damping", options.damping),
-    ];
-    match positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((what, value)) => Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" }),
-        None => Ok(()),
-    }
 }
 
 fn errors(

@@ -14,23 +14,18 @@ use crate::lti::{Continuous, Discrete, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, Scale};
 
-/// The coordinates in which everything is computed: balanced states `x = diag(states) z` (powers of two), outputs divided
-/// by the deviation of their noise.
+/// The coordinates in which everything is computed: balanced states `x = diag(states) z` (powers of two).
 pub(super) struct Coordinates {
     pub(super) states: Vec<f64>,
-    pub(super) outputs: Vec<f64>,
 }
 
 impl Coordinates {
-    /// The model in these coordinates.
-    pub(super) fn apply(&self, model: &StateSpace<Continuous>) -> Result<StateSpace<Continuous>> {
-        let (n, m, p) = (self.states.len(), model.inputs(), self.outputs.len());
+    /// The model in these coordinates; `outputs` is its number of outputs.
+    pub(super) fn apply(&self, model: &StateSpace<Continuous>, outputs: usize) -> Result<StateSpace<Continuous>> {
+        let n = self.states.len();
         check_shape("the state matrix of the structure", model.a(), (n, n))?;
-        check_shape("the feedthrough of the structure", model.d(), (p, m))?;
-        let model = model.with_scaled_states(&self.states);
-        let c = Mat::from_fn(p, n, |i, j| model.c()[(i, j)] / self.outputs[i]);
-        let d = Mat::from_fn(p, m, |i, j| model.d()[(i, j)] / self.outputs[i]);
-        StateSpace::new(model.a().to_owned(), model.b().to_owned(), c, d, Continuous)
+        check_shape("the feedthrough of the structure", model.d(), (outputs, model.inputs()))?;
+        Ok(model.with_scaled_states(&self.states))
     }
 
     /// A derivative in these coordinates.
@@ -38,8 +33,8 @@ impl Coordinates {
         match matrix {
             Matrix::A => value * self.states[column] / self.states[row],
             Matrix::B => value / self.states[row],
-            Matrix::C => value * self.states[column] / self.outputs[row],
-            Matrix::D => value / self.outputs[row],
+            Matrix::C => value * self.states[column],
+            Matrix::D => value,
         }
     }
 }

@@ -11,7 +11,7 @@
 
 use super::narrow::NarrowTriangle;
 use super::sampled::SampledSlope;
-use crate::lti::{Discrete, SimulationState, Simulator, StateSpace};
+use crate::lti::{Discrete, Simulator, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 
@@ -45,75 +45,39 @@ pub(super) fn condense(
     x0: &[f64],
     initial: usize,
 ) -> Result<Mat<f64>> {
-    let mut rows = Rows::new(samples, system, slopes, x0, initial)?;
-    let mut triangle = NarrowTriangle::new(rows.columns + 1);
-    let mut piece = Vec::new();
-    while let count @ 1.. = rows.fill(&mut piece)? {
-        triangle.fold(&mut piece, count);
-    }
-    Ok(triangle.into_factor())
-}
-
-/// The rows `[y_0 y_theta e]`, piece by piece.
-struct Rows<'a> {
-    samples: &'a Samples,
-    system: &'a StateSpace<Discrete>,
-    simulator: Simulator,
-    state: SimulationState,
-    bank: Bank,
-    /// Without that of e.
-    columns: usize,
-    signals: Vec<f64>,
-    next: usize,
-}
-
-impl<'a> Rows<'a> {
-    fn new(
-        samples: &'a Samples,
-        system: &'a StateSpace<Discrete>,
-        slopes: &[SampledSlope],
-        x0: &[f64],
-        initial: usize,
-    ) -> Result<Self> {
-        let simulator = Simulator::new(system);
-        let state = simulator.start(x0)?;
-        let (bank, columns) = (Bank::new(system, slopes, initial), initial + slopes.len());
-        let signals = vec![0.0; system.order() + system.inputs()];
-        Ok(Rows { samples, system, simulator, state, bank, columns, signals, next: 0 })
-    }
-
-    /// Writes the rows of the next samples, column by column; returns how many, 0 at the end.
-    fn fill(&mut self, piece: &mut Vec<f64>) -> Result<usize> {
-        let (n, m, p) = (self.system.order(), self.system.inputs(), self.system.outputs());
-        let (first, columns) = (self.next, self.columns);
-        let count = PIECE.min(self.samples.count - first);
-        if count == 0 {
-            return Ok(0);
-        }
+    let (n, m, p) = (system.order(), system.inputs(), system.outputs());
+    let columns = initial + slopes.len();
+    let simulator = Simulator::new(system);
+    let mut state = simulator.start(x0)?;
+    let mut bank = Bank::new(system, slopes, initial);
+    let mut triangle = NarrowTriangle::new(columns + 1);
+    let mut piece = vec![0.0; PIECE * p * (columns + 1)];
+    let mut signals = vec![0.0; n + m];
+    for first in (0..samples.count).step_by(PIECE) {
+        let count = PIECE.min(samples.count - first);
         let rows = count * p;
-        piece.resize(rows * (columns + 1), 0.0);
         for k in 0..count {
-            let u = &self.samples.u[(first + k) * m..][..m];
-            let y = &self.samples.y[(first + k) * p..][..p];
-            self.signals[..n].copy_from_slice(self.state.x());
-            self.signals[n..].copy_from_slice(u);
-            self.bank.step(&self.signals, |i, column, value| piece[column * rows + k * p + i] = value);
-            for (i, (y, model)) in y.iter().zip(self.simulator.step(&mut self.state, u)).enumerate() {
+            let u = &samples.u[(first + k) * m..][..m];
+            let y = &samples.y[(first + k) * p..][..p];
+            signals[..n].copy_from_slice(state.x());
+            signals[n..].copy_from_slice(u);
+            bank.step(&signals, |i, column, value| piece[column * rows + k * p + i] = value);
+            for (i, (y, model)) in y.iter().zip(simulator.step(&mut state, u)).enumerate() {
                 piece[columns * rows + k * p + i] = y - model;
             }
         }
-        if let Some(roots) = self.samples.roots.get(first * p..first * p + rows) {
-            for column in piece.chunks_exact_mut(rows) {
+        if let Some(roots) = samples.roots.get(first * p..first * p + rows) {
+            for column in piece[..rows * (columns + 1)].chunks_exact_mut(rows) {
                 column.iter_mut().zip(roots).for_each(|(value, root)| *value *= root);
             }
         }
-        if !piece.iter().fold(0.0, |sum, v| sum + v * v).is_finite() {
-            return Err(diverged(first + 1, self.system));
+        if !piece[..rows * (columns + 1)].iter().fold(0.0, |sum, v| sum + v * v).is_finite() {
+            return Err(diverged(first + 1, system));
         }
-        self.bank.forget_the_vanished();
-        self.next += count;
-        Ok(rows)
+        bank.forget_the_vanished();
+        triangle.fold(&mut piece[..rows * (columns + 1)], rows);
     }
+    Ok(triangle.into_factor())
 }
 
 /// The sum of squares of the weighted residual of the model started from rest.

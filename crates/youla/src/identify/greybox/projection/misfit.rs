@@ -47,8 +47,8 @@ impl<'a> Misfit<'a> {
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
         let model = self.structure.model(theta)?;
         check_shape("the feedthrough of the structure", model.d(), (self.target.outputs(), self.target.inputs()))?;
-        let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
-        let continuous = coordinates.apply(&model)?;
+        let coordinates = Coordinates { states: model.state_scales()? };
+        let continuous = coordinates.apply(&model, self.target.outputs())?;
         let sampled = continuous.zoh(self.target.time())?;
         let response = self.target.response(&sampled)?;
         let cost: f64 = self.entries(&response).col_iter().flat_map(|column| column.iter()).sum();

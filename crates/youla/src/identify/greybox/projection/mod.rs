@@ -23,6 +23,7 @@ mod tests;
 pub(crate) use target::decayed;
 pub use target::{FrequencyTarget, logarithmic_grid};
 
+use super::options::require_positive;
 use super::{Stop, Structure};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
@@ -164,14 +165,10 @@ fn check(structure: &dyn Structure, starts: &[Vec<f64>], options: &ProjectionOpt
         check_shape("the start vector of a projection", theta, (parameters, 1))?;
         check_finite("the start vector of a projection", theta)?;
     }
-    let positive = [
+    require_positive(&[
         ("the tolerance of a projection", options.tolerance),
         ("the step tolerance of a projection", options.step_tolerance),
-    ];
-    match positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((what, value)) => Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" }),
-        None => Ok(()),
-    }
+    ])
 }
 
 /// The starts, the lowest misfit first.

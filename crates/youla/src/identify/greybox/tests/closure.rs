@@ -2,13 +2,11 @@
 
 use super::super::closure::Closure;
 use super::super::criterion::Criterion;
-use super::super::{
-    GreyBoxOptions, InitialState, LoopOutput, Matrix, Slope, Stop, Structure, greybox, greybox_in_loop,
-};
+use super::super::{GreyBoxOptions, LoopOutput, Matrix, Slope, Stop, Structure, greybox, greybox_in_loop};
 use super::gradient::gradient_error;
 use crate::Result;
 use crate::control::closed_loop;
-use crate::identify::subspace::Experiment;
+use crate::identify::subspace::{Experiment, InitialState};
 use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};

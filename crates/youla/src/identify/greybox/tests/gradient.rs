@@ -2,9 +2,10 @@
 
 use super::super::criterion::Criterion;
 use super::super::sampled::{Coordinates, sampled_slopes};
-use super::super::{BearingStructure, InitialState, Matrix, Slope, Structure};
+use super::super::{BearingStructure, Matrix, Slope, Structure};
 use super::{off, open_loop, time, truth};
 use crate::Result;
+use crate::identify::subspace::InitialState;
 use crate::linalg::eye;
 use crate::lti::{Continuous, StateSpace};
 use faer::Mat;
@@ -101,7 +102,7 @@ fn sampling_has_the_derivative_of_a_lag() {
     }
     // Ad = e^(-rt), Bd = (1 - e^(-rt)) / r.
     let (r, t) = (3.0, time().ts());
-    let coordinates = Coordinates { states: vec![1.0], outputs: vec![1.0] };
+    let coordinates = Coordinates { states: vec![1.0] };
     let slopes = sampled_slopes(&Lag, &[r], &Lag.model(&[r]).unwrap(), &coordinates, time()).unwrap();
     let decay = f64::exp(-r * t);
     assert!((slopes[0].states[(0, 0)] / (-t * decay) - 1.0).abs() < 1e-14);

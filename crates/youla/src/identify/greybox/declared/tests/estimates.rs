@@ -1,12 +1,11 @@
 //! Parameters of declared structures from simulated records.
 
 use super::super::super::tests::off;
-use super::super::super::{
-    Experiment, GreyBoxModel, GreyBoxOptions, InitialState, Loss, Side, Stop, Structure, greybox,
-};
+use super::super::super::{Experiment, GreyBoxModel, GreyBoxOptions, Loss, Side, Stop, Structure, greybox};
 use super::super::DeclaredStructure;
 use super::declared;
 use crate::Mat;
+use crate::identify::subspace::InitialState;
 use crate::lti::{Discrete, simulate};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

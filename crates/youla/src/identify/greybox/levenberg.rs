@@ -6,8 +6,9 @@
 //! to that bound, and the others take the step that is best with it there.
 
 use super::bounds::Bounds;
-use super::criterion::{Criterion, Linearisation, Point};
+use super::criterion::{Criterion, Point};
 use super::damped::{Damping, damped_step, length};
+use super::linearisation::Linearisation;
 use super::{GreyBoxOptions, Stop};
 use crate::Result;
 use faer::Mat;

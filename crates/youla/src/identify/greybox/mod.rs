@@ -1,4 +1,4 @@
-//! Grey-box identification: the physical parameters of a continuous-time structure by the prediction-error method.
+//! Grey-box identification: the physical parameters of a structure by the prediction-error method.
 //!
 //! For white output noise, `y = G(theta) u + n`, the predictor is the simulation and the estimate
 //! ```text
@@ -10,33 +10,45 @@
 //! lightly damped modes that are far off leave it in a local one, which [`Stop::Converged`] cannot tell from the global one;
 //! [`GreyBoxModel::fit`] can, next to the fit of another method.
 //!
+//! Process noise or coloured output noise take another predictor, [`NoiseModel`]: the innovation form with a free gain
+//! (`predictor.rs`) or a known filter (`whitening.rs`).
+//!
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
-//! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
+//! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`) or steady
+//! (`steady.rs`),
 //! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
 //! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bearing;
 mod bounds;
+mod checks;
 mod closure;
 mod cost;
 mod criterion;
 mod damped;
 mod declared;
 mod delays;
+mod estimate;
 mod identifiability;
 mod levenberg;
+mod linearisation;
 mod narrow;
+mod noise;
 mod options;
+mod predictor;
 mod projection;
 mod result;
 mod robust;
 mod sampled;
 mod sensitivity;
+mod simulated;
+mod steady;
 mod structure;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
+mod whitening;
 
 pub use bearing::BearingStructure;
 pub use bounds::{AtBound, Side};
@@ -46,6 +58,7 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
 pub use options::GreyBoxOptions;
 pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
@@ -53,20 +66,13 @@ pub use result::{GreyBoxModel, Stop};
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
-use super::fit::reproduction;
 use super::subspace::Experiment;
-use crate::lti::{Discrete, Partitioned, StateSpace, simulate};
-use crate::{Error, Result};
-use bounds::Bounds;
+use crate::Result;
+use crate::lti::{Discrete, Partitioned};
 use closure::Closure;
-use criterion::Criterion;
-use delays::Shifted;
-use faer::{Mat, Scale};
-use levenberg::minimise;
-use robust::reweighted;
-use uncertainty::{Information, spread};
+use estimate::{Setting, estimate};
 
-/// Estimates the parameters of a structure from one or more experiments by the output-error method.
+/// Estimates the parameters of a structure from one or more experiments by the prediction-error method.
 ///
 /// The criterion is minimised by Levenberg-Marquardt from `start`, within the bounds of the structure where it has any. A
 /// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
@@ -102,7 +108,7 @@ pub fn greybox(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, None, options)
+    estimate(structure, start, experiments, time, Setting { closure: None, confined: false }, options)
 }
 
 /// The same through the loop: the model is simulated under the controller that ran, from the external signal w alone, and
@@ -128,88 +134,6 @@ pub fn greybox_in_loop(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, Some(Closure::new(controller, output)), options)
-}
-
-fn estimate(
-    structure: &dyn Structure,
-    start: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    closure: Option<Closure<'_>>,
-    options: &GreyBoxOptions,
-) -> Result<GreyBoxModel> {
-    options.check()?;
-    if structure.names().is_empty() {
-        let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
-        return Err(Error::OutOfRange { what, value: 0.0, must });
-    }
-    if closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
-        let (what, must) = ("the delay of an input inside of the loop".into(), "0: put it into the controller");
-        return Err(Error::OutOfRange { what, value: 1.0, must });
-    }
-    let shifted = Shifted::new(experiments, &options.delays)?;
-    let experiments = &shifted.experiments();
-    let mut criterion = Criterion::new(
-        structure,
-        start,
-        experiments,
-        time,
-        closure,
-        options.initial_state,
-        &options.output_deviations,
-    )?;
-    let bounds = Bounds::new(structure, start)?;
-    let mut outcome = minimise(&criterion, &bounds, start, options)?;
-    let mut variance = 2.0 * outcome.point.cost / criterion.degrees_of_freedom as f64;
-    let mut unweighted = outcome.face.here.clone();
-    let mut report = None;
-    if options.loss == Loss::Huber {
-        let robust = reweighted(&mut criterion, &bounds, options, outcome)?;
-        (outcome, variance, report) = (robust.outcome, robust.variance, Some(robust.report));
-        unweighted = criterion.linearise(&outcome.point)?.along(&outcome.face.free);
-    }
-    let point = &outcome.point;
-    let names = structure.names();
-    let sizes: Vec<f64> =
-        point.theta.iter().zip(&criterion.scales).map(|(v, scale)| if *v == 0.0 { *scale } else { v.abs() }).collect();
-    let information = Information::new(&outcome.linearisation, &sizes, criterion.energy.sqrt());
-    let free = &outcome.face.free;
-    let free_sizes: Vec<f64> = free.iter().map(|j| sizes[*j]).collect();
-    let inverse = Information::new(&unweighted, &free_sizes, criterion.energy.sqrt()).inverse;
-    let continuous = structure.model(&point.theta)?;
-    let model = continuous.zoh(time)?;
-    let initial_states = criterion.initial_states(point);
-    let measured: Vec<_> = experiments.iter().map(|e| e.y).collect();
-    let outputs = reproduction(&measured, &errors(experiments, &criterion.simulated(&model)?, &initial_states)?);
-    Ok(GreyBoxModel {
-        covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
-        stable: model.is_stable()?,
-        continuous,
-        model: shifted.delays.put_before(model)?,
-        initial_states: shifted.initial_states(initial_states),
-        cost: point.cost,
-        fit: outputs.iter().map(|o| o.fit).collect(),
-        residual: outputs.iter().map(|o| o.residual).collect(),
-        stop: outcome.stop,
-        relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
-        iterations: outcome.work.iterations,
-        evaluations: outcome.work.evaluations,
-        diverged: outcome.work.diverged,
-        rank: information.rank,
-        rcond: information.rcond,
-        undetermined: information.undetermined(&names, &sizes),
-        at_bounds: bounds.touched(&point.theta),
-        robust: report,
-        parameters: outcome.point.theta,
-    })
-}
-
-fn errors(
-    experiments: &[Experiment<'_>],
-    model: &StateSpace<Discrete>,
-    initial_states: &[Vec<f64>],
-) -> Result<Vec<Mat<f64>>> {
-    let error = |(e, x0): (&Experiment<'_>, &Vec<f64>)| simulate(model, e.u, x0).map(|simulated| e.y - simulated);
-    experiments.iter().zip(initial_states).map(error).collect()
+    let closure = Some(Closure::new(controller, output));
+    estimate(structure, start, experiments, time, Setting { closure, confined: false }, options)
 }

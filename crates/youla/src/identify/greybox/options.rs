@@ -1,5 +1,6 @@
 //! Choices of the search.
 
+use super::noise::NoiseModel;
 use super::robust::Loss;
 use crate::identify::subspace::InitialState;
 use crate::{Error, Result};
@@ -27,6 +28,8 @@ pub struct GreyBoxOptions {
     pub damping: f64,
     /// The state at the first sample of each experiment.
     pub initial_state: InitialState,
+    /// The model of the noise.
+    pub noise: NoiseModel,
     /// Standard deviation of the noise of each output, of which only the ratios count; empty where all are equal.
     pub output_deviations: Vec<f64>,
     /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
@@ -43,6 +46,7 @@ impl Default for GreyBoxOptions {
             step_tolerance: 1e-10,
             damping: 1e-3,
             initial_state: InitialState::default(),
+            noise: NoiseModel::default(),
             output_deviations: Vec::new(),
             delays: Vec::new(),
             loss: Loss::default(),

@@ -26,25 +26,30 @@ pub enum Stop {
 pub struct GreyBoxModel {
     /// Estimated parameters, in the order of [`super::Structure::names`].
     pub parameters: Vec<f64>,
-    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
+    /// Their covariance, q x q, for white residuals, whatever the gain of the innovation form is; `None` where the data do not determine them all. Parameters that a
     /// bound holds back count as known: their rows and columns are zero.
     pub covariance: Option<Mat<f64>>,
-    /// The continuous-time model, without delays.
-    pub continuous: StateSpace<Continuous>,
-    /// The same behind a zero-order hold, with the delays of the inputs as further states behind its own.
+    /// The continuous-time model, without delays; `None` of a structure of discrete time.
+    pub continuous: Option<StateSpace<Continuous>>,
+    /// The sampled model, behind a zero-order hold for a structure of continuous time, with the delays of the inputs as further states behind its own.
     pub model: StateSpace<Discrete>,
     /// Whether it is stable.
     pub stable: bool,
+    /// The gain K of the innovation form in the states of the structure, n x p, where one was estimated.
+    pub gain: Option<Mat<f64>>,
     /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
     /// and those of the delays each.
     pub initial_states: Vec<Vec<f64>>,
     /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
     /// loss of Huber.
     pub cost: f64,
-    /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26).
+    /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26), yhat the prediction that the
+    /// criterion compares: the simulation for output error, else the prediction one step ahead.
     pub fit: Vec<f64>,
-    /// Root-mean-square residual per output, in its units.
+    /// Root-mean-square residual `y - yhat` per output, in its units.
     pub residual: Vec<f64>,
+    /// The same fit of the simulation from the initial states, minus infinity where it diverges.
+    pub simulation_fit: Vec<f64>,
     /// Why the search ended.
     pub stop: Stop,
     /// Distance to the minimum of the linearised criterion over the radius of the confidence region.

@@ -2,7 +2,7 @@
 //!
 //! With the state x of the model, `v = [x; u]` and the derivatives of the sampled matrices,
 //! ```text
-//! x_theta+ = Ad x_theta + [dAd dBd] v,    y_theta = C x_theta + [dC dD] v,      x_theta(0) = 0
+//! x_theta+ = Ad x_theta + [dAd dBd] v,    y_theta = C x_theta + [dC dD] v,      x_theta(0) = 0, or that of the steady state
 //! x_0+     = Ad x_0,                      y_0     = C x_0,                      x_0(0) = I
 //! ```
 //! so all sensitivities are columns of one matrix (n x columns) under one Ad and share one v. Eight columns at a time stay
@@ -33,8 +33,17 @@ pub(super) struct Samples {
     pub(super) roots: Vec<f64>,
 }
 
-/// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the model started at `x0`.
-/// `initial` is n where the sensitivity to the initial state is wanted, else 0.
+/// How a simulation begins.
+pub(super) struct Begin<'a> {
+    /// The initial state.
+    pub(super) x0: &'a [f64],
+    /// x_theta(0), n x q; zero where `None`.
+    pub(super) slopes: Option<MatRef<'a, f64>>,
+    /// n where the sensitivity to the initial state is wanted, else 0.
+    pub(super) estimated: usize,
+}
+
+/// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the simulated model.
 ///
 /// # Errors
 /// [`Error::Diverged`] where the recursion leaves the range of the numbers.
@@ -42,14 +51,13 @@ pub(super) fn condense(
     samples: &Samples,
     system: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
-    x0: &[f64],
-    initial: usize,
+    begin: &Begin<'_>,
 ) -> Result<Mat<f64>> {
     let (n, m, p) = (system.order(), system.inputs(), system.outputs());
-    let columns = initial + slopes.len();
+    let columns = begin.estimated + slopes.len();
     let simulator = Simulator::new(system);
-    let mut state = simulator.start(x0)?;
-    let mut bank = Bank::new(system, slopes, initial);
+    let mut state = simulator.start(begin.x0)?;
+    let mut bank = Bank::new(system, slopes, begin);
     let mut triangle = NarrowTriangle::new(columns + 1);
     let mut piece = vec![0.0; PIECE * p * (columns + 1)];
     let mut signals = vec![0.0; n + m];
@@ -80,14 +88,14 @@ pub(super) fn condense(
     Ok(triangle.into_factor())
 }
 
-/// The sum of squares of the weighted residual of the model started from rest.
+/// The sum of squares of the weighted residual of the model started at `x0`.
 ///
 /// # Errors
 /// [`Error::Diverged`] where the simulation leaves the range of the numbers.
-pub(super) fn sum_of_squares(samples: &Samples, system: &StateSpace<Discrete>) -> Result<f64> {
+pub(super) fn sum_of_squares(samples: &Samples, system: &StateSpace<Discrete>, x0: &[f64]) -> Result<f64> {
     let (m, p) = (system.inputs(), system.outputs());
     let simulator = Simulator::new(system);
-    let mut state = simulator.start(&vec![0.0; system.order()])?;
+    let mut state = simulator.start(x0)?;
     let mut sum = 0.0;
     for k in 0..samples.count {
         let model = simulator.step(&mut state, &samples.u[k * m..][..m]);
@@ -150,10 +158,15 @@ struct Row {
 }
 
 impl Bank {
-    fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], initial: usize) -> Self {
-        let n = system.order();
+    fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], begin: &Begin<'_>) -> Self {
+        let (n, initial) = (system.order(), begin.estimated);
         let columns = initial + slopes.len();
         let slope_of = |column: usize| column.checked_sub(initial).and_then(|theta| slopes.get(theta));
+        let begun = |column: usize, i: usize| match (column.checked_sub(initial), begin.slopes) {
+            (Some(theta), Some(moved)) if theta < moved.ncols() => moved[(i, theta)],
+            (None, _) if column == i => 1.0,
+            _ => 0.0,
+        };
         let groups = (0..columns).step_by(LANES).map(|first| {
             let lanes = |value: &dyn Fn(usize) -> f64| std::array::from_fn::<f64, LANES, _>(|lane| value(first + lane));
             let rows = |from: MatRef<'_, f64>, part: fn(&SampledSlope) -> MatRef<'_, f64>| {
@@ -168,9 +181,7 @@ impl Bank {
                     .collect()
             };
             Group {
-                states: (0..n)
-                    .map(|i| lanes(&|column| if column < initial && column == i { 1.0 } else { 0.0 }))
-                    .collect(),
+                states: (0..n).map(|i| lanes(&|column| begun(column, i))).collect(),
                 next: vec![[0.0; LANES]; n],
                 state_rows: rows(system.a(), |slope| slope.states.as_ref()),
                 output_rows: rows(system.c(), |slope| slope.outputs.as_ref()),

@@ -137,3 +137,15 @@ pub fn greybox_in_loop(
     let closure = Some(Closure::new(controller, output));
     estimate(structure, start, experiments, time, Setting { closure, confined: false }, options)
 }
+
+/// The same as [`greybox`]; where `stable` says so, models that are not stable are rejected.
+pub(crate) fn greybox_confined(
+    structure: &dyn Structure,
+    start: &[f64],
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    stable: bool,
+    options: &GreyBoxOptions,
+) -> Result<GreyBoxModel> {
+    estimate(structure, start, experiments, time, Setting { closure: None, confined: stable }, options)
+}

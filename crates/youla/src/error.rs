@@ -658,6 +658,21 @@ pub enum Error {
         "the structure is not linear in its parameters and no start gives a model; give a parameter vector to start from"
     )]
     NoStart,
+    /// A structure of discrete time has no continuous-time model.
+    #[error("the structure is one of discrete time, sampled every {} s: it has no continuous-time model", Seconds(*ts))]
+    DiscreteStructure {
+        /// Its sample time in seconds.
+        ts: f64,
+    },
+    /// A steady state is asked of an integrator.
+    #[error("a model of the search has no steady state: its pole {} integrates; take initial_state = \"estimated\" or \"zero\"", Pole(*pole))]
+    NoSteadyState {
+        /// The pole at 1.
+        pole: c64,
+    },
+    /// A black box is asked for the steady state.
+    #[error("initial_state = \"steady-state\" serves physical structures only; take \"estimated\" or \"zero\"")]
+    SteadyBlackBox,
     // ---- report ------------------------------------------------------------------------------------------------
     /// The data of a report cannot be written as JSON.
     #[error("the data of the report cannot be written as JSON: {source}")]
@@ -699,6 +714,7 @@ impl Error {
             | Error::NoLogarithm { .. }
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. }
+            | Error::NoSteadyState { .. }
             | Error::ReportData { .. }
             | Error::ReportTemplate { .. }
             | Error::NotStabilisable { .. }

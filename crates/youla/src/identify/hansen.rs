@@ -7,6 +7,7 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
+use super::hansen_refine::Refinement;
 use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
 use super::subspace::subspace_stream;
 use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
@@ -28,6 +29,8 @@ pub struct HansenModel {
     pub uncertainty: Option<Uncertainty>,
     /// Whether the data contradict the nominal model, where an uncertainty was asked for.
     pub evidence: Option<Result<Evidence, NoUncertainty>>,
+    /// What [`super::hansen_refine::refine_hansen`] changed.
+    pub refinement: Option<Refinement>,
 }
 
 /// Identifies S from the signals of one or more experiments and recombines it to the plant G(S).
@@ -94,7 +97,7 @@ pub fn hansen_stream(
     let mut signals = YoulaStream::new(factors, measured, settle)?;
     let deviation = subspace_stream(&mut signals, factors.nominal().time(), options)?;
     let plant = factors.plant_of(&deviation.model)?;
-    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None })
+    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None, refinement: None })
 }
 
 #[cfg(test)]

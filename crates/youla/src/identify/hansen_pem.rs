@@ -112,7 +112,7 @@ impl HansenPem {
     /// Whether the structure stays behind G(S), or behind a constant, by more than [`LOST_POINTS`] on an output: the search is
     /// lost, or the structure does not describe the plant.
     pub fn lost(&self) -> bool {
-        self.model.fit.iter().zip(&self.fit_of_plant).any(|(fit, plant)| *fit < plant.max(0.0) - LOST_POINTS)
+        self.model.simulation_fit.iter().zip(&self.fit_of_plant).any(|(fit, plant)| *fit < plant.max(0.0) - LOST_POINTS)
     }
 }
 
@@ -253,11 +253,11 @@ fn fit_of(model: &StateSpace<Discrete>, experiments: &[Experiment<'_>], initial:
     Ok(reproduction(&measured, &errors).iter().map(|output| output.fit).collect())
 }
 
-/// `y - yhat`, from rest or from the initial state that fits best.
+/// `y - yhat`, from rest or from the initial state that fits best; a black box has no steady state that can be trusted.
 fn simulated_error(model: &StateSpace<Discrete>, e: &Experiment<'_>, initial: InitialState) -> Result<Mat<f64>> {
     let simulated = match initial {
         InitialState::Zero => simulate(model, e.u, &vec![0.0; model.order()])?,
-        InitialState::Estimated => simulate_best(model, e.u, e.y)?,
+        InitialState::Estimated | InitialState::SteadyState => simulate_best(model, e.u, e.y)?,
     };
     Ok(e.y - simulated)
 }

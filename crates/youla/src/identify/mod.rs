@@ -5,5 +5,7 @@ mod fit;
 pub mod greybox;
 pub mod hansen;
 pub mod hansen_pem;
+pub mod hansen_refine;
 pub mod innovation_form;
+pub mod refine;
 pub mod subspace;

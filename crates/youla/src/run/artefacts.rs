@@ -238,6 +238,9 @@ impl Writer<'_> {
                 "misfit": form.misfit, "from_kalman": form.from_kalman,
             });
         }
+        if let Some(refinement) = &found.hansen.refinement {
+            details["refinement"] = serde_json::json!(refinement);
+        }
         self.model_with("4-identify/deviation", &s.model, named("alpha", u), named("beta", y), details)?;
         match &found.direct {
             Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, subspace_details(direct))?,

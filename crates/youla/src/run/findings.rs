@@ -3,8 +3,10 @@
 use super::pipeline::Identification;
 use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::greybox::Stop;
 use crate::identify::hansen_pem::PemStart;
 use crate::identify::innovation_form::Settling;
+use crate::identify::refine::RefineNoise;
 use crate::identify::subspace::{Uncertainty, amplitudes};
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
@@ -91,6 +93,28 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             form.iterations,
             form.change,
             100.0 * form.misfit
+        );
+        add(status, text);
+    }
+    if let Some(refined) = &found.hansen.refinement {
+        let (status, ended) = match refined.stop {
+            Stop::Iterations => (Status::Caution, " and stopped at the limit"),
+            _ => (Status::Info, ""),
+        };
+        let noise = match refined.noise {
+            RefineNoise::OutputError => "the simulated beta",
+            RefineNoise::Innovation => "beta predicted one step ahead",
+        };
+        let fits = |fit: &[f64]| fit.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" and ");
+        let text = format!(
+            "S was refined on {noise}: {} steps{ended} took the criterion from {:.5e} to {:.5e}, and the fit of the simulated \
+             beta from {} % to {} %. S is {}.",
+            refined.iterations,
+            refined.cost_before,
+            refined.cost,
+            fits(&refined.fit_before),
+            fits(&refined.fit),
+            if refined.stable { "stable, so that the controller stabilises G(S)" } else { "not stable" },
         );
         add(status, text);
     }

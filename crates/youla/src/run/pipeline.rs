@@ -11,6 +11,7 @@ use super::uncertainty::{RunUncertainty, run_uncertainty};
 use super::verdict::{Method, Verdict, verify};
 use crate::factor::CoprimeFactors;
 use crate::identify::hansen::{HansenModel, deviation_data};
+use crate::identify::hansen_refine::refine_hansen_disturbed;
 use crate::identify::innovation_form::hansen_structured;
 use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
@@ -206,7 +207,9 @@ fn scheme(
     let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
     let found = hansen_structured(factors, &data, &settings.hansen, &settings.deviation)?;
     let diagram = diagram(&data, &found.deviation, &settings.hansen, &settings.stabilisation);
-    Ok((found, diagram))
+    let Some(options) = &settings.deviation.refine else { return Ok((found, diagram)) };
+    let refined = refine_hansen_disturbed(found, factors, &signals.experiments, &lines, options);
+    Ok((refined.map_err(|e| e.within("[deviation.refine]"))?, diagram))
 }
 
 /// The plant from u and y, and its diagram.

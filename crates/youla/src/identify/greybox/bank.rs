@@ -8,6 +8,7 @@
 //! The instructions are those of the widest registers of the processor.
 
 use super::sampled::SampledSlope;
+use super::sensitivity::Begin;
 use crate::lti::{Discrete, StateSpace};
 use faer::MatRef;
 use pulp::Simd;
@@ -46,9 +47,9 @@ struct Block {
 }
 
 impl Bank {
-    /// Sensitivities to `initial` (n or 0) initial states, then to the parameters of `slopes`.
-    pub(super) fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], initial: usize) -> Self {
-        let (n, p) = (system.order(), system.outputs());
+    /// Sensitivities to the initial states that are estimated, then to the parameters of `slopes`.
+    pub(super) fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], begin: &Begin<'_>) -> Self {
+        let (n, p, initial) = (system.order(), system.outputs(), begin.estimated);
         let columns = initial + slopes.len();
         let group = |first: usize| {
             let lanes = |value: &dyn Fn(usize) -> f64| std::array::from_fn(|lane| value(first + lane));
@@ -57,8 +58,12 @@ impl Bank {
                 |i: usize, b: usize| lanes(&|column| slope_of(column).map_or(0.0, |slope| slope.states[(i, b)]));
             let output_slope =
                 |i: usize, b: usize| lanes(&|column| slope_of(column).map_or(0.0, |slope| slope.outputs[(i, b)]));
-            let one = |i: usize| lanes(&|column| if column < initial && column == i { 1.0 } else { 0.0 });
-            let states: Vec<Lanes> = (0..n.next_multiple_of(ROWS)).map(one).collect();
+            let begun = |column: usize, i: usize| match (column.checked_sub(initial), begin.slopes) {
+                (Some(theta), Some(moved)) if theta < moved.ncols() && i < n => moved[(i, theta)],
+                (None, _) if column == i => 1.0,
+                _ => 0.0,
+            };
+            let states: Vec<Lanes> = (0..n.next_multiple_of(ROWS)).map(|i| lanes(&|column| begun(column, i))).collect();
             Group {
                 next: states.clone(),
                 states,

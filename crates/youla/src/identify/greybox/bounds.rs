@@ -4,7 +4,7 @@
 //! an upper one, and is zero for all other parameters (J. Nocedal and S. J. Wright, Numerical Optimization, 2nd ed.,
 //! Springer 2006, section 16.7). A parameter that its bound holds back in this sense stays for the next step.
 
-use super::criterion::Linearisation;
+use super::linearisation::Linearisation;
 use super::structure::Structure;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -54,6 +54,13 @@ impl Bounds {
             }
         }
         Ok(Bounds { names, limits })
+    }
+
+    /// The same with parameters behind them that have no bounds, up to these names.
+    pub(super) fn extended(mut self, names: &[String]) -> Self {
+        self.limits.resize(names.len(), (f64::NEG_INFINITY, f64::INFINITY));
+        self.names = names.to_vec();
+        self
     }
 
     /// The parameters that no bound holds back.

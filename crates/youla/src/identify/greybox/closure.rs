@@ -128,16 +128,3 @@ impl<'a> Closure<'a> {
         SampledSlope { states, outputs }
     }
 }
-
-/// A system with its outputs divided by the deviations of their noise.
-pub(super) fn with_scaled_outputs(system: &StateSpace<Discrete>, deviations: &[f64]) -> Result<StateSpace<Discrete>> {
-    let divide = |m: MatRef<'_, f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / deviations[i]);
-    let (a, b) = (system.a().to_owned(), system.b().to_owned());
-    StateSpace::new(a, b, divide(system.c()), divide(system.d()), system.time())
-}
-
-/// The same for slopes.
-pub(super) fn with_scaled_slopes(slopes: Vec<SampledSlope>, deviations: &[f64]) -> Vec<SampledSlope> {
-    let divide = |m: &Mat<f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| m[(i, j)] / deviations[i]);
-    slopes.into_iter().map(|s| SampledSlope { outputs: divide(&s.outputs), ..s }).collect()
-}

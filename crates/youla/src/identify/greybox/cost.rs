@@ -2,13 +2,15 @@
 
 use super::criterion::Criterion;
 use super::delays::Shifted;
+use super::estimate::{Setting, comparison};
 use super::{GreyBoxOptions, Structure};
 use crate::Result;
 use crate::identify::subspace::Experiment;
 use crate::lti::Discrete;
 
 /// [`super::GreyBoxModel::cost`] of the structure at `theta`: half the sum of squares of the residuals, each divided by the
-/// deviation of its output, with the best initial states where they are estimated.
+/// deviation of its output, with the best initial states where they are estimated, and with the gain of the innovation form
+/// at its start.
 ///
 /// # Errors
 /// As [`super::greybox`] with the start `theta`.
@@ -34,8 +36,7 @@ pub fn greybox_cost(
     options: &GreyBoxOptions,
 ) -> Result<f64> {
     let shifted = Shifted::new(experiments, &options.delays)?;
-    let (experiments, initial_state) = (&shifted.experiments(), options.initial_state);
-    let criterion =
-        Criterion::new(structure, theta, experiments, time, None, initial_state, &options.output_deviations)?;
-    Ok(criterion.evaluate(theta)?.cost)
+    let setting = Setting { closure: None, confined: false };
+    let criterion = Criterion::new(structure, theta, &shifted.experiments(), time, comparison(setting, options))?;
+    Ok(criterion.evaluate(&criterion.start(theta))?.cost)
 }

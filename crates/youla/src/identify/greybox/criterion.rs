@@ -1,36 +1,46 @@
-//! The output-error criterion and its linearisation.
+//! The criterion and its linearisation.
 //!
 //! ```text
 //! V(theta) = 1/2 min_x0 sum_k |W (y(k) - yhat(k; theta, x0))|^2,     W = diag(1 / deviations)
 //! ```
-//! The initial states enter linearly and are solved for at every theta (variable projection). The rows over
-//! `[y_0 | y_theta | e]` of one experiment have the factor `[R11 R12 r1; 0 R22 r2]`; with `e` taken at the best x0, the
-//! gradient of V is exactly `-R22' r2`, and `R22` is the Jacobian in Kaufman's approximation (L. Kaufman, BIT 15 (1975),
-//! 49), the one that belongs to the covariance of theta alone.
+//! with yhat the simulation of the plant or of what stands around it (`simulated.rs`); theta holds the parameters of the
+//! structure, then those of the noise. Estimated initial states enter linearly and are solved for at every theta (variable
+//! projection). The rows over `[y_0 | y_theta | e]` of one experiment have the factor `[R11 R12 r1; 0 R22 r2]`; with `e`
+//! taken at the best x0, the gradient of V is exactly `-R22' r2`, and `R22` is the Jacobian in Kaufman's approximation (L.
+//! Kaufman, BIT 15 (1975), 49), the one that belongs to the covariance of theta alone. Those of the steady state move with
+//! theta.
 
-use super::closure::{Closure, with_scaled_outputs, with_scaled_slopes};
-use super::sampled::{Coordinates, sampled_slopes};
-use super::sensitivity::{Samples, condense, residuals, sum_of_squares};
+use super::checks::{check_records, check_start, check_time, checked_deviations, checked_scales};
+use super::closure::Closure;
+use super::linearisation::Linearisation;
+use super::noise::NoiseModel;
+use super::sampled::{Coordinates, Sample, sample, sampled_slopes};
+use super::sensitivity::{Begin, Samples, condense, residuals, sum_of_squares};
+use super::simulated::{Simulated, with_scaled_outputs, with_scaled_slopes};
+use super::steady::{steady_slopes, steady_state};
 use super::structure::Structure;
 use crate::identify::subspace::{Experiment, InitialState};
-use crate::linalg::{Triangle, check_finite, check_shape, leading_rank, least_squares};
-use crate::lti::{Continuous, Discrete, StateSpace};
-use crate::{Error, Result};
-use faer::{Mat, MatRef};
+use crate::linalg::{Triangle, leading_rank, least_squares};
+use crate::lti::{Discrete, StateSpace};
+use crate::{Mat, Result};
 
 /// Data and structure, checked and scaled.
 pub(super) struct Criterion<'a> {
     structure: &'a dyn Structure,
     experiments: Vec<Samples>,
     coordinates: Coordinates,
-    /// The controller around the model, where the loop is simulated.
-    closure: Option<Closure<'a>>,
+    simulated: Simulated<'a>,
+    initial_state: InitialState,
     /// Of the noise of each output that is compared.
     deviations: Vec<f64>,
     time: Discrete,
-    /// n where initial states are estimated, else 0.
+    /// Initial states per experiment that are estimated.
     initial: usize,
-    /// Number of parameters q.
+    /// Whether a plant that is not stable is refused.
+    confined: bool,
+    /// Number of parameters of the structure.
+    physical: usize,
+    /// Number of all parameters q.
     pub(super) parameters: usize,
     /// Residuals minus unknowns.
     pub(super) degrees_of_freedom: usize,
@@ -40,23 +50,25 @@ pub(super) struct Criterion<'a> {
     pub(super) scales: Vec<f64>,
 }
 
+/// What is compared, and how.
+pub(super) struct Comparison<'a> {
+    pub(super) closure: Option<Closure<'a>>,
+    pub(super) noise: &'a NoiseModel,
+    pub(super) initial_state: InitialState,
+    pub(super) deviations: &'a [f64],
+    pub(super) confined: bool,
+}
+
 /// The criterion at one parameter vector.
 pub(super) struct Point {
     pub(super) theta: Vec<f64>,
     /// V.
     pub(super) cost: f64,
     /// In the coordinates of the criterion.
-    continuous: StateSpace<Continuous>,
-    plant: StateSpace<Discrete>,
-    /// What is simulated: the plant, or the loop around it, its outputs divided by the deviations.
+    plant: Sample,
+    /// What is simulated, its outputs divided by the deviations.
     sampled: StateSpace<Discrete>,
     initial_states: Vec<Vec<f64>>,
-}
-
-/// The linearised criterion `1/2 |r - J step|^2` as the triangular factor of `[J r]`.
-#[derive(Clone)]
-pub(super) struct Linearisation {
-    factor: Mat<f64>,
 }
 
 impl<'a> Criterion<'a> {
@@ -65,46 +77,39 @@ impl<'a> Criterion<'a> {
         start: &[f64],
         experiments: &[Experiment<'_>],
         time: Discrete,
-        closure: Option<Closure<'a>>,
-        initial_state: InitialState,
-        deviations: &[f64],
+        comparison: Comparison<'a>,
     ) -> Result<Self> {
-        let parameters = structure.names().len();
-        let theta = MatRef::from_column_major_slice(start, start.len(), 1);
-        check_shape("the start vector of the parameters", theta, (parameters, 1))?;
-        check_finite("the start vector of the parameters", theta)?;
-        let scales = checked_scales(structure.scales(), parameters)?;
-        let model = structure.model(start)?;
-        let deviations = checked_deviations(deviations, model.outputs())?;
-        let order = model.order() + closure.as_ref().map_or(0, Closure::order);
-        let inputs = closure.as_ref().map_or(model.inputs(), Closure::inputs);
-        let initial = if initial_state == InitialState::Estimated { order } else { 0 };
-        let mut rows = 0;
-        for (k, Experiment { u, y }) in experiments.iter().enumerate() {
-            let named = |what: &str| format!("the {what} record of experiment {}", k + 1);
-            check_shape(&named("input"), *u, (u.nrows(), inputs))?;
-            check_shape(&named("output"), *y, (u.nrows(), model.outputs()))?;
-            check_finite(&named("input"), *u)?;
-            check_finite(&named("output"), *y)?;
-            rows += y.nrows() * y.ncols();
-        }
+        let Comparison { closure, noise, initial_state, deviations, confined } = comparison;
+        let physical = structure.names().len();
+        check_start(start, physical)?;
+        check_time(structure, time)?;
+        let mut scales = checked_scales(structure.scales(), physical)?;
+        let coordinates = Coordinates::new(structure, start, time)?;
+        let (order, outputs) = (coordinates.states.len(), coordinates.outputs);
+        let deviations = checked_deviations(deviations, outputs)?;
+        let simulated = Simulated::new(closure, noise, (order, outputs), time)?;
+        let states = order + simulated.further_states();
+        let initial = if initial_state == InitialState::Estimated { states } else { 0 };
+        let parameters = physical + simulated.gains();
         let unknowns = parameters + initial * experiments.len();
-        if rows <= unknowns {
-            let what = format!("the output records ({unknowns} unknowns)");
-            return Err(Error::TooFewSamples { what, found: rows, needed: unknowns + 1 });
-        }
-        let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
-        let experiments: Vec<Samples> = experiments.iter().map(|e| interleave(e, &deviations)).collect();
+        let inputs = simulated.inputs(coordinates.inputs);
+        let rows = check_records(experiments, (inputs, outputs), unknowns)?;
+        scales.resize(parameters, 1.0);
+        let experiments: Vec<Samples> =
+            experiments.iter().map(|e| simulated.samples(e, &deviations)).collect::<Result<_>>()?;
         let energy = experiments.iter().flat_map(|e| &e.y).map(|y| y * y).sum();
         let degrees_of_freedom = rows - unknowns;
         Ok(Criterion {
             structure,
             experiments,
             coordinates,
-            closure,
+            simulated,
+            initial_state,
             deviations,
             time,
             initial,
+            confined,
+            physical,
             parameters,
             degrees_of_freedom,
             energy,
@@ -112,46 +117,99 @@ impl<'a> Criterion<'a> {
         })
     }
 
+    /// The start of a search: that of the structure, then that of the noise.
+    pub(super) fn start(&self, theta: &[f64]) -> Vec<f64> {
+        let gain = match &self.simulated {
+            Simulated::Predictor(predictor) => predictor.start(&self.coordinates.states),
+            _ => Vec::new(),
+        };
+        [theta, &gain].concat()
+    }
+
     /// The value of the criterion, with the best initial states.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
-        let continuous = self.coordinates.apply(&self.structure.model(theta)?)?;
-        let plant = continuous.zoh(self.time)?;
-        let closed = self.closure.as_ref().map(|closure| closure.close(&plant)).transpose()?;
-        let sampled = with_scaled_outputs(closed.as_ref().unwrap_or(&plant), &self.deviations)?;
-        let mut initial_states = Vec::with_capacity(self.experiments.len());
-        let mut sum = 0.0;
-        for samples in &self.experiments {
-            if self.initial == 0 {
-                sum += sum_of_squares(samples, &sampled)?;
-                initial_states.push(vec![0.0; sampled.order()]);
-            } else {
-                let factor = condense(samples, &sampled, &[], &vec![0.0; self.initial], self.initial)?;
-                let rank = leading_rank(factor.as_ref(), self.initial);
-                let (r11, r1) = factor.as_ref().subrows(0, rank).split_at_col(self.initial);
-                let x0 = least_squares("the sensitivity to the initial state", r11, r1)?.x;
-                initial_states.push(x0.col(0).iter().copied().collect());
-                let left = factor.col(self.initial).subrows(rank, factor.nrows() - rank).norm_l2();
-                sum += left * left;
-            }
+        let (own, gain) = theta.split_at(self.physical);
+        let plant = sample(self.structure, own, &self.coordinates, self.time)?;
+        if self.confined {
+            plant.discrete.require_stable("a model of the search")?;
         }
-        Ok(Point { theta: theta.to_vec(), cost: 0.5 * sum, continuous, plant, sampled, initial_states })
+        let seen = self.simulated.system(&plant.discrete, gain)?;
+        let sampled = with_scaled_outputs(seen.as_ref().unwrap_or(&plant.discrete), &self.deviations)?;
+        let mut point = Point { theta: theta.to_vec(), cost: 0.0, plant, sampled, initial_states: Vec::new() };
+        for samples in &self.experiments {
+            let (x0, sum) = self.begun(samples, &point)?;
+            point.initial_states.push(x0);
+            point.cost += 0.5 * sum;
+        }
+        Ok(point)
+    }
+
+    /// The initial state of an experiment, and the sum of squares with it.
+    fn begun(&self, samples: &Samples, point: &Point) -> Result<(Vec<f64>, f64)> {
+        let states = point.sampled.order();
+        if self.initial > 0 {
+            let rest = vec![0.0; states];
+            let begin = Begin { x0: &rest, slopes: None, estimated: self.initial };
+            let factor = condense(samples, &point.sampled, &[], &begin)?;
+            let rank = leading_rank(factor.as_ref(), self.initial);
+            let (r11, r1) = factor.as_ref().subrows(0, rank).split_at_col(self.initial);
+            let x0 = least_squares("the sensitivity to the initial state", r11, r1)?.x;
+            let left = factor.col(self.initial).subrows(rank, factor.nrows() - rank).norm_l2();
+            return Ok((x0.col(0).iter().copied().collect(), left * left));
+        }
+        let mut x0 = match self.initial_state {
+            InitialState::SteadyState => steady_state(self.resting(point), &self.first(samples))?,
+            _ => Vec::new(),
+        };
+        x0.resize(states, 0.0);
+        let sum = sum_of_squares(samples, &point.sampled, &x0)?;
+        Ok((x0, sum))
+    }
+
+    /// The system that rests at the first sample: the loop where one is simulated, else the plant.
+    fn resting<'b>(&self, point: &'b Point) -> &'b StateSpace<Discrete> {
+        if matches!(self.simulated, Simulated::Loop(_)) { &point.sampled } else { &point.plant.discrete }
+    }
+
+    /// The first sample of the inputs of the plant or loop; zero of an empty record.
+    fn first(&self, samples: &Samples) -> Vec<f64> {
+        let inputs = self.simulated.inputs(self.coordinates.inputs);
+        samples.u.get(..inputs).map_or_else(|| vec![0.0; inputs], <[f64]>::to_vec)
     }
 
     /// Residual and Jacobian at a point.
     pub(super) fn linearise(&self, point: &Point) -> Result<Linearisation> {
-        let slopes = sampled_slopes(self.structure, &point.theta, &point.continuous, &self.coordinates, self.time)?;
-        let slopes = match &self.closure {
-            Some(closure) => closure.slopes(&point.plant, slopes),
-            None => slopes,
-        };
+        let (own, gain) = point.theta.split_at(self.physical);
+        let of_plant = sampled_slopes(self.structure, own, &point.plant, &self.coordinates, self.time)?;
+        let steady = self.initial_state == InitialState::SteadyState;
+        let own_slopes = if steady { of_plant.clone() } else { Vec::new() };
+        let slopes = self.simulated.slopes(&point.plant.discrete, gain, of_plant);
         let slopes = with_scaled_slopes(slopes, &self.deviations);
+        let resting = if matches!(self.simulated, Simulated::Loop(_)) { &slopes } else { &own_slopes };
         let mut whole = Triangle::new(self.parameters + 1, self.initial + self.parameters + 1);
         for (samples, x0) in self.experiments.iter().zip(&point.initial_states) {
-            let factor = condense(samples, &point.sampled, &slopes, x0, self.initial)?;
+            let moved = steady.then(|| self.steady_slopes(point, resting, x0, samples)).transpose()?;
+            let begin = Begin { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: self.initial };
+            let factor = condense(samples, &point.sampled, &slopes, &begin)?;
             let skip = leading_rank(factor.as_ref(), self.initial);
             whole.fold_rows(factor.as_ref().submatrix(skip, self.initial, factor.nrows() - skip, self.parameters + 1));
         }
-        Ok(Linearisation { factor: whole.r().to_owned() })
+        Ok(Linearisation::new(whole.r().to_owned()))
+    }
+
+    /// x_theta(0) over all states and parameters, zero for those that the steady state does not know.
+    fn steady_slopes(
+        &self,
+        point: &Point,
+        slopes: &[super::sampled::SampledSlope],
+        x0: &[f64],
+        samples: &Samples,
+    ) -> Result<Mat<f64>> {
+        let system = self.resting(point);
+        let known = steady_slopes(system, slopes, &x0[..system.order()], &self.first(samples))?;
+        let inside = |i: usize, j: usize| i < known.nrows() && j < known.ncols();
+        let entry = |i: usize, j: usize| if inside(i, j) { known[(i, j)] } else { 0.0 };
+        Ok(Mat::from_fn(x0.len(), self.parameters, entry))
     }
 
     /// The residuals of each experiment, sample after sample, divided by the deviations of the outputs, without weights.
@@ -168,7 +226,7 @@ impl<'a> Criterion<'a> {
 
     /// Number of outputs p.
     pub(super) fn outputs(&self) -> usize {
-        self.coordinates.outputs.len()
+        self.deviations.len()
     }
 
     /// One number per output, back in its units.
@@ -178,89 +236,31 @@ impl<'a> Criterion<'a> {
 
     /// The initial states of a point in the coordinates of the structure, those of a controller behind them.
     pub(super) fn initial_states(&self, point: &Point) -> Vec<Vec<f64>> {
-        let scales = || self.coordinates.states.iter().copied().chain(std::iter::repeat(1.0));
+        let states = &self.coordinates.states;
+        let shown = if matches!(self.simulated, Simulated::Filtered(_)) { states.len() } else { usize::MAX };
+        let scales = || states.iter().copied().chain(std::iter::repeat(1.0)).take(shown);
         point.initial_states.iter().map(|x0| x0.iter().zip(scales()).map(|(z, t)| z * t).collect()).collect()
     }
 
-    /// What is simulated with a sampled model, in the units of the data.
-    pub(super) fn simulated(&self, model: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
-        self.closure.as_ref().map_or_else(|| Ok(model.clone()), |closure| closure.close(model))
-    }
-}
-
-impl Linearisation {
-    /// Rows of the factor that belong to the Jacobian J, q columns, triangular.
-    pub(super) fn jacobian(&self) -> MatRef<'_, f64> {
-        self.factor.as_ref().subcols(0, self.parameters())
+    /// The parameters of the structure and the gain K of the innovation form in its states.
+    pub(super) fn split(&self, theta: &[f64]) -> (Vec<f64>, Option<Mat<f64>>) {
+        let (own, gain) = theta.split_at(self.physical);
+        let gain = match &self.simulated {
+            Simulated::Predictor(predictor) => Some(predictor.gain(gain, &self.coordinates.states)),
+            _ => None,
+        };
+        (own.to_vec(), gain)
     }
 
-    /// The residual r in the same rows.
-    pub(super) fn residual(&self) -> MatRef<'_, f64> {
-        self.factor.as_ref().subcols(self.parameters(), 1)
+    /// Whether the residual is that of a simulation of the plant or of the loop.
+    pub(super) fn simulates(&self) -> bool {
+        matches!(self.simulated, Simulated::Plant | Simulated::Loop(_))
     }
 
-    pub(super) fn parameters(&self) -> usize {
-        self.factor.ncols() - 1
+    /// Names of all parameters.
+    pub(super) fn names(&self) -> Vec<String> {
+        let order = self.coordinates.states.len();
+        let gain = |k: usize| format!("K[{}, {}] of the noise", k % order + 1, k / order + 1);
+        self.structure.names().into_iter().chain((0..self.parameters - self.physical).map(gain)).collect()
     }
-
-    /// The same where only these parameters move.
-    pub(super) fn along(&self, parameters: &[usize]) -> Linearisation {
-        let (rows, count) = (self.factor.nrows(), parameters.len());
-        if count == self.parameters() {
-            return self.clone();
-        }
-        let column = |j: usize| parameters.get(j).copied().unwrap_or(self.parameters());
-        let mut whole = Triangle::new(count + 1, rows);
-        whole.fold_rows(Mat::from_fn(rows, count + 1, |i, j| self.factor[(i, column(j))]).as_ref());
-        Linearisation { factor: whole.r().to_owned() }
-    }
-
-    /// Length of the part of r that J can remove, over the length of the rest, each by its degrees of freedom: the
-    /// distance to the minimum in units of the radius of the confidence region.
-    pub(super) fn relative_offset(&self, degrees_of_freedom: usize) -> f64 {
-        let rank = leading_rank(self.factor.as_ref(), self.parameters());
-        let (removable, rest) = self.residual().split_at_row(rank);
-        let per_freedom = |r: MatRef<'_, f64>, freedom: usize| r.norm_l2() / (freedom.max(1) as f64).sqrt();
-        let (offset, radius) = (per_freedom(removable, rank), per_freedom(rest, degrees_of_freedom));
-        if offset == 0.0 { 0.0 } else { offset / radius }
-    }
-}
-
-/// One positive size for each parameter.
-fn checked_scales(scales: Vec<f64>, parameters: usize) -> Result<Vec<f64>> {
-    if scales.len() != parameters {
-        let what = "the number of typical sizes of the structure".into();
-        return Err(Error::Ports { what, expected: parameters, found: scales.len() });
-    }
-    match scales.iter().find(|size| !(**size > 0.0 && size.is_finite())) {
-        Some(bad) => {
-            let what = "a typical size of a parameter".into();
-            Err(Error::OutOfRange { what, value: *bad, must: "a positive number" })
-        }
-        None => Ok(scales),
-    }
-}
-
-/// One deviation for each output, 1 where none are given.
-fn checked_deviations(deviations: &[f64], outputs: usize) -> Result<Vec<f64>> {
-    if deviations.is_empty() {
-        return Ok(vec![1.0; outputs]);
-    }
-    if deviations.len() != outputs {
-        let what = "the number of output deviations".into();
-        return Err(Error::Ports { what, expected: outputs, found: deviations.len() });
-    }
-    match deviations.iter().find(|d| !(**d > 0.0 && d.is_finite())) {
-        Some(bad) => {
-            Err(Error::OutOfRange { what: "an output deviation".into(), value: *bad, must: "a positive number" })
-        }
-        None => Ok(deviations.to_vec()),
-    }
-}
-
-fn interleave(experiment: &Experiment<'_>, deviations: &[f64]) -> Samples {
-    let Experiment { u, y } = experiment;
-    let u: Vec<f64> = u.row_iter().flat_map(|row| row.iter().copied()).collect();
-    let y = y.row_iter().flat_map(|row| row.iter().zip(deviations).map(|(y, d)| y / d)).collect();
-    Samples { u, y, count: experiment.u.nrows(), roots: Vec::new() }
 }

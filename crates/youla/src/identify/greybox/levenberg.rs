@@ -1,19 +1,17 @@
 //! Levenberg-Marquardt on the triangular factor of `[J r]`.
 //!
-//! The step solves `min |r - J step|^2 + damping |D step|^2` by orthogonal transformation of `[J; sqrt(damping) D]`, D the
-//! lengths of the columns of J (their largest so far), so that units of parameters do not matter (J. J. More, in Numerical
-//! Analysis, Lecture Notes in Mathematics 630 (1978), 105). The damping follows the ratio of the actual to the predicted
-//! decrease (H. B. Nielsen, Damping parameter in Marquardt's method, IMM-REP-1999-05, Technical University of Denmark).
+//! The step and its damping are those of `damped.rs`; the lengths of the columns of J are their largest so far.
 //!
 //! A parameter that its bound holds back stays for the step (`bounds.rs`); one that the step would take beyond a bound goes
 //! to that bound, and the others take the step that is best with it there.
 
 use super::bounds::Bounds;
-use super::criterion::{Criterion, Linearisation, Point};
+use super::criterion::{Criterion, Point};
+use super::damped::{Damping, damped_step, length};
+use super::linearisation::Linearisation;
 use super::{GreyBoxOptions, Stop};
 use crate::Result;
 use faer::Mat;
-use faer::prelude::*;
 
 /// The residual is nothing but rounding below this share of the output.
 const ROUNDING: f64 = 1e-12;
@@ -65,7 +63,7 @@ pub(super) fn minimise(
     let mut work = Work { evaluations: 1, ..Work::default() };
     let mut point = criterion.evaluate(start)?;
     let mut scale = vec![0.0; criterion.parameters];
-    let mut damping = Damping { value: options.damping, growth: 2.0 };
+    let mut damping = Damping::new(options.damping);
     loop {
         let linearisation = criterion.linearise(&point)?;
         enlarge(&mut scale, &linearisation, &criterion.scales);
@@ -150,18 +148,14 @@ impl Search<'_> {
     /// The damped Gauss-Newton step of the free parameters with those that have landed at a bound.
     fn step(&self, damping: f64, landed: &[Option<f64>]) -> Step {
         let (jacobian, residual) = (self.face.here.jacobian(), self.face.here.residual());
-        let (rows, free, theta) = (jacobian.nrows(), &self.face.free, &self.point.theta);
+        let (free, theta) = (&self.face.free, &self.point.theta);
         let mut step = Mat::from_fn(free.len(), 1, |k, _| landed[k].map_or(0.0, |bound| bound - theta[free[k]]));
         let moving: Vec<usize> = (0..free.len()).filter(|k| landed[*k].is_none()).collect();
         if !moving.is_empty() {
-            let damped = Mat::from_fn(rows + moving.len(), moving.len(), |i, j| match i.checked_sub(rows) {
-                None => jacobian[(i, moving[j])],
-                Some(k) if k == j => damping.sqrt() * self.scale[free[moving[j]]],
-                Some(_) => 0.0,
-            });
+            let columns = Mat::from_fn(jacobian.nrows(), moving.len(), |i, j| jacobian[(i, moving[j])]);
             let wanted = if moving.len() == free.len() { residual.to_owned() } else { residual - jacobian * &step };
-            let target = Mat::from_fn(rows + moving.len(), 1, |i, _| if i < rows { wanted[(i, 0)] } else { 0.0 });
-            let solved = damped.qr().solve_lstsq(&target);
+            let scale = |j: usize| self.scale[free[moving[j]]];
+            let solved = damped_step(columns.as_ref(), wanted.as_ref(), scale, damping);
             moving.iter().enumerate().for_each(|(j, k)| step[(*k, 0)] = solved[(j, 0)]);
         }
         let left = residual - jacobian * &step;
@@ -175,26 +169,6 @@ impl Search<'_> {
     }
 }
 
-/// The damping and how fast it grows.
-struct Damping {
-    value: f64,
-    growth: f64,
-}
-
-impl Damping {
-    /// After a success with the given ratio of actual to predicted decrease.
-    fn relax(&mut self, ratio: f64) {
-        self.value *= (1.0 - (2.0 * ratio.clamp(0.0, 1.0) - 1.0).powi(3)).max(1.0 / 3.0);
-        self.growth = 2.0;
-    }
-
-    /// After a failure.
-    fn tighten(&mut self) {
-        self.value *= self.growth;
-        self.growth *= 2.0;
-    }
-}
-
 /// A damped Gauss-Newton step.
 struct Step {
     step: Vec<f64>,
@@ -202,11 +176,6 @@ struct Step {
     theta: Vec<f64>,
     /// Decrease of the linearised criterion.
     predicted: f64,
-}
-
-/// `|D theta|`.
-fn length(theta: &[f64], scale: &[f64]) -> f64 {
-    theta.iter().zip(scale).map(|(theta, scale)| (theta * scale).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The lengths of the columns of J where they exceed those before; one over the typical size of a parameter that has no

@@ -1,4 +1,4 @@
-//! Grey-box identification: the physical parameters of a continuous-time structure by the prediction-error method.
+//! Grey-box identification: the physical parameters of a structure by the prediction-error method.
 //!
 //! For white output noise, `y = G(theta) u + n`, the predictor is the simulation and the estimate
 //! ```text
@@ -10,8 +10,12 @@
 //! lightly damped modes that are far off leave it in a local one, which [`Stop::Converged`] cannot tell from the global one;
 //! [`GreyBoxModel::fit`] can, next to the fit of another method.
 //!
+//! Process noise or coloured output noise take another predictor, [`NoiseModel`]: the innovation form with a free gain
+//! (`predictor.rs`) or a known filter (`whitening.rs`).
+//!
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
-//! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
+//! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`) or steady
+//! (`steady.rs`),
 //! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
 //! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
@@ -19,22 +23,33 @@
 mod bank;
 mod bearing;
 mod bounds;
+mod checks;
 mod closure;
 mod cost;
 mod criterion;
+mod damped;
 mod declared;
 mod delays;
+mod estimate;
 mod identifiability;
 mod levenberg;
+mod linearisation;
 mod narrow;
+mod noise;
+mod options;
+mod predictor;
 mod projection;
+mod result;
 mod robust;
 mod sampled;
 mod sensitivity;
+mod simulated;
+mod steady;
 mod structure;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
+mod whitening;
 
 pub use bearing::BearingStructure;
 pub use bounds::{AtBound, Side};
@@ -44,140 +59,21 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
+pub use options::GreyBoxOptions;
 pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
+pub use result::{GreyBoxModel, Stop};
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
-use super::fit::reproduction;
-use super::subspace::{Experiment, InitialState};
-use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
-use crate::{Error, Result};
-use bounds::Bounds;
+use super::subspace::Experiment;
+use crate::Result;
+use crate::lti::{Discrete, Partitioned};
 use closure::Closure;
-use criterion::Criterion;
-use delays::Shifted;
-use faer::{Mat, Scale};
-use levenberg::minimise;
-use robust::reweighted;
-use serde::{Deserialize, Serialize};
-use uncertainty::{Information, spread};
+use estimate::{Setting, estimate};
 
-/// Choices of [`greybox`].
-///
-/// ```
-/// use youla::identify::{greybox::GreyBoxOptions, subspace::InitialState};
-/// let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
-/// assert_eq!(options.max_iterations, 50);
-/// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct GreyBoxOptions {
-    /// Largest number of steps. From nominal models of the bearing that are up to 60 % wrong the search takes 5 to 20; one
-    /// that is lost creeps on to the limit.
-    pub max_iterations: usize,
-    /// Converged where the distance to the minimum of the linearised criterion is below this share of the radius of the
-    /// confidence region: the relative offset (D. M. Bates and D. G. Watts, Technometrics 23 (1981), 179).
-    pub offset_tolerance: f64,
-    /// Smallest step, relative to the parameters, both in units of their effect on the output.
-    pub step_tolerance: f64,
-    /// Damping of the first step, relative to the squared lengths of the columns of the Jacobian.
-    pub damping: f64,
-    /// The state at the first sample of each experiment.
-    pub initial_state: InitialState,
-    /// Standard deviation of the noise of each output, of which only the ratios count; empty where all are equal.
-    pub output_deviations: Vec<f64>,
-    /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
-    pub delays: Vec<usize>,
-    /// How residuals count.
-    pub loss: Loss,
-}
-
-impl Default for GreyBoxOptions {
-    fn default() -> Self {
-        GreyBoxOptions {
-            max_iterations: 50,
-            offset_tolerance: 1e-4,
-            step_tolerance: 1e-10,
-            damping: 1e-3,
-            initial_state: InitialState::default(),
-            output_deviations: Vec::new(),
-            delays: Vec::new(),
-            loss: Loss::default(),
-        }
-    }
-}
-
-/// Why the search ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Stop {
-    /// At a minimum, as exactly as the noise lets it be known.
-    Converged,
-    /// The model reproduces the data to rounding.
-    Exact,
-    /// No step that is longer than the tolerance lowers the criterion.
-    StepTooSmall,
-    /// The limit of iterations was reached.
-    Iterations,
-}
-
-/// Result of [`greybox`].
-#[derive(Debug, Clone)]
-pub struct GreyBoxModel {
-    /// Estimated parameters, in the order of [`Structure::names`].
-    pub parameters: Vec<f64>,
-    /// Their covariance, q x q, for white output noise; `None` where the data do not determine them all. Parameters that a
-    /// bound holds back count as known: their rows and columns are zero.
-    pub covariance: Option<Mat<f64>>,
-    /// The continuous-time model, without delays.
-    pub continuous: StateSpace<Continuous>,
-    /// The same behind a zero-order hold, with the delays of the inputs as further states behind its own.
-    pub model: StateSpace<Discrete>,
-    /// Whether it is stable.
-    pub stable: bool,
-    /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
-    /// and those of the delays each.
-    pub initial_states: Vec<Vec<f64>>,
-    /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
-    /// loss of Huber.
-    pub cost: f64,
-    /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26).
-    pub fit: Vec<f64>,
-    /// Root-mean-square residual per output, in its units.
-    pub residual: Vec<f64>,
-    /// Why the search ended.
-    pub stop: Stop,
-    /// Distance to the minimum of the linearised criterion over the radius of the confidence region.
-    pub relative_offset: f64,
-    /// Steps that lowered the criterion; there is one linearisation more.
-    pub iterations: usize,
-    /// Simulations of all records for the value of the criterion, those of rejected trial points included.
-    pub evaluations: usize,
-    /// Trial points that were rejected because the model could not be computed or its simulation was not finite.
-    pub diverged: usize,
-    /// Number of parameters (in combination) that the data determine: rank of the Jacobian, columns of unit length.
-    pub rank: usize,
-    /// Reciprocal condition number of that Jacobian.
-    pub rcond: f64,
-    /// Which parameters those are that the data do not determine.
-    pub undetermined: Undetermined,
-    /// Parameters that ended at a bound.
-    pub at_bounds: Vec<AtBound>,
-    /// Weights of the residuals, `None` where all count by their square.
-    pub robust: Option<RobustReport>,
-}
-
-impl GreyBoxModel {
-    /// Standard deviations of the parameters, `None` where the data do not determine them all.
-    pub fn standard_deviations(&self) -> Option<Vec<f64>> {
-        self.covariance
-            .as_ref()
-            .map(|covariance| covariance.diagonal().column_vector().iter().map(|v| v.sqrt()).collect())
-    }
-}
-
-/// Estimates the parameters of a structure from one or more experiments by the output-error method.
+/// Estimates the parameters of a structure from one or more experiments by the prediction-error method.
 ///
 /// The criterion is minimised by Levenberg-Marquardt from `start`, within the bounds of the structure where it has any. A
 /// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
@@ -213,7 +109,7 @@ pub fn greybox(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, None, options)
+    estimate(structure, start, experiments, time, Setting { closure: None, confined: false }, options)
 }
 
 /// The same through the loop: the model is simulated under the controller that ran, from the external signal w alone, and
@@ -239,100 +135,18 @@ pub fn greybox_in_loop(
     time: Discrete,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, Some(Closure::new(controller, output)), options)
+    let closure = Some(Closure::new(controller, output));
+    estimate(structure, start, experiments, time, Setting { closure, confined: false }, options)
 }
 
-fn estimate(
+/// The same as [`greybox`]; where `stable` says so, models that are not stable are rejected.
+pub(crate) fn greybox_confined(
     structure: &dyn Structure,
     start: &[f64],
     experiments: &[Experiment<'_>],
     time: Discrete,
-    closure: Option<Closure<'_>>,
+    stable: bool,
     options: &GreyBoxOptions,
 ) -> Result<GreyBoxModel> {
-    check(options)?;
-    if structure.names().is_empty() {
-        let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
-        return Err(Error::OutOfRange { what, value: 0.0, must });
-    }
-    if closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
-        let (what, must) = ("the delay of an input inside of the loop".into(), "0: put it into the controller");
-        return Err(Error::OutOfRange { what, value: 1.0, must });
-    }
-    let shifted = Shifted::new(experiments, &options.delays)?;
-    let experiments = &shifted.experiments();
-    let mut criterion = Criterion::new(
-        structure,
-        start,
-        experiments,
-        time,
-        closure,
-        options.initial_state,
-        &options.output_deviations,
-    )?;
-    let bounds = Bounds::new(structure, start)?;
-    let mut outcome = minimise(&criterion, &bounds, start, options)?;
-    let mut variance = 2.0 * outcome.point.cost / criterion.degrees_of_freedom as f64;
-    let mut unweighted = outcome.face.here.clone();
-    let mut report = None;
-    if options.loss == Loss::Huber {
-        let robust = reweighted(&mut criterion, &bounds, options, outcome)?;
-        (outcome, variance, report) = (robust.outcome, robust.variance, Some(robust.report));
-        unweighted = criterion.linearise(&outcome.point)?.along(&outcome.face.free);
-    }
-    let point = &outcome.point;
-    let names = structure.names();
-    let sizes: Vec<f64> =
-        point.theta.iter().zip(&criterion.scales).map(|(v, scale)| if *v == 0.0 { *scale } else { v.abs() }).collect();
-    let information = Information::new(&outcome.linearisation, &sizes, criterion.energy.sqrt());
-    let free = &outcome.face.free;
-    let free_sizes: Vec<f64> = free.iter().map(|j| sizes[*j]).collect();
-    let inverse = Information::new(&unweighted, &free_sizes, criterion.energy.sqrt()).inverse;
-    let continuous = structure.model(&point.theta)?;
-    let model = continuous.zoh(time)?;
-    let initial_states = criterion.initial_states(point);
-    let measured: Vec<_> = experiments.iter().map(|e| e.y).collect();
-    let outputs = reproduction(&measured, &errors(experiments, &criterion.simulated(&model)?, &initial_states)?);
-    Ok(GreyBoxModel {
-        covariance: inverse.map(|inverse| Scale(variance) * spread(inverse.as_ref(), free, names.len())),
-        stable: model.is_stable()?,
-        continuous,
-        model: shifted.delays.put_before(model)?,
-        initial_states: shifted.initial_states(initial_states),
-        cost: point.cost,
-        fit: outputs.iter().map(|o| o.fit).collect(),
-        residual: outputs.iter().map(|o| o.residual).collect(),
-        stop: outcome.stop,
-        relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
-        iterations: outcome.work.iterations,
-        evaluations: outcome.work.evaluations,
-        diverged: outcome.work.diverged,
-        rank: information.rank,
-        rcond: information.rcond,
-        undetermined: information.undetermined(&names, &sizes),
-        at_bounds: bounds.touched(&point.theta),
-        robust: report,
-        parameters: outcome.point.theta,
-    })
-}
-
-fn check(options: &GreyBoxOptions) -> Result<()> {
-    let positive = [
-        ("the offset tolerance", options.offset_tolerance),
-        ("the step tolerance", options.step_tolerance),
-        ("the damping", options.damping),
-    ];
-    match positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((what, value)) => Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" }),
-        None => Ok(()),
-    }
-}
-
-fn errors(
-    experiments: &[Experiment<'_>],
-    model: &StateSpace<Discrete>,
-    initial_states: &[Vec<f64>],
-) -> Result<Vec<Mat<f64>>> {
-    let error = |(e, x0): (&Experiment<'_>, &Vec<f64>)| simulate(model, e.u, x0).map(|simulated| e.y - simulated);
-    experiments.iter().zip(initial_states).map(error).collect()
+    estimate(structure, start, experiments, time, Setting { closure: None, confined: stable }, options)
 }

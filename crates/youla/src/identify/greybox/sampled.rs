@@ -1,6 +1,6 @@
-//! Zero-order-hold discretisation with derivatives.
+//! The sampled model of a structure with derivatives, which those of discrete time give themselves.
 //!
-//! With `M = [A B; 0 0] ts` and `E = dM / dtheta`, the derivative of `exp(M) = [Ad Bd; 0 I]` is its Frechet derivative in
+//! Behind a zero-order hold: with `M = [A B; 0 0] ts` and `E = dM / dtheta`, the derivative of `exp(M) = [Ad Bd; 0 I]` is its Frechet derivative in
 //! the direction E, which is the upper right block of
 //! ```text
 //! exp([M E; 0 M]) = [exp(M) L(M, E); 0 exp(M)]
@@ -10,27 +10,43 @@
 
 use super::structure::{Matrix, Slope, Structure};
 use crate::linalg::{block, check_shape, expm};
-use crate::lti::{Continuous, Discrete, StateSpace};
+use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain};
 use crate::{Error, Result};
 use faer::{Mat, Scale};
 
-/// The coordinates in which everything is computed: balanced states `x = diag(states) z` (powers of two), outputs divided
-/// by the deviation of their noise.
+/// The coordinates in which everything is computed: balanced states `x = diag(states) z` (powers of two).
 pub(super) struct Coordinates {
     pub(super) states: Vec<f64>,
-    pub(super) outputs: Vec<f64>,
+    pub(super) inputs: usize,
+    pub(super) outputs: usize,
+}
+
+/// A structure at one parameter vector.
+pub(super) struct Sample {
+    /// Before the hold; `None` of a structure of discrete time.
+    pub(super) continuous: Option<StateSpace<Continuous>>,
+    pub(super) discrete: StateSpace<Discrete>,
 }
 
 impl Coordinates {
+    /// Those in which the model at `theta` is balanced.
+    pub(super) fn new(structure: &dyn Structure, theta: &[f64], time: Discrete) -> Result<Self> {
+        match structure.sample_time() {
+            None => Self::of(&structure.model(theta)?),
+            Some(_) => Self::of(&structure.sampled(theta, time)?),
+        }
+    }
+
+    fn of<T: TimeDomain>(model: &StateSpace<T>) -> Result<Self> {
+        Ok(Coordinates { states: model.state_scales()?, inputs: model.inputs(), outputs: model.outputs() })
+    }
+
     /// The model in these coordinates.
-    pub(super) fn apply(&self, model: &StateSpace<Continuous>) -> Result<StateSpace<Continuous>> {
-        let (n, m, p) = (self.states.len(), model.inputs(), self.outputs.len());
+    fn apply<T: TimeDomain>(&self, model: &StateSpace<T>) -> Result<StateSpace<T>> {
+        let n = self.states.len();
         check_shape("the state matrix of the structure", model.a(), (n, n))?;
-        check_shape("the feedthrough of the structure", model.d(), (p, m))?;
-        let model = model.with_scaled_states(&self.states);
-        let c = Mat::from_fn(p, n, |i, j| model.c()[(i, j)] / self.outputs[i]);
-        let d = Mat::from_fn(p, m, |i, j| model.d()[(i, j)] / self.outputs[i]);
-        StateSpace::new(model.a().to_owned(), model.b().to_owned(), c, d, Continuous)
+        check_shape("the feedthrough of the structure", model.d(), (self.outputs, self.inputs))?;
+        Ok(model.with_scaled_states(&self.states))
     }
 
     /// A derivative in these coordinates.
@@ -38,13 +54,30 @@ impl Coordinates {
         match matrix {
             Matrix::A => value * self.states[column] / self.states[row],
             Matrix::B => value / self.states[row],
-            Matrix::C => value * self.states[column] / self.outputs[row],
-            Matrix::D => value / self.outputs[row],
+            Matrix::C => value * self.states[column],
+            Matrix::D => value,
         }
     }
 }
 
+/// The structure at `theta` in these coordinates.
+pub(super) fn sample(
+    structure: &dyn Structure,
+    theta: &[f64],
+    coordinates: &Coordinates,
+    time: Discrete,
+) -> Result<Sample> {
+    if structure.sample_time().is_some() {
+        let discrete = coordinates.apply(&structure.sampled(theta, time)?)?;
+        return Ok(Sample { continuous: None, discrete });
+    }
+    let continuous = coordinates.apply(&structure.model(theta)?)?;
+    let discrete = continuous.zoh(time)?;
+    Ok(Sample { continuous: Some(continuous), discrete })
+}
+
 /// Derivatives of a sampled model with respect to one parameter.
+#[derive(Clone)]
 pub(super) struct SampledSlope {
     /// `[dAd dBd]`, n x (n + m).
     pub(super) states: Mat<f64>,
@@ -52,10 +85,43 @@ pub(super) struct SampledSlope {
     pub(super) outputs: Mat<f64>,
 }
 
-/// Derivatives of the sampled model with respect to all parameters. `model` is the continuous one in `coordinates`.
+/// Derivatives of the sampled model with respect to all parameters, at a sample in the same coordinates.
 pub(super) fn sampled_slopes(
     structure: &dyn Structure,
     theta: &[f64],
+    sample: &Sample,
+    coordinates: &Coordinates,
+    time: Discrete,
+) -> Result<Vec<SampledSlope>> {
+    let of = |parameter: usize| structure.slopes(theta, parameter);
+    match &sample.continuous {
+        Some(model) => held_slopes((0..theta.len()).map(of), model, coordinates, time),
+        None => {
+            (0..theta.len()).map(|parameter| discrete_slope(of(parameter), &sample.discrete, coordinates)).collect()
+        }
+    }
+}
+
+/// The entries of a structure of discrete time are those of the sampled model.
+fn discrete_slope(slopes: Vec<Slope>, model: &StateSpace<Discrete>, coordinates: &Coordinates) -> Result<SampledSlope> {
+    let (n, m, p) = (model.order(), model.inputs(), model.outputs());
+    let (mut states, mut outputs) = (Mat::zeros(n, n + m), Mat::zeros(p, n + m));
+    for slope in slopes {
+        check_entry(slope, model)?;
+        let value = coordinates.slope(slope);
+        match slope.matrix {
+            Matrix::A => states[(slope.row, slope.column)] += value,
+            Matrix::B => states[(slope.row, n + slope.column)] += value,
+            Matrix::C => outputs[(slope.row, slope.column)] += value,
+            Matrix::D => outputs[(slope.row, n + slope.column)] += value,
+        }
+    }
+    Ok(SampledSlope { states, outputs })
+}
+
+/// Those of a model behind a zero-order hold.
+fn held_slopes(
+    slopes: impl Iterator<Item = Vec<Slope>>,
     model: &StateSpace<Continuous>,
     coordinates: &Coordinates,
     time: Discrete,
@@ -68,11 +134,11 @@ pub(super) fn sampled_slopes(
     let b = Mat::from_fn(n, m, |i, j| model.b()[(i, j)] * inputs[j]);
     let generator = Scale(time.ts()) * block(&[&[model.a(), b.as_ref()], &[hold.as_ref()]]);
     let zero = Mat::zeros(n + m, n + m);
-    (0..theta.len())
-        .map(|parameter| {
+    slopes
+        .map(|slopes| {
             let mut direction = Mat::zeros(n + m, n + m);
             let mut outputs = Mat::zeros(p, n + m);
-            for slope in structure.slopes(theta, parameter) {
+            for slope in slopes {
                 check_entry(slope, model)?;
                 let value = coordinates.slope(slope);
                 match slope.matrix {
@@ -95,7 +161,7 @@ pub(super) fn sampled_slopes(
 }
 
 /// Refuses a slope of an entry that does not exist.
-fn check_entry(slope: Slope, model: &StateSpace<Continuous>) -> Result<()> {
+fn check_entry<T: TimeDomain>(slope: Slope, model: &StateSpace<T>) -> Result<()> {
     let matrix = match slope.matrix {
         Matrix::A => model.a(),
         Matrix::B => model.b(),

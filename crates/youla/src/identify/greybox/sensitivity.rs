@@ -2,7 +2,7 @@
 //!
 //! With the state x of the model, `v = [x; u]` and the derivatives of the sampled matrices,
 //! ```text
-//! x_theta+ = Ad x_theta + [dAd dBd] v,    y_theta = C x_theta + [dC dD] v,      x_theta(0) = 0
+//! x_theta+ = Ad x_theta + [dAd dBd] v,    y_theta = C x_theta + [dC dD] v,      x_theta(0) = 0, or that of the steady state
 //! x_0+     = Ad x_0,                      y_0     = C x_0,                      x_0(0) = I
 //! ```
 //! so all sensitivities are columns of one matrix (n x columns) under one Ad and share one v (`bank.rs`). The rows
@@ -13,7 +13,7 @@ use super::narrow::{NarrowTriangle, dot};
 use super::sampled::SampledSlope;
 use crate::lti::{Discrete, Simulator, StateSpace};
 use crate::{Error, Result};
-use faer::Mat;
+use faer::{Mat, MatRef};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Samples folded in at a time; small enough to stay in the cache.
@@ -30,8 +30,17 @@ pub(super) struct Samples {
     pub(super) roots: Vec<f64>,
 }
 
-/// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the model started at `x0`.
-/// `initial` is n where the sensitivity to the initial state is wanted, else 0.
+/// How a simulation begins.
+pub(super) struct Begin<'a> {
+    /// The initial state.
+    pub(super) x0: &'a [f64],
+    /// x_theta(0), n x q; zero where `None`.
+    pub(super) slopes: Option<MatRef<'a, f64>>,
+    /// n where the sensitivity to the initial state is wanted, else 0.
+    pub(super) estimated: usize,
+}
+
+/// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the simulated model.
 ///
 /// # Errors
 /// [`Error::Diverged`] where the recursion leaves the range of the numbers.
@@ -39,10 +48,9 @@ pub(super) fn condense(
     samples: &Samples,
     system: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
-    x0: &[f64],
-    initial: usize,
+    begin: &Begin<'_>,
 ) -> Result<Mat<f64>> {
-    Arch::new().dispatch(Condensation { samples, system, slopes, x0, initial })
+    Arch::new().dispatch(Condensation { samples, system, slopes, begin })
 }
 
 /// The arguments of [`condense`], for the widest instructions of the processor.
@@ -50,8 +58,7 @@ struct Condensation<'a> {
     samples: &'a Samples,
     system: &'a StateSpace<Discrete>,
     slopes: &'a [SampledSlope],
-    x0: &'a [f64],
-    initial: usize,
+    begin: &'a Begin<'a>,
 }
 
 impl WithSimd for Condensation<'_> {
@@ -59,12 +66,12 @@ impl WithSimd for Condensation<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Condensation { samples, system, slopes, x0, initial } = self;
+        let Condensation { samples, system, slopes, begin } = self;
         let (n, m, p) = (system.order(), system.inputs(), system.outputs());
-        let columns = initial + slopes.len();
+        let columns = begin.estimated + slopes.len();
         let simulator = Simulator::new(system);
-        let mut state = simulator.start(x0)?;
-        let mut bank = Bank::new(system, slopes, initial);
+        let mut state = simulator.start(begin.x0)?;
+        let mut bank = Bank::new(system, slopes, begin);
         let mut triangle = NarrowTriangle::new(columns + 1);
         let mut signals = vec![0.0; n + m];
         let mut piece = vec![0.0; PIECE * p * (columns + 1)];
@@ -101,14 +108,14 @@ fn weigh(piece: &mut [f64], rows: usize, roots: Option<&[f64]>) {
     }
 }
 
-/// The sum of squares of the weighted residual of the model started from rest.
+/// The sum of squares of the weighted residual of the model started at `x0`.
 ///
 /// # Errors
 /// [`Error::Diverged`] where the simulation leaves the range of the numbers.
-pub(super) fn sum_of_squares(samples: &Samples, system: &StateSpace<Discrete>) -> Result<f64> {
+pub(super) fn sum_of_squares(samples: &Samples, system: &StateSpace<Discrete>, x0: &[f64]) -> Result<f64> {
     let (m, p) = (system.inputs(), system.outputs());
     let simulator = Simulator::new(system);
-    let mut state = simulator.start(&vec![0.0; system.order()])?;
+    let mut state = simulator.start(x0)?;
     let mut sum = 0.0;
     for k in 0..samples.count {
         let model = simulator.step(&mut state, &samples.u[k * m..][..m]);

@@ -1,10 +1,10 @@
-//! The seam between an estimator and a physical structure: continuous-time matrices as functions of named parameters, and
-//! their derivatives.
+//! The seam between an estimator and a physical structure: matrices as functions of named parameters, in continuous or
+//! discrete time, and their derivatives.
 
 use crate::Result;
-use crate::lti::{Continuous, StateSpace};
+use crate::lti::{Continuous, Discrete, StateSpace};
 
-/// One of the four matrices of `x' = A x + B u, y = C x + D u`.
+/// One of the four matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Matrix {
     /// State matrix, n x n.
@@ -30,7 +30,8 @@ pub struct Slope {
     pub value: f64,
 }
 
-/// A family of continuous-time models `A(theta), B(theta), C(theta), D(theta)` with derivatives.
+/// A family of models `A(theta), B(theta), C(theta), D(theta)` with derivatives, in continuous time unless
+/// [`Structure::sample_time`] says otherwise.
 ///
 /// The shapes of the matrices must not depend on the parameters. Entries that a parameter does not move are left out of
 /// its slopes; a parameter may move any number of entries, each named once.
@@ -60,7 +61,7 @@ pub trait Structure: Sync {
     /// Names of the parameters, in the order of `theta`.
     fn names(&self) -> Vec<String>;
 
-    /// The model at `theta`, one value per name.
+    /// The continuous-time model at `theta`, one value per name; an error for a structure of discrete time.
     ///
     /// # Errors
     /// Whatever makes a model impossible there; a trial point with an error counts as rejected.
@@ -68,6 +69,21 @@ pub trait Structure: Sync {
 
     /// Derivatives of the entries with respect to parameter `parameter` (counted from 0) at `theta`.
     fn slopes(&self, theta: &[f64], parameter: usize) -> Vec<Slope>;
+
+    /// The sample time of a structure whose matrices, and slopes, are those of `x(k+1) = A x(k) + B u(k)`; `None`, as where
+    /// this is not implemented, for one of continuous time. A structure of discrete time implements
+    /// [`Structure::sampled`] too.
+    fn sample_time(&self) -> Option<Discrete> {
+        None
+    }
+
+    /// The sampled model at `theta`: where this is not implemented, [`Structure::model`] behind a zero-order hold.
+    ///
+    /// # Errors
+    /// As [`Structure::model`].
+    fn sampled(&self, theta: &[f64], time: Discrete) -> Result<StateSpace<Discrete>> {
+        self.model(theta)?.zoh(time)
+    }
 
     /// Smallest and largest value of each parameter; infinite where there is none, as for all where this is not
     /// implemented.

@@ -6,8 +6,8 @@
 //! the inverse of the Fisher information (L. Ljung, System Identification: Theory for the User, 2nd ed., 1999, section
 //! 9.4), where the noise is white, Gaussian, and of the stated ratio between the outputs.
 
-use super::criterion::Linearisation;
 use super::identifiability::{RANK_TOLERANCE, Undetermined};
+use super::linearisation::Linearisation;
 use faer::{Mat, MatRef};
 
 /// A parameter whose change by its own size moves the outputs by less than this share of themselves has no effect.

@@ -4,7 +4,7 @@
 use super::delay::Delays;
 use super::realisation::OutputPair;
 use super::statistics::Statistics;
-use super::{ChannelScaling, Experiment, SubspaceOptions};
+use super::{ChannelScaling, Experiment, InitialState, SubspaceOptions};
 use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
@@ -331,8 +331,11 @@ fn rms_or_one(record: MatRef<'_, f64>, j: usize) -> f64 {
     if rms > 0.0 { rms } else { 1.0 }
 }
 
-/// Refuses a horizon or past without meaning.
+/// Refuses a horizon, past or initial state without meaning.
 pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
+    if options.initial_state == InitialState::SteadyState {
+        return Err(Error::SteadyBlackBox);
+    }
     if let Some(automatic) = options.automatic_horizon {
         return at_least("the largest past", automatic.max, 1, "at least 1 block row");
     }

@@ -41,6 +41,8 @@ pub enum NoInnovation {
     NoiseFree,
     /// The Riccati equation has no solution for which A - K C is stable; the equation's own words.
     NotSolvable(String),
+    /// The model was refined without a model of its noise.
+    Refined,
 }
 
 impl Innovation {

@@ -286,4 +286,6 @@ pub enum InitialState {
     Estimated,
     /// Zero: the system was at rest.
     Zero,
+    /// The steady state at the first sample of the inputs. Grey-box structures only.
+    SteadyState,
 }

@@ -3,6 +3,7 @@
 use super::declaration::{Declaration, ParameterDeclaration};
 use super::names::{Names, finite, nearest};
 use super::{Cell, DeclaredStructure, Formula, Parameter, Quantity};
+use crate::lti::Discrete;
 use crate::{Error, Result};
 use std::cmp::Ordering;
 
@@ -21,8 +22,16 @@ impl DeclaredStructure {
         let derived = names.derived(&whole.derived)?;
         let order = order_of_evaluation(&derived, whole.parameters.0.len())?;
         let (numbers, mut cells) = names.matrices(&whole)?;
-        let mut structure =
-            DeclaredStructure { parameters: Vec::new(), free: Vec::new(), derived, order, numbers, cells: Vec::new() };
+        let time = time(declaration, &whole)?;
+        let mut structure = DeclaredStructure {
+            time,
+            parameters: Vec::new(),
+            free: Vec::new(),
+            derived,
+            order,
+            numbers,
+            cells: Vec::new(),
+        };
         structure.spread_dependence(whole.parameters.0.len(), &mut cells);
         structure.cells = cells;
         structure.check_use(declaration, &whole)?;
@@ -78,6 +87,17 @@ impl DeclaredStructure {
         }
         Ok(())
     }
+}
+
+/// The sample time of a structure of discrete time. The matrices of templates are of continuous time.
+fn time(declaration: &Declaration, whole: &Declaration) -> Result<Option<Discrete>> {
+    let Some(ts) = whole.sample_time else { return Ok(None) };
+    if declaration.template.is_some() && (declaration.a.is_none() || declaration.b.is_none()) {
+        let what = "the sample time of the structure".into();
+        let must = "absent: the template is a structure of continuous time";
+        return Err(Error::OutOfRange { what, value: ts, must });
+    }
+    Discrete::new(ts).map(Some)
 }
 
 fn parameter(name: &str, declared: &ParameterDeclaration) -> Result<Parameter> {

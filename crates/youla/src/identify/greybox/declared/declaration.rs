@@ -6,7 +6,7 @@ use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
-/// Matrices of `x' = A x + B u, y = C x + D u` with entries that are numbers or expressions of named parameters.
+/// Matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)` where a sample time is given, with entries that are numbers or expressions of named parameters.
 ///
 /// With a template, what is given here replaces what the template says: single keys of parameters, derived quantities,
 /// whole matrices. Without one, `a`, `b`, `c` and an initial value of every parameter are needed. All keys stand in
@@ -38,6 +38,9 @@ pub struct Declaration {
     /// A declaration that comes with the library, which this one amends.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub template: Option<Template>,
+    /// Sample time in seconds of a structure of discrete time; absent for one of continuous time behind a zero-order hold.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub sample_time: Option<f64>,
     /// State matrix, n x n, row by row.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub a: Option<Vec<Vec<Entry>>>,
@@ -107,7 +110,7 @@ impl Declaration {
     /// None for the templates of the library.
     pub fn whole(&self) -> Result<Declaration> {
         let Some(template) = self.template else { return Ok(self.clone()) };
-        let Declaration { a, b, c, d, mut parameters, mut derived, .. } = template.declaration()?;
+        let Declaration { sample_time, a, b, c, d, mut parameters, mut derived, .. } = template.declaration()?;
         let amended = self.clone();
         for (name, amendment) in amended.parameters.0 {
             match parameters.get_mut(&name) {
@@ -122,7 +125,8 @@ impl Declaration {
             }
         }
         let (a, b, c, d) = (amended.a.or(a), amended.b.or(b), amended.c.or(c), amended.d.or(d));
-        Ok(Declaration { template: None, a, b, c, d, parameters, derived })
+        let sample_time = amended.sample_time.or(sample_time);
+        Ok(Declaration { template: None, sample_time, a, b, c, d, parameters, derived })
     }
 }
 

@@ -25,16 +25,17 @@ pub use declaration::{Declaration, Entry, ParameterDeclaration};
 pub use named::Named;
 pub use template::Template;
 
+use super::checks::check_time;
 use super::{Matrix, Slope, Structure};
 use crate::linalg::check_shape;
-use crate::lti::{Continuous, StateSpace};
-use crate::{Mat, MatRef, Result};
+use crate::lti::{Continuous, Discrete, StateSpace};
+use crate::{Error, Mat, MatRef, Result};
 use dual::Dual;
 use expression::Expression;
 use names::finite;
 use serde::Serialize;
 
-/// A continuous-time structure with named parameters, made from a [`Declaration`] or a [`Template`].
+/// A structure with named parameters, made from a [`Declaration`] or a [`Template`].
 ///
 /// The parameter vector holds the free parameters in the order of the declaration; fixed ones keep their initial value.
 ///
@@ -48,6 +49,8 @@ use serde::Serialize;
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeclaredStructure {
+    /// Of a structure of discrete time.
+    time: Option<Discrete>,
     parameters: Vec<Parameter>,
     /// Numbers of the free parameters.
     free: Vec<usize>,
@@ -158,7 +161,7 @@ impl DeclaredStructure {
     /// `sqrt(g' cov g)` with the gradient g.
     ///
     /// # Errors
-    /// [`crate::Error::Shape`] for a vector or covariance of another size.
+    /// [`Error::Shape`] for a vector or covariance of another size.
     pub fn derived(&self, theta: &[f64], covariance: Option<MatRef<'_, f64>>) -> Result<Vec<DerivedValue>> {
         self.check_length(theta)?;
         let q = self.free.len();
@@ -217,8 +220,25 @@ impl Structure for DeclaredStructure {
 
     fn model(&self, theta: &[f64]) -> Result<StateSpace<Continuous>> {
         self.check_length(theta)?;
+        if let Some(time) = self.time {
+            return Err(Error::DiscreteStructure { ts: time.ts() });
+        }
         let [a, b, c, d] = self.evaluated(theta)?;
         StateSpace::new(a, b, c, d, Continuous)
+    }
+
+    fn sample_time(&self) -> Option<Discrete> {
+        self.time
+    }
+
+    fn sampled(&self, theta: &[f64], time: Discrete) -> Result<StateSpace<Discrete>> {
+        if self.time.is_none() {
+            return self.model(theta)?.zoh(time);
+        }
+        check_time(self, time)?;
+        self.check_length(theta)?;
+        let [a, b, c, d] = self.evaluated(theta)?;
+        StateSpace::new(a, b, c, d, time)
     }
 
     fn slopes(&self, theta: &[f64], parameter: usize) -> Vec<Slope> {

@@ -7,11 +7,11 @@
 //! with the exact derivatives of the zero-order hold (`../sampled.rs`).
 
 use super::super::narrow::NarrowTriangle;
-use super::super::sampled::{Coordinates, SampledSlope, sampled_slopes};
+use super::super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
 use super::super::structure::Structure;
 use super::target::FrequencyTarget;
 use crate::linalg::check_shape;
-use crate::lti::{Continuous, Discrete, FrequencyResponse, StateSpace};
+use crate::lti::{Discrete, FrequencyResponse, StateSpace};
 use crate::{Error, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, c64};
@@ -31,8 +31,7 @@ pub(super) struct Point {
     /// `sum |W (Y - G_theta U)|^2`.
     pub(super) cost: f64,
     coordinates: Coordinates,
-    continuous: StateSpace<Continuous>,
-    sampled: StateSpace<Discrete>,
+    sample: Sample,
     /// `G_theta` on the grid.
     pub(super) response: FrequencyResponse,
 }
@@ -45,17 +44,17 @@ impl<'a> Misfit<'a> {
 
     /// The value at `theta`.
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
-        let model = self.structure.model(theta)?;
-        check_shape("the feedthrough of the structure", model.d(), (self.target.outputs(), self.target.inputs()))?;
-        let coordinates = Coordinates { states: model.state_scales()?, outputs: vec![1.0; model.outputs()] };
-        let continuous = coordinates.apply(&model)?;
-        let sampled = continuous.zoh(self.target.time())?;
-        let response = self.target.response(&sampled)?;
+        let time = self.target.time();
+        let coordinates = Coordinates::new(self.structure, theta, time)?;
+        let sample = sample(self.structure, theta, &coordinates, time)?;
+        let direct = sample.discrete.d();
+        check_shape("the feedthrough of the structure", direct, (self.target.outputs(), self.target.inputs()))?;
+        let response = self.target.response(&sample.discrete)?;
         let cost: f64 = self.entries(&response).col_iter().flat_map(|column| column.iter()).sum();
         if !cost.is_finite() {
             return Err(Error::PoleOnBoundary { omega: self.target.omega()[0] });
         }
-        Ok(Point { theta: theta.to_vec(), cost, coordinates, continuous, sampled, response })
+        Ok(Point { theta: theta.to_vec(), cost, coordinates, sample, response })
     }
 
     /// `sum_k |W (Y - G_theta U)|^2` for each entry, p x r.
@@ -76,14 +75,14 @@ impl<'a> Misfit<'a> {
     /// The triangular factor of `[J r]`, J the slopes of the weighted model, r the weighted misfit, real and imaginary parts.
     pub(super) fn linearise(&self, point: &Point) -> Result<Mat<f64>> {
         let slopes =
-            sampled_slopes(self.structure, &point.theta, &point.continuous, &point.coordinates, self.target.time())?;
+            sampled_slopes(self.structure, &point.theta, &point.sample, &point.coordinates, self.target.time())?;
         let (p, r, q) = (self.target.outputs(), self.target.columns(), self.parameters);
         let each = 2 * p * r;
         let count = each * self.target.omega().len();
         let mut rows = vec![0.0; count * (q + 1)];
         let mut values = vec![c64::new(0.0, 0.0); p * r];
         for k in 0..self.target.omega().len() {
-            let mut here = Resolvent::new(&point.sampled, self.target.s(k), self.target.excited(k));
+            let mut here = Resolvent::new(&point.sample.discrete, self.target.s(k), self.target.excited(k));
             let (y, w) = (self.target.value(k), self.target.weight(k));
             let mut write = |column: usize, values: &[c64]| {
                 let rows = &mut rows[column * count + k * each..][..each];
@@ -98,7 +97,7 @@ impl<'a> Misfit<'a> {
             }
             for (entry, value) in values.iter_mut().enumerate() {
                 let (i, j) = (entry % p, entry / p);
-                *value = y[(i, j)] - here.value(&point.sampled, i, j);
+                *value = y[(i, j)] - here.value(&point.sample.discrete, i, j);
             }
             write(q, &values);
         }

@@ -8,7 +8,7 @@
 //! in records it costs the same for any number of samples, and it forgets all states that the structure does not have.
 //!
 //! A search finds the minimum next to its start. Structures that are linear in most parameters once their equation is
-//! multiplied out, as the bearing (3)-(6), need none: `separable.rs` solves a weighted linear least squares for each point of a
+//! multiplied out, as the bearing (3)-(6), need none (in continuous time): `separable.rs` solves a weighted linear least squares for each point of a
 //! small grid of the other parameters. For other structures the starts are the given ones and points around the first of
 //! them (`design.rs`). The best few are polished by Levenberg-Marquardt with exact slopes (`misfit.rs`, `search.rs`).
 
@@ -23,6 +23,8 @@ mod tests;
 pub(crate) use target::decayed;
 pub use target::{FrequencyTarget, logarithmic_grid};
 
+use super::checks::check_time;
+use super::options::require_positive;
 use super::{Stop, Structure};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
@@ -145,6 +147,7 @@ pub fn projections(
     options: &ProjectionOptions,
 ) -> Result<Vec<Projection>> {
     check(structure, starts, options)?;
+    check_time(structure, target.time())?;
     let misfit = Misfit::new(structure, target);
     let begun = begin(&misfit, starts, options)?;
     let count = begun.len();
@@ -164,14 +167,10 @@ fn check(structure: &dyn Structure, starts: &[Vec<f64>], options: &ProjectionOpt
         check_shape("the start vector of a projection", theta, (parameters, 1))?;
         check_finite("the start vector of a projection", theta)?;
     }
-    let positive = [
+    require_positive(&[
         ("the tolerance of a projection", options.tolerance),
         ("the step tolerance of a projection", options.step_tolerance),
-    ];
-    match positive.into_iter().find(|(_, value)| !(*value > 0.0 && value.is_finite())) {
-        Some((what, value)) => Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" }),
-        None => Ok(()),
-    }
+    ])
 }
 
 /// The starts, the lowest misfit first.
@@ -213,7 +212,7 @@ fn describe(misfit: &Misfit<'_>, outcome: Outcome, origin: Origin, starts: usize
     let sums = misfit.entries(&point.response);
     let sizes = misfit.target.entries();
     Ok(Projection {
-        model: misfit.structure.model(&point.theta)?.zoh(misfit.target.time())?,
+        model: misfit.structure.sampled(&point.theta, misfit.target.time())?,
         misfit: point.cost.sqrt() / misfit.size,
         entries: Mat::from_fn(sums.nrows(), sums.ncols(), |i, j| (sums[(i, j)] / sizes[(i, j)]).sqrt()),
         parameters: point.theta,

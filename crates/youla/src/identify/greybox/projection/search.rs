@@ -1,11 +1,11 @@
-//! Levenberg-Marquardt on the weighted misfit: the steps and the damping of `../levenberg.rs`.
+//! Levenberg-Marquardt on the weighted misfit, by the steps of `../damped.rs`.
 
 use super::super::Stop;
+use super::super::damped::{Damping, damped_step, length};
 use super::ProjectionOptions;
 use super::misfit::{Misfit, Point};
 use crate::Result;
-use faer::linalg::solvers::SolveLstsq;
-use faer::{Mat, MatRef};
+use faer::MatRef;
 
 /// The misfit is nothing but rounding below this share of the response.
 const ROUNDING: f64 = 1e-13;
@@ -23,7 +23,7 @@ pub(super) struct Outcome {
 pub(super) fn minimise(misfit: &Misfit<'_>, start: Point, options: &ProjectionOptions) -> Result<Outcome> {
     let mut point = start;
     let mut scale = vec![0.0_f64; misfit.parameters];
-    let (mut damping, mut growth) = (DAMPING, 2.0);
+    let mut damping = Damping::new(DAMPING);
     let mut iterations = 0;
     loop {
         let end = |point, stop| Ok(Outcome { point, stop, iterations });
@@ -42,23 +42,23 @@ pub(super) fn minimise(misfit: &Misfit<'_>, start: Point, options: &ProjectionOp
             return end(point, Stop::Iterations);
         }
         loop {
-            let step = damped_step(jacobian, residual, &scale, damping);
-            let length = |v: &[f64]| v.iter().zip(&scale).map(|(v, s)| (v * s).powi(2)).sum::<f64>().sqrt();
+            let step = damped_step(jacobian, residual, |j| if scale[j] > 0.0 { scale[j] } else { 1.0 }, damping.value);
+            let left = residual - jacobian * &step;
+            let predicted = residual.squared_norm_l2() - left.squared_norm_l2();
+            let step: Vec<f64> = step.col(0).iter().copied().collect();
             // Written so that a step that is not a number ends the search too.
-            let moves = length(&step.step) > options.step_tolerance * length(&point.theta);
+            let moves = length(&step, &scale) > options.step_tolerance * length(&point.theta, &scale);
             if !moves {
                 return end(point, Stop::StepTooSmall);
             }
-            let theta: Vec<f64> = point.theta.iter().zip(&step.step).map(|(theta, step)| theta + step).collect();
+            let theta: Vec<f64> = point.theta.iter().zip(&step).map(|(theta, step)| theta + step).collect();
             match misfit.evaluate(&theta) {
                 Ok(trial) if trial.cost < point.cost => {
-                    let ratio = ((point.cost - trial.cost) / step.predicted).clamp(0.0, 1.0);
-                    damping *= (1.0 - (2.0 * ratio - 1.0).powi(3)).max(1.0 / 3.0);
-                    growth = 2.0;
+                    damping.relax((point.cost - trial.cost) / predicted);
                     (point, iterations) = (trial, iterations + 1);
                     break;
                 }
-                _ => (damping, growth) = (damping * growth, 2.0 * growth),
+                _ => damping.tighten(),
             }
         }
     }
@@ -68,26 +68,4 @@ pub(super) fn minimise(misfit: &Misfit<'_>, start: Point, options: &ProjectionOp
 fn removable(jacobian: MatRef<'_, f64>, residual: MatRef<'_, f64>) -> f64 {
     let rank = crate::linalg::leading_rank(jacobian, jacobian.ncols());
     residual.subrows(0, rank).norm_l2()
-}
-
-struct Step {
-    step: Vec<f64>,
-    /// Decrease of the linearised cost.
-    predicted: f64,
-}
-
-/// `min |r - J step|^2 + damping |D step|^2`.
-fn damped_step(jacobian: MatRef<'_, f64>, residual: MatRef<'_, f64>, scale: &[f64], damping: f64) -> Step {
-    let (rows, q) = (jacobian.nrows(), jacobian.ncols());
-    let unit = |j: usize| if scale[j] > 0.0 { scale[j] } else { 1.0 };
-    let damped = Mat::from_fn(rows + q, q, |i, j| match i.checked_sub(rows) {
-        None => jacobian[(i, j)],
-        Some(k) if k == j => damping.sqrt() * unit(j),
-        Some(_) => 0.0,
-    });
-    let target = Mat::from_fn(rows + q, 1, |i, _| if i < rows { residual[(i, 0)] } else { 0.0 });
-    let step = damped.qr().solve_lstsq(&target);
-    let left = residual - jacobian * &step;
-    let predicted = residual.squared_norm_l2() - left.squared_norm_l2();
-    Step { step: step.col(0).iter().copied().collect(), predicted }
 }

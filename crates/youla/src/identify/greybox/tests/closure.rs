@@ -1,14 +1,12 @@
 //! The loop around the model: derivatives against differences, and a plant that is unstable by itself.
 
 use super::super::closure::Closure;
-use super::super::criterion::Criterion;
-use super::super::{
-    GreyBoxOptions, InitialState, LoopOutput, Matrix, Slope, Stop, Structure, greybox, greybox_in_loop,
-};
-use super::gradient::gradient_error;
+use super::super::criterion::{Comparison, Criterion};
+use super::super::{GreyBoxOptions, LoopOutput, Matrix, NoiseModel, Slope, Stop, Structure, greybox, greybox_in_loop};
+use super::gradient::{comparison, gradient_error};
 use crate::Result;
 use crate::control::closed_loop;
-use crate::identify::subspace::Experiment;
+use crate::identify::subspace::{Experiment, InitialState};
 use crate::lti::{Continuous, Discrete, Partitioned, StateSpace, simulate};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
@@ -75,11 +73,12 @@ fn gradient_of_the_loop_is_that_of_the_criterion() {
     let [w, _, y, beta] = record(300, 0.02, 1);
     let (controller, theta) = (controller(), [3.9, 0.6, 12.5, 29.0]);
     for (output, seen) in [(LoopOutput::Plant, &y), (LoopOutput::Deviation, &beta)] {
-        for initial in [InitialState::Zero, InitialState::Estimated] {
+        for initial in [InitialState::Zero, InitialState::Estimated, InitialState::SteadyState] {
             let experiment = [Experiment { u: w.as_ref(), y: seen.as_ref() }];
             let closure = Some(Closure::new(&controller, output));
-            let criterion = Criterion::new(&Pendulum, &theta, &experiment, time(), closure, initial, &[0.7]).unwrap();
-            let error = gradient_error(&Pendulum, &theta, &criterion, 1e-3);
+            let compared = Comparison { closure, ..comparison(&NoiseModel::OutputError, initial, &[0.7]) };
+            let criterion = Criterion::new(&Pendulum, &theta, &experiment, time(), compared).unwrap();
+            let error = gradient_error(&theta, &criterion, 1e-3);
             assert!(error < 1e-7, "{output:?}, {initial:?}: {error:.1e}");
         }
     }

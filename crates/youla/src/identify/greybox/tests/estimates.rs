@@ -1,7 +1,8 @@
 //! What the estimates are worth.
 
-use super::super::{BearingStructure, GreyBoxModel, GreyBoxOptions, InitialState, Stop, greybox};
+use super::super::{BearingStructure, GreyBoxModel, GreyBoxOptions, Stop, greybox};
 use super::{off, open_loop, time, truth};
+use crate::identify::subspace::InitialState;
 use rayon::prelude::*;
 
 const REST: [f64; 6] = [0.0; 6];

@@ -1,10 +1,11 @@
 //! Derivatives against differences.
 
-use super::super::criterion::Criterion;
-use super::super::sampled::{Coordinates, sampled_slopes};
-use super::super::{BearingStructure, InitialState, Matrix, Slope, Structure};
+use super::super::criterion::{Comparison, Criterion};
+use super::super::sampled::{Coordinates, sample, sampled_slopes};
+use super::super::{BearingStructure, Matrix, NoiseModel, Slope, Structure};
 use super::{off, open_loop, time, truth};
 use crate::Result;
+use crate::identify::subspace::InitialState;
 use crate::linalg::eye;
 use crate::lti::{Continuous, StateSpace};
 use faer::Mat;
@@ -16,7 +17,17 @@ fn difference(value: impl Fn(f64) -> f64, at: f64, h: f64) -> f64 {
     (8.0 * pair(1.0) - pair(2.0)) / (12.0 * h)
 }
 
-pub(super) fn gradient_error(structure: &dyn Structure, theta: &[f64], criterion: &Criterion<'_>, h: f64) -> f64 {
+/// What is compared in the open loop.
+pub(in super::super) fn comparison<'a>(
+    noise: &'a NoiseModel,
+    initial_state: InitialState,
+    deviations: &'a [f64],
+) -> Comparison<'a> {
+    Comparison { closure: None, noise, initial_state, deviations, confined: false }
+}
+
+/// Largest error of the gradient over all parameters, those of the noise too, relative to `|J_j| |r|`.
+pub(in super::super) fn gradient_error(theta: &[f64], criterion: &Criterion<'_>, h: f64) -> f64 {
     let here = criterion.linearise(&criterion.evaluate(theta).unwrap()).unwrap();
     let gradient = here.jacobian().transpose() * here.residual();
     let error = |j: usize| {
@@ -28,7 +39,7 @@ pub(super) fn gradient_error(structure: &dyn Structure, theta: &[f64], criterion
         let size = here.jacobian().col(j).norm_l2() * here.residual().norm_l2();
         (difference(value, theta[j], h) + gradient[(j, 0)]).abs() / size
     };
-    (0..structure.names().len()).map(error).fold(0.0, f64::max)
+    (0..theta.len()).map(error).fold(0.0, f64::max)
 }
 
 #[test]
@@ -37,18 +48,18 @@ fn gradient_is_that_of_the_criterion() {
     let theta = off(&truth(), 0.1, 2);
     for initial in [InitialState::Zero, InitialState::Estimated] {
         let experiments = [data.experiment(), data.experiment()];
-        let criterion =
-            Criterion::new(&BearingStructure, &theta, &experiments, time(), None, initial, &[0.5, 2.0]).unwrap();
+        let compared = comparison(&NoiseModel::OutputError, initial, &[0.5, 2.0]);
+        let criterion = Criterion::new(&BearingStructure, &theta, &experiments, time(), compared).unwrap();
         let point = criterion.evaluate(&theta).unwrap();
         let here = criterion.linearise(&point).unwrap();
         assert!((0.5 * here.residual().squared_norm_l2() / point.cost - 1.0).abs() < 1e-11);
-        let error = gradient_error(&BearingStructure, &theta, &criterion, 1e-3);
+        let error = gradient_error(&theta, &criterion, 1e-3);
         assert!(error < 1e-7, "{initial:?}: {error:.1e}");
     }
 }
 
 /// A structure in which every matrix moves, with three lanes of different kinds.
-struct Everything;
+pub(super) struct Everything;
 
 impl Structure for Everything {
     fn names(&self) -> Vec<String> {
@@ -79,9 +90,9 @@ fn every_matrix_may_move() {
     let theta = [1.3, 0.7, -0.4, 0.2, 0.9];
     let experiment = super::super::Experiment { u: u.as_ref(), y: y.as_ref() };
     let time = crate::lti::Discrete::new(0.2).unwrap();
-    let criterion =
-        Criterion::new(&Everything, &theta, &[experiment], time, None, InitialState::Estimated, &[]).unwrap();
-    let error = gradient_error(&Everything, &theta, &criterion, 1e-3);
+    let compared = comparison(&NoiseModel::OutputError, InitialState::Estimated, &[]);
+    let criterion = Criterion::new(&Everything, &theta, &[experiment], time, compared).unwrap();
+    let error = gradient_error(&theta, &criterion, 1e-3);
     assert!(error < 1e-9, "{error:.1e}");
 }
 
@@ -101,8 +112,9 @@ fn sampling_has_the_derivative_of_a_lag() {
     }
     // Ad = e^(-rt), Bd = (1 - e^(-rt)) / r.
     let (r, t) = (3.0, time().ts());
-    let coordinates = Coordinates { states: vec![1.0], outputs: vec![1.0] };
-    let slopes = sampled_slopes(&Lag, &[r], &Lag.model(&[r]).unwrap(), &coordinates, time()).unwrap();
+    let coordinates = Coordinates { states: vec![1.0], inputs: 1, outputs: 1 };
+    let here = sample(&Lag, &[r], &coordinates, time()).unwrap();
+    let slopes = sampled_slopes(&Lag, &[r], &here, &coordinates, time()).unwrap();
     let decay = f64::exp(-r * t);
     assert!((slopes[0].states[(0, 0)] / (-t * decay) - 1.0).abs() < 1e-14);
     assert!((slopes[0].states[(0, 1)] / ((t * decay + (-r * t).exp_m1() / r) / r) - 1.0).abs() < 1e-8);

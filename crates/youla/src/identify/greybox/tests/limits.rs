@@ -1,9 +1,8 @@
 //! Starts that are bad, structures that are not identifiable, input that does not fit.
 
-use super::super::{
-    BearingStructure, Experiment, GreyBoxOptions, InitialState, Matrix, Slope, Stop, Structure, greybox,
-};
+use super::super::{BearingStructure, Experiment, GreyBoxOptions, Matrix, Slope, Stop, Structure, greybox};
 use super::{open_loop, time, truth};
+use crate::identify::subspace::InitialState;
 use crate::linalg::eye;
 use crate::lti::{Continuous, StateSpace};
 use crate::rig::Bearing;

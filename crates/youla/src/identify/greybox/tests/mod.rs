@@ -2,6 +2,9 @@ mod closure;
 mod estimates;
 mod gradient;
 mod limits;
+mod noise;
+
+pub(super) use gradient::{comparison, gradient_error};
 
 use super::{BearingStructure, Structure};
 use crate::lti::{Discrete, simulate};

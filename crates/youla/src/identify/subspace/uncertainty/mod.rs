@@ -55,8 +55,8 @@ pub enum NoUncertainty {
     /// Simulated records of the estimate would grow without bound.
     #[error("the bootstrap simulates the estimate, and it is unstable; take method = \"delta\"")]
     Unstable,
-    /// B and D were not found as the method finds them.
-    #[error("it holds for structure = \"free\", and B and D were refitted in the innovation form")]
+    /// The model was not found as the method finds it.
+    #[error("it holds for structure = \"free\" without a refinement, and the model was fitted anew")]
     OtherFit,
     /// A step failed.
     #[error("{0}")]
@@ -136,6 +136,9 @@ pub(super) fn find(
             .map_err(|error| NoUncertainty::Failed(error.to_string())),
         (UncertaintyMethod::Bootstrap, Innovation::None { reason: NoInnovation::NotSolvable(reason) }) => {
             Err(NoUncertainty::NoGain(reason.clone()))
+        }
+        (UncertaintyMethod::Bootstrap, Innovation::None { reason: NoInnovation::Refined }) => {
+            Err(NoUncertainty::OtherFit)
         }
         (UncertaintyMethod::Bootstrap, Innovation::Found { gain, .. }) => base()
             .map_err(|error| NoUncertainty::Failed(error.to_string()))

@@ -1,12 +1,11 @@
 //! Parameters of declared structures from simulated records.
 
 use super::super::super::tests::off;
-use super::super::super::{
-    Experiment, GreyBoxModel, GreyBoxOptions, InitialState, Loss, Side, Stop, Structure, greybox,
-};
+use super::super::super::{Experiment, GreyBoxModel, GreyBoxOptions, Loss, Side, Stop, Structure, greybox};
 use super::super::DeclaredStructure;
 use super::declared;
 use crate::Mat;
+use crate::identify::subspace::InitialState;
 use crate::lti::{Discrete, simulate};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -232,7 +231,7 @@ fn known_delays_are_taken_out() {
     for (found, truth) in found.parameters.iter().zip(mass.start()) {
         assert!((found / truth - 1.0).abs() < 1e-6, "{found} for {truth}");
     }
-    assert_eq!((found.continuous.order(), found.model.order()), (2, 5));
+    assert_eq!((found.continuous.as_ref().unwrap().order(), found.model.order()), (2, 5));
     let again = simulate(&found.model, data.u.as_ref().subrows(3, 3987), &found.initial_states[0]).unwrap();
     assert!((&again - data.y.as_ref().subrows(3, 3987)).norm_max() < 1e-9 * data.y.norm_max());
     let refused = |delays: Vec<usize>, rows: usize| {

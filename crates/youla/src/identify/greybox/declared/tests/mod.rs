@@ -1,3 +1,4 @@
+mod discrete;
 mod estimates;
 mod expressions;
 mod refusals;

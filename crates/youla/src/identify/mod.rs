@@ -6,4 +6,6 @@ pub mod greybox;
 pub mod hansen;
 pub mod hansen_pem;
 pub mod innovation_form;
+mod projected_pem;
 pub mod subspace;
+pub mod subspace_pem;

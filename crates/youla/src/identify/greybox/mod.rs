@@ -13,18 +13,21 @@
 //! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
 //! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`),
 //! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
-//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
+//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`), and against
+//! a lost search several starts (`multi_start.rs`) and an observer that is taken away step by step (`continuation.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bearing;
 mod bounds;
 mod closure;
+mod continuation;
 mod cost;
 mod criterion;
 mod declared;
 mod delays;
 mod identifiability;
 mod levenberg;
+mod multi_start;
 mod narrow;
 mod projection;
 mod robust;
@@ -38,11 +41,13 @@ mod uncertainty;
 pub use bearing::BearingStructure;
 pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
+pub use continuation::{Continuation, ContinuationOptions, ContinuationStage, greybox_continued};
 pub use cost::greybox_cost;
 pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
 pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
 pub use robust::{Loss, RobustReport};

@@ -2,6 +2,7 @@ mod closure;
 mod estimates;
 mod gradient;
 mod limits;
+mod starts;
 
 use super::{BearingStructure, Structure};
 use crate::lti::{Discrete, simulate};

@@ -39,9 +39,9 @@ pub struct Item {
 
 /// The rows of an item, and how long each took.
 #[derive(Debug, Clone)]
-pub struct Evaluated {
+pub struct Evaluated<R = Row> {
     /// The nominal model, then the methods in the order of the settings.
-    pub rows: Vec<Row>,
+    pub rows: Vec<R>,
     /// Design and simulation, then as `rows`.
     pub durations: Vec<Duration>,
 }
@@ -79,17 +79,17 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
 }
 
 /// Seconds of one part after the other.
-struct Laps {
+pub(super) struct Laps {
     last: Instant,
-    laps: Vec<Duration>,
+    pub(super) laps: Vec<Duration>,
 }
 
 impl Laps {
-    fn start() -> Self {
+    pub(super) fn start() -> Self {
         Laps { last: Instant::now(), laps: Vec::new() }
     }
 
-    fn lap(&mut self) {
+    pub(super) fn lap(&mut self) {
         let now = Instant::now();
         self.laps.push(now - self.last);
         self.last = now;
@@ -97,12 +97,12 @@ impl Laps {
 }
 
 /// A record of the loop, from rest.
-struct LoopRecord {
-    u: Mat<f64>,
-    y: Mat<f64>,
+pub(super) struct LoopRecord {
+    pub(super) u: Mat<f64>,
+    pub(super) y: Mat<f64>,
 }
 
-fn record(
+pub(super) fn record(
     design: &Design,
     plant: &StateSpace<Discrete>,
     samples: usize,
@@ -156,7 +156,7 @@ impl LoopData<'_> {
         let judged = self.identify(method, settings).and_then(|found| {
             let stable = found.model.is_stable()?;
             let status = if stable { Status::Stable } else { Status::Unstable };
-            Ok((status, self.fit_of(&found.model)?, found.steps, found.note))
+            Ok((status, fit_on(&self.verification, &found.model)?, found.steps, found.note))
         });
         let (status, fit, steps, note) = match judged {
             Ok(outcome) => outcome,
@@ -236,18 +236,17 @@ impl LoopData<'_> {
         let model = pem_from_hansen(found, factors, &signals, &experiment, &BearingStructure, nominal, &options)?.model;
         Ok(Found { model: model.model, steps: Some(model.iterations), note })
     }
+}
 
-    /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
-    fn fit_of(&self, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
-        let LoopRecord { u, y } = &self.verification;
-        match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
-            Ok(predicted) => {
-                let percent = fit(y.as_ref(), predicted.as_ref())?;
-                Ok([percent[0], percent[1]])
-            }
-            Err(Error::Diverged { .. }) => Ok([f64::NEG_INFINITY; 2]),
-            Err(e) => Err(e),
+/// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
+pub(super) fn fit_on(LoopRecord { u, y }: &LoopRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
+    match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
+        Ok(predicted) => {
+            let percent = fit(y.as_ref(), predicted.as_ref())?;
+            Ok([percent[0], percent[1]])
         }
+        Err(Error::Diverged { .. }) => Ok([f64::NEG_INFINITY; 2]),
+        Err(e) => Err(e),
     }
 }
 
@@ -256,7 +255,7 @@ fn grey_box(found: GreyBoxModel) -> Found {
 }
 
 /// What was done to the poles of S.
-fn reflected(found: &HansenModel) -> String {
+pub(super) fn reflected(found: &HansenModel) -> String {
     match found.deviation.stability.moved.len() {
         0 => String::new(),
         poles => format!("{poles} poles of S reflected"),

@@ -16,22 +16,18 @@
 #[cfg(test)]
 mod tests;
 
-use super::fit::reproduction;
+pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
+
 use super::greybox::{
-    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed, greybox,
-    greybox_cost, logarithmic_grid, projections,
+    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed,
 };
 use super::hansen::{HansenModel, hansen};
-use super::subspace::{Experiment, InitialState, SubspaceOptions};
+use super::projected_pem::{Grid, Projected, falls_behind, fit_of, pem_from_target};
+use super::subspace::{Experiment, SubspaceOptions};
+use crate::Result;
 use crate::factor::{CoprimeFactors, YoulaSignals};
-use crate::lti::{Discrete, StateSpace, frequency_response, simulate, simulate_best};
-use crate::record::{Welch, cross_spectrum};
-use crate::{Error, Mat, Result};
+use crate::lti::{Discrete, StateSpace, frequency_response};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
-
-/// Points of fit by which the structure may stay behind G(S) on an output before the result counts as lost.
-pub const LOST_POINTS: f64 = 1.0;
 
 /// Choices of [`hansen_pem`]. The initial states of `hansen` and `pem` are separate choices.
 ///
@@ -70,27 +66,6 @@ impl Default for HansenPemOptions {
     }
 }
 
-/// Where a search of the prediction-error method began.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum PemStart {
-    /// At the projection of G(S).
-    Projection,
-    /// At the nominal parameters.
-    Nominal,
-}
-
-/// One search.
-#[derive(Debug)]
-pub struct PemRun {
-    /// Where it began.
-    pub start: PemStart,
-    /// The criterion there, infinite where the simulation diverges.
-    pub cost_at_start: f64,
-    /// The criterion where it ended, or why it led to no model.
-    pub cost: Result<f64>,
-}
-
 /// Result of [`hansen_pem`].
 #[derive(Debug)]
 pub struct HansenPem {
@@ -112,7 +87,7 @@ impl HansenPem {
     /// Whether the structure stays behind G(S), or behind a constant, by more than [`LOST_POINTS`] on an output: the search is
     /// lost, or the structure does not describe the plant.
     pub fn lost(&self) -> bool {
-        self.model.simulation_fit.iter().zip(&self.fit_of_plant).any(|(fit, plant)| *fit < plant.max(0.0) - LOST_POINTS)
+        falls_behind(&self.model.simulation_fit, &self.fit_of_plant)
     }
 }
 
@@ -122,7 +97,7 @@ impl HansenPem {
 /// `signals` are those of (28), `experiments` the measured u and y that they were made of.
 ///
 /// # Errors
-/// As [`hansen`], [`super::greybox::project`] and [`greybox`]; [`Error::Diverged`] where no start leads to a model.
+/// As [`hansen`], [`super::greybox::project`] and [`super::greybox::greybox`]; [`crate::Error::Diverged`] where no start leads to a model.
 ///
 /// # Accuracy
 /// See `docs/hansen-pem.md` for how often the result is that of a search started at the true parameters.
@@ -151,44 +126,18 @@ pub fn pem_from_hansen(
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
-    let time = factors.nominal().time();
     let target = projection_target(factors, &found.deviation.model, signals, options)?;
-    let starts: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
-    let projections = projections(structure, &target, &starts, &options.projection)?;
-    let cost = |theta: &[f64]| greybox_cost(structure, theta, experiments, time, &options.pem).unwrap_or(f64::INFINITY);
-    let mut order: Vec<(f64, Projection)> = projections.into_iter().map(|p| (cost(&p.parameters), p)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let begun = [(PemStart::Projection, order[0].0, order[0].1.parameters.as_slice())]
-        .into_iter()
-        .chain(nominal.map(|theta| (PemStart::Nominal, cost(theta), theta)));
-    let mut best: Option<(PemStart, GreyBoxModel)> = None;
-    let mut runs = Vec::new();
-    for (start, cost_at_start, theta) in begun {
-        let outcome = greybox(structure, theta, experiments, time, &options.pem).map(|model| {
-            let cost = model.cost;
-            if best.as_ref().is_none_or(|(_, best)| cost < best.cost) {
-                best = Some((start, model));
-            }
-            cost
-        });
-        runs.push(PemRun { start, cost_at_start, cost: outcome });
-    }
-    let Some((won, model)) = best else { return Err(first_error(runs)) };
+    let options_of_both = (&options.projection, &options.pem);
+    let Projected { projections, runs, won, model } =
+        pem_from_target("G(S)", &target, structure, nominal, experiments, options_of_both)?;
     let fit_of_plant = fit_of(&found.plant, experiments, options.pem.initial_state)?;
-    let projections = order.into_iter().map(|(_, projection)| projection).collect();
     Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
-}
-
-/// Why the first search failed.
-fn first_error(runs: Vec<PemRun>) -> Error {
-    let first = runs.into_iter().find_map(|run| run.cost.err());
-    first.unwrap_or(Error::NoStart).within("the prediction-error method from the projection of G(S)")
 }
 
 /// What alpha makes of u and y by S on the grid, with the weights of the criterion of the records.
 ///
 /// # Errors
-/// Ports; [`Error::TooFewSamples`] for a record that is too short for a spectrum; [`Error::PoleOnBoundary`].
+/// Ports; [`crate::Error::TooFewSamples`] for a record that is too short for a spectrum; [`crate::Error::PoleOnBoundary`].
 pub fn projection_target(
     factors: &CoprimeFactors<Discrete>,
     s: &StateSpace<Discrete>,
@@ -196,68 +145,11 @@ pub fn projection_target(
     options: &HansenPemOptions,
 ) -> Result<FrequencyTarget> {
     let (p, m, time) = (factors.outputs(), factors.inputs(), s.time());
-    let shortest = signals.iter().map(|s| s.alpha.nrows()).min().unwrap_or(0);
-    let window = options.window.min(shortest / 4);
-    if window < SHORTEST_WINDOW {
-        let what = "the shortest record, for the spectrum of alpha".into();
-        return Err(Error::TooFewSamples { what, found: shortest, needed: 4 * SHORTEST_WINDOW });
-    }
-    let spacing = 2.0 * PI / (window as f64 * time.ts());
-    let omega = logarithmic_grid([spacing, 0.9 * PI / time.ts()], options.frequencies)?;
-    let spectrum = alpha_spectrum(signals, time, window)?;
-    let size = |k: usize, j: usize| {
-        let (before, after) = (omega[k.saturating_sub(1)], omega[(k + 1).min(omega.len() - 1)]);
-        let bin = ((omega[k] / spacing).round() as usize).min(spectrum.nrows() - 1);
-        (spectrum[(bin, j)] * 0.5 * (after - before)).sqrt()
-    };
-    let deviation = |i: usize| options.pem.output_deviations.get(i).copied().unwrap_or(1.0);
-    let weight = |k: usize| Mat::from_fn(p, m, |i, j| size(k, j) / deviation(i));
-    let decay = options.decay / (shortest as f64 * time.ts());
-    let response = frequency_response(&decayed(&factors.right_factors_of(s)?, decay)?, &omega)?;
+    let alpha: Vec<_> = signals.iter().map(|s| s.alpha.as_ref()).collect();
+    let grid = Grid::new("alpha", &alpha, options.window, options.frequencies, time)?;
+    let weights = grid.weights(&alpha, p, &options.pem)?;
+    let decay = options.decay / grid.shortest;
+    let response = frequency_response(&decayed(&factors.right_factors_of(s)?, decay)?, &grid.omega)?;
     let part = |first: usize, count: usize| response.iter().map(|g| g.subrows(first, count).to_owned()).collect();
-    let weights = (0..omega.len()).map(weight).collect();
-    FrequencyTarget::of_excitation(&omega, part(0, m), part(m, p), time)?.weighted(weights)?.decaying(decay)
-}
-
-/// Shortest segment of the spectrum of alpha.
-const SHORTEST_WINDOW: usize = 16;
-
-/// Power of each alpha per Hz, frequencies x m, averaged over the records by their length.
-fn alpha_spectrum(signals: &[YoulaSignals], time: Discrete, window: usize) -> Result<Mat<f64>> {
-    let welch = Welch { window, remove_mean: false, ..Welch::default() };
-    let inputs = signals.first().map_or(0, |s| s.alpha.ncols());
-    let mut sum = Mat::zeros(window / 2 + 1, inputs);
-    for s in signals {
-        let alpha = s.alpha.as_ref();
-        let spectrum = cross_spectrum(alpha, alpha, time, &welch)?;
-        for (k, density) in spectrum.density.iter().enumerate() {
-            for j in 0..inputs.min(density.ncols()) {
-                sum[(k, j)] += density[(j, j)].re.max(0.0) * alpha.nrows() as f64;
-            }
-        }
-    }
-    Ok(sum)
-}
-
-/// Fit (26) of a simulated model per output over all records, percent.
-fn fit_of(model: &StateSpace<Discrete>, experiments: &[Experiment<'_>], initial: InitialState) -> Result<Vec<f64>> {
-    let mut errors = Vec::new();
-    for e in experiments {
-        match simulated_error(model, e, initial) {
-            Ok(error) => errors.push(error),
-            Err(Error::Diverged { .. }) => return Ok(vec![f64::NEG_INFINITY; model.outputs()]),
-            Err(other) => return Err(other),
-        }
-    }
-    let measured: Vec<_> = experiments.iter().map(|e| e.y).collect();
-    Ok(reproduction(&measured, &errors).iter().map(|output| output.fit).collect())
-}
-
-/// `y - yhat`, from rest or from the initial state that fits best; a black box has no steady state that can be trusted.
-fn simulated_error(model: &StateSpace<Discrete>, e: &Experiment<'_>, initial: InitialState) -> Result<Mat<f64>> {
-    let simulated = match initial {
-        InitialState::Zero => simulate(model, e.u, &vec![0.0; model.order()])?,
-        InitialState::Estimated | InitialState::SteadyState => simulate_best(model, e.u, e.y)?,
-    };
-    Ok(e.y - simulated)
+    FrequencyTarget::of_excitation(&grid.omega, part(0, m), part(m, p), time)?.weighted(weights)?.decaying(decay)
 }

@@ -41,9 +41,9 @@ pub struct Item {
 
 /// The rows of an item, and how long each took.
 #[derive(Debug, Clone)]
-pub struct Evaluated {
+pub struct Evaluated<R = Row> {
     /// The nominal model, then the methods in the order of the settings.
-    pub rows: Vec<Row>,
+    pub rows: Vec<R>,
     /// Design and simulation, then as `rows`.
     pub durations: Vec<Duration>,
 }
@@ -83,17 +83,17 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
 }
 
 /// Seconds of one part after the other.
-struct Laps {
+pub(super) struct Laps {
     last: Instant,
-    laps: Vec<Duration>,
+    pub(super) laps: Vec<Duration>,
 }
 
 impl Laps {
-    fn start() -> Self {
+    pub(super) fn start() -> Self {
         Laps { last: Instant::now(), laps: Vec::new() }
     }
 
-    fn lap(&mut self) {
+    pub(super) fn lap(&mut self) {
         let now = Instant::now();
         self.laps.push(now - self.last);
         self.last = now;
@@ -101,12 +101,12 @@ impl Laps {
 }
 
 /// A record of the loop, from rest.
-struct LoopRecord {
-    u: Mat<f64>,
-    y: Mat<f64>,
+pub(super) struct LoopRecord {
+    pub(super) u: Mat<f64>,
+    pub(super) y: Mat<f64>,
 }
 
-fn record(
+pub(super) fn record(
     design: &Design,
     plant: &StateSpace<Discrete>,
     samples: usize,
@@ -183,7 +183,7 @@ impl LoopData<'_> {
 
     fn judge(&self, found: Found) -> Result<(Status, [f64; 2], Option<usize>, String)> {
         let status = if found.model.is_stable()? { Status::Stable } else { Status::Unstable };
-        Ok((status, self.fit_of(&found.model)?, found.steps, found.note))
+        Ok((status, fit_on(&self.verification, &found.model)?, found.steps, found.note))
     }
 
     fn identify(&self, method: Method, settings: &PaperSettings) -> Result<Found, String> {
@@ -253,18 +253,17 @@ impl LoopData<'_> {
         let model = lower(from_projection.map(|found| found.model).map_err(text), self.single(settings).cloned())?;
         Ok(Found { note, ..grey_box(&model) })
     }
+}
 
-    /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
-    fn fit_of(&self, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
-        let LoopRecord { u, y } = &self.verification;
-        match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
-            Ok(predicted) => {
-                let percent = fit(y.as_ref(), predicted.as_ref())?;
-                Ok([percent[0], percent[1]])
-            }
-            Err(Error::Diverged { .. }) => Ok([f64::NEG_INFINITY; 2]),
-            Err(e) => Err(e),
+/// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
+pub(super) fn fit_on(LoopRecord { u, y }: &LoopRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
+    match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
+        Ok(predicted) => {
+            let percent = fit(y.as_ref(), predicted.as_ref())?;
+            Ok([percent[0], percent[1]])
         }
+        Err(Error::Diverged { .. }) => Ok([f64::NEG_INFINITY; 2]),
+        Err(e) => Err(e),
     }
 }
 
@@ -289,7 +288,7 @@ fn grey_box(found: &GreyBoxModel) -> Found {
 }
 
 /// What was done to the poles of S.
-fn reflected(found: &HansenModel) -> String {
+pub(super) fn reflected(found: &HansenModel) -> String {
     match found.deviation.stability.moved.len() {
         0 => String::new(),
         poles => format!("{poles} poles of S reflected"),

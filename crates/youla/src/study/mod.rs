@@ -11,6 +11,7 @@
 //! | `campaign` | many items on all cores, streamed to a file in order, resumable |
 //! | `experiment`, `experiments` | Table 1 and Figs 6 to 10 on the digital twin |
 //! | `paper` | everything that was found |
+//! | `starts` | how often a search from a start arrives, and from which |
 //! | `statistics` | quantiles, deciles, failures, winners |
 
 mod campaign;
@@ -24,6 +25,7 @@ mod monte_carlo;
 mod paper;
 mod row;
 mod settings;
+mod starts;
 mod statistics;
 mod synchronous;
 
@@ -36,7 +38,11 @@ pub use item::{Evaluated, Item, evaluate};
 pub use method::Method;
 pub use monte_carlo::monte_carlo;
 pub use paper::{Paper, Timing};
-pub use row::{Row, Status};
+pub use row::{Line, Row, Status};
 pub use settings::{ControllerSettings, CrossoverSettings, ExperimentSettings, PaperSettings, StudySettings};
+pub use starts::{
+    ARRIVED, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts, start_counts,
+    start_failures,
+};
 pub use statistics::{Decile, LOST, TIE, Winner, deciles, median, overall, quantile, winner};
 pub use synchronous::without_harmonics;

@@ -3,6 +3,21 @@
 use super::method::Method;
 use sha2::{Digest, Sha256};
 
+/// One line of a results file of [`super::Campaign`].
+pub trait Line: Sized + Send {
+    /// The first line of the file.
+    const HEADER: &str;
+
+    /// Number of the item, from 0.
+    fn item(&self) -> usize;
+
+    /// The line, without its end.
+    fn line(&self) -> String;
+
+    /// Reads a line; `None` where it is damaged.
+    fn parse(line: &str) -> Option<Self>;
+}
+
 /// What became of an identification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
@@ -24,7 +39,12 @@ impl Status {
         (Status::NoController, "no-controller"),
     ];
 
-    fn word(self) -> &'static str {
+    /// The status with this word.
+    pub(super) fn of_word(word: &str) -> Option<Status> {
+        Status::ALL.iter().find(|(_, known)| *known == word).map(|(status, _)| *status)
+    }
+
+    pub(super) fn word(self) -> &'static str {
         Status::ALL.iter().find(|(status, _)| *status == self).map_or("", |(_, word)| word)
     }
 }
@@ -70,7 +90,6 @@ impl Row {
     /// The line of the file, without its end. Numbers are written such that they read back bit by bit; `check` is the
     /// beginning of the SHA-256 of what stands before it.
     pub fn line(&self) -> String {
-        let note: String = self.note.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect();
         let text = format!(
             "{},{},{},{},{},{},{},{},{},{},{},{}",
             self.item,
@@ -84,19 +103,14 @@ impl Row {
             self.fit[0],
             self.fit[1],
             self.steps.map_or_else(String::new, |steps| steps.to_string()),
-            note,
+            in_one_field(&self.note),
         );
-        let check = check(&text);
-        format!("{text},{check}")
+        checked(text)
     }
 
     /// Reads a line; `None` where it is damaged.
     pub fn parse(line: &str) -> Option<Row> {
-        let (text, found) = line.rsplit_once(',')?;
-        if check(text) != found {
-            return None;
-        }
-        let fields: Vec<&str> = text.split(',').collect();
+        let fields: Vec<&str> = unchecked(line)?.split(',').collect();
         let [item, theta, noise, weight, peak_nominal, peak_plant, method, status, h, v, steps, note] =
             fields.as_slice().try_into().ok()?;
         Some(Row {
@@ -107,12 +121,45 @@ impl Row {
             peak_nominal: str::parse(peak_nominal).ok()?,
             peak_plant: str::parse(peak_plant).ok()?,
             method: Method::of_key(method)?,
-            status: Status::ALL.iter().find(|(_, word)| *word == status)?.0,
+            status: Status::of_word(status)?,
             fit: [str::parse(h).ok()?, str::parse(v).ok()?],
             steps: if steps.is_empty() { None } else { Some(str::parse(steps).ok()?) },
             note: str::to_owned(note),
         })
     }
+}
+
+impl Line for Row {
+    const HEADER: &str = Row::HEADER;
+
+    fn item(&self) -> usize {
+        self.item
+    }
+
+    fn line(&self) -> String {
+        self.line()
+    }
+
+    fn parse(line: &str) -> Option<Row> {
+        Row::parse(line)
+    }
+}
+
+/// A note without what would end its field.
+pub(super) fn in_one_field(note: &str) -> String {
+    note.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect()
+}
+
+/// A line with its check behind it.
+pub(super) fn checked(text: String) -> String {
+    let check = check(&text);
+    format!("{text},{check}")
+}
+
+/// What stands before the check, where that is right.
+pub(super) fn unchecked(line: &str) -> Option<&str> {
+    let (text, found) = line.rsplit_once(',')?;
+    (check(text) == found).then_some(text)
 }
 
 fn check(text: &str) -> String {

@@ -17,7 +17,8 @@
 //! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`) or steady
 //! (`steady.rs`),
 //! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
-//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`).
+//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`), and against
+//! a lost search several starts (`multi_start.rs`) and an observer that is taken away step by step (`continuation.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
 mod bank;
@@ -25,6 +26,7 @@ mod bearing;
 mod bounds;
 mod checks;
 mod closure;
+mod continuation;
 mod cost;
 mod criterion;
 mod damped;
@@ -34,6 +36,7 @@ mod estimate;
 mod identifiability;
 mod levenberg;
 mod linearisation;
+mod multi_start;
 mod narrow;
 mod noise;
 mod options;
@@ -54,11 +57,13 @@ mod whitening;
 pub use bearing::BearingStructure;
 pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
+pub use continuation::{Continuation, ContinuationOptions, ContinuationStage, greybox_continued};
 pub use cost::greybox_cost;
 pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
 pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
 pub use options::GreyBoxOptions;
 pub(crate) use projection::decayed;

@@ -2,14 +2,15 @@
 
 use super::*;
 use crate::control::closed_loop;
-use crate::identify::greybox::{BearingStructure, Matrix, Slope, project};
+use crate::identify::greybox::{BearingStructure, Matrix, Slope, greybox, project};
 use crate::identify::subspace::Order;
 use crate::linalg::{block, eye};
-use crate::lti::Continuous;
+use crate::lti::{Continuous, simulate};
 use crate::record::{Excitation, SquareWaves};
 use crate::rig::{Bearing, degraded};
 use crate::study::{Design, PaperSettings, design};
 use crate::validate::fit;
+use crate::{Error, Mat};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

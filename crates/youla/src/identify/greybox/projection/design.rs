@@ -61,14 +61,37 @@ pub(super) fn design(ranges: &[Range]) -> Vec<Vec<f64>> {
     (0..full.unwrap_or(POINTS)).map(point).collect()
 }
 
-/// Points around a parameter vector, itself first.
-pub(super) fn spread(theta: &[f64]) -> Vec<Vec<f64>> {
-    let ranges: Vec<Range> = theta.iter().map(|value| Range::around(*value, SPREAD)).collect();
+/// Where points around a parameter vector lie.
+pub(in super::super) struct Neighbourhood<'a> {
+    /// Each parameter over its value from one over this to this.
+    pub(in super::super) factor: f64,
+    /// Points, the vector itself among them.
+    pub(in super::super) points: usize,
+    /// Every how many-th of Halton's points is taken. The first points of a large base lie close together at the lower end; with
+    /// 409 they do not (L. Kocis and W. J. Whiten, ACM Trans. Math. Softw. 23 (1997), 266).
+    pub(in super::super) leap: usize,
+    /// Smallest and largest value of each parameter.
+    pub(in super::super) limits: &'a [(f64, f64)],
+}
+
+/// Points around a parameter vector, itself first; logarithmic in each parameter, which keeps its sign, and zero stays zero.
+pub(in super::super) fn spread(theta: &[f64], around: &Neighbourhood<'_>) -> Vec<Vec<f64>> {
+    let range = |(value, (min, max)): (&f64, &(f64, f64))| {
+        let Range { low, high } = Range::around(*value, around.factor);
+        Range { low: low.max(*min).min(*max), high: high.max(*min).min(*max) }
+    };
+    let ranges: Vec<Range> = theta.iter().zip(around.limits).map(range).collect();
     let point = |k: usize| {
-        let share = |j: usize| halton(k, PRIMES[j % PRIMES.len()]);
+        let share = |j: usize| halton(k * around.leap, PRIMES[j % PRIMES.len()]);
         ranges.iter().enumerate().map(|(j, range)| range.at(share(j))).collect()
     };
-    [theta.to_vec()].into_iter().chain((1..POINTS).map(point)).collect()
+    [theta.to_vec()].into_iter().chain((1..around.points).map(point)).collect()
+}
+
+/// The points among which a projection looks for its start where the structure gives none.
+pub(super) fn decades(theta: &[f64]) -> Vec<Vec<f64>> {
+    let limits = vec![(f64::NEG_INFINITY, f64::INFINITY); theta.len()];
+    spread(theta, &Neighbourhood { factor: SPREAD, points: POINTS, leap: 1, limits: &limits })
 }
 
 /// The digits of `k` in a base, mirrored at the point.
@@ -91,6 +114,17 @@ mod tests {
         let first: Vec<f64> = (1..=4).map(|k| halton(k, 2)).collect();
         assert_eq!(first, [0.5, 0.25, 0.75, 0.125]);
         assert!((halton(5, 3) - 7.0 / 9.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn points_around_a_vector_keep_signs_and_limits() {
+        let limits = [(0.5, 2.0), (f64::NEG_INFINITY, 0.0), (f64::NEG_INFINITY, f64::INFINITY)];
+        let around = Neighbourhood { factor: 4.0, points: 50, leap: 409, limits: &limits };
+        let points = spread(&[1.0, -3.0, 0.0], &around);
+        assert_eq!((points.len(), &points[0]), (50, &vec![1.0, -3.0, 0.0]));
+        assert!(points.iter().all(|p| (0.5..=2.0).contains(&p[0]) && (-12.0..=-0.75).contains(&p[1]) && p[2] == 0.0));
+        let low = points[1..].iter().filter(|p| p[1] > -3.0).count();
+        assert!((20..=29).contains(&low), "{low}");
     }
 
     #[test]

@@ -29,7 +29,8 @@ use super::{Stop, Structure};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
-use design::spread;
+use design::decades;
+pub(super) use design::{Neighbourhood, spread};
 use faer::{Mat, MatRef, c64};
 use misfit::{Misfit, Point};
 use search::{Outcome, minimise};
@@ -183,7 +184,7 @@ fn begin(misfit: &Misfit<'_>, starts: &[Vec<f64>], options: &ProjectionOptions) 
         found.extend(misfit.evaluate(start).ok().map(|point| (Origin::Given(k), point)));
     }
     if !found.iter().any(|(origin, _)| *origin == Origin::Linear) {
-        let around = starts.first().map(|first| spread(first)).unwrap_or_default();
+        let around = starts.first().map(|first| decades(first)).unwrap_or_default();
         let points = around.iter().skip(1).filter_map(|theta| misfit.evaluate(theta).ok());
         found.extend(points.map(|point| (Origin::Around, point)));
     }

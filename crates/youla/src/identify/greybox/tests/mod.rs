@@ -3,6 +3,7 @@ mod estimates;
 mod gradient;
 mod limits;
 mod noise;
+mod starts;
 
 pub(super) use gradient::{comparison, gradient_error};
 

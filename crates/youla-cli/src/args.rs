@@ -3,7 +3,7 @@
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 use youla::record::ChannelRef;
-use youla::study::{Method, Shard};
+use youla::study::{Method, Shard, StartCase};
 
 /// Identifies a machine while its controller keeps running.
 #[derive(Debug, Parser)]
@@ -42,7 +42,7 @@ pub(crate) enum Command {
     /// the same command is given again.
     #[command(after_help = PAPER_EXAMPLES)]
     Paper(Box<PaperArgs>),
-    /// Put together a study that was computed in parts.
+    /// Count how often searches arrive, or put together a study of the paper that was computed in parts.
     #[command(subcommand)]
     Study(StudyCommand),
     /// Simulate the gas bearing in closed loop with a nominal model that is half wrong, and identify it.
@@ -171,9 +171,14 @@ pub(crate) struct PaperArgs {
     pub(crate) print_rig: bool,
 }
 
-/// What is done with parts of a study.
+/// Studies beside the paper, and what is done with parts of its study.
 #[derive(Debug, Subcommand)]
 pub(crate) enum StudyCommand {
+    /// Count how often the prediction-error method arrives, from which start: single, several, continued, or none.
+    ///
+    /// Results stream to the folder as they are found, and a run that was stopped goes on where it was.
+    #[command(after_help = STARTS_EXAMPLES)]
+    Starts(StartsArgs),
     /// Join the results folders of all shards and finish the paper from them.
     #[command(after_help = "Example:\n  youla study merge part1 part2 --out whole")]
     Merge {
@@ -184,6 +189,35 @@ pub(crate) enum StudyCommand {
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
     },
+}
+
+const STARTS_EXAMPLES: &str = "\
+Examples:
+  youla study starts                                     all cases; 500 loops at each noise, 100 items of the others
+  youla study starts --cases light-damping --items 20    a first look
+
+Cases: loop-0.2, loop-1.0, light-damping, periodic, far-start, slow-squares.";
+
+/// What is asked of the study of starts.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct StartsArgs {
+    /// Cases, separated by commas; all by default.
+    #[arg(long, value_delimiter = ',', value_parser = case)]
+    pub(crate) cases: Option<Vec<StartCase>>,
+    /// Items of each case.
+    #[arg(long, value_name = "N")]
+    pub(crate) items: Option<usize>,
+    /// Seed of everything random; the same seed gives the same results.
+    #[arg(long, default_value_t = 1)]
+    pub(crate) seed: u64,
+    /// Results folder; runs/starts-seed-S by default.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
+
+fn case(name: &str) -> Result<StartCase, String> {
+    let known: Vec<&str> = StartCase::ALL.iter().map(|case| case.key()).collect();
+    StartCase::of_key(name).ok_or_else(|| format!("there is no such case; known are {}", known.join(", ")))
 }
 
 fn method(name: &str) -> Result<Method, String> {

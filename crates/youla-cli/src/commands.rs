@@ -3,6 +3,7 @@
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::output::{Failure, Progress, say};
 use crate::paper;
+use crate::starts;
 use crate::subspace;
 use crate::table;
 use std::path::{Path, PathBuf};
@@ -26,6 +27,7 @@ pub(crate) fn run(args: &Args) -> Result<(), Failure> {
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
         Command::Paper(asked) => paper::reproduce(args, asked),
+        Command::Study(StudyCommand::Starts(asked)) => starts::count(args, asked),
         Command::Study(StudyCommand::Merge { parts, out }) => paper::merge_parts(args, parts, out.as_deref()),
     }
 }

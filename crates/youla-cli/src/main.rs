@@ -4,6 +4,7 @@ mod args;
 mod commands;
 mod output;
 mod paper;
+mod starts;
 mod subspace;
 mod table;
 

@@ -8,7 +8,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use youla::rig::RigParameters;
-use youla::run::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, paper};
+use youla::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
 use youla::study::{PaperSettings, Shard};
 
 /// Reproduces the paper, or its part.
@@ -77,13 +77,13 @@ fn part_of(shard: Shard, written: &WrittenPaper) -> String {
 }
 
 /// One bar per stage, on a terminal only.
-struct Bar {
-    bar: ProgressBar,
+pub(crate) struct Bar {
+    pub(crate) bar: ProgressBar,
     quiet: bool,
 }
 
 impl Bar {
-    fn new(hidden: bool) -> Self {
+    pub(crate) fn new(hidden: bool) -> Self {
         let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
         bar.enable_steady_tick(Duration::from_millis(100));
         Bar { bar, quiet: hidden }
@@ -91,20 +91,23 @@ impl Bar {
 
     fn tell(&self, progress: PaperProgress<'_>) {
         match progress {
-            PaperProgress::Begins(stage, loops) => self.begin(stage, loops),
+            PaperProgress::Begins(stage, loops) => self.begin(stage.name(), loops),
             PaperProgress::Done(loops) => self.bar.set_position(loops as u64),
-            PaperProgress::Continued { path, loops, redone } => {
-                let path = path.display();
-                let damaged = if redone > 0 {
-                    format!(", {redone} damaged or incomplete rows are computed again")
-                } else {
-                    String::new()
-                };
-                self.say(&format!("{path}: {loops} loops are there already{damaged}"));
-                // The remaining time is that of the loops of this call.
-                self.bar.reset_eta();
-            }
+            PaperProgress::Continued { path, loops, redone } => self.continued(path, &format!("{loops} loops"), redone),
         }
+    }
+
+    /// A file of an earlier call.
+    pub(crate) fn continued(&self, path: &Path, found: &str, redone: usize) {
+        let path = path.display();
+        let damaged = if redone > 0 {
+            format!(", {redone} damaged or incomplete rows are computed again")
+        } else {
+            String::new()
+        };
+        self.say(&format!("{path}: {found} are there already{damaged}"));
+        // The remaining time is that of the loops of this call.
+        self.bar.reset_eta();
     }
 
     /// Above the bar, or on standard error where there is none to be seen.
@@ -117,7 +120,7 @@ impl Bar {
         }
     }
 
-    fn begin(&self, stage: PaperStage, loops: usize) {
+    pub(crate) fn begin(&self, stage: &'static str, loops: usize) {
         let template = if loops > 0 {
             "{spinner} {msg} {wide_bar} {pos}/{len}, {elapsed} gone, {eta} left"
         } else {
@@ -128,6 +131,6 @@ impl Bar {
         }
         self.bar.reset();
         self.bar.set_length(loops as u64);
-        self.bar.set_message(stage.name());
+        self.bar.set_message(stage);
     }
 }

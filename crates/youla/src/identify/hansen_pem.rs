@@ -127,10 +127,10 @@ pub fn pem_from_hansen(
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
     let target = projection_target(factors, &found.deviation.model, signals, options)?;
-    let options_of_both = (&options.projection, &options.pem);
-    let Projected { projections, runs, won, model } =
-        pem_from_target("G(S)", &target, structure, nominal, experiments, options_of_both)?;
     let fit_of_plant = fit_of(&found.plant, experiments, options.pem.initial_state)?;
+    let both = (&options.projection, &options.pem);
+    let Projected { projections, runs, won, model } =
+        pem_from_target("G(S)", &target, structure, nominal, experiments, &fit_of_plant, both)?;
     Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
 }
 

@@ -7,8 +7,8 @@
 
 use super::fit::reproduction;
 use super::greybox::{
-    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, greybox, greybox_cost,
-    logarithmic_grid, projections,
+    ContinuationOptions, FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure,
+    greybox, greybox_continued, greybox_cost, logarithmic_grid, projections,
 };
 use super::subspace::{Experiment, InitialState};
 use crate::lti::{Discrete, StateSpace, simulate, simulate_best};
@@ -32,6 +32,8 @@ pub enum PemStart {
     Projection,
     /// At the nominal parameters.
     Nominal,
+    /// At the projection, behind an observer that is taken away step by step: tried where the searches before it are lost.
+    Continued,
 }
 
 /// One search.
@@ -62,6 +64,7 @@ pub(super) fn pem_from_target(
     structure: &dyn Structure,
     nominal: Option<&[f64]>,
     experiments: &[Experiment<'_>],
+    fit_of_plant: &[f64],
     options: (&ProjectionOptions, &GreyBoxOptions),
 ) -> Result<Projected> {
     let ((projection, pem), time) = (options, target.time());
@@ -73,21 +76,40 @@ pub(super) fn pem_from_target(
     let begun = [(PemStart::Projection, order[0].0, order[0].1.parameters.as_slice())]
         .into_iter()
         .chain(nominal.map(|theta| (PemStart::Nominal, cost(theta), theta)));
-    let mut best: Option<(PemStart, GreyBoxModel)> = None;
-    let mut runs = Vec::new();
+    let mut searches = Searches::default();
     for (start, cost_at_start, theta) in begun {
-        let outcome = greybox(structure, theta, experiments, time, pem).map(|model| {
-            let cost = model.cost;
-            if best.as_ref().is_none_or(|(_, best)| cost < best.cost) {
-                best = Some((start, model));
-            }
-            cost
-        });
-        runs.push(PemRun { start, cost_at_start, cost: outcome });
+        searches.take(start, cost_at_start, greybox(structure, theta, experiments, time, pem));
     }
+    if searches.best.as_ref().is_none_or(|(_, best)| falls_behind(&best.fit, fit_of_plant)) {
+        let options = ContinuationOptions { pem: pem.clone(), ..Default::default() };
+        let (cost_at_start, best) = &order[0];
+        let found = greybox_continued(structure, &best.parameters, experiments, time, &options);
+        searches.take(PemStart::Continued, *cost_at_start, found.map(|found| found.model));
+    }
+    let Searches { best, runs } = searches;
     let Some((won, model)) = best else { return Err(first_error(source, runs)) };
     let projections = order.into_iter().map(|(_, projection)| projection).collect();
     Ok(Projected { projections, runs, won, model })
+}
+
+/// What came of them, and the best so far.
+#[derive(Default)]
+struct Searches {
+    runs: Vec<PemRun>,
+    best: Option<(PemStart, GreyBoxModel)>,
+}
+
+impl Searches {
+    fn take(&mut self, start: PemStart, cost_at_start: f64, outcome: Result<GreyBoxModel>) {
+        let cost = outcome.map(|model| {
+            let cost = model.cost;
+            if self.best.as_ref().is_none_or(|(_, best)| cost < best.cost) {
+                self.best = Some((start, model));
+            }
+            cost
+        });
+        self.runs.push(PemRun { start, cost_at_start, cost });
+    }
 }
 
 /// Why the first search failed.

@@ -121,10 +121,10 @@ pub fn subspace_pem(
 ) -> Result<SubspacePem> {
     let found = direct(experiments, time, &options.subspace)?;
     let target = target(&found, experiments, options)?;
+    let fit_of_plant = fit_of(&found.model, experiments, options.pem.initial_state)?;
     let both = (&options.projection, &options.pem);
     let Projected { projections, runs, won, model } =
-        pem_from_target("the subspace model", &target, structure, nominal, experiments, both)?;
-    let fit_of_plant = fit_of(&found.model, experiments, options.pem.initial_state)?;
+        pem_from_target("the subspace model", &target, structure, nominal, experiments, &fit_of_plant, both)?;
     Ok(SubspacePem { subspace: found, projections, runs, won, model, fit_of_plant })
 }
 

@@ -15,6 +15,7 @@
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
 //! | `paper` | the results of the whole paper as such a page |
+//! | `starts` | the study of starts as such a page |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `page` | template, style, code, data and library put into one file |
 //! | `html` | a run as a page |
@@ -30,6 +31,7 @@ mod numbers;
 mod page;
 mod paper;
 mod phase;
+mod starts;
 pub mod story;
 mod story_html;
 mod svg;
@@ -44,6 +46,7 @@ pub use html::html;
 pub use paper::{
     Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
 };
+pub use starts::{Starts, starts_methods, starts_story};
 pub use story::Story;
 pub use story_html::story_html;
 pub use svg::svg;

@@ -20,6 +20,7 @@ mod segments;
 mod settings;
 mod signals;
 mod stabilisation;
+mod starts;
 mod summary;
 mod uncertainty;
 mod verdict;
@@ -46,6 +47,7 @@ pub use settings::{
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stabilisation::Diagrams;
+pub use starts::{StartsProgress, WrittenStarts, starts};
 pub use summary::summary;
 pub use uncertainty::{RunUncertainty, SystemUncertainty};
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};

@@ -9,7 +9,7 @@ use std::path::Path;
 use toml::{Table, Value};
 
 /// The file in a results folder that says what the results are results of.
-const FILE: &str = "configuration.toml";
+pub(in crate::run) const FILE: &str = "configuration.toml";
 
 /// Everything on which the results depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,23 +61,12 @@ impl Configuration {
 
     /// Makes `target` the folder of this configuration, or finds that it is.
     pub(super) fn claim(&self, target: &Path) -> Result<()> {
-        let io = |source| Error::Io { path: target.to_owned(), source };
-        std::fs::create_dir_all(target).map_err(io)?;
-        if target.join(FILE).exists() {
-            let found = Configuration::read(target)?;
-            return match self.difference(&found)? {
-                None => Ok(()),
-                Some(difference) => Err(Error::OtherSettings { path: target.to_owned(), difference }),
-            };
-        }
-        // A process that was killed while it wrote the file leaves a hidden one behind.
-        let visible = |entry: std::io::Result<std::fs::DirEntry>| {
-            entry.map_or(true, |entry| !entry.file_name().to_string_lossy().starts_with('.'))
-        };
-        if std::fs::read_dir(target).map_err(io)?.any(visible) {
-            return Err(Error::OutputExists { path: target.to_owned() });
-        }
-        replace_file(&target.join(FILE), &self.to_toml()?)
+        let there = |folder: &Path| Configuration::read(folder)?.table();
+        claim(target, &self.table()?, there)
+    }
+
+    fn table(&self) -> Result<Table> {
+        Table::try_from(self).map_err(|e| not_toml(&e))
     }
 
     /// The configuration as TOML.
@@ -90,12 +79,31 @@ impl Configuration {
 
     /// The first key in which another configuration differs, with its value there and here.
     pub(super) fn difference(&self, other: &Configuration) -> Result<Option<String>> {
-        let table = |c: &Configuration| Table::try_from(c).map_err(|e| not_toml(&e));
-        Ok(first_difference("", &Value::Table(table(other)?), &Value::Table(table(self)?)))
+        Ok(first_difference("", &Value::Table(other.table()?), &Value::Table(self.table()?)))
     }
 }
 
-fn not_toml(error: &toml::ser::Error) -> Error {
+/// Makes `target` the folder of a configuration, or finds that it is; `there` reads that of a folder.
+pub(in crate::run) fn claim(target: &Path, here: &Table, there: impl Fn(&Path) -> Result<Table>) -> Result<()> {
+    let io = |source| Error::Io { path: target.to_owned(), source };
+    std::fs::create_dir_all(target).map_err(io)?;
+    if target.join(FILE).exists() {
+        return match first_difference("", &Value::Table(there(target)?), &Value::Table(here.clone())) {
+            None => Ok(()),
+            Some(difference) => Err(Error::OtherSettings { path: target.to_owned(), difference }),
+        };
+    }
+    // A process that was killed while it wrote the file leaves a hidden one behind.
+    let visible = |entry: std::io::Result<std::fs::DirEntry>| {
+        entry.map_or(true, |entry| !entry.file_name().to_string_lossy().starts_with('.'))
+    };
+    if std::fs::read_dir(target).map_err(io)?.any(visible) {
+        return Err(Error::OutputExists { path: target.to_owned() });
+    }
+    replace_file(&target.join(FILE), &toml::to_string(here).map_err(|e| not_toml(&e))?)
+}
+
+pub(in crate::run) fn not_toml(error: &toml::ser::Error) -> Error {
     Error::Settings { path: FILE.into(), at: None, problem: error.to_string() }
 }
 

@@ -1,8 +1,8 @@
 //! `youla paper`: the whole paper in one results folder, resumable, in parts if need be.
 
-mod configuration;
+pub(super) mod configuration;
 mod merge;
-mod results;
+pub(super) mod results;
 
 pub use configuration::Configuration;
 pub use merge::merge;

@@ -41,13 +41,13 @@ pub(super) fn write_page(paper: &Paper, target: &Path) -> Result<()> {
 }
 
 /// Makes a folder of the results.
-fn folder(target: &Path, name: &str) -> Result<PathBuf> {
+pub(in crate::run) fn folder(target: &Path, name: &str) -> Result<PathBuf> {
     let path = target.join(name);
     std::fs::create_dir_all(&path).map_err(|source| Error::Io { path: path.clone(), source })?;
     Ok(path)
 }
 
-fn json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
+pub(in crate::run) fn json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text =
         serde_json::to_string_pretty(value).map_err(|e| Error::Io { path: path.to_owned(), source: e.into() })?;
     replace_file(path, &(text + "\n"))

@@ -9,7 +9,7 @@
 //! 49), the one that belongs to the covariance of theta alone.
 
 use super::closure::{Closure, with_scaled_outputs, with_scaled_slopes};
-use super::sampled::{Coordinates, sampled_slopes};
+use super::sampled::{Coordinates, SampledSlope, sampled_slopes};
 use super::sensitivity::{Samples, condense, residuals, sum_of_squares};
 use super::structure::Structure;
 use crate::identify::subspace::{Experiment, InitialState};
@@ -21,15 +21,15 @@ use faer::{Mat, MatRef};
 /// Data and structure, checked and scaled.
 pub(super) struct Criterion<'a> {
     structure: &'a dyn Structure,
-    experiments: Vec<Samples>,
-    coordinates: Coordinates,
+    pub(super) experiments: Vec<Samples>,
+    pub(super) coordinates: Coordinates,
     /// The controller around the model, where the loop is simulated.
     closure: Option<Closure<'a>>,
     /// Of the noise of each output that is compared.
     deviations: Vec<f64>,
     time: Discrete,
     /// n where initial states are estimated, else 0.
-    initial: usize,
+    pub(super) initial: usize,
     /// Number of parameters q.
     pub(super) parameters: usize,
     /// Residuals minus unknowns.
@@ -46,11 +46,11 @@ pub(super) struct Point {
     /// V.
     pub(super) cost: f64,
     /// In the coordinates of the criterion.
-    continuous: StateSpace<Continuous>,
-    plant: StateSpace<Discrete>,
+    pub(super) continuous: StateSpace<Continuous>,
+    pub(super) plant: StateSpace<Discrete>,
     /// What is simulated: the plant, or the loop around it, its outputs divided by the deviations.
-    sampled: StateSpace<Discrete>,
-    initial_states: Vec<Vec<f64>>,
+    pub(super) sampled: StateSpace<Discrete>,
+    pub(super) initial_states: Vec<Vec<f64>>,
 }
 
 /// The linearised criterion `1/2 |r - J step|^2` as the triangular factor of `[J r]`.
@@ -139,12 +139,7 @@ impl<'a> Criterion<'a> {
 
     /// Residual and Jacobian at a point.
     pub(super) fn linearise(&self, point: &Point) -> Result<Linearisation> {
-        let slopes = sampled_slopes(self.structure, &point.theta, &point.continuous, &self.coordinates, self.time)?;
-        let slopes = match &self.closure {
-            Some(closure) => closure.slopes(&point.plant, slopes),
-            None => slopes,
-        };
-        let slopes = with_scaled_slopes(slopes, &self.deviations);
+        let slopes = self.simulated_slopes(point, self.plant_slopes(point)?);
         let mut whole = Triangle::new(self.parameters + 1, self.initial + self.parameters + 1);
         for (samples, x0) in self.experiments.iter().zip(&point.initial_states) {
             let factor = condense(samples, &point.sampled, &slopes, x0, self.initial)?;
@@ -152,6 +147,20 @@ impl<'a> Criterion<'a> {
             whole.fold_rows(factor.as_ref().submatrix(skip, self.initial, factor.nrows() - skip, self.parameters + 1));
         }
         Ok(Linearisation { factor: whole.r().to_owned() })
+    }
+
+    /// Derivatives of the sampled plant, in the coordinates of the criterion.
+    pub(super) fn plant_slopes(&self, point: &Point) -> Result<Vec<SampledSlope>> {
+        sampled_slopes(self.structure, &point.theta, &point.continuous, &self.coordinates, self.time)
+    }
+
+    /// Derivatives of what is simulated, from those of the plant.
+    pub(super) fn simulated_slopes(&self, point: &Point, of_plant: Vec<SampledSlope>) -> Vec<SampledSlope> {
+        let slopes = match &self.closure {
+            Some(closure) => closure.slopes(&point.plant, of_plant),
+            None => of_plant,
+        };
+        with_scaled_slopes(slopes, &self.deviations)
     }
 
     /// The residuals of each experiment, sample after sample, divided by the deviations of the outputs, without weights.
@@ -164,6 +173,11 @@ impl<'a> Criterion<'a> {
     pub(super) fn reweigh(&mut self, roots: Vec<Vec<f64>>) {
         let mut roots = roots.into_iter();
         self.experiments.iter_mut().for_each(|samples| samples.roots = roots.next().unwrap_or_default());
+    }
+
+    /// Parameters and estimated initial states.
+    pub(super) fn unknowns(&self) -> usize {
+        self.parameters + self.initial * self.experiments.len()
     }
 
     /// Number of outputs p.

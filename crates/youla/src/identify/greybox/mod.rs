@@ -24,6 +24,7 @@ mod criterion;
 mod declared;
 mod delays;
 mod identifiability;
+mod intervals;
 mod levenberg;
 mod narrow;
 mod projection;
@@ -43,6 +44,10 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use intervals::{
+    ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ParameterInterval,
+    ResidualAssumption, ResidualTest, compare, greybox_intervals, greybox_intervals_in_loop, likelihood_ratio,
+};
 pub(crate) use projection::decayed;
 pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
 pub use robust::{Loss, RobustReport};
@@ -145,6 +150,10 @@ pub struct GreyBoxModel {
     pub fit: Vec<f64>,
     /// Root-mean-square residual per output, in its units.
     pub residual: Vec<f64>,
+    /// Number of residuals: samples times outputs, over all experiments.
+    pub residuals: usize,
+    /// Parameters and estimated initial states.
+    pub unknowns: usize,
     /// Why the search ended.
     pub stop: Stop,
     /// Distance to the minimum of the linearised criterion over the radius of the confidence region.
@@ -301,6 +310,8 @@ fn estimate(
         cost: point.cost,
         fit: outputs.iter().map(|o| o.fit).collect(),
         residual: outputs.iter().map(|o| o.residual).collect(),
+        residuals: criterion.degrees_of_freedom + criterion.unknowns(),
+        unknowns: criterion.unknowns(),
         stop: outcome.stop,
         relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
         iterations: outcome.work.iterations,

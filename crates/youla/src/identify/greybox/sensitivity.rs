@@ -18,7 +18,7 @@ use faer::{Mat, MatRef};
 /// Columns that are advanced together.
 const LANES: usize = 8;
 /// Samples folded in at a time; small enough to stay in the cache.
-const PIECE: usize = 128;
+pub(super) const PIECE: usize = 128;
 /// Sensitivities below this are zero; it keeps decaying modes out of the slow subnormal range.
 const VANISHED: f64 = 1e-150;
 
@@ -55,7 +55,7 @@ pub(super) fn condense(
 }
 
 /// The rows `[y_0 y_theta e]`, piece by piece.
-struct Rows<'a> {
+pub(super) struct Rows<'a> {
     samples: &'a Samples,
     system: &'a StateSpace<Discrete>,
     simulator: Simulator,
@@ -68,7 +68,7 @@ struct Rows<'a> {
 }
 
 impl<'a> Rows<'a> {
-    fn new(
+    pub(super) fn new(
         samples: &'a Samples,
         system: &'a StateSpace<Discrete>,
         slopes: &[SampledSlope],
@@ -83,7 +83,7 @@ impl<'a> Rows<'a> {
     }
 
     /// Writes the rows of the next samples, column by column; returns how many, 0 at the end.
-    fn fill(&mut self, piece: &mut Vec<f64>) -> Result<usize> {
+    pub(super) fn fill(&mut self, piece: &mut Vec<f64>) -> Result<usize> {
         let (n, m, p) = (self.system.order(), self.system.inputs(), self.system.outputs());
         let (first, columns) = (self.next, self.columns);
         let count = PIECE.min(self.samples.count - first);

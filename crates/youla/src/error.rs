@@ -169,6 +169,12 @@ pub enum Error {
         /// Smallest singular value of `[A - p I; C]` in balanced coordinates.
         distance: f64,
     },
+    /// The data do not determine all parameters, so that there is no covariance.
+    #[error("the parameters have no covariance: {}", sentences.join("; "))]
+    Undetermined {
+        /// One sentence for each ambiguity.
+        sentences: Vec<String>,
+    },
     // ---- lti and factor ----------------------------------------------------------------------------------------
     /// Numbers of ports do not fit together.
     #[error("{what} is {found}, but must be {expected}")]
@@ -718,7 +724,8 @@ impl Error {
             | Error::ReportData { .. }
             | Error::ReportTemplate { .. }
             | Error::NotStabilisable { .. }
-            | Error::NotDetectable { .. } => ErrorKind::Numerical,
+            | Error::NotDetectable { .. }
+            | Error::Undetermined { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }
     }

@@ -98,13 +98,12 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
 /// G(S) and the prediction-error method reach the fit of the plant itself, and its 14 parameters within four deviations.
 #[test]
 fn a_declared_structure_is_estimated_from_the_scheme_on() {
-    use youla::identify::greybox::{BearingStructure, Declaration, GreyBoxOptions, Template};
+    use youla::identify::greybox::{BearingStructure, Declaration, Template};
     use youla::identify::hansen_pem::PemStart;
     use youla::run::GreyBoxSettings;
     let mut demo = demo(2).unwrap();
     let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };
-    let pem = GreyBoxOptions::default();
-    demo.settings.grey_box = Some(GreyBoxSettings { structure, start_from_initial: false, pem });
+    demo.settings.grey_box = Some(GreyBoxSettings { start_from_initial: false, ..GreyBoxSettings::new(structure) });
     let mut silent = |_| ();
     let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap();
     let run = found.grey_box.as_ref().unwrap().as_ref().unwrap();

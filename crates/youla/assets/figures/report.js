@@ -148,7 +148,7 @@ function frequency(host) {
   const plotHost = element("div"), caption = element("p", { class: "caption" });
   const tell = () => {
     const some = indirect.some(same);
-    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "") + (bands.some(same) ? ` Filled: where the magnitude of G(S) lies with a probability of ${+(100 * bands.find(same).level).toPrecision(4)} % at each frequency.` : "");
+    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "") + (bands.some(same) ? ` Filled: where the magnitude of ${bands.filter(same).map(b => methodOf(b.method).label).join(" and of ")} lies with a probability of ${+(100 * bands.find(same).level).toPrecision(4)} % at each frequency.` : "");
   };
   const controls = element("div", { class: "controls" });
   host.append(controls, plotHost, caption);
@@ -164,7 +164,7 @@ function frequency(host) {
     return stack(plotHost, {
       label: `Bode diagram, ${title(pair)}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
       x: { label: "Frequency", unit: "Hz", log: true }, shades: measured.flatMap(lowCoherence),
-      legend: [...regions.map(b => ({ id: "band", name: `${methodOf(b.method).label}, ${+(100 * b.level).toPrecision(4)} %`, style: bandStyle(b) })), ...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
+      legend: [...regions.map(b => ({ id: `band-${b.method}`, name: `${methodOf(b.method).label}, ${+(100 * b.level).toPrecision(4)} %`, style: bandStyle(b) })), ...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
       panels: [
         { label: "Magnitude", unit: "dB", axisUnit: `dB${gain}`, height: 280, curves: [...regions.map(band), ...curves("magnitude_db")] },
         { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
@@ -177,19 +177,23 @@ function frequency(host) {
   tell();
 }
 
-const bandStyle = b => ({ ...methodOf(b.method).style, width: 6, dash: [], points: false, colour: "--band" });
+// The scheme's own band has a colour of its own, that of another method its colour, faint.
+const faint = b => b.method !== "hansen";
+const bandStyle = b => ({ ...methodOf(b.method).style, width: 6, dash: [], points: false, ...(faint(b) ? {} : { colour: "--band" }) });
 
 // The region between the bounds of a magnitude, filled under the curves.
 function band(b) {
   const { hz } = report.frequency;
-  return { id: "band", x: hz, y: b.high_db, style: bandStyle(b), draw: u => clipped(u, ctx => {
+  return { id: `band-${b.method}`, x: hz, y: b.high_db, style: bandStyle(b), draw: u => clipped(u, ctx => {
     const at = (values, k) => [u.valToPos(hz[k], "x", true), u.valToPos(values[k], "y", true)];
     const known = hz.map((_, k) => k).filter(k => b.low_db[k] != null && b.high_db[k] != null);
-    ctx.fillStyle = colour("--band");
+    ctx.fillStyle = colour(bandStyle(b).colour);
+    if (faint(b)) ctx.globalAlpha = 0.25;
     ctx.beginPath();
     known.forEach(k => ctx.lineTo(...at(b.high_db, k)));
     known.reverse().forEach(k => ctx.lineTo(...at(b.low_db, k)));
     ctx.fill();
+    ctx.globalAlpha = 1;
   }) };
 }
 

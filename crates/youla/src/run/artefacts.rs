@@ -5,6 +5,7 @@ use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::settings::RunSettings;
 use super::stabilisation::{as_csv, as_json};
+use super::uncertainty::grey_box_uncertainty;
 use crate::factor::YoulaSignals;
 use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceModel, amplitudes};
@@ -259,7 +260,15 @@ impl Writer<'_> {
             }
         }
         match &found.grey_box {
-            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, run.details()?)?,
+            Some(Ok(run)) => {
+                self.model("4-identify/grey_box", &run.found.model.model, run.details()?)?;
+                if let Some((hz, band)) = grey_box_uncertainty(found)? {
+                    let mut file = band.json(&hz);
+                    file["level"] = serde_json::json!(run.shown().level);
+                    file["provenance"] = serde_json::json!(self.provenance);
+                    self.folder.json("4-identify/grey_box_uncertainty.json", &file)?;
+                }
+            }
             Some(Err(e)) => self.folder.json("4-identify/grey_box.json", &refused(e))?,
             None => {}
         }

@@ -248,7 +248,12 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
         ),
         false => (Status::Good, text),
     };
-    Some(Verdict { status, text, evidence: Evidence::Fits })
+    let (doubt, residuals) = match &run.intervals {
+        Ok(known) => (!known.residuals.independent() || known.coloured == known.residuals.white(), known.verdict()),
+        Err(reason) => (true, format!("There are no intervals: {reason}.")),
+    };
+    let status = if doubt { Status::Caution } else { status };
+    Some(Verdict { status, text: format!("{text} {residuals}"), evidence: Evidence::Fits })
 }
 
 fn controller_line(found: &Identification) -> Option<Verdict> {

@@ -2,13 +2,14 @@
 
 use super::artefacts::pairs;
 use super::findings::{notes, verdict_lines};
-use super::grey_box::ParameterRow;
+use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::response::{decibel, log_grid, model_responses};
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
+use crate::identify::subspace::ResponseBand;
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::FrequencyResponse;
 use crate::report::data::{self as draw, ReportData, Role, SignalKind};
@@ -48,8 +49,9 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
             .collect::<Result<_>>()?,
         frequency: Some(frequency(found)?),
         poles: found.verdict.models.iter().map(poles).collect(),
-        modes: found.verdict.models.iter().flat_map(|v| modes(found, v)).collect(),
-        parameters: parameters(found)?,
+        modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
+        parameters: structure(found).map_or_else(|| Ok(Vec::new()), GreyBoxRun::rows)?,
+        physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
         bezout_residual: Some(found.factorisation.bezout_residual),
@@ -242,21 +244,32 @@ fn frequency(found: &Identification) -> Result<draw::FrequencyResponse> {
             ports(found).map(entry).collect()
         }
     };
-    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect, bands: bands(found) })
+    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect, bands: bands(found)? })
 }
 
-/// Bounds of the magnitude of G(S). A bound of zero is drawn far below the curve.
-fn bands(found: &Identification) -> Vec<draw::Band> {
-    let Some(uncertainty) = &found.uncertainty else { return Vec::new() };
-    let band = &uncertainty.plant.response;
+/// Bounds of the magnitudes of G(S) and of the physical structure. A bound of zero is drawn far below the curve.
+fn bands(found: &Identification) -> Result<Vec<draw::Band>> {
+    let mut all = Vec::new();
+    if let Some(uncertainty) = &found.uncertainty {
+        let level = found.settings.hansen.uncertainty.level;
+        all.extend(bands_of(found, Method::Hansen, &uncertainty.plant.response, level));
+    }
+    if let Some(known) = structure(found).and_then(|run| run.intervals.as_ref().ok()) {
+        let omega: Vec<f64> = log_grid(found).iter().map(|f| TAU * f).collect();
+        all.extend(bands_of(found, Method::GreyBox, &known.response(&omega)?, known.level));
+    }
+    Ok(all)
+}
+
+fn bands_of(found: &Identification, method: Method, band: &ResponseBand, level: f64) -> Vec<draw::Band> {
     let entry = |(output, input): (usize, usize)| {
-        let bounds: Vec<[f64; 2]> =
-            (0..uncertainty.hz.len()).map(|k| band.magnitude[band.place(k, output, input)]).collect();
+        let places = 0..band.response.omega.len();
+        let bounds: Vec<[f64; 2]> = places.map(|k| band.magnitude[band.place(k, output, input)]).collect();
         draw::Band {
-            method: Method::Hansen.key().into(),
+            method: method.key().into(),
             output,
             input,
-            level: found.settings.hansen.uncertainty.level,
+            level,
             low_db: bounds.iter().map(|b| decibel(b[0].max(LEAST_BOUND * b[1]))).collect(),
             high_db: bounds.iter().map(|b| decibel(b[1])).collect(),
         }
@@ -285,32 +298,24 @@ fn poles(v: &ModelVerdict) -> draw::Poles {
     draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles) }
 }
 
-fn modes(found: &Identification, v: &ModelVerdict) -> Vec<draw::Mode> {
-    let mode = |(k, m): (usize, &crate::lti::Mode)| {
-        let of_plant = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen);
-        let band = of_plant.and_then(|u| u.plant.modes.get(k));
-        draw::Mode {
-            method: v.method.key().into(),
-            hz: m.hz,
-            zeta: m.zeta,
-            deviation: band.map(|b| [b.hz_deviation, b.zeta_deviation]),
-        }
+fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
+    let bands = match (v.method, &found.uncertainty, structure(found)) {
+        (Method::Hansen, Some(uncertainty), _) => uncertainty.plant.modes.clone(),
+        (Method::GreyBox, _, Some(run)) => run.modes()?,
+        _ => Vec::new(),
     };
-    v.modes.iter().enumerate().map(mode).collect()
+    let mode = |(k, m): (usize, &crate::lti::Mode)| draw::Mode {
+        method: v.method.key().into(),
+        hz: m.hz,
+        zeta: m.zeta,
+        deviation: bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation]),
+    };
+    Ok(v.modes.iter().enumerate().map(mode).collect())
 }
 
-/// The parameters of the physical structure; empty without one.
-fn parameters(found: &Identification) -> Result<Vec<draw::PhysicalParameter>> {
-    let Some(Ok(run)) = &found.grey_box else { return Ok(Vec::new()) };
-    let row = |row: ParameterRow| draw::PhysicalParameter {
-        name: row.name,
-        unit: row.unit,
-        value: row.value,
-        deviation: row.deviation,
-        at_bound: row.at_bound.is_some(),
-        derived: row.derived,
-    };
-    Ok(run.rows()?.into_iter().map(row).collect())
+/// The physical structure, where one was estimated.
+fn structure(found: &Identification) -> Option<&GreyBoxRun> {
+    found.grey_box.as_ref()?.as_ref().ok()
 }
 
 fn reduction(found: &Identification) -> Option<draw::Reduction> {

@@ -249,7 +249,7 @@ pub fn identify(
             || settings.direct.as_ref().map(|options| direct(&records, options, &settings.stabilisation)),
         );
         let hansen = scheme.as_ref().ok().map(|(hansen, _)| hansen);
-        let grey_box = hansen.and_then(|hansen| grey_box(factors, &signals, &records, hansen, &settings));
+        let grey_box = hansen.and_then(|hansen| grey_box(&factorisation, &signals, &records, hansen, &settings));
         (scheme, direct, grey_box)
     });
     let (hansen, deviation_diagram) = scheme.map_err(|e| e.within(deviation_context(&signals)))?;

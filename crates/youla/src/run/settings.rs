@@ -332,6 +332,12 @@ impl RunSettings {
                     .into(),
             );
         }
+        let of_structure = self.grey_box.as_ref().is_some_and(|g| g.prediction == Prediction::ClosedLoop);
+        if of_structure && !known {
+            return Some(
+                "[grey_box] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha".into(),
+            );
+        }
         None
     }
 

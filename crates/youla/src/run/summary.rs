@@ -18,17 +18,18 @@ use std::f64::consts::TAU;
 ///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
 /// ```
 ///
-/// With an uncertainty there is `uncertainty`, and the modes of `hansen` have deviations and intervals.
+/// With an uncertainty there is `uncertainty`, and the modes of `hansen` have deviations and intervals; those of `grey_box` have them
+/// where its parameters have a covariance. It has `parameters`, `level`, `correlations`, `verdict`, `structures` and `lost`.
 /// A method or an indirect response that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
 ///
 /// # Errors
-/// Those of the frequency responses.
+/// Those of the frequency responses, modes and derived quantities.
 pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     let mut methods = Map::new();
     let mut refused = Map::new();
     for v in &found.verdict.models {
         if !matches!(v.method, Method::Nominal | Method::TruePlant) {
-            methods.insert(v.method.key().into(), method_entry(found, v));
+            methods.insert(v.method.key().into(), method_entry(found, v)?);
         }
     }
     for refusal in found.refusals() {
@@ -54,7 +55,7 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     Ok(all)
 }
 
-fn method_entry(found: &Identification, v: &ModelVerdict) -> Value {
+fn method_entry(found: &Identification, v: &ModelVerdict) -> Result<Value> {
     let mut entry = json!({
         "order": v.model.order(),
         "stabilised_by_controller": v.certificate.stable,
@@ -67,14 +68,23 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Value {
         entry["modes"] = modes.collect::<Vec<_>>().into();
     }
     if let (Method::GreyBox, Some(Ok(run))) = (v.method, &found.grey_box) {
-        entry["parameters"] = json!(run.rows().unwrap_or_default());
+        let modes = run.modes()?;
+        if !modes.is_empty() {
+            entry["modes"] = modes.iter().map(|band| with_deviations(json!({}), band)).collect::<Vec<_>>().into();
+        }
+        let shown = run.shown();
+        entry["parameters"] = json!(run.rows()?);
+        entry["level"] = json!(shown.level);
+        entry["correlations"] = json!(shown.correlations);
+        entry["verdict"] = json!(shown.verdict);
+        entry["structures"] = json!(shown.structures);
         entry["lost"] = json!(run.found.lost());
     }
     if matches!(v.method, Method::Hansen | Method::HansenReduced) {
         entry["s_order"] = json!(found.hansen.deviation.model.order());
         entry["s_stable"] = json!(found.hansen.deviation.stability.stable);
     }
-    entry
+    Ok(entry)
 }
 
 fn fits(v: &ModelVerdict) -> Value {

@@ -47,6 +47,18 @@ pub(super) fn run_uncertainty(found: &Identification) -> Result<Option<RunUncert
     })
 }
 
+/// The same of the physical structure, with its frequencies in Hz; `None` where its parameters have no covariance.
+///
+/// # Errors
+/// Those of the frequency responses and eigenvalues.
+pub(super) fn grey_box_uncertainty(found: &Identification) -> Result<Option<(Vec<f64>, SystemUncertainty)>> {
+    let run = found.grey_box.as_ref().and_then(|run| run.as_ref().ok());
+    let Some(known) = run.and_then(|run| run.intervals.as_ref().ok()) else { return Ok(None) };
+    let hz = log_grid(found);
+    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
+    Ok(Some((hz, SystemUncertainty { response: known.response(&omega)?, modes: known.modes()? })))
+}
+
 impl SystemUncertainty {
     /// As JSON: per output and input the response, the bounds of its magnitude and the covariance of its parts.
     pub(super) fn json(&self, hz: &[f64]) -> Value {

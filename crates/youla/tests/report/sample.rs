@@ -166,10 +166,21 @@ fn report(plan: &Plan) -> ReportData {
                 unit: "1/s".into(),
                 value: 1.7e6,
                 deviation: (name == "damping").then_some(2e3),
-                at_bound: name == "stiffness",
+                interval: (name == "damping").then_some([1.696e6, 1.704e6]),
+                at_bound: (name == "stiffness").then_some(1.7e6),
                 derived: false,
             })
             .into(),
+        physical: Some(PhysicalEstimate {
+            level: Some(0.95),
+            verdict: "The residuals are white.".into(),
+            names: vec!["stiffness".into(), "damping".into()],
+            correlations: vec![vec![1.0, -0.25], vec![-0.25, 1.0]],
+            structures: vec![
+                PhysicalStructure { name: "[grey_box.structure]".into(), unknowns: Some(2), fit: vec![91.2], aic: Some(0.0), bic: Some(0.0), ..Default::default() },
+                PhysicalStructure { name: "with a lag".into(), failure: Some("no start".into()), ..Default::default() },
+            ],
+        }),
         reduction: Some(Reduction {
             label: "G(S) of order 12 by balanced truncation".into(),
             hankel: vec![31.0, 29.5, 12.1, 11.4, 0.21, 0.12, 0.03, 0.01, 2e-3, 1e-3, 3e-4, 1e-6],

@@ -14,7 +14,7 @@ use super::checks::{check_records, check_start, check_time, checked_deviations, 
 use super::closure::Closure;
 use super::linearisation::Linearisation;
 use super::noise::NoiseModel;
-use super::sampled::{Coordinates, Sample, sample, sampled_slopes};
+use super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
 use super::sensitivity::{Begin, Samples, condense, residuals, sum_of_squares};
 use super::simulated::{Simulated, with_scaled_outputs, with_scaled_slopes};
 use super::steady::{steady_slopes, steady_state};
@@ -27,7 +27,7 @@ use crate::{Mat, Result};
 /// Data and structure, checked and scaled.
 pub(super) struct Criterion<'a> {
     structure: &'a dyn Structure,
-    experiments: Vec<Samples>,
+    pub(super) experiments: Vec<Samples>,
     coordinates: Coordinates,
     simulated: Simulated<'a>,
     initial_state: InitialState,
@@ -35,11 +35,11 @@ pub(super) struct Criterion<'a> {
     deviations: Vec<f64>,
     time: Discrete,
     /// Initial states per experiment that are estimated.
-    initial: usize,
+    pub(super) initial: usize,
     /// Whether a plant that is not stable is refused.
     confined: bool,
     /// Number of parameters of the structure.
-    physical: usize,
+    pub(super) physical: usize,
     /// Number of all parameters q.
     pub(super) parameters: usize,
     /// Residuals minus unknowns.
@@ -65,10 +65,18 @@ pub(super) struct Point {
     /// V.
     pub(super) cost: f64,
     /// In the coordinates of the criterion.
-    plant: Sample,
+    pub(super) plant: Sample,
     /// What is simulated, its outputs divided by the deviations.
-    sampled: StateSpace<Discrete>,
-    initial_states: Vec<Vec<f64>>,
+    pub(super) sampled: StateSpace<Discrete>,
+    pub(super) initial_states: Vec<Vec<f64>>,
+}
+
+/// Derivatives with respect to all parameters.
+pub(super) struct Slopes {
+    /// Of what is simulated, its outputs divided by the deviations.
+    pub(super) simulated: Vec<SampledSlope>,
+    /// Of the plant, where that rests at the first sample and is not what is simulated.
+    resting: Option<Vec<SampledSlope>>,
 }
 
 impl<'a> Criterion<'a> {
@@ -179,32 +187,49 @@ impl<'a> Criterion<'a> {
 
     /// Residual and Jacobian at a point.
     pub(super) fn linearise(&self, point: &Point) -> Result<Linearisation> {
-        let (own, gain) = point.theta.split_at(self.physical);
-        let of_plant = sampled_slopes(self.structure, own, &point.plant, &self.coordinates, self.time)?;
-        let steady = self.initial_state == InitialState::SteadyState;
-        let own_slopes = if steady { of_plant.clone() } else { Vec::new() };
-        let slopes = self.simulated.slopes(&point.plant.discrete, gain, of_plant);
-        let slopes = with_scaled_slopes(slopes, &self.deviations);
-        let resting = if matches!(self.simulated, Simulated::Loop(_)) { &slopes } else { &own_slopes };
+        let slopes = self.slopes(point, self.plant_slopes(point)?);
         let mut whole = Triangle::new(self.parameters + 1, self.initial + self.parameters + 1);
         for (samples, x0) in self.experiments.iter().zip(&point.initial_states) {
-            let moved = steady.then(|| self.steady_slopes(point, resting, x0, samples)).transpose()?;
+            let moved = self.moved(point, &slopes, x0, samples)?;
             let begin = Begin { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: self.initial };
-            let factor = condense(samples, &point.sampled, &slopes, &begin)?;
+            let factor = condense(samples, &point.sampled, &slopes.simulated, &begin)?;
             let skip = leading_rank(factor.as_ref(), self.initial);
             whole.fold_rows(factor.as_ref().submatrix(skip, self.initial, factor.nrows() - skip, self.parameters + 1));
         }
         Ok(Linearisation::new(whole.r().to_owned()))
     }
 
-    /// x_theta(0) over all states and parameters, zero for those that the steady state does not know.
-    fn steady_slopes(
+    /// Derivatives of the sampled plant with respect to the parameters of the structure.
+    pub(super) fn plant_slopes(&self, point: &Point) -> Result<Vec<SampledSlope>> {
+        let own = &point.theta[..self.physical];
+        sampled_slopes(self.structure, own, &point.plant, &self.coordinates, self.time)
+    }
+
+    /// Derivatives of what is simulated, from those of the plant.
+    pub(super) fn slopes(&self, point: &Point, of_plant: Vec<SampledSlope>) -> Slopes {
+        let gain = &point.theta[self.physical..];
+        let steady = self.initial_state == InitialState::SteadyState;
+        let plant_rests = steady && !matches!(self.simulated, Simulated::Loop(_));
+        let resting = plant_rests.then(|| of_plant.clone());
+        let simulated = self.simulated.slopes(&point.plant.discrete, gain, of_plant);
+        Slopes { simulated: with_scaled_slopes(simulated, &self.deviations), resting }
+    }
+
+    /// x_theta(0) of an experiment; `None` where it does not move.
+    pub(super) fn moved(
         &self,
         point: &Point,
-        slopes: &[super::sampled::SampledSlope],
+        slopes: &Slopes,
         x0: &[f64],
         samples: &Samples,
-    ) -> Result<Mat<f64>> {
+    ) -> Result<Option<Mat<f64>>> {
+        let steady = self.initial_state == InitialState::SteadyState;
+        let resting = slopes.resting.as_ref().unwrap_or(&slopes.simulated);
+        steady.then(|| self.steady_slopes(point, resting, x0, samples)).transpose()
+    }
+
+    /// x_theta(0) over all states and parameters, zero for those that the steady state does not know.
+    fn steady_slopes(&self, point: &Point, slopes: &[SampledSlope], x0: &[f64], samples: &Samples) -> Result<Mat<f64>> {
         let system = self.resting(point);
         let known = steady_slopes(system, slopes, &x0[..system.order()], &self.first(samples))?;
         let inside = |i: usize, j: usize| i < known.nrows() && j < known.ncols();
@@ -222,6 +247,11 @@ impl<'a> Criterion<'a> {
     pub(super) fn reweigh(&mut self, roots: Vec<Vec<f64>>) {
         let mut roots = roots.into_iter();
         self.experiments.iter_mut().for_each(|samples| samples.roots = roots.next().unwrap_or_default());
+    }
+
+    /// Parameters and estimated initial states.
+    pub(super) fn unknowns(&self) -> usize {
+        self.parameters + self.initial * self.experiments.len()
     }
 
     /// Number of outputs p.

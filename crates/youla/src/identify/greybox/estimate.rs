@@ -79,6 +79,8 @@ pub(super) fn estimate(
         fit,
         residual,
         simulation_fit,
+        residuals: criterion.degrees_of_freedom + criterion.unknowns(),
+        unknowns: criterion.unknowns(),
         stop: outcome.stop,
         relative_offset: outcome.face.here.relative_offset(criterion.degrees_of_freedom),
         iterations: outcome.work.iterations,

@@ -34,6 +34,7 @@ mod declared;
 mod delays;
 mod estimate;
 mod identifiability;
+mod intervals;
 mod levenberg;
 mod linearisation;
 mod multi_start;
@@ -63,6 +64,10 @@ pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
 };
 pub use identifiability::{Combination, Part, Undetermined};
+pub use intervals::{
+    ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ParameterInterval,
+    ResidualAssumption, ResidualTest, compare, greybox_intervals, greybox_intervals_in_loop, likelihood_ratio,
+};
 pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
 pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
 pub use options::GreyBoxOptions;

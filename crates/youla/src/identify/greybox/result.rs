@@ -50,6 +50,10 @@ pub struct GreyBoxModel {
     pub residual: Vec<f64>,
     /// The same fit of the simulation from the initial states, minus infinity where it diverges.
     pub simulation_fit: Vec<f64>,
+    /// Number of residuals: samples times outputs, over all experiments.
+    pub residuals: usize,
+    /// Parameters, entries of a free gain, and estimated initial states.
+    pub unknowns: usize,
     /// Why the search ended.
     pub stop: Stop,
     /// Distance to the minimum of the linearised criterion over the radius of the confidence region.

@@ -16,7 +16,7 @@ use crate::Result;
 use serde::{Deserialize, Serialize};
 
 /// Deviations up to which a residual counts in full: 95 % efficiency where the noise is normal after all.
-const LIMIT: f64 = 1.345;
+pub(super) const LIMIT: f64 = 1.345;
 /// Ratio of the deviation to the median magnitude of normal noise.
 const DEVIATION_OVER_MEDIAN: f64 = 1.4826;
 /// Largest number of weightings; some ten are usual.

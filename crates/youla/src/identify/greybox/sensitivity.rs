@@ -17,7 +17,7 @@ use faer::{Mat, MatRef};
 use pulp::{Arch, Simd, WithSimd};
 
 /// Samples folded in at a time; small enough to stay in the cache.
-const PIECE: usize = 128;
+pub(super) const PIECE: usize = 128;
 
 /// The records of one experiment, sample after sample.
 pub(super) struct Samples {
@@ -50,29 +50,65 @@ pub(super) fn condense(
     slopes: &[SampledSlope],
     begin: &Begin<'_>,
 ) -> Result<Mat<f64>> {
-    Arch::new().dispatch(Condensation { samples, system, slopes, begin })
+    let mut triangle = NarrowTriangle::new(begin.estimated + slopes.len() + 1);
+    rows(samples, system, slopes, begin, &mut triangle)?;
+    Ok(triangle.into_factor())
 }
 
-/// The arguments of [`condense`], for the widest instructions of the processor.
-struct Condensation<'a> {
+/// What is done with the rows `[y_0 | y_theta | e]`.
+pub(super) trait Take {
+    /// Takes `count` rows of at most [`PIECE`] samples, given by columns, and may use them up.
+    fn take(&mut self, piece: &mut [f64], count: usize);
+}
+
+impl Take for NarrowTriangle {
+    #[inline(always)]
+    fn take(&mut self, piece: &mut [f64], count: usize) {
+        self.fold(piece, count);
+    }
+}
+
+impl<F: FnMut(&mut [f64], usize)> Take for F {
+    #[inline(always)]
+    fn take(&mut self, piece: &mut [f64], count: usize) {
+        self(piece, count);
+    }
+}
+
+/// Hands out the rows `[y_0 | y_theta | e]` of an experiment piece by piece.
+///
+/// # Errors
+/// [`Error::Diverged`] where the recursion leaves the range of the numbers.
+pub(super) fn rows(
+    samples: &Samples,
+    system: &StateSpace<Discrete>,
+    slopes: &[SampledSlope],
+    begin: &Begin<'_>,
+    take: &mut impl Take,
+) -> Result<()> {
+    Arch::new().dispatch(Rows { samples, system, slopes, begin, take })
+}
+
+/// The arguments of [`rows`], for the widest instructions of the processor.
+struct Rows<'a, T> {
     samples: &'a Samples,
     system: &'a StateSpace<Discrete>,
     slopes: &'a [SampledSlope],
     begin: &'a Begin<'a>,
+    take: &'a mut T,
 }
 
-impl WithSimd for Condensation<'_> {
-    type Output = Result<Mat<f64>>;
+impl<T: Take> WithSimd for Rows<'_, T> {
+    type Output = Result<()>;
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
-        let Condensation { samples, system, slopes, begin } = self;
+        let Rows { samples, system, slopes, begin, take } = self;
         let (n, m, p) = (system.order(), system.inputs(), system.outputs());
         let columns = begin.estimated + slopes.len();
         let simulator = Simulator::new(system);
         let mut state = simulator.start(begin.x0)?;
         let mut bank = Bank::new(system, slopes, begin);
-        let mut triangle = NarrowTriangle::new(columns + 1);
         let mut signals = vec![0.0; n + m];
         let mut piece = vec![0.0; PIECE * p * (columns + 1)];
         for first in (0..samples.count).step_by(PIECE) {
@@ -93,9 +129,9 @@ impl WithSimd for Condensation<'_> {
                 return Err(diverged(first + 1, system));
             }
             bank.forget_the_vanished();
-            triangle.fold(piece, rows);
+            take.take(piece, rows);
         }
-        Ok(triangle.into_factor())
+        Ok(())
     }
 }
 

@@ -53,3 +53,17 @@ pub struct ModeBand {
     /// Interval of the damping ratio.
     pub zeta: [f64; 2],
 }
+
+impl ModeBand {
+    /// From the variances of frequency and damping and the half width of an interval over the deviation.
+    pub(crate) fn new(mode: Mode, variances: [f64; 2], student: f64) -> Self {
+        let [hz, zeta] = variances.map(|v| v.max(0.0).sqrt());
+        ModeBand {
+            mode,
+            hz_deviation: hz,
+            zeta_deviation: zeta,
+            hz: [(mode.hz - student * hz).max(0.0), mode.hz + student * hz],
+            zeta: [mode.zeta - student * zeta, mode.zeta + student * zeta],
+        }
+    }
+}

@@ -14,6 +14,7 @@ mod response;
 mod student;
 #[cfg(test)]
 mod tests;
+mod zeros;
 
 pub use band::{ModeBand, ResponseBand};
 pub use bootstrap::Bootstrap;
@@ -21,6 +22,9 @@ pub use delta::{BlockInfluence, Delta};
 pub use evidence::Evidence;
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 pub(super) use poles::pole_deviations;
+pub(crate) use response::{Eigen, magnitude_interval, mode_change, response_changes};
+pub(crate) use student::{ellipse, student, two_sided_student};
+pub(crate) use zeros::zero_changes;
 
 use super::channels::View;
 use super::innovation::{Innovation, NoInnovation};

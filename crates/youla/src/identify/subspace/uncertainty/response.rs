@@ -41,19 +41,7 @@ impl Delta {
 
     /// The change of the response with each block at one frequency, rad/s; p m numbers, column by column.
     pub fn response_changes(&self, omega: f64) -> Vec<Vec<c64>> {
-        let z = self.model.time().boundary(omega);
-        let (n, m, p) = (self.model.order(), self.model.inputs(), self.model.outputs());
-        let a = self.model.a();
-        let pencil = Mat::from_fn(n, n, |i, j| if i == j { z - a[(i, j)] } else { c64::new(-a[(i, j)], 0.0) });
-        let lu = pencil.partial_piv_lu();
-        let y = lu.solve(complex(self.model.b()));
-        let x = lu.solve_transpose(complex(self.model.c()).transpose()).transpose().to_owned();
-        let change = |block: &BlockInfluence| {
-            let states = product(&block.a, &y) + complex(block.b.as_ref());
-            let d = &x * states + product(&block.c, &y) + complex(block.d.as_ref());
-            (0..m * p).map(|k| d[(k % p, k / p)]).collect()
-        };
-        self.blocks.iter().map(change).collect()
+        response_changes(&self.model, &self.blocks, omega)
     }
 
     /// The modes in the order of [`StateSpace::modes`], with their intervals.
@@ -74,19 +62,29 @@ impl Delta {
             .map(|block| mode_change(mode.pole, eigen.change(mode.pole, &block.a), self.model.time()).to_vec())
             .collect();
         let v = self.covariance(&changes);
-        let [hz, zeta] = [v[(0, 0)].max(0.0).sqrt(), v[(1, 1)].max(0.0).sqrt()];
-        ModeBand {
-            mode,
-            hz_deviation: hz,
-            zeta_deviation: zeta,
-            hz: [(mode.hz - student * hz).max(0.0), mode.hz + student * hz],
-            zeta: [mode.zeta - student * zeta, mode.zeta + student * zeta],
-        }
+        ModeBand::new(mode, [v[(0, 0)], v[(1, 1)]], student)
     }
 }
 
+/// What changes of a system make of its response at one frequency, rad/s; p m numbers each, column by column.
+pub(crate) fn response_changes(model: &StateSpace<Discrete>, changes: &[BlockInfluence], omega: f64) -> Vec<Vec<c64>> {
+    let z = model.time().boundary(omega);
+    let (n, m, p) = (model.order(), model.inputs(), model.outputs());
+    let a = model.a();
+    let pencil = Mat::from_fn(n, n, |i, j| if i == j { z - a[(i, j)] } else { c64::new(-a[(i, j)], 0.0) });
+    let lu = pencil.partial_piv_lu();
+    let y = lu.solve(complex(model.b()));
+    let x = lu.solve_transpose(complex(model.c()).transpose()).transpose().to_owned();
+    let change = |block: &BlockInfluence| {
+        let states = product(&block.a, &y) + complex(block.b.as_ref());
+        let d = &x * states + product(&block.c, &y) + complex(block.d.as_ref());
+        (0..m * p).map(|k| d[(k % p, k / p)]).collect()
+    };
+    changes.iter().map(change).collect()
+}
+
 /// `|g| -+ t sigma`, sigma that of the part of the error along g.
-fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
+pub(crate) fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
     let size = g.norm();
     let (r, i) = if size > 0.0 { (g.re / size, g.im / size) } else { (1.0, 0.0) };
     let half = student * (r * r * v[0] + 2.0 * r * i * v[1] + i * i * v[2]).max(0.0).sqrt();
@@ -94,7 +92,7 @@ fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
 }
 
 /// Change of frequency and damping with the pole: `s = ln(z) / ts`.
-pub(super) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
+pub(crate) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
     let s = time.continuous_pole(pole);
     let size = s.norm();
     if !size.is_finite() || size == 0.0 {
@@ -107,7 +105,7 @@ pub(super) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
 }
 
 /// Eigenvalues with left and right eigenvectors, scaled to `w' v = 1`, in balanced coordinates.
-struct Eigen {
+pub(crate) struct Eigen {
     poles: Vec<c64>,
     scale: Vec<f64>,
     right: Mat<c64>,
@@ -115,7 +113,7 @@ struct Eigen {
 }
 
 impl Eigen {
-    fn new(model: &StateSpace<Discrete>) -> Result<Self> {
+    pub(crate) fn new(model: &StateSpace<Discrete>) -> Result<Self> {
         let scale = balance("the state matrix", model.a())?.scale;
         let n = model.order();
         let a = Mat::from_fn(n, n, |i, j| model.a()[(i, j)] * scale[j] / scale[i]);
@@ -128,7 +126,7 @@ impl Eigen {
     }
 
     /// `w' dA v` for the pole nearest to the given one.
-    fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
+    pub(crate) fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
         let near = |k: &usize| (self.poles[*k] - pole).norm();
         let Some(k) = (0..self.poles.len()).min_by(|a, b| near(a).total_cmp(&near(b))) else {
             return c64::new(0.0, 0.0);

@@ -1,0 +1,435 @@
+//! What a grey-box estimate is worth: intervals of parameters, modes, zeros and responses, and whether they can be believed.
+//!
+//! Everything follows from the covariance of the parameters to first order,
+//! ```text
+//! cov f(theta) = f' cov(theta) f'^T
+//! dG = X (dA Y + dB) + dC Y + dD,    dlambda = w' dA v / (w' v)
+//! ```
+//! with the exact derivatives of the sampled matrices (`../sampled.rs`). The covariance is that of white residuals
+//! (`../uncertainty.rs`) or counts their colour (`sandwich.rs`); a test of the residuals (`residuals.rs`) says which one holds.
+//! `compare.rs` compares structures by their likelihood.
+
+mod chi_square;
+mod compare;
+mod lags;
+mod residuals;
+mod sandwich;
+#[cfg(test)]
+mod tests;
+
+pub use compare::{ComparedStructure, LikelihoodRatio, compare, likelihood_ratio};
+pub use residuals::{CrossCorrelation, ResidualTest};
+
+use super::closure::{Closure, LoopOutput};
+use super::criterion::{Criterion, Point};
+use super::delays::Shifted;
+use super::estimate::{Setting, comparison};
+use super::robust::LIMIT;
+use super::sampled::SampledSlope;
+use super::uncertainty::{Information, spread};
+use super::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseModel, Structure};
+use crate::identify::subspace::uncertainty::{
+    Eigen, ellipse, magnitude_interval, mode_change, response_changes, two_sided_student, zero_changes,
+};
+use crate::identify::subspace::{BlockInfluence, Experiment, ModeBand, ResponseBand};
+use crate::lti::{Discrete, Mode, Partitioned, StateSpace, frequency_response};
+use crate::{Error, Mat, Result, c64};
+use faer::Scale;
+use sandwich::{Counted, middle, residual_sums};
+use serde::{Deserialize, Serialize};
+
+/// Largest default number of lags of the correlation of the residuals.
+const MOST_LAGS: usize = 500;
+
+/// What the covariance takes the residuals for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ResidualAssumption {
+    /// White where they pass the test, else coloured.
+    #[default]
+    Tested,
+    /// White, whatever the test says.
+    White,
+    /// Coloured, whatever the test says.
+    Coloured,
+}
+
+/// Choices of [`greybox_intervals`], the table `[grey_box.intervals]` of run.toml.
+///
+/// ```
+/// let options = youla::identify::greybox::IntervalOptions::default();
+/// assert_eq!((options.level, options.lags), (0.95, None));
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct IntervalOptions {
+    /// Probability with which an interval or region should hold the truth.
+    pub level: f64,
+    /// What the covariance takes the residuals for.
+    pub residuals: ResidualAssumption,
+    /// Lags up to which the residuals are correlated, where their colour counts; absent: four times the root of the number of
+    /// samples, at most 500.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub lags: Option<usize>,
+}
+
+impl Default for IntervalOptions {
+    fn default() -> Self {
+        IntervalOptions { level: 0.95, residuals: ResidualAssumption::default(), lags: None }
+    }
+}
+
+/// A parameter with its interval.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ParameterInterval {
+    /// Name.
+    pub name: String,
+    /// Estimate.
+    pub value: f64,
+    /// Standard deviation; 0 for a parameter that its bound holds back.
+    pub deviation: f64,
+    /// Interval at the level that was asked for.
+    pub interval: [f64; 2],
+}
+
+/// What is known of the error of a grey-box estimate.
+#[derive(Debug, Clone)]
+pub struct GreyBoxIntervals {
+    /// Level of intervals and regions.
+    pub level: f64,
+    /// Whether the covariance counts the colour of the residuals.
+    pub coloured: bool,
+    /// Covariance of the parameters, q x q, with zero rows and columns for those that a bound holds back.
+    pub covariance: Mat<f64>,
+    /// Residuals less unknowns.
+    pub degrees_of_freedom: usize,
+    /// The parameters.
+    pub parameters: Vec<ParameterInterval>,
+    /// Correlations of the parameters, q x q; zero beside the diagonal for those that a bound holds back.
+    pub correlations: Mat<f64>,
+    /// Deviation with colour over that for white residuals, per parameter; 1 for those that a bound holds back.
+    pub colour: Vec<f64>,
+    /// The tests of the residuals.
+    pub residuals: ResidualTest,
+    /// The model of the plant, its delays behind its own states.
+    model: StateSpace<Discrete>,
+    /// Its slopes with respect to the parameters.
+    slopes: Vec<BlockInfluence>,
+}
+
+/// Intervals of an estimate of [`super::greybox`], which must come from the same structure, experiments and options.
+///
+/// # Errors
+/// [`Error::Undetermined`] where the data do not determine all parameters; [`Error::OutOfRange`] for a level or a number of
+/// lags without meaning; as [`super::greybox`] at the estimate.
+///
+/// # Accuracy
+/// Over 1000 seeded records 95 % intervals hold the truth in 93 to 97 %, in open and in closed loop (`tests::coverage`).
+///
+/// ```
+/// use youla::identify::greybox::{DeclaredStructure, GreyBoxOptions, IntervalOptions, Structure, Template};
+/// use youla::identify::greybox::{greybox, greybox_intervals};
+/// use youla::identify::subspace::Experiment;
+/// use youla::lti::{Discrete, simulate};
+/// use youla::Mat;
+/// let structure = DeclaredStructure::new(&Template::MassSpringDamper.declaration()?)?;
+/// let (theta, time) = (structure.start(), Discrete::new(5e-3)?);
+/// let u = Mat::from_fn(600, 1, |k, _| if (k * k / 90) % 2 == 0 { 1.0 } else { -1.0 });
+/// let clean = simulate(&structure.model(&theta)?.zoh(time)?, u.as_ref(), &[0.0; 2])?;
+/// let noise = |k: usize| 1e-4 * (((k * 7919 + 13) * (k + 5)) % 1009) as f64 / 1009.0;
+/// let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + noise(k));
+/// let (records, options) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], GreyBoxOptions::default());
+/// let found = greybox(&structure, &theta, &records, time, &options)?;
+/// let known = greybox_intervals(&structure, &found, &records, time, &options, &IntervalOptions::default())?;
+/// assert!(known.parameters[0].interval[0] < found.parameters[0]);
+/// assert!(known.modes()?[0].hz_deviation > 0.0);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn greybox_intervals(
+    structure: &dyn Structure,
+    found: &GreyBoxModel,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    options: &GreyBoxOptions,
+    asked: &IntervalOptions,
+) -> Result<GreyBoxIntervals> {
+    intervals(structure, found, None, experiments, time, options, asked)
+}
+
+/// The same for an estimate of [`super::greybox_in_loop`], whose residuals are coloured by the loop.
+///
+/// # Errors
+/// As [`greybox_intervals`] and [`super::greybox_in_loop`].
+#[allow(clippy::too_many_arguments)]
+pub fn greybox_intervals_in_loop(
+    structure: &dyn Structure,
+    found: &GreyBoxModel,
+    controller: &Partitioned<Discrete>,
+    output: LoopOutput,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    options: &GreyBoxOptions,
+    asked: &IntervalOptions,
+) -> Result<GreyBoxIntervals> {
+    let closure = Some(Closure::new(controller, output));
+    intervals(structure, found, closure, experiments, time, options, asked)
+}
+
+fn intervals(
+    structure: &dyn Structure,
+    found: &GreyBoxModel,
+    closure: Option<Closure<'_>>,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    options: &GreyBoxOptions,
+    asked: &IntervalOptions,
+) -> Result<GreyBoxIntervals> {
+    let Some(white) = &found.covariance else {
+        return Err(Error::Undetermined { sentences: found.undetermined.sentences() });
+    };
+    let shifted = Shifted::new(experiments, &options.delays)?;
+    let experiments = &shifted.experiments();
+    let theta = &found.parameters;
+    let noisy = with_gain(options, found);
+    let setting = Setting { closure, confined: false };
+    let criterion = Criterion::new(structure, theta, experiments, time, comparison(setting, &noisy))?;
+    let point = criterion.evaluate(&criterion.start(theta))?;
+    let samples: usize = experiments.iter().map(|e| e.y.nrows()).sum();
+    let lags = checked_lags(asked, samples)?;
+    let counted = counted(found, &options.output_deviations, criterion.outputs());
+    let sums = residual_sums(&criterion, &point, &counted, lags + residuals::LAGS)?;
+    // In closed loop u depends on the residual of the same sample; a model without a direct path has nothing to say there.
+    let first = usize::from(point.sampled.d().norm_max() == 0.0);
+    let residuals = sums.test(lags.min(residuals::LAGS), first)?;
+
+    let of_plant = criterion.plant_slopes(&point)?;
+    let slopes = slopes_with_delays(&point.plant.discrete, &of_plant, &shifted)?;
+    let of_simulation = criterion.slopes(&point, of_plant);
+    let sum = middle(&criterion, &point, &of_simulation, &sums, lags)?;
+    let with_colour = coloured(&criterion, &point, found, &sum)?;
+    let is_coloured = match asked.residuals {
+        ResidualAssumption::White => false,
+        ResidualAssumption::Coloured => true,
+        ResidualAssumption::Tested => !residuals.white(),
+    };
+    let covariance = if is_coloured { with_colour.clone() } else { white.clone() };
+    let ratio = |j: usize| if white[(j, j)] > 0.0 { (with_colour[(j, j)] / white[(j, j)]).sqrt() } else { 1.0 };
+    let half = two_sided_student(asked.level, criterion.degrees_of_freedom as f64);
+    let parameter = |(j, name): (usize, String)| {
+        let deviation = covariance[(j, j)].max(0.0).sqrt();
+        let interval = [theta[j] - half * deviation, theta[j] + half * deviation];
+        ParameterInterval { name, value: theta[j], deviation, interval }
+    };
+    Ok(GreyBoxIntervals {
+        level: asked.level,
+        coloured: is_coloured,
+        degrees_of_freedom: criterion.degrees_of_freedom,
+        parameters: structure.names().into_iter().enumerate().map(parameter).collect(),
+        correlations: correlations(&covariance),
+        covariance,
+        colour: (0..theta.len()).map(ratio).collect(),
+        residuals,
+        model: shifted.delays.put_before(point.plant.discrete)?,
+        slopes,
+    })
+}
+
+impl GreyBoxIntervals {
+    /// The frequency response of the plant at the angular frequencies `omega`, rad/s, with its regions.
+    ///
+    /// # Errors
+    /// As [`frequency_response`].
+    pub fn response(&self, omega: &[f64]) -> Result<ResponseBand> {
+        let response = frequency_response(&self.model, omega)?;
+        let half = self.half_width();
+        let (mut covariance, mut magnitude) = (Vec::new(), Vec::new());
+        for (w, at) in omega.iter().zip(response.iter()) {
+            let slopes = response_changes(&self.model, &self.slopes, *w);
+            let values = at.col_iter().flat_map(|column| column.iter().copied().collect::<Vec<c64>>());
+            for (entry, value) in values.enumerate() {
+                let parts: Vec<[f64; 2]> = slopes.iter().map(|slope| [slope[entry].re, slope[entry].im]).collect();
+                let v = self.variances(&parts);
+                covariance.push(v);
+                magnitude.push(magnitude_interval(value, &v, half));
+            }
+        }
+        Ok(ResponseBand {
+            response,
+            covariance,
+            magnitude,
+            ellipse: ellipse(self.level, self.degrees_of_freedom as f64),
+        })
+    }
+
+    /// The modes of the plant with their intervals, in the order of [`StateSpace::modes`]; those of delays have none.
+    ///
+    /// # Errors
+    /// [`Error::NoConvergence`] of the eigenvalues.
+    pub fn modes(&self) -> Result<Vec<ModeBand>> {
+        let eigen = Eigen::new(&self.model)?;
+        let slopes = |mode: &Mode| -> Vec<[f64; 2]> {
+            let of =
+                |slope: &BlockInfluence| mode_change(mode.pole, eigen.change(mode.pole, &slope.a), self.model.time());
+            self.slopes.iter().map(of).collect()
+        };
+        Ok(self.model.modes()?.into_iter().map(|mode| self.band(mode, &slopes(&mode))).collect())
+    }
+
+    /// The invariant zeros of a plant with as many inputs as outputs as modes, with their intervals: anti-resonances, and the
+    /// zeros that sampling adds.
+    ///
+    /// # Errors
+    /// [`Error::Ports`] for a plant that is not square, [`Error::NoConvergence`].
+    pub fn zeros(&self) -> Result<Vec<ModeBand>> {
+        let zeros = zero_changes(&self.model, &self.slopes)?;
+        Ok(zeros.into_iter().map(|(zero, slopes)| self.band(zero, &slopes)).collect())
+    }
+
+    /// Half the width of an interval over the standard deviation.
+    pub fn half_width(&self) -> f64 {
+        two_sided_student(self.level, self.degrees_of_freedom as f64)
+    }
+
+    /// One sentence on whether the intervals can be believed.
+    pub fn verdict(&self) -> String {
+        let test = &self.residuals;
+        let (lag, largest) = test.largest_autocorrelation();
+        let colour = self.colour.iter().copied().fold(0.0, f64::max);
+        let noise = match (test.white(), self.coloured) {
+            (true, false) => "The residuals are white, as the intervals take them to be".to_owned(),
+            (true, true) => "The residuals are white; the intervals would count their colour".to_owned(),
+            (false, counted) => format!(
+                "The residuals are coloured (auto-correlation {largest:.2} at lag {lag}), and the intervals {} (deviations up to \
+                 {colour:.2} times those of white residuals)",
+                if counted { "count that" } else { "do not count that" }
+            ),
+        };
+        let cross = &test.cross;
+        let inputs = if test.independent() {
+            "they do not depend on past inputs".to_owned()
+        } else {
+            format!(
+                "they depend on past inputs (output {} on input {} {} samples before: {:.1} standard deviations), so that the \
+                 structure lacks something that no interval counts",
+                cross.output + 1,
+                cross.input + 1,
+                cross.lag,
+                cross.deviations.abs()
+            )
+        };
+        format!("{noise}; {inputs}.")
+    }
+
+    fn band(&self, mode: Mode, slopes: &[[f64; 2]]) -> ModeBand {
+        let [hz, _, zeta] = self.variances(slopes);
+        ModeBand::new(mode, [hz, zeta], self.half_width())
+    }
+
+    /// Covariance `[11, 12, 22]` of two quantities from their slopes with respect to each parameter.
+    fn variances(&self, slopes: &[[f64; 2]]) -> [f64; 3] {
+        let product = |a: usize, b: usize| {
+            let row = |j: usize| (0..slopes.len()).map(|k| self.covariance[(j, k)] * slopes[k][b]).sum::<f64>();
+            (0..slopes.len()).map(|j| slopes[j][a] * row(j)).sum()
+        };
+        [product(0, 0), product(0, 1), product(1, 1)]
+    }
+}
+
+/// The options with the gain that was found as the start of the innovation form.
+fn with_gain(options: &GreyBoxOptions, found: &GreyBoxModel) -> GreyBoxOptions {
+    let rows = |gain: &Mat<f64>| gain.row_iter().map(|row| row.iter().copied().collect()).collect();
+    let noise = match &found.gain {
+        Some(gain) => NoiseModel::Innovation(InnovationStart { gain: rows(gain) }),
+        None => options.noise.clone(),
+    };
+    GreyBoxOptions { noise, ..options.clone() }
+}
+
+fn checked_lags(asked: &IntervalOptions, samples: usize) -> Result<usize> {
+    let refuse = |what: &str, value: f64, must: &'static str| Err(Error::OutOfRange { what: what.into(), value, must });
+    if !(asked.level >= 0.5 && asked.level <= 0.999) {
+        return refuse("the level of the intervals", asked.level, "from 0.5 to 0.999");
+    }
+    let longest = (samples / 2).max(1);
+    match asked.lags {
+        Some(0) => refuse("the number of lags of the residuals", 0.0, "at least 1"),
+        Some(lags) if lags > longest => {
+            refuse("the number of lags of the residuals", lags as f64, "at most half the number of samples")
+        }
+        Some(lags) => Ok(lags),
+        None => Ok(((4.0 * (samples as f64).sqrt()) as usize).clamp(residuals::LAGS, MOST_LAGS).min(longest)),
+    }
+}
+
+/// Where the loss of Huber cuts residuals off; nowhere under least squares.
+fn counted(found: &GreyBoxModel, deviations: &[f64], outputs: usize) -> Counted {
+    let limits = match &found.robust {
+        None => vec![f64::INFINITY; outputs],
+        Some(robust) => {
+            let scale = |i: usize| deviations.get(i).copied().unwrap_or(1.0);
+            let limit = |(i, deviation): (usize, &f64)| LIMIT * deviation / scale(i);
+            robust.deviations.iter().enumerate().map(limit).collect()
+        }
+    };
+    Counted { limits }
+}
+
+/// The slopes of the sampled plant as changes of its matrices, those of delays behind.
+fn slopes_with_delays(
+    plant: &StateSpace<Discrete>,
+    slopes: &[SampledSlope],
+    shifted: &Shifted<'_>,
+) -> Result<Vec<BlockInfluence>> {
+    let (n, m, p) = (plant.order(), plant.inputs(), plant.outputs());
+    let system = |part: &dyn Fn(usize, usize, usize) -> f64| {
+        let matrix = |which: usize, rows, columns| Mat::from_fn(rows, columns, |i, j| part(which, i, j));
+        let model = StateSpace::new(matrix(0, n, n), matrix(1, n, m), matrix(2, p, n), matrix(3, p, m), plant.time())?;
+        shifted.delays.put_before(model)
+    };
+    // The delays' own entries are constant.
+    let unmoved = system(&|_, _, _| 0.0)?;
+    let change = |slope: &SampledSlope| {
+        let entry = |which: usize, i: usize, j: usize| match which {
+            0 => slope.states[(i, j)],
+            1 => slope.states[(i, n + j)],
+            2 => slope.outputs[(i, j)],
+            _ => slope.outputs[(i, n + j)],
+        };
+        Ok(BlockInfluence::between(0, &unmoved, &system(&entry)?))
+    };
+    slopes.iter().map(change).collect()
+}
+
+/// The covariance with the colour of the residuals, for the parameters that the estimate moved.
+fn coloured(criterion: &Criterion<'_>, point: &Point, found: &GreyBoxModel, middle: &Mat<f64>) -> Result<Mat<f64>> {
+    let white = found.covariance.as_ref();
+    let own = criterion.physical;
+    let moved = |j: &usize| *j >= own || white.is_some_and(|w| w[(*j, *j)] > 0.0);
+    let free: Vec<usize> = (0..criterion.parameters).filter(moved).collect();
+    let size = |j: &usize| if point.theta[*j] == 0.0 { criterion.scales[*j] } else { point.theta[*j].abs() };
+    let sizes: Vec<f64> = free.iter().map(size).collect();
+    let here = criterion.linearise(point)?.along(&free);
+    let Some(inverse) = Information::new(&here, &sizes, criterion.energy.sqrt()).inverse else {
+        return Err(Error::Undetermined { sentences: found.undetermined.sentences() });
+    };
+    let inner = Mat::from_fn(free.len(), free.len(), |i, j| middle[(free[i], free[j])]);
+    // As for white residuals: what the unknowns took from the residuals, and what the loss of Huber took from the slope.
+    let rows = found.residuals as f64;
+    let beyond = found.robust.as_ref().map_or(0, |robust| robust.beyond.iter().sum::<usize>()) as f64;
+    let factor = rows / criterion.degrees_of_freedom as f64 / (1.0 - beyond / rows).powi(2);
+    let all = spread((&inverse * inner * &inverse).as_ref(), &free, criterion.parameters);
+    Ok(Scale(factor) * all.as_ref().submatrix(0, 0, own, own))
+}
+
+fn correlations(covariance: &Mat<f64>) -> Mat<f64> {
+    Mat::from_fn(covariance.nrows(), covariance.ncols(), |i, j| {
+        let size = (covariance[(i, i)] * covariance[(j, j)]).sqrt();
+        if i == j {
+            1.0
+        } else if size > 0.0 {
+            covariance[(i, j)] / size
+        } else {
+            0.0
+        }
+    })
+}

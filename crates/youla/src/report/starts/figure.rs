@@ -42,7 +42,7 @@ fn cell(count: &StartCount) -> Cell {
     Cell {
         method: count.search.key().into(),
         strength: share,
-        text: format!("{} of {}", count.arrived, count.items),
-        detail: format!("{}: {:.1} % arrived", count.search.label(), 100.0 * share),
+        text: if count.arrived == count.items { "all".into() } else { format!("{:.1} %", 100.0 * share) },
+        detail: format!("{}: {} of {} arrived", count.search.label(), count.arrived, count.items),
     }
 }

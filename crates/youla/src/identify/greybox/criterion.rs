@@ -39,7 +39,7 @@ pub(super) struct Criterion<'a> {
     /// Whether a plant that is not stable is refused.
     confined: bool,
     /// Number of parameters of the structure.
-    physical: usize,
+    pub(super) physical: usize,
     /// Number of all parameters q.
     pub(super) parameters: usize,
     /// Residuals minus unknowns.

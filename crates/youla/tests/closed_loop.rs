@@ -158,30 +158,29 @@ fn innovation_form_is_better_in_noise() {
     }
 }
 
-/// S of twelve states and noise of 1 um: refined, its criterion falls, and the error of G(S) with it; in innovation form, which is
-/// the true one, further. Means of three seeds.
+/// S of twelve states and noise of 1 um: the noise of beta is coloured, so that a fit of the simulated beta lowers the
+/// criterion and not the error of G(S); the innovation form, which is the true one, lowers both. Means of two seeds after 12 steps.
 #[test]
 fn a_refined_deviation_system_errs_less() {
     let rig = Loop::new(0.0);
-    let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
-    let errors = [1, 2, 3].map(|seed| {
+    let subspace = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+    let errors = [1, 2].map(|seed| {
         let (u, y) = rig.record(4000, 1.0, seed);
         let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-        let found = hansen(&rig.factors, &signals, &options).unwrap();
+        let found = hansen(&rig.factors, &signals, &subspace).unwrap();
         let refined = |noise| {
-            let refined =
-                refine_hansen(found.clone(), &rig.factors, &signals, &RefineOptions { noise, ..Default::default() });
-            let refined = refined.unwrap();
+            let options = RefineOptions { noise, max_iterations: 12, ..RefineOptions::default() };
+            let refined = refine_hansen(found.clone(), &rig.factors, &signals, &options).unwrap();
             let change = refined.refinement.as_ref().unwrap();
-            assert!(change.stable && change.cost < change.cost_before, "{change:?}");
-            println!("{change:?}");
+            assert!(change.stable && change.cost < 0.998 * change.cost_before, "{change:?}");
+            assert_eq!(refined.deviation.stability.stable, refined.deviation.model.is_stable().unwrap());
             rig.error(&refined.plant)
         };
         [rig.error(&found.plant), refined(RefineNoise::OutputError), refined(RefineNoise::Innovation)]
     });
-    let [free, simulated, predicted] = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
+    let [free, simulated, predicted] = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 2.0);
     println!("{free:.4} {simulated:.4} {predicted:.4}");
-    assert!(simulated < free && predicted < free, "{free:.3}, {simulated:.3}, {predicted:.3}");
+    assert!(predicted < 0.9 * free && simulated < 1.2 * free, "{free:.3}, {simulated:.3}, {predicted:.3}");
 }
 
 #[test]

@@ -118,8 +118,12 @@ fn search(criterion: &mut Criterion<'_>, bounds: &Bounds, start: &[f64], options
         unweighted = criterion.linearise(&outcome.point)?.along(&outcome.face.free);
     }
     let theta = &outcome.point.theta;
-    let sizes: Vec<f64> =
-        theta.iter().zip(&criterion.scales).map(|(v, scale)| if *v == 0.0 { *scale } else { v.abs() }).collect();
+    let size = |(j, (v, scale)): (usize, (&f64, &f64))| match v.abs() {
+        zero if zero == 0.0 => *scale,
+        own if j < criterion.physical => own,
+        gain => gain.max(*scale),
+    };
+    let sizes: Vec<f64> = theta.iter().zip(&criterion.scales).enumerate().map(size).collect();
     let free_sizes: Vec<f64> = outcome.face.free.iter().map(|j| sizes[*j]).collect();
     let inverse = Information::new(&unweighted, &free_sizes, criterion.energy.sqrt()).inverse;
     Ok(Searched { outcome, variance, inverse, report, sizes })

@@ -89,8 +89,8 @@ use estimate::{Setting, estimate};
 /// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
 ///
 /// # Errors
-/// [`Error::Shape`], [`Error::NotFinite`], [`Error::Ports`], [`Error::OutOfRange`] for data, start or options that do not
-/// fit; [`Error::EmptyBounds`], [`Error::OutsideBounds`]; [`Error::TooFewSamples`]; [`Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
+/// [`crate::Error::Shape`], [`crate::Error::NotFinite`], [`crate::Error::Ports`], [`crate::Error::OutOfRange`] for data, start or options that do not
+/// fit; [`crate::Error::EmptyBounds`], [`crate::Error::OutsideBounds`]; [`crate::Error::TooFewSamples`]; [`crate::Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
 /// errors of the structure at `start`.
 ///
 /// # Accuracy
@@ -135,7 +135,7 @@ pub fn greybox(
 /// colour. For a stable plant [`greybox`] on (u, y) is efficient.
 ///
 /// # Errors
-/// As [`greybox`]; [`Error::Ports`] where the controller does not fit, [`Error::OutOfRange`] for a structure with a direct path.
+/// As [`greybox`]; [`crate::Error::Ports`] where the controller does not fit, [`crate::Error::OutOfRange`] for a structure with a direct path.
 pub fn greybox_in_loop(
     structure: &dyn Structure,
     start: &[f64],

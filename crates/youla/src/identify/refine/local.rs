@@ -19,9 +19,11 @@ use crate::{Error, Mat, Result};
 /// ```
 /// use youla::identify::{greybox::Structure, refine::LocalCoordinates};
 /// use youla::lti::{Discrete, StateSpace};
-/// use youla::{Mat, linalg::eye};
+/// use youla::Mat;
 /// let time = Discrete::new(0.1)?;
-/// let model = StateSpace::new(eye(2) * 0.5, Mat::full(2, 1, 1.0), Mat::full(1, 2, 1.0), Mat::zeros(1, 1), time)?;
+/// let a = Mat::from_fn(2, 2, |i, j| if i == j { 0.5 + 0.1 * i as f64 } else { 0.0 });
+/// let ones = |rows, columns| Mat::from_fn(rows, columns, |_, _| 1.0);
+/// let model = StateSpace::new(a, ones(2, 1), ones(1, 2), Mat::zeros(1, 1), time)?;
 /// let local = LocalCoordinates::new(model, false);
 /// assert_eq!(local.names().len(), 2 * (1 + 1));
 /// # Ok::<(), youla::Error>(())

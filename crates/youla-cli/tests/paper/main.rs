@@ -8,4 +8,5 @@ mod common;
 mod resume;
 mod shards;
 mod small;
+mod starts;
 mod whole;

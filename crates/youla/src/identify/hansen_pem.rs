@@ -18,12 +18,13 @@ mod tests;
 
 pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
 
+use super::direct::direct;
 use super::greybox::{
     FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed,
 };
 use super::hansen::{HansenModel, hansen};
-use super::projected_pem::{Grid, Projected, falls_behind, fit_of, pem_from_target};
-use super::subspace::{Experiment, SubspaceOptions};
+use super::projected_pem::{Grid, Projected, Task, falls_behind, fit_of, pem_from_targets, plant_target};
+use super::subspace::{Experiment, Order, Stability, SubspaceOptions, UncertaintyOptions, Weight};
 use crate::Result;
 use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace, frequency_response};
@@ -47,6 +48,10 @@ pub struct HansenPemOptions {
     /// Time constants that the shortest record is long, of the decay under which responses are compared: ghosts of S that
     /// live longer than the record are flat then. The modes of the plant should decay faster.
     pub decay: f64,
+    /// Whether the prediction-error method starts a second time, at the projection of a model that PBSIDopt finds from u and y with
+    /// the horizons of `hansen`. It is consistent in closed loop and sees what noise that is fed back excites, which alpha does
+    /// not: for much noise and strong feedback. A model that cannot be found is left out.
+    pub direct_start: bool,
     /// The projection.
     pub projection: ProjectionOptions,
     /// The prediction-error method.
@@ -60,6 +65,7 @@ impl Default for HansenPemOptions {
             frequencies: 120,
             window: 1024,
             decay: 10.0,
+            direct_start: true,
             projection: ProjectionOptions::default(),
             pem: GreyBoxOptions::default(),
         }
@@ -126,12 +132,35 @@ pub fn pem_from_hansen(
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
+    let time = factors.nominal().time();
     let target = projection_target(factors, &found.deviation.model, signals, options)?;
     let fit_of_plant = fit_of(&found.plant, experiments, options.pem.initial_state)?;
-    let both = (&options.projection, &options.pem);
-    let Projected { projections, runs, won, model } =
-        pem_from_target("G(S)", &target, structure, nominal, experiments, &fit_of_plant, both)?;
+    let direct =
+        if options.direct_start { direct_target(structure, experiments, time, nominal, options).ok() } else { None };
+    let task = Task { structure, nominal, experiments, projection: &options.projection, pem: &options.pem };
+    let Projected { projections, runs, won, model } = pem_from_targets("G(S)", &target, direct, &task)?;
     Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
+}
+
+/// The response of a model of the order of the structure that PBSIDopt finds from u and y.
+fn direct_target(
+    structure: &dyn Structure,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    nominal: Option<&[f64]>,
+    options: &HansenPemOptions,
+) -> Result<FrequencyTarget> {
+    // The order does not depend on the parameters.
+    let probe = nominal.map_or_else(|| vec![1.0; structure.names().len()], <[f64]>::to_vec);
+    let subspace = SubspaceOptions {
+        weight: Weight::PbsidOpt,
+        order: Order::Fixed(structure.model(&probe)?.order()),
+        stability: Stability::Allow,
+        uncertainty: UncertaintyOptions::default(),
+        ..options.hansen.clone()
+    };
+    let model = direct(experiments, time, &subspace)?.model;
+    plant_target(&model, experiments, [options.window, options.frequencies], options.decay, &options.pem)
 }
 
 /// What alpha makes of u and y by S on the grid, with the weights of the criterion of the records.

@@ -2,16 +2,16 @@
 //!
 //! ```text
 //! theta_0 = arg min sum_k |(Y - G_theta U) W_k|^2          W_jj^2 = Phi_jj domega, the noise-free part of what follows
-//! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    from theta_0 and, where there are any, from nominal parameters
+//! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    from theta_0 of each response, and from nominal parameters
 //! ```
 
 use super::fit::reproduction;
 use super::greybox::{
-    ContinuationOptions, FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure,
-    greybox, greybox_continued, greybox_cost, logarithmic_grid, projections,
+    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed, greybox,
+    greybox_cost, logarithmic_grid, projections,
 };
 use super::subspace::{Experiment, InitialState};
-use crate::lti::{Discrete, StateSpace, simulate, simulate_best};
+use crate::lti::{Discrete, StateSpace, frequency_response, simulate, simulate_best};
 use crate::record::{Welch, cross_spectrum};
 use crate::{Error, Mat, MatRef, Result};
 use serde::{Deserialize, Serialize};
@@ -32,8 +32,8 @@ pub enum PemStart {
     Projection,
     /// At the nominal parameters.
     Nominal,
-    /// At the projection, behind an observer that is taken away step by step: tried where the searches before it are lost.
-    Continued,
+    /// At the projection of a model that was identified from u and y by a method for closed loops.
+    Direct,
 }
 
 /// One search.
@@ -47,68 +47,73 @@ pub struct PemRun {
     pub cost: Result<f64>,
 }
 
+/// A start counts as better where it lowers the criterion by more than this share.
+const BETTER: f64 = 1e-6;
+
 /// The searches, and the model with the lowest criterion.
 pub(super) struct Projected {
-    /// That with the lowest criterion first.
+    /// Of the first response, that with the lowest criterion first.
     pub(super) projections: Vec<Projection>,
     pub(super) runs: Vec<PemRun>,
     pub(super) won: PemStart,
     pub(super) model: GreyBoxModel,
 }
 
-/// Projects a response, `source` in words, on the structure and starts the prediction-error method there and at the nominal
-/// parameters.
-pub(super) fn pem_from_target(
+/// What is searched in, and how.
+pub(super) struct Task<'a> {
+    pub(super) structure: &'a dyn Structure,
+    pub(super) nominal: Option<&'a [f64]>,
+    pub(super) experiments: &'a [Experiment<'a>],
+    pub(super) projection: &'a ProjectionOptions,
+    pub(super) pem: &'a GreyBoxOptions,
+}
+
+/// Projects responses on the structure and starts the prediction-error method at the best projection of each, and at the nominal
+/// parameters. Only the first response must have a projection; `source` says in words what it is of. The first start wins unless a
+/// later one is better by more than rounding.
+pub(super) fn pem_from_targets(
     source: &str,
-    target: &FrequencyTarget,
-    structure: &dyn Structure,
-    nominal: Option<&[f64]>,
-    experiments: &[Experiment<'_>],
-    fit_of_plant: &[f64],
-    options: (&ProjectionOptions, &GreyBoxOptions),
+    first: &FrequencyTarget,
+    further: Option<FrequencyTarget>,
+    task: &Task<'_>,
 ) -> Result<Projected> {
-    let ((projection, pem), time) = (options, target.time());
-    let starts: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
-    let projections = projections(structure, target, &starts, projection)?;
-    let cost = |theta: &[f64]| greybox_cost(structure, theta, experiments, time, pem).unwrap_or(f64::INFINITY);
-    let mut order: Vec<(f64, Projection)> = projections.into_iter().map(|p| (cost(&p.parameters), p)).collect();
-    order.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let begun = [(PemStart::Projection, order[0].0, order[0].1.parameters.as_slice())]
-        .into_iter()
-        .chain(nominal.map(|theta| (PemStart::Nominal, cost(theta), theta)));
-    let mut searches = Searches::default();
+    let projections = task.projections(first)?;
+    let mut begun = vec![(PemStart::Projection, projections[0].0, projections[0].1.parameters.clone())];
+    if let Some(others) = further.and_then(|target| task.projections(&target).ok()) {
+        begun.push((PemStart::Direct, others[0].0, others[0].1.parameters.clone()));
+    }
+    begun.extend(task.nominal.map(|theta| (PemStart::Nominal, task.cost(theta, first.time()), theta.to_vec())));
+    let mut best: Option<(PemStart, GreyBoxModel)> = None;
+    let mut runs = Vec::new();
     for (start, cost_at_start, theta) in begun {
-        searches.take(start, cost_at_start, greybox(structure, theta, experiments, time, pem));
-    }
-    if searches.best.as_ref().is_none_or(|(_, best)| falls_behind(&best.fit, fit_of_plant)) {
-        let options = ContinuationOptions { pem: pem.clone(), ..Default::default() };
-        let (cost_at_start, best) = &order[0];
-        let found = greybox_continued(structure, &best.parameters, experiments, time, &options);
-        searches.take(PemStart::Continued, *cost_at_start, found.map(|found| found.model));
-    }
-    let Searches { best, runs } = searches;
-    let Some((won, model)) = best else { return Err(first_error(source, runs)) };
-    let projections = order.into_iter().map(|(_, projection)| projection).collect();
-    Ok(Projected { projections, runs, won, model })
-}
-
-/// What came of them, and the best so far.
-#[derive(Default)]
-struct Searches {
-    runs: Vec<PemRun>,
-    best: Option<(PemStart, GreyBoxModel)>,
-}
-
-impl Searches {
-    fn take(&mut self, start: PemStart, cost_at_start: f64, outcome: Result<GreyBoxModel>) {
-        let cost = outcome.map(|model| {
+        let outcome = greybox(task.structure, &theta, task.experiments, first.time(), task.pem).map(|model| {
             let cost = model.cost;
-            if self.best.as_ref().is_none_or(|(_, best)| cost < best.cost) {
-                self.best = Some((start, model));
+            if best.as_ref().is_none_or(|(_, best)| cost < best.cost * (1.0 - BETTER)) {
+                best = Some((start, model));
             }
             cost
         });
-        self.runs.push(PemRun { start, cost_at_start, cost });
+        runs.push(PemRun { start, cost_at_start, cost: outcome });
+    }
+    let Some((won, model)) = best else { return Err(first_error(source, runs)) };
+    let projections = projections.into_iter().map(|(_, projection)| projection).collect();
+    Ok(Projected { projections, runs, won, model })
+}
+
+impl Task<'_> {
+    /// Projections of a response with their criterion, the lowest first.
+    fn projections(&self, target: &FrequencyTarget) -> Result<Vec<(f64, Projection)>> {
+        let starts: Vec<Vec<f64>> = self.nominal.iter().map(|theta| theta.to_vec()).collect();
+        let found = projections(self.structure, target, &starts, self.projection)?;
+        let mut order: Vec<(f64, Projection)> =
+            found.into_iter().map(|p| (self.cost(&p.parameters, target.time()), p)).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0));
+        Ok(order)
+    }
+
+    /// The criterion, infinite where there is none.
+    fn cost(&self, theta: &[f64], time: Discrete) -> f64 {
+        greybox_cost(self.structure, theta, self.experiments, time, self.pem).unwrap_or(f64::INFINITY)
     }
 }
 
@@ -121,6 +126,23 @@ fn first_error(source: &str, runs: Vec<PemRun>) -> Error {
 /// Whether a fit stays behind another, or behind a constant, by more than [`LOST_POINTS`] on an output.
 pub(super) fn falls_behind(fit: &[f64], other: &[f64]) -> bool {
     fit.iter().zip(other).any(|(fit, other)| *fit < other.max(0.0) - LOST_POINTS)
+}
+
+/// The response of a model of the plant on a grid of frequencies, with the weights of the criterion of its inputs' records.
+pub(super) fn plant_target(
+    model: &StateSpace<Discrete>,
+    experiments: &[Experiment<'_>],
+    [window, frequencies]: [usize; 2],
+    decay: f64,
+    pem: &GreyBoxOptions,
+) -> Result<FrequencyTarget> {
+    let u: Vec<_> = experiments.iter().map(|e| e.u).collect();
+    let grid = Grid::new("the inputs", &u, window, frequencies, model.time())?;
+    let weights = grid.weights(&u, model.outputs(), pem)?;
+    let decay = decay / grid.shortest;
+    let response = frequency_response(&decayed(model, decay)?, &grid.omega)?;
+    let values: Vec<Mat<_>> = response.iter().map(|g| g.to_owned()).collect();
+    FrequencyTarget::new(&grid.omega, values, model.time())?.weighted(weights)?.decaying(decay)
 }
 
 /// The frequencies of a projection.

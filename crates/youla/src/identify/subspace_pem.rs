@@ -14,13 +14,11 @@ mod tests;
 pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
 
 use super::direct::direct;
-use super::greybox::{
-    FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed,
-};
-use super::projected_pem::{Grid, Projected, falls_behind, fit_of, pem_from_target};
+use super::greybox::{GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure};
+use super::projected_pem::{Projected, Task, falls_behind, fit_of, pem_from_targets, plant_target};
 use super::subspace::{Experiment, SubspaceModel, SubspaceOptions};
-use crate::lti::{Discrete, frequency_response};
-use crate::{Mat, Result};
+use crate::Result;
+use crate::lti::Discrete;
 use serde::{Deserialize, Serialize};
 
 /// Choices of [`subspace_pem`].
@@ -120,26 +118,10 @@ pub fn subspace_pem(
     options: &SubspacePemOptions,
 ) -> Result<SubspacePem> {
     let found = direct(experiments, time, &options.subspace)?;
-    let target = target(&found, experiments, options)?;
+    let sizes = [options.window, options.frequencies];
+    let target = plant_target(&found.model, experiments, sizes, options.decay, &options.pem)?;
     let fit_of_plant = fit_of(&found.model, experiments, options.pem.initial_state)?;
-    let both = (&options.projection, &options.pem);
-    let Projected { projections, runs, won, model } =
-        pem_from_target("the subspace model", &target, structure, nominal, experiments, &fit_of_plant, both)?;
+    let task = Task { structure, nominal, experiments, projection: &options.projection, pem: &options.pem };
+    let Projected { projections, runs, won, model } = pem_from_targets("the subspace model", &target, None, &task)?;
     Ok(SubspacePem { subspace: found, projections, runs, won, model, fit_of_plant })
-}
-
-/// G on the grid, with the weights of the criterion of the records.
-fn target(
-    found: &SubspaceModel,
-    experiments: &[Experiment<'_>],
-    options: &SubspacePemOptions,
-) -> Result<FrequencyTarget> {
-    let (model, time) = (&found.model, found.model.time());
-    let u: Vec<_> = experiments.iter().map(|e| e.u).collect();
-    let grid = Grid::new("the inputs", &u, options.window, options.frequencies, time)?;
-    let weights = grid.weights(&u, model.outputs(), &options.pem)?;
-    let decay = options.decay / grid.shortest;
-    let response = frequency_response(&decayed(model, decay)?, &grid.omega)?;
-    let values: Vec<Mat<_>> = response.iter().map(|g| g.to_owned()).collect();
-    FrequencyTarget::new(&grid.omega, values, time)?.weighted(weights)?.decaying(decay)
 }

@@ -236,7 +236,7 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
     let start = match run.found.won {
         PemStart::Projection => "the projection of G(S)",
         PemStart::Nominal => "its initial values",
-        PemStart::Continued => "the projection of G(S), behind an observer that was taken away step by step,",
+        PemStart::Direct => "the projection of a model of u and y by PBSIDopt",
     };
     let text = format!(
         "The physical structure explains the estimation records with a fit of {model} per output, G(S) {plant} (found from {start})."

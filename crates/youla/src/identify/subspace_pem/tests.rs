@@ -1,12 +1,12 @@
 //! The bearing in open loop.
 
 use super::*;
-use crate::Error;
 use crate::identify::greybox::BearingStructure;
 use crate::identify::subspace::{InitialState, Order};
 use crate::lti::simulate;
 use crate::record::{Excitation, SquareWaves};
 use crate::rig::Bearing;
+use crate::{Error, Mat};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

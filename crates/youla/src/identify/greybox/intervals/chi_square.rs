@@ -45,7 +45,7 @@ fn fraction(a: f64, x: f64) -> f64 {
 
 /// `ln Gamma(k / 2)` by the recursion from `Gamma(1/2) = sqrt(pi)` and `Gamma(1) = 1`.
 fn ln_gamma_of_half(k: usize) -> f64 {
-    let first = if k % 2 == 0 { 0.0 } else { 0.5 * PI.ln() };
+    let first = if k.is_multiple_of(2) { 0.0 } else { 0.5 * PI.ln() };
     (2 - k % 2..k).step_by(2).fold(first, |sum, j| sum + (0.5 * j as f64).ln())
 }
 

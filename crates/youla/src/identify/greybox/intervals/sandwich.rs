@@ -8,17 +8,36 @@
 //! the window of Parzen, so that the sum stays positive. J are the sensitivities without the part that the initial states can
 //! remove. Beside the records, memory goes with the number of lags.
 
+use super::super::GreyBoxModel;
 use super::super::criterion::{Criterion, Point, Slopes};
+use super::super::robust::LIMIT;
 use super::super::sensitivity::{Begin, condense, rows};
+use super::super::uncertainty::{Information, spread};
 use super::lags::{History, dot};
 use super::residuals::ResidualSums;
 use crate::linalg::{leading_rank, least_squares};
-use crate::{Mat, Result};
+use crate::{Error, Mat, Result};
+use faer::Scale;
 
 /// Residuals as the estimate sees them: cut off where the loss of Huber does.
 pub(super) struct Counted {
     /// Largest magnitude per output, in the units of the criterion.
-    pub(super) limits: Vec<f64>,
+    limits: Vec<f64>,
+}
+
+impl Counted {
+    /// Where the loss of Huber cuts residuals off; nowhere under least squares.
+    pub(super) fn new(found: &GreyBoxModel, deviations: &[f64], outputs: usize) -> Self {
+        let limits = match &found.robust {
+            None => vec![f64::INFINITY; outputs],
+            Some(robust) => {
+                let scale = |i: usize| deviations.get(i).copied().unwrap_or(1.0);
+                let limit = |(i, deviation): (usize, &f64)| LIMIT * deviation / scale(i);
+                robust.deviations.iter().enumerate().map(limit).collect()
+            }
+        };
+        Counted { limits }
+    }
 }
 
 /// First pass: lagged products of residuals and inputs, over `lags` lags.
@@ -105,4 +124,30 @@ fn add_products(half: &mut Mat<f64>, history: &History, residuals: &ResidualSums
 fn parzen(lag: usize, lags: usize) -> f64 {
     let x = lag as f64 / (lags + 1) as f64;
     if x <= 0.5 { 1.0 - 6.0 * x * x * (1.0 - x) } else { 2.0 * (1.0 - x).powi(3) }
+}
+
+/// The covariance with the colour of the residuals, for the parameters that the estimate moved.
+pub(super) fn coloured(
+    criterion: &Criterion<'_>,
+    point: &Point,
+    found: &GreyBoxModel,
+    middle: &Mat<f64>,
+) -> Result<Mat<f64>> {
+    let white = found.covariance.as_ref();
+    let own = criterion.physical;
+    let moved = |j: &usize| *j >= own || white.is_some_and(|w| w[(*j, *j)] > 0.0);
+    let free: Vec<usize> = (0..criterion.parameters).filter(moved).collect();
+    let size = |j: &usize| if point.theta[*j] == 0.0 { criterion.scales[*j] } else { point.theta[*j].abs() };
+    let sizes: Vec<f64> = free.iter().map(size).collect();
+    let here = criterion.linearise(point)?.along(&free);
+    let Some(inverse) = Information::new(&here, &sizes, criterion.energy.sqrt()).inverse else {
+        return Err(Error::Undetermined { sentences: found.undetermined.sentences() });
+    };
+    let inner = Mat::from_fn(free.len(), free.len(), |i, j| middle[(free[i], free[j])]);
+    // As for white residuals: what the unknowns took from the residuals, and what the loss of Huber took from the slope.
+    let rows = found.residuals as f64;
+    let beyond = found.robust.as_ref().map_or(0, |robust| robust.beyond.iter().sum::<usize>()) as f64;
+    let factor = rows / criterion.degrees_of_freedom as f64 / (1.0 - beyond / rows).powi(2);
+    let all = spread((&inverse * inner * &inverse).as_ref(), &free, criterion.parameters);
+    Ok(Scale(factor) * all.as_ref().submatrix(0, 0, own, own))
 }

@@ -23,7 +23,8 @@ fn between(all: &[ModeBand], from: f64, to: f64) -> ModeBand {
     *all.iter().find(|b| (from..to).contains(&b.mode.hz) && b.mode.zeta.abs() < 0.2).unwrap()
 }
 
-/// With 7 parameters the structure predicts fresh records within 2 points of G(S) of order 10, 20 above the rigid body, and has its
+/// Resonance and anti-resonance lie within 53 to 56.5 Hz and 39 to 43 Hz, where the indirect frequency response has them. With 7
+/// parameters the structure predicts fresh records within 2 points of G(S) of order 10, 20 above the rigid body, and has its
 /// resonance within 1 % and its anti-resonance within 4 % of those of G(S). It is not the plant: it lies outside of the intervals of
 /// G(S), its residuals are coloured and depend on past inputs, and the run says so (stick-slip friction, docs/grey-box.md).
 #[test]
@@ -37,11 +38,12 @@ fn two_inertias_of_the_flexible_drive() {
     println!("{}", known.verdict());
     let Some(Uncertainty::Delta(plant)) = &found.hansen.uncertainty else { panic!("no uncertainty of G(S)") };
     for (what, of_structure, of_plant, from, to, tolerance) in [
-        ("resonance", known.modes().unwrap(), plant.modes().unwrap(), 50.0, 60.0, 0.01),
-        ("anti-resonance", known.zeros().unwrap(), plant.zeros().unwrap(), 36.0, 48.0, 0.04),
+        ("resonance", known.modes().unwrap(), plant.modes().unwrap(), 53.0, 56.5, 0.01),
+        ("anti-resonance", known.zeros().unwrap(), plant.zeros().unwrap(), 39.0, 43.0, 0.04),
     ] {
         let (one, other) = (between(&of_structure, from, to), between(&of_plant, from, to));
         println!("{what}: {:.2} Hz {:.2?}, of G(S) {:.2} Hz {:.2?}", one.mode.hz, one.hz, other.mode.hz, other.hz);
+        assert!(one.hz[0] > from && one.hz[1] < to, "{what}: {one:?}");
         assert!((one.mode.hz / other.mode.hz - 1.0).abs() < tolerance, "{what}: {one:?}, G(S) {other:?}");
         assert!(one.hz_deviation > 0.0 && one.hz_deviation < 0.01 * one.mode.hz, "{one:?}");
     }

@@ -78,9 +78,9 @@ pub(super) fn pem_from_targets(
     task: &Task<'_>,
 ) -> Result<Projected> {
     let projections = task.projections(first)?;
-    let mut begun = vec![(PemStart::Projection, projections[0].0, projections[0].1.parameters.clone())];
+    let mut begun = vec![(PemStart::Projection, projections[0].0, projections[0].1.start(task.structure))];
     if let Some(others) = further.and_then(|target| task.projections(&target).ok()) {
-        begun.push((PemStart::Direct, others[0].0, others[0].1.parameters.clone()));
+        begun.push((PemStart::Direct, others[0].0, others[0].1.start(task.structure)));
     }
     begun.extend(task.nominal.map(|theta| (PemStart::Nominal, task.cost(theta, first.time()), theta.to_vec())));
     let mut best: Option<(PemStart, GreyBoxModel)> = None;
@@ -106,7 +106,7 @@ impl Task<'_> {
         let starts: Vec<Vec<f64>> = self.nominal.iter().map(|theta| theta.to_vec()).collect();
         let found = projections(self.structure, target, &starts, self.projection)?;
         let mut order: Vec<(f64, Projection)> =
-            found.into_iter().map(|p| (self.cost(&p.parameters, target.time()), p)).collect();
+            found.into_iter().map(|p| (self.cost(&p.start(self.structure), target.time()), p)).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
         Ok(order)
     }

@@ -91,10 +91,10 @@ impl<'a> Criterion<'a> {
         let hints: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
         let mut order: Vec<(f64, Projection)> = projections(structure, &target, &hints, &self.options.projection)?
             .into_iter()
-            .map(|p| (self.cost(closed, structure, &p.parameters), p))
+            .map(|p| (self.cost(closed, structure, &p.start(structure)), p))
             .collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let projected = order.first().map(|(cost, p)| (PemStart::Projection, *cost, p.parameters.clone()));
+        let projected = order.first().map(|(cost, p)| (PemStart::Projection, *cost, p.start(structure)));
         let initial = nominal.map(|n| (PemStart::Nominal, self.cost(closed, structure, n), n.to_vec()));
         let mut best: Option<(PemStart, GreyBoxModel)> = None;
         let mut runs = Vec::new();

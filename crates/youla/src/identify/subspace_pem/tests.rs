@@ -1,7 +1,7 @@
 //! The bearing in open loop.
 
 use super::*;
-use crate::identify::greybox::BearingStructure;
+use crate::identify::greybox::{BearingStructure, DeclaredStructure, Template};
 use crate::identify::subspace::{InitialState, Order};
 use crate::lti::simulate;
 use crate::record::{Excitation, SquareWaves};
@@ -65,4 +65,19 @@ fn a_record_that_is_too_short_is_refused() {
     few.subspace.horizon = 5;
     let refused = subspace_pem(&experiments, Discrete::new(2e-4).unwrap(), &BearingStructure, None, &few);
     assert!(matches!(refused, Err(Error::TooFewSamples { found: 60, needed: 64, .. })), "{refused:?}");
+}
+
+/// The projection knows no bounds: where it lies beyond one, the search starts at the bound and ends there.
+#[test]
+fn a_projection_beyond_a_bound_starts_at_the_bound() {
+    let (u, y) = log(0.0, 3);
+    let mut declared = Template::Bearing.declaration().unwrap();
+    // The true value is -224.9.
+    declared.parameters.get_mut("damping_hh").unwrap().min = Some(-200.0);
+    declared.parameters.get_mut("damping_hh").unwrap().initial = Some(-100.0);
+    let structure = DeclaredStructure::new(&declared).unwrap();
+    let (time, experiments) = (Discrete::new(2e-4).unwrap(), [Experiment { u: u.as_ref(), y: y.as_ref() }]);
+    let found = subspace_pem(&experiments, time, &structure, None, &options()).unwrap();
+    assert!((found.projections[0].parameters[0] / -224.9 - 1.0).abs() < 1e-6, "{:?}", found.projections[0].parameters);
+    assert_eq!((found.model.parameters[0], found.model.at_bounds.len()), (-200.0, 1));
 }

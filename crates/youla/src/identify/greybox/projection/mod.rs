@@ -106,6 +106,15 @@ pub struct Projection {
     pub starts: usize,
 }
 
+impl Projection {
+    /// Where a search from here starts: the parameters, those beyond a bound of the structure at that bound. The projection knows no
+    /// bounds; the search does not begin outside of them.
+    pub fn start(&self, structure: &dyn Structure) -> Vec<f64> {
+        let within = |(value, (min, max)): (&f64, (f64, f64))| value.max(min).min(max);
+        self.parameters.iter().zip(structure.bounds()).map(within).collect()
+    }
+}
+
 /// Projects a response on a structure. `starts` are parameter vectors to start from besides; none is needed for a structure
 /// that is linear in most parameters.
 ///

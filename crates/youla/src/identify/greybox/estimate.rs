@@ -119,7 +119,7 @@ fn search(criterion: &mut Criterion<'_>, bounds: &Bounds, start: &[f64], options
     }
     let theta = &outcome.point.theta;
     let size = |(j, (v, scale)): (usize, (&f64, &f64))| match v.abs() {
-        zero if zero == 0.0 => *scale,
+        0.0 => *scale,
         own if j < criterion.physical => own,
         gain => gain.max(*scale),
     };

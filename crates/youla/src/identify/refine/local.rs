@@ -58,16 +58,15 @@ impl LocalCoordinates {
     }
 }
 
-/// The entry at a place of the vector of A, B and C, each column by column.
+/// The entry at a place of the vector of A and B, column by column, and C, row by row.
 fn entry(place: usize, (n, m): (usize, usize)) -> Slope {
     let at = |matrix, k: usize, rows: usize| Slope { matrix, row: k % rows, column: k / rows, value: 0.0 };
     match place {
         k if k < n * n => at(Matrix::A, k, n),
         k if k < n * (n + m) => at(Matrix::B, k - n * n, n),
         k => {
-            let (k, p_of_column) = (k - n * (n + m), n);
-            // C is held row by row, so that p is not needed.
-            Slope { matrix: Matrix::C, row: k / p_of_column, column: k % p_of_column, value: 0.0 }
+            let k = k - n * (n + m);
+            Slope { matrix: Matrix::C, row: k / n, column: k % n, value: 0.0 }
         }
     }
 }

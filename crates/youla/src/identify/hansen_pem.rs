@@ -157,6 +157,7 @@ fn direct_target(
         order: Order::Fixed(structure.model(&probe)?.order()),
         stability: Stability::Allow,
         uncertainty: UncertaintyOptions::default(),
+        delays: options.pem.delays.clone(),
         ..options.hansen.clone()
     };
     let model = direct(experiments, time, &subspace)?.model;
@@ -180,5 +181,8 @@ pub fn projection_target(
     let decay = options.decay / grid.shortest;
     let response = frequency_response(&decayed(&factors.right_factors_of(s)?, decay)?, &grid.omega)?;
     let part = |first: usize, count: usize| response.iter().map(|g| g.subrows(first, count).to_owned()).collect();
-    FrequencyTarget::of_excitation(&grid.omega, part(0, m), part(m, p), time)?.weighted(weights)?.decaying(decay)
+    FrequencyTarget::of_excitation(&grid.omega, part(0, m), part(m, p), time)?
+        .weighted(weights)?
+        .decaying(decay)?
+        .behind_delays(&options.pem.delays)
 }

@@ -142,7 +142,10 @@ pub(super) fn plant_target(
     let decay = decay / grid.shortest;
     let response = frequency_response(&decayed(model, decay)?, &grid.omega)?;
     let values: Vec<Mat<_>> = response.iter().map(|g| g.to_owned()).collect();
-    FrequencyTarget::new(&grid.omega, values, model.time())?.weighted(weights)?.decaying(decay)
+    FrequencyTarget::new(&grid.omega, values, model.time())?
+        .weighted(weights)?
+        .decaying(decay)?
+        .behind_delays(&pem.delays)
 }
 
 /// The frequencies of a projection.

@@ -81,3 +81,21 @@ fn a_projection_beyond_a_bound_starts_at_the_bound() {
     assert!((found.projections[0].parameters[0] / -224.9 - 1.0).abs() < 1e-6, "{:?}", found.projections[0].parameters);
     assert_eq!((found.model.parameters[0], found.model.at_bounds.len()), (-200.0, 1));
 }
+
+/// The bearing with its first input three samples late: the projection takes the known delay off.
+#[test]
+fn a_known_delay_is_not_projected_on_the_structure() {
+    let (u, y) = log(0.0, 4);
+    let late = 3;
+    let rows = u.nrows() - late;
+    let early = Mat::from_fn(rows, 2, |k, j| u[(if j == 0 { k + late } else { k }, j)]);
+    let mut options = options();
+    (options.subspace.delays, options.pem.delays) = (vec![late, 0], vec![late, 0]);
+    (options.subspace.initial_state, options.pem.initial_state) = (InitialState::Estimated, InitialState::Estimated);
+    let experiments = [Experiment { u: early.as_ref(), y: y.subrows(0, rows) }];
+    let found = subspace_pem(&experiments, Discrete::new(2e-4).unwrap(), &BearingStructure, None, &options).unwrap();
+    let truth = BearingStructure::parameters(&Bearing::default());
+    for (projected, truth) in found.projections[0].parameters.iter().zip(&truth) {
+        assert!((projected / truth - 1.0).abs() < 1e-5, "{projected} for {truth}");
+    }
+}

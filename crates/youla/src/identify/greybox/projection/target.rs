@@ -119,6 +119,29 @@ impl FrequencyTarget {
         Ok(self)
     }
 
+    /// Says that the inputs reach the structure by these whole samples later: `U_j exp(-s ts d_j)`. After
+    /// [`FrequencyTarget::decaying`]; none when empty.
+    ///
+    /// # Errors
+    /// [`Error::Ports`] for another number of delays than inputs.
+    pub fn behind_delays(mut self, delays: &[usize]) -> Result<Self> {
+        if delays.is_empty() {
+            return Ok(self);
+        }
+        if delays.len() != self.inputs() {
+            let what = "the number of delays of the frequency response".into();
+            return Err(Error::Ports { what, expected: self.inputs(), found: delays.len() });
+        }
+        for k in 0..self.omega.len() {
+            let sample = self.s(k) * self.time.ts();
+            for (j, delay) in delays.iter().enumerate() {
+                let turn = (-sample * *delay as f64).exp();
+                self.excited[k].row_mut(j).iter_mut().for_each(|u| *u *= turn);
+            }
+        }
+        Ok(self)
+    }
+
     /// Angular frequencies, rad/s.
     pub fn omega(&self) -> &[f64] {
         &self.omega

@@ -142,3 +142,28 @@ fn names_and_numbers_of_channels() {
         + "[verification]\nprediction = \"closed-loop\"\n";
     settings_refused("undriven", &undriven, &["[verification] prediction = \"closed-loop\" needs"]);
 }
+
+#[test]
+fn structures_that_cannot_be_used() {
+    let structure = "a = [[\"-rate\"]]\nb = [[\"gain\"]]\nc = [[1]]\n";
+    let rate = "parameters.rate = { initial = 10.0, min = 0.0 }\n";
+    let gain = "parameters.gain = { initial = 6.0 }\n";
+    let cases: [(String, &[&str]); 4] = [
+        (
+            format!("{structure}{rate}"),
+            &["run.toml: [grey_box.structure]", "row 1, column 1 of the matrix b", "\"gain\"", "rate"],
+        ),
+        (
+            format!("{structure}{gain}parameters.rate = {{ initial = 10.0, min = 20.0, max = 5.0 }}\n"),
+            &["[grey_box.structure]", "rate", "20", "5"],
+        ),
+        (format!("{structure}{gain}{rate}parameters.mass = {{ initial = 1.0 }}\n"), &["[grey_box.structure]", "mass"]),
+        (
+            format!("{structure}{gain}{rate}").replace("[[\"gain\"]]", "[[\"gain\", 1]]"),
+            &["[grey_box.structure]", "2 inputs and 1 outputs", "1 and 1"],
+        ),
+    ];
+    for (declared, evidence) in cases {
+        settings_refused("structure", &format!("{SETTINGS}\n[grey_box.structure]\n{declared}"), evidence);
+    }
+}

@@ -73,6 +73,25 @@ fn yes() -> bool {
     true
 }
 
+impl GreyBoxSettings {
+    /// What is wrong with a structure, beside `inputs` and `outputs` channels.
+    pub(super) fn problem(&self, inputs: usize, outputs: usize) -> Option<String> {
+        let of = |place: String, declaration: &Declaration| match DeclaredStructure::new(declaration) {
+            Err(e) => Some(format!("{place} {e}")),
+            Ok(structure) if structure.ports() != (inputs, outputs) => {
+                let (m, p) = structure.ports();
+                Some(format!("{place} has {m} inputs and {p} outputs, but [data] lists {inputs} and {outputs}"))
+            }
+            Ok(_) => None,
+        };
+        let own = of("[grey_box.structure]".into(), &self.structure);
+        let alternatives = &mut self.alternative.iter();
+        own.or_else(|| {
+            alternatives.find_map(|a| of(format!("[grey_box.alternative.structure] of {:?}", a.name), &a.structure))
+        })
+    }
+}
+
 /// The structure with its estimate.
 #[derive(Debug)]
 pub struct GreyBoxRun {

@@ -267,7 +267,9 @@ impl RunSettings {
     }
 
     fn check(&self, path: &Path) -> Result<()> {
+        let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
         let problem = self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.number_problem());
+        let problem = problem.or_else(structure);
         problem.map_or(Ok(()), |problem| Err(Error::Settings { path: path.to_owned(), at: None, problem }))
     }
 

@@ -152,6 +152,12 @@ impl DeclaredStructure {
         &self.parameters
     }
 
+    /// Number of inputs and of outputs.
+    pub fn ports(&self) -> (usize, usize) {
+        let [_, b, c, _] = &self.numbers;
+        (b.ncols(), c.nrows())
+    }
+
     /// Initial values of the free parameters.
     pub fn start(&self) -> Vec<f64> {
         self.free.iter().map(|number| self.parameters[*number].initial).collect()

@@ -12,13 +12,14 @@
 //! which matters to the stages on the way only. This is the homotopy of C. P. Vyasarayani, T. Uchida, A. Carvalho and J. McPhee
 //! (Multibody Syst. Dyn. 26 (2011), 411) with Kalman's gain for the observer.
 
+use super::options::require_positive;
 use super::structure::{Matrix, Slope, Structure};
 use super::{GreyBoxModel, GreyBoxOptions, SearchEnd, greybox};
 use crate::control::{NoiseCovariance, kalman};
 use crate::identify::subspace::Experiment;
 use crate::linalg::block;
 use crate::lti::{Continuous, Discrete, StateSpace};
-use crate::{Error, Mat, MatRef, Result};
+use crate::{Mat, MatRef, Result};
 use serde::{Deserialize, Serialize};
 
 /// Choices of [`greybox_continued`].
@@ -74,7 +75,7 @@ pub struct Continuation {
 /// Searches with an observer that is taken away step by step, then without: [`greybox`] from a start that may be far off.
 ///
 /// # Errors
-/// As [`greybox`]; [`Error::OutOfRange`] for options without meaning. A stage that leads nowhere is an outcome.
+/// As [`greybox`]; [`crate::Error::OutOfRange`] for options without meaning. A stage that leads nowhere is an outcome.
 ///
 /// # Accuracy
 /// See `docs/grey-box.md` for how often it arrives where a search from the true parameters ends.
@@ -121,12 +122,7 @@ pub fn greybox_continued(
 }
 
 fn check(options: &ContinuationOptions) -> Result<()> {
-    for (what, value) in [("the first noise of a continuation", options.first), ("the last noise", options.last)] {
-        if !(value > 0.0 && value.is_finite()) {
-            return Err(Error::OutOfRange { what: what.into(), value, must: "a positive number" });
-        }
-    }
-    Ok(())
+    require_positive(&[("the first noise of a continuation", options.first), ("the last noise", options.last)])
 }
 
 /// rho of each stage.

@@ -1,7 +1,7 @@
 //! What is known of the noise: the predictor that belongs to it.
 
 use crate::lti::{Discrete, StateSpace};
-use crate::{Error, Mat, Result};
+use crate::{Error, Mat, MatRef, Result};
 use serde::{Deserialize, Serialize};
 
 /// The model of the noise, which decides what is predicted from what.
@@ -31,6 +31,13 @@ pub enum NoiseModel {
 pub struct InnovationStart {
     /// K in the states of the sampled structure, n x p, row by row; zero when empty.
     pub gain: Vec<Vec<f64>>,
+}
+
+impl InnovationStart {
+    /// At a gain K, n x p.
+    pub fn of(gain: MatRef<'_, f64>) -> Self {
+        InnovationStart { gain: rows(gain) }
+    }
 }
 
 /// `H(z) = I + C (zI - A)^-1 B` at the sample time of the data, p x p, with a stable inverse.
@@ -65,7 +72,6 @@ impl NoiseFilter {
             let what = "the distance of D of the noise filter from the identity".into();
             return Err(Error::OutOfRange { what, value: off, must: "0: H must be monic" });
         }
-        let rows = |m: crate::MatRef<'_, f64>| m.row_iter().map(|row| row.iter().copied().collect()).collect();
         Ok(NoiseFilter { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()) })
     }
 
@@ -78,6 +84,11 @@ impl NoiseFilter {
         inverse.require_stable("the inverse of the noise filter")?;
         Ok(inverse)
     }
+}
+
+/// The rows of a matrix.
+fn rows(matrix: MatRef<'_, f64>) -> Vec<Vec<f64>> {
+    matrix.row_iter().map(|row| row.iter().copied().collect()).collect()
 }
 
 /// A matrix from its rows.

@@ -215,10 +215,9 @@ fn choices(options: &RefineOptions, here: &Balanced, max_iterations: usize) -> G
 }
 
 fn noise(here: &Balanced) -> NoiseModel {
-    let rows = |gain: &Mat<f64>| gain.row_iter().map(|row| row.iter().copied().collect()).collect();
     match &here.gain {
         None => NoiseModel::OutputError,
-        Some(gain) => NoiseModel::Innovation(InnovationStart { gain: rows(gain) }),
+        Some(gain) => NoiseModel::Innovation(InnovationStart::of(gain.as_ref())),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Signals with a past, taken in piece by piece, and sums of their products over lags: memory independent of the record.
 
+use super::super::narrow::dot;
 use super::super::sensitivity::PIECE;
 
 /// The latest piece of several signals and `lags` samples before it; zero before the start.
@@ -61,17 +62,6 @@ impl LagSums {
             sums.iter_mut().enumerate().for_each(|(lag, sum)| *sum += dot(now, self.history.before(*b, lag)));
         }
     }
-}
-
-/// Inner product with eight running sums, which the compiler vectorises.
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0; 8];
-    let (a, b) = (a.chunks_exact(8), b.chunks_exact(8));
-    let rest: f64 = a.remainder().iter().zip(b.remainder()).map(|(a, b)| a * b).sum();
-    for (a, b) in a.zip(b) {
-        sums.iter_mut().zip(a.iter().zip(b)).for_each(|(sum, (a, b))| *sum += a * b);
-    }
-    sums.iter().sum::<f64>() + rest
 }
 
 #[cfg(test)]

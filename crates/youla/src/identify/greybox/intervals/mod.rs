@@ -232,9 +232,8 @@ fn intervals(
 
 /// The options with the gain that was found as the start of the innovation form.
 fn with_gain(options: &GreyBoxOptions, found: &GreyBoxModel) -> GreyBoxOptions {
-    let rows = |gain: &Mat<f64>| gain.row_iter().map(|row| row.iter().copied().collect()).collect();
     let noise = match &found.gain {
-        Some(gain) => NoiseModel::Innovation(InnovationStart { gain: rows(gain) }),
+        Some(gain) => NoiseModel::Innovation(InnovationStart::of(gain.as_ref())),
         None => options.noise.clone(),
     };
     GreyBoxOptions { noise, ..options.clone() }

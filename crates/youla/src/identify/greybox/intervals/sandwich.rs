@@ -10,10 +10,11 @@
 
 use super::super::GreyBoxModel;
 use super::super::criterion::{Criterion, Point, Slopes};
+use super::super::narrow::dot;
 use super::super::robust::LIMIT;
 use super::super::sensitivity::{Begin, condense, rows};
 use super::super::uncertainty::{Information, spread};
-use super::lags::{History, dot};
+use super::lags::History;
 use super::residuals::ResidualSums;
 use crate::linalg::{leading_rank, least_squares};
 use crate::{Error, Mat, Result};

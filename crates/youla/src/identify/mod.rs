@@ -7,7 +7,7 @@ pub mod hansen;
 pub mod hansen_pem;
 pub mod hansen_refine;
 pub mod innovation_form;
-mod projected_pem;
+pub(crate) mod projected_pem;
 pub mod refine;
 pub mod subspace;
 pub mod subspace_pem;

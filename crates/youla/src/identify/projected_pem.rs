@@ -77,16 +77,45 @@ pub(super) fn pem_from_targets(
     further: Option<FrequencyTarget>,
     task: &Task<'_>,
 ) -> Result<Projected> {
+    let time = first.time();
     let projections = task.projections(first)?;
     let mut begun = vec![(PemStart::Projection, projections[0].0, projections[0].1.start(task.structure))];
     if let Some(others) = further.and_then(|target| task.projections(&target).ok()) {
         begun.push((PemStart::Direct, others[0].0, others[0].1.start(task.structure)));
     }
-    begun.extend(task.nominal.map(|theta| (PemStart::Nominal, task.cost(theta, first.time()), theta.to_vec())));
+    begun.extend(task.nominal.map(|theta| (PemStart::Nominal, task.cost(theta, time), theta.to_vec())));
+    let search = |theta: &[f64]| greybox(task.structure, theta, task.experiments, time, task.pem);
+    let (runs, best) = searched(begun, search);
+    let Some((won, model)) = best else { return Err(first_error(source, runs)) };
+    let projections = projections.into_iter().map(|(_, projection)| projection).collect();
+    Ok(Projected { projections, runs, won, model })
+}
+
+/// The projections of a response on a structure with the criterion where a search from them starts, the lowest first; nominal
+/// parameters are a hint.
+pub(crate) fn projected(
+    structure: &dyn Structure,
+    target: &FrequencyTarget,
+    nominal: Option<&[f64]>,
+    options: &ProjectionOptions,
+    cost: impl Fn(&[f64]) -> f64,
+) -> Result<Vec<(f64, Projection)>> {
+    let hints: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
+    let found = projections(structure, target, &hints, options)?;
+    let mut order: Vec<(f64, Projection)> = found.into_iter().map(|p| (cost(&p.start(structure)), p)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    Ok(order)
+}
+
+/// Searches from all starts, given with the criterion there. The first wins unless a later one ends lower by more than rounding.
+pub(crate) fn searched(
+    begun: Vec<(PemStart, f64, Vec<f64>)>,
+    search: impl Fn(&[f64]) -> Result<GreyBoxModel>,
+) -> (Vec<PemRun>, Option<(PemStart, GreyBoxModel)>) {
     let mut best: Option<(PemStart, GreyBoxModel)> = None;
     let mut runs = Vec::new();
     for (start, cost_at_start, theta) in begun {
-        let outcome = greybox(task.structure, &theta, task.experiments, first.time(), task.pem).map(|model| {
+        let outcome = search(&theta).map(|model| {
             let cost = model.cost;
             if best.as_ref().is_none_or(|(_, best)| cost < best.cost * (1.0 - BETTER)) {
                 best = Some((start, model));
@@ -95,20 +124,14 @@ pub(super) fn pem_from_targets(
         });
         runs.push(PemRun { start, cost_at_start, cost: outcome });
     }
-    let Some((won, model)) = best else { return Err(first_error(source, runs)) };
-    let projections = projections.into_iter().map(|(_, projection)| projection).collect();
-    Ok(Projected { projections, runs, won, model })
+    (runs, best)
 }
 
 impl Task<'_> {
     /// Projections of a response with their criterion, the lowest first.
     fn projections(&self, target: &FrequencyTarget) -> Result<Vec<(f64, Projection)>> {
-        let starts: Vec<Vec<f64>> = self.nominal.iter().map(|theta| theta.to_vec()).collect();
-        let found = projections(self.structure, target, &starts, self.projection)?;
-        let mut order: Vec<(f64, Projection)> =
-            found.into_iter().map(|p| (self.cost(&p.start(self.structure), target.time()), p)).collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        Ok(order)
+        let cost = |theta: &[f64]| self.cost(theta, target.time());
+        projected(self.structure, target, self.nominal, self.projection, cost)
     }
 
     /// The criterion, infinite where there is none.

@@ -15,11 +15,12 @@ use super::signals::DeviationSignals;
 use crate::control::with_input_port;
 use crate::factor::CoprimeFactors;
 use crate::identify::greybox::{
-    DeclaredStructure, GreyBoxIntervals, GreyBoxModel, GreyBoxOptions, IntervalOptions, LoopOutput, Projection,
-    greybox_in_loop, greybox_intervals, greybox_intervals_in_loop, projections,
+    DeclaredStructure, GreyBoxIntervals, GreyBoxModel, GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop,
+    greybox_intervals, greybox_intervals_in_loop,
 };
 use crate::identify::hansen::HansenModel;
-use crate::identify::hansen_pem::{HansenPem, HansenPemOptions, PemRun, PemStart, pem_from_hansen, projection_target};
+use crate::identify::hansen_pem::{HansenPem, HansenPemOptions, PemStart, pem_from_hansen, projection_target};
+use crate::identify::projected_pem::{projected, searched};
 use crate::identify::subspace::Experiment;
 use crate::linalg::block;
 use crate::lti::{Discrete, Partitioned, StateSpace};
@@ -88,26 +89,12 @@ impl<'a> Criterion<'a> {
             return pem_from_hansen(hansen, self.factors, signals, experiments, structure, nominal, self.options);
         };
         let target = projection_target(self.factors, &hansen.deviation.model, signals, self.options)?;
-        let hints: Vec<Vec<f64>> = nominal.iter().map(|theta| theta.to_vec()).collect();
-        let mut order: Vec<(f64, Projection)> = projections(structure, &target, &hints, &self.options.projection)?
-            .into_iter()
-            .map(|p| (self.cost(closed, structure, &p.start(structure)), p))
-            .collect();
-        order.sort_by(|a, b| a.0.total_cmp(&b.0));
-        let projected = order.first().map(|(cost, p)| (PemStart::Projection, *cost, p.start(structure)));
-        let initial = nominal.map(|n| (PemStart::Nominal, self.cost(closed, structure, n), n.to_vec()));
-        let mut best: Option<(PemStart, GreyBoxModel)> = None;
-        let mut runs = Vec::new();
-        for (start, cost_at_start, theta) in projected.into_iter().chain(initial) {
-            let outcome = self.search(closed, structure, &theta, &self.options.pem).map(|model| {
-                let cost = model.cost;
-                if best.as_ref().is_none_or(|(_, best)| cost < best.cost) {
-                    best = Some((start, model));
-                }
-                cost
-            });
-            runs.push(PemRun { start, cost_at_start, cost: outcome });
-        }
+        let cost = |theta: &[f64]| self.cost(closed, structure, theta);
+        let order = projected(structure, &target, nominal, &self.options.projection, cost)?;
+        let best = order.first().map(|(cost, p)| (PemStart::Projection, *cost, p.start(structure)));
+        let initial = nominal.map(|n| (PemStart::Nominal, cost(n), n.to_vec()));
+        let search = |theta: &[f64]| self.search(closed, structure, theta, &self.options.pem);
+        let (runs, best) = searched(best.into_iter().chain(initial).collect(), search);
         let Some((won, model)) = best else {
             return Err(runs.into_iter().find_map(|run| run.cost.err()).unwrap_or(Error::NoStart));
         };

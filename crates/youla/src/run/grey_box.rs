@@ -67,16 +67,10 @@ impl GreyBoxSettings {
             alternative: Vec::new(),
         }
     }
-}
 
-fn yes() -> bool {
-    true
-}
-
-impl GreyBoxSettings {
     /// What is wrong with a structure, beside `inputs` and `outputs` channels.
     pub(super) fn problem(&self, inputs: usize, outputs: usize) -> Option<String> {
-        let of = |place: String, declaration: &Declaration| match DeclaredStructure::new(declaration) {
+        let of = |(place, declaration): (String, &Declaration)| match DeclaredStructure::new(declaration) {
             Err(e) => Some(format!("{place} {e}")),
             Ok(structure) if structure.ports() != (inputs, outputs) => {
                 let (m, p) = structure.ports();
@@ -84,12 +78,17 @@ impl GreyBoxSettings {
             }
             Ok(_) => None,
         };
-        let own = of("[grey_box.structure]".into(), &self.structure);
-        let alternatives = &mut self.alternative.iter();
-        own.or_else(|| {
-            alternatives.find_map(|a| of(format!("[grey_box.alternative.structure] of {:?}", a.name), &a.structure))
-        })
+        let own = ("[grey_box.structure]".to_owned(), &self.structure);
+        let others = self
+            .alternative
+            .iter()
+            .map(|a| (format!("[grey_box.alternative.structure] of {:?}", a.name), &a.structure));
+        std::iter::once(own).chain(others).find_map(of)
     }
+}
+
+fn yes() -> bool {
+    true
 }
 
 /// The structure with its estimate.

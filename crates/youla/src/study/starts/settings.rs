@@ -2,7 +2,7 @@
 
 use super::super::settings::PaperSettings;
 use super::case::StartCase;
-use crate::identify::greybox::{ContinuationOptions, GreyBoxOptions, MultiStartOptions};
+use crate::identify::greybox::{ContinuationOptions, MultiStartOptions};
 use crate::identify::subspace::{InitialState, Order, Stability, SubspaceOptions, Weight};
 use crate::rig::{Bearing, RigParameters};
 use crate::{Error, Result};
@@ -39,7 +39,7 @@ impl StartsSettings {
         let mut paper = PaperSettings::shipped();
         paper.seed = seed;
         let rig = RigParameters::shipped();
-        let pem = || GreyBoxOptions { ..paper.pem.clone() };
+        let pem = || paper.pem.clone();
         StartsSettings {
             cases: cases.to_vec(),
             items,

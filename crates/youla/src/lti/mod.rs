@@ -4,6 +4,7 @@ mod connect;
 mod discretise;
 mod initial;
 pub(crate) mod modes;
+mod norms;
 mod partitioned;
 mod response;
 mod scaling;
@@ -15,6 +16,7 @@ mod zeros;
 
 pub(crate) use initial::simulate_best;
 pub use modes::Mode;
+pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
 pub use partitioned::Partitioned;
 pub use response::{FrequencyResponse, frequency_response};
 pub use simulate::{SimulationState, Simulator, simulate};

@@ -94,7 +94,7 @@ pub fn frequency_response<T: TimeDomain>(system: &StateSpace<T>, omega: &[f64]) 
 }
 
 /// `(Q' D^-1 A D Q, Q' D^-1 B, C D Q, D)` with the balancing D and the Hessenberg reduction Q.
-struct HessenbergSystem<T> {
+pub(super) struct HessenbergSystem<T> {
     h: Mat<f64>,
     b: Mat<f64>,
     c: Mat<f64>,
@@ -103,7 +103,7 @@ struct HessenbergSystem<T> {
 }
 
 impl<T: TimeDomain> HessenbergSystem<T> {
-    fn new(system: &StateSpace<T>) -> Result<Self> {
+    pub(super) fn new(system: &StateSpace<T>) -> Result<Self> {
         let system = system.balanced()?;
         let form = hessenberg("the state matrix", system.a())?;
         let (b, c) = (form.q.transpose() * system.b(), system.c() * &form.q);
@@ -111,7 +111,7 @@ impl<T: TimeDomain> HessenbergSystem<T> {
     }
 
     /// Writes one matrix per frequency.
-    fn fill(&self, omega: &[f64], values: &mut [c64], size: usize) -> Result<()> {
+    pub(super) fn fill(&self, omega: &[f64], values: &mut [c64], size: usize) -> Result<()> {
         let (n, m) = (self.h.nrows(), self.d.ncols());
         let mut work = vec![c64::new(0.0, 0.0); n * (n + m)];
         for (omega, value) in omega.iter().zip(values.chunks_exact_mut(size)) {

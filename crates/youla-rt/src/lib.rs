@@ -48,9 +48,11 @@
 #![forbid(unsafe_code)]
 
 mod controller;
+mod filter;
 mod matrices;
 mod real;
 
 pub use controller::{Controller, Output, State};
+pub use filter::Filter;
 pub use matrices::{Matrices, NotFinite};
 pub use real::Real;

@@ -66,7 +66,10 @@ impl<const N: usize, const M: usize, const P: usize> Matrices<f64, N, M, P> {
     }
 }
 
-fn check_finite<T: Real, const R: usize, const K: usize>(matrix: char, x: &[[T; K]; R]) -> Result<(), NotFinite> {
+pub(crate) fn check_finite<T: Real, const R: usize, const K: usize>(
+    matrix: char,
+    x: &[[T; K]; R],
+) -> Result<(), NotFinite> {
     for (row, values) in (1..).zip(x) {
         for (column, value) in (1..).zip(values) {
             if !value.is_finite() {
@@ -77,7 +80,7 @@ fn check_finite<T: Real, const R: usize, const K: usize>(matrix: char, x: &[[T; 
     Ok(())
 }
 
-fn to_f32<const R: usize, const K: usize>(x: &[[f64; K]; R]) -> [[f32; K]; R] {
+pub(crate) fn to_f32<const R: usize, const K: usize>(x: &[[f64; K]; R]) -> [[f32; K]; R] {
     x.map(|row| row.map(|value| value as f32))
 }
 

@@ -2,6 +2,7 @@
 
 mod connect;
 mod discretise;
+mod eigen;
 mod initial;
 pub(crate) mod modes;
 mod norms;
@@ -14,6 +15,8 @@ mod time;
 mod transfer;
 mod zeros;
 
+pub(crate) use eigen::Eigen;
+pub use eigen::SharedMode;
 pub(crate) use initial::simulate_best;
 pub use modes::Mode;
 pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};

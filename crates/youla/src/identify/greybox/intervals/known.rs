@@ -4,10 +4,10 @@ use super::super::delays::Shifted;
 use super::super::sampled::SampledSlope;
 use super::GreyBoxIntervals;
 use crate::identify::subspace::uncertainty::{
-    Eigen, ellipse, magnitude_interval, mode_change, response_changes, two_sided_student, zero_changes,
+    ellipse, magnitude_interval, mode_change, response_changes, two_sided_student, zero_changes,
 };
 use crate::identify::subspace::{BlockInfluence, ModeBand, ResponseBand};
-use crate::lti::{Discrete, Mode, StateSpace, frequency_response};
+use crate::lti::{Discrete, Eigen, Mode, StateSpace, frequency_response};
 use crate::{Mat, Result, c64};
 
 impl GreyBoxIntervals {

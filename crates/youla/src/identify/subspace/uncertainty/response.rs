@@ -7,9 +7,8 @@
 
 use super::band::{ModeBand, ResponseBand};
 use super::delta::{BlockInfluence, Delta};
-use crate::linalg::balance;
-use crate::lti::{Discrete, Mode, StateSpace, TimeDomain, frequency_response};
-use crate::{Error, Mat, MatRef, Result, c64};
+use crate::lti::{Discrete, Eigen, Mode, StateSpace, TimeDomain, frequency_response};
+use crate::{Mat, MatRef, Result, c64};
 use faer::prelude::*;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -47,7 +46,7 @@ impl Delta {
     /// The modes in the order of [`StateSpace::modes`], with their intervals.
     ///
     /// # Errors
-    /// [`Error::NoConvergence`] of the eigenvectors.
+    /// [`crate::Error::NoConvergence`] of the eigenvectors.
     pub fn modes(&self) -> Result<Vec<ModeBand>> {
         let modes = self.model.modes()?;
         let eigen = Eigen::new(&self.model)?;
@@ -102,42 +101,6 @@ pub(crate) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
     let along = (s.re * ds.re + s.im * ds.im) / size;
     let dzeta = if pole.im == 0.0 && pole.re > 0.0 { 0.0 } else { (s.re * along / size - ds.re) / size };
     [along / TAU, dzeta]
-}
-
-/// Eigenvalues with left and right eigenvectors, scaled to `w' v = 1`, in balanced coordinates.
-pub(crate) struct Eigen {
-    poles: Vec<c64>,
-    scale: Vec<f64>,
-    right: Mat<c64>,
-    left: Mat<c64>,
-}
-
-impl Eigen {
-    pub(crate) fn new(model: &StateSpace<Discrete>) -> Result<Self> {
-        let scale = balance("the state matrix", model.a())?.scale;
-        let n = model.order();
-        let a = Mat::from_fn(n, n, |i, j| model.a()[(i, j)] * scale[j] / scale[i]);
-        let failed = |_| Error::NoConvergence { what: "the eigenvectors of the state matrix".into(), iterations: 0 };
-        let eigen = a.eigen().map_err(failed)?;
-        let right = eigen.U().to_owned();
-        let left = right.partial_piv_lu().solve(Mat::<c64>::identity(n, n));
-        let poles = eigen.S().column_vector().iter().copied().collect();
-        Ok(Eigen { poles, scale, right, left })
-    }
-
-    /// `w' dA v` for the pole nearest to the given one.
-    pub(crate) fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
-        let near = |k: &usize| (self.poles[*k] - pole).norm();
-        let Some(k) = (0..self.poles.len()).min_by(|a, b| near(a).total_cmp(&near(b))) else {
-            return c64::new(0.0, 0.0);
-        };
-        let n = self.scale.len();
-        let mut sum = c64::new(0.0, 0.0);
-        for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
-            sum += self.left[(k, i)] * self.right[(j, k)] * (da[(i, j)] * self.scale[j] / self.scale[i]);
-        }
-        sum
-    }
 }
 
 fn complex(m: MatRef<'_, f64>) -> Mat<c64> {

@@ -60,8 +60,8 @@ pub use stability::{MovedPole, StabilityReport};
 pub use stream::subspace_stream;
 pub(crate) use uncertainty::check as check_uncertainty;
 pub use uncertainty::{
-    BlockInfluence, Bootstrap, Delta, Evidence, ModeBand, NoUncertainty, ResponseBand, Uncertainty, UncertaintyMethod,
-    UncertaintyOptions,
+    BlockInfluence, Bootstrap, Delta, Draw, Evidence, Interval, ModeBand, NoUncertainty, ResponseBand, Uncertainty,
+    UncertaintyMethod, UncertaintyOptions,
 };
 
 use crate::lti::{Discrete, StateSpace};

@@ -213,14 +213,14 @@ fn covariance(values: &[c64]) -> [f64; 3] {
     sum.map(|s| s / (count - 1.0))
 }
 
-fn deviation(values: &[f64]) -> f64 {
+pub(super) fn deviation(values: &[f64]) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
     (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt()
 }
 
 /// Percentiles.
-fn interval(mut values: Vec<f64>, level: f64) -> [f64; 2] {
+pub(super) fn interval(mut values: Vec<f64>, level: f64) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     [0.5 * (1.0 - level), 0.5 * (1.0 + level)].map(|share| quantile(&values, share))
 }

@@ -18,7 +18,7 @@ use crate::{Mat, Result};
 use faer::Scale;
 
 /// Share of the influence of a block by which a system is moved to differentiate what follows from it.
-const STEP: f64 = 1e-2;
+pub(super) const STEP: f64 = 1e-2;
 
 /// The change of a system for twice the weight of a block, to first order.
 #[derive(Debug, Clone)]
@@ -102,16 +102,10 @@ impl Delta {
     /// Those of `map`.
     pub fn through(&self, map: impl Fn(&StateSpace<Discrete>) -> Result<StateSpace<Discrete>>) -> Result<Delta> {
         let model = map(&self.model)?;
-        let blocks = self.blocks.iter().map(|block| {
-            let moved = map(&self.moved(block)?)?;
+        let blocks = self.blocks.iter().enumerate().map(|(j, block)| {
+            let moved = map(&self.towards(&[(j, STEP)])?)?;
             Ok(BlockInfluence::between(block.experiment, &model, &moved).times(1.0 / STEP))
         });
         Ok(Delta { blocks: blocks.collect::<Result<_>>()?, model, level: self.level })
-    }
-
-    fn moved(&self, block: &BlockInfluence) -> Result<StateSpace<Discrete>> {
-        let by = |m: crate::MatRef<'_, f64>, change: &Mat<f64>| m + change * Scale(STEP);
-        let m = &self.model;
-        StateSpace::new(by(m.a(), &block.a), by(m.b(), &block.b), by(m.c(), &block.c), by(m.d(), &block.d), m.time())
     }
 }

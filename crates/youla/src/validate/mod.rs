@@ -1,9 +1,14 @@
-//! Evidence for or against a model: fit, variance accounted for, loop certificate, prediction on fresh data.
+//! Evidence for or against a model: fit, variance accounted for, certificates of the loop (exact, and over the region of
+//! an uncertain model), prediction on fresh data.
 
+mod band;
 mod certificate;
+mod exact;
 mod fit;
 mod predict;
 
+pub use band::{BandCertificate, BandOptions, certify_band};
 pub use certificate::{LoopCertificate, certify};
+pub use exact::{ExactCertificate, certify_deviation};
 pub use fit::{fit, vaf};
 pub use predict::{LoopExcitation, predict_closed_loop, predict_open_loop};

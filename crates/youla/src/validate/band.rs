@@ -1,0 +1,108 @@
+//! A loop under the uncertainty of its model: does the controller stabilise every model within the region?
+//!
+//! Models are drawn from the distribution of the estimate and each loop is tested exactly, by its poles. The region of level p
+//! holds the share p of the models that lie nearest to the estimate. The statement is about the error that the records let
+//! expect, not about what no record shows (an operating point never visited, a mode never excited).
+
+use crate::identify::subspace::{Draw, Interval, Uncertainty};
+use crate::lti::{Discrete, StateSpace};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Choices of [`certify_band`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct BandOptions {
+    /// Models that are drawn; a bootstrap has its replicates instead.
+    pub draws: usize,
+    /// Seed of the drawing.
+    pub seed: u64,
+}
+
+impl Default for BandOptions {
+    fn default() -> Self {
+        BandOptions { draws: 500, seed: 1 }
+    }
+}
+
+/// What a controller does to the models within a region.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct BandCertificate {
+    /// Level of region and interval.
+    pub level: f64,
+    /// Models that were drawn but are impossible, and not tested.
+    pub impossible: usize,
+    /// Models that were tested.
+    pub models: usize,
+    /// Those of them within the region.
+    pub within: usize,
+    /// Models whose loop is unstable, anywhere.
+    pub unstable: usize,
+    /// Those of them within the region.
+    pub unstable_within: usize,
+    /// Largest magnitude of a closed-loop pole over the models within the region.
+    pub worst_within: f64,
+    /// The largest magnitude of a closed-loop pole, of the estimate, with its interval.
+    pub radius: Interval,
+}
+
+impl BandCertificate {
+    /// Whether the controller stabilises every model that was tested within the region, and the estimate.
+    pub fn holds(&self) -> bool {
+        self.unstable_within == 0 && self.radius.value < 1.0
+    }
+}
+
+/// Tests the loop that `closed` makes of each model of an estimate (S, or a plant), by its largest pole.
+///
+/// `possible` says which models are left out because something else is known: a machine that ran under K while the records
+/// were taken has a stable S. Where nothing else is known it is true throughout.
+///
+/// `None` where there is no uncertainty. Models in parallel; the same seed gives the same result.
+///
+/// # Errors
+/// Those of `closed` for the estimate; a loop that is not well posed counts as unstable. [`Error::OutOfRange`] for fewer than 20
+/// draws.
+pub fn certify_band<F>(
+    uncertainty: &Uncertainty,
+    options: &BandOptions,
+    possible: impl Fn(&StateSpace<Discrete>) -> Result<bool> + Sync,
+    closed: F,
+) -> Result<Option<BandCertificate>>
+where
+    F: Fn(&StateSpace<Discrete>) -> Result<StateSpace<Discrete>> + Sync,
+{
+    if options.draws < 20 {
+        let what = "the number of models to draw".into();
+        return Err(Error::OutOfRange { what, value: options.draws as f64, must: "at least 20" });
+    }
+    let Some(level) = uncertainty.level() else { return Ok(None) };
+    let radius = |model: &StateSpace<Discrete>| spectral_radius(&closed(model)?);
+    let draws = uncertainty.draws(options.draws, options.seed);
+    let mut tested: Vec<(f64, f64)> = draws
+        .par_iter()
+        .filter(|draw| possible(&draw.model).unwrap_or(true))
+        .map(|Draw { model, distance }| (*distance, radius(model).unwrap_or(f64::INFINITY)))
+        .collect();
+    tested.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let within = (level * tested.len() as f64).floor() as usize;
+    let unstable = |part: &[(f64, f64)]| part.iter().filter(|(_, radius)| *radius >= 1.0 || radius.is_nan()).count();
+    let Some(radius) = uncertainty.intervals(|model| Ok(vec![radius(model)?]))?.first().copied() else {
+        return Ok(None);
+    };
+    Ok(Some(BandCertificate {
+        level,
+        impossible: draws.len() - tested.len(),
+        models: tested.len(),
+        within,
+        unstable: unstable(&tested),
+        unstable_within: unstable(&tested[..within]),
+        worst_within: tested[..within].iter().map(|(_, radius)| *radius).fold(0.0, f64::max),
+        radius,
+    }))
+}
+
+fn spectral_radius(closed: &StateSpace<Discrete>) -> Result<f64> {
+    Ok(closed.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max))
+}

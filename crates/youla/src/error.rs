@@ -248,6 +248,12 @@ pub enum Error {
         /// Lowest peak of those that stabilise both.
         lowest: Option<f64>,
     },
+    /// No controller could be designed on an identified model within the limits.
+    #[error("no weight gives a new controller within the limits ({reasons}); add weights or allow more in [redesign]")]
+    NoRedesign {
+        /// For each weight why not.
+        reasons: String,
+    },
     /// A shard is not written as one number of another.
     #[error("{text:?} is not a shard; write the number of the part and the number of parts, for example 2/4")]
     BadShard {
@@ -725,6 +731,7 @@ impl Error {
             | Error::ReportTemplate { .. }
             | Error::NotStabilisable { .. }
             | Error::NotDetectable { .. }
+            | Error::NoRedesign { .. }
             | Error::Undetermined { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }

@@ -76,6 +76,7 @@ pub mod linalg;
 pub mod lti;
 mod quantile;
 pub mod record;
+pub mod redesign;
 pub mod reduce;
 pub mod report;
 pub mod rig;

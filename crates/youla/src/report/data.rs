@@ -64,6 +64,12 @@ pub struct ReportData {
     pub reduction: Option<Reduction>,
     /// Loop certificate of each model.
     pub certificates: Vec<Certificate>,
+    /// Further evidence on the loop, below the certificates.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub loop_tables: Vec<EvidenceTable>,
+    /// A new controller; empty without one.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub redesign_tables: Vec<EvidenceTable>,
     /// Relative residual of the Bezout identity of the factors.
     pub bezout_residual: Option<f64>,
     /// Duration of each stage.
@@ -180,6 +186,8 @@ pub enum Evidence {
     Reduction,
     /// Loop certificate.
     Certificate,
+    /// New controller.
+    Redesign,
 }
 
 /// How a finding is to be taken.
@@ -571,6 +579,21 @@ pub struct Certificate {
     pub stabilised_by_controller: Option<bool>,
     /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
     pub worst_closed_loop_pole: Option<[f64; 2]>,
+}
+
+/// A table of evidence, in words.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct EvidenceTable {
+    /// Title.
+    pub title: String,
+    /// What it says, in a sentence above it; may be empty.
+    pub text: String,
+    /// Heads of the columns; the first one names the rows.
+    pub columns: Vec<String>,
+    /// Rows of cells; a short row ends early.
+    pub rows: Vec<Vec<String>>,
+    /// What stands below it.
+    pub caption: String,
 }
 
 /// Duration of one stage of the run.

@@ -3,6 +3,7 @@
 use super::folder::RunFolder;
 use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
+use super::redesign;
 use super::settings::RunSettings;
 use super::stabilisation::{as_csv, as_json};
 use super::uncertainty::grey_box_uncertainty;
@@ -118,7 +119,9 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
     writer.factors()?;
     writer.signals()?;
     writer.models()?;
-    writer.verdict()
+    writer.verdict()?;
+    writer.certificate()?;
+    writer.redesign()
 }
 
 /// The provenance that every artefact of a run carries.
@@ -294,6 +297,32 @@ impl Writer<'_> {
                 self.folder.text(&format!("{name}.csv"), &as_csv(diagram))
             }
             Some(Err(e)) => self.folder.json(&format!("{name}.json"), &refused(e)),
+            None => Ok(()),
+        }
+    }
+
+    /// `7-validate/certificate.json`.
+    fn certificate(&self) -> Result<()> {
+        let Some(certificate) = &self.found.certificate else { return Ok(()) };
+        let mut file = certificate.json();
+        file["provenance"] = serde_json::json!(self.provenance);
+        self.folder.json("7-validate/certificate.json", &file)
+    }
+
+    /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.
+    fn redesign(&self) -> Result<()> {
+        match &self.found.redesign {
+            Some(Ok(new)) => {
+                let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+                self.model_with("8-redesign/new_controller", &new.controller.system, y, u, serde_json::Value::Null)?;
+                let exported = redesign::exported(self.found, new);
+                self.folder.text("8-redesign/controller.rs", &exported.rust())?;
+                self.folder.json("8-redesign/controller.json", &exported)?;
+                let mut file = redesign::json(new);
+                file["provenance"] = serde_json::json!(self.provenance);
+                self.folder.json("8-redesign/redesign.json", &file)
+            }
+            Some(Err(e)) => self.folder.json("8-redesign/redesign.json", &refused(e)),
             None => Ok(()),
         }
     }

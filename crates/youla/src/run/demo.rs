@@ -1,5 +1,6 @@
 //! The demonstration: the paper's gas bearing, simulated in closed loop, with a nominal model that is half wrong.
 
+use super::certificate::CertificateSettings;
 use super::models::{ControllerSettings, Feedback, NominalModel};
 use super::records::{LoopRecord, RunRecords, SourceFile};
 use super::settings::{
@@ -12,6 +13,7 @@ use crate::identify::subspace::{Order, Stability, SubspaceOptions, UncertaintyMe
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Excitation, Gaps, SquareWaves};
+use crate::redesign::RedesignOptions;
 use crate::reduce::{ReducedOrder, ReductionOptions};
 use crate::rig::{Bearing, degraded};
 use crate::units::Channel;
@@ -173,6 +175,8 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         deviation: DeviationOptions::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         grey_box: None,
+        certificate: Some(CertificateSettings { controller_errors: true, ..CertificateSettings::default() }),
+        redesign: Some(RedesignOptions::default()),
         stabilisation: StabilisationSettings::default(),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },

@@ -1,7 +1,7 @@
 //! From nominal model and controller of a run to its coprime factors, with balanced states.
 
 use super::models::Controller;
-use super::records::{RunRecords, rms};
+use super::records::RunRecords;
 use super::settings::{Construction, FactorSettings, RunSettings};
 use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr};
 use crate::factor::CoprimeFactors;
@@ -106,13 +106,8 @@ struct Weights {
 
 impl Weights {
     fn new(records: &RunRecords, settings: &FactorSettings) -> Self {
-        let estimation = records.estimation.iter();
-        Weights {
-            u: rms(estimation.clone().map(|r| &r.u), records.inputs.len()),
-            y: rms(estimation.map(|r| &r.y), records.outputs.len()),
-            input_weight: settings.input_weight,
-            output_noise: settings.output_noise,
-        }
+        let (u, y) = records.sizes();
+        Weights { u, y, input_weight: settings.input_weight, output_noise: settings.output_noise }
     }
 
     /// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs.

@@ -15,6 +15,8 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     [
         fit_line(found),
         loop_line(found),
+        band_line(found),
+        redesign_line(found),
         deviation_line(found),
         evidence_line(found),
         grey_box_line(found),
@@ -194,6 +196,20 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
         "The controller that ran {verb} G(S); the closed-loop pole of largest magnitude is at |z| = {worst:.5}."
     );
     Some(Verdict { status, text, evidence: Evidence::Certificate })
+}
+
+/// Whether the controller stabilises every model within the region of S, where its uncertainty was asked for.
+fn band_line(found: &Identification) -> Option<Verdict> {
+    let certificate = found.certificate.as_ref()?;
+    let text = certificate.band_sentence()?;
+    let status = if certificate.band?.holds() { Status::Good } else { Status::Caution };
+    Some(Verdict { status, text, evidence: Evidence::Certificate })
+}
+
+fn redesign_line(found: &Identification) -> Option<Verdict> {
+    let new = found.redesign.as_ref()?.as_ref().ok()?;
+    let status = if new.gains_damping() { Status::Good } else { Status::Caution };
+    Some(Verdict { status, text: super::redesign::sentence(new), evidence: Evidence::Redesign })
 }
 
 fn deviation_line(found: &Identification) -> Option<Verdict> {

@@ -1,6 +1,8 @@
 //! A whole run: run.toml and a log in, models with evidence out. The program and the Python package call this.
 
 mod artefacts;
+mod certificate;
+mod controller_errors;
 mod demo;
 mod disturbance;
 mod explain;
@@ -15,6 +17,7 @@ mod page;
 mod paper;
 mod pipeline;
 mod records;
+mod redesign;
 mod redraw;
 mod response;
 mod segments;
@@ -28,6 +31,8 @@ mod verdict;
 mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
+pub use certificate::{CertificateSettings, RunCertificate};
+pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use factorise::{Factorisation, factorise, factorise_run};

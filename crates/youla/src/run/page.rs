@@ -1,10 +1,12 @@
 //! What the report of a run shows: plain data, drawn by [`crate::report`].
 
 use super::artefacts::pairs;
+use super::certificate::RunCertificate;
 use super::findings::{notes, verdict_lines};
 use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
+use super::redesign;
 use super::response::{decibel, log_grid, model_responses};
 use super::settings::Prediction;
 use super::stabilisation::drawn;
@@ -54,6 +56,13 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
+        loop_tables: found.certificate.as_ref().map(RunCertificate::tables).unwrap_or_default(),
+        redesign_tables: found
+            .redesign
+            .as_ref()
+            .and_then(|r| r.as_ref().ok())
+            .map(redesign::tables)
+            .unwrap_or_default(),
         bezout_residual: Some(found.factorisation.bezout_residual),
         stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
     })

@@ -1,8 +1,10 @@
 //! The driver: from records, nominal model and controller to models with evidence. Read this file first.
 
+use super::certificate::{RunCertificate, certificate};
 use super::factorise::{Factorisation, factorise_run};
 use super::grey_box::{GreyBoxRun, grey_box};
 use super::records::RunRecords;
+use super::redesign::redesigned;
 use super::response::{check_grid, indirect};
 use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
@@ -17,6 +19,7 @@ use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
+use crate::redesign::Redesign;
 use crate::reduce::{Reduction, reduce};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -39,6 +42,10 @@ pub enum Stage {
     Reduce,
     /// Fits (26) and certificates.
     Validate,
+    /// The loop under uncertainty and wrong descriptions.
+    Certify,
+    /// A new controller.
+    Redesign,
     /// Artefacts are written.
     Write,
     /// The report is drawn.
@@ -47,13 +54,15 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 8] = [
+    pub const ALL: [Stage; 10] = [
         Stage::Record,
         Stage::Factor,
         Stage::Signals,
         Stage::Identify,
         Stage::Reduce,
         Stage::Validate,
+        Stage::Certify,
+        Stage::Redesign,
         Stage::Write,
         Stage::Report,
     ];
@@ -67,6 +76,8 @@ impl Stage {
             Stage::Identify => "identify",
             Stage::Reduce => "reduce",
             Stage::Validate => "validate",
+            Stage::Certify => "certify",
+            Stage::Redesign => "redesign",
             Stage::Write => "write",
             Stage::Report => "report",
         }
@@ -126,6 +137,10 @@ pub struct Identification {
     pub indirect: Option<Result<IndirectResponse>>,
     /// Evidence on every model.
     pub verdict: Verdict,
+    /// The loop of G(S): the exact test, the region of S, wrong descriptions of the controller.
+    pub certificate: Option<RunCertificate>,
+    /// The new controller where it was asked for, or the reason why there is none.
+    pub redesign: Option<Result<Redesign>>,
 }
 
 /// Where a failure of the scheme happened, with the likely cause when the log contradicts the declared controller.
@@ -165,6 +180,7 @@ impl Identification {
             refusal("stabilisation", "stabilisation diagram of S", &self.diagrams.deviation),
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", &self.diagrams.direct),
             refusal("indirect", "indirect frequency response", &self.indirect),
+            refusal("redesign", "new controller", &self.redesign),
         ]
         .into_iter()
         .flatten()
@@ -262,6 +278,8 @@ pub fn identify(
     let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
     let mut found = Identification {
         verdict: Verdict::default(),
+        certificate: None,
+        redesign: None,
         settings,
         records,
         factorisation,
@@ -277,5 +295,7 @@ pub fn identify(
     found.uncertainty = run_uncertainty(&found)?;
     // (26), the loop certificate and the response that rests on no model.
     (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?;
+    found.certificate = Some(clock.run(Stage::Certify, || certificate(&found))?);
+    found.redesign = clock.run(Stage::Redesign, || redesigned(&found));
     Ok(found)
 }

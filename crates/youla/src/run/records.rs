@@ -67,6 +67,13 @@ pub struct RunRecords {
 }
 
 impl RunRecords {
+    /// Root mean square of each input and of each output over the estimation records, 1 for a channel that is zero throughout.
+    pub fn sizes(&self) -> (Vec<f64>, Vec<f64>) {
+        let estimation = self.estimation.iter();
+        let u = rms(estimation.clone().map(|r| &r.u), self.inputs.len());
+        (u, rms(estimation.map(|r| &r.y), self.outputs.len()))
+    }
+
     /// The estimation records as (u, y).
     pub fn experiments(&self) -> Vec<Experiment<'_>> {
         self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()

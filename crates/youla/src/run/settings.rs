@@ -1,5 +1,6 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+use super::certificate::CertificateSettings;
 use super::disturbance::DisturbanceSettings;
 use super::explain::{explain, problem_at};
 use super::grey_box::GreyBoxSettings;
@@ -9,6 +10,7 @@ use crate::identify::innovation_form::DeviationOptions;
 use crate::identify::subspace::SubspaceOptions;
 use crate::identify::subspace::stabilisation::StabilisationOptions;
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Detrend, Gaps, open};
+use crate::redesign::RedesignOptions;
 use crate::reduce::ReductionOptions;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -46,6 +48,12 @@ pub struct RunSettings {
     /// A physical structure, estimated from the result of the scheme on; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grey_box: Option<GreyBoxSettings>,
+    /// What is stated about the loop; its cheap parts also without this table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<CertificateSettings>,
+    /// A new controller on the identified model; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redesign: Option<RedesignOptions>,
     /// The stabilisation diagrams of S and of the direct model.
     #[serde(default)]
     pub stabilisation: StabilisationSettings,
@@ -269,7 +277,7 @@ impl RunSettings {
     fn check(&self, path: &Path) -> Result<()> {
         let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
         let problem = self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.number_problem());
-        let problem = problem.or_else(structure);
+        let problem = problem.or_else(structure).or_else(|| self.certificate.as_ref()?.problem());
         problem.map_or(Ok(()), |problem| Err(Error::Settings { path: path.to_owned(), at: None, problem }))
     }
 

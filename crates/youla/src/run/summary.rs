@@ -1,7 +1,9 @@
 //! summary.json: the stable contract for scripts.
 
 use super::artefacts::{SCHEMA, pairs};
+use super::certificate::RunCertificate;
 use super::pipeline::{Identification, StageTimes};
+use super::redesign;
 use super::response::{decibel, log_grid, model_responses};
 use super::uncertainty::{summary_entry, with_deviations};
 use super::verdict::{Method, ModelVerdict};
@@ -48,6 +50,10 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     });
     if let Some(v) = found.verdict.of(Method::TruePlant) {
         all["true_plant"] = json!({"fit": fits(v)});
+    }
+    all["certificate"] = json!(found.certificate.as_ref().map(RunCertificate::json));
+    if let Some(Ok(new)) = &found.redesign {
+        all["redesign"] = redesign::json(new);
     }
     if found.hansen.uncertainty.is_some() {
         all["uncertainty"] = summary_entry(found);

@@ -136,7 +136,12 @@ fn verify_model(found: &Identification, method: Method, model: &StateSpace<Discr
     })
 }
 
-fn verify_record(found: &Identification, model: &StateSpace<Discrete>, record: &LoopRecord) -> Result<RecordVerdict> {
+/// One model on one verification record.
+pub(super) fn verify_record(
+    found: &Identification,
+    model: &StateSpace<Discrete>,
+    record: &LoopRecord,
+) -> Result<RecordVerdict> {
     let lines = record.disturbance.as_ref().map(|w| w.as_ref());
     let measured = without_lines(record.y.as_ref(), lines)?;
     let predicted = match found.settings.verification.prediction {

@@ -16,6 +16,7 @@ mod paper;
 mod pipeline;
 mod records;
 mod redraw;
+mod reduction;
 mod response;
 mod segments;
 mod settings;
@@ -41,6 +42,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use reduction::RunReduction;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

@@ -319,6 +319,40 @@ pub enum Error {
         /// The order of the minimal realisation.
         minimal: usize,
     },
+    /// Fewer states were asked for than are kept as they are.
+    #[error(
+        "a model of order {order} was asked for, but {kept} poles at or beyond the stability boundary are kept as they are; ask for at least {kept} or move the boundary"
+    )]
+    OrderBelowKept {
+        /// The order that was asked for.
+        order: usize,
+        /// Poles that are kept.
+        kept: usize,
+    },
+    /// An order was to follow from a bound that the method does not have.
+    #[error(
+        "the weighted reduction has no error bound from which an order could follow; take order = {{ fixed = ... }} or {{ closed-loop = ... }}"
+    )]
+    NoErrorBound,
+    /// A choice of the reduction needs the loop.
+    #[error(
+        "{what} needs the loop of the model with its controller, which a reduction of the model alone does not have"
+    )]
+    NeedsLoop {
+        /// The choice.
+        what: &'static str,
+    },
+    /// No order of a reduction is good enough in the loop.
+    #[error(
+        "no order has a relative closed-loop error of at most {limit} under a controller that stabilises it{}; allow a larger error or reduce by another method",
+        lowest.map(|error| format!(" (the lowest is {error:.2e})")).unwrap_or_default()
+    )]
+    NoReducedOrder {
+        /// The error that was asked for.
+        limit: f64,
+        /// The lowest of all orders that the controller stabilises.
+        lowest: Option<f64>,
+    },
     // ---- records and files -------------------------------------------------------------------------------------
     /// The operating system refused to read or write a file.
     #[error("{}: {source}", path.display())]
@@ -732,6 +766,7 @@ impl Error {
             | Error::NotStabilisable { .. }
             | Error::NotDetectable { .. }
             | Error::NoRedesign { .. }
+            | Error::NoReducedOrder { .. }
             | Error::Undetermined { .. } => ErrorKind::Numerical,
             _ => ErrorKind::BadInput,
         }

@@ -59,7 +59,8 @@ fn models_do_not_depend_on_the_number_of_threads() {
             let found = run_demo(3);
             let direct = found.direct.unwrap().unwrap();
             let models = (found.hansen.deviation.model, found.hansen.plant, direct.model);
-            (models, found.reduction.unwrap().unwrap().model, found.diagrams.deviation.unwrap().unwrap())
+            let reduced = found.reduction.unwrap().unwrap().found;
+            (models, (reduced.reduction.model, reduced.sweep), found.diagrams.deviation.unwrap().unwrap())
         })
     };
     assert_eq!(models(1), models(2));

@@ -25,7 +25,7 @@ fn summary_has_the_documented_structure() {
     let summary = json(&demo().join("summary.json"));
     let mut expected =
         ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
-    expected.extend(["controller_mismatch", "seconds", "true_plant", "uncertainty"]);
+    expected.extend(["controller_mismatch", "reduction", "seconds", "true_plant", "uncertainty"]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
     assert_eq!(summary["schema"], 1);
@@ -67,6 +67,31 @@ fn summary_describes_every_method() {
     }
     assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
     assert_eq!(summary["methods"]["hansen"]["s_stable"], true);
+}
+
+#[test]
+fn the_reduction_is_measured_at_every_order() {
+    let reduction = &json(&demo().join("summary.json"))["reduction"];
+    let figures = ["closed_loop_relative", "error_bound", "kept", "method", "minimal_order", "open_loop_error"];
+    let others = ["open_loop_relative", "order", "proposed_order", "stabilised_by_controller"];
+    assert_eq!(keys(reduction), [&figures[..], &others[..]].concat());
+    assert_eq!((&reduction["order"], &reduction["minimal_order"]), (&Value::from(6), &Value::from(16)));
+    assert_eq!(
+        (&reduction["stabilised_by_controller"], &reduction["proposed_order"]),
+        (&Value::Bool(true), &Value::Null)
+    );
+    assert!(reduction["open_loop_error"].as_f64() <= reduction["error_bound"].as_f64());
+    let sweep = json(&demo().join("6-reduce/sweep.json"));
+    let orders = sweep["orders"].as_array().expect("an array");
+    assert_eq!(orders.len(), 16);
+    assert_eq!(orders[5]["closed_loop_relative"], reduction["closed_loop_relative"]);
+    assert_eq!(sweep["provenance"]["seed"], 1);
+    let table = fs::read_to_string(demo().join("6-reduce/sweep.csv")).expect("readable");
+    let header = "order,error_bound,open_loop_error,open_loop_relative,closed_loop_relative,stabilised_by_controller";
+    assert!(table.starts_with(&format!("{header},worst_pole_re,worst_pole_im\n")), "{table}");
+    assert_eq!(table.lines().count(), 17);
+    let page = fs::read_to_string(demo().join("report.html")).expect("readable");
+    assert!(page.contains("The controller stabilises the reduced model of order 6"));
 }
 
 #[test]
@@ -129,6 +154,8 @@ fn same_seed_same_artefacts_on_any_number_of_threads() {
             "4-identify/stabilisation_direct.csv",
             "5-recombine/hansen.json",
             "6-reduce/hansen_reduced.json",
+            "6-reduce/sweep.json",
+            "6-reduce/sweep.csv",
             "7-validate/verdict.json",
         ] {
             let bytes = |run: &Path| fs::read(run.join(name)).expect("readable");

@@ -73,9 +73,34 @@ function order(host) {
 }
 
 function reduction(host) {
-  const { hankel, chosen, bound, label } = report.reduction;
-  const said = bound == null ? "" : ` The error is at most ${inProse(bound)} in the H∞ norm.`;
-  stemFigure(host, label, { ...methodOf("hansen_reduced").style, dash: [] }, hankel, chosen, "Hankel singular value", `Hankel singular values (${label}). ${chosen} of ${hankel.length} states are kept.${said}`);
+  const { hankel, chosen, kept = 0, bound, bound_is_gap, label, orders = [] } = report.reduction;
+  const said = bound == null ? "" : ` The error is at most ${inProse(bound)} in the ${bound_is_gap ? "gap metric" : "H∞ norm"}.`;
+  const apart = kept ? `, besides ${kept} whose poles are kept as they are` : "";
+  stemFigure(host, label, { ...methodOf("hansen_reduced").style, dash: [] }, hankel, chosen - kept, "Hankel singular value", `Hankel singular values (${label}). ${chosen - kept} of ${hankel.length} states are kept${apart}.${said}`);
+  if (orders.length) errorsByOrder(host);
+}
+
+// Errors in open and closed loop over the order; shaded: orders that the controller does not stabilise.
+function errorsByOrder(host) {
+  const { orders, plant_norm, bound_is_gap, chosen } = report.reduction;
+  const plotHost = element("div"), rows = orders.filter(o => !o.failure);
+  const own = { ...methodOf("hansen_reduced").style, dash: [] };
+  const relativeBound = o => o.bound == null ? null : bound_is_gap ? o.bound : plant_norm ? o.bound / plant_norm : null;
+  const entries = [
+    { id: "closed", name: "closed loop", style: own, of: o => o.closed_loop_relative },
+    { id: "open", name: "open loop", style: { ...own, colour: "--soft" }, of: o => o.open_loop_relative },
+    { id: "bound", name: bound_is_gap ? "bound (gap)" : "bound", style: { ...own, colour: "--soft", dash: [5, 4], width: 1 }, of: relativeBound },
+  ].map(e => ({ ...e, at: rows.filter(o => e.of(o) > 0) })).filter(e => e.at.length);
+  const caption = `Relative errors over the order (H∞ norm); order ${chosen} is taken.` + (rows.some(o => !o.stabilised) ? " Shaded: the controller does not stabilise the reduced model." : "");
+  host.append(element("div", {}, element("p", { class: "panel-title" }, "Error against order"), plotHost, element("p", { class: "caption" }, caption)));
+  if (!entries.length) return;
+  mount(plotHost, () => stack(plotHost, {
+    label: `${caption} The numbers are in the table beneath.`, x: { label: "Order", unit: "", whole: true },
+    legend: entries.map(({ id, name, style }) => ({ id, name, style })),
+    shades: rows.filter(o => !o.stabilised).map(o => [o.order - 0.5, o.order + 0.5]),
+    panels: [{ label: "Relative error", unit: "", height: 220, log: true,
+      curves: entries.map(e => ({ id: e.id, x: e.at.map(o => o.order), y: e.at.map(e.of), style: e.style })) }],
+  }));
 }
 
 function stemFigure(host, title, style, values, chosen, label, caption) {

@@ -1,11 +1,16 @@
-//! Doubly coprime factors and the Youla-Jabr-Bongiorno-Kucera parametrisation, eqs (13)-(25) and (28).
+//! Doubly coprime factors and the Youla-Jabr-Bongiorno-Kucera parametrisation, eqs (13)-(25) and (28); coprime factors of a
+//! plant alone.
 
 mod bezout;
 mod coprime;
+mod normalised;
 mod signals;
+mod stable;
 mod stream;
 mod youla;
 
 pub use coprime::CoprimeFactors;
+pub use normalised::{NormalisedFactors, normalised_right_coprime};
 pub use signals::YoulaSignals;
+pub use stable::{Denominator, StableFactors, left_coprime, right_coprime};
 pub use stream::YoulaStream;

@@ -550,8 +550,8 @@ pub struct Mode {
     pub deviation: Option<[f64; 2]>,
 }
 
-/// Hankel singular values of a model that was reduced.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+/// Hankel singular values of a model that was reduced, and what each order costs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Reduction {
     /// What was reduced and how, for example "G(S) by balanced truncation".
     pub label: String,
@@ -560,8 +560,44 @@ pub struct Reduction {
     pub hankel: Vec<f64>,
     /// Order that was kept.
     pub chosen: usize,
-    /// Bound of the error in the H-infinity norm, in the units of the model.
+    /// States among them whose poles were kept as they are; they have no Hankel singular value.
+    #[serde(default)]
+    pub kept: usize,
+    /// Bound of the error in the H-infinity norm, in the units of the model, or in the gap metric.
     pub bound: Option<f64>,
+    /// Whether the bound is one of the gap.
+    #[serde(default)]
+    pub bound_is_gap: bool,
+    /// Largest gain of the model over frequency, where it is finite.
+    #[serde(default)]
+    pub plant_norm: Option<f64>,
+    /// What every order costs; empty where that was not computed.
+    #[serde(default)]
+    pub orders: Vec<ReductionOrder>,
+    /// The outcome, in a sentence.
+    #[serde(default)]
+    pub sentence: String,
+}
+
+/// One order of a reduction.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReductionOrder {
+    /// The order.
+    pub order: usize,
+    /// A-priori bound of the error.
+    pub bound: Option<f64>,
+    /// Largest gain of the error over frequency.
+    pub open_loop: Option<f64>,
+    /// The same over that of the model.
+    pub open_loop_relative: Option<f64>,
+    /// Error of the closed loop from alpha to y over the closed loop.
+    pub closed_loop_relative: Option<f64>,
+    /// Whether the controller stabilises the model of this order.
+    pub stabilised: bool,
+    /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
+    pub worst_pole: Option<[f64; 2]>,
+    /// Why there is no model of this order.
+    pub failure: Option<String>,
 }
 
 /// What can be said of one model in the loop with the actual controller.

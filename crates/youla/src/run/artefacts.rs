@@ -4,6 +4,7 @@ use super::folder::RunFolder;
 use super::pipeline::Identification;
 use super::records::{LoopRecord, SourceFile};
 use super::redesign;
+use super::reduction;
 use super::settings::RunSettings;
 use super::stabilisation::{as_csv, as_json};
 use super::uncertainty::grey_box_uncertainty;
@@ -277,10 +278,11 @@ impl Writer<'_> {
         }
         match &found.reduction {
             Some(Ok(r)) => {
-                let details = serde_json::json!({
-                    "hankel_singular_values": r.hankel, "error_bound": r.error_bound, "minimal_order": r.minimal_order,
-                });
-                self.model("6-reduce/hansen_reduced", &r.model, details)
+                self.model("6-reduce/hansen_reduced", &r.found.reduction.model, r.details())?;
+                let mut file = reduction::as_json(r);
+                file["provenance"] = serde_json::json!(self.provenance);
+                self.folder.json("6-reduce/sweep.json", &file)?;
+                self.folder.text("6-reduce/sweep.csv", &reduction::as_csv(&r.found.sweep))
             }
             Some(Err(e)) => self.folder.json("6-reduce/hansen_reduced.json", &refused(e)),
             None => Ok(()),

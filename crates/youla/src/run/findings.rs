@@ -10,7 +10,7 @@ use crate::identify::refine::RefineNoise;
 use crate::identify::subspace::{Uncertainty, amplitudes};
 use crate::report::data::{Evidence, Note, Status, Verdict};
 
-/// The answer to "can I trust it?", about five lines, each with its evidence.
+/// The answer to "can I trust it?", a few lines, each with its evidence.
 pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     [
         fit_line(found),
@@ -19,6 +19,7 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
         redesign_line(found),
         deviation_line(found),
         evidence_line(found),
+        reduction_line(found),
         grey_box_line(found),
         controller_line(found),
         factor_line(found),
@@ -242,6 +243,11 @@ fn evidence_line(found: &Identification) -> Option<Verdict> {
         (Status::Caution, text)
     };
     Some(Verdict { status, text, evidence: Evidence::Frequency })
+}
+
+/// Whether the controller stabilises the reduced model, and what the reduction costs in the loop.
+fn reduction_line(found: &Identification) -> Option<Verdict> {
+    Some(found.reduction.as_ref()?.as_ref().ok()?.verdict())
 }
 
 /// Whether the physical structure explains what G(S) explains.

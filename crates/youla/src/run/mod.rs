@@ -19,6 +19,7 @@ mod pipeline;
 mod records;
 mod redesign;
 mod redraw;
+mod reduction;
 mod response;
 mod segments;
 mod settings;
@@ -46,6 +47,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use reduction::RunReduction;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

@@ -328,13 +328,7 @@ fn structure(found: &Identification) -> Option<&GreyBoxRun> {
 }
 
 fn reduction(found: &Identification) -> Option<draw::Reduction> {
-    let reduction = found.reduction.as_ref()?.as_ref().ok()?;
-    Some(draw::Reduction {
-        label: format!("G(S) by {}", reduction.method),
-        hankel: reduction.hankel.clone(),
-        chosen: reduction.model.order(),
-        bound: Some(reduction.error_bound),
-    })
+    Some(found.reduction.as_ref()?.as_ref().ok()?.drawn())
 }
 
 fn certificate(found: &Identification, v: &ModelVerdict) -> draw::Certificate {

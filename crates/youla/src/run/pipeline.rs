@@ -5,6 +5,7 @@ use super::factorise::{Factorisation, factorise_run};
 use super::grey_box::{GreyBoxRun, grey_box};
 use super::records::RunRecords;
 use super::redesign::redesigned;
+use super::reduction::{RunReduction, run_reduction};
 use super::response::{check_grid, indirect};
 use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
@@ -20,7 +21,6 @@ use crate::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::lti::Discrete;
 use crate::record::IndirectResponse;
 use crate::redesign::Redesign;
-use crate::reduce::{Reduction, reduce};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -125,8 +125,8 @@ pub struct Identification {
     pub hansen: HansenModel,
     /// The uncertainty of S and G(S), where it was asked for and can be had.
     pub uncertainty: Option<RunUncertainty>,
-    /// `G_red(S)` where it was asked for, or the reason why there is none.
-    pub reduction: Option<Result<Reduction<Discrete>>>,
+    /// `G_red(S)` in its loop where it was asked for, or the reason why there is none.
+    pub reduction: Option<Result<RunReduction>>,
     /// The direct model where it was asked for, or the reason why there is none.
     pub direct: Option<Result<SubspaceModel>>,
     /// The physical structure where one was declared, or the reason why it has no estimate.
@@ -275,7 +275,9 @@ pub fn identify(
         None => (None, None),
     };
     let diagrams = Diagrams { deviation: Some(deviation_diagram), direct: direct_diagram };
-    let reduction = clock.run(Stage::Reduce, || settings.reduction.as_ref().map(|o| reduce(&hansen.plant, o))); // (29)
+    let reduction = clock.run(Stage::Reduce, || {
+        settings.reduction.as_ref().map(|options| run_reduction(factors, &hansen, &records, options)) // (29)
+    });
     let mut found = Identification {
         verdict: Verdict::default(),
         certificate: None,

@@ -16,7 +16,7 @@ pub(super) fn redesigned(found: &Identification) -> Option<Result<Redesign>> {
     let reduced = found.reduction.as_ref().and_then(|r| r.as_ref().ok());
     let (input, output) = found.records.sizes();
     let problem = RedesignProblem {
-        model: reduced.map_or(&found.hansen.plant, |r| &r.model),
+        model: reduced.map_or(&found.hansen.plant, |r| &r.found.reduction.model),
         factors: &found.factorisation.factors,
         deviation: &found.hansen.deviation.model,
         uncertainty: found.hansen.deviation.uncertainty.as_ref(),

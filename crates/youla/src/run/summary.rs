@@ -20,6 +20,7 @@ use std::f64::consts::TAU;
 ///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
 /// ```
 ///
+/// With a reduction there is `reduction`: its order, errors in open and closed loop, whether the controller stabilises it.
 /// With an uncertainty there is `uncertainty`, and the modes of `hansen` have deviations and intervals; those of `grey_box` have them
 /// where its parameters have a covariance. It has `parameters`, `level`, `correlations`, `verdict`, `structures` and `lost`.
 /// A method or an indirect response that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
@@ -54,6 +55,9 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     all["certificate"] = json!(found.certificate.as_ref().map(RunCertificate::json));
     if let Some(Ok(new)) = &found.redesign {
         all["redesign"] = redesign::json(new);
+    }
+    if let Some(Ok(reduction)) = &found.reduction {
+        all["reduction"] = reduction.summary();
     }
     if found.hansen.uncertainty.is_some() {
         all["uncertainty"] = summary_entry(found);

@@ -111,7 +111,7 @@ pub(super) fn verify(found: &Identification) -> Result<Verdict> {
     }
     models.push((Method::Hansen, &found.hansen.plant));
     if let Some(Ok(reduction)) = &found.reduction {
-        models.push((Method::HansenReduced, &reduction.model));
+        models.push((Method::HansenReduced, &reduction.found.reduction.model));
     }
     if let Some(Ok(grey_box)) = &found.grey_box {
         models.push((Method::GreyBox, &grey_box.found.model.model));

@@ -186,6 +186,10 @@ fn report(plan: &Plan) -> ReportData {
             hankel: vec![31.0, 29.5, 12.1, 11.4, 0.21, 0.12, 0.03, 0.01, 2e-3, 1e-3, 3e-4, 1e-6],
             chosen: 4,
             bound: Some(0.75),
+            plant_norm: Some(60.0),
+            orders: (1..=6).map(reduced_to).collect(),
+            sentence: "The controller stabilises the reduced model of order 4.".into(),
+            ..Reduction::default()
         }),
         ..ReportData::default()
     };
@@ -341,6 +345,21 @@ fn experiment(plan: &Plan, seed: u64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
         })
         .collect();
     (u, y)
+}
+
+/// An order of the reduction; the first two are not stabilised, and the last has no model.
+fn reduced_to(order: usize) -> ReductionOrder {
+    let error = 3.0 * 10f64.powi(-(order as i32));
+    ReductionOrder {
+        order,
+        bound: Some(120.0 * error),
+        open_loop: Some(60.0 * error),
+        open_loop_relative: Some(error),
+        closed_loop_relative: (order > 2).then_some(0.5 * error),
+        stabilised: order > 2,
+        worst_pole: Some([0.99, 0.01]),
+        failure: (order == 6).then(|| "the reduced model must be stable".into()),
+    }
 }
 
 fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> Experiment {

@@ -13,6 +13,9 @@ pub(super) fn choices(paper: &Paper) -> Vec<String> {
         ReducedOrder::Minimal => "the minimal order".into(),
         ReducedOrder::Fixed(n) => format!("order {n}"),
         ReducedOrder::Bound(bound) => format!("the fewest states for an error bound of {}", short(bound, 3)),
+        ReducedOrder::ClosedLoop(limit) => {
+            format!("the fewest states for a relative closed-loop error of {}", short(limit, 3))
+        }
     };
     vec![
         format!("Sample time: {} s.", short(rig.timing.sample_time.value, 4)),

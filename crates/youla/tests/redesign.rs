@@ -249,6 +249,8 @@ fn exported_data_are_the_controller() {
         match (method, read.observer, read.q) {
             (RedesignMethod::Lqg, Some(observer), None) => assert_eq!((observer.f.len(), observer.l.len()), (2, 6)),
             (RedesignMethod::Youla, None, Some(q)) => {
+                let exact = new.exact.unwrap();
+                assert!(exact.stable && exact.identity_residual < 1e-9, "{:.1e}", exact.identity_residual);
                 // Q around the running controller is the new one.
                 let with_q = bench.factors.controller_of(&q.system(time).unwrap()).unwrap();
                 let omega: Vec<f64> = (1..60).map(|k| 250.0 * f64::from(k)).collect();

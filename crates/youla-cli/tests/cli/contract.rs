@@ -6,6 +6,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 use youla::record::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
+use youla::redesign::ExportedController;
 use youla::run::ModelFile;
 
 fn json(path: &Path) -> Value {
@@ -25,7 +26,15 @@ fn summary_has_the_documented_structure() {
     let summary = json(&demo().join("summary.json"));
     let mut expected =
         ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
-    expected.extend(["controller_mismatch", "reduction", "seconds", "true_plant", "uncertainty"]);
+    expected.extend([
+        "certificate",
+        "controller_mismatch",
+        "redesign",
+        "reduction",
+        "seconds",
+        "true_plant",
+        "uncertainty",
+    ]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
     assert_eq!(summary["schema"], 1);
@@ -38,7 +47,8 @@ fn summary_has_the_documented_structure() {
     assert!(summary["controller_mismatch"].as_f64().expect("a number") < 1e-9);
     assert_eq!(keys(&summary["uncertainty"]), ["blocks", "evidence", "level", "method"]);
     assert_eq!(summary["uncertainty"]["evidence"]["against_nominal"], true);
-    let stages = ["factor", "identify", "record", "reduce", "report", "signals", "validate", "write"];
+    let stages =
+        ["certify", "factor", "identify", "record", "redesign", "reduce", "report", "signals", "validate", "write"];
     assert_eq!(keys(&summary["seconds"]), stages);
     assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
 }
@@ -92,6 +102,58 @@ fn the_reduction_is_measured_at_every_order() {
     assert_eq!(table.lines().count(), 17);
     let page = fs::read_to_string(demo().join("report.html")).expect("readable");
     assert!(page.contains("The controller stabilises the reduced model of order 6"));
+}
+
+/// The demonstration's controller stabilises the bearing with hardly any damping; the region of S is small.
+#[test]
+fn the_certificate_covers_the_region_of_s_and_wrong_controllers() {
+    let certificate = &json(&demo().join("summary.json"))["certificate"];
+    let expected = ["band", "controller_errors", "deviation_poles", "identity_residual", "margins", "stable"];
+    assert_eq!(keys(certificate), expected);
+    assert_eq!((&certificate["stable"], &certificate["band"]["holds"]), (&Value::Bool(true), &Value::Bool(true)));
+    assert!(certificate["identity_residual"].as_f64().expect("a number") < 1e-9);
+    let band = &certificate["band"];
+    assert_eq!((band["models"].as_u64(), band["within"].as_u64()), (Some(500), Some(475)));
+    let [low, high] = [0, 1].map(|k| numbers(&band["radius"]["bounds"])[k]);
+    let estimate = band["radius"]["value"].as_f64().expect("a number");
+    assert!(low < estimate && estimate < high && high < 1.0);
+    let errors = certificate["controller_errors"].as_array().expect("an array");
+    let names: Vec<&str> = errors.iter().filter_map(|e| e["error"].as_str()).collect();
+    assert_eq!(names, ["none", "delay", "gain_high", "gain_low", "saturation", "initial_state"]);
+    // With a delay left out S comes out unstable; 5 % of gain move the modes of the machine by less than 1 %.
+    assert!(errors[1]["deviation_radius"].as_f64() > Some(1.0));
+    let machine = |error: &Value| {
+        let modes = error["modes"].as_array().expect("an array").clone();
+        modes.into_iter().filter(|m| m["without"]["hz"].as_f64() > Some(190.0)).collect::<Vec<_>>()
+    };
+    for error in &errors[2..4] {
+        assert_eq!(machine(error).len(), 2);
+        for mode in machine(error) {
+            let ratio = mode["hz"].as_f64().unwrap() / mode["without"]["hz"].as_f64().unwrap();
+            assert!((ratio - 1.0).abs() < 0.01, "{mode}");
+        }
+    }
+    let file = json(&demo().join("7-validate/certificate.json"));
+    assert_eq!(file["band"], certificate["band"]);
+}
+
+#[test]
+fn the_new_controller_is_exported_with_its_promise() {
+    let redesign = &json(&demo().join("summary.json"))["redesign"];
+    let damping = |of: &str| redesign[of]["least_damping"].as_f64().expect("a number");
+    assert!(damping("predicted") > 5.0 * damping("present"), "{redesign}");
+    assert_eq!(redesign["band"]["holds"], true);
+    let text = fs::read_to_string(demo().join("8-redesign/controller.json")).expect("readable");
+    let data: ExportedController = serde_json::from_str(&text).expect("the documented form");
+    let model: ModelFile =
+        serde_json::from_str(&fs::read_to_string(demo().join("8-redesign/new_controller.json")).expect("readable"))
+            .expect("a model");
+    assert_eq!((&data.controller.a, &data.controller.c), (&model.a, &model.c));
+    let observer = data.observer.expect("LQG has an observer form");
+    assert_eq!((observer.a.len(), observer.f.len(), observer.l[0].len()), (6, 2, 2));
+    let source = fs::read_to_string(demo().join("8-redesign/controller.rs")).expect("readable");
+    assert!(source.contains("pub const OBSERVER: Matrices<f64, 6, 2, 2> = Matrices {"), "{source}");
+    assert!(source.contains(&format!("{:?}", observer.f[0][0])), "{source}");
 }
 
 #[test]

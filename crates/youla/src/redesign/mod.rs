@@ -24,7 +24,7 @@ pub use robust::small_gain;
 use crate::factor::CoprimeFactors;
 use crate::identify::subspace::Uncertainty;
 use crate::lti::{Discrete, StateSpace};
-use crate::validate::{BandCertificate, BandOptions, certify_band};
+use crate::validate::{BandCertificate, BandOptions, ExactCertificate, certify_band, certify_deviation};
 use crate::{Error, ErrorKind, Mat, Result};
 use serde::{Deserialize, Serialize};
 
@@ -130,6 +130,8 @@ pub struct Redesign {
     pub present: LoopFigures,
     /// The loop of the model with the new one.
     pub predicted: LoopFigures,
+    /// The exact test of G(S) with K(Q), for `youla`.
+    pub exact: Option<ExactCertificate>,
     /// The new loop over the region of S, where it is known.
     pub band: Option<BandCertificate>,
     /// All weights that were tried, in the order of the options.
@@ -171,7 +173,9 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
             let input_weight = tried[k].0.input_weight;
             let candidates = tried.into_iter().map(|t| t.0).collect();
             let method = options.method;
-            return Ok(Redesign { method, input_weight, controller, present, predicted, band, candidates });
+            let exact = controller.q.as_ref().map(|q| certify_deviation(problem.factors, problem.deviation, Some(q)));
+            let exact = exact.transpose()?;
+            return Ok(Redesign { method, input_weight, controller, present, predicted, exact, band, candidates });
         }
         tried[k].0.refused =
             band.map(|b| format!("unstable for {} of {} models within the region of S", b.unstable_within, b.within));

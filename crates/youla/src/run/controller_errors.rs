@@ -12,11 +12,11 @@ use super::records::{LoopRecord, RunRecords};
 use super::settings::{Construction, FactorSettings};
 use super::signals::deviation_signals;
 use super::verdict::verify_record;
-use crate::identify::hansen::deviation_data;
+use crate::identify::hansen::{HansenModel, deviation_data};
 use crate::identify::innovation_form::hansen_structured;
-use crate::identify::subspace::{SubspaceOptions, UncertaintyOptions};
+use crate::identify::subspace::{Stability, SubspaceOptions, UncertaintyOptions};
 use crate::linalg::eye;
-use crate::lti::{Discrete, Mode, StateSpace};
+use crate::lti::{Mode, StateSpace};
 use crate::report::data as draw;
 use crate::{Mat, Result};
 use faer::Scale;
@@ -82,18 +82,20 @@ pub struct Changed {
     pub modes: Vec<[f64; 2]>,
     /// The same of the nearest modes with it.
     pub changed: Vec<[f64; 2]>,
-    /// Fit per verification record and output, percent.
+    /// Fit of S on alpha and beta, per channel, percent.
+    pub deviation_fit: Vec<f64>,
+    /// Largest magnitude of a pole of S: from 1 on, S is unstable.
+    pub deviation_radius: f64,
+    /// Fit of G(S) per verification record and output, percent.
     pub fit: Vec<Vec<f64>>,
-    /// Whether S is stable.
+    /// Whether the controller that ran stabilises G(S).
     pub stable: bool,
 }
 
-impl Changed {
-    /// Mean over records and outputs.
-    fn mean_fit(&self) -> f64 {
-        let all: Vec<f64> = self.fit.iter().flatten().copied().collect();
-        all.iter().sum::<f64>() / all.len() as f64
-    }
+/// Mean of fits.
+fn mean<'a>(fits: impl Iterator<Item = &'a f64>) -> f64 {
+    let all: Vec<f64> = fits.copied().collect();
+    all.iter().sum::<f64>() / all.len() as f64
 }
 
 /// Identifies once for each error; errors in parallel.
@@ -105,7 +107,7 @@ pub(super) fn controller_errors(
     settings: &CertificateSettings,
 ) -> Result<Vec<ControllerErrorEffect>> {
     let plain = identified(found, ControllerError::None)?;
-    let modes: Vec<Mode> = plain.modes()?.into_iter().filter(light).collect();
+    let modes: Vec<Mode> = plain.plant.modes()?.into_iter().filter(light).collect();
     let errors = [
         ControllerError::None,
         ControllerError::Delay,
@@ -115,11 +117,11 @@ pub(super) fn controller_errors(
         ControllerError::InitialState,
     ];
     let effect = |error: &ControllerError| {
-        let plant = match error {
+        let result = match error {
             ControllerError::None => Ok(plain.clone()),
             error => identified(found, *error),
         };
-        let outcome = plant.and_then(|plant| changed(found, &modes, &plant)).map_err(|e| e.to_string());
+        let outcome = result.and_then(|result| changed(found, &modes, &result)).map_err(|e| e.to_string());
         ControllerErrorEffect { error: *error, outcome }
     };
     Ok(errors.par_iter().map(effect).collect())
@@ -129,8 +131,8 @@ fn light(mode: &Mode) -> bool {
     mode.pole.im > 0.0 && mode.zeta < WELL_DAMPED
 }
 
-/// G(S) with an error in the description of the controller.
-fn identified(found: &Identification, error: ControllerError) -> Result<StateSpace<Discrete>> {
+/// S and G(S) with an error in the description of the controller; an unstable S is a result here.
+fn identified(found: &Identification, error: ControllerError) -> Result<HansenModel> {
     let (settings, time) = (&found.settings, found.records.time);
     let controller = &found.factorisation.controller;
     let described = match error {
@@ -154,9 +156,10 @@ fn identified(found: &Identification, error: ControllerError) -> Result<StateSpa
     };
     let signals = deviation_signals(&factors, &records.estimation, settle)?;
     let lines = records.disturbances(signals.settle);
-    let options = SubspaceOptions { uncertainty: UncertaintyOptions::default(), ..settings.hansen.clone() };
+    let uncertainty = UncertaintyOptions::default();
+    let options = SubspaceOptions { uncertainty, stability: Stability::Allow, ..settings.hansen.clone() };
     let data = deviation_data(&factors, &signals.experiments, &lines, &options)?;
-    Ok(hansen_structured(&factors, &data, &options, &settings.deviation)?.plant)
+    hansen_structured(&factors, &data, &options, &settings.deviation)
 }
 
 /// The record as an error leaves it.
@@ -188,7 +191,8 @@ fn altered(record: &LoopRecord, error: ControllerError, settle: usize) -> LoopRe
     record
 }
 
-fn changed(found: &Identification, modes: &[Mode], plant: &StateSpace<Discrete>) -> Result<Changed> {
+fn changed(found: &Identification, modes: &[Mode], result: &HansenModel) -> Result<Changed> {
+    let HansenModel { plant, deviation, .. } = result;
     let own = plant.modes()?;
     let nearest = |mode: &Mode| {
         let distance = |other: &&Mode| (other.pole - mode.pole).norm();
@@ -200,7 +204,8 @@ fn changed(found: &Identification, modes: &[Mode], plant: &StateSpace<Discrete>)
         modes: modes.iter().map(|m| [m.hz, m.zeta]).collect(),
         changed: modes.iter().map(nearest).collect(),
         fit,
-        // K stabilises G(S) exactly where S is stable.
+        deviation_fit: deviation.fit.percent.clone(),
+        deviation_radius: deviation.model.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max),
         stable: crate::validate::certify(plant, &found.factorisation.controller)?.stable,
     })
 }
@@ -213,6 +218,8 @@ impl ControllerErrorEffect {
                 let mode = |(m, c): (&[f64; 2], &[f64; 2])| json!({"hz": c[0], "zeta": c[1], "without": {"hz": m[0], "zeta": m[1]}});
                 entry["modes"] = c.modes.iter().zip(&c.changed).map(mode).collect::<Vec<_>>().into();
                 entry["fit"] = json!(c.fit);
+                entry["deviation_fit"] = json!(c.deviation_fit);
+                entry["deviation_radius"] = json!(c.deviation_radius);
                 entry["stabilised_by_controller"] = json!(c.stable);
             }
             Err(reason) => entry["refused"] = json!(reason),
@@ -234,7 +241,9 @@ pub(super) fn table(effects: &[ControllerErrorEffect]) -> Option<draw::EvidenceT
                     _ => format!("{:+.2} Hz, ζ {:+.4}", c[0] - m[0], c[1] - m[1]),
                 };
                 cells.extend(c.modes.iter().zip(&c.changed).map(mode));
-                cells.push(percent(c.mean_fit()));
+                cells.push(percent(mean(c.deviation_fit.iter())));
+                cells.push(format!("{:.4}", c.deviation_radius));
+                cells.push(percent(mean(c.fit.iter().flatten())));
                 cells.push(if c.stable { "yes" } else { "no" }.into());
             }
             Err(reason) => cells.push(reason.clone()),
@@ -243,12 +252,12 @@ pub(super) fn table(effects: &[ControllerErrorEffect]) -> Option<draw::EvidenceT
     };
     let mut columns = vec!["Error".to_owned()];
     columns.extend((1..=first.modes.len()).map(|k| format!("Mode {k}")));
-    columns.extend(["Mean fit, %", "K stabilises G(S)"].map(String::from));
+    columns.extend(["Fit of S, %", "Largest pole of S", "Fit of G(S), %", "K stabilises G(S)"].map(String::from));
     Some(draw::EvidenceTable {
         title: "How wrong may the controller be described?".into(),
         text: "S was identified again with alpha and beta from a description of the controller that is wrong in one point.".into(),
         columns,
         rows: effects.iter().map(row).collect(),
-        caption: "Lightly damped modes of G(S), below the first row their change; fit on the verification records.".into(),
+        caption: "Lightly damped modes of G(S), below the first row their change. Fit of S on alpha and beta, of G(S) on the verification records, means over channels.".into(),
     })
 }

@@ -45,6 +45,7 @@ pub(super) fn json(redesign: &Redesign) -> Value {
             entry["holds"] = json!(band.holds());
             entry
         }),
+        "exact": redesign.exact.as_ref().map(|e| json!({"stable": e.stable, "identity_residual": e.identity_residual})),
         "candidates": redesign.candidates,
     })
 }

@@ -12,6 +12,8 @@ const LEAST_SHARE: f64 = 0.05;
 /// Figures of one loop.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LoopFigures {
+    /// From a disturbance at the plant input to y, channels in their rms.
+    pub response: StateSpace<Discrete>,
     /// Modes of the response of y to a disturbance at the plant input, channels in their rms, by their share in it.
     pub modes: Vec<SharedMode>,
     /// Least damping ratio of the oscillating modes with a share of 5 % or more; 1 where there is none.
@@ -41,7 +43,7 @@ impl LoopFigures {
         let modes = response.shared_modes()?;
         let least_damping = least_damping(&modes);
         let peak_response = hinf_norm(&response, &PeakOptions { tolerance: 1e-6 })?.value;
-        Ok(LoopFigures { modes, least_damping, peak_response, peak_sensitivity })
+        Ok(LoopFigures { response, modes, least_damping, peak_response, peak_sensitivity })
     }
 
     /// As JSON: the modes that matter, the least damping and the peak.

@@ -5,6 +5,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::figure::Figure;
 use super::numbers;
 use super::trace::{Timeline, Trace};
 use crate::units::Channel;
@@ -67,9 +68,9 @@ pub struct ReportData {
     /// Further evidence on the loop, below the certificates.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loop_tables: Vec<EvidenceTable>,
-    /// A new controller; empty without one.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub redesign_tables: Vec<EvidenceTable>,
+    /// A new controller.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redesign: Option<Redesign>,
     /// Relative residual of the Bezout identity of the factors.
     pub bezout_residual: Option<f64>,
     /// Duration of each stage.
@@ -615,6 +616,17 @@ pub struct Certificate {
     pub stabilised_by_controller: Option<bool>,
     /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
     pub worst_closed_loop_pole: Option<[f64; 2]>,
+}
+
+/// A new controller: its loop beside the present one.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Redesign {
+    /// The loops that the figure compares.
+    pub loops: Vec<Method>,
+    /// Their responses.
+    pub figure: Figure,
+    /// Modes, and the weights that were tried.
+    pub tables: Vec<EvidenceTable>,
 }
 
 /// A table of evidence, in words.

@@ -5,7 +5,7 @@ use minijinja::{Value, context};
 
 use super::data::{ReportData, Role};
 use super::page::{self, ALL_POINTS};
-use super::{phase, tables};
+use super::{phase, svg, tables};
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../../assets/report.html");
@@ -35,12 +35,15 @@ pub fn html(data: &ReportData) -> Result<String> {
         fits => Serde(tables::fit_rows(data)),
         modes => Serde(tables::mode_rows(data)),
         has => parts(data),
+        redesign_svg => data.redesign.as_ref().map(|new| svg(&new.figure, &new.loops)).transpose()?,
     };
     page::render(TEMPLATE, content, &FIGURES, &prepared_for_drawing(data))
 }
 
 fn prepared_for_drawing(data: &ReportData) -> ReportData {
     let mut drawn = data.clone();
+    // Drawn as SVG.
+    drawn.redesign = None;
     let points = all_points(&drawn);
     if points > ALL_POINTS {
         thin(&mut drawn, super::trace::MAX_POINTS * ALL_POINTS / points);

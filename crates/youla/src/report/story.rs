@@ -83,3 +83,20 @@ pub struct Row {
     /// As the text of the first column, then one text per further column. Those that are numbers stand to the right.
     pub cells: Vec<String>,
 }
+
+/// A section; `short` is its entry in the list of sections.
+pub(super) fn section(key: &str, title: &str, short: &str, blocks: Vec<Block>) -> Section {
+    Section { key: key.into(), title: title.into(), short: short.into(), blocks }
+}
+
+/// A table without groups of columns.
+pub(super) fn plain(key: &str, title: &str, caption: impl Into<String>, header: &[&str], rows: Vec<Row>) -> Table {
+    Table {
+        key: key.into(),
+        title: title.into(),
+        caption: caption.into(),
+        groups: Vec::new(),
+        header: header.iter().map(|h| (*h).into()).collect(),
+        rows,
+    }
+}

@@ -13,6 +13,7 @@ use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceModel, amplitudes};
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{Packing, Value, Variable, write_mat};
+use crate::report::{figure_csv, svg};
 use crate::units::Channel;
 use crate::{Mat, MatRef, Result, c64};
 use serde::{Deserialize, Serialize};
@@ -320,6 +321,9 @@ impl Writer<'_> {
                 let exported = redesign::exported(self.found, new);
                 self.folder.text("8-redesign/controller.rs", &exported.rust())?;
                 self.folder.json("8-redesign/controller.json", &exported)?;
+                let (figure, loops) = (redesign::figure(new)?, redesign::loops());
+                self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &loops))?;
+                self.folder.text("8-redesign/response.svg", &svg(&figure, &loops)?)?;
                 let mut file = redesign::json(new);
                 file["provenance"] = serde_json::json!(self.provenance);
                 self.folder.json("8-redesign/redesign.json", &file)

@@ -57,12 +57,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
         loop_tables: found.certificate.as_ref().map(RunCertificate::tables).unwrap_or_default(),
-        redesign_tables: found
-            .redesign
-            .as_ref()
-            .and_then(|r| r.as_ref().ok())
-            .map(redesign::tables)
-            .unwrap_or_default(),
+        redesign: redesign(found)?,
         bezout_residual: Some(found.factorisation.bezout_residual),
         stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
     })
@@ -320,6 +315,13 @@ fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
         deviation: bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation]),
     };
     Ok(v.modes.iter().enumerate().map(mode).collect())
+}
+
+/// The present and the predicted loop.
+fn redesign(found: &Identification) -> Result<Option<draw::Redesign>> {
+    let Some(Ok(new)) = &found.redesign else { return Ok(None) };
+    let (loops, figure) = (redesign::loops().to_vec(), redesign::figure(new)?);
+    Ok(Some(draw::Redesign { loops, figure, tables: redesign::tables(new) }))
 }
 
 /// The physical structure, where one was estimated.

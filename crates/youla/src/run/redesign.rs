@@ -1,11 +1,14 @@
 //! `[redesign]`: a new controller on the model of a run, with what it is worth.
 
 use super::pipeline::Identification;
-use crate::lti::SharedMode;
+use super::response::decibel;
+use crate::lti::{SharedMode, frequency_response};
 use crate::redesign::{Candidate, ExportedController, LoopFigures, Redesign, RedesignProblem, redesign};
 use crate::report::data as draw;
+use crate::report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
 use crate::{Error, Result};
 use serde_json::{Value, json};
+use std::f64::consts::TAU;
 
 /// Designs on the reduced model where there is one, else on G(S).
 ///
@@ -56,12 +59,12 @@ pub(super) fn sentence(redesign: &Redesign) -> String {
     let band = redesign.band.map_or_else(String::new, |b| {
         format!(", and stabilises every one of the {} models within the {:.0} % region of S", b.within, 100.0 * b.level)
     });
-    let verb = if redesign.gains_damping() { "raises" } else { "does not raise" };
+    let verb = if redesign.gains_damping() { "raises" } else { "takes" };
     format!(
-        "The new controller {verb} the least damping of the loop: {:.3} instead of {:.3}, a peak of the response to a disturbance at \
-         the input of {:.2} instead of {:.2}, a peak sensitivity of {:.2} instead of {:.2}{band}. It has not run yet.",
-        predicted.least_damping,
+        "The new controller {verb} the least damping of the loop from {:.3} to {:.3}, with a peak of the response to a disturbance at \
+         the input of {:.2} (now {:.2}) and a peak sensitivity of {:.2} (now {:.2}){band}. It has not run yet.",
         present.least_damping,
+        predicted.least_damping,
         predicted.peak_response,
         present.peak_response,
         predicted.peak_sensitivity,
@@ -107,5 +110,48 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
             caption: "Of those within the limits the one with the most damping is taken that stabilises every model within the region of S."
                 .into(),
         },
+    ]
+}
+
+/// Points of the responses that are drawn.
+const POINTS: usize = 600;
+
+/// The largest gain from a disturbance at the plant input to y over frequency, now and with the new controller.
+///
+/// # Errors
+/// As [`frequency_response`].
+pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
+    let nyquist = 0.5 / redesign.controller.system.time().ts();
+    let hz: Vec<f64> =
+        (0..POINTS).map(|k| nyquist * 10f64.powf(-2.5 * (1.0 - (k + 1) as f64 / POINTS as f64))).collect();
+    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
+    let curve = |method: &draw::Method, figures: &LoopFigures| {
+        let response = frequency_response(&figures.response, &omega)?;
+        let gain = response.iter().map(|g| g.singular_values().map_or(f64::NAN, |s| s.first().copied().unwrap_or(0.0)));
+        let y = gain.map(decibel).collect();
+        Ok(Curve { method: method.key.clone(), note: String::new(), drawn: Drawn::Line, x: hz.clone(), y })
+    };
+    let [present, new] = loops();
+    let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), range: None, log };
+    let panel = Panel {
+        title: String::new(),
+        x: axis("frequency", "Hz", true),
+        y: axis("largest gain", "dB", false),
+        content: Content::Curves(vec![curve(&present, &redesign.present)?, curve(&new, &redesign.predicted)?]),
+    };
+    Ok(Figure {
+        key: "response".into(),
+        title: "The loop, present and predicted".into(),
+        caption: "Largest gain from a disturbance at the plant input to y, channels in their rms.".into(),
+        layout: Layout::Stacked,
+        panels: vec![panel],
+    })
+}
+
+/// The two loops as the figure names them.
+pub(super) fn loops() -> [draw::Method; 2] {
+    [
+        draw::Method::new("present", "controller that ran", draw::Role::Nominal),
+        draw::Method::new("new", "new controller", draw::Role::Hansen),
     ]
 }

@@ -7,6 +7,7 @@ use super::{section_experiments, section_rig, section_settings, section_study, s
 use crate::Result;
 use crate::report::data;
 use crate::report::figure::Figure;
+pub(super) use crate::report::story::section;
 use crate::report::story::{Block, Section, Story, Table};
 use crate::study::{Method, Paper};
 
@@ -78,11 +79,6 @@ pub fn paper_tables(paper: &Paper) -> Result<Vec<Table>> {
     let sections = paper_story(paper)?.sections.into_iter().filter(|s| s.key != TIMING);
     let blocks = sections.flat_map(|s| s.blocks);
     Ok(blocks.filter_map(|b| if let Block::Table(table) = b { Some(table) } else { None }).collect())
-}
-
-/// A section; `short` is its entry in the list of sections.
-pub(super) fn section(key: &str, title: &str, short: &str, blocks: Vec<Block>) -> Section {
-    Section { key: key.into(), title: title.into(), short: short.into(), blocks }
 }
 
 /// What the paper claims and whether it comes out.

@@ -1,20 +1,9 @@
 //! Parts that the tables share.
 
 use super::words::{AXES, percent};
-use crate::report::story::{Row, Table};
+use crate::report::story::Row;
+pub(super) use crate::report::story::plain;
 use crate::study::{ExperimentModel, Method};
-
-/// A table without groups of columns.
-pub(super) fn plain(key: &str, title: &str, caption: impl Into<String>, header: &[&str], rows: Vec<Row>) -> Table {
-    Table {
-        key: key.into(),
-        title: title.into(),
-        caption: caption.into(),
-        groups: Vec::new(),
-        header: header.iter().map(|h| (*h).into()).collect(),
-        rows,
-    }
-}
 
 /// A row that is about no method.
 pub(super) fn row(cells: impl IntoIterator<Item = String>) -> Row {

@@ -9,7 +9,7 @@ mod figure;
 mod tables;
 
 use super::data::{Method, Role};
-use super::story::{Block, Section, Story};
+use super::story::{Block, Story, section};
 use crate::study::{ARRIVED, Search, StartCase, StartRow, StartsSettings, start_counts, start_failures};
 
 /// What the study of starts found.
@@ -59,10 +59,12 @@ pub fn starts_story(starts: &Starts) -> Story {
             section(
                 "arrived",
                 "What arrives",
+                "What arrives",
                 vec![Block::Figure(figure::arrived(&counts)), Block::Table(tables::counts(&counts))],
             ),
             section(
                 "failures",
+                "What the searches without a start leave",
                 "What the searches without a start leave",
                 vec![match failures.is_empty() {
                     true => Block::Text("Nothing: all items arrived.".into()),
@@ -71,6 +73,7 @@ pub fn starts_story(starts: &Starts) -> Story {
             ),
             section(
                 "settings",
+                "What was done",
                 "What was done",
                 vec![
                     Block::List(
@@ -81,10 +84,6 @@ pub fn starts_story(starts: &Starts) -> Story {
             ),
         ],
     }
-}
-
-fn section(key: &str, title: &str, blocks: Vec<Block>) -> Section {
-    Section { key: key.into(), title: title.into(), short: title.into(), blocks }
 }
 
 fn searches(settings: &StartsSettings) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! Counts, and the items that the searches without a start do not solve.
 
-use crate::report::story::{Row, Table};
+use crate::report::story::{Row, Table, plain};
 use crate::study::{ARRIVED, StartCount, StartFailure};
 
 /// One line per case and search.
@@ -13,7 +13,7 @@ pub(super) fn counts(counts: &[StartCount]) -> Table {
         let cells = [c.case.key().to_owned(), c.search.label().to_owned()].into_iter().chain(numbers).chain(rest);
         Row { method: c.search.key().into(), cells: cells.chain([optional(c.with_start)]).collect() }
     };
-    table(
+    plain(
         "counts",
         "Counts",
         format!(
@@ -38,17 +38,11 @@ pub(super) fn failures(failures: &[StartFailure]) -> Table {
         let cells = first.into_iter().chain(behind).chain([f.reason.clone()]).collect();
         Row { method: f.search.key().into(), cells }
     };
-    table(
+    plain(
         "failures",
         "Failures",
-        "Items at which the search without a start did not arrive: points of fit behind the search from the true parameters, and why."
-            .into(),
+        "Items at which the search without a start did not arrive: points of fit behind the search from the true parameters, and why.",
         &["case", "item", "setting", "behind, horizontal", "behind, vertical", "reason"],
         failures.iter().map(row).collect(),
     )
-}
-
-fn table(key: &str, title: &str, caption: String, header: &[&str], rows: Vec<Row>) -> Table {
-    let header = header.iter().map(|h| (*h).into()).collect();
-    Table { key: key.into(), title: title.into(), caption, groups: Vec::new(), header, rows }
 }

@@ -1,8 +1,11 @@
 //! The files of a results folder beside the rows of the loops: data first, then what is drawn from them.
 
 use super::super::folder::replace_file;
-use crate::report::story::Block;
-use crate::report::{figure_csv, paper_figures, paper_story, paper_summary, story_html, story_methods, svg, table_csv};
+use crate::report::data::Method;
+use crate::report::story::{Block, Table};
+use crate::report::{
+    Figure, figure_csv, paper_figures, paper_story, paper_summary, story_html, story_methods, svg, table_csv,
+};
 use crate::study::Paper;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -18,13 +21,18 @@ pub(super) fn write_figures(paper: &Paper, target: &Path) -> Result<()> {
     let figures = folder(target, "figures")?;
     let methods = story_methods();
     let drawn = paper_figures(paper)?;
-    for figure in &drawn {
-        replace_file(&figures.join(format!("{}.csv", figure.key)), &figure_csv(figure, &methods))?;
-    }
-    for figure in &drawn {
-        replace_file(&figures.join(format!("{}.svg", figure.key)), &svg(figure, &methods)?)?;
-    }
-    Ok(())
+    drawn.iter().try_for_each(|drawn| figure_files(&figures, drawn, &methods))
+}
+
+/// A figure as CSV, then as SVG.
+pub(in crate::run) fn figure_files(folder: &Path, figure: &Figure, methods: &[Method]) -> Result<()> {
+    replace_file(&folder.join(format!("{}.csv", figure.key)), &figure_csv(figure, methods))?;
+    replace_file(&folder.join(format!("{}.svg", figure.key)), &svg(figure, methods)?)
+}
+
+/// A table as CSV.
+pub(in crate::run) fn table_file(folder: &Path, table: &Table) -> Result<()> {
+    replace_file(&folder.join(format!("{}.csv", table.key)), &table_csv(table))
 }
 
 /// `timing.json`, every table as CSV, those of times included, and the page.
@@ -34,7 +42,7 @@ pub(super) fn write_page(paper: &Paper, target: &Path) -> Result<()> {
     let tables = folder(target, "tables")?;
     for block in story.sections.iter().flat_map(|section| &section.blocks) {
         if let Block::Table(table) = block {
-            replace_file(&tables.join(format!("{}.csv", table.key)), &table_csv(table))?;
+            table_file(&tables, table)?;
         }
     }
     replace_file(&target.join("report.html"), &story_html(&story)?)

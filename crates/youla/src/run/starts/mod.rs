@@ -2,9 +2,9 @@
 
 use super::folder::replace_file;
 use super::paper::configuration::{FILE, claim, not_toml};
-use super::paper::results::{folder, json};
+use super::paper::results::{figure_files, folder, json, table_file};
 use crate::report::story::Block;
-use crate::report::{Starts, figure_csv, starts_methods, starts_story, story_html, svg, table_csv};
+use crate::report::{Starts, starts_methods, starts_story, story_html};
 use crate::study::{
     Campaign, Outcome, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts,
     start_counts, start_failures,
@@ -141,11 +141,8 @@ fn write(found: Starts, target: &Path) -> Result<WrittenStarts> {
     let (figures, tables, methods) = (folder(target, "figures")?, folder(target, "tables")?, starts_methods());
     for block in story.sections.iter().flat_map(|section| &section.blocks) {
         match block {
-            Block::Figure(figure) => {
-                replace_file(&figures.join(format!("{}.csv", figure.key)), &figure_csv(figure, &methods))?;
-                replace_file(&figures.join(format!("{}.svg", figure.key)), &svg(figure, &methods)?)?;
-            }
-            Block::Table(table) => replace_file(&tables.join(format!("{}.csv", table.key)), &table_csv(table))?,
+            Block::Figure(figure) => figure_files(&figures, figure, &methods)?,
+            Block::Table(table) => table_file(&tables, table)?,
             Block::Text(_) | Block::List(_) | Block::Listing { .. } => {}
         }
     }

@@ -17,6 +17,7 @@ mod pipeline;
 mod records;
 mod redraw;
 mod response;
+mod robustness;
 mod segments;
 mod settings;
 mod signals;
@@ -41,6 +42,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use robustness::Robustness;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

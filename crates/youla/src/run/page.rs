@@ -6,6 +6,7 @@ use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::response::{decibel, log_grid, model_responses};
+use super::robustness;
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
@@ -54,6 +55,8 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
+        margins: found.verdict.models.iter().map(robustness::row).collect(),
+        margins_caption: robustness::caption(found),
         bezout_residual: Some(found.factorisation.bezout_residual),
         stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
     })

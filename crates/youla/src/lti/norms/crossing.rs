@@ -59,7 +59,7 @@ pub(crate) fn crossings<T: TimeDomain>(system: &StateSpace<T>, part: Part) -> Re
     let value = |frequency: f64| -> Result<c64> { Ok(curve.at(frequency)?[(0, 0)]) };
     let mut found = if part == Part::Imaginary { vec![0.0, curve.end()] } else { Vec::new() };
     let mut marks = vec![0.0, curve.end()];
-    marks.extend(zeros(&system, part, &value)?.into_iter().filter(|w| w.is_finite()).map(|w| w.min(curve.end())));
+    marks.extend(zeros(&system, part, value)?.into_iter().filter(|w| w.is_finite()).map(|w| w.min(curve.end())));
     marks.sort_by(f64::total_cmp);
     marks.dedup();
     for mark in &marks {

@@ -28,6 +28,7 @@ fn summary_has_the_documented_structure() {
         ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
     expected.extend([
         "certificate",
+        "channel_scales",
         "controller_mismatch",
         "redesign",
         "reduction",
@@ -57,8 +58,8 @@ fn summary_has_the_documented_structure() {
 fn summary_describes_every_method() {
     let summary = json(&demo().join("summary.json"));
     assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced"]);
-    let common = ["fit", "modes", "order", "poles", "stabilised_by_controller"];
-    let hansen = ["fit", "modes", "order", "poles", "s_order", "s_stable", "stabilised_by_controller"];
+    let common = ["fit", "modes", "order", "poles", "robustness", "stabilised_by_controller"];
+    let hansen = ["fit", "modes", "order", "poles", "robustness", "s_order", "s_stable", "stabilised_by_controller"];
     for (name, expected, order) in
         [("direct", &common[..], 6), ("hansen", &hansen[..], 16), ("hansen_reduced", &hansen[..], 6)]
     {
@@ -154,6 +155,60 @@ fn the_new_controller_is_exported_with_its_promise() {
     let source = fs::read_to_string(demo().join("8-redesign/controller.rs")).expect("readable");
     assert!(source.contains("pub const OBSERVER: Matrices<f64, 6, 2, 2> = Matrices {"), "{source}");
     assert!(source.contains(&format!("{:?}", observer.f[0][0])), "{source}");
+}
+
+#[test]
+fn summary_says_what_each_loop_can_bear() {
+    let summary = json(&demo().join("summary.json"));
+    let scales = &summary["channel_scales"];
+    assert_eq!(keys(scales), ["basis", "inputs", "outputs"]);
+    assert!(["inputs", "outputs"].iter().all(|s| numbers(&scales[s]).iter().all(|x| *x > 0.0)));
+    let expected = [
+        "coprime_margin",
+        "delay_margin_s",
+        "highest_gain",
+        "input_disk_margin",
+        "iso_14839_zone",
+        "lowest_gain",
+        "nu_gap_to_hansen",
+        "nu_gap_to_nominal",
+        "output_disk_margin",
+        "output_peak_sensitivities",
+        "peak_complementary_sensitivity",
+        "peak_input_sensitivity",
+        "peak_sensitivity",
+        "phase_margin_deg",
+        "refused",
+    ];
+    for model in ["/nominal", "/true_plant", "/methods/direct", "/methods/hansen", "/methods/hansen_reduced"] {
+        let entry = summary.pointer(model).expect("there");
+        let robustness = &entry["robustness"];
+        assert_eq!(keys(robustness), expected, "{model}");
+        let number = |key: &str| robustness[key].as_f64().expect("a number");
+        for key in ["coprime_margin", "nu_gap_to_hansen", "nu_gap_to_nominal"] {
+            assert!((0.0..=1.0).contains(&number(key)), "{model}: {key}");
+        }
+        if entry["stabilised_by_controller"] == false {
+            assert!(robustness["refused"].as_str().expect("a reason").contains("unstable"));
+            assert_eq!((number("coprime_margin"), &robustness["peak_sensitivity"]), (0.0, &Value::Null));
+            continue;
+        }
+        assert_eq!(robustness["refused"], Value::Null, "{model}");
+        let peaks = numbers(&robustness["output_peak_sensitivities"]);
+        assert!(peaks.len() == 2 && peaks.iter().all(|p| *p <= number("peak_sensitivity") * (1.0 + 1e-6)), "{model}");
+        assert!(["A", "B", "C", "D"].contains(&robustness["iso_14839_zone"].as_str().expect("a zone")));
+        assert!(number("lowest_gain") < 1.0 && number("highest_gain") > 1.0);
+        assert!(number("phase_margin_deg") > 0.0 && number("delay_margin_s") > 0.0);
+        for disk in ["input_disk_margin", "output_disk_margin"] {
+            assert_eq!(keys(&robustness[disk]), ["alpha", "highest_gain", "lowest_gain", "phase_deg"]);
+            assert!(robustness[disk]["alpha"].as_f64().expect("a number") > 0.0);
+        }
+    }
+    let gap = |pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).expect("a number");
+    assert!(gap("/nominal/robustness/nu_gap_to_nominal") < 1e-6);
+    assert!(gap("/methods/hansen/robustness/nu_gap_to_hansen") < 1e-6);
+    let there = gap("/methods/hansen/robustness/nu_gap_to_nominal");
+    assert!((there - gap("/nominal/robustness/nu_gap_to_hansen")).abs() < 1e-6);
 }
 
 #[test]

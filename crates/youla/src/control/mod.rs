@@ -2,15 +2,21 @@
 //! stable) and the loops that controllers close.
 
 mod closed_loop;
+mod gap;
 mod kalman;
 mod lqr;
 mod margin;
+mod margins;
 mod observer_controller;
 mod real_time;
 
 pub use closed_loop::{closed_loop, with_input_port};
+pub use gap::{ChannelScales, NuGap, coprime_margin, normalised_left_factors, normalised_right_factors, nu_gap};
 pub use kalman::{NoiseCovariance, ObserverGain, kalman};
 pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
 pub use margin::peak_sensitivity;
+pub use margins::{
+    ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, margins,
+};
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;

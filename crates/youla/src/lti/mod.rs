@@ -19,6 +19,7 @@ pub(crate) use eigen::Eigen;
 pub use eigen::SharedMode;
 pub(crate) use initial::simulate_best;
 pub use modes::Mode;
+pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings, largest_singular_value};
 pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
 pub use partitioned::Partitioned;
 pub use response::{FrequencyResponse, frequency_response};

@@ -186,7 +186,7 @@ fn check_split<T: TimeDomain>(system: &StateSpace<T>, boundary: f64, omega: &[f6
     let sum = parts.beyond.plus(&parts.within).unwrap();
     let size = error(system, &StateSpace::gain(Mat::zeros(3, 2), system.time()).unwrap(), omega);
     assert!(error(&sum, system, omega) < 1e-10 * size);
-    if !matches!(system.time().sample_time(), Some(_) if boundary > 1.0) {
+    if !(system.time().sample_time().is_some() && boundary > 1.0) {
         let options = ReductionOptions { stability_boundary: Some(boundary), ..Default::default() };
         let minimal = reduce(system, &options).unwrap();
         for order in minimal.kept.len()..=minimal.minimal_order {
@@ -201,7 +201,7 @@ fn check_split<T: TimeDomain>(system: &StateSpace<T>, boundary: f64, omega: &[f6
             assert!(error(&reduced.model, system, omega) <= reduced.error_bound.unwrap() + rounding);
             assert!(reduced.measured_error().unwrap().value <= reduced.error_bound.unwrap() + rounding);
         }
-        if minimal.kept.len() > 0 {
+        if !minimal.kept.is_empty() {
             let below = ReductionOptions { order: ReducedOrder::Fixed(minimal.kept.len() - 1), ..options };
             assert!(matches!(reduce(system, &below), Err(Error::OrderBelowKept { .. })));
         }

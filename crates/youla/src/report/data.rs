@@ -71,6 +71,12 @@ pub struct ReportData {
     /// A new controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<Redesign>,
+    /// Margins of each model in its loop, and distances between models.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub margins: Vec<LoopMargins>,
+    /// In which units channels are compared, in one sentence; empty without margins.
+    #[serde(default, skip_serializing_if = "String::is_empty")]
+    pub margins_caption: String,
     /// Relative residual of the Bezout identity of the factors.
     pub bezout_residual: Option<f64>,
     /// Duration of each stage.
@@ -189,6 +195,8 @@ pub enum Evidence {
     Certificate,
     /// New controller.
     Redesign,
+    /// Margins of the loops.
+    Margins,
 }
 
 /// How a finding is to be taken.
@@ -642,6 +650,37 @@ pub struct EvidenceTable {
     pub rows: Vec<Vec<String>>,
     /// What stands below it.
     pub caption: String,
+}
+
+/// What the loop of one model with the actual controller can bear, and how far the model is from others.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct LoopMargins {
+    /// Key of the method.
+    pub method: String,
+    /// Why there are no margins: the loop is unstable, or not well posed.
+    pub refusal: Option<String>,
+    /// Peak of the output sensitivity, all outputs at once.
+    pub peak_sensitivity: Option<f64>,
+    /// Zone of ISO 14839-3 by the worst output, one at a time: A to D.
+    pub zone: Option<String>,
+    /// Highest factor below 1 on the gain of one channel at which the loop is no longer stable; absent where no factor is too low.
+    pub lowest_gain: Option<f64>,
+    /// Lowest factor above 1 at which it is no longer stable; absent where no factor is too high.
+    pub highest_gain: Option<f64>,
+    /// Smallest phase margin of one channel, degrees.
+    pub phase_deg: Option<f64>,
+    /// Smallest delay margin of one channel, milliseconds.
+    pub delay_ms: Option<f64>,
+    /// Balanced disk margin of all inputs or all outputs at once, the smaller one.
+    pub disk: Option<f64>,
+    /// Change of phase that it allows, degrees.
+    pub disk_phase_deg: Option<f64>,
+    /// Normalised coprime margin b(G, K) in scaled channels; 0 where the loop is unstable.
+    pub coprime: Option<f64>,
+    /// nu-gap to the nominal model, in scaled channels.
+    pub gap_to_nominal: Option<f64>,
+    /// nu-gap to G(S), in scaled channels.
+    pub gap_to_hansen: Option<f64>,
 }
 
 /// Duration of one stage of the run.

@@ -351,12 +351,16 @@ impl Writer<'_> {
                 "modes": v.modes.iter().map(|m| serde_json::json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
                 "stabilised_by_controller": v.certificate.stable,
                 "closed_loop_poles": pairs(&v.certificate.poles),
+                "robustness": super::robustness::artefact(&v.robustness),
                 "records": records,
             });
             models.insert(v.method.key().into(), entry);
         }
-        self.folder
-            .json("7-validate/verdict.json", &serde_json::json!({"models": models, "provenance": self.provenance}))?;
+        let scales = self.found.verdict.scales.as_ref().map(super::robustness::scales_entry);
+        self.folder.json(
+            "7-validate/verdict.json",
+            &serde_json::json!({"models": models, "channel_scales": scales, "provenance": self.provenance}),
+        )?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
             for v in &self.found.verdict.models {

@@ -3,6 +3,7 @@
 use super::pipeline::Identification;
 use super::segments::RecordSegment;
 use super::verdict::{Method, ModelVerdict};
+use crate::control::IsoZone;
 use crate::identify::greybox::Stop;
 use crate::identify::hansen_pem::PemStart;
 use crate::identify::innovation_form::Settling;
@@ -15,6 +16,7 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     [
         fit_line(found),
         loop_line(found),
+        margin_line(found),
         band_line(found),
         redesign_line(found),
         deviation_line(found),
@@ -211,6 +213,28 @@ fn redesign_line(found: &Identification) -> Option<Verdict> {
     let new = found.redesign.as_ref()?.as_ref().ok()?;
     let status = if new.gains_damping() { Status::Good } else { Status::Caution };
     Some(Verdict { status, text: super::redesign::sentence(new), evidence: Evidence::Redesign })
+}
+
+/// What the loop of G(S) can bear; nothing where it is unstable, which the line before says.
+fn margin_line(found: &Identification) -> Option<Verdict> {
+    let robustness = &found.verdict.of(Method::Hansen)?.robustness;
+    let margins = robustness.margins.as_ref().ok()?;
+    let zone = margins.zone()?;
+    let worst = margins.outputs.iter().map(|c| c.sensitivity.value).fold(0.0, f64::max);
+    let disk = margins.output_disks.balanced;
+    let highest = disk.highest_gain.map_or("any higher factor".into(), |g| format!("{g:.2}"));
+    let text = format!(
+        "With G(S) the peak sensitivity of the loop is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
+         all outputs at once; the gains of all outputs may change by factors from {:.2} to {highest}, or their phases by {:.0} \
+         degrees.",
+        margins.output_sensitivity.value, disk.lowest_gain, disk.phase_degrees
+    );
+    let status = match zone {
+        IsoZone::A | IsoZone::B => Status::Good,
+        IsoZone::C => Status::Caution,
+        IsoZone::D => Status::Bad,
+    };
+    Some(Verdict { status, text, evidence: Evidence::Margins })
 }
 
 fn deviation_line(found: &Identification) -> Option<Verdict> {

@@ -21,6 +21,7 @@ mod redesign;
 mod redraw;
 mod reduction;
 mod response;
+mod robustness;
 mod segments;
 mod settings;
 mod signals;
@@ -48,6 +49,7 @@ pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, ident
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use reduction::RunReduction;
+pub use robustness::Robustness;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

@@ -8,6 +8,7 @@ use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::redesign;
 use super::response::{decibel, log_grid, model_responses};
+use super::robustness;
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
@@ -58,6 +59,8 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
         loop_tables: found.certificate.as_ref().map(RunCertificate::tables).unwrap_or_default(),
         redesign: redesign(found)?,
+        margins: found.verdict.models.iter().map(robustness::row).collect(),
+        margins_caption: robustness::caption(found),
         bezout_residual: Some(found.factorisation.bezout_residual),
         stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
     })

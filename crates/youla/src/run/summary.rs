@@ -5,6 +5,7 @@ use super::certificate::RunCertificate;
 use super::pipeline::{Identification, StageTimes};
 use super::redesign;
 use super::response::{decibel, log_grid, model_responses};
+use super::robustness;
 use super::uncertainty::{summary_entry, with_deviations};
 use super::verdict::{Method, ModelVerdict};
 use crate::Result;
@@ -15,8 +16,8 @@ use std::f64::consts::TAU;
 /// The summary of a run, schema 1; magnitudes are those of output 1 from input 1.
 ///
 /// ```text
-/// {"schema":1, "nominal":{"fit":{record:[per output]}}, "methods":{method:{"order", "s_order", "s_stable",
-///  "stabilised_by_controller", "fit", "modes":[{"hz","zeta"}], "poles":[[re,im]]}},
+/// {"schema":1, "nominal":{"fit":{record:[per output]}, "robustness"}, "methods":{method:{"order", "s_order", "s_stable",
+///  "stabilised_by_controller", "fit", "modes":[{"hz","zeta"}], "poles":[[re,im]], "robustness"}}, "channel_scales",
 ///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
 /// ```
 ///
@@ -41,7 +42,10 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
     let mut all = json!({
         "schema": SCHEMA,
         "name": found.settings.name,
-        "nominal": {"fit": found.verdict.of(Method::Nominal).map(fits)},
+        "nominal": {
+            "fit": found.verdict.of(Method::Nominal).map(fits),
+            "robustness": found.verdict.of(Method::Nominal).map(|v| robustness::summary_entry(&v.robustness)),
+        },
         "methods": methods,
         "refused": refused,
         "frequency_response": response_entry(found)?,
@@ -50,7 +54,10 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
         "seconds": seconds.iter().map(|(s, t)| (s.name().to_owned(), json!(t))).collect::<Map<_, _>>(),
     });
     if let Some(v) = found.verdict.of(Method::TruePlant) {
-        all["true_plant"] = json!({"fit": fits(v)});
+        all["true_plant"] = json!({"fit": fits(v), "robustness": robustness::summary_entry(&v.robustness)});
+    }
+    if let Some(scales) = &found.verdict.scales {
+        all["channel_scales"] = robustness::scales_entry(scales);
     }
     all["certificate"] = json!(found.certificate.as_ref().map(RunCertificate::json));
     if let Some(Ok(new)) = &found.redesign {
@@ -72,6 +79,7 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Result<Value> {
         "fit": fits(v),
         "modes": v.modes.iter().map(|m| json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
         "poles": pairs(&v.poles),
+        "robustness": robustness::summary_entry(&v.robustness),
     });
     if let Some(uncertainty) = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen) {
         let modes = uncertainty.plant.modes.iter().map(|band| with_deviations(json!({}), band));

@@ -4,8 +4,9 @@ use super::disturbance::without_lines;
 use super::factorise::Factorisation;
 use super::pipeline::Identification;
 use super::records::LoopRecord;
+use super::robustness::{Robustness, channel_scales, robustness};
 use super::settings::Prediction;
-use crate::control::with_input_port;
+use crate::control::{ChannelScales, with_input_port};
 use crate::lti::{Discrete, Mode, StateSpace};
 use crate::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
 use crate::{Error, Mat, MatRef, Result, c64};
@@ -82,6 +83,8 @@ pub struct ModelVerdict {
     pub modes: Vec<Mode>,
     /// Its loop with the controller that ran.
     pub certificate: LoopCertificate,
+    /// Margins of that loop, and distances from other models.
+    pub robustness: Robustness,
     /// One entry per verification record.
     pub records: Vec<RecordVerdict>,
 }
@@ -91,6 +94,8 @@ pub struct ModelVerdict {
 pub struct Verdict {
     /// One entry per model that exists.
     pub models: Vec<ModelVerdict>,
+    /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none; `None` before any model.
+    pub scales: Option<Result<ChannelScales, String>>,
 }
 
 impl Verdict {
@@ -119,12 +124,18 @@ pub(super) fn verify(found: &Identification) -> Result<Verdict> {
     if let Some(plant) = &found.records.true_plant {
         models.push((Method::TruePlant, plant));
     }
+    let scales = channel_scales(&found.records.estimation).map_err(|e| e.to_string());
     let verdicts: Vec<Result<ModelVerdict>> =
-        models.par_iter().map(|(method, model)| verify_model(found, *method, model)).collect();
-    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()? })
+        models.par_iter().map(|(method, model)| verify_model(found, &scales, *method, model)).collect();
+    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()?, scales: Some(scales) })
 }
 
-fn verify_model(found: &Identification, method: Method, model: &StateSpace<Discrete>) -> Result<ModelVerdict> {
+fn verify_model(
+    found: &Identification,
+    scales: &Result<ChannelScales, String>,
+    method: Method,
+    model: &StateSpace<Discrete>,
+) -> Result<ModelVerdict> {
     let records = found.records.verification.iter().map(|r| verify_record(found, model, r)).collect::<Result<_>>()?;
     Ok(ModelVerdict {
         method,
@@ -132,6 +143,7 @@ fn verify_model(found: &Identification, method: Method, model: &StateSpace<Discr
         poles: model.poles()?,
         modes: model.modes()?,
         certificate: certify(model, &found.factorisation.controller)?,
+        robustness: robustness(found, scales, model),
         records,
     })
 }

@@ -52,7 +52,15 @@ fn several_inputs_and_outputs_are_all_inside() {
     let page = written("report-bearing", &data);
     let response = embedded(&page).frequency.unwrap();
     assert_eq!((response.models.len(), response.indirect.len()), (16, 4));
-    for text in ["Hansen reduced G_red(S)", "y_x", "Can I trust it?", "3.1e−14"] {
+    for text in [
+        "Hansen reduced G_red(S)",
+        "y_x",
+        "Can I trust it?",
+        "3.1e−14",
+        "Zone, ISO 14839-3",
+        "2.314",
+        "the loop is unstable",
+    ] {
         assert!(page.contains(text), "{text} is missing");
     }
 }

@@ -246,6 +246,22 @@ fn report(plan: &Plan) -> ReportData {
             stabilised_by_controller: Some(place != 1),
             worst_closed_loop_pole: Some(if place == 1 { [0.9989, 0.0613] } else { [0.9812, 0.1023] }),
         });
+        let stable = place != 1;
+        data.margins.push(LoopMargins {
+            method: method.key.clone(),
+            refusal: (!stable).then(|| "the loop is unstable, with the pole 1.002000".into()),
+            peak_sensitivity: stable.then_some(2.314),
+            zone: stable.then(|| "A".into()),
+            lowest_gain: stable.then_some(-0.25),
+            highest_gain: None,
+            phase_deg: stable.then_some(41.25),
+            delay_ms: stable.then_some(0.75),
+            disk: stable.then_some(0.6),
+            disk_phase_deg: stable.then_some(33.4),
+            coprime: Some(if stable { 0.31 } else { 0.0 }),
+            gap_to_nominal: Some(0.0),
+            gap_to_hansen: Some(1.0),
+        });
         data.poles.push(Poles { method: method.key.clone(), poles });
     }
     for (method, label) in [("hansen", "S from alpha to beta"), ("direct", "G from u to y")] {

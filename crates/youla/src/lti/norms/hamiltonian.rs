@@ -15,14 +15,15 @@
 //! R is ill-conditioned where the gain at the reference point, infinity or z = -1, is near to the level. The other real point
 //! of the boundary, zero or z = 1, is then the reference, by `s -> 1/s` or `z -> -z`.
 
+use super::curve::Curve;
 use crate::linalg::{balance, block, eigenvalues, eye, solve, solve_right};
-use crate::lti::{StateSpace, TimeDomain};
+use crate::lti::{Continuous, StateSpace, TimeDomain};
 use crate::{Mat, Result};
 use faer::Scale;
 use std::f64::consts::{PI, SQRT_2};
 
-/// Gain at the reference point, over the level, from which the other one is tried.
-const NEAR_LEVEL: f64 = 0.9;
+/// Distance of the gain at the reference point from the level, over the level, below which the other one is tried.
+const NEAR_LEVEL: f64 = 0.1;
 
 /// Reciprocal condition number below which a reference point is not changed to.
 const WELL_CONDITIONED: f64 = 1e-8;
@@ -39,14 +40,11 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    /// Of a system in balanced states; `gain_at_zero` and `gain_at_end` (infinity or Nyquist) are below the level.
-    pub(super) fn at_level<T: TimeDomain>(
-        system: &StateSpace<T>,
-        level: f64,
-        gain_at_zero: f64,
-        gain_at_end: f64,
-    ) -> Result<Self> {
-        let prefer_other = gain_at_end > NEAR_LEVEL * level && gain_at_zero < gain_at_end;
+    /// Of a system in balanced states with the given response.
+    pub(super) fn at_level<T: TimeDomain>(system: &StateSpace<T>, curve: &Curve<T>, level: f64) -> Result<Self> {
+        let (at_zero, at_end) = (curve.gain(0.0)?, curve.gain(curve.end())?);
+        let distance = |gain: f64| (1.0 - gain / level).abs();
+        let prefer_other = distance(at_end) < NEAR_LEVEL && distance(at_zero) > distance(at_end);
         let continuous = Image::new(system, prefer_other)?;
         let h = balance("the Hamiltonian matrix", continuous.hamiltonian(level)?.as_ref())?.a;
         let size = h.norm_max();
@@ -62,6 +60,11 @@ impl Crossings {
         near.sort_by(f64::total_cmp);
         near.dedup();
         Ok(Crossings { all, near })
+    }
+
+    /// All candidates, rising.
+    pub(super) fn all(&self) -> &[f64] {
+        &self.all
     }
 
     /// All candidates and the middles between neighbours.
@@ -80,16 +83,16 @@ enum Map {
 }
 
 /// A continuous system with the gains of the given one.
-struct Image {
-    a: Mat<f64>,
-    b: Mat<f64>,
-    c: Mat<f64>,
-    d: Mat<f64>,
+pub(super) struct Image {
+    pub(super) a: Mat<f64>,
+    pub(super) b: Mat<f64>,
+    pub(super) c: Mat<f64>,
+    pub(super) d: Mat<f64>,
     map: Map,
 }
 
 impl Image {
-    fn new<T: TimeDomain>(system: &StateSpace<T>, prefer_other: bool) -> Result<Self> {
+    pub(super) fn new<T: TimeDomain>(system: &StateSpace<T>, prefer_other: bool) -> Result<Self> {
         let [a, b, c, d] = [system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned());
         let n = a.nrows();
         match system.time().sample_time() {
@@ -130,7 +133,7 @@ impl Image {
     }
 
     /// The frequency of the system, rad/s, that belongs to one of the image.
-    fn frequency(&self, image: f64) -> f64 {
+    pub(super) fn frequency(&self, image: f64) -> f64 {
         match self.map {
             Map::Same => image,
             Map::Reciprocal => 1.0 / image,
@@ -138,6 +141,26 @@ impl Image {
             Map::Reflected { ts } => (PI - 2.0 * image.atan()) / ts,
         }
     }
+
+    /// The frequency of the image, rad/s, that belongs to one of the system.
+    pub(super) fn of_frequency(&self, frequency: f64) -> f64 {
+        match self.map {
+            Map::Same => frequency,
+            Map::Reciprocal => 1.0 / frequency,
+            Map::Bilinear { ts } => (0.5 * frequency * ts).tan(),
+            Map::Reflected { ts } => (0.5 * (PI - frequency * ts)).tan(),
+        }
+    }
+}
+
+/// The continuous image of a system without a pole at z = -1; a continuous system is its own.
+pub(crate) fn continuous_image<T: TimeDomain>(system: &StateSpace<T>) -> Result<StateSpace<Continuous>> {
+    let [a, b, c, d] = [system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned());
+    let Image { a, b, c, d, .. } = match system.time().sample_time() {
+        None => Image { a, b, c, d, map: Map::Same },
+        Some(ts) => bilinear(a, b, c, d, Map::Bilinear { ts })?,
+    };
+    StateSpace::new(a, b, c, d, Continuous)
 }
 
 /// `A^-1` and `A^-1 B`.

@@ -9,13 +9,20 @@
 //! and `hankel <= hinf <= 2 (sum of the Hankel singular values) + sigma_max(D)` (continuous time; K. Glover, Int. J. Control 39
 //! (1984), 1115).
 
+mod crossing;
+mod curve;
 mod hamiltonian;
+mod level;
 mod peak;
 #[cfg(test)]
 mod reference;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use crossing::{Part, crossings};
+pub(crate) use curve::{Curve, largest_singular_value};
+pub(crate) use hamiltonian::continuous_image;
+pub(crate) use level::below_level;
 pub use peak::{PeakGain, PeakOptions, hinf_norm, linf_norm};
 
 use super::{StateSpace, TimeDomain};

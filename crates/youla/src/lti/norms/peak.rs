@@ -10,13 +10,11 @@
 //! Rounding moves imaginary eigenvalues off the axis. No threshold therefore decides which of them count: the gain is
 //! computed at the imaginary parts of all, and a level is an upper bound where no gain exceeds it.
 
+use super::curve::Curve;
 use super::hamiltonian::Crossings;
-use crate::lti::response::HessenbergSystem;
 use crate::lti::{StateSpace, TimeDomain};
-use crate::{Error, MatRef, Result, c64};
-use faer::Scale;
+use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::PI;
 
 /// Steps before the tolerance is widened, by a factor of two with every further one.
 const PATIENCE: usize = 12;
@@ -108,7 +106,7 @@ pub fn linf_norm<T: TimeDomain>(system: &StateSpace<T>, options: &PeakOptions) -
 }
 
 /// Frequencies at which poles show in the gain: their imaginary part, their magnitude and the resonance between.
-fn frequencies_of_poles<T: TimeDomain>(system: &StateSpace<T>) -> Result<Vec<f64>> {
+pub(super) fn frequencies_of_poles<T: TimeDomain>(system: &StateSpace<T>) -> Result<Vec<f64>> {
     let time = system.time();
     let size = match time.sample_time() {
         Some(_) => system.a().norm_l2().max(1.0),
@@ -130,20 +128,19 @@ fn frequencies_of_poles<T: TimeDomain>(system: &StateSpace<T>) -> Result<Vec<f64
 /// The best lower bound so far.
 struct Search<'a, T: TimeDomain> {
     system: &'a StateSpace<T>,
-    response: HessenbergSystem<T>,
+    curve: Curve<T>,
     value: f64,
     frequency: f64,
 }
 
 impl<'a, T: TimeDomain> Search<'a, T> {
     fn new(system: &'a StateSpace<T>) -> Result<Self> {
-        let response = HessenbergSystem::new(system)?;
-        Ok(Search { system, response, value: 0.0, frequency: 0.0 })
+        Ok(Search { system, curve: Curve::new(system)?, value: 0.0, frequency: 0.0 })
     }
 
     /// Step 1.
     fn start(&mut self, poles: &[f64]) -> Result<()> {
-        let end = self.end();
+        let end = self.curve.end();
         self.visit([0.0, end].into_iter().chain(poles.iter().copied()))?;
         if self.value == 0.0 {
             // More frequencies than a transfer function that is not zero has zeros.
@@ -158,11 +155,10 @@ impl<'a, T: TimeDomain> Search<'a, T> {
     fn raise(mut self, mut tolerance: f64) -> Result<PeakGain> {
         for iterations in 0..LIMIT {
             let upper = self.value * (1.0 + tolerance);
-            let done = |s: Self| Ok(PeakGain { value: s.value, upper, frequency: s.frequency, iterations });
             if self.value == 0.0 || self.system.order() == 0 {
-                return done(self);
+                return Ok(PeakGain { value: self.value, upper, frequency: self.frequency, iterations });
             }
-            let crossings = Crossings::at_level(self.system, upper, self.gain(0.0)?, self.gain(self.end())?)?;
+            let crossings = Crossings::at_level(self.system, &self.curve, upper)?;
             self.visit(crossings.frequencies())?;
             if self.value <= upper {
                 let iterations = iterations + 1;
@@ -175,42 +171,14 @@ impl<'a, T: TimeDomain> Search<'a, T> {
         Err(Error::NoConvergence { what: "the largest gain over frequency".into(), iterations: LIMIT })
     }
 
-    /// Infinite or Nyquist frequency.
-    fn end(&self) -> f64 {
-        self.system.time().sample_time().map_or(f64::INFINITY, |ts| PI / ts)
-    }
-
     fn visit(&mut self, frequencies: impl IntoIterator<Item = f64>) -> Result<()> {
         for frequency in frequencies {
-            let frequency = frequency.clamp(0.0, self.end());
-            let gain = self.gain(frequency)?;
+            let frequency = frequency.clamp(0.0, self.curve.end());
+            let gain = self.curve.gain(frequency)?;
             if gain > self.value {
                 (self.value, self.frequency) = (gain, frequency);
             }
         }
         Ok(())
     }
-
-    /// Largest singular value of the response.
-    fn gain(&self, frequency: f64) -> Result<f64> {
-        let (m, p) = (self.system.inputs(), self.system.outputs());
-        let mut value = vec![c64::new(0.0, 0.0); p * m];
-        if frequency.is_infinite() {
-            (0..p * m).for_each(|k| value[k] = c64::new(self.system.d()[(k % p, k / p)], 0.0));
-        } else {
-            self.response.fill(&[frequency], &mut value, p * m)?;
-        }
-        largest_singular_value(MatRef::from_column_major_slice(&value, p, m))
-    }
-}
-
-/// The largest singular value of a response, which is not empty; scaled, so that tiny gains do not underflow.
-pub(crate) fn largest_singular_value(value: MatRef<'_, c64>) -> Result<f64> {
-    let refused = |_| Error::NoConvergence { what: "the singular values of a response".into(), iterations: 0 };
-    let largest = value.norm_max();
-    if largest == 0.0 {
-        return Ok(0.0);
-    }
-    let scaled = Scale(c64::new(1.0 / largest, 0.0)) * value;
-    Ok(largest * scaled.singular_values().map_err(refused)?[0])
 }

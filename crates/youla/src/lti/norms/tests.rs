@@ -1,4 +1,4 @@
-use super::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm, peak::largest_singular_value};
+use super::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, largest_singular_value, linf_norm};
 use crate::Error;
 use crate::linalg::eye;
 use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};

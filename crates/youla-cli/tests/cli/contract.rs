@@ -25,7 +25,7 @@ fn summary_has_the_documented_structure() {
     let summary = json(&demo().join("summary.json"));
     let mut expected =
         ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
-    expected.extend(["controller_mismatch", "seconds", "true_plant", "uncertainty"]);
+    expected.extend(["controller_mismatch", "data", "seconds", "true_plant", "uncertainty"]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
     assert_eq!(summary["schema"], 1);
@@ -47,8 +47,8 @@ fn summary_has_the_documented_structure() {
 fn summary_describes_every_method() {
     let summary = json(&demo().join("summary.json"));
     assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced"]);
-    let common = ["fit", "modes", "order", "poles", "stabilised_by_controller"];
-    let hansen = ["fit", "modes", "order", "poles", "s_order", "s_stable", "stabilised_by_controller"];
+    let common = ["fit", "modes", "order", "poles", "residuals", "stabilised_by_controller"];
+    let hansen = ["fit", "modes", "order", "poles", "residuals", "s_order", "s_stable", "stabilised_by_controller"];
     for (name, expected, order) in
         [("direct", &common[..], 6), ("hansen", &hansen[..], 16), ("hansen_reduced", &hansen[..], 6)]
     {

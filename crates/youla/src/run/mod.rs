@@ -1,6 +1,7 @@
 //! A whole run: run.toml and a log in, models with evidence out. The program and the Python package call this.
 
 mod artefacts;
+mod check;
 mod demo;
 mod disturbance;
 mod explain;
@@ -16,6 +17,7 @@ mod paper;
 mod pipeline;
 mod records;
 mod redraw;
+mod residual_tests;
 mod response;
 mod segments;
 mod settings;
@@ -28,6 +30,7 @@ mod verdict;
 mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
+pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, further, read_check_options};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use factorise::{Factorisation, factorise, factorise_run};
@@ -41,6 +44,7 @@ pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, p
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
+pub use residual_tests::RecordResiduals;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

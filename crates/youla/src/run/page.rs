@@ -5,10 +5,12 @@ use super::findings::{notes, verdict_lines};
 use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
+use super::residual_tests::drawn as drawn_residuals;
 use super::response::{decibel, log_grid, model_responses};
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
+use crate::check::{Finding, Severity};
 use crate::identify::subspace::ResponseBand;
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::FrequencyResponse;
@@ -37,6 +39,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         verdict: verdict_lines(found),
         notes: notes(found),
         fits: fits(found),
+        findings: findings(found),
         experiments: experiments(found)?,
         orders: orders(found),
         stabilisation: diagrams(found),
@@ -47,6 +50,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
             .enumerate()
             .map(|(k, r)| verification(found, k, r))
             .collect::<Result<_>>()?,
+        residuals: drawn_residuals(found),
         frequency: Some(frequency(found)?),
         poles: found.verdict.models.iter().map(poles).collect(),
         modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
@@ -114,6 +118,26 @@ fn fits(found: &Identification) -> Vec<draw::Fit> {
         }
     }
     all
+}
+
+/// What the check of the data found, the most serious first.
+fn findings(found: &Identification) -> Vec<draw::DataFinding> {
+    let status = |severity: Severity| match severity {
+        Severity::Note => draw::Status::Info,
+        Severity::Caution => draw::Status::Caution,
+        Severity::Defect => draw::Status::Bad,
+    };
+    let one = |(f, more): (&Finding, usize)| draw::DataFinding {
+        status: status(f.severity),
+        test: f.test.key().into(),
+        record: f.record.clone(),
+        channel: f.channel.clone(),
+        rows: f.rows,
+        what: f.what.clone(),
+        advice: f.advice.clone(),
+        further: more,
+    };
+    found.data.grouped().into_iter().map(one).collect()
 }
 
 fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {

@@ -64,13 +64,15 @@ pub struct ControllerRecord<'a> {
     pub reference: Option<MatRef<'a, f64>>,
 }
 
+/// Magnitude of a pole up to which a controller that integrates can be simulated.
+const INTEGRATOR: f64 = 1.0 + 1e-6;
 /// A change must leave less than this share of the residual.
 const HELPS: f64 = 0.1;
 
 /// Holds a controller (positive feedback, `u = K y`) against a record.
 ///
 /// # Errors
-/// Shapes; [`Error::Diverged`] for a controller that is unstable by itself, which cannot be simulated.
+/// Shapes; [`Error::Unstable`] for a controller that is unstable by itself, which cannot be simulated.
 ///
 /// ```
 /// use youla::check::{Change, CheckOptions, ControllerRecord, controller};
@@ -90,6 +92,9 @@ pub fn controller(
     record: ControllerRecord<'_>,
     options: &CheckOptions,
 ) -> Result<ControllerCheck> {
+    if k.worst_pole()?.is_some_and(|pole| pole.norm() > INTEGRATOR) {
+        k.require_stable("the declared controller, to be simulated by itself")?;
+    }
     let log = Log::new(record);
     let residual = log.residual(k, &log.e, &log.w)?;
     let excited = record.input_excitation.is_some();

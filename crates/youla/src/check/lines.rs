@@ -214,7 +214,7 @@ mod tests {
             }
             false_alarms += lines(&y, &[], time, &options).len();
             let line =
-                |k: usize| 5.0 * (TAU * 41.67 * k as f64 * 1e-3).sin() + 3.0 * (TAU * 83.34 * k as f64 * 1e-3).cos();
+                |k: usize| 5.0 * (TAU * 41.67 * k as f64 * 1e-3).sin() + 5.0 * (TAU * 83.34 * k as f64 * 1e-3).cos();
             let disturbed: Vec<f64> = y.iter().enumerate().map(|(k, y)| y + line(k)).collect();
             let found = lines(&disturbed, &[], time, &options);
             assert!(

@@ -92,6 +92,8 @@ pub struct ChannelNames {
     pub alpha: Vec<Channel>,
 }
 
+/// Samples of a record, at least.
+const SHORTEST: usize = 16;
 /// Order of persistency that is asked for where nothing is said.
 const ORDER: usize = 40;
 
@@ -107,6 +109,10 @@ pub fn check_record(
     options: &CheckOptions,
 ) -> Result<Vec<Finding>> {
     options.check()?;
+    if record.u.nrows() < SHORTEST {
+        let what = format!("it has {} samples; nothing can be tested below {SHORTEST}", record.u.nrows());
+        return Ok(vec![Finding::new(Test::Timing, Severity::Caution, record.name, what)]);
+    }
     let mut all = Vec::new();
     let (m, p) = (record.u.ncols(), record.y.ncols());
     let moving: Vec<MatRef<'_, f64>> = [record.input_excitation, record.alpha, record.reference]
@@ -142,7 +148,9 @@ pub fn check_record(
     if let Some(k) = declared.filter(|_| record.alpha.is_none()) {
         match controller(k, of_controller(record), options) {
             Ok(found) => all.extend(found.finding(record.name, &names.outputs, options)),
-            Err(error @ Error::Diverged { .. }) => all.push(controller::not_simulated(record.name, &error)),
+            Err(error @ (Error::Diverged { .. } | Error::Unstable { .. })) => {
+                all.push(controller::not_simulated(record.name, &error))
+            }
             Err(error) => return Err(error),
         }
     }

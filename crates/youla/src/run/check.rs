@@ -15,9 +15,10 @@ use crate::control::observer_controller;
 use crate::identify::subspace::SubspaceOptions;
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{ChannelRef, ChannelSpec, CsvOptions, Format, Source, TimeSource, read};
-use crate::{Error, Mat, Result};
+use crate::{Error, ErrorKind, Mat, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// A record that was checked.
@@ -188,7 +189,13 @@ pub(super) fn check_records(
     let one = |record: &&LoopRecord| {
         let (file, first) = place(settings, records, &record.name);
         let logged = logged(record, first);
-        let findings = check_record(&logged, &names, Some(controller), &options)?;
+        // A test that cannot be computed does not end a run.
+        let findings = match check_record(&logged, &names, Some(controller), &options) {
+            Err(error) if error.kind() == ErrorKind::Numerical => {
+                vec![finding(Severity::Note, &record.name, format!("it could not be checked: {error}"), "")]
+            }
+            found => found?,
+        };
         let rows = [first, first + record.samples() - 1];
         Ok((CheckedRecord { record: record.name.clone(), file, rows, sample_time: record.time.ts() }, findings))
     };
@@ -207,6 +214,9 @@ struct Job {
     options: CheckOptions,
 }
 
+/// A record with its findings.
+type CheckedPart = (CheckedRecord, Vec<Finding>);
+
 type DeclaredController<'a> = dyn Fn(Discrete) -> Result<Option<StateSpace<Discrete>>> + Sync + 'a;
 
 /// Name of the time column while a file is read.
@@ -215,7 +225,7 @@ const TIME: &str = "(time)";
 fn check_all(job: &Job, files: &[&DataFile], folder: &Path, controller: &DeclaredController<'_>) -> Result<DataCheck> {
     job.options.check()?;
     let one = |file: &&DataFile| check_file(job, file, folder, controller);
-    let parts: Vec<Result<Vec<(CheckedRecord, Vec<Finding>)>>> = files.par_iter().map(one).collect();
+    let parts: Vec<Result<Vec<CheckedPart>>> = files.par_iter().map(one).collect();
     let mut all = Vec::new();
     for part in parts {
         all.extend(part?.into_iter().map(Ok));
@@ -223,7 +233,7 @@ fn check_all(job: &Job, files: &[&DataFile], folder: &Path, controller: &Declare
     collected(all)
 }
 
-fn collected(all: Vec<Result<(CheckedRecord, Vec<Finding>)>>) -> Result<DataCheck> {
+fn collected(all: Vec<Result<CheckedPart>>) -> Result<DataCheck> {
     let mut check = DataCheck { records: Vec::new(), findings: Vec::new() };
     for one in all {
         let (record, findings) = one?;
@@ -238,7 +248,7 @@ fn check_file(
     file: &DataFile,
     folder: &Path,
     controller: &DeclaredController<'_>,
-) -> Result<Vec<(CheckedRecord, Vec<Finding>)>> {
+) -> Result<Vec<CheckedPart>> {
     let path = folder.join(&file.file);
     if job.time.column.is_none() && job.time.ts.is_none() {
         return Err(Error::SampleTimeMissing { what: path.display().to_string() });
@@ -256,12 +266,7 @@ fn check_file(
     found.iter().map(|part| check_part(job, file, part, controller)).collect()
 }
 
-fn check_part(
-    job: &Job,
-    file: &DataFile,
-    part: &Part,
-    controller: &DeclaredController<'_>,
-) -> Result<(CheckedRecord, Vec<Finding>)> {
+fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredController<'_>) -> Result<CheckedPart> {
     let mut findings = Vec::new();
     let (mut record, mut first, mut time) = (part.record.clone(), part.rows[0], part.record.time());
     if job.time.column.is_some() {
@@ -355,16 +360,21 @@ fn method_finding(settings: &RunSettings) -> Option<Finding> {
         "[direct] weight = \"{weight}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
     );
     let advice = "Take weight = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
-    Some(Finding {
+    Some(finding(Severity::Caution, "run.toml", what, advice))
+}
+
+/// A finding on the method or the record as a whole.
+fn finding(severity: Severity, record: &str, what: String, advice: &str) -> Finding {
+    Finding {
         test: Test::Feedback,
-        severity: Severity::Caution,
-        record: "run.toml".into(),
+        severity,
+        record: record.to_owned(),
         channel: None,
         rows: None,
         what,
-        numbers: std::collections::BTreeMap::new(),
-        advice: advice.into(),
-    })
+        numbers: BTreeMap::new(),
+        advice: advice.to_owned(),
+    }
 }
 
 /// Reads the options of a check from a TOML file, as `[check]` has them.

@@ -24,6 +24,7 @@ const EXAMPLES: &str = "\
 Examples:
   youla paper                                  the whole paper: 500 models, three experiments, every figure
   youla demo                                   simulate the gas bearing of the paper and identify it
+  youla check run.toml                         say what is wrong with the data, before anything is identified
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
   youla signals run.toml --out signals         alpha and beta as CSV, to go on in another tool
@@ -31,7 +32,7 @@ Examples:
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
 
-Exit codes: 0 done, 2 the input cannot be used, 3 the computation is impossible on this input.";
+Exit codes: 0 done, 1 `check` found a defect, 2 the input cannot be used, 3 the computation is impossible on this input.";
 
 /// The verbs.
 #[derive(Debug, Subcommand)]
@@ -63,6 +64,12 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: OutputFolder,
     },
+    /// Say what is wrong with the data before anything is identified from them.
+    ///
+    /// With a run.toml all its records are checked, also against the declared controller; otherwise files with --input and
+    /// --output. Nothing is changed, and nothing is written without --out.
+    #[command(after_help = CHECK_EXAMPLES)]
+    Check(CheckArgs),
     /// Write alpha, beta, eta and epsilon of every estimation record as CSV.
     #[command(after_help = "Example:\n  youla signals examples/qube/run.toml --out qube-signals")]
     Signals {
@@ -91,6 +98,46 @@ const SUBSPACE_EXAMPLES: &str = "\
 Example:
   youla subspace log.csv.gz --input u --output x,y --time t
   youla subspace long.npy --input '#1,#2' --output '#3,#4' --sample-time 2e-4 --options options.toml --out model.json";
+
+const CHECK_EXAMPLES: &str = "\
+Example:
+  youla check run.toml
+  youla check log.csv --input u --output y --time t
+  youla check log.csv --input u --output y --excitation d --sample-time 1e-3 --json
+
+Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a test could not be computed.";
+
+/// What is to be checked.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct CheckArgs {
+    /// A run.toml; or, with --input and --output, text, MATLAB or NumPy files, one record each.
+    #[arg(value_name = "FILE", required = true)]
+    pub(crate) files: Vec<PathBuf>,
+    /// Inputs, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "output")]
+    pub(crate) input: Vec<ChannelRef>,
+    /// Outputs, as the inputs.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    pub(crate) output: Vec<ChannelRef>,
+    /// Known excitation added at the plant input, one per input.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    pub(crate) excitation: Vec<ChannelRef>,
+    /// Known reference, one per output.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    pub(crate) reference: Vec<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "S", requires = "input", allow_negative_numbers = true)]
+    pub(crate) sample_time: Option<f64>,
+    /// Column with the time in seconds.
+    #[arg(long, value_name = "NAME", requires = "input")]
+    pub(crate) time: Option<ChannelRef>,
+    /// Thresholds, as in [check] of run.toml.
+    #[arg(long, value_name = "FILE", requires = "input")]
+    pub(crate) options: Option<PathBuf>,
+    /// Folder for check.json; it must not exist.
+    #[arg(long, value_name = "DIR")]
+    pub(crate) out: Option<PathBuf>,
+}
 
 /// Files, channels and clock of `subspace`.
 #[derive(Debug, ClapArgs)]

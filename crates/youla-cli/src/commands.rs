@@ -1,6 +1,7 @@
 //! What each verb does: read, call the library, print.
 
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
+use crate::check;
 use crate::output::{Failure, Progress, say};
 use crate::paper;
 use crate::starts;
@@ -12,9 +13,17 @@ use youla::run::{
     signal_records, unused_folder, write_run, write_signals,
 };
 
-/// Runs the verb that was asked for.
-pub(crate) fn run(args: &Args) -> Result<(), Failure> {
+/// Runs the verb that was asked for; false where a check found a defect.
+pub(crate) fn run(args: &Args) -> Result<bool, Failure> {
     match &args.command {
+        Command::Check(asked) => check::check(args, asked),
+        command => other(args, command).map(|()| true),
+    }
+}
+
+fn other(args: &Args, command: &Command) -> Result<(), Failure> {
+    match command {
+        Command::Check(_) => Ok(()),
         Command::Demo { seed, output } => {
             let demo = demo(*seed)?;
             identify_and_write(args, output, Path::new("."), demo.settings, |_| Ok(demo.records))
@@ -77,6 +86,6 @@ fn report(args: &Args, run: &Path) -> Result<(), Failure> {
 }
 
 /// The folder to which the paths in a settings file are relative.
-fn folder_of(settings: &Path) -> PathBuf {
+pub(crate) fn folder_of(settings: &Path) -> PathBuf {
     settings.parent().map_or_else(PathBuf::new, Path::to_owned)
 }

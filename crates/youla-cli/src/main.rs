@@ -1,6 +1,7 @@
 //! The program `youla`: from a closed-loop log to a trusted model.
 
 mod args;
+mod check;
 mod commands;
 mod output;
 mod paper;
@@ -14,7 +15,8 @@ use std::process::ExitCode;
 fn main() -> ExitCode {
     let args = args::Args::parse();
     match commands::run(&args) {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(true) => ExitCode::SUCCESS,
+        Ok(false) => ExitCode::FAILURE,
         Err(failure) => output::fail(&failure),
     }
 }

@@ -10,7 +10,7 @@
 //! Modules depend on each other in one direction only, in the order in which data flow:
 //!
 //! ```text
-//! error, units -> linalg -> lti -> record -> control -> rig -> factor -> identify -> reduce -> validate -> study -> report -> run
+//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> study -> report -> run
 //! ```
 //!
 //! | module | holds |
@@ -18,6 +18,7 @@
 //! | [`linalg`] | ordered real Schur form, Sylvester, Lyapunov and Riccati equations, exponential and logarithm, each with its residual |
 //! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, simulation |
 //! | [`record`] | labelled, clocked data; CSV, MATLAB and NumPy files; spectra; excitation signals |
+//! | [`check`] | what is wrong with the data: clock, clipping, steps, drift, outliers, delays, excitation, lines, feedback, controller |
 //! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops |
 //! | [`rig`] | the gas bearing of the paper, its digital twin with sensors, actuators and rotation, and experiments on it |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
@@ -68,6 +69,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 
+pub mod check;
 pub mod control;
 pub mod error;
 pub mod factor;

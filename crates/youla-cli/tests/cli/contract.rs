@@ -30,6 +30,7 @@ fn summary_has_the_documented_structure() {
         "certificate",
         "channel_scales",
         "controller_mismatch",
+        "data",
         "redesign",
         "reduction",
         "seconds",
@@ -58,8 +59,18 @@ fn summary_has_the_documented_structure() {
 fn summary_describes_every_method() {
     let summary = json(&demo().join("summary.json"));
     assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced"]);
-    let common = ["fit", "modes", "order", "poles", "robustness", "stabilised_by_controller"];
-    let hansen = ["fit", "modes", "order", "poles", "robustness", "s_order", "s_stable", "stabilised_by_controller"];
+    let common = ["fit", "modes", "order", "poles", "residuals", "robustness", "stabilised_by_controller"];
+    let hansen = [
+        "fit",
+        "modes",
+        "order",
+        "poles",
+        "residuals",
+        "robustness",
+        "s_order",
+        "s_stable",
+        "stabilised_by_controller",
+    ];
     for (name, expected, order) in
         [("direct", &common[..], 6), ("hansen", &hansen[..], 16), ("hansen_reduced", &hansen[..], 6)]
     {

@@ -155,6 +155,39 @@ function verification(host) {
   });
 }
 
+// Correlations of the residuals over lags, all models in one figure, with the widest band.
+function residuals(host) {
+  const { tests, external } = report.residuals;
+  const records = [...new Set(tests.map(t => t.record))], outputs = report.outputs.map(o => o.name), inputs = tests[0].excitations;
+  let record = records[0], output = 0, input = 0;
+  const controls = element("div", { class: "controls" }), plotHost = element("div"), caption = element("p", { class: "caption" });
+  host.append(controls, plotHost, caption);
+  const shown = () => tests.filter(t => t.record === record);
+  const panel = (label, of, first) => {
+    const all = shown().map(t => ({ method: t.method, ...of(t) })).filter(c => c.values?.length);
+    const band = Math.max(...all.map(c => c.band)), last = first + all[0].values.length - 1;
+    const level = (y, k) => ({ id: `band${k}`, x: [first, last], y: [y, y], style: { colour: "--soft", dash: [4, 4], width: 1 } });
+    return { label, unit: "", height: 180, curves: [level(band, 1), level(-band, 2),
+      ...all.map(c => ({ id: c.method, x: c.values.map((_, k) => first + k), y: c.values, style: methodOf(c.method).style }))] };
+  };
+  const lags = () => (shown()[0].cross[0].values.length - 1) / 2;
+  const figure = mount(plotHost, () => stack(plotHost, {
+    label: `Correlations of the residual of ${outputs[output]} on ${record}.`,
+    x: { label: "Lag", unit: "samples", whole: true },
+    legend: shown().map(t => ({ id: t.method, name: methodOf(t.method).label, style: methodOf(t.method).style })),
+    panels: [panel(`with ${inputs[input]}`, t => t.cross[output * inputs.length + input], -lags()), panel("with itself", t => t.auto[output], 0)],
+  }));
+  const tell = () => {
+    caption.textContent = `Correlation of the residual of ${outputs[output]} with ${inputs[input]} and with itself. Dashed: the widest band of 99 % of all models for residuals that are noise. ` +
+      (external ? "Positive lags judge the model; negative ones only show what is fed back." : "No excitation from outside is known: the input holds fed-back noise, and judges nothing.");
+  };
+  const choose = (label, options, changed) => { if (options.length > 1) controls.append(chooser(label, options, k => { changed(k); figure.draw(); tell(); })); };
+  choose("Record", records, k => { record = records[k]; });
+  choose("Output", outputs, k => { output = k; });
+  choose("Excitation", inputs, k => { input = k; });
+  tell();
+}
+
 function span(values) {
   let low = Infinity, high = -Infinity;
   for (const v of values) if (v != null) { low = Math.min(low, v); high = Math.max(high, v); }
@@ -240,7 +273,7 @@ function poles(host) {
 // A line of the verdict leads nowhere where the run has no such part.
 for (const link of document.querySelectorAll(".evidence")) if (!document.querySelector(link.hash)) link.remove();
 
-const BUILDERS = { data, signals, order, stabilisation, verification, frequency, poles, reduction };
+const BUILDERS = { data, signals, order, stabilisation, verification, residuals, frequency, poles, reduction };
 for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dataset.figure](host);
 
 // Worst closed-loop poles of discrete loops are judged by their magnitude.

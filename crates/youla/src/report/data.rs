@@ -40,6 +40,9 @@ pub struct ReportData {
     pub notes: Vec<Note>,
     /// Fits on verification data.
     pub fits: Vec<Fit>,
+    /// What is wrong with the data, the most serious first.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub findings: Vec<DataFinding>,
     /// Records used for estimation.
     pub experiments: Vec<Experiment>,
     /// How orders were chosen.
@@ -49,6 +52,9 @@ pub struct ReportData {
     pub stabilisation: Vec<Stabilisation>,
     /// Measured against predicted.
     pub verification: Vec<Verification>,
+    /// What is left of the verification records.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub residuals: Option<Residuals>,
     /// Frequency responses.
     pub frequency: Option<FrequencyResponse>,
     /// Poles of each model.
@@ -231,6 +237,28 @@ pub struct Note {
     pub status: Status,
     /// One sentence.
     pub text: String,
+}
+
+/// One finding of the check of the data.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DataFinding {
+    /// Its weight: `Bad` where results would be wrong.
+    pub status: Status,
+    /// Which test.
+    pub test: String,
+    /// Name of the record.
+    pub record: String,
+    /// Channel, where one is meant.
+    pub channel: Option<String>,
+    /// First and last row of the file, where a place is known.
+    pub rows: Option<[usize; 2]>,
+    /// What was found.
+    pub what: String,
+    /// What to do; may be empty.
+    pub advice: String,
+    /// Further records with the same finding.
+    #[serde(default)]
+    pub further: usize,
 }
 
 /// Fit of one model to one output of one record.
@@ -462,6 +490,55 @@ pub struct Prediction {
     pub predicted: Trace,
     /// Measured less predicted, reduced from all samples by itself.
     pub residual: Trace,
+}
+
+/// What the models leave of the verification records.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Residuals {
+    /// What the measured outputs are held against, in words.
+    pub prediction: String,
+    /// Whether all are correlated with excitations from outside of the loop, and not with the input.
+    pub external: bool,
+    /// Steps ahead of the fits.
+    pub steps: Vec<usize>,
+    /// One entry per method and record.
+    pub tests: Vec<ResidualTest>,
+}
+
+/// What one model leaves of one record.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ResidualTest {
+    /// Name of the record.
+    pub record: String,
+    /// Key of the method.
+    pub method: String,
+    /// Names of what the residual is correlated with.
+    pub excitations: Vec<String>,
+    /// Whether it does not depend on their past; absent where they are not from outside.
+    pub independent: Option<bool>,
+    /// Auto-correlation per output, at the lags from 0 on.
+    pub auto: Vec<Correlation>,
+    /// Correlation with each excitation, outputs first: at the lags around 0.
+    pub cross: Vec<Correlation>,
+    /// Fits in percent, per number of steps and last for the simulation, per output.
+    pub step_fits: Vec<Vec<Option<f64>>>,
+}
+
+/// A correlation over lags with the band of noise.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Correlation {
+    /// Values.
+    pub values: Vec<f64>,
+    /// Band of a single value at 99 %.
+    pub band: f64,
+}
+
+impl Correlation {
+    /// Values to four decimal places, which is what a figure shows.
+    pub fn new(values: &[f64], band: f64) -> Self {
+        let round = |v: f64| if v.is_finite() { (1e4 * v).round() / 1e4 } else { 0.0 };
+        Correlation { values: values.iter().map(|v| round(*v)).collect(), band: (1e5 * band).round() / 1e5 }
+    }
 }
 
 /// Frequency responses of all models on one grid, and the measured ones on theirs.

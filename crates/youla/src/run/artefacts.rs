@@ -170,7 +170,10 @@ impl Writer<'_> {
             "segments": records.segments,
             "provenance": self.provenance,
         });
-        self.folder.json("1-record/records.json", &index)
+        self.folder.json("1-record/records.json", &index)?;
+        let mut check = self.found.data.json();
+        check["provenance"] = serde_json::json!(self.provenance);
+        self.folder.json("1-record/check.json", &check)
     }
 
     fn record(&self, purpose: &str, record: &LoopRecord) -> Result<()> {
@@ -361,6 +364,8 @@ impl Writer<'_> {
             "7-validate/verdict.json",
             &serde_json::json!({"models": models, "channel_scales": scales, "provenance": self.provenance}),
         )?;
+        let residuals = super::residual_tests::artefact(self.found, &self.provenance);
+        self.folder.json("7-validate/residuals.json", &residuals)?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
             for v in &self.found.verdict.models {

@@ -6,6 +6,7 @@ use super::records::{LoopRecord, RunRecords, SourceFile};
 use super::settings::{
     DataFile, DataSettings, FactorSettings, FrequencySettings, RunSettings, StabilisationSettings, VerificationSettings,
 };
+use crate::check::CheckOptions;
 use crate::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use crate::factor::CoprimeFactors;
 use crate::identify::innovation_form::DeviationOptions;
@@ -177,6 +178,7 @@ fn settings(seed: u64, f: &Mat<f64>, l: &Mat<f64>) -> RunSettings {
         grey_box: None,
         certificate: Some(CertificateSettings { controller_errors: true, ..CertificateSettings::default() }),
         redesign: Some(RedesignOptions::default()),
+        check: CheckOptions::default(),
         stabilisation: StabilisationSettings::default(),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },

@@ -32,10 +32,13 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
 }
 
 /// What speaks against the result or asks for a look, in sentences: for a terminal that shows no report.
+///
+/// What the check of the data says at least as a caution comes first.
 pub fn cautions(found: &Identification) -> Vec<String> {
     let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
     let lines = verdict_lines(found).into_iter().map(|v| weigh(v.status, v.text));
-    lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten().collect()
+    let rest = lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten();
+    found.data.sentences().into_iter().chain(rest).collect()
 }
 
 /// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.

@@ -2,6 +2,7 @@
 
 mod artefacts;
 mod certificate;
+mod check;
 mod controller_errors;
 mod demo;
 mod disturbance;
@@ -20,6 +21,7 @@ mod records;
 mod redesign;
 mod redraw;
 mod reduction;
+mod residual_tests;
 mod response;
 mod robustness;
 mod segments;
@@ -34,6 +36,7 @@ mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use certificate::{CertificateSettings, RunCertificate};
+pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, further, read_check_options};
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
@@ -49,6 +52,7 @@ pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, ident
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use reduction::RunReduction;
+pub use residual_tests::RecordResiduals;
 pub use robustness::Robustness;
 pub use segments::RecordSegment;
 pub use settings::{

@@ -7,11 +7,13 @@ use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::redesign;
+use super::residual_tests::drawn as drawn_residuals;
 use super::response::{decibel, log_grid, model_responses};
 use super::robustness;
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
+use crate::check::{Finding, Severity};
 use crate::identify::subspace::ResponseBand;
 use crate::identify::subspace::SubspaceModel;
 use crate::lti::FrequencyResponse;
@@ -40,6 +42,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         verdict: verdict_lines(found),
         notes: notes(found),
         fits: fits(found),
+        findings: findings(found),
         experiments: experiments(found)?,
         orders: orders(found),
         stabilisation: diagrams(found),
@@ -50,6 +53,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
             .enumerate()
             .map(|(k, r)| verification(found, k, r))
             .collect::<Result<_>>()?,
+        residuals: drawn_residuals(found),
         frequency: Some(frequency(found)?),
         poles: found.verdict.models.iter().map(poles).collect(),
         modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
@@ -121,6 +125,26 @@ fn fits(found: &Identification) -> Vec<draw::Fit> {
         }
     }
     all
+}
+
+/// What the check of the data found, the most serious first.
+fn findings(found: &Identification) -> Vec<draw::DataFinding> {
+    let status = |severity: Severity| match severity {
+        Severity::Note => draw::Status::Info,
+        Severity::Caution => draw::Status::Caution,
+        Severity::Defect => draw::Status::Bad,
+    };
+    let one = |(f, more): (&Finding, usize)| draw::DataFinding {
+        status: status(f.severity),
+        test: f.test.key().into(),
+        record: f.record.clone(),
+        channel: f.channel.clone(),
+        rows: f.rows,
+        what: f.what.clone(),
+        advice: f.advice.clone(),
+        further: more,
+    };
+    found.data.grouped().into_iter().map(one).collect()
 }
 
 fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {

@@ -1,6 +1,7 @@
 //! The driver: from records, nominal model and controller to models with evidence. Read this file first.
 
 use super::certificate::{RunCertificate, certificate};
+use super::check::{DataCheck, check_records};
 use super::factorise::{Factorisation, factorise_run};
 use super::grey_box::{GreyBoxRun, grey_box};
 use super::records::RunRecords;
@@ -117,6 +118,8 @@ pub struct Identification {
     pub settings: RunSettings,
     /// The records.
     pub records: RunRecords,
+    /// What is wrong with them.
+    pub data: DataCheck,
     /// Nominal model, controller and their factors.
     pub factorisation: Factorisation,
     /// alpha and beta of the estimation records.
@@ -256,8 +259,10 @@ pub fn identify(
     check_grid(&settings.frequency_response, records.time)?;
     let factorisation = clock.run(Stage::Factor, || factorise_run(&settings, &records, folder))?; // (13)-(15)
     let factors = &factorisation.factors;
-    let signals =
-        clock.run(Stage::Signals, || deviation_signals(factors, &records.estimation, settings.factors.settle))?; // (28)
+    let (signals, data) = clock.run(Stage::Signals, || {
+        let signals = deviation_signals(factors, &records.estimation, settings.factors.settle)?; // (28)
+        Ok((signals, check_records(&settings, &records, &factorisation.controller)?))
+    })?;
     require_length(&settings.hansen, &records, signals.settle)?;
     let (scheme, direct, grey_box) = clock.run(Stage::Identify, || {
         let (scheme, direct) = rayon::join(
@@ -284,6 +289,7 @@ pub fn identify(
         redesign: None,
         settings,
         records,
+        data,
         factorisation,
         signals,
         hansen,

@@ -167,7 +167,7 @@ fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataF
 }
 
 impl LoopRecord {
-    fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
+    pub(super) fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
         let matrix = |group: &[ChannelSpec]| {
             let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();
             record.matrix(&names)

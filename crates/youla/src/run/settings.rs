@@ -6,6 +6,7 @@ use super::explain::{explain, problem_at};
 use super::grey_box::GreyBoxSettings;
 use super::models::{ControllerSettings, NominalModel};
 use super::segments;
+use crate::check::CheckOptions;
 use crate::identify::innovation_form::DeviationOptions;
 use crate::identify::subspace::SubspaceOptions;
 use crate::identify::subspace::stabilisation::StabilisationOptions;
@@ -60,6 +61,9 @@ pub struct RunSettings {
     /// How models are held against the verification records.
     #[serde(default)]
     pub verification: VerificationSettings,
+    /// Thresholds of the check of the data.
+    #[serde(default)]
+    pub check: CheckOptions,
     /// Frequency responses.
     #[serde(default)]
     pub frequency_response: FrequencySettings,

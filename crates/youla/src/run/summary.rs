@@ -49,6 +49,7 @@ pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
         "methods": methods,
         "refused": refused,
         "frequency_response": response_entry(found)?,
+        "data": found.data.json(),
         "bezout_residual": found.factorisation.bezout_residual,
         "controller_mismatch": found.signals.controller_mismatch,
         "seconds": seconds.iter().map(|(s, t)| (s.name().to_owned(), json!(t))).collect::<Map<_, _>>(),
@@ -80,6 +81,7 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Result<Value> {
         "modes": v.modes.iter().map(|m| json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
         "poles": pairs(&v.poles),
         "robustness": robustness::summary_entry(&v.robustness),
+        "residuals": super::residual_tests::summary_entry(v),
     });
     if let Some(uncertainty) = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen) {
         let modes = uncertainty.plant.modes.iter().map(|band| with_deviations(json!({}), band));

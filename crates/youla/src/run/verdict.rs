@@ -4,6 +4,7 @@ use super::disturbance::without_lines;
 use super::factorise::Factorisation;
 use super::pipeline::Identification;
 use super::records::LoopRecord;
+use super::residual_tests::{RecordResiduals, residual_tests};
 use super::robustness::{Robustness, channel_scales, robustness};
 use super::settings::Prediction;
 use crate::control::{ChannelScales, with_input_port};
@@ -68,6 +69,8 @@ pub struct RecordVerdict {
     pub fit: Vec<f64>,
     /// Variance accounted for per output, percent, likewise; NaN where there is no prediction.
     pub vaf: Vec<f64>,
+    /// Tests of measured less predicted outputs; `None` where there is no prediction.
+    pub residuals: Option<RecordResiduals>,
 }
 
 /// What is known of one model.
@@ -181,11 +184,13 @@ pub(super) fn verify_record(
             let rest = |m: &Mat<f64>| without_lines(counted(m.as_ref()).as_ref(), lines.as_ref().map(|w| w.as_ref()));
             let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
-            Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf })
+            let residuals = Some(residual_tests(found, record, measured.as_ref(), predicted.as_ref(), skip)?);
+            Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
         }
         Err(e @ Error::Diverged { .. }) => {
             let none = vec![f64::NAN; record.y.ncols()];
-            Ok(RecordVerdict { record: record_name, predicted: Err(e.to_string()), fit: none.clone(), vaf: none })
+            let predicted = Err(e.to_string());
+            Ok(RecordVerdict { record: record_name, predicted, fit: none.clone(), vaf: none, residuals: None })
         }
         Err(e) => Err(e),
     }

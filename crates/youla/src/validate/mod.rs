@@ -6,9 +6,14 @@ mod certificate;
 mod exact;
 mod fit;
 mod predict;
+mod residuals;
 
 pub use band::{BandCertificate, BandOptions, certify_band};
 pub use certificate::{LoopCertificate, certify};
 pub use exact::{ExactCertificate, certify_deviation};
 pub use fit::{fit, vaf};
 pub use predict::{LoopExcitation, predict_closed_loop, predict_open_loop};
+pub use residuals::{
+    CrossCorrelogram, LargestCorrelation, PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations,
+    step_fits,
+};

@@ -20,7 +20,7 @@ fn family<T: TimeDomain>(seed: u64, spread: f64, time: T) -> Vec<StateSpace<T>> 
     let zero = |r: usize, c: usize| Mat::<f64>::zeros(r, c);
     let mut source = ChaCha8Rng::seed_from_u64(seed + 1000);
     let (a, b, c) = (draw(4, 4, &mut source), draw(4, 2, &mut source), draw(3, 4, &mut source));
-    let d = if seed % 2 == 0 { zero(3, 2) } else { draw(3, 2, &mut source) };
+    let d = if seed.is_multiple_of(2) { zero(3, 2) } else { draw(3, 2, &mut source) };
     (0..3).map(|_| StateSpace::new(Scale(size) * near(&a), near(&b), near(&c), near(&d), time).unwrap()).collect()
 }
 

@@ -2,7 +2,9 @@
 
 use super::controller_errors::{ControllerErrorEffect, controller_errors};
 use super::pipeline::Identification;
+use super::robustness::channel_scales;
 use crate::Result;
+use crate::control::{self, Margins, coprime_margin};
 use crate::identify::subspace::Interval;
 use crate::lti::{Discrete, StateSpace};
 use crate::report::data as draw;
@@ -85,19 +87,49 @@ pub(super) fn certificate(found: &Identification) -> Result<RunCertificate> {
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 
-/// Margins of the loop of G(S) with their intervals, channels in their rms.
+/// Names of the margins that get intervals, in the order of [`figures`].
+const MARGINS: [&str; 8] = [
+    "peak sensitivity, worst output",
+    "peak sensitivity, all outputs",
+    "disk margin of all outputs",
+    "lowest gain factor",
+    "highest gain factor",
+    "phase margin, degrees",
+    "delay margin, ms",
+    "normalised coprime margin",
+];
+
+/// Margins of the loop of G(S) with their intervals; those that do not exist are left out.
 fn margins(found: &Identification) -> Result<Vec<(String, Interval)>> {
     let Some(uncertainty) = &found.hansen.deviation.uncertainty else { return Ok(Vec::new()) };
-    let factors = &found.factorisation.factors;
-    let controller = &found.factorisation.controller;
-    let (u, y) = found.records.sizes();
-    let k = controller.in_units(&y, &u);
-    let peak = |s: &StateSpace<Discrete>| {
-        let plant = factors.plant_of(s)?.in_units(&u, &y);
-        Ok(vec![crate::control::peak_sensitivity(&plant, &k)?])
+    let (factors, controller) = (&found.factorisation.factors, &found.factorisation.controller);
+    let scales = channel_scales(&found.records.estimation).ok();
+    let scaled = scales.as_ref().map(|scales| scales.controller(controller)).transpose()?;
+    let figures = |s: &StateSpace<Discrete>| {
+        let plant = factors.plant_of(s)?;
+        let coprime = match (&scales, &scaled) {
+            (Some(scales), Some(controller)) => coprime_margin(&scales.plant(&plant)?, controller)?,
+            _ => f64::NAN,
+        };
+        Ok(figures(&control::margins(&plant, controller)?, coprime).to_vec())
     };
-    let intervals = uncertainty.intervals(peak)?;
-    Ok(["peak sensitivity"].into_iter().map(String::from).zip(intervals).collect())
+    let named = MARGINS.into_iter().map(String::from).zip(uncertainty.intervals(figures)?);
+    Ok(named.filter(|(_, interval)| interval.value.is_finite() && interval.deviation.is_finite()).collect())
+}
+
+/// In the order of [`MARGINS`]; NaN where a margin does not exist.
+fn figures(margins: &Margins, coprime: f64) -> [f64; 8] {
+    let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+    [
+        margins.outputs.iter().map(|channel| channel.sensitivity.value).fold(0.0, f64::max),
+        margins.output_sensitivity.value,
+        margins.output_disks.balanced.alpha,
+        or_nan(margins.lowest_gain().map(|limit| limit.factor)),
+        or_nan(margins.highest_gain().map(|limit| limit.factor)),
+        or_nan(margins.phase().map(|limit| limit.degrees)),
+        or_nan(margins.delay().map(|limit| 1e3 * limit.seconds)),
+        coprime,
+    ]
 }
 
 impl RunCertificate {
@@ -125,8 +157,11 @@ impl RunCertificate {
 
     /// For `7-validate/certificate.json` and summary.json.
     pub(super) fn json(&self) -> Value {
-        let margins: serde_json::Map<String, Value> =
-            self.margins.iter().map(|(name, interval)| (name.replace(' ', "_"), json!(interval))).collect();
+        let margins: serde_json::Map<String, Value> = self
+            .margins
+            .iter()
+            .map(|(name, interval)| (name.replace(',', "").replace(' ', "_"), json!(interval)))
+            .collect();
         let errors: Vec<Value> = self.controller_errors.iter().map(ControllerErrorEffect::json).collect();
         json!({
             "stable": self.exact.stable,
@@ -154,7 +189,8 @@ impl RunCertificate {
                 text: self.band_sentence().unwrap_or_default(),
                 columns: ["Figure", "Estimate", "Interval"].map(String::from).to_vec(),
                 rows: self.margins.iter().map(row).collect(),
-                caption: "Channels in their rms on the estimation records.".into(),
+                caption: "Gain, phase and delay of one channel at a time, the worst one; the coprime margin in channels scaled by their rms."
+                    .into(),
             });
         }
         tables.extend(super::controller_errors::table(&self.controller_errors));

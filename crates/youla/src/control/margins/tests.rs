@@ -121,7 +121,7 @@ fn check_loop<T: TimeDomain>(plant: &StateSpace<T>, controller: &StateSpace<T>, 
             }
             for disk in [channel.disk, channel.sensitivity_disk] {
                 let worst = |size: f64| {
-                    let angles = (0..720).map(|k| f64::from(k) * std::f64::consts::PI / 360.0);
+                    let angles = (0..120).map(|k| f64::from(k) * std::f64::consts::PI / 60.0);
                     let delta = |angle: f64| c64::new(angle.cos(), angle.sin()) * (size * disk.alpha);
                     angles.map(|angle| with(i, factor(&disk, delta(angle)))).fold(f64::NEG_INFINITY, f64::max)
                 };
@@ -129,7 +129,7 @@ fn check_loop<T: TimeDomain>(plant: &StateSpace<T>, controller: &StateSpace<T>, 
             }
         }
         for disk in [together.balanced, together.sensitivity] {
-            for _ in 0..300 {
+            for _ in 0..100 {
                 let delta = |angle: f64| c64::new(angle.cos(), angle.sin()) * (0.999 * disk.alpha);
                 let all: Vec<c64> = (0..ports).map(|_| factor(&disk, delta(rng.random_range(0.0..6.3)))).collect();
                 assert!(instability(&side, &all) < 0.0, "{disk:?}");
@@ -139,10 +139,10 @@ fn check_loop<T: TimeDomain>(plant: &StateSpace<T>, controller: &StateSpace<T>, 
         if ports == 2 {
             let disk = together.balanced;
             let delta = |k: i32| {
-                let angle = f64::from(k) * std::f64::consts::PI / 60.0;
+                let angle = f64::from(k) * std::f64::consts::PI / 30.0;
                 factor(&disk, c64::new(angle.cos(), angle.sin()) * (1.01 * disk.alpha))
             };
-            assert!((0..120).any(|j| (0..120).any(|k| instability(&side, &[delta(j), delta(k)]) > 0.0)), "{disk:?}");
+            assert!((0..60).any(|j| (0..60).any(|k| instability(&side, &[delta(j), delta(k)]) > 0.0)), "{disk:?}");
         }
     }
 }
@@ -150,7 +150,7 @@ fn check_loop<T: TimeDomain>(plant: &StateSpace<T>, controller: &StateSpace<T>, 
 #[test]
 fn loops_are_stable_just_inside_and_unstable_just_outside() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
-    for seed in 0..9 {
+    for seed in 0..6 {
         let (plant, controller) = random_loop(seed, Continuous);
         check_loop(&plant, &controller, &mut rng);
         let (plant, controller) = random_loop(seed, Discrete::new(1e-2).unwrap());

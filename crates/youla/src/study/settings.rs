@@ -4,7 +4,7 @@ use super::method::Method;
 use crate::identify::greybox::GreyBoxOptions;
 use crate::identify::subspace::SubspaceOptions;
 use crate::record::RampedExcitation;
-use crate::reduce::ReductionOptions;
+use crate::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
 use crate::rig::Bearing;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -164,7 +164,8 @@ impl PaperSettings {
     /// Fails for the first value without meaning.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] naming the key.
+    /// [`Error::OutOfRange`] naming the key; [`Error::NeedsLoop`] for a reduction that weighs or measures the loop: the study
+    /// reduces models alone.
     pub fn check(&self) -> Result<()> {
         let (c, s, x, e) = (&self.controller, &self.study, &self.crossover, &self.experiments);
         positive("controller.displacement_weight", &[c.displacement_weight])?;
@@ -195,6 +196,12 @@ impl PaperSettings {
             ("experiments.verification_samples", e.verification_samples),
         ] {
             count(what, samples, 100, 100_000_000)?;
+        }
+        if self.reduction.method == ReductionMethod::Weighted {
+            return Err(Error::NeedsLoop { what: "[reduction] method = \"weighted\"" });
+        }
+        if matches!(self.reduction.order, ReducedOrder::ClosedLoop(_)) {
+            return Err(Error::NeedsLoop { what: "[reduction] order = { closed-loop = ... }" });
         }
         count("experiments.settle", e.settle, 0, e.samples.min(e.verification_samples) / 2)?;
         count("experiments.harmonics", e.harmonics, 0, 20)

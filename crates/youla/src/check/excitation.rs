@@ -43,7 +43,8 @@ const WORTH: f64 = 0.1;
 ///
 /// ```
 /// use youla::{Mat, check::excitation, lti::Discrete};
-/// let sines = Mat::from_fn(2000, 1, |k, _| (0.3 * k as f64).sin() + (0.5 * k as f64).sin());
+/// let turn = std::f64::consts::TAU / 100.0;
+/// let sines = Mat::from_fn(2000, 1, |k, _| (5.0 * turn * k as f64).sin() + (13.0 * turn * k as f64).sin());
 /// let found = excitation(sines.as_ref(), Discrete::new(0.01)?, 20)?;
 /// assert_eq!((found.order, found.reached), (20, 4));
 /// # Ok::<(), youla::Error>(())

@@ -3,7 +3,7 @@
 //! A line of the Hann-windowed periodogram is held against the median of its neighbours, without the two on either side that it
 //! leaks into. Over noise the ratio to the mean of the neighbours has, with nu of them independent, the tail
 //! `(1 + x / nu)^-nu`, from which the threshold for the given probability in N / 2 lines follows. Resonances are wider than a line
-//! and lift their neighbours; a line must also fall off by a factor five within two bins, as the window makes it. Lines that
+//! and lift their neighbours; a line must also stand out from the eight nearest of them and fall off by a factor five within two bins, as the window makes it. Lines that
 //! the excitation has too are not disturbances.
 //!
 //! Source: for the window F. J. Harris, Proc. IEEE 66 (1978), 51; for the test R. A. Fisher, Proc. R. Soc. A 125 (1929), 54.
@@ -33,6 +33,9 @@ pub struct Line {
 
 /// Neighbours on each side, at least and at most.
 const SIDE: [usize; 2] = [20, 60];
+/// Ratio to the mean of the eight nearest bins that a line leaks nothing into: `4 ((20 / 1e-3)^(1/4) - 1)`, for the 20 or so bins of
+/// a resonance that stand out from further neighbours.
+const NEAR: f64 = 43.6;
 /// Fall within two bins.
 const FALL: f64 = 0.2;
 /// Ratio of a line of an excitation, over the threshold, from which it is taken to be the cause; noise reaches it in one of 1e4.
@@ -57,9 +60,13 @@ pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOp
     let n = values.len();
     let Some(spectrum) = Spectrum::new(values) else { return Vec::new() };
     let threshold = spectrum.threshold(options.line_false_alarm);
+    let candidates = spectrum.lines(threshold);
+    if candidates.is_empty() {
+        return Vec::new();
+    }
     let known: Vec<Spectrum> = known.iter().filter_map(|k| Spectrum::new(k)).collect();
     let mut found: Vec<Line> = Vec::new();
-    for k in spectrum.lines(threshold) {
+    for k in candidates {
         let shared = |other: &Spectrum| (k - 1..=k + 1).any(|i| other.ratio(i) > SHARED * threshold) || other.periodic;
         if known.iter().any(shared) {
             continue;
@@ -130,12 +137,18 @@ impl Spectrum {
         }
     }
 
+    /// Mean of the bins next to those that a line leaks into, which a resonance lifts.
+    fn near(&self, k: usize) -> f64 {
+        let sum: f64 = (3..=6).map(|i| self.power[k - i] + self.power[k + i]).sum();
+        sum / 8.0
+    }
+
     /// Local maxima above the threshold that fall off as a line does.
     fn lines(&self, threshold: f64) -> Vec<usize> {
         let p = &self.power;
-        (2..p.len().saturating_sub(2))
+        (6..p.len().saturating_sub(6))
             .filter(|k| self.ratio(*k) > threshold && p[*k] >= p[k - 1] && p[*k] > p[k + 1])
-            .filter(|k| p[k - 2].max(p[k + 2]) < FALL * p[*k])
+            .filter(|k| p[k - 2].max(p[k + 2]) < FALL * p[*k] && p[*k] > NEAR * self.near(*k))
             .collect()
     }
 

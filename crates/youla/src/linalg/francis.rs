@@ -6,6 +6,7 @@ use super::reflector::{householder, reflect_columns, reflect_rows};
 use super::schur::standardise;
 use crate::{Error, Result};
 use faer::Mat;
+use std::ops::Range;
 
 /// Turns the Hessenberg matrix `t` into quasi-triangular form, deflating from the bottom until nothing is left, and
 /// accumulates the transformations in `q`.
@@ -29,7 +30,8 @@ pub(super) fn iterate(what: &str, t: &mut Mat<f64>, q: &mut Mat<f64>) -> Result<
                 total += 1;
                 since_deflation += 1;
                 let shifts = Shifts::choose(t, start, end, since_deflation);
-                sweep(t, q, start, end, shifts);
+                let first = first_row(t, start, end, shifts);
+                sweep(t, q, start..end, first, shifts);
             }
         }
     }
@@ -70,11 +72,11 @@ fn is_negligible(t: &Mat<f64>, k: usize) -> bool {
     small * (large / sum) <= (f64::MIN_POSITIVE / eps).max(eps * (least * (most / sum)))
 }
 
-/// Sum and product of the two shifts, real or a conjugate pair.
+/// The two shifts: twice the same real number, or a conjugate pair.
 #[derive(Clone, Copy)]
 struct Shifts {
-    sum: f64,
-    product: f64,
+    re: f64,
+    im: f64,
 }
 
 impl Shifts {
@@ -86,50 +88,63 @@ impl Shifts {
         if sweeps.is_multiple_of(10) {
             let k = if sweeps.is_multiple_of(20) { n } else { start + 2 };
             let size = t[(k, k - 1)].abs() + t[(k - 1, k - 2)].abs();
-            let centre = t[(k, k)] + 0.75 * size;
-            return Shifts { sum: 2.0 * centre, product: centre * centre + 0.4375 * size * size };
+            return Shifts { re: t[(k, k)] + 0.75 * size, im: 0.4375_f64.sqrt() * size };
         }
         let half = 0.5 * (a - d);
         let discriminant = half * half + b * c;
         if discriminant < 0.0 {
-            return Shifts { sum: a + d, product: a * d - b * c };
+            return Shifts { re: d + half, im: (-discriminant).sqrt() };
         }
         let away = half + discriminant.sqrt().copysign(half);
-        let near = if away == 0.0 { d } else { d - b * c / away };
-        Shifts { sum: 2.0 * near, product: near * near }
+        Shifts { re: if away == 0.0 { d } else { d - b * c / away }, im: 0.0 }
     }
 
-    /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size.
+    /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size. It is made of
+    /// differences to the shifts, so that eigenvalues that agree in many digits are still told apart.
     fn first_column(self, t: &Mat<f64>, k: usize) -> [f64; 3] {
-        let (a, b, c, d) = (t[(k, k)], t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)]);
-        let size = a.abs() + b.abs() + c.abs() + d.abs() + self.sum.abs();
+        let (a, b, c, d) = (t[(k, k)] - self.re, t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)] - self.re);
+        let size = a.abs() + self.im.abs() + c.abs();
         if size == 0.0 {
             return [0.0; 3];
         }
         let r = c / size;
-        let first = a / size * (a - self.sum) + self.product / size + b * r;
-        [first, r * (a + d - self.sum), r * t[(k + 2, k + 1)]]
+        [r * b + a * (a / size) + self.im * (self.im / size), r * (a + d), r * t[(k + 2, k + 1)]]
     }
 }
 
-/// One implicit double-shift QR sweep on the unreduced rows `start..end`, chasing the bulge down.
-fn sweep(t: &mut Mat<f64>, q: &mut Mat<f64>, start: usize, end: usize, shifts: Shifts) {
-    let n = t.nrows();
-    let mut column = shifts.first_column(t, start);
-    for k in start..end - 1 {
+/// The row in which a sweep may begin: the lowest below which the shifts act as if the rows above were split off, because
+/// two subdiagonal entries in turn are small. From farther up they would be lost in rounding on their way down.
+fn first_row(t: &Mat<f64>, start: usize, end: usize, shifts: Shifts) -> usize {
+    for k in (start + 1..end - 2).rev() {
+        let [x, y, z] = shifts.first_column(t, k);
+        let neighbours = t[(k - 1, k - 1)].abs() + t[(k, k)].abs() + t[(k + 1, k + 1)].abs();
+        if t[(k, k - 1)].abs() * (y.abs() + z.abs()) <= f64::EPSILON * x.abs() * neighbours {
+            return k;
+        }
+    }
+    start
+}
+
+/// One implicit double-shift QR sweep on the unreduced rows `block`, chasing the bulge down from the row `first` on.
+fn sweep(t: &mut Mat<f64>, q: &mut Mat<f64>, block: Range<usize>, first: usize, shifts: Shifts) {
+    let (n, Range { start, end }) = (t.nrows(), block);
+    let mut column = shifts.first_column(t, first);
+    for k in first..end - 1 {
         let length = 3.min(end - k);
-        if k > start {
+        if k > first {
             for (i, e) in column.iter_mut().enumerate().take(length) {
                 *e = t[(k + i, k - 1)];
             }
         }
         let v = &mut column[..length];
         let (tau, beta) = householder(v);
-        if k > start {
+        if k > first {
             t[(k, k - 1)] = beta;
             for i in 1..length {
                 t[(k + i, k - 1)] = 0.0;
             }
+        } else if k > start {
+            t[(k, k - 1)] *= 1.0 - tau;
         }
         reflect_rows(t, v, tau, k, k..n);
         reflect_columns(t, v, tau, k, 0..end.min(k + 4));

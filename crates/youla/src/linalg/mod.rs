@@ -96,6 +96,32 @@ pub fn solve(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f
     }
 }
 
+/// [`solve`] for equations whose rows and columns carry units of their own (direct feedthroughs of loops): where `a` looks
+/// singular, it is judged and solved again with rows and columns scaled to like size by powers of two.
+///
+/// # Errors
+/// [`Error::Singular`] naming `what`.
+pub(crate) fn solve_in_any_units(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    let plain = solve(what, a, b);
+    if plain.is_ok() {
+        return plain;
+    }
+    let n = a.nrows();
+    let (mut rows, mut columns) = (vec![1.0_f64; n], vec![1.0_f64; n]);
+    let half = |size: f64| if size.is_normal() { (-0.5 * size.log2()).round().exp2() } else { 1.0 };
+    for _ in 0..20 {
+        let size = |i: usize, j: usize| (a[(i, j)] * rows[i] * columns[j]).abs();
+        let row: Vec<f64> = (0..n).map(|i| half((0..n).map(|j| size(i, j)).fold(0.0, f64::max))).collect();
+        let column: Vec<f64> = (0..n).map(|j| half((0..n).map(|i| size(i, j)).fold(0.0, f64::max))).collect();
+        rows.iter_mut().zip(&row).for_each(|(r, factor)| *r *= factor);
+        columns.iter_mut().zip(&column).for_each(|(c, factor)| *c *= factor);
+    }
+    let scaled = Mat::from_fn(n, n, |i, j| a[(i, j)] * rows[i] * columns[j]);
+    let rhs = Mat::from_fn(n, b.ncols(), |i, j| b[(i, j)] * rows[i]);
+    let x = solve(what, scaled.as_ref(), rhs.as_ref())?;
+    Ok(Mat::from_fn(n, b.ncols(), |i, j| x[(i, j)] * columns[i]))
+}
+
 /// Solves `x a = b`, by transposition of [`solve`].
 ///
 /// # Errors
@@ -115,15 +141,18 @@ pub fn reciprocal_condition(a: MatRef<'_, f64>) -> f64 {
     }
 }
 
-/// Eigenvalues of a square matrix.
+/// Eigenvalues of a square matrix, balanced first: states in very different units cost no digits.
 ///
 /// # Errors
-/// [`Error::NoConvergence`] naming `what`.
+/// [`Error::NoConvergence`], [`Error::NotFinite`] and [`Error::Shape`] naming `what`.
 pub fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
     if a.nrows() == 0 {
         return Ok(Vec::new());
     }
-    a.eigenvalues().map_err(|_| Error::NoConvergence { what: format!("the eigenvalues of {what}"), iterations: 0 })
+    balance(what, a)?
+        .a
+        .eigenvalues()
+        .map_err(|_| Error::NoConvergence { what: format!("the eigenvalues of {what}"), iterations: 0 })
 }
 
 /// `[C; C A; ...; C A^(blocks-1)]`.

@@ -1,7 +1,7 @@
 //! Interconnection: series, parallel, stacking, inversion and the closing of internal loops, all in state space.
 
 use super::{StateSpace, TimeDomain};
-use crate::linalg::{block, block_diagonal, eye, solve, solve_right};
+use crate::linalg::{block, block_diagonal, eye, solve, solve_in_any_units, solve_right};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use std::ops::Range;
@@ -62,7 +62,8 @@ impl<T: TimeDomain> StateSpace<T> {
     /// [`Error::Shape`] unless square, [`Error::Singular`] when D is not invertible.
     pub fn inverse(&self) -> Result<Self> {
         check_ports("the number of inputs of a system to invert", self.inputs(), self.outputs())?;
-        let d_inv = solve("the feedthrough of the system to invert", self.d(), eye(self.outputs()).as_ref())?;
+        let d_inv =
+            solve_in_any_units("the feedthrough of the system to invert", self.d(), eye(self.outputs()).as_ref())?;
         let b = self.b() * &d_inv;
         let a = self.a() - &b * self.c();
         let c = faer::Scale(-1.0) * (&d_inv * self.c());
@@ -113,7 +114,7 @@ impl<T: TimeDomain> StateSpace<T> {
         let drv = self.part(nz..self.outputs(), ne..self.inputs());
         let loop_matrix = eye(nv) - routing * drv.d();
         let rhs = block(&[&[(routing * to_r.c()).as_ref(), (routing * to_r.d()).as_ref()]]);
-        let v = solve("loop", loop_matrix.as_ref(), rhs.as_ref()).map_err(|e| match e {
+        let v = solve_in_any_units("loop", loop_matrix.as_ref(), rhs.as_ref()).map_err(|e| match e {
             Error::Singular { rcond, .. } => Error::AlgebraicLoop { rcond },
             other => other,
         })?;

@@ -13,8 +13,9 @@ use super::Equation;
 use super::normal_form::NormalForm;
 use crate::Result;
 use crate::linalg::sylvester::{Form, solve_on_schur_forms};
-use crate::linalg::{eye, real_schur, solve};
-use faer::Mat;
+use crate::linalg::{eye, real_schur, solve, solve_in_any_units};
+use faer::prelude::*;
+use faer::{Mat, Side};
 
 /// Most Newton steps; near the solution two suffice.
 const MOST_STEPS: usize = 8;
@@ -53,9 +54,22 @@ pub(super) fn gain(normal: &NormalForm, x: &Mat<f64>) -> Result<Mat<f64>> {
     let bx = b.transpose() * x;
     match normal.equation {
         Equation::Continuous => Ok(bx + s.transpose()),
+        // `(I + B'X B)^-1 B'X = B'X (I + B B'X)^-1`, whichever is smaller: the larger one would be nearly singular.
+        Equation::Discrete if a.nrows() < b.ncols() => {
+            let weight = eye(a.nrows()) + b * &bx;
+            let rhs = normal.a_without_cross_term();
+            let moved =
+                solve_in_any_units("the matrix I + B B'X of a Riccati equation", weight.as_ref(), rhs.as_ref())?;
+            Ok(bx * moved + s.transpose())
+        }
+        // By Cholesky's factor inputs of very different effect cost no digits.
         Equation::Discrete => {
             let weight = eye(b.ncols()) + &bx * b;
-            solve("the matrix R + B'X B of a Riccati equation", weight.as_ref(), (bx * a + s.transpose()).as_ref())
+            let rhs = bx * a + s.transpose();
+            match weight.llt(Side::Lower) {
+                Ok(factor) => Ok(factor.solve(rhs)),
+                Err(_) => solve("the matrix R + B'X B of a Riccati equation", weight.as_ref(), rhs.as_ref()),
+            }
         }
     }
 }

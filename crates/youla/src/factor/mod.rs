@@ -3,14 +3,12 @@
 
 mod bezout;
 mod coprime;
-mod normalised;
 mod signals;
 mod stable;
 mod stream;
 mod youla;
 
 pub use coprime::CoprimeFactors;
-pub use normalised::{NormalisedFactors, normalised_right_coprime};
 pub use signals::YoulaSignals;
 pub use stable::{Denominator, StableFactors, left_coprime, right_coprime};
 pub use stream::YoulaStream;

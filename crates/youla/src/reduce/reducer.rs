@@ -5,7 +5,7 @@ use super::options::Scales;
 use super::split::{Split, split};
 use super::weighted::{FrequencyWeights, decompose};
 use super::{ReducedOrder, Reduction, ReductionMethod, ReductionOptions};
-use crate::factor::normalised_right_coprime;
+use crate::control::normalised_right_factors;
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Mat, Result, c64};
 use std::ops::RangeInclusive;
@@ -69,7 +69,7 @@ impl<T: TimeDomain> Reducer<T> {
         };
         let decomposition = match (options.method, weights) {
             (ReductionMethod::NormalisedCoprime, _) => {
-                HankelDecomposition::new(normalised_right_coprime(&part)?.factors.balanced()?)?
+                HankelDecomposition::new(normalised_right_factors(&part)?.balanced()?)?
             }
             (ReductionMethod::Weighted, None) => return Err(Error::NeedsLoop { what: "method = \"weighted\"" }),
             (ReductionMethod::Weighted, Some(weights)) => {

@@ -1,7 +1,7 @@
 //! Properties of the reductions on seeded random systems; see `loop_tests` for those in the loop.
 
 use super::*;
-use crate::factor::normalised_right_coprime;
+use crate::control::normalised_right_factors;
 use crate::linalg::{block, block_diagonal, eye};
 use crate::lti::{Continuous, Discrete, bearing, frequency_response};
 use crate::{Error, Mat, MatRef};
@@ -186,25 +186,23 @@ fn check_split<T: TimeDomain>(system: &StateSpace<T>, boundary: f64, omega: &[f6
     let sum = parts.beyond.plus(&parts.within).unwrap();
     let size = error(system, &StateSpace::gain(Mat::zeros(3, 2), system.time()).unwrap(), omega);
     assert!(error(&sum, system, omega) < 1e-10 * size);
-    if !(system.time().sample_time().is_some() && boundary > 1.0) {
-        let options = ReductionOptions { stability_boundary: Some(boundary), ..Default::default() };
-        let minimal = reduce(system, &options).unwrap();
-        for order in minimal.kept.len()..=minimal.minimal_order {
-            let reduced =
-                reduce(system, &ReductionOptions { order: ReducedOrder::Fixed(order), ..options.clone() }).unwrap();
-            let poles = reduced.model.poles().unwrap();
-            let nearest = |p: &c64| poles.iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min);
-            // The poles of the given system that are kept stand in the reduced one.
-            let given = system.poles().unwrap();
-            assert!(given.iter().filter(|p| is_beyond(p)).all(|p| nearest(p) < 1e-10 * (1.0 + p.norm())));
-            let rounding = 1e-10 * (size + reduced.hankel.first().copied().unwrap_or(0.0));
-            assert!(error(&reduced.model, system, omega) <= reduced.error_bound.unwrap() + rounding);
-            assert!(reduced.measured_error().unwrap().value <= reduced.error_bound.unwrap() + rounding);
-        }
-        if !minimal.kept.is_empty() {
-            let below = ReductionOptions { order: ReducedOrder::Fixed(minimal.kept.len() - 1), ..options };
-            assert!(matches!(reduce(system, &below), Err(Error::OrderBelowKept { .. })));
-        }
+    let options = ReductionOptions { stability_boundary: Some(boundary), ..Default::default() };
+    let minimal = reduce(system, &options).unwrap();
+    for order in minimal.kept.len()..=minimal.minimal_order {
+        let reduced =
+            reduce(system, &ReductionOptions { order: ReducedOrder::Fixed(order), ..options.clone() }).unwrap();
+        let poles = reduced.model.poles().unwrap();
+        let nearest = |p: &c64| poles.iter().map(|q| (p - q).norm()).fold(f64::INFINITY, f64::min);
+        // The poles of the given system that are kept stand in the reduced one.
+        let given = system.poles().unwrap();
+        assert!(given.iter().filter(|p| is_beyond(p)).all(|p| nearest(p) < 1e-10 * (1.0 + p.norm())));
+        let rounding = 1e-10 * (size + reduced.hankel.first().copied().unwrap_or(0.0));
+        assert!(error(&reduced.model, system, omega) <= reduced.error_bound.unwrap() + rounding);
+        assert!(reduced.measured_error().unwrap().value <= reduced.error_bound.unwrap() + rounding);
+    }
+    if !minimal.kept.is_empty() {
+        let below = ReductionOptions { order: ReducedOrder::Fixed(minimal.kept.len() - 1), ..options };
+        assert!(matches!(reduce(system, &below), Err(Error::OrderBelowKept { .. })));
     }
 }
 
@@ -253,7 +251,7 @@ fn check_normalised<T: TimeDomain>(system: &StateSpace<T>) {
 /// Largest distance of the graphs of two systems over frequency, of each point of the one graph to the other.
 fn pointwise_gap<T: TimeDomain>(x: &StateSpace<T>, y: &StateSpace<T>) -> f64 {
     let omega = if x.time().sample_time().is_some() { LINEAR() } else { LOGARITHMIC() };
-    let graph = |s: &StateSpace<T>| frequency_response(&normalised_right_coprime(s).unwrap().factors, &omega).unwrap();
+    let graph = |s: &StateSpace<T>| frequency_response(&normalised_right_factors(s).unwrap(), &omega).unwrap();
     let (x, y) = (graph(x), graph(y));
     x.iter().zip(y.iter()).map(|(x, y)| (x - y * (y.adjoint() * x)).singular_values().unwrap()[0]).fold(0.0, f64::max)
 }

@@ -10,21 +10,22 @@
 //! Modules depend on each other in one direction only, in the order in which data flow:
 //!
 //! ```text
-//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> study -> report -> run
+//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> redesign -> study -> report -> run
 //! ```
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`linalg`] | ordered real Schur form, Sylvester, Lyapunov and Riccati equations, exponential and logarithm, each with its residual |
-//! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, simulation |
+//! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, norms, simulation |
 //! | [`record`] | labelled, clocked data; CSV, MATLAB and NumPy files; spectra; excitation signals |
 //! | [`check`] | what is wrong with the data: clock, clipping, steps, drift, outliers, delays, excitation, lines, feedback, controller |
-//! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops |
+//! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops, margins, nu-gap |
 //! | [`rig`] | the gas bearing of the paper, its digital twin with sensors, actuators and rotation, and experiments on it |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
 //! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it; grey-box prediction error |
-//! | [`reduce`] | balanced truncation and singular perturbation |
-//! | [`validate`] | fit, variance accounted for, loop certificate, prediction of fresh data |
+//! | [`reduce`] | balanced truncation, singular perturbation, weighted by the loop, normalised coprime factors; every order judged in the loop |
+//! | [`validate`] | fit, variance accounted for, residual tests, certificates of the loop, prediction of fresh data |
+//! | [`redesign`] | a new controller on the identified model, with its prediction and its data for firmware |
 //! | [`study`] | the paper: its 500 models, its three experiments, the map of which method wins where |
 //! | [`report`] | results as data and as one offline page |
 //! | [`run`] | run.toml in, run folder out: the driver of the program |

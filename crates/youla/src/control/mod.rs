@@ -16,7 +16,8 @@ pub use kalman::{NoiseCovariance, ObserverGain, kalman};
 pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
 pub use margin::peak_sensitivity;
 pub use margins::{
-    ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, margins,
+    ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, channel_margins,
+    margins,
 };
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;

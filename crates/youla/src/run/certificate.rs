@@ -4,7 +4,7 @@ use super::controller_errors::{ControllerErrorEffect, controller_errors};
 use super::pipeline::Identification;
 use super::robustness::channel_scales;
 use crate::Result;
-use crate::control::{self, Margins, coprime_margin};
+use crate::control::{ChannelMargins, channel_margins, coprime_margin, peak_sensitivity};
 use crate::identify::subspace::Interval;
 use crate::lti::{Discrete, StateSpace};
 use crate::report::data as draw;
@@ -63,7 +63,8 @@ pub struct RunCertificate {
     pub exact: ExactCertificate,
     /// The controller on every model within the region of S; `None` without an uncertainty.
     pub band: Option<BandCertificate>,
-    /// Margins with intervals, by name; empty without an uncertainty or where the loop of the estimate is unstable.
+    /// Margins with intervals, by name, where `[certificate]` stands; empty without an uncertainty or where the loop of the
+    /// estimate is unstable.
     pub margins: Vec<(String, Interval)>,
     /// S with a controller that is described wrongly, where it was asked for.
     pub controller_errors: Vec<ControllerErrorEffect>,
@@ -82,16 +83,16 @@ pub(super) fn certificate(found: &Identification) -> Result<RunCertificate> {
         Some(uncertainty) => certify_band(uncertainty, &settings.band, |_| Ok(true), |s| Ok(s.clone()))?,
         None => None,
     };
-    let margins = if exact.stable { margins(found)? } else { Vec::new() };
+    let asked = found.settings.certificate.is_some();
+    let margins = if exact.stable && asked { margins(found)? } else { Vec::new() };
     let controller_errors = if settings.controller_errors { controller_errors(found, &settings)? } else { Vec::new() };
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 
 /// Names of the margins that get intervals, in the order of [`figures`].
-const MARGINS: [&str; 8] = [
+const MARGINS: [&str; 7] = [
     "peak sensitivity, worst output",
     "peak sensitivity, all outputs",
-    "disk margin of all outputs",
     "lowest gain factor",
     "highest gain factor",
     "phase margin, degrees",
@@ -111,23 +112,25 @@ fn margins(found: &Identification) -> Result<Vec<(String, Interval)>> {
             (Some(scales), Some(controller)) => coprime_margin(&scales.plant(&plant)?, controller)?,
             _ => f64::NAN,
         };
-        Ok(figures(&control::margins(&plant, controller)?, coprime).to_vec())
+        let peak = peak_sensitivity(&plant, controller)?;
+        Ok(figures(&channel_margins(&plant, controller)?, peak, coprime).to_vec())
     };
     let named = MARGINS.into_iter().map(String::from).zip(uncertainty.intervals(figures)?);
     Ok(named.filter(|(_, interval)| interval.value.is_finite() && interval.deviation.is_finite()).collect())
 }
 
 /// In the order of [`MARGINS`]; NaN where a margin does not exist.
-fn figures(margins: &Margins, coprime: f64) -> [f64; 8] {
-    let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+fn figures([inputs, outputs]: &[Vec<ChannelMargins>; 2], peak: f64, coprime: f64) -> [f64; 7] {
+    let extreme = |of: fn(&ChannelMargins) -> Option<f64>, better: fn(f64, f64) -> f64| {
+        inputs.iter().chain(outputs).filter_map(of).reduce(better).unwrap_or(f64::NAN)
+    };
     [
-        margins.outputs.iter().map(|channel| channel.sensitivity.value).fold(0.0, f64::max),
-        margins.output_sensitivity.value,
-        margins.output_disks.balanced.alpha,
-        or_nan(margins.lowest_gain().map(|limit| limit.factor)),
-        or_nan(margins.highest_gain().map(|limit| limit.factor)),
-        or_nan(margins.phase().map(|limit| limit.degrees)),
-        or_nan(margins.delay().map(|limit| 1e3 * limit.seconds)),
+        outputs.iter().map(|channel| channel.sensitivity.value).fold(0.0, f64::max),
+        peak,
+        extreme(|channel| channel.lowest_gain.map(|limit| limit.factor), f64::max),
+        extreme(|channel| channel.highest_gain.map(|limit| limit.factor), f64::min),
+        extreme(|channel| channel.phase.map(|limit| limit.degrees), f64::min),
+        extreme(|channel| channel.delay.map(|limit| 1e3 * limit.seconds), f64::min),
         coprime,
     ]
 }

@@ -5,7 +5,7 @@
 
 use super::{Value, Variable, Variables};
 use crate::{Error, Result};
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read, Seek};
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -28,7 +28,18 @@ const LONGEST_HEADER: usize = 1 << 16;
 /// ```
 pub fn read_npz(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    let file = BufReader::new(super::open(path)?);
+    variables(BufReader::new(super::open(path)?), path)
+}
+
+/// The arrays of a NumPy archive that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_npz`] but for the operating system's.
+pub fn npz_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables> {
+    variables(Cursor::new(bytes), path.as_ref())
+}
+
+fn variables(file: impl Read + Seek, path: &Path) -> Result<Variables> {
     let corrupt = |offset, expected| Error::Corrupt { path: path.to_owned(), offset, expected };
     let mut archive = ZipArchive::new(file).map_err(|e| corrupt(0, format!("a NumPy archive: {e}")))?;
     let mut variables = Vec::new();

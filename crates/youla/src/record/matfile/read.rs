@@ -25,7 +25,16 @@ pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let mut bytes = Vec::new();
     let read = crate::record::open(path)?.read_to_end(&mut bytes);
     read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    let big_endian = check_format(path, &bytes)?;
+    mat_from_bytes(&bytes, path)
+}
+
+/// The variables of a MATLAB file of version 5 that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_mat`] but for the operating system's.
+pub fn mat_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables> {
+    let path = path.as_ref();
+    let big_endian = check_format(path, bytes)?;
     let body = Bytes { data: &bytes[HEADER..], offset: HEADER, big_endian };
     match variables(body) {
         Ok(variables) => Ok(Variables::new(path, variables)),

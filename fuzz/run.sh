@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Coverage-guided fuzzing of one reader on the stable toolchain: fuzz/run.sh NAME [RUNS], for example fuzz/run.sh mat 1000000.
-# Names: csv mat npz npy run_toml paper_toml rig_toml subspace_toml structure row. Needs a C++ compiler for libFuzzer.
+# The names are those of the folders of seeds, crates/youla/tests/readers/seeds. Needs a C++ compiler for libFuzzer.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 name=${1:?which reader}
@@ -11,9 +11,10 @@ export RUSTFLAGS="-Cpasses=sancov-module -Cllvm-args=-sanitizer-coverage-level=4
 -Cllvm-args=-sanitizer-coverage-inline-8bit-counters -Cllvm-args=-sanitizer-coverage-pc-table \
 -Cllvm-args=-sanitizer-coverage-trace-compares --cfg fuzzing"
 target=$(rustc -vV | sed -n 's/^host: //p')
-cargo build --release --target "$target" --bin "$name"
-found=${CARGO_TARGET_DIR:-target}/corpus/$name
+cargo build --release --target "$target"
+folder=${CARGO_TARGET_DIR:-target}
+found=$folder/corpus/$name
 mkdir -p "$found"
 # A megabyte per input of at most 4 kB is let through, a gigabyte is not.
-exec "${CARGO_TARGET_DIR:-target}/$target/release/$name" "$found" "../crates/youla/tests/readers/seeds/$name" \
+YOULA_READER=$name exec "$folder/$target/release/readers" "$found" "../crates/youla/tests/readers/seeds/$name" \
     -runs="$runs" -max_len=4096 -rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=10 -print_final_stats=1

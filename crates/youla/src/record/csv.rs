@@ -65,6 +65,7 @@ pub struct CsvOptions {
 ///
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`], [`Error::CorruptGzip`], [`Error::NoData`],
+/// [`Error::FormatNotRead`] for zero bytes and for more than 65536 columns,
 /// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
 /// and those of the sample time: [`Error::SampleTimeMissing`], [`Error::NonUniformTime`],
 /// [`Error::SampleTimeMismatch`].

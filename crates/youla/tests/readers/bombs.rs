@@ -21,6 +21,8 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
             ("gzip of zeros", gzip(&[b'0'; 3 << 20])),
             ("gzip of lines", gzip(&b"1,2\n".repeat(700_000))),
             ("gzip of gzip", gzip(&gzip(&[b' '; 64 << 20]))),
+            ("gzip of columns", gzip(&b"1,".repeat(1_500_000))),
+            ("gzip of some columns", gzip(&[b"1,".repeat(65_535), b"1\n".to_vec()].concat())),
             ("many columns", b"1,".repeat(2000)),
             ("a huge gap in time", b"t,u\n0,1\n1,1\n1e300,1\n".to_vec()),
             ("times that are all but equal", b"0,1\n1e-300,1\n2e-300,1\n".to_vec()),
@@ -35,12 +37,14 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
             ("names of 2^31 bytes", mat(&matrix([1, 1], 2, &fields(0x7fff_ffff, &[0; 32])))),
             ("packed zeros", mat(&packed(&[0; 3 << 20]))),
             ("packed cells", mat(&packed(&matrix([1 << 18, 1], 1, &[14, 0, 0, 0, 0, 0, 0, 0].repeat(1 << 18))))),
+            ("a long name of a field", mat(&packed(&matrix([1000, 1], 2, &long_field(3 << 20))))),
             ("cells inside of cells", mat(&(0..80).fold(Vec::new(), |inner, _| matrix([1, 1], 1, &inner)))),
         ],
         "npz" | "npy" => ["(4294967296, 4294967296)", "(1000000000000,)", "(0, 1000000000000)", "(1000000000000, 0)"]
             .into_iter()
             .map(|shape| ("a huge shape", if name == "npz" { npz(&npy(shape)) } else { npy(shape) }))
             .chain((name == "npz").then(|| ("zeros", npz(&[npy("(3000000,)"), vec![0; 24 << 20]].concat()))))
+            .chain((name == "npz").then(|| ("entries that share their bytes", shared(40))))
             .collect(),
         "structure" => [
             nested("a"),
@@ -54,6 +58,11 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
         ]
         .concat(),
         "row" => vec![("fields", b",".repeat(4000))],
+        "report_json" | "model_json" | "controller_json" => vec![
+            ("deep arrays", deep("[", "]").into_bytes()),
+            ("deep objects", deep("{\"a\":", "}").into_bytes()),
+            ("deep details", format!("{{\"details\":{}}}", deep("[", "]")).into_bytes()),
+        ],
         _ => nested("record"),
     }
 }
@@ -82,6 +91,11 @@ fn fields(length: u32, names: &[u8]) -> Vec<u8> {
     [small, element(1, names)].concat()
 }
 
+/// A thousand structs with one field, whose name is this long.
+fn long_field(width: u32) -> Vec<u8> {
+    [fields(width, &vec![b'n'; width as usize]), [14, 0, 0, 0, 0, 0, 0, 0].repeat(1000)].concat()
+}
+
 fn packed(data: &[u8]) -> Vec<u8> {
     let mut encoder = ZlibEncoder::new(Vec::new(), Compression::best());
     encoder.write_all(data).unwrap();
@@ -103,6 +117,30 @@ fn npz(array: &[u8]) -> Vec<u8> {
     writer.start_file("x.npy", zip::write::SimpleFileOptions::default()).unwrap();
     writer.write_all(array).unwrap();
     writer.finish().unwrap().into_inner()
+}
+
+/// An archive whose entries of different names all lead to the same packed bytes: 2 MB, 16 MB as numbers.
+fn shared(count: u8) -> Vec<u8> {
+    let mut array = [npy("(2000000,)"), vec![0; 2_000_000]].concat();
+    // The type, behind the magic string and `{'descr': '`.
+    array[21..24].copy_from_slice(b"|i1");
+    let archive = npz(&array);
+    // Directory and its end: the entry "x.npy" and 22 bytes.
+    let end = archive.len() - 22;
+    let start = u32::from_le_bytes(archive[end + 16..end + 20].try_into().unwrap()) as usize;
+    let entry = &archive[start..end];
+    let mut out = archive[..start].to_vec();
+    for number in 0..count {
+        let mut entry = entry.to_vec();
+        entry[46] = b'0' + number;
+        out.extend(entry);
+    }
+    let mut tail = archive[end..].to_vec();
+    for at in [8, 10] {
+        tail[at..at + 2].copy_from_slice(&u16::from(count).to_le_bytes());
+    }
+    tail[12..16].copy_from_slice(&(u32::from(count) * entry.len() as u32).to_le_bytes());
+    [out, tail].concat()
 }
 
 fn structure(expression: &str) -> Vec<u8> {

@@ -1,6 +1,0 @@
-#![no_main]
-#[allow(dead_code)]
-#[path = "../../crates/youla/tests/readers/readers.rs"]
-mod readers;
-
-libfuzzer_sys::fuzz_target!(|bytes: &[u8]| readers::rig_toml(bytes));

@@ -9,6 +9,7 @@ use crate::units::Channel;
 use crate::{Error, Result};
 use faer::Mat;
 use serde::{Deserialize, Serialize};
+use std::io::Cursor;
 use std::path::Path;
 
 mod lines;
@@ -64,6 +65,7 @@ pub struct CsvOptions {
 ///
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`], [`Error::CorruptGzip`], [`Error::NoData`],
+/// [`Error::FormatNotRead`] for zero bytes and for more than 65536 columns,
 /// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
 /// and those of the sample time: [`Error::SampleTimeMissing`], [`Error::NonUniformTime`],
 /// [`Error::SampleTimeMismatch`].
@@ -83,14 +85,38 @@ pub fn read_csv(
     only(read_csv_parts(path.as_ref(), channels, time, options)?)
 }
 
-/// The same, with a record for each part without gaps.
+/// The same for text, plain or gzip, that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_csv`] but for the operating system's.
+pub fn csv_from_bytes(
+    bytes: &[u8],
+    path: impl AsRef<Path>,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Record> {
+    let path = path.as_ref();
+    only(read_parts(Lines::over(path, Cursor::new(bytes.to_vec()))?, path, channels, time, options)?)
+}
+
+/// The record of a file for each part without gaps.
 pub(super) fn read_csv_parts(
     path: &Path,
     channels: &[ChannelSpec],
     time: &TimeSource,
     options: &CsvOptions,
 ) -> Result<Vec<Record>> {
-    let mut lines = Lines::open(path)?;
+    read_parts(Lines::open(path)?, path, channels, time, options)
+}
+
+fn read_parts(
+    mut lines: Lines,
+    path: &Path,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Vec<Record>> {
     // What damage in a gzip file makes of its text is not the user's mistake.
     let (plan, columns) =
         read_columns(&mut lines, channels, time, options).map_err(|error| lines.damage().unwrap_or(error))?;

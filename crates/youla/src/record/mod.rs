@@ -23,14 +23,14 @@ mod time;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, CsvStream, Delimiter, HeaderLine, read_csv, write_csv};
+pub use csv::{CsvOptions, CsvStream, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{
     Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,
     RampedExcitation, SquareWaves, describe_excitation,
 };
-pub use matfile::{Packing, read_mat, write_mat};
-pub use npz::read_npz;
+pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
+pub use npz::{npz_from_bytes, read_npz};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, read_parts, sha256};

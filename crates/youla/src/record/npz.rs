@@ -5,7 +5,8 @@
 
 use super::{Value, Variable, Variables};
 use crate::{Error, Result};
-use std::io::{BufReader, Read};
+use std::io::{BufReader, Cursor, Read, Seek};
+use std::ops::Range;
 use std::path::Path;
 use zip::ZipArchive;
 
@@ -28,14 +29,32 @@ const LONGEST_HEADER: usize = 1 << 16;
 /// ```
 pub fn read_npz(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    let file = BufReader::new(super::open(path)?);
+    variables(BufReader::new(super::open(path)?), path)
+}
+
+/// The arrays of a NumPy archive that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_npz`] but for the operating system's.
+pub fn npz_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables> {
+    variables(Cursor::new(bytes), path.as_ref())
+}
+
+fn variables(file: impl Read + Seek, path: &Path) -> Result<Variables> {
     let corrupt = |offset, expected| Error::Corrupt { path: path.to_owned(), offset, expected };
     let mut archive = ZipArchive::new(file).map_err(|e| corrupt(0, format!("a NumPy archive: {e}")))?;
     let mut variables = Vec::new();
+    let mut taken: Vec<Range<u64>> = Vec::new();
     for k in 0..archive.len() {
         let mut entry = archive.by_index(k).map_err(|e| corrupt(0, format!("a readable entry {}: {e}", k + 1)))?;
         let name = entry.name().strip_suffix(".npy").unwrap_or(entry.name()).to_owned();
         let offset = entry.data_start();
+        let place = offset..offset.saturating_add(entry.compressed_size());
+        // A hundred entries that share their bytes would unpack to a hundred times as much.
+        if taken.iter().any(|other| other.start < place.end && place.start < other.end) {
+            return Err(corrupt(offset, format!("bytes that belong to the entry {name:?} only")));
+        }
+        taken.push(place);
         let value = array(&mut entry).map_err(|expected| corrupt(offset, format!("{expected} for {name:?}")))?;
         variables.push(Variable { name, value });
     }
@@ -66,6 +85,10 @@ fn array(reader: &mut impl Read) -> Result<Value, String> {
     };
     let bytes = rows.checked_mul(columns).and_then(|n| n.checked_mul(size)).ok_or("a shape that fits into memory")?;
     let stored = body(reader, bytes)?;
+    if stored.is_empty() {
+        // Without rows there may be any number of columns to walk over.
+        return Ok(Value::Real { dims: vec![rows, columns], data: Vec::new() });
+    }
     let by_row = !header.fortran_order;
     let number = |k: usize| decode(&header.descr, &stored[k * size..(k + 1) * size]);
     let at = |i: usize, j: usize| if by_row { i * columns + j } else { j * rows + i };

@@ -6,6 +6,7 @@ use crate::lti::Discrete;
 use crate::units::Channel;
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
+use std::collections::HashSet;
 
 /// Samples x channels, row k at time `start + k ts`; all values finite, all names different.
 ///
@@ -54,8 +55,9 @@ impl Record {
     pub fn new(name: impl Into<String>, channels: Vec<Channel>, data: Mat<f64>, time: Discrete) -> Result<Self> {
         let name = name.into();
         check_shape(&format!("the data of {name}"), data.as_ref(), (data.nrows().max(1), channels.len().max(1)))?;
+        let mut names = HashSet::new();
         for (j, channel) in channels.iter().enumerate() {
-            if channels[..j].iter().any(|earlier| earlier.name == channel.name) {
+            if !names.insert(&channel.name) {
                 return Err(Error::DuplicateChannel { what: name, name: channel.name.clone() });
             }
             if let Some(i) = (0..data.nrows()).find(|&i| !data[(i, j)].is_finite()) {

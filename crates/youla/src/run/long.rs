@@ -110,7 +110,15 @@ pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<Subspa
     let mut text = String::new();
     let read = crate::record::open(path)?.read_to_string(&mut text);
     read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    crate::toml_file::parse(&text, path)
+    parse_subspace_options(&text, path)
+}
+
+/// Parses the text of such a file; `path` is named in errors.
+///
+/// # Errors
+/// [`Error::Settings`] with line, column and key.
+pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<SubspaceOptions> {
+    crate::toml_file::parse(text, path)
 }
 
 fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {

@@ -44,7 +44,10 @@ pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};
 pub use grey_box::{AlternativeStructure, GreyBoxRun, GreyBoxSettings};
-pub use long::{LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, read_subspace_options};
+pub use long::{
+    LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
+    read_subspace_options,
+};
 pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
 pub use page::page;
 pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, paper};

@@ -2,7 +2,6 @@
 
 use crate::{Error, Result};
 use flate2::bufread::MultiGzDecoder;
-use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
@@ -22,7 +21,11 @@ pub(super) struct Lines {
 
 impl Lines {
     pub(super) fn open(path: &Path) -> Result<Lines> {
-        let mut file = BufReader::with_capacity(BUFFER, crate::record::open(path)?);
+        Self::over(path, BufReader::with_capacity(BUFFER, crate::record::open(path)?))
+    }
+
+    /// The lines of what stands in a file or in memory; `path` is named in errors.
+    pub(super) fn over(path: &Path, mut file: impl BufRead + Send + 'static) -> Result<Lines> {
         let start = file.fill_buf().map_err(|source| Error::Io { path: path.to_owned(), source })?;
         if start.is_empty() {
             return Err(Error::NoData { path: path.to_owned(), problem: "the file is empty (0 bytes)" });
@@ -87,7 +90,7 @@ impl Lines {
     }
 }
 
-fn unpacked(file: BufReader<File>, gzip: bool) -> Box<dyn BufRead + Send> {
+fn unpacked(file: impl BufRead + Send + 'static, gzip: bool) -> Box<dyn BufRead + Send> {
     if gzip { Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file))) } else { Box::new(file) }
 }
 

@@ -3,6 +3,10 @@
 use super::lines::Lines;
 use super::{CsvOptions, Delimiter, HeaderLine};
 use crate::{Error, Result};
+use std::collections::HashSet;
+
+/// Most columns of a table. Rows are samples; a packed file of some kilobytes may hold millions of cells on one line.
+const MOST_COLUMNS: usize = 1 << 16;
 
 /// The form of a text file: its columns and what stands between them.
 pub(super) struct Fields {
@@ -28,6 +32,11 @@ impl Fields {
             Delimiter::Whitespace => None,
         };
         let cells = header_cells(lines, delimiter);
+        if cells.len() > MOST_COLUMNS {
+            let (found, remedy) =
+                ("a table of more than 65536 columns", "write samples as rows and channels as columns");
+            return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
+        }
         let named = match options.header {
             HeaderLine::Present => true,
             HeaderLine::Absent => false,
@@ -37,10 +46,9 @@ impl Fields {
             lines.hold();
             return Ok(Fields { delimiter, names: (1..=cells.len()).map(|j| format!("#{j}")).collect() });
         }
-        match (1..cells.len()).find(|&j| cells[..j].contains(&cells[j])) {
-            Some(j) => {
-                Err(Error::DuplicateChannel { what: lines.path().display().to_string(), name: cells[j].clone() })
-            }
+        let mut names = HashSet::new();
+        match cells.iter().find(|cell| !names.insert(*cell)) {
+            Some(name) => Err(Error::DuplicateChannel { what: lines.path().display().to_string(), name: name.clone() }),
             None => Ok(Fields { delimiter, names: cells }),
         }
     }

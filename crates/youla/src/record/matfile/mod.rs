@@ -8,7 +8,7 @@ mod bytes;
 mod read;
 mod write;
 
-pub use read::read_mat;
+pub use read::{mat_from_bytes, read_mat};
 pub use write::{Packing, write_mat};
 
 /// Class of an array, as the flags element states it.

@@ -10,6 +10,8 @@ use std::path::Path;
 
 /// Structs and cells inside of each other; a file deeper than this is refused.
 const MAX_DEPTH: usize = 32;
+/// Longest name of a variable or field, in bytes; MATLAB has 63. Paths repeat them.
+const LONGEST_NAME: usize = 1024;
 const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// Reads all variables of a MATLAB file of version 5.
@@ -25,7 +27,16 @@ pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let mut bytes = Vec::new();
     let read = crate::record::open(path)?.read_to_end(&mut bytes);
     read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    let big_endian = check_format(path, &bytes)?;
+    mat_from_bytes(&bytes, path)
+}
+
+/// The variables of a MATLAB file of version 5 that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_mat`] but for the operating system's.
+pub fn mat_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables> {
+    let path = path.as_ref();
+    let big_endian = check_format(path, bytes)?;
     let body = Bytes { data: &bytes[HEADER..], offset: HEADER, big_endian };
     match variables(body) {
         Ok(variables) => Ok(Variables::new(path, variables)),
@@ -125,11 +136,11 @@ fn array(mut rest: Bytes, depth: usize) -> Result<Variable, Fault> {
     let flags = flags.body.word(0);
     let class = flags as u8;
     if class == class::OPAQUE {
-        let name = text(rest.element("the name of an object")?.body);
+        let name = name(rest.element("the name of an object")?.body)?;
         return Ok(Variable { name, value: unsupported(class) });
     }
     let dims = dimensions(rest.element("dimensions")?)?;
-    let name = text(rest.element("an array name")?.body);
+    let name = name(rest.element("an array name")?.body)?;
     let value = match class {
         class::CELL => {
             let count = count(&dims, rest)?;
@@ -189,6 +200,9 @@ fn structure(mut rest: Bytes, dims: Vec<usize>, depth: usize) -> Result<Value, F
     let length = rest.element("the length of field names")?;
     let width = length.numbers(1, "the length of field names")?[0] as usize;
     let names = rest.element("field names")?.body;
+    if width > LONGEST_NAME {
+        return names.fault(format!("field names of at most {LONGEST_NAME} bytes each, not {width}"));
+    }
     if names.data.len() % width.max(1) != 0 || (width == 0 && !names.data.is_empty()) {
         return names.fault(format!("field names of {width} bytes each"));
     }
@@ -229,6 +243,14 @@ fn numeric(mut rest: Bytes, dims: Vec<usize>, complex: bool) -> Result<Value, Fa
     }
     let im = rest.element("imaginary parts")?.numbers(count, "imaginary parts")?;
     Ok(Value::Complex { dims, re: data, im })
+}
+
+/// The name of a variable.
+fn name(bytes: Bytes) -> Result<String, Fault> {
+    if bytes.data.len() > LONGEST_NAME {
+        return bytes.fault(format!("a name of at most {LONGEST_NAME} bytes, not {}", bytes.data.len()));
+    }
+    Ok(text(bytes))
 }
 
 /// A name, which may end with a zero byte before the end of its place.

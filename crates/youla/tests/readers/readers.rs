@@ -1,0 +1,142 @@
+//! Every reader of what a user may hand in, as a function of bytes. The fuzz targets (`fuzz/`) and the tests share it. What a
+//! reader says of its input does not matter here; that it says something does.
+
+use std::path::{Path, PathBuf};
+use youla::identify::greybox::{Declaration, DeclaredStructure};
+use youla::identify::subspace::SubspaceOptions;
+use youla::lti::Discrete;
+use youla::record::{
+    ChannelRef, CsvOptions, NpyStream, SampleStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
+    npz_from_bytes,
+};
+use youla::redesign::ExportedController;
+use youla::report::{ReportData, html};
+use youla::rig::RigParameters;
+use youla::run::{ModelFile, RunSettings};
+use youla::study::{PaperSettings, Row};
+
+/// A reader and its name, which is that of its fuzz target and of its folder of seeds.
+pub(crate) type Reader = (&'static str, fn(&[u8]));
+
+/// All of them.
+pub(crate) const READERS: [Reader; 14] = [
+    ("csv", csv),
+    ("mat", mat),
+    ("npz", npz),
+    ("npy", npy),
+    ("run_toml", run_toml),
+    ("paper_toml", paper_toml),
+    ("rig_toml", rig_toml),
+    ("subspace_toml", subspace_toml),
+    ("structure", structure),
+    ("row", row),
+    ("check_toml", check_toml),
+    ("report_json", report_json),
+    ("model_json", model_json),
+    ("controller_json", controller_json),
+];
+
+fn path() -> &'static Path {
+    Path::new("input")
+}
+
+/// Text, plain or gzip: with a sample time that is given, and with a time column.
+pub(crate) fn csv(bytes: &[u8]) {
+    for time in [TimeSource::ts(1e-3), TimeSource::column(ChannelRef::Column(1))] {
+        let _ = csv_from_bytes(bytes, path(), &[], &time, &CsvOptions::default());
+    }
+}
+
+/// A MATLAB file, and everything that is in it.
+pub(crate) fn mat(bytes: &[u8]) {
+    if let Ok(variables) = mat_from_bytes(bytes, path()) {
+        look_at(&variables);
+    }
+}
+
+/// A NumPy archive, and everything that is in it.
+pub(crate) fn npz(bytes: &[u8]) {
+    if let Ok(variables) = npz_from_bytes(bytes, path()) {
+        look_at(&variables);
+    }
+}
+
+fn look_at(variables: &Variables) {
+    for path in variables.leaves() {
+        let _ = variables.column(&path);
+        let _ = variables.column(&format!("{path}(:,2)"));
+        let _ = variables.matrix(&path);
+    }
+}
+
+/// A file for a reader that takes nothing else.
+fn written(bytes: &[u8]) -> PathBuf {
+    let file = std::env::temp_dir().join(format!("youla-readers-{}", std::process::id()));
+    std::fs::write(&file, bytes).expect("the folder of temporary files can be written");
+    file
+}
+
+/// A NumPy array as a stream of samples, which reads from a file.
+pub(crate) fn npy(bytes: &[u8]) {
+    let file = written(bytes);
+    if let Ok(mut stream) = NpyStream::open(&file, &[ChannelRef::Column(1)], &[ChannelRef::Column(2)]) {
+        let mut rows = youla::Mat::zeros(64, 2);
+        let _ = stream.read(rows.as_mut());
+    }
+    let _ = std::fs::remove_file(file);
+}
+
+pub(crate) fn run_toml(bytes: &[u8]) {
+    let _ = RunSettings::parse(&String::from_utf8_lossy(bytes), path());
+}
+
+pub(crate) fn paper_toml(bytes: &[u8]) {
+    let _ = PaperSettings::parse(&String::from_utf8_lossy(bytes), path());
+}
+
+pub(crate) fn rig_toml(bytes: &[u8]) {
+    let _ = RigParameters::parse(&String::from_utf8_lossy(bytes), path());
+}
+
+pub(crate) fn subspace_toml(bytes: &[u8]) {
+    let _ = youla::run::parse_subspace_options(&String::from_utf8_lossy(bytes), path()).map(|o: SubspaceOptions| o);
+}
+
+/// A structure with its expressions, and its matrices at the start.
+pub(crate) fn structure(bytes: &[u8]) {
+    let Ok(declaration) = Declaration::parse(&String::from_utf8_lossy(bytes), path()) else { return };
+    if let Ok(structure) = DeclaredStructure::new(&declaration) {
+        let _ = structure.derived(&structure.start(), None);
+    }
+}
+
+/// A line of the results of the study.
+pub(crate) fn row(bytes: &[u8]) {
+    let _ = Row::parse(&String::from_utf8_lossy(bytes));
+}
+
+/// The options of the check of data, which are read from a file.
+pub(crate) fn check_toml(bytes: &[u8]) {
+    let file = written(bytes);
+    let _ = youla::run::read_check_options(&file);
+    let _ = std::fs::remove_file(file);
+}
+
+/// The data of a report, and the page that `youla report` draws from it.
+pub(crate) fn report_json(bytes: &[u8]) {
+    if let Ok(report) = serde_json::from_slice::<ReportData>(bytes) {
+        let _ = html(&report);
+    }
+}
+
+/// A model as an artefact.
+pub(crate) fn model_json(bytes: &[u8]) {
+    let _ = serde_json::from_slice::<ModelFile<SubspaceOptions>>(bytes);
+}
+
+/// A new controller, its system and its source.
+pub(crate) fn controller_json(bytes: &[u8]) {
+    let Ok(controller) = serde_json::from_slice::<ExportedController>(bytes) else { return };
+    let _ = controller.rust();
+    let _ = Discrete::new(controller.ts).and_then(|time| controller.controller.system(time));
+}

@@ -1,0 +1,103 @@
+"""Writes the seeds of the fuzz targets to crates/youla/tests/readers/seeds: synthetic, a few hundred bytes each.
+Needs numpy and scipy; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
+import gzip, hashlib, io, json, pathlib
+import numpy as np
+from scipy.io import savemat
+
+root = pathlib.Path(__file__).resolve().parent.parent
+seeds = root / 'crates/youla/tests/readers/seeds'
+
+
+def put(reader, name, data):
+    folder = seeds / reader
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / name).write_bytes(data if isinstance(data, bytes) else data.encode())
+
+
+def saved(**variables):
+    out = io.BytesIO()
+    np.savez_compressed(out, **variables)
+    return out.getvalue()
+
+
+def matlab(variables, packed):
+    out = io.BytesIO()
+    savemat(out, variables, do_compression=packed)
+    return b'MATLAB 5.0 MAT-file, synthetic'.ljust(116) + out.getvalue()[116:]
+
+
+def array(data):
+    out = io.BytesIO()
+    np.save(out, data)
+    return out.getvalue()
+
+
+table = 't,u,y\n0,1,-0.5\n0.001,2,1e-3\n0.002,3,4\n'
+put('csv', 'comma.csv', table)
+put('csv', 'packed.csv.gz', gzip.compress(table.encode(), mtime=0))
+put('csv', 'semicolon.csv', '# a comment\n' + table.replace(',', ';').replace('\n', '\r\n'))
+put('csv', 'tabs.txt', '\ufeff' + table.replace(',', '\t'))
+put('csv', 'blanks.txt', '0 1 2\n1 3 4\n\n2 5 6\n')
+put('csv', 'gap.csv', '0,1\n1,1\n2,1\n5,1\n6,1\n')
+structure = {'Data': {'u': np.arange(3.0), 'name': 'rig', 'runs': [{'y': np.eye(2)}, {'y': np.ones(3)}]}}
+cells = np.empty((1, 2), dtype=object)
+cells[0, 0], cells[0, 1] = np.arange(2, dtype=np.int16), 'text'
+variables = {**structure, 'c': cells, 'z': np.array([1 + 2j]), 'flag': np.array([True]), 'i': np.arange(3, dtype=np.uint8)}
+put('mat', 'plain.mat', matlab(variables, False))
+put('mat', 'packed.mat', matlab(variables, True))
+put('npz', 'two.npz', saved(u=np.arange(4.0), y=np.arange(4, dtype=np.float32).reshape(2, 2)))
+put('npz', 'text.npz', saved(names=np.array(['u', 'y']), n=np.int16(3)))
+put('npy', 'rows.npy', array(np.arange(6.0).reshape(3, 2)))
+put('npy', 'columns.npy', array(np.asfortranarray(np.arange(6, dtype='>f4').reshape(3, 2))))
+put('run_toml', 'drive.toml', (root / 'examples/flexible-drive/run.toml').read_bytes())
+put('subspace_toml', 'options.toml', 'horizon = 20\nweight = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
+put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = { fixed = 4 }\nstability = "allow"\n')
+for template in sorted((root / 'crates/youla/src/identify/greybox/declared/templates').glob('*.toml')):
+    put('structure', template.name, template.read_bytes())
+put('structure', 'small.toml', 'sample_time = 0.1\na = [["sqrt(k) ^ -2 * pi", "exp(-m)"], [0, "atan(k / m)"]]\nb = [["1 / m"], [1]]\n'
+    'c = [["(k - 2) * ratio", 0]]\n[parameters]\nk = { initial = 2.0, min = 0.0, unit = "N/m" }\nm = { initial = 1.0, fixed = true }\n'
+    '[derived]\nratio = "k / m"\n')
+row = '3,0.5,0.1,100,1.5,1.6,hansen,ok,97.1,96.2,12,note'
+put('row', 'row.csv', f'{row},{hashlib.sha256(row.encode()).hexdigest()[:8]}')
+put('paper_toml', 'paper.toml', (root / 'crates/youla/assets/paper.toml').read_bytes())
+put('rig_toml', 'bearing.toml', (root / 'crates/youla/assets/bearing.toml').read_bytes())
+put('check_toml', 'check.toml', 'clipped_samples = 3\nlags = 20\nexcitation_order = 40\ncrest = 4.5\nsignificance = 1e-3\n[limits]\ny = [-1.0, 2.5]\n')
+channel = {'name': 'y', 'unit': 'um'}
+system = {'a': [[0.5, 0.1], [0, 0.25]], 'b': [[1.0], [0]], 'c': [[1, -1e-3]], 'd': [[0]]}
+put('controller_json', 'youla.json', json.dumps({'method': 'youla', 'ts': 1e-3, 'measured': [channel], 'commanded': [channel],
+                                                 'controller': system, 'q': system}))
+put('controller_json', 'lqg.json', json.dumps({'method': 'lqg', 'ts': 1e-3, 'measured': [channel], 'commanded': [channel],
+                                               'controller': system, 'observer': {**system, 'f': [[1, 2]], 'l': [[1], [2]]}}))
+put('model_json', 'model.json', json.dumps({'name': 'hansen', 'inputs': [channel], 'outputs': [channel], 'ts': 1e-3, **system,
+    'poles': [[0.5, 0], [0.25, 0]], 'details': {'order': 2}, 'provenance': {'schema': 1, 'program': 'youla 0.1.0', 'seed': None,
+    'sources': [{'path': 'y.csv', 'purpose': 'estimation', 'sha256': ''}], 'options': {'horizon': 20}}}))
+clock = {'sample_time': 1e-3, 'samples': 3, 'detail': {'start': 0, 'end': 0}, 'bucket': 1}
+trace = {'steps': [0, 1, 1], 'values': [1.0, None, -2.5]}
+axis = {'label': 'time', 'unit': 's', 'range': [0, 2.5], 'log': False}
+empty = {'title': 'rig', 'summary': '', 'program': 'youla', 'run': 'a', 'settings': '[data]', 'sources': [], 'inputs': [channel],
+         'outputs': [channel], 'sample_time': 1e-3, 'methods': [{'key': 'hansen', 'label': 'Hansen', 'role': 'hansen'}], 'verdict': [],
+         'notes': [], 'fits': [], 'experiments': [], 'orders': [], 'verification': [], 'frequency': None, 'poles': [], 'modes': [],
+         'reduction': None, 'certificates': [], 'bezout_residual': 1e-12, 'stages': []}
+
+
+def report(name, **parts):
+    put('report_json', name, json.dumps({**empty, **parts}, separators=(',', ':')))
+
+
+report('tables.json', verdict=[{'status': 'good', 'text': 'fits', 'evidence': 'fits'}], notes=[{'status': 'caution', 'text': 'few'}],
+       fits=[{'record': 'r', 'output': 0, 'method': 'hansen', 'fit': 91.5}], modes=[{'method': 'hansen', 'hz': 10.5, 'zeta': 0.02}],
+       poles=[{'method': 'hansen', 'poles': [[0.5, 0.1]]}], stages=[{'name': 'read', 'seconds': 0.1}],
+       orders=[{'method': 'hansen', 'label': 'S', 'values': [3, 1, None], 'chosen': 2}])
+report('curves.json', frequency={'hz': [1, 2], 'models': [{'method': 'hansen', 'output': 0, 'input': 0, 'magnitude_db': [1, 2],
+       'phase_deg': [0, -190]}], 'indirect': [{'output': 0, 'input': 0, 'hz': [1, 2], 'magnitude_db': [1, 2], 'phase_deg': [9, 8],
+       'coherence': [1, 0.5]}]}, experiments=[{'name': 'r', 'clock': clock, 'signals': [{'kind': 'alpha', 'channel': channel, 'trace': trace}]}],
+       verification=[{'record': 'r', 'prediction': 'simulated', 'clock': clock, 'outputs': [{'output': 0, 'measured': trace,
+       'predictions': [{'method': 'hansen', 'predicted': trace, 'residual': trace}]}]}])
+for name, content, log in [
+    ('curves', {'curves': [{'method': 'hansen', 'note': '', 'drawn': 'line', 'x': [1, 2, 4], 'y': [1, None, 3]},
+                           {'method': 'b', 'note': 'n', 'drawn': 'points', 'x': [1, 2], 'y': [1e-3, 1e3]}]}, True),
+    ('boxes', {'boxes': [{'method': 'hansen', 'note': 'n', 'values': [1, 2, 3, 9, None]}]}, False),
+    ('cells', {'cells': {'columns': ['a'], 'rows': ['b'], 'cells': [{'method': 'hansen', 'strength': 0.5, 'text': 't', 'detail': ''}]}}, False)]:
+    figure = {'key': 'loop', 'title': 'Loop', 'caption': '', 'layout': 'beside',
+              'panels': [{'title': 'p', 'x': {**axis, 'log': log}, 'y': {**axis, 'range': None}, 'content': content}]}
+    report(f'figure-{name}.json', redesign={'loops': empty['methods'], 'figure': figure, 'tables': []})

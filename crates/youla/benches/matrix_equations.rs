@@ -234,7 +234,7 @@ fn hard_problem(rng: &mut ChaCha8Rng, class: usize, k: usize, n: usize) -> Probl
         }
         _ => {
             let a = p.matrices[0].submatrix(0, 0, m, m);
-            p.matrices[1] = -(&a + eye(m) * Scale(1e-9));
+            p.matrices[1] = -(a + eye(m) * Scale(1e-9));
         }
     }
     p

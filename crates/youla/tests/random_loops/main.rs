@@ -39,6 +39,9 @@ const ROUNDING: [&str; 5] = [
 /// What became of a loop; a text for what must not be.
 type Outcome = std::result::Result<&'static str, String>;
 
+/// Why there is no gain, and how near the plant was to having none.
+type Refused = Box<(Error, Nearness)>;
+
 #[test]
 fn every_loop_factorises_or_is_refused_for_a_reason() {
     let discrete = Discrete::new(0.1).unwrap();
@@ -77,16 +80,13 @@ fn one_loop<T: TimeDomain>(seed: u64, time: T) -> Outcome {
     };
     let result = match design(rng, &drawn) {
         Ok((f, l)) => with_gains(rng, &drawn, &f, &l),
-        Err((error, nearness)) => design_refused(&drawn, &error, &nearness),
+        Err(refused) => design_refused(&drawn, &refused.0, &refused.1),
     };
     result.map_err(label)
 }
 
 /// Gains of a regulator and a filter with unit weights, in the units of the plant or without minding them.
-fn design<T: TimeDomain>(
-    rng: &mut ChaCha8Rng,
-    drawn: &Drawn<T>,
-) -> std::result::Result<(Mat<f64>, Mat<f64>), (Error, Nearness)> {
+fn design<T: TimeDomain>(rng: &mut ChaCha8Rng, drawn: &Drawn<T>) -> std::result::Result<(Mat<f64>, Mat<f64>), Refused> {
     let weight = draw::decades(rng, -2.0, 2.0);
     let square = |unit: &[f64], power: i32, factor: f64| {
         Mat::from_fn(unit.len(), unit.len(), |i, j| match i == j {
@@ -96,10 +96,10 @@ fn design<T: TimeDomain>(
         })
     };
     let weights = LqrWeights { q: square(&drawn.state, 2, 1.0), r: square(&drawn.input, 2, weight), s: None };
-    let f = lqr(&drawn.plant, &weights).map_err(|e| (e, Nearness::of(&drawn.core)))?.f;
+    let f = lqr(&drawn.plant, &weights).map_err(|e| Box::new((e, Nearness::of(&drawn.core))))?.f;
     let (process, measurement) = (square(&drawn.state, -2, 1.0), square(&drawn.output, 2, weight));
     let noise = NoiseCovariance { process, measurement, cross: None };
-    let l = kalman(&drawn.plant, &noise).map_err(|e| (e, Nearness::of(&drawn.core.dual())))?.l;
+    let l = kalman(&drawn.plant, &noise).map_err(|e| Box::new((e, Nearness::of(&drawn.core.dual()))))?.l;
     Ok((f, l))
 }
 

@@ -39,7 +39,7 @@ pub(super) fn iterate(what: &str, t: &mut Mat<f64>, q: &mut Mat<f64>) -> Result<
 }
 
 /// Sets the lowest negligible subdiagonal entry above row `end` to zero and returns the first row of the unreduced block.
-fn deflate(t: &mut Mat<f64>, end: usize) -> usize {
+pub(super) fn deflate(t: &mut Mat<f64>, end: usize) -> usize {
     for k in (1..end).rev() {
         if is_negligible(t, k) {
             t[(k, k - 1)] = 0.0;
@@ -72,43 +72,45 @@ fn is_negligible(t: &Mat<f64>, k: usize) -> bool {
     small * (large / sum) <= (f64::MIN_POSITIVE / eps).max(eps * (least * (most / sum)))
 }
 
-/// The two shifts: twice the same real number, or a conjugate pair.
-#[derive(Clone, Copy)]
-struct Shifts {
-    re: f64,
-    im: f64,
+/// Two shifts: a conjugate pair `re +- i im`, or the real numbers `re +- split`; one of `im` and `split` is zero.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Shifts {
+    pub(super) re: f64,
+    pub(super) im: f64,
+    pub(super) split: f64,
 }
 
 impl Shifts {
     /// Eigenvalues of the trailing 2 x 2 block (if real, twice the one nearer to the last entry), with an exceptional
     /// pair every tenth sweep to leave a cycle.
-    fn choose(t: &Mat<f64>, start: usize, end: usize, sweeps: usize) -> Self {
+    pub(super) fn choose(t: &Mat<f64>, start: usize, end: usize, sweeps: usize) -> Self {
         let n = end - 1;
         let (a, b, c, d) = (t[(n - 1, n - 1)], t[(n - 1, n)], t[(n, n - 1)], t[(n, n)]);
         if sweeps.is_multiple_of(10) {
             let k = if sweeps.is_multiple_of(20) { n } else { start + 2 };
             let size = t[(k, k - 1)].abs() + t[(k - 1, k - 2)].abs();
-            return Shifts { re: t[(k, k)] + 0.75 * size, im: 0.4375_f64.sqrt() * size };
+            return Shifts { re: t[(k, k)] + 0.75 * size, im: 0.4375_f64.sqrt() * size, split: 0.0 };
         }
         let half = 0.5 * (a - d);
         let discriminant = half * half + b * c;
         if discriminant < 0.0 {
-            return Shifts { re: d + half, im: (-discriminant).sqrt() };
+            return Shifts { re: d + half, im: (-discriminant).sqrt(), split: 0.0 };
         }
         let away = half + discriminant.sqrt().copysign(half);
-        Shifts { re: if away == 0.0 { d } else { d - b * c / away }, im: 0.0 }
+        Shifts { re: if away == 0.0 { d } else { d - b * c / away }, im: 0.0, split: 0.0 }
     }
 
     /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size. It is made of
     /// differences to the shifts, so that eigenvalues that agree in many digits are still told apart.
-    fn first_column(self, t: &Mat<f64>, k: usize) -> [f64; 3] {
+    pub(super) fn first_column(self, t: &Mat<f64>, k: usize) -> [f64; 3] {
         let (a, b, c, d) = (t[(k, k)] - self.re, t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)] - self.re);
-        let size = a.abs() + self.im.abs() + c.abs();
+        let Shifts { im, split, .. } = self;
+        let size = a.abs() + im.abs() + split.abs() + c.abs();
         if size == 0.0 {
             return [0.0; 3];
         }
         let r = c / size;
-        [r * b + a * (a / size) + self.im * (self.im / size), r * (a + d), r * t[(k + 2, k + 1)]]
+        [r * b + (a - split) * ((a + split) / size) + im * (im / size), r * (a + d), r * t[(k + 2, k + 1)]]
     }
 }
 

@@ -6,6 +6,7 @@
 mod balance;
 mod complex_schur;
 mod definite;
+mod early_deflation;
 mod expm;
 mod francis;
 mod gramian;
@@ -14,6 +15,7 @@ mod kronecker;
 mod least_squares;
 mod logm;
 mod lyapunov;
+mod multishift;
 mod reflector;
 mod reorder;
 mod riccati;
@@ -36,6 +38,9 @@ pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 pub use triangle::Triangle;
 pub(crate) use triangle::{leading_rank, triangular_condition};
+
+#[cfg(test)]
+mod levels;
 
 use crate::{Error, Result};
 use faer::prelude::*;

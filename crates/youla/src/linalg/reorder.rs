@@ -64,7 +64,7 @@ impl RealSchur {
 }
 
 /// Moves the block that begins in row `from` up to row `to`; returns the sum of what was set to zero.
-fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize, norm: f64) -> Result<f64> {
+pub(super) fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize, norm: f64) -> Result<f64> {
     let (mut row, mut disturbed) = (from, 0.0);
     while row > to {
         let above = if row >= to + 2 && t[(row - 1, row - 2)] != 0.0 { 2 } else { 1 };

@@ -1,9 +1,10 @@
 //! Real Schur form `A = Q T Q'`: Q orthogonal, T quasi-triangular with 1 x 1 blocks for real eigenvalues and 2 x 2 blocks
 //! `[a b; c a]`, b c < 0, for the pairs `a +- i sqrt(-b c)`.
 //!
-//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5).
+//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5),
+//! for large n with many shifts at a time.
 
-use super::francis::iterate;
+use super::multishift::quasi_triangular;
 use super::reflector::Rotation;
 use super::{Hessenberg, hessenberg};
 use crate::Result;
@@ -75,7 +76,7 @@ pub(super) fn block_eigenvalues(t: MatRef<'_, f64>, block: DiagonalBlock) -> Vec
 /// ```
 pub fn real_schur(what: &str, a: MatRef<'_, f64>) -> Result<RealSchur> {
     let Hessenberg { mut q, h: mut t } = hessenberg(what, a)?;
-    iterate(what, &mut t, &mut q)?;
+    quasi_triangular(what, &mut t, &mut q)?;
     let residual = relative_residual(a, &q, &t);
     Ok(RealSchur { q, t, residual })
 }

@@ -6,7 +6,11 @@ use super::kronecker::{Small, SmallSolution};
 use super::schur::{DiagonalBlock, RealSchur, blocks, real_schur};
 use super::{check_finite, check_shape};
 use crate::{Error, Result};
-use faer::{Mat, MatRef};
+use faer::prelude::*;
+use faer::{Mat, MatMut, MatRef};
+
+/// Order up to which an equation is not split.
+const UNSPLIT: usize = 16;
 
 /// Solution of a Sylvester equation.
 #[derive(Debug, Clone)]
@@ -100,19 +104,59 @@ pub(super) fn solve_on_schur_forms(
     right: &RealSchur,
     c: MatRef<'_, f64>,
 ) -> Result<Mat<f64>> {
-    let d = left.q.transpose() * c * &right.q;
-    let y = solve_quasi_triangular(what, form, left.t.as_ref(), right.t.as_ref(), d)?;
+    let mut y = left.q.transpose() * c * &right.q;
+    solve_quasi_triangular(what, form, left.t.as_ref(), right.t.as_ref(), y.as_mut())?;
     Ok(&left.q * y * right.q.transpose())
 }
 
-/// Solves `T Y + Y S' = D` or `T Y S' - Y = D`, block column by block column from the right.
+/// Solves `T Y + Y S' = D` or `T Y S' - Y = D` by halves of the longer side, so that most of the work is matrix products: with
+/// `T = [T1 T12; 0 T2]` the lower half of Y comes first, with `S = [S1 S12; 0 S2]` its right half.
 fn solve_quasi_triangular(
     what: &str,
     form: Form,
     t: MatRef<'_, f64>,
     s: MatRef<'_, f64>,
-    mut y: Mat<f64>,
-) -> Result<Mat<f64>> {
+    mut y: MatMut<'_, f64>,
+) -> Result<()> {
+    let (n, m) = (t.nrows(), s.nrows());
+    if n.max(m) <= UNSPLIT {
+        return solve_by_columns(what, form, t, s, y);
+    }
+    if n >= m {
+        let k = middle(t);
+        let (t1, t12, _, t2) = t.split_at(k, k);
+        let (mut upper, mut lower) = y.split_at_row_mut(k);
+        solve_quasi_triangular(what, form, t2, s, lower.rb_mut())?;
+        let known = match form {
+            Form::Sum => t12 * &lower,
+            Form::Product => t12 * (&lower * s.transpose()),
+        };
+        upper -= known;
+        return solve_quasi_triangular(what, form, t1, s, upper);
+    }
+    let k = middle(s);
+    let (s1, s12, _, s2) = s.split_at(k, k);
+    let (mut left, mut right) = y.rb_mut().split_at_col_mut(k);
+    solve_quasi_triangular(what, form, t, s2, right.rb_mut())?;
+    let known = &right * s12.transpose();
+    left -= if form == Form::Sum { known } else { t * known };
+    solve_quasi_triangular(what, form, t, s1, left)
+}
+
+/// A row near the middle between two diagonal blocks.
+fn middle(t: MatRef<'_, f64>) -> usize {
+    let k = t.nrows() / 2;
+    if t[(k, k - 1)] == 0.0 { k } else { k + 1 }
+}
+
+/// The same, block column by block column from the right.
+fn solve_by_columns(
+    what: &str,
+    form: Form,
+    t: MatRef<'_, f64>,
+    s: MatRef<'_, f64>,
+    mut y: MatMut<'_, f64>,
+) -> Result<()> {
     let (rows, columns) = (blocks(t), blocks(s));
     let (n, m) = (t.nrows(), s.nrows());
     for &column in columns.iter().rev() {
@@ -128,10 +172,10 @@ fn solve_quasi_triangular(
             }
         }
         for &row in rows.iter().rev() {
-            solve_block(what, form, t, s, &mut y, row, column)?;
+            solve_block(what, form, t, s, y.rb_mut(), row, column)?;
         }
     }
-    Ok(y)
+    Ok(())
 }
 
 /// Solves for one block of Y, all blocks below it in its block column being known.
@@ -140,7 +184,7 @@ fn solve_block(
     form: Form,
     t: MatRef<'_, f64>,
     s: MatRef<'_, f64>,
-    y: &mut Mat<f64>,
+    y: MatMut<'_, f64>,
     row: DiagonalBlock,
     column: DiagonalBlock,
 ) -> Result<()> {
@@ -171,7 +215,7 @@ fn solve_block(
     if !rcond.is_finite() || rcond <= f64::EPSILON {
         return Err(Error::Singular { what: format!("the equation of {what}"), rcond: rcond.max(0.0) });
     }
-    y.as_mut().submatrix_mut(i, j, height, width).copy_from(&x);
+    y.submatrix_mut(i, j, height, width).copy_from(&x);
     Ok(())
 }
 

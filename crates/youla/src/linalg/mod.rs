@@ -4,22 +4,24 @@
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
 mod balance;
+mod bulges;
 mod complex_schur;
 mod definite;
-mod early_deflation;
 mod expm;
 mod francis;
 mod gramian;
 mod hessenberg;
 mod kronecker;
+mod late;
 mod least_squares;
 mod logm;
 mod lyapunov;
-mod multishift;
 mod reflector;
 mod reorder;
 mod riccati;
 mod schur;
+mod shifts;
+mod square;
 mod sylvester;
 mod triangle;
 

@@ -2,7 +2,7 @@
 //! the Hessenberg and Schur reductions (Golub and Van Loan, Matrix Computations, 4th ed., section 5.1).
 
 use faer::Mat;
-use std::ops::Range;
+use std::ops::{IndexMut, Range};
 
 /// Overwrites `x` by the Householder vector `v` and returns `(tau, beta)` with `(I - tau v v') x = beta e1`.
 /// `beta` takes the sign opposite to `x[0]`, so that no cancellation occurs.
@@ -99,17 +99,18 @@ impl Rotation {
         if r == 0.0 { Rotation { c: 1.0, s: 0.0 } } else { Rotation { c: x / r, s: y / r } }
     }
 
-    /// Similarity `t := R t R'` in the plane (k, k+1) of a quasi-triangular `t`, and `q := q R'`.
-    pub(super) fn similarity(self, t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) {
+    /// Similarity `t := R t R'` in the plane (k, k+1) of a quasi-triangular `t` of order n, and `q := q R'`.
+    pub(super) fn similarity<M>(self, t: &mut M, q: &mut M, n: usize, k: usize)
+    where
+        M: IndexMut<(usize, usize), Output = f64>,
+    {
         let Rotation { c, s } = self;
-        for j in k..t.ncols() {
+        for j in k..n {
             let (x, y) = (t[(k, j)], t[(k + 1, j)]);
             t[(k, j)] = c * x + s * y;
             t[(k + 1, j)] = c * y - s * x;
         }
-        let height = (k + 2).min(t.nrows());
-        let rows = q.nrows();
-        for (m, rows) in [(t, height), (q, rows)] {
+        for (m, rows) in [(t, (k + 2).min(n)), (q, n)] {
             for i in 0..rows {
                 let (x, y) = (m[(i, k)], m[(i, k + 1)]);
                 m[(i, k)] = c * x + s * y;

@@ -84,9 +84,10 @@ pub(super) fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize
 /// Exchanges the neighbouring blocks of `above` and `below` rows that begin in row k; returns the size of what was set to
 /// zero.
 fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize, norm: f64) -> Result<f64> {
+    let n = t.nrows();
     if above == 1 && below == 1 {
         let (first, second) = (t[(k, k)], t[(k + 1, k + 1)]);
-        Rotation::onto_first(t[(k, k + 1)], second - first).similarity(t, q, k);
+        Rotation::onto_first(t[(k, k + 1)], second - first).similarity(t, q, n, k);
         (t[(k, k)], t[(k + 1, k + 1)], t[(k + 1, k)]) = (second, first, 0.0);
         return Ok(0.0);
     }
@@ -110,7 +111,7 @@ fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize
     }
     for (row, rows) in [(k, below), (k + below, above)] {
         if rows == 2 {
-            standardise(t, q, row);
+            standardise(t, q, n, row);
         }
     }
     Ok(left)

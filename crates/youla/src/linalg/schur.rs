@@ -2,13 +2,14 @@
 //! `[a b; c a]`, b c < 0, for the pairs `a +- i sqrt(-b c)`.
 //!
 //! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5),
-//! for large n with many shifts at a time.
+//! for large n with several pairs of shifts at a time.
 
-use super::multishift::quasi_triangular;
+use super::francis::quasi_triangular;
 use super::reflector::Rotation;
 use super::{Hessenberg, hessenberg};
 use crate::Result;
 use faer::{Mat, MatRef, c64};
+use std::ops::IndexMut;
 
 /// The real Schur form `A = Q T Q'` of an n x n matrix.
 #[derive(Debug, Clone)]
@@ -89,19 +90,22 @@ pub(super) fn relative_residual(a: MatRef<'_, f64>, q: &Mat<f64>, t: &Mat<f64>) 
 
 /// Brings the 2 x 2 block in rows k, k+1 to standard form: triangular where its eigenvalues are real, equal diagonal
 /// entries where they are not.
-pub(super) fn standardise(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) {
-    if split_real_pair(t, q, k) {
+pub(super) fn standardise<M>(t: &mut M, q: &mut M, n: usize, k: usize)
+where
+    M: IndexMut<(usize, usize), Output = f64>,
+{
+    if split_real_pair(t, q, n, k) {
         return;
     }
     let (half, sum) = (0.5 * (t[(k, k)] - t[(k + 1, k + 1)]), t[(k, k + 1)] + t[(k + 1, k)]);
     // The difference of the diagonal, a - d, turns by twice the angle: tan(2 angle) = -(a - d) / (b + c).
     let angle = if sum == 0.0 && half == 0.0 { 0.0 } else { 0.5 * angle_of(-2.0 * half, sum) };
-    Rotation { c: angle.cos(), s: angle.sin() }.similarity(t, q, k);
+    Rotation { c: angle.cos(), s: angle.sin() }.similarity(t, q, n, k);
     let mean = 0.5 * (t[(k, k)] + t[(k + 1, k + 1)]);
     t[(k, k)] = mean;
     t[(k + 1, k + 1)] = mean;
     // Rounding may have made the pair real.
-    split_real_pair(t, q, k);
+    split_real_pair(t, q, n, k);
 }
 
 /// Angle of the line through (x, y) and the origin, in (-pi/2, pi/2].
@@ -110,7 +114,10 @@ fn angle_of(y: f64, x: f64) -> f64 {
 }
 
 /// Makes the block triangular where its eigenvalues are real, the one of larger distance from the last entry first.
-fn split_real_pair(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) -> bool {
+fn split_real_pair<M>(t: &mut M, q: &mut M, n: usize, k: usize) -> bool
+where
+    M: IndexMut<(usize, usize), Output = f64>,
+{
     let (a, b, c, d) = (t[(k, k)], t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)]);
     if c == 0.0 {
         return true;
@@ -123,7 +130,7 @@ fn split_real_pair(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) -> bool {
     }
     // Eigenvalue d + z with the eigenvector [z; c].
     let z = half + scale * discriminant.sqrt().copysign(half);
-    Rotation::onto_first(z, c).similarity(t, q, k);
+    Rotation::onto_first(z, c).similarity(t, q, n, k);
     t[(k + 1, k)] = 0.0;
     true
 }

@@ -2,7 +2,7 @@
 //! Stewart, Commun. ACM 15 (1972), 820; G. Kitagawa, Int. J. Control 25 (1977), 745. They are Sylvester equations
 //! whose two coefficients share one real Schur form.
 
-use super::sylvester::{Form, solve_on_schur_forms};
+use super::sylvester::{Form, solve_on_schur_forms, solve_symmetric};
 use super::{check_finite, check_shape, real_schur};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -70,14 +70,18 @@ fn solve(domain: Domain, a: MatRef<'_, f64>, q: MatRef<'_, f64>) -> Result<Lyapu
         Domain::Continuous => (Form::Sum, "two eigenvalues of A add up to zero"),
         Domain::Discrete => (Form::Product, "two eigenvalues of A have the product 1"),
     };
-    let x = solve_on_schur_forms("X", form, &schur, &schur, (-q).as_ref()).map_err(|e| match e {
+    let x = if q == q.transpose() {
+        solve_symmetric("X", form, &schur, (-q).as_ref())
+    } else {
+        solve_on_schur_forms("X", form, &schur, &schur, (-q).as_ref())
+    };
+    let x = x.map_err(|e| match e {
         Error::Singular { .. } => {
             let what = "the Lyapunov equation".into();
             Error::NoSolution { what, condition: condition.into(), residual: f64::NAN }
         }
         other => other,
     })?;
-    let x = if q == q.transpose() { 0.5 * (&x + x.transpose()) } else { x };
     let residual = residual(domain, a, x.as_ref(), q);
     Ok(Lyapunov { x, residual })
 }

@@ -22,6 +22,7 @@ mod riccati;
 mod schur;
 mod shifts;
 mod square;
+mod substitution;
 mod sylvester;
 mod triangle;
 

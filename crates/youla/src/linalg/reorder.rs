@@ -4,7 +4,7 @@
 //! Neighbours A11 (p x p) and A22 (q x q) change places under the orthogonal matrix of the QR factorisation
 //! `[-X; I] = Q R`, where `A11 X - X A22 = A12`. A swap that would disturb the matrix by more than rounding is refused.
 
-use super::kronecker::{Small, SmallSolution};
+use super::kronecker::{SmallSolution, solve_sum};
 use super::reflector::{Rotation, householder, reflect_columns, reflect_rows};
 use super::schur::{DiagonalBlock, RealSchur, block_eigenvalues, blocks, standardise};
 use crate::{Error, Result};
@@ -137,13 +137,16 @@ fn rehearse(t: &Mat<f64>, k: usize, below: usize, size: usize, reflections: &[Re
 /// Householder vectors of the QR factorisation of `[-X; g I]`, where `A11 X - X A22 = g A12`.
 fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> Vec<Reflection> {
     let middle = k + above;
-    let a11 = t.as_ref().submatrix(k, k, above, above);
-    let a22 = t.as_ref().submatrix(middle, middle, below, below);
-    let minus_a22 = Mat::from_fn(below, below, |i, j| -a22[(j, i)]);
-    let rhs = t.as_ref().submatrix(k, middle, above, below);
-    let SmallSolution { x, scale, .. } = Small::sum(a11, minus_a22.as_ref(), rhs).solve();
+    let entries = |row, column, height, width, sign: f64| {
+        let entry = |i, j| if i < height && j < width { sign * t[(row + i, column + j)] } else { 0.0 };
+        [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
+    };
+    let a11 = entries(k, k, above, above, 1.0);
+    let [[a, b], [c, d]] = entries(middle, middle, below, below, -1.0);
+    let rhs = entries(k, middle, above, below, 1.0);
+    let SmallSolution { x, scale, .. } = solve_sum((above, below), &a11, &[[a, c], [b, d]], &rhs);
     let mut panel = Mat::from_fn(above + below, below, |i, j| match i.checked_sub(above) {
-        None => -x[(i, j)],
+        None => -x[i][j],
         Some(row) => f64::from(u8::from(row == j)) * scale,
     });
     let mut reflections = Vec::with_capacity(below);

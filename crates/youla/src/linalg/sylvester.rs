@@ -2,15 +2,12 @@
 //! real Schur forms `A = U T U'` and `B' = V S V'` turn them into `T Y + Y S' = D` and `T Y S' - Y = D` with `D = U' C V`,
 //! which are solved block by block from the lower right corner; then `X = U Y V'`.
 
-use super::kronecker::{Small, SmallSolution};
-use super::schur::{DiagonalBlock, RealSchur, blocks, real_schur};
+use super::schur::{RealSchur, real_schur};
+pub(super) use super::substitution::Form;
+use super::substitution::{substitute, substitute_symmetric};
 use super::{check_finite, check_shape};
-use crate::{Error, Result};
-use faer::prelude::*;
-use faer::{Mat, MatMut, MatRef};
-
-/// Order up to which an equation is not split.
-const UNSPLIT: usize = 16;
+use crate::Result;
+use faer::{Mat, MatRef};
 
 /// Solution of a Sylvester equation.
 #[derive(Debug, Clone)]
@@ -27,8 +24,8 @@ pub struct SylvesterSolution {
 /// small multiple of the machine precision (held to 1e-13 by `random_equations_are_solved`).
 ///
 /// # Errors
-/// [`Error::Shape`] and [`Error::NotFinite`] naming `what`; [`Error::Singular`] where the solution is not unique to
-/// working precision; [`Error::NoConvergence`] of a Schur form.
+/// [`crate::Error::Shape`] and [`crate::Error::NotFinite`] naming `what`; [`crate::Error::Singular`] where the solution is not unique to
+/// working precision; [`crate::Error::NoConvergence`] of a Schur form.
 ///
 /// ```
 /// use youla::{Mat, linalg::{eye, sylvester}};
@@ -64,15 +61,6 @@ pub fn discrete_sylvester(
     bartels_stewart(what, Form::Product, a, b, c)
 }
 
-/// The two equations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
-    /// `A X + X B = C`.
-    Sum,
-    /// `A X B - X = C`.
-    Product,
-}
-
 fn bartels_stewart(
     what: &str,
     form: Form,
@@ -105,123 +93,22 @@ pub(super) fn solve_on_schur_forms(
     c: MatRef<'_, f64>,
 ) -> Result<Mat<f64>> {
     let mut y = left.q.transpose() * c * &right.q;
-    solve_quasi_triangular(what, form, left.t.as_ref(), right.t.as_ref(), y.as_mut())?;
+    substitute(what, form, left.t.as_ref(), right.t.as_ref(), y.as_mut())?;
     Ok(&left.q * y * right.q.transpose())
 }
 
-/// Solves `T Y + Y S' = D` or `T Y S' - Y = D` by halves of the longer side, so that most of the work is matrix products: with
-/// `T = [T1 T12; 0 T2]` the lower half of Y comes first, with `S = [S1 S12; 0 S2]` its right half.
-fn solve_quasi_triangular(
-    what: &str,
-    form: Form,
-    t: MatRef<'_, f64>,
-    s: MatRef<'_, f64>,
-    mut y: MatMut<'_, f64>,
-) -> Result<()> {
-    let (n, m) = (t.nrows(), s.nrows());
-    if n.max(m) <= UNSPLIT {
-        return solve_by_columns(what, form, t, s, y);
-    }
-    if n >= m {
-        let k = middle(t);
-        let (t1, t12, _, t2) = t.split_at(k, k);
-        let (mut upper, mut lower) = y.split_at_row_mut(k);
-        solve_quasi_triangular(what, form, t2, s, lower.rb_mut())?;
-        let known = match form {
-            Form::Sum => t12 * &lower,
-            Form::Product => t12 * (&lower * s.transpose()),
-        };
-        upper -= known;
-        return solve_quasi_triangular(what, form, t1, s, upper);
-    }
-    let k = middle(s);
-    let (s1, s12, _, s2) = s.split_at(k, k);
-    let (mut left, mut right) = y.rb_mut().split_at_col_mut(k);
-    solve_quasi_triangular(what, form, t, s2, right.rb_mut())?;
-    let known = &right * s12.transpose();
-    left -= if form == Form::Sum { known } else { t * known };
-    solve_quasi_triangular(what, form, t, s1, left)
-}
-
-/// A row near the middle between two diagonal blocks.
-fn middle(t: MatRef<'_, f64>) -> usize {
-    let k = t.nrows() / 2;
-    if t[(k, k - 1)] == 0.0 { k } else { k + 1 }
-}
-
-/// The same, block column by block column from the right.
-fn solve_by_columns(
-    what: &str,
-    form: Form,
-    t: MatRef<'_, f64>,
-    s: MatRef<'_, f64>,
-    mut y: MatMut<'_, f64>,
-) -> Result<()> {
-    let (rows, columns) = (blocks(t), blocks(s));
-    let (n, m) = (t.nrows(), s.nrows());
-    for &column in columns.iter().rev() {
-        let (j, width) = (column.start, column.size);
-        let solved = j + width..m;
-        // Y_right S'_right,j is known; it enters as it is or multiplied by T.
-        let known = y.as_ref().subcols(solved.start, solved.len())
-            * s.submatrix(j, solved.start, width, solved.len()).transpose();
-        let known = if form == Form::Sum { known } else { t * known };
-        for k in 0..width {
-            for i in 0..n {
-                y[(i, j + k)] -= known[(i, k)];
-            }
-        }
-        for &row in rows.iter().rev() {
-            solve_block(what, form, t, s, y.rb_mut(), row, column)?;
-        }
-    }
-    Ok(())
-}
-
-/// Solves for one block of Y, all blocks below it in its block column being known.
-fn solve_block(
-    what: &str,
-    form: Form,
-    t: MatRef<'_, f64>,
-    s: MatRef<'_, f64>,
-    y: MatMut<'_, f64>,
-    row: DiagonalBlock,
-    column: DiagonalBlock,
-) -> Result<()> {
-    let n = t.nrows();
-    let (i, j, height, width) = (row.start, column.start, row.size, column.size);
-    let (t_ii, s_jj) = (t.submatrix(i, i, height, height), s.submatrix(j, j, width, width));
-    let mut below = [[0.0; 2]; 2];
-    for l in i + height..n {
-        for k in 0..width {
-            for r in 0..height {
-                below[k][r] += t[(i + r, l)] * y[(l, j + k)];
-            }
-        }
-    }
-    let rhs = Mat::from_fn(height, width, |r, k| {
-        let from_below = match form {
-            Form::Sum => below[k][r],
-            Form::Product => (0..width).map(|q| below[q][r] * s_jj[(k, q)]).sum(),
-        };
-        y[(i + r, j + k)] - from_below
-    });
-    let (system, size) = match form {
-        Form::Sum => (Small::sum(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() + s_jj.norm_max()),
-        Form::Product => (Small::product(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() * s_jj.norm_max() + 1.0),
-    };
-    let SmallSolution { x, smallest_pivot, .. } = system.solve();
-    let rcond = smallest_pivot / size;
-    if !rcond.is_finite() || rcond <= f64::EPSILON {
-        return Err(Error::Singular { what: format!("the equation of {what}"), rcond: rcond.max(0.0) });
-    }
-    y.submatrix_mut(i, j, height, width).copy_from(&x);
-    Ok(())
+/// The same for one form on both sides and a symmetric right-hand side; the solution is symmetric to the last digit.
+pub(super) fn solve_symmetric(what: &str, form: Form, schur: &RealSchur, c: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    let mut y = schur.q.transpose() * c * &schur.q;
+    substitute_symmetric(what, form, schur.t.as_ref(), y.as_mut())?;
+    let x = &schur.q * y * schur.q.transpose();
+    Ok(0.5 * (&x + x.transpose()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};

@@ -7,7 +7,7 @@ use pulp::Simd;
 use std::ops::Range;
 
 /// Vectors that are reflected side by side, so that none waits for itself.
-const VECTORS: usize = 2;
+const VECTORS: usize = 4;
 
 /// Rows of a strip of columns, turned on their side.
 pub(super) type Strip = Vec<[f64; LANES]>;

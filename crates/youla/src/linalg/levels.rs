@@ -1,5 +1,7 @@
-//! Residual levels of all solvers on seeded problems that are large enough for the blocked methods, hard ones included: the
-//! classes of `benches/matrix_equations.rs`, in which SciPy and SLICOT solve the same problems.
+//! Residual levels on seeded problems that are large enough for the blocked methods: Schur forms of random, clustered, cyclic
+//! and Jordan matrices up to n = 150; linear equations up to n = 90, among them Lyapunov equations with a mode 1e-8 from the
+//! boundary; Riccati equations at n = 40, among them some with such a mode almost out of reach. They are some of the classes of
+//! `benches/matrix_equations.rs`, where SciPy and SLICOT solve the same problems.
 
 use super::*;
 use rand::{RngExt, SeedableRng};
@@ -37,7 +39,7 @@ fn check_schur(a: &Mat<f64>) {
 #[test]
 fn large_schur_forms_hold() {
     let rng = &mut ChaCha8Rng::seed_from_u64(31);
-    for n in [64, 109, 110, 150] {
+    for n in [63, 64, 100, 150] {
         check_schur(&disc(rng, n));
     }
     // Clusters: a few eigenvalues many times over, in any coordinates, and with a coupling above the diagonal.

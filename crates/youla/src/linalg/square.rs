@@ -4,7 +4,7 @@ use faer::{Mat, MatRef};
 use std::ops::{Index, IndexMut};
 
 /// The height of the columns is a multiple of this.
-pub(super) const LANES: usize = 16;
+pub(super) const LANES: usize = 32;
 
 /// n x n, column after column; rows of zeros fill the columns up.
 #[derive(Debug, Clone)]

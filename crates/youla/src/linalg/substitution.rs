@@ -6,7 +6,7 @@ use super::kronecker::{Entries, SmallSolution, solve_product, solve_sum};
 use super::schur::{DiagonalBlock, blocks};
 use crate::{Error, Result};
 use faer::prelude::*;
-use faer::{Mat, MatMut, MatRef};
+use faer::{MatMut, MatRef};
 use pulp::{Arch, NullaryFnOnce};
 
 /// Order up to which an equation is not split.
@@ -119,7 +119,7 @@ fn substitute_small(
         small.above[start..start + size].iter_mut().for_each(|column| column[start..].fill(0.0));
     }
     let rcond = Arch::new().dispatch(&mut small);
-    if !rcond.is_finite() || rcond <= f64::EPSILON {
+    if rcond.is_nan() || rcond <= f64::EPSILON {
         return Err(Error::Singular { what: format!("the equation of {what}"), rcond: rcond.max(0.0) });
     }
     for j in 0..y.ncols() {

@@ -46,7 +46,7 @@ impl WithSimd for Iteration<'_> {
             match end - start {
                 1 => (end, since_deflation) = (end - 1, 0),
                 2 => {
-                    standardise(t, q, n, start);
+                    standardise(t, q, start);
                     (end, since_deflation) = (end - 2, 0);
                 }
                 _ if total == limit => {

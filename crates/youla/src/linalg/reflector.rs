@@ -1,8 +1,9 @@
 //! Householder reflections `P = I - tau v v'` with `v[0] = 1` and plane rotations, the two orthogonal building blocks of
 //! the Hessenberg and Schur reductions (Golub and Van Loan, Matrix Computations, 4th ed., section 5.1).
 
+use super::square::Square;
 use faer::Mat;
-use std::ops::{IndexMut, Range};
+use std::ops::Range;
 
 /// Overwrites `x` by the Householder vector `v` and returns `(tau, beta)` with `(I - tau v v') x = beta e1`.
 /// `beta` takes the sign opposite to `x[0]`, so that no cancellation occurs.
@@ -99,22 +100,18 @@ impl Rotation {
         if r == 0.0 { Rotation { c: 1.0, s: 0.0 } } else { Rotation { c: x / r, s: y / r } }
     }
 
-    /// Similarity `t := R t R'` in the plane (k, k+1) of a quasi-triangular `t` of order n, and `q := q R'`.
-    pub(super) fn similarity<M>(self, t: &mut M, q: &mut M, n: usize, k: usize)
-    where
-        M: IndexMut<(usize, usize), Output = f64>,
-    {
+    /// Similarity `t := R t R'` in the plane (k, k+1) of a quasi-triangular `t`, and `q := q R'`.
+    pub(super) fn similarity(self, t: &mut Square, q: &mut Square, k: usize) {
         let Rotation { c, s } = self;
-        for j in k..n {
-            let (x, y) = (t[(k, j)], t[(k + 1, j)]);
-            t[(k, j)] = c * x + s * y;
-            t[(k + 1, j)] = c * y - s * x;
+        let (n, height) = (t.order(), t.height());
+        for column in t.columns_from(k).chunks_exact_mut(height) {
+            let (x, y) = (column[k], column[k + 1]);
+            (column[k], column[k + 1]) = (c * x + s * y, c * y - s * x);
         }
         for (m, rows) in [(t, (k + 2).min(n)), (q, n)] {
-            for i in 0..rows {
-                let (x, y) = (m[(i, k)], m[(i, k + 1)]);
-                m[(i, k)] = c * x + s * y;
-                m[(i, k + 1)] = c * y - s * x;
+            let (left, right) = m.columns_from(k).split_at_mut(height);
+            for (x, y) in left[..rows].iter_mut().zip(&mut right[..rows]) {
+                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
             }
         }
     }

@@ -6,10 +6,10 @@
 
 use super::francis::quasi_triangular;
 use super::reflector::Rotation;
+use super::square::Square;
 use super::{Hessenberg, hessenberg};
 use crate::Result;
 use faer::{Mat, MatRef, c64};
-use std::ops::IndexMut;
 
 /// The real Schur form `A = Q T Q'` of an n x n matrix.
 #[derive(Debug, Clone)]
@@ -90,22 +90,19 @@ pub(super) fn relative_residual(a: MatRef<'_, f64>, q: &Mat<f64>, t: &Mat<f64>) 
 
 /// Brings the 2 x 2 block in rows k, k+1 to standard form: triangular where its eigenvalues are real, equal diagonal
 /// entries where they are not.
-pub(super) fn standardise<M>(t: &mut M, q: &mut M, n: usize, k: usize)
-where
-    M: IndexMut<(usize, usize), Output = f64>,
-{
-    if split_real_pair(t, q, n, k) {
+pub(super) fn standardise(t: &mut Square, q: &mut Square, k: usize) {
+    if split_real_pair(t, q, k) {
         return;
     }
     let (half, sum) = (0.5 * (t[(k, k)] - t[(k + 1, k + 1)]), t[(k, k + 1)] + t[(k + 1, k)]);
     // The difference of the diagonal, a - d, turns by twice the angle: tan(2 angle) = -(a - d) / (b + c).
     let angle = if sum == 0.0 && half == 0.0 { 0.0 } else { 0.5 * angle_of(-2.0 * half, sum) };
-    Rotation { c: angle.cos(), s: angle.sin() }.similarity(t, q, n, k);
+    Rotation { c: angle.cos(), s: angle.sin() }.similarity(t, q, k);
     let mean = 0.5 * (t[(k, k)] + t[(k + 1, k + 1)]);
     t[(k, k)] = mean;
     t[(k + 1, k + 1)] = mean;
     // Rounding may have made the pair real.
-    split_real_pair(t, q, n, k);
+    split_real_pair(t, q, k);
 }
 
 /// Angle of the line through (x, y) and the origin, in (-pi/2, pi/2].
@@ -114,10 +111,7 @@ fn angle_of(y: f64, x: f64) -> f64 {
 }
 
 /// Makes the block triangular where its eigenvalues are real, the one of larger distance from the last entry first.
-fn split_real_pair<M>(t: &mut M, q: &mut M, n: usize, k: usize) -> bool
-where
-    M: IndexMut<(usize, usize), Output = f64>,
-{
+fn split_real_pair(t: &mut Square, q: &mut Square, k: usize) -> bool {
     let (a, b, c, d) = (t[(k, k)], t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)]);
     if c == 0.0 {
         return true;
@@ -130,7 +124,7 @@ where
     }
     // Eigenvalue d + z with the eigenvector [z; c].
     let z = half + scale * discriminant.sqrt().copysign(half);
-    Rotation::onto_first(z, c).similarity(t, q, n, k);
+    Rotation::onto_first(z, c).similarity(t, q, k);
     t[(k + 1, k)] = 0.0;
     true
 }

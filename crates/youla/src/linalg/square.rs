@@ -54,6 +54,29 @@ impl Square {
         &mut self.entries[j * self.height..]
     }
 
+    /// `m := P m` with `P = I - tau v v'` on the rows from `row` on, restricted to the columns from `column` on.
+    #[inline(always)]
+    pub(super) fn reflect_rows<const N: usize>(&mut self, v: &[f64; N], tau: f64, row: usize, column: usize) {
+        let height = self.height;
+        for x in self.columns_from(column).chunks_exact_mut(height) {
+            let x = &mut x[row..row + N];
+            let w = tau * x.iter().zip(v).map(|(x, v)| x * v).sum::<f64>();
+            x.iter_mut().zip(v).for_each(|(x, v)| *x -= w * v);
+        }
+    }
+
+    /// `m := m P`, where P acts on the columns from `column` on, restricted to the first `rows` rows.
+    #[inline(always)]
+    pub(super) fn reflect_columns<const N: usize>(&mut self, v: &[f64; N], tau: f64, column: usize, rows: usize) {
+        let height = self.height;
+        let mut columns = self.columns_from(column).chunks_exact_mut(height);
+        let x: [&mut [f64]; N] = std::array::from_fn(|_| columns.next().map(|x| &mut x[..rows]).unwrap_or_default());
+        for i in 0..rows {
+            let w = tau * (0..N).map(|k| x[k][i] * v[k]).sum::<f64>();
+            (0..N).for_each(|k| x[k][i] -= w * v[k]);
+        }
+    }
+
     pub(super) fn norm_max(&self) -> f64 {
         self.entries.iter().fold(0.0, |m, x| x.abs().max(m))
     }

@@ -1,13 +1,11 @@
 //! Lyapunov equations `A X + X A' + Q = 0` and `A X A' - X + Q = 0` (Stein) by the Schur method: R. H. Bartels and G. W.
-//! Stewart, Commun. ACM 15 (1972), 820; G. Kitagawa, Int. J. Control 25 (1977), 745. With `A = Z T Z^H` the columns of
-//! `Z^H X Z` follow from the last to the first, each from a triangular system.
+//! Stewart, Commun. ACM 15 (1972), 820; G. Kitagawa, Int. J. Control 25 (1977), 745. They are Sylvester equations
+//! whose two coefficients share one real Schur form.
 
-use super::complex_schur::{ComplexSchur, complex, complex_schur, real_part};
-use super::{check_finite, check_shape};
+use super::sylvester::{Form, solve_on_schur_forms, solve_symmetric};
+use super::{check_finite, check_shape, real_schur};
 use crate::{Error, Result};
-use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
-use faer::prelude::*;
-use faer::{Mat, MatRef, Par, c64};
+use faer::{Mat, MatRef};
 
 /// Solution of a Lyapunov equation.
 #[derive(Debug, Clone)]
@@ -67,50 +65,25 @@ fn solve(domain: Domain, a: MatRef<'_, f64>, q: MatRef<'_, f64>) -> Result<Lyapu
     let n = a.nrows();
     check_shape("the constant term of the Lyapunov equation", q, (n, n))?;
     check_finite("the constant term of the Lyapunov equation", q)?;
-    let ComplexSchur { q: z, t } = complex_schur("the matrix A of the Lyapunov equation", a)?;
-    let constant = z.adjoint() * complex(q) * &z;
-    let y = triangular(domain, &t, &constant)?;
-    let x = real_part((&z * y * z.adjoint()).as_ref());
+    let schur = real_schur("the matrix A of the Lyapunov equation", a)?;
+    let (form, condition) = match domain {
+        Domain::Continuous => (Form::Sum, "two eigenvalues of A add up to zero"),
+        Domain::Discrete => (Form::Product, "two eigenvalues of A have the product 1"),
+    };
+    let x = if q == q.transpose() {
+        solve_symmetric("X", form, &schur, (-q).as_ref())
+    } else {
+        solve_on_schur_forms("X", form, &schur, &schur, (-q).as_ref())
+    };
+    let x = x.map_err(|e| match e {
+        Error::Singular { .. } => {
+            let what = "the Lyapunov equation".into();
+            Error::NoSolution { what, condition: condition.into(), residual: f64::NAN }
+        }
+        other => other,
+    })?;
     let residual = residual(domain, a, x.as_ref(), q);
     Ok(Lyapunov { x, residual })
-}
-
-/// The equation with the triangular T in place of A. Column k of `T Y + Y T^H + Q = 0` reads
-/// `(T + t_kk^* I) y_k = -q_k - sum_(j>k) t_kj^* y_j`; of `T Y T^H - Y + Q = 0`,
-/// `(t_kk^* T - I) y_k = -q_k - T sum_(j>k) t_kj^* y_j`.
-fn triangular(domain: Domain, t: &Mat<c64>, q: &Mat<c64>) -> Result<Mat<c64>> {
-    let n = t.nrows();
-    let identity = Mat::<c64>::identity(n, n);
-    let mut y = Mat::<c64>::zeros(n, n);
-    for k in (0..n).rev() {
-        let mut later = Mat::<c64>::zeros(n, 1);
-        for j in k + 1..n {
-            for i in 0..n {
-                later[(i, 0)] += t[(k, j)].conj() * y[(i, j)];
-            }
-        }
-        let pole = t[(k, k)].conj();
-        let (operator, later) = match domain {
-            Domain::Continuous => (t + Scale(pole) * &identity, later),
-            Domain::Discrete => (Scale(pole) * t - &identity, t * later),
-        };
-        check_regular(domain, &operator, t)?;
-        let mut column = Scale(c64::new(-1.0, 0.0)) * q.subcols(k, 1) - later;
-        solve_upper_triangular_in_place(operator.as_ref(), column.as_mut(), Par::Seq);
-        y.as_mut().subcols_mut(k, 1).copy_from(column);
-    }
-    Ok(y)
-}
-
-fn check_regular(domain: Domain, operator: &Mat<c64>, t: &Mat<c64>) -> Result<()> {
-    let (floor, condition) = match domain {
-        Domain::Continuous => (f64::EPSILON * t.norm_max(), "two eigenvalues of A add up to zero"),
-        Domain::Discrete => (f64::EPSILON, "two eigenvalues of A have the product 1"),
-    };
-    if (0..t.nrows()).all(|i| operator[(i, i)].norm() > floor) {
-        return Ok(());
-    }
-    Err(Error::NoSolution { what: "the Lyapunov equation".into(), condition: condition.into(), residual: f64::NAN })
 }
 
 /// Relative residual, zero where all terms are.

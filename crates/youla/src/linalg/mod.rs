@@ -4,6 +4,7 @@
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
 mod balance;
+mod bulges;
 mod complex_schur;
 mod definite;
 mod expm;
@@ -11,6 +12,7 @@ mod francis;
 mod gramian;
 mod hessenberg;
 mod kronecker;
+mod late;
 mod least_squares;
 mod logm;
 mod lyapunov;
@@ -18,6 +20,9 @@ mod reflector;
 mod reorder;
 mod riccati;
 mod schur;
+mod shifts;
+mod square;
+mod substitution;
 mod sylvester;
 mod triangle;
 
@@ -36,6 +41,9 @@ pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 pub use triangle::Triangle;
 pub(crate) use triangle::{leading_rank, triangular_condition};
+
+#[cfg(test)]
+mod levels;
 
 use crate::{Error, Result};
 use faer::prelude::*;

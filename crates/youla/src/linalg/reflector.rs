@@ -1,6 +1,7 @@
 //! Householder reflections `P = I - tau v v'` with `v[0] = 1` and plane rotations, the two orthogonal building blocks of
 //! the Hessenberg and Schur reductions (Golub and Van Loan, Matrix Computations, 4th ed., section 5.1).
 
+use super::square::Square;
 use faer::Mat;
 use std::ops::Range;
 
@@ -25,6 +26,16 @@ pub(super) fn householder(x: &mut [f64]) -> (f64, f64) {
 
 /// `m := P m`, where P acts on the rows from `row` on, restricted to the given columns.
 pub(super) fn reflect_rows(m: &mut Mat<f64>, v: &[f64], tau: f64, row: usize, columns: Range<usize>) {
+    if let &[_, v1, v2] = v {
+        // The reflector of a double shift: no loop, no bounds.
+        for j in columns {
+            if let [x0, x1, x2] = &mut m.col_as_slice_mut(j)[row..row + 3] {
+                let w = tau * (*x0 + v1 * *x1 + v2 * *x2);
+                (*x0, *x1, *x2) = (*x0 - w, *x1 - w * v1, *x2 - w * v2);
+            }
+        }
+        return;
+    }
     for j in columns {
         let x = &mut m.col_as_slice_mut(j)[row..row + v.len()];
         let w = tau * x.iter().zip(v).map(|(x, v)| x * v).sum::<f64>();
@@ -36,6 +47,9 @@ pub(super) fn reflect_rows(m: &mut Mat<f64>, v: &[f64], tau: f64, row: usize, co
 
 /// `m := m P`, where P acts on the columns from `column` on, restricted to the given rows.
 pub(super) fn reflect_columns(m: &mut Mat<f64>, v: &[f64], tau: f64, column: usize, rows: Range<usize>) {
+    if let &[_, v1, v2] = v {
+        return reflect_three_columns(m, [tau * v1, tau * v2], [v1, v2], tau, column, rows);
+    }
     let mut w = vec![0.0; rows.len()];
     for (k, v) in v.iter().enumerate() {
         for (w, x) in w.iter_mut().zip(&m.col_as_slice(column + k)[rows.clone()]) {
@@ -47,6 +61,28 @@ pub(super) fn reflect_columns(m: &mut Mat<f64>, v: &[f64], tau: f64, column: usi
         for (x, w) in m.col_as_slice_mut(column + k)[rows.clone()].iter_mut().zip(&w) {
             *x -= factor * w;
         }
+    }
+}
+
+/// The same for the reflector of a double shift, in one pass over the three columns.
+fn reflect_three_columns(m: &mut Mat<f64>, scaled: [f64; 2], v: [f64; 2], tau: f64, column: usize, rows: Range<usize>) {
+    let (_, right) = m.as_mut().split_at_col_mut(column);
+    let (first, right) = right.split_at_col_mut(1);
+    let (second, right) = right.split_at_col_mut(1);
+    let columns = (first.col_mut(0), second.col_mut(0), right.col_mut(0));
+    let (Some(x0), Some(x1), Some(x2)) =
+        (columns.0.try_as_col_major_mut(), columns.1.try_as_col_major_mut(), columns.2.try_as_col_major_mut())
+    else {
+        return;
+    };
+    let x0 = &mut x0.as_slice_mut()[rows.clone()];
+    let x1 = &mut x1.as_slice_mut()[rows.clone()];
+    let x2 = &mut x2.as_slice_mut()[rows];
+    for ((x0, x1), x2) in x0.iter_mut().zip(x1).zip(x2) {
+        let w = *x0 + v[0] * *x1 + v[1] * *x2;
+        *x0 -= tau * w;
+        *x1 -= scaled[0] * w;
+        *x2 -= scaled[1] * w;
     }
 }
 
@@ -65,20 +101,17 @@ impl Rotation {
     }
 
     /// Similarity `t := R t R'` in the plane (k, k+1) of a quasi-triangular `t`, and `q := q R'`.
-    pub(super) fn similarity(self, t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) {
+    pub(super) fn similarity(self, t: &mut Square, q: &mut Square, k: usize) {
         let Rotation { c, s } = self;
-        for j in k..t.ncols() {
-            let (x, y) = (t[(k, j)], t[(k + 1, j)]);
-            t[(k, j)] = c * x + s * y;
-            t[(k + 1, j)] = c * y - s * x;
+        let (n, height) = (t.order(), t.height());
+        for column in t.columns_from(k).chunks_exact_mut(height) {
+            let (x, y) = (column[k], column[k + 1]);
+            (column[k], column[k + 1]) = (c * x + s * y, c * y - s * x);
         }
-        let height = (k + 2).min(t.nrows());
-        let rows = q.nrows();
-        for (m, rows) in [(t, height), (q, rows)] {
-            for i in 0..rows {
-                let (x, y) = (m[(i, k)], m[(i, k + 1)]);
-                m[(i, k)] = c * x + s * y;
-                m[(i, k + 1)] = c * y - s * x;
+        for (m, rows) in [(t, (k + 2).min(n)), (q, n)] {
+            let (left, right) = m.columns_from(k).split_at_mut(height);
+            for (x, y) in left[..rows].iter_mut().zip(&mut right[..rows]) {
+                (*x, *y) = (c * *x + s * *y, c * *y - s * *x);
             }
         }
     }

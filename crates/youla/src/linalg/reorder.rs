@@ -4,9 +4,10 @@
 //! Neighbours A11 (p x p) and A22 (q x q) change places under the orthogonal matrix of the QR factorisation
 //! `[-X; I] = Q R`, where `A11 X - X A22 = A12`. A swap that would disturb the matrix by more than rounding is refused.
 
-use super::kronecker::{Small, SmallSolution};
+use super::kronecker::{SmallSolution, solve_sum};
 use super::reflector::{Rotation, householder, reflect_columns, reflect_rows};
 use super::schur::{DiagonalBlock, RealSchur, block_eigenvalues, blocks, standardise};
+use super::square::Square;
 use crate::{Error, Result};
 use faer::{Mat, c64};
 
@@ -46,12 +47,13 @@ impl RealSchur {
     /// # Ok::<(), youla::Error>(())
     /// ```
     pub fn reorder(self, select: impl Fn(c64) -> bool) -> Result<OrderedSchur> {
-        let RealSchur { mut q, mut t, residual } = self;
-        let norm = t.norm_l2();
+        let RealSchur { q, t: form, residual } = self;
+        let norm = form.norm_l2();
+        let (mut t, mut q) = (Square::new(form.as_ref()), Square::new(q.as_ref()));
         let (mut dimension, mut start, mut disturbed) = (0, 0, 0.0_f64);
-        while start < t.nrows() {
-            let size = if start + 1 < t.nrows() && t[(start + 1, start)] != 0.0 { 2 } else { 1 };
-            let chosen = select(block_eigenvalues(t.as_ref(), DiagonalBlock { start, size })[0]);
+        while start < t.order() {
+            let size = if start + 1 < t.order() && t[(start + 1, start)] != 0.0 { 2 } else { 1 };
+            let chosen = select(block_eigenvalues(form.as_ref(), DiagonalBlock { start, size })[0]);
             start += size;
             if chosen {
                 disturbed += move_up(&mut t, &mut q, start - size, dimension, norm)?;
@@ -59,16 +61,16 @@ impl RealSchur {
             }
         }
         let residual = residual + if norm == 0.0 { 0.0 } else { disturbed / norm };
-        Ok(OrderedSchur { q, t, dimension, residual })
+        Ok(OrderedSchur { q: q.to_mat(), t: t.to_mat(), dimension, residual })
     }
 }
 
 /// Moves the block that begins in row `from` up to row `to`; returns the sum of what was set to zero.
-fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize, norm: f64) -> Result<f64> {
+fn move_up(t: &mut Square, q: &mut Square, from: usize, to: usize, norm: f64) -> Result<f64> {
     let (mut row, mut disturbed) = (from, 0.0);
     while row > to {
         let above = if row >= to + 2 && t[(row - 1, row - 2)] != 0.0 { 2 } else { 1 };
-        let below = if row + 1 < t.nrows() && t[(row + 1, row)] != 0.0 { 2 } else { 1 };
+        let below = if row + 1 < t.order() && t[(row + 1, row)] != 0.0 { 2 } else { 1 };
         disturbed += swap(t, q, row - above, above, below, norm)?;
         row -= above;
         // A pair on the verge of being real may have split: then its first half is moved on, and the second follows.
@@ -83,7 +85,7 @@ fn move_up(t: &mut Mat<f64>, q: &mut Mat<f64>, from: usize, to: usize, norm: f64
 
 /// Exchanges the neighbouring blocks of `above` and `below` rows that begin in row k; returns the size of what was set to
 /// zero.
-fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize, norm: f64) -> Result<f64> {
+fn swap(t: &mut Square, q: &mut Square, k: usize, above: usize, below: usize, norm: f64) -> Result<f64> {
     if above == 1 && below == 1 {
         let (first, second) = (t[(k, k)], t[(k + 1, k + 1)]);
         Rotation::onto_first(t[(k, k + 1)], second - first).similarity(t, q, k);
@@ -99,9 +101,12 @@ fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize
         return Err(Error::NoConvergence { what, iterations: 1 });
     }
     for Reflection { row, v, tau } in &reflections {
-        reflect_rows(t, v, *tau, k + row, k..t.ncols());
-        reflect_columns(t, v, *tau, k + row, 0..k + size);
-        reflect_columns(q, v, *tau, k + row, 0..q.nrows());
+        match **v {
+            [v0, v1] => apply(t, q, &[v0, v1], *tau, k + row, k, size),
+            [v0, v1, v2] => apply(t, q, &[v0, v1, v2], *tau, k + row, k, size),
+            [v0, v1, v2, v3] => apply(t, q, &[v0, v1, v2, v3], *tau, k + row, k, size),
+            _ => {}
+        }
     }
     for i in k + below..k + size {
         for j in k..k + below {
@@ -116,6 +121,13 @@ fn swap(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize, above: usize, below: usize
     Ok(left)
 }
 
+/// A reflection of the rows from `row` on, for a swap of the `size` rows from row k on.
+fn apply<const N: usize>(t: &mut Square, q: &mut Square, v: &[f64; N], tau: f64, row: usize, k: usize, size: usize) {
+    t.reflect_rows(v, tau, row, k);
+    t.reflect_columns(v, tau, row, k + size);
+    q.reflect_columns(v, tau, row, q.order());
+}
+
 /// A Householder reflection of the rows from `row` on, counted within the two blocks.
 struct Reflection {
     row: usize,
@@ -124,8 +136,8 @@ struct Reflection {
 }
 
 /// What the exchange would leave below the new diagonal blocks, tried on a copy of the old ones.
-fn rehearse(t: &Mat<f64>, k: usize, below: usize, size: usize, reflections: &[Reflection]) -> f64 {
-    let mut copy = t.as_ref().submatrix(k, k, size, size).to_owned();
+fn rehearse(t: &Square, k: usize, below: usize, size: usize, reflections: &[Reflection]) -> f64 {
+    let mut copy = Mat::from_fn(size, size, |i, j| t[(k + i, k + j)]);
     for Reflection { row, v, tau } in reflections {
         reflect_rows(&mut copy, v, *tau, *row, 0..size);
         reflect_columns(&mut copy, v, *tau, *row, 0..size);
@@ -134,15 +146,18 @@ fn rehearse(t: &Mat<f64>, k: usize, below: usize, size: usize, reflections: &[Re
 }
 
 /// Householder vectors of the QR factorisation of `[-X; g I]`, where `A11 X - X A22 = g A12`.
-fn swapping_reflections(t: &Mat<f64>, k: usize, above: usize, below: usize) -> Vec<Reflection> {
+fn swapping_reflections(t: &Square, k: usize, above: usize, below: usize) -> Vec<Reflection> {
     let middle = k + above;
-    let a11 = t.as_ref().submatrix(k, k, above, above);
-    let a22 = t.as_ref().submatrix(middle, middle, below, below);
-    let minus_a22 = Mat::from_fn(below, below, |i, j| -a22[(j, i)]);
-    let rhs = t.as_ref().submatrix(k, middle, above, below);
-    let SmallSolution { x, scale, .. } = Small::sum(a11, minus_a22.as_ref(), rhs).solve();
+    let entries = |row, column, height, width, sign: f64| {
+        let entry = |i, j| if i < height && j < width { sign * t[(row + i, column + j)] } else { 0.0 };
+        [[entry(0, 0), entry(0, 1)], [entry(1, 0), entry(1, 1)]]
+    };
+    let a11 = entries(k, k, above, above, 1.0);
+    let [[a, b], [c, d]] = entries(middle, middle, below, below, -1.0);
+    let rhs = entries(k, middle, above, below, 1.0);
+    let SmallSolution { x, scale, .. } = solve_sum((above, below), &a11, &[[a, c], [b, d]], &rhs);
     let mut panel = Mat::from_fn(above + below, below, |i, j| match i.checked_sub(above) {
-        None => -x[(i, j)],
+        None => -x[i][j],
         Some(row) => f64::from(u8::from(row == j)) * scale,
     });
     let mut reflections = Vec::with_capacity(below);

@@ -1,10 +1,12 @@
 //! Real Schur form `A = Q T Q'`: Q orthogonal, T quasi-triangular with 1 x 1 blocks for real eigenvalues and 2 x 2 blocks
 //! `[a b; c a]`, b c < 0, for the pairs `a +- i sqrt(-b c)`.
 //!
-//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5).
+//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5),
+//! for large n with several pairs of shifts at a time.
 
-use super::francis::iterate;
+use super::francis::quasi_triangular;
 use super::reflector::Rotation;
+use super::square::Square;
 use super::{Hessenberg, hessenberg};
 use crate::Result;
 use faer::{Mat, MatRef, c64};
@@ -75,7 +77,7 @@ pub(super) fn block_eigenvalues(t: MatRef<'_, f64>, block: DiagonalBlock) -> Vec
 /// ```
 pub fn real_schur(what: &str, a: MatRef<'_, f64>) -> Result<RealSchur> {
     let Hessenberg { mut q, h: mut t } = hessenberg(what, a)?;
-    iterate(what, &mut t, &mut q)?;
+    quasi_triangular(what, &mut t, &mut q)?;
     let residual = relative_residual(a, &q, &t);
     Ok(RealSchur { q, t, residual })
 }
@@ -88,7 +90,7 @@ pub(super) fn relative_residual(a: MatRef<'_, f64>, q: &Mat<f64>, t: &Mat<f64>) 
 
 /// Brings the 2 x 2 block in rows k, k+1 to standard form: triangular where its eigenvalues are real, equal diagonal
 /// entries where they are not.
-pub(super) fn standardise(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) {
+pub(super) fn standardise(t: &mut Square, q: &mut Square, k: usize) {
     if split_real_pair(t, q, k) {
         return;
     }
@@ -109,7 +111,7 @@ fn angle_of(y: f64, x: f64) -> f64 {
 }
 
 /// Makes the block triangular where its eigenvalues are real, the one of larger distance from the last entry first.
-fn split_real_pair(t: &mut Mat<f64>, q: &mut Mat<f64>, k: usize) -> bool {
+fn split_real_pair(t: &mut Square, q: &mut Square, k: usize) -> bool {
     let (a, b, c, d) = (t[(k, k)], t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)]);
     if c == 0.0 {
         return true;

@@ -2,10 +2,11 @@
 //! real Schur forms `A = U T U'` and `B' = V S V'` turn them into `T Y + Y S' = D` and `T Y S' - Y = D` with `D = U' C V`,
 //! which are solved block by block from the lower right corner; then `X = U Y V'`.
 
-use super::kronecker::{Small, SmallSolution};
-use super::schur::{DiagonalBlock, RealSchur, blocks, real_schur};
+use super::schur::{RealSchur, real_schur};
+pub(super) use super::substitution::Form;
+use super::substitution::{substitute, substitute_symmetric};
 use super::{check_finite, check_shape};
-use crate::{Error, Result};
+use crate::Result;
 use faer::{Mat, MatRef};
 
 /// Solution of a Sylvester equation.
@@ -23,8 +24,8 @@ pub struct SylvesterSolution {
 /// small multiple of the machine precision (held to 1e-13 by `random_equations_are_solved`).
 ///
 /// # Errors
-/// [`Error::Shape`] and [`Error::NotFinite`] naming `what`; [`Error::Singular`] where the solution is not unique to
-/// working precision; [`Error::NoConvergence`] of a Schur form.
+/// [`crate::Error::Shape`] and [`crate::Error::NotFinite`] naming `what`; [`crate::Error::Singular`] where the solution is not unique to
+/// working precision; [`crate::Error::NoConvergence`] of a Schur form.
 ///
 /// ```
 /// use youla::{Mat, linalg::{eye, sylvester}};
@@ -60,15 +61,6 @@ pub fn discrete_sylvester(
     bartels_stewart(what, Form::Product, a, b, c)
 }
 
-/// The two equations.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Form {
-    /// `A X + X B = C`.
-    Sum,
-    /// `A X B - X = C`.
-    Product,
-}
-
 fn bartels_stewart(
     what: &str,
     form: Form,
@@ -100,84 +92,23 @@ pub(super) fn solve_on_schur_forms(
     right: &RealSchur,
     c: MatRef<'_, f64>,
 ) -> Result<Mat<f64>> {
-    let d = left.q.transpose() * c * &right.q;
-    let y = solve_quasi_triangular(what, form, left.t.as_ref(), right.t.as_ref(), d)?;
+    let mut y = left.q.transpose() * c * &right.q;
+    substitute(what, form, left.t.as_ref(), right.t.as_ref(), y.as_mut())?;
     Ok(&left.q * y * right.q.transpose())
 }
 
-/// Solves `T Y + Y S' = D` or `T Y S' - Y = D`, block column by block column from the right.
-fn solve_quasi_triangular(
-    what: &str,
-    form: Form,
-    t: MatRef<'_, f64>,
-    s: MatRef<'_, f64>,
-    mut y: Mat<f64>,
-) -> Result<Mat<f64>> {
-    let (rows, columns) = (blocks(t), blocks(s));
-    let (n, m) = (t.nrows(), s.nrows());
-    for &column in columns.iter().rev() {
-        let (j, width) = (column.start, column.size);
-        let solved = j + width..m;
-        // Y_right S'_right,j is known; it enters as it is or multiplied by T.
-        let known = y.as_ref().subcols(solved.start, solved.len())
-            * s.submatrix(j, solved.start, width, solved.len()).transpose();
-        let known = if form == Form::Sum { known } else { t * known };
-        for k in 0..width {
-            for i in 0..n {
-                y[(i, j + k)] -= known[(i, k)];
-            }
-        }
-        for &row in rows.iter().rev() {
-            solve_block(what, form, t, s, &mut y, row, column)?;
-        }
-    }
-    Ok(y)
-}
-
-/// Solves for one block of Y, all blocks below it in its block column being known.
-fn solve_block(
-    what: &str,
-    form: Form,
-    t: MatRef<'_, f64>,
-    s: MatRef<'_, f64>,
-    y: &mut Mat<f64>,
-    row: DiagonalBlock,
-    column: DiagonalBlock,
-) -> Result<()> {
-    let n = t.nrows();
-    let (i, j, height, width) = (row.start, column.start, row.size, column.size);
-    let (t_ii, s_jj) = (t.submatrix(i, i, height, height), s.submatrix(j, j, width, width));
-    let mut below = [[0.0; 2]; 2];
-    for l in i + height..n {
-        for k in 0..width {
-            for r in 0..height {
-                below[k][r] += t[(i + r, l)] * y[(l, j + k)];
-            }
-        }
-    }
-    let rhs = Mat::from_fn(height, width, |r, k| {
-        let from_below = match form {
-            Form::Sum => below[k][r],
-            Form::Product => (0..width).map(|q| below[q][r] * s_jj[(k, q)]).sum(),
-        };
-        y[(i + r, j + k)] - from_below
-    });
-    let (system, size) = match form {
-        Form::Sum => (Small::sum(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() + s_jj.norm_max()),
-        Form::Product => (Small::product(t_ii, s_jj, rhs.as_ref()), t_ii.norm_max() * s_jj.norm_max() + 1.0),
-    };
-    let SmallSolution { x, smallest_pivot, .. } = system.solve();
-    let rcond = smallest_pivot / size;
-    if !rcond.is_finite() || rcond <= f64::EPSILON {
-        return Err(Error::Singular { what: format!("the equation of {what}"), rcond: rcond.max(0.0) });
-    }
-    y.as_mut().submatrix_mut(i, j, height, width).copy_from(&x);
-    Ok(())
+/// The same for one form on both sides and a symmetric right-hand side; the solution is symmetric to the last digit.
+pub(super) fn solve_symmetric(what: &str, form: Form, schur: &RealSchur, c: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    let mut y = schur.q.transpose() * c * &schur.q;
+    substitute_symmetric(what, form, schur.t.as_ref(), y.as_mut())?;
+    let x = &schur.q * y * schur.q.transpose();
+    Ok(0.5 * (&x + x.transpose()))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Error;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};

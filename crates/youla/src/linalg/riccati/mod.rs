@@ -9,8 +9,10 @@
 //! a Hamiltonian matrix by a Cayley transformation, the stable invariant subspace comes from an ordered real Schur form
 //! (A. J. Laub, IEEE Trans. Autom. Control 24 (1979), 913), and Newton steps (D. L. Kleinman, IEEE Trans. Autom. Control 13
 //! (1968), 114; G. A. Hewer, 16 (1971), 382) refine X on the original data while they lower the residual. A singular
-//! A in discrete time needs no special care: nothing inverts it.
+//! A in discrete time needs no special care: nothing inverts it. From 32 states on, doubling takes the place of the subspace where
+//! its refined result holds.
 
+mod doubling;
 mod hamiltonian;
 mod modes;
 mod newton;
@@ -23,6 +25,13 @@ use normal_form::{NormalForm, check_symmetric};
 
 /// Relative residual beyond which a computed solution is refused.
 const ACCEPTED_RESIDUAL: f64 = 1e-8;
+
+/// Order from which on doubling is tried first.
+const LARGE: usize = 32;
+
+/// Relative residual after refinement up to which its result is taken: Newton steps end at the rounding of the data from
+/// either start.
+const DOUBLED_RESIDUAL: f64 = 1e-11;
 
 /// Data of a Riccati equation: n states, m inputs.
 #[derive(Debug, Clone, Copy)]
@@ -176,14 +185,28 @@ impl Stabilised {
     }
 }
 
-/// Invariant subspace, refinement, and the proof that the outcome solves and stabilises.
+/// Doubling for large n where it holds, else the invariant subspace.
 fn stabilising_solution(what: &str, normal: &NormalForm) -> Result<Stabilised> {
-    let start = hamiltonian::stabilising_solution(what, normal)?;
+    if normal.a.nrows() >= LARGE
+        && let Some(start) = doubling::stabilising_solution(normal)
+        && let Ok(found) = finished(what, normal, start)
+        && found.relative_residual < DOUBLED_RESIDUAL
+    {
+        return Ok(found);
+    }
+    finished(what, normal, hamiltonian::stabilising_solution(what, normal)?)
+}
+
+/// Refinement, and the proof that the outcome solves and stabilises.
+fn finished(what: &str, normal: &NormalForm, start: Mat<f64>) -> Result<Stabilised> {
     let newton::Refined { x, relative_residual, steps } = newton::refine(what, normal, start)?;
     let gain = newton::gain(normal, &x)?;
     let closed_loop = &normal.a - &normal.b * &gain;
-    let closed_loop_poles =
-        super::real_schur(&format!("the closed loop of {what}"), closed_loop.as_ref())?.eigenvalues();
+    let name = format!("the closed loop of {what}");
+    let closed_loop_poles = match normal.a.nrows() >= LARGE {
+        true => super::eigenvalues(&name, closed_loop.as_ref())?,
+        false => super::real_schur(&name, closed_loop.as_ref())?.eigenvalues(),
+    };
     let worst = closed_loop_poles.iter().copied().max_by(|p, q| {
         let (p, q) = (normal.equation.instability(*p), normal.equation.instability(*q));
         p.total_cmp(&q)

@@ -1,0 +1,150 @@
+//! One sweep of the QR iteration: a chain of small bulges, one for each pair of shifts and three rows apart, is chased down the
+//! diagonal (K. Braman, R. Byers and R. Mathias, The multishift QR algorithm, part I, SIAM J. Matrix Anal. Appl. 23 (2002),
+//! 929). It moves from window to window; the rest of the matrix follows late.
+
+use super::late::{Path, Strip, reflect_columns_late, reflect_rows_late};
+use super::shifts::Shifts;
+use super::square::{LANES, Square};
+use pulp::Simd;
+use std::ops::Range;
+
+/// Rows by which the chain moves within one window.
+const WINDOW: usize = 32;
+
+/// Memory that the sweeps share.
+pub(super) struct Memory {
+    paths: Vec<Path>,
+    strip: Strip,
+}
+
+impl Memory {
+    pub(super) fn new(n: usize) -> Self {
+        Memory { paths: Vec::new(), strip: vec![[0.0; LANES]; n + 1] }
+    }
+}
+
+/// A sweep with `shifts` from row `first` of the unreduced rows `block` on.
+#[inline(always)]
+pub(super) fn sweep<S: Simd>(
+    simd: S,
+    t: &mut Square,
+    q: &mut Square,
+    block: Range<usize>,
+    first: usize,
+    shifts: &[Shifts],
+    memory: &mut Memory,
+) {
+    let Memory { paths, strip } = memory;
+    paths.resize_with(shifts.len(), Path::default);
+    paths.iter_mut().for_each(|path| (path.first, _) = (first, path.steps.clear()));
+    let last = block.end - 1;
+    let mut top = first;
+    while top < last {
+        // Where the leading bulge stops; a short rest is taken along.
+        let stop = top + 3 * (shifts.len() - 1) + WINDOW;
+        let stop = if stop + WINDOW / 2 < last { stop } else { last };
+        let right = (stop + 2).min(block.end);
+        let above = top / LANES * LANES;
+        for (k, (path, shifts)) in paths.iter_mut().zip(shifts).enumerate() {
+            path.first += path.steps.len();
+            path.steps.clear();
+            for row in path.first..if stop == last { last } else { stop - 3 * k } {
+                let start = if row == first { Some(*shifts) } else { None };
+                path.steps.push(advance(t, row, &block, start, above..right));
+            }
+            top = path.first + path.steps.len();
+        }
+        reflect_rows_late(simd, t, paths, right, strip);
+        reflect_columns_late(simd, t, paths, above);
+        reflect_columns_late(simd, q, paths, q.order().next_multiple_of(LANES));
+    }
+}
+
+/// Moves a bulge, or with `start` brings it in, by the reflection that begins in row k; applies it to the rows and columns `near`
+/// and returns it.
+#[inline(always)]
+fn advance(t: &mut Square, k: usize, block: &Range<usize>, start: Option<Shifts>, near: Range<usize>) -> [f64; 3] {
+    let whole = k + 2 < block.end;
+    let mut v = match start {
+        Some(shifts) => shifts.first_column(t, k),
+        None => [t[(k, k - 1)], t[(k + 1, k - 1)], if whole { t[(k + 2, k - 1)] } else { 0.0 }],
+    };
+    let (tau, beta) = householder(&mut v);
+    if start.is_none() {
+        (t[(k, k - 1)], t[(k + 1, k - 1)]) = (beta, 0.0);
+        if whole {
+            t[(k + 2, k - 1)] = 0.0;
+        }
+    } else if k > block.start {
+        t[(k, k - 1)] *= 1.0 - tau;
+    }
+    let step = [tau, v[1], v[2]];
+    if whole {
+        reflect_three_rows(t, step, k, k..near.end);
+        reflect_three_columns(t, step, k, near.start..block.end.min(k + 4));
+    } else {
+        reflect_two_rows(t, step, k, k..near.end);
+        reflect_two_columns(t, step, k, near.start..block.end);
+    }
+    step
+}
+
+/// [`super::reflector::householder`] for three numbers.
+#[inline(always)]
+fn householder(x: &mut [f64; 3]) -> (f64, f64) {
+    let [head, y, z] = *x;
+    if y == 0.0 && z == 0.0 {
+        x[0] = 1.0;
+        return (0.0, head);
+    }
+    let scale = head.abs().max(y.abs()).max(z.abs());
+    let norm = scale * ((head / scale).powi(2) + (y / scale).powi(2) + (z / scale).powi(2)).sqrt();
+    let beta = -norm.copysign(head);
+    let pivot = head - beta;
+    *x = [1.0, y / pivot, z / pivot];
+    (-pivot / beta, beta)
+}
+
+#[inline(always)]
+fn reflect_three_rows(t: &mut Square, [tau, v1, v2]: [f64; 3], k: usize, columns: Range<usize>) {
+    let height = t.height();
+    let (tau1, tau2) = (tau * v1, tau * v2);
+    for column in t.columns_from(columns.start)[..columns.len() * height].chunks_exact_mut(height) {
+        if let [x0, x1, x2] = &mut column[k..k + 3] {
+            let w = *x0 + v1 * *x1 + v2 * *x2;
+            (*x0, *x1, *x2) = (*x0 - tau * w, *x1 - tau1 * w, *x2 - tau2 * w);
+        }
+    }
+}
+
+#[inline(always)]
+fn reflect_two_rows(t: &mut Square, [tau, v1, _]: [f64; 3], k: usize, columns: Range<usize>) {
+    for j in columns {
+        let w = tau * (t[(k, j)] + v1 * t[(k + 1, j)]);
+        t[(k, j)] -= w;
+        t[(k + 1, j)] -= v1 * w;
+    }
+}
+
+#[inline(always)]
+fn reflect_three_columns(t: &mut Square, [tau, v1, v2]: [f64; 3], k: usize, rows: Range<usize>) {
+    let height = t.height();
+    let (tau1, tau2) = (tau * v1, tau * v2);
+    let (x0, rest) = t.columns_from(k).split_at_mut(height);
+    let (x1, x2) = rest.split_at_mut(height);
+    for ((x0, x1), x2) in x0[rows.clone()].iter_mut().zip(&mut x1[rows.clone()]).zip(&mut x2[rows]) {
+        let w = *x0 + v1 * *x1 + v2 * *x2;
+        *x0 -= tau * w;
+        *x1 -= tau1 * w;
+        *x2 -= tau2 * w;
+    }
+}
+
+#[inline(always)]
+fn reflect_two_columns(t: &mut Square, [tau, v1, _]: [f64; 3], k: usize, rows: Range<usize>) {
+    for i in rows {
+        let w = tau * (t[(i, k)] + v1 * t[(i, k + 1)]);
+        t[(i, k)] -= w;
+        t[(i, k + 1)] -= v1 * w;
+    }
+}

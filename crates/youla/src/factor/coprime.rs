@@ -13,7 +13,7 @@ use crate::{Error, Result};
 use faer::{Mat, MatRef, Scale};
 
 /// Bezout residual beyond which factors of an arbitrary controller are refused.
-const ACCEPTED_RESIDUAL: f64 = 5e-9;
+const ACCEPTED_RESIDUAL: f64 = 1e-9;
 
 /// Frequencies at which it is computed.
 const FREQUENCIES: usize = 12;
@@ -168,8 +168,9 @@ impl<T: TimeDomain> CoprimeFactors<T> {
         let highest = omega.iter().copied().fold(0.0, f64::max);
         omega.retain(|w| *w > 1e-8 * highest);
         omega.sort_by(f64::total_cmp);
-        let (count, all) = (FREQUENCIES.min(omega.len()), omega.len());
-        let chosen: Vec<f64> = (0..count).map(|k| omega[k * all / count]).collect();
+        let count = FREQUENCIES.min(omega.len());
+        // Evenly through the list, both ends included.
+        let chosen: Vec<f64> = (0..count).map(|k| omega[k * (omega.len() - 1) / (count - 1).max(1)]).collect();
         let residual = self.bezout_residual(&chosen)?;
         if residual <= ACCEPTED_RESIDUAL {
             return Ok(self);

@@ -10,18 +10,20 @@
 //! (A. J. Laub, IEEE Trans. Autom. Control 24 (1979), 913), and Newton steps (D. L. Kleinman, IEEE Trans. Autom. Control 13
 //! (1968), 114; G. A. Hewer, 16 (1971), 382) refine X on the original data while they lower the residual. A singular
 //! A in discrete time needs no special care: nothing inverts it. From 32 states on, doubling takes the place of the subspace where
-//! its refined result holds.
+//! its refined result holds. Where a mode that needs feedback is almost out of reach, the states are changed first (`reach.rs`).
 
 mod doubling;
 mod hamiltonian;
 mod modes;
 mod newton;
 mod normal_form;
+mod reach;
 
 use super::{check_finite, check_shape};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use normal_form::{NormalForm, check_symmetric};
+use reach::WithinReach;
 
 /// Relative residual beyond which a computed solution is refused.
 const ACCEPTED_RESIDUAL: f64 = 1e-8;
@@ -29,9 +31,11 @@ const ACCEPTED_RESIDUAL: f64 = 1e-8;
 /// Order from which on doubling is tried first.
 const LARGE: usize = 32;
 
-/// Relative residual after refinement up to which its result is taken: Newton steps end at the rounding of the data from
-/// either start.
-const DOUBLED_RESIDUAL: f64 = 1e-11;
+/// Relative residual after refinement up to which no other way is tried.
+const GOOD_RESIDUAL: f64 = 1e-12;
+
+/// Rounding that a closed loop bears, relative to its largest pole and to the distance of the nearest to the stability boundary.
+const BORNE: f64 = 1e-4;
 
 /// Data of a Riccati equation: n states, m inputs.
 #[derive(Debug, Clone, Copy)]
@@ -73,14 +77,16 @@ impl RiccatiProblem<'_> {
 /// Stabilising solution of a Riccati equation.
 #[derive(Debug, Clone)]
 pub struct RiccatiSolution {
-    /// Symmetric solution X, n x n.
+    /// Symmetric solution X, n x n. Its rounding is relative to its largest entry: where a mode that needs feedback is almost out
+    /// of reach, take the gain, not `B'X`.
     pub x: Mat<f64>,
     /// Gain K, m x n, in the sign of the textbooks: `A - B K` is stable.
     pub gain: Mat<f64>,
     /// Eigenvalues of `A - B K`, strictly inside of the stability boundary.
     pub closed_loop_poles: Vec<c64>,
     /// Norm of the left-hand side, written with the closed loop, over the sum of the norms of its terms, in coordinates in
-    /// which R = I and the states are balanced: there no large entry can hide an error in a small one.
+    /// which R = I, the states are balanced and no mode that needs feedback is almost out of reach: there no large entry can hide
+    /// an error in a small one.
     pub relative_residual: f64,
     /// Newton steps that lowered the residual.
     pub newton_steps: usize,
@@ -185,16 +191,52 @@ impl Stabilised {
     }
 }
 
-/// Doubling for large n where it holds, else the invariant subspace.
+/// In coordinates in which all modes that need feedback are within reach, where some are not; else, or where these do not lead
+/// to a residual of rounding, in those of `normal`.
 fn stabilising_solution(what: &str, normal: &NormalForm) -> Result<Stabilised> {
+    let within = within_reach(what, normal);
+    match within {
+        Ok(Some(found)) if found.relative_residual < GOOD_RESIDUAL => Ok(found),
+        Ok(Some(found)) => match solution(what, normal) {
+            Ok(direct) if direct.relative_residual < found.relative_residual => Ok(direct),
+            _ => Ok(found),
+        },
+        _ => solution(what, normal),
+    }
+}
+
+/// Doubling for large n where its refined outcome holds, else the invariant subspace.
+fn solution(what: &str, normal: &NormalForm) -> Result<Stabilised> {
     if normal.a.nrows() >= LARGE
         && let Some(start) = doubling::stabilising_solution(normal)
-        && let Ok(found) = finished(what, normal, start)
-        && found.relative_residual < DOUBLED_RESIDUAL
+        && let Ok(doubled) = finished(what, normal, start)
+        && doubled.relative_residual < GOOD_RESIDUAL
     {
-        return Ok(found);
+        return Ok(doubled);
     }
     finished(what, normal, hamiltonian::stabilising_solution(what, normal)?)
+}
+
+/// The solution by way of [`WithinReach`]; none where the closed loop there is not determined by the data. Its gain is taken
+/// there too where the stability bears the rounding of data and gain: X in other coordinates may be too large in one direction
+/// to hold the others.
+fn within_reach(what: &str, normal: &NormalForm) -> Result<Option<Stabilised>> {
+    let Some(problem) = WithinReach::new(what, normal)? else { return Ok(None) };
+    let found = solution(what, &problem.normal)?;
+    let (x, gain) = (problem.solution(&found.x), problem.gain(&found.gain, normal));
+    let rounding = problem.rounding(&gain, normal);
+    let of_poles = |size: fn(Equation, c64) -> f64, better: fn(f64, f64) -> f64| {
+        found.closed_loop_poles.iter().map(|p| size(normal.equation, *p)).reduce(better).unwrap_or(0.0)
+    };
+    if rounding > BORNE * of_poles(|_, p| p.norm(), f64::max) {
+        return Ok(None);
+    }
+    if rounding > BORNE * of_poles(|equation, p| -equation.instability(p), f64::min) {
+        return finished(what, normal, x).map(Some);
+    }
+    let closed_loop = &normal.a - &normal.b * &gain;
+    let closed_loop_poles = stable_poles(what, normal.equation, &closed_loop, found.relative_residual)?;
+    Ok(Some(Stabilised { x, gain, closed_loop_poles, ..found }))
 }
 
 /// Refinement, and the proof that the outcome solves and stabilises.
@@ -202,25 +244,25 @@ fn finished(what: &str, normal: &NormalForm, start: Mat<f64>) -> Result<Stabilis
     let newton::Refined { x, relative_residual, steps } = newton::refine(what, normal, start)?;
     let gain = newton::gain(normal, &x)?;
     let closed_loop = &normal.a - &normal.b * &gain;
-    let name = format!("the closed loop of {what}");
-    let closed_loop_poles = match normal.a.nrows() >= LARGE {
-        true => super::eigenvalues(&name, closed_loop.as_ref())?,
-        false => super::real_schur(&name, closed_loop.as_ref())?.eigenvalues(),
-    };
-    let worst = closed_loop_poles.iter().copied().max_by(|p, q| {
-        let (p, q) = (normal.equation.instability(*p), normal.equation.instability(*q));
-        p.total_cmp(&q)
-    });
-    let refusal = match worst {
-        Some(p) if normal.equation.instability(p) >= 0.0 => {
-            format!("the closed loop keeps the pole {}", crate::error::Pole(p))
+    let closed_loop_poles = stable_poles(what, normal.equation, &closed_loop, relative_residual)?;
+    if relative_residual > ACCEPTED_RESIDUAL || relative_residual.is_nan() {
+        let condition = "the equation is too ill-conditioned for its solution to be computed".to_owned();
+        return Err(Error::NoSolution { what: equation_name(what), condition, residual: relative_residual });
+    }
+    Ok(Stabilised { x, gain, closed_loop_poles, relative_residual, newton_steps: steps })
+}
+
+/// Eigenvalues of the closed loop, or the refusal that names one that is not stable.
+fn stable_poles(what: &str, equation: Equation, closed_loop: &Mat<f64>, residual: f64) -> Result<Vec<c64>> {
+    let poles = super::eigenvalues(&format!("the closed loop of {what}"), closed_loop.as_ref())?;
+    let worst = poles.iter().copied().max_by(|p, q| equation.instability(*p).total_cmp(&equation.instability(*q)));
+    match worst {
+        Some(p) if equation.instability(p) >= 0.0 => {
+            let condition = format!("the closed loop keeps the pole {}", crate::error::Pole(p));
+            Err(Error::NoSolution { what: equation_name(what), condition, residual })
         }
-        _ if relative_residual > ACCEPTED_RESIDUAL || relative_residual.is_nan() => {
-            "the equation is too ill-conditioned for its solution to be computed".to_owned()
-        }
-        _ => return Ok(Stabilised { x, gain, closed_loop_poles, relative_residual, newton_steps: steps }),
-    };
-    Err(Error::NoSolution { what: equation_name(what), condition: refusal, residual: relative_residual })
+        _ => Ok(poles),
+    }
 }
 
 /// How errors name the equation of `what`.

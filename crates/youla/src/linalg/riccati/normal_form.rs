@@ -46,6 +46,16 @@ impl NormalForm {
         Ok(normal)
     }
 
+    /// A problem without cross term in other coordinates, balanced.
+    pub(super) fn within(equation: Equation, a: Mat<f64>, b: Mat<f64>, q: Mat<f64>) -> Self {
+        let (n, m) = (a.nrows(), b.ncols());
+        let s = Mat::zeros(n, m);
+        let mut normal = NormalForm { equation, a, b, q, s, scale: vec![1.0; n], factor: Mat::identity(m, m) };
+        let scale = balancing_scale(&normal);
+        normal.rescale(scale);
+        normal
+    }
+
     /// `A - B S'`, the state matrix when the cross term is absorbed by feedback.
     pub(super) fn a_without_cross_term(&self) -> Mat<f64> {
         &self.a - &self.b * self.s.transpose()

@@ -199,7 +199,7 @@ fn changed(found: &Identification, modes: &[Mode], result: &HansenModel) -> Resu
         own.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or([f64::NAN; 2], |m| [m.hz, m.zeta])
     };
     let fit =
-        found.records.verification.iter().map(|r| Ok(verify_record(found, plant, r)?.fit)).collect::<Result<_>>()?;
+        found.records.verification.iter().map(|r| Ok(verify_record(found, plant, None, r)?.fit)).collect::<Result<_>>()?;
     Ok(Changed {
         modes: modes.iter().map(|m| [m.hz, m.zeta]).collect(),
         changed: modes.iter().map(nearest).collect(),

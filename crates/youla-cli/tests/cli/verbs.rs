@@ -68,3 +68,22 @@ fn report_draws_again() {
     assert_eq!(youla(&folder, &["report", "."]).code, Some(0));
     assert!(page() == first, "the same data give the same page");
 }
+
+#[test]
+fn a_report_with_an_impossible_clock_is_refused() {
+    let folder = empty_folder("redraw-clock");
+    let text = fs::read_to_string(demo().join("report.json")).expect("readable");
+    let start = text.find("\"detail\":{\"start\":").expect("a clock") + 9;
+    let end = start + text[start..].find('}').expect("its end") + 1;
+    for (detail, evidence) in [
+        ("{\"start\":18446744073709551615,\"end\":18446744073709551615}", "does not lie within its"),
+        ("{\"start\":9,\"end\":7}", "rows 9 to 7"),
+    ] {
+        let changed = [&text[..start], detail, &text[end..]].concat();
+        fs::write(folder.join("report.json"), changed).expect("written");
+        let found = youla(&folder, &["report", "."]);
+        assert_eq!(found.code, Some(2), "{}", found.stderr);
+        assert!(found.stderr.contains("report.json") && found.stderr.contains(evidence), "{}", found.stderr);
+        assert_eq!(found.stderr.trim_end().lines().count(), 1, "{}", found.stderr);
+    }
+}

@@ -80,6 +80,9 @@ function reduction(host) {
   if (orders.length) errorsByOrder(host);
 }
 
+// Relative errors below this are rounding, as of a model that is not reduced.
+const ROUNDING = 1e-9;
+
 // Errors in open and closed loop over the order; shaded: orders that the controller does not stabilise.
 function errorsByOrder(host) {
   const { orders, plant_norm, bound_is_gap, chosen } = report.reduction;
@@ -90,7 +93,7 @@ function errorsByOrder(host) {
     { id: "closed", name: "closed loop", style: own, of: o => o.closed_loop_relative },
     { id: "open", name: "open loop", style: { ...own, colour: "--soft" }, of: o => o.open_loop_relative },
     { id: "bound", name: bound_is_gap ? "bound (gap)" : "bound", style: { ...own, colour: "--soft", dash: [5, 4], width: 1 }, of: relativeBound },
-  ].map(e => ({ ...e, at: rows.filter(o => e.of(o) > 0) })).filter(e => e.at.length);
+  ].map(e => ({ ...e, at: rows.filter(o => e.of(o) > ROUNDING) })).filter(e => e.at.length);
   const caption = `Relative errors over the order (H∞ norm); order ${chosen} is taken.` + (rows.some(o => !o.stabilised) ? " Shaded: the controller does not stabilise the reduced model." : "");
   host.append(element("div", {}, element("p", { class: "panel-title" }, "Error against order"), plotHost, element("p", { class: "caption" }, caption)));
   if (!entries.length) return;
@@ -278,8 +281,9 @@ for (const host of document.querySelectorAll("[data-figure]")) BUILDERS[host.dat
 
 // Worst closed-loop poles of discrete loops are judged by their magnitude.
 if (report.sample_time != null) {
-  document.querySelectorAll("#certificate tbody tr").forEach((row, k) => {
-    const pole = report.certificates[k].worst_closed_loop_pole;
+  const rows = document.querySelector("#certificate tbody")?.rows ?? [];
+  [...rows].forEach((row, k) => {
+    const pole = report.certificates[k]?.worst_closed_loop_pole;
     if (pole) row.lastElementChild.append(`, |z| = ${Math.hypot(...pole).toFixed(6)}`);
   });
 }

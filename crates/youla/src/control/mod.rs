@@ -19,5 +19,6 @@ pub use margins::{
     ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, channel_margins,
     margins,
 };
+pub(crate) use margins::{LinearMargins, WorstMargins};
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;

@@ -103,6 +103,22 @@ impl<T: TimeDomain> CoprimeFactors<T> {
         self.left().system().then(&row)
     }
 
+    /// What noise of beta is at the plant outputs: with `beta = S alpha + H e`, the `noise` H p x p,
+    ///
+    /// ```text
+    /// y = G(S) u + (Mt + S Ut)^-1 H e
+    /// ```
+    ///
+    /// Of `H = I + C (z I - A)^-1 K` with the Kalman gain of S it is the noise model of G(S). Its inverse is stable where S and
+    /// `H^-1` are, whatever the plant. Not minimal.
+    ///
+    /// # Errors
+    /// Ports, sample times, or `Mt + S Ut` without invertible feedthrough.
+    pub fn noise_of(&self, s: &StateSpace<T>, noise: &StateSpace<T>) -> Result<StateSpace<T>> {
+        let (m, p) = (self.inputs(), self.outputs());
+        noise.then(&self.residual_filter(s)?.part(0..p, m..m + p).inverse()?)
+    }
+
     /// The deviation system S of a given plant: `J_K` closed around it, `S = F_u(J_K, G)`. Stable exactly when the
     /// controller stabilises the plant. Not minimal.
     ///
@@ -110,5 +126,53 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     /// Ports, sample times, or a loop that is not well posed.
     pub fn deviation_of(&self, plant: &StateSpace<T>) -> Result<StateSpace<T>> {
         self.j_k()?.upper_lft(plant)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+    use crate::lti::{Discrete, simulate};
+
+    /// A plant with an unstable mode moved by noise in its states, `x+ = A x + B u + K e, y = C x + e`, in a loop: with the S of that
+    /// plant and `H = beta / e`, the noise of beta comes out as that of the plant.
+    #[test]
+    fn noise_of_beta_is_noise_of_the_plant() {
+        let time = Discrete::new(1e-2).unwrap();
+        let entries = |r: usize, c: usize, s: f64, p: f64| {
+            Mat::from_fn(r, c, |i, j| s * ((2 * i + 5 * j) as f64 * 1.7 + p).sin())
+        };
+        let a = Mat::from_fn(3, 3, |i, j| [[1.05, 0.2, 0.0], [0.0, 0.8, 0.3], [0.1, -0.2, 0.6]][i][j]);
+        let plant = |shift: f64| {
+            StateSpace::new(
+                &a + entries(3, 3, shift, 0.4),
+                entries(3, 2, 1.0, 0.0),
+                entries(2, 3, 1.0, 0.9),
+                Mat::zeros(2, 2),
+                time,
+            )
+        };
+        let (nominal, machine) = (plant(0.0).unwrap(), plant(0.02).unwrap());
+        let weights = LqrWeights::on_outputs(&nominal, eye(2).as_ref(), eye(2).as_ref()).unwrap();
+        let f = lqr(&nominal, &weights).unwrap().f;
+        let covariance = NoiseCovariance::at_inputs(&nominal, eye(2).as_ref(), eye(2).as_ref()).unwrap();
+        let l = kalman(&nominal, &covariance).unwrap().l;
+        let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref()).unwrap();
+        let s = factors.deviation_of(&machine).unwrap();
+        // e to y of the machine with its own gain, and to beta: (Mt + S Ut) of it, which is the H to be found.
+        let gain = entries(3, 2, 0.3, 2.0);
+        let own = StateSpace::new(machine.a().to_owned(), gain, machine.c().to_owned(), eye(2), time).unwrap();
+        let of_beta = own.then(&factors.residual_filter(&s).unwrap().part(0..2, 2..4)).unwrap();
+        let back = factors.noise_of(&s, &of_beta).unwrap();
+        let pulses = Mat::from_fn(40, 2, |k, j| if k == 3 * j { 1.0 } else { 0.0 });
+        let response = |h: &StateSpace<Discrete>| simulate(h, pulses.as_ref(), &vec![0.0; h.order()]).unwrap();
+        let (expected, found) = (response(&own), response(&back));
+        let error = (&found - &expected).norm_l2() / expected.norm_l2();
+        assert!(error < 1e-9, "{error:.1e}");
+        // Without S it is another noise.
+        let nominal_noise = own.then(&factors.m_t()).unwrap();
+        let wrong = response(&factors.noise_of(&s, &nominal_noise).unwrap());
+        assert!((&wrong - &expected).norm_l2() / expected.norm_l2() > 1e-3);
     }
 }

@@ -129,7 +129,7 @@ impl<T: TimeDomain> Reducer<T> {
 
     /// A-priori bound at an order; weights have none.
     pub(super) fn bound(&self, order: usize) -> Option<f64> {
-        (self.method != ReductionMethod::Weighted).then(|| self.tail(order))
+        (self.method != ReductionMethod::Weighted).then(|| self.tail(order) + 0.0)
     }
 
     /// Reduces the part to an order that is possible.

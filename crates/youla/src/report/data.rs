@@ -522,6 +522,9 @@ pub struct ResidualTest {
     pub cross: Vec<Correlation>,
     /// Fits in percent, per number of steps and last for the simulation, per output.
     pub step_fits: Vec<Vec<Option<f64>>>,
+    /// What foresees the residual of the simulation in them, in words.
+    #[serde(default)]
+    pub foreseen_by: String,
 }
 
 /// A correlation over lags with the band of noise.

@@ -43,11 +43,13 @@ pub use csv::{figure_csv, table_csv};
 pub use data::ReportData;
 pub use figure::Figure;
 pub use html::html;
+pub(crate) use page::with_minus;
 pub use paper::{
     Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
 };
 pub use starts::{Starts, starts_methods, starts_story};
 pub use story::Story;
 pub use story_html::story_html;
+pub(crate) use svg::pretty_unit;
 pub use svg::svg;
 pub use trace::{Timeline, Trace};

@@ -40,10 +40,10 @@ pub(super) fn render(template: &str, content: Value, figures: &[&str], data: &im
 fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
-    environment.add_filter("fixed", |value: f64, digits: usize| printed(format!("{value:.digits$}")));
-    environment.add_filter("scientific", |value: f64| printed(format!("{value:.1e}")));
-    environment.add_filter("significant", |value: f64| printed(significant(value)));
-    environment.add_filter("printed", printed);
+    environment.add_filter("fixed", |value: f64, digits: usize| with_minus(format!("{value:.digits$}")));
+    environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
+    environment.add_filter("significant", |value: f64| with_minus(significant(value)));
+    environment.add_filter("printed", with_minus);
     environment.add_template("page.html", FRAME)?;
     environment.add_template("content.html", template)?;
     environment.get_template("content.html")?.render(page)
@@ -53,13 +53,16 @@ fn safe(text: String) -> Value {
     Value::from_safe_string(text)
 }
 
-/// Four significant digits without an exponent.
+/// Four significant digits, without an exponent down to 1e-9.
 fn significant(value: f64) -> String {
+    if value.abs() < 1e-9 {
+        return if value == 0.0 { "0".into() } else { format!("{value:.1e}") };
+    }
     let places = super::numbers::decimals(value, 4).clamp(0, 12) as usize;
     format!("{value:.places$}")
 }
 
 /// Numbers in tables have a minus sign as wide as a digit.
-fn printed(number: String) -> String {
+pub(crate) fn with_minus(number: String) -> String {
     number.replace('-', "\u{2212}")
 }

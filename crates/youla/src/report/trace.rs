@@ -10,6 +10,9 @@ use crate::{Error, Result};
 /// Most points that one curve is drawn with. A screen has fewer columns than half of this.
 pub const MAX_POINTS: usize = 4000;
 
+/// Most rows of a record: what a number on the page counts exactly.
+const MAX_ROWS: usize = 1 << 53;
+
 /// Most samples in the window in which every sample is drawn.
 const MAX_DETAIL: usize = 1600;
 
@@ -18,6 +21,7 @@ const MAX_DETAIL: usize = 1600;
 /// Sample `k` is at `k * sample_time`. A record of more than [`MAX_POINTS`] samples is drawn by the minimum and maximum of
 /// each bucket, except within `detail`, where every sample is drawn.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "TimelineNumbers")]
 pub struct Timeline {
     /// Seconds between samples.
     pub sample_time: f64,
@@ -52,10 +56,42 @@ impl Timeline {
     /// Chooses window and buckets such that a curve has at most `points` points.
     pub(super) fn fit_into(&mut self, points: usize) {
         let length = if self.samples <= points { 0 } else { MAX_DETAIL.min(points * 2 / 5) };
-        let centre = (self.detail.start + self.detail.end) / 2;
+        let centre = self.detail.start + self.detail.len() / 2;
         let start = centre.saturating_sub(length / 2).min(self.samples - length);
         self.detail = start..start + length;
         self.bucket = self.bucket.max(decimate::width_for(self.samples, length, points));
+    }
+}
+
+/// A [`Timeline`] as it stands in a file.
+#[derive(Deserialize)]
+struct TimelineNumbers {
+    sample_time: f64,
+    samples: usize,
+    detail: Range<usize>,
+    bucket: usize,
+}
+
+impl TryFrom<TimelineNumbers> for Timeline {
+    type Error = String;
+
+    fn try_from(clock: TimelineNumbers) -> std::result::Result<Self, String> {
+        let TimelineNumbers { sample_time, samples, detail, bucket } = clock;
+        if !(sample_time > 0.0 && sample_time.is_finite()) {
+            return Err(format!(
+                "the sample_time of a clock is {sample_time}, but must be a positive number of seconds"
+            ));
+        }
+        if samples > MAX_ROWS || detail.start > detail.end || detail.end > samples {
+            let Range { start, end } = detail;
+            return Err(format!(
+                "the detail of a clock, rows {start} to {end}, does not lie within its {samples} samples"
+            ));
+        }
+        if bucket == 0 {
+            return Err("the bucket of a clock is 0, but must be at least 1".into());
+        }
+        Ok(Timeline { sample_time, samples, detail, bucket })
     }
 }
 
@@ -70,12 +106,37 @@ impl Timeline {
 /// # Ok::<(), youla::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "TraceNumbers")]
 pub struct Trace {
     /// Rows from each point to the next; the first counts from row 0.
     pub steps: Vec<usize>,
     /// Values, rounded to 1e-5 of themselves or of the range of the curve, whichever is finer; NaN makes a gap.
     #[serde(with = "numbers")]
     pub values: Vec<f64>,
+}
+
+/// A [`Trace`] as it stands in a file.
+#[derive(Deserialize)]
+struct TraceNumbers {
+    steps: Vec<usize>,
+    #[serde(with = "numbers")]
+    values: Vec<f64>,
+}
+
+impl TryFrom<TraceNumbers> for Trace {
+    type Error = String;
+
+    fn try_from(curve: TraceNumbers) -> std::result::Result<Self, String> {
+        let TraceNumbers { steps, values } = curve;
+        if steps.len() != values.len() {
+            return Err(format!("a curve has {} steps and {} values", steps.len(), values.len()));
+        }
+        let last = steps.iter().try_fold(0_usize, |row, step| row.checked_add(*step).filter(|row| *row < MAX_ROWS));
+        match last {
+            Some(_) => Ok(Trace { steps, values }),
+            None => Err(format!("the steps of a curve lead beyond row {MAX_ROWS}")),
+        }
+    }
 }
 
 impl Trace {
@@ -142,6 +203,34 @@ mod tests {
         assert!(thin.values.len() <= 600);
         assert!(thin.points().any(|point| point == (77_777, 5.0)));
         assert_eq!(thin.points().last(), Some((99_999, 0.0)));
+    }
+
+    /// What a report.json that was changed by hand may hold.
+    #[test]
+    fn impossible_clocks_and_curves_are_refused() {
+        let clock = |detail: &str, bucket: &str| {
+            let text =
+                format!("{{\"sample_time\": 1e-3, \"samples\": 9000, \"detail\": {detail}, \"bucket\": {bucket}}}");
+            serde_json::from_str::<Timeline>(&text).map_err(|e| e.to_string())
+        };
+        let huge = usize::MAX;
+        let mut good = clock("{\"start\": 8990, \"end\": 9000}", "7").unwrap();
+        good.fit_into(600);
+        assert!(good.detail.end <= 9000);
+        for (detail, bucket, evidence) in [
+            (format!("{{\"start\": {huge}, \"end\": {huge}}}"), "1", "within its 9000 samples"),
+            ("{\"start\": 5, \"end\": 3}".into(), "1", "rows 5 to 3"),
+            ("{\"start\": 0, \"end\": 9001}".into(), "1", "rows 0 to 9001"),
+            ("{\"start\": 0, \"end\": 0}".into(), "0", "the bucket of a clock is 0"),
+        ] {
+            let error = clock(&detail, bucket).unwrap_err();
+            assert!(error.contains(evidence), "{error}");
+        }
+        for (steps, evidence) in [(format!("[0, {huge}, 1]"), "beyond row"), ("[0]".into(), "1 steps and 3 values")] {
+            let text = format!("{{\"steps\": {steps}, \"values\": [1.0, null, 2.0]}}");
+            let error = serde_json::from_str::<Trace>(&text).unwrap_err().to_string();
+            assert!(error.contains(evidence), "{error}");
+        }
     }
 
     #[test]

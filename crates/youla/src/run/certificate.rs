@@ -4,10 +4,9 @@ use super::controller_errors::{ControllerErrorEffect, controller_errors};
 use super::pipeline::Identification;
 use super::robustness::channel_scales;
 use crate::Result;
-use crate::control::{ChannelMargins, channel_margins, coprime_margin, peak_sensitivity};
-use crate::identify::subspace::Interval;
-use crate::lti::{Discrete, StateSpace};
-use crate::report::data as draw;
+use crate::control::{LinearMargins, WorstMargins};
+use crate::identify::subspace::{Interval, Uncertainty};
+use crate::report::{data as draw, with_minus};
 use crate::validate::{BandCertificate, BandOptions, ExactCertificate, certify_band, certify_deviation};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -89,6 +88,26 @@ pub(super) fn certificate(found: &Identification) -> Result<RunCertificate> {
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 
+/// Margins of the loop of G(S) with their intervals; those that do not exist, or have no derivative, are left out.
+///
+/// The delta method takes derivatives, and gets them from the responses of a loop at the frequencies where that of the estimate is
+/// critical; a bootstrap takes each replicate exactly.
+fn margins(found: &Identification) -> Result<Vec<(String, Interval)>> {
+    let Some(uncertainty) = &found.hansen.deviation.uncertainty else { return Ok(Vec::new()) };
+    let (factors, controller) = (&found.factorisation.factors, &found.factorisation.controller);
+    let scales = channel_scales(&found.records.estimation).ok();
+    let intervals = match uncertainty {
+        Uncertainty::Delta(delta) => {
+            let linear = LinearMargins::new(&factors.plant_of(&delta.model)?, controller, scales.as_ref())?;
+            uncertainty.intervals(|s| Ok(figures(&linear.at(&factors.plant_of(s)?)?)))?
+        }
+        _ => uncertainty
+            .intervals(|s| Ok(figures(&WorstMargins::of(&factors.plant_of(s)?, controller, scales.as_ref())?)))?,
+    };
+    let named = MARGINS.into_iter().map(String::from).zip(intervals);
+    Ok(named.filter(|(_, interval)| interval.value.is_finite() && interval.deviation.is_finite()).collect())
+}
+
 /// Names of the margins that get intervals, in the order of [`figures`].
 const MARGINS: [&str; 7] = [
     "peak sensitivity, worst output",
@@ -100,39 +119,18 @@ const MARGINS: [&str; 7] = [
     "normalised coprime margin",
 ];
 
-/// Margins of the loop of G(S) with their intervals; those that do not exist are left out.
-fn margins(found: &Identification) -> Result<Vec<(String, Interval)>> {
-    let Some(uncertainty) = &found.hansen.deviation.uncertainty else { return Ok(Vec::new()) };
-    let (factors, controller) = (&found.factorisation.factors, &found.factorisation.controller);
-    let scales = channel_scales(&found.records.estimation).ok();
-    let scaled = scales.as_ref().map(|scales| scales.controller(controller)).transpose()?;
-    let figures = |s: &StateSpace<Discrete>| {
-        let plant = factors.plant_of(s)?;
-        let coprime = match (&scales, &scaled) {
-            (Some(scales), Some(controller)) => coprime_margin(&scales.plant(&plant)?, controller)?,
-            _ => f64::NAN,
-        };
-        let peak = peak_sensitivity(&plant, controller)?;
-        Ok(figures(&channel_margins(&plant, controller)?, peak, coprime).to_vec())
-    };
-    let named = MARGINS.into_iter().map(String::from).zip(uncertainty.intervals(figures)?);
-    Ok(named.filter(|(_, interval)| interval.value.is_finite() && interval.deviation.is_finite()).collect())
-}
-
 /// In the order of [`MARGINS`]; NaN where a margin does not exist.
-fn figures([inputs, outputs]: &[Vec<ChannelMargins>; 2], peak: f64, coprime: f64) -> [f64; 7] {
-    let extreme = |of: fn(&ChannelMargins) -> Option<f64>, better: fn(f64, f64) -> f64| {
-        inputs.iter().chain(outputs).filter_map(of).reduce(better).unwrap_or(f64::NAN)
-    };
-    [
-        outputs.iter().map(|channel| channel.sensitivity.value).fold(0.0, f64::max),
-        peak,
-        extreme(|channel| channel.lowest_gain.map(|limit| limit.factor), f64::max),
-        extreme(|channel| channel.highest_gain.map(|limit| limit.factor), f64::min),
-        extreme(|channel| channel.phase.map(|limit| limit.degrees), f64::min),
-        extreme(|channel| channel.delay.map(|limit| 1e3 * limit.seconds), f64::min),
-        coprime,
-    ]
+fn figures(worst: &WorstMargins) -> Vec<f64> {
+    let all = [
+        worst.output_sensitivity,
+        worst.all_outputs_sensitivity,
+        worst.lowest_gain,
+        worst.highest_gain,
+        worst.phase_degrees,
+        worst.delay.map(|seconds| 1e3 * seconds),
+        worst.coprime,
+    ];
+    all.map(|figure| figure.unwrap_or(f64::NAN)).to_vec()
 }
 
 impl RunCertificate {
@@ -185,7 +183,8 @@ impl RunCertificate {
         let mut tables = Vec::new();
         if !self.margins.is_empty() {
             let row = |(name, i): &(String, Interval)| {
-                vec![name.clone(), format!("{:.3}", i.value), format!("{:.3} to {:.3}", i.bounds[0], i.bounds[1])]
+                let cells = [format!("{:.3}", i.value), format!("{:.3} to {:.3}", i.bounds[0], i.bounds[1])];
+                std::iter::once(name.clone()).chain(cells.map(with_minus)).collect()
             };
             tables.push(draw::EvidenceTable {
                 title: "The loop of G(S) under the uncertainty of S".into(),

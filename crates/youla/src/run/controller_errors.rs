@@ -17,7 +17,7 @@ use crate::identify::innovation_form::hansen_structured;
 use crate::identify::subspace::{Stability, SubspaceOptions, UncertaintyOptions};
 use crate::linalg::eye;
 use crate::lti::{Mode, StateSpace};
-use crate::report::data as draw;
+use crate::report::{data as draw, with_minus};
 use crate::{Mat, Result};
 use faer::Scale;
 use rayon::prelude::*;
@@ -198,8 +198,12 @@ fn changed(found: &Identification, modes: &[Mode], result: &HansenModel) -> Resu
         let distance = |other: &&Mode| (other.pole - mode.pole).norm();
         own.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or([f64::NAN; 2], |m| [m.hz, m.zeta])
     };
-    let fit =
-        found.records.verification.iter().map(|r| Ok(verify_record(found, plant, r)?.fit)).collect::<Result<_>>()?;
+    let fit = found
+        .records
+        .verification
+        .iter()
+        .map(|r| Ok(verify_record(found, plant, None, r)?.fit))
+        .collect::<Result<_>>()?;
     Ok(Changed {
         modes: modes.iter().map(|m| [m.hz, m.zeta]).collect(),
         changed: modes.iter().map(nearest).collect(),
@@ -231,14 +235,14 @@ impl ControllerErrorEffect {
 /// For the report.
 pub(super) fn table(effects: &[ControllerErrorEffect]) -> Option<draw::EvidenceTable> {
     let first = effects.first()?.outcome.as_ref().ok()?;
-    let percent = |v: f64| if v.is_finite() { format!("{v:.1}") } else { "–".into() };
+    let percent = |v: f64| if v.is_finite() { with_minus(format!("{v:.1}")) } else { "–".into() };
     let row = |effect: &ControllerErrorEffect| {
         let mut cells = vec![effect.error.label()];
         match &effect.outcome {
             Ok(c) => {
                 let mode = |(m, c): (&[f64; 2], &[f64; 2])| match effect.error {
-                    ControllerError::None => format!("{:.2} Hz, ζ {:.4}", c[0], c[1]),
-                    _ => format!("{:+.2} Hz, ζ {:+.4}", c[0] - m[0], c[1] - m[1]),
+                    ControllerError::None => format!("{:.2} Hz, ζ\u{a0}{:.4}", c[0], c[1]),
+                    _ => with_minus(format!("{:+.2} Hz, ζ\u{a0}{:+.4}", c[0] - m[0], c[1] - m[1])),
                 };
                 cells.extend(c.modes.iter().zip(&c.changed).map(mode));
                 cells.push(percent(mean(c.deviation_fit.iter())));

@@ -14,6 +14,7 @@ mod grey_box;
 mod grey_box_loop;
 mod long;
 mod models;
+mod noise_models;
 mod page;
 mod paper;
 mod pipeline;
@@ -55,7 +56,7 @@ pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, ident
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use reduction::RunReduction;
-pub use residual_tests::RecordResiduals;
+pub use residual_tests::{Foresight, RecordResiduals};
 pub use robustness::Robustness;
 pub use segments::RecordSegment;
 pub use settings::{

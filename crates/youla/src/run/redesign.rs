@@ -135,8 +135,8 @@ pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
     let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), range: None, log };
     let panel = Panel {
         title: String::new(),
-        x: axis("frequency", "Hz", true),
-        y: axis("largest gain", "dB", false),
+        x: axis("Frequency", "Hz", true),
+        y: axis("Largest gain", "dB", false),
         content: Content::Curves(vec![curve(&present, &redesign.present)?, curve(&new, &redesign.predicted)?]),
     };
     Ok(Figure {

@@ -6,9 +6,12 @@ use super::records::{LoopRecord, channels_of};
 use super::settings::Prediction;
 use super::verdict::ModelVerdict;
 use crate::linalg::block;
+use crate::lti::{Discrete, StateSpace};
 use crate::report::data as draw;
-use crate::validate::{PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations, step_fits};
-use crate::{Mat, MatRef, Result};
+use crate::validate::{
+    PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations, step_fits, step_fits_by_noise,
+};
+use crate::{Error, Mat, MatRef, Result};
 use serde::Serialize;
 use serde_json::{Value, json};
 
@@ -24,6 +27,27 @@ pub struct RecordResiduals {
     pub correlations: ResidualCorrelations,
     /// Fits in percent over the second half: per [`PREDICTION_STEPS`] and last for the simulation, per output.
     pub step_fits: Vec<Vec<f64>>,
+    /// What foresees the residual of the simulation in them.
+    pub foreseen_by: Foresight,
+}
+
+/// What foresees the residual of a simulation some steps ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Foresight {
+    /// The noise model of the model itself, from its Kalman gain or that of S.
+    Kalman,
+    /// An autoregression of the residual.
+    Autoregression,
+}
+
+impl Foresight {
+    fn words(self) -> &'static str {
+        match self {
+            Foresight::Kalman => "Kalman gain",
+            Foresight::Autoregression => "autoregression",
+        }
+    }
 }
 
 impl RecordResiduals {
@@ -33,10 +57,12 @@ impl RecordResiduals {
     }
 }
 
-/// Tests measured less predicted outputs, samples x p, without the first `skip` samples.
+/// Tests measured less predicted outputs, samples x p, without the first `skip` samples; `noise` is what the model says of
+/// its noise.
 pub(super) fn residual_tests(
     found: &Identification,
     record: &LoopRecord,
+    noise: Option<&StateSpace<Discrete>>,
     measured: MatRef<'_, f64>,
     predicted: MatRef<'_, f64>,
     skip: usize,
@@ -60,12 +86,27 @@ pub(super) fn residual_tests(
     };
     let rest = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
     let e = rest((measured - predicted).as_ref());
+    let (step_fits, foreseen_by) = fits_ahead(rest(measured).as_ref(), rest(predicted).as_ref(), noise)?;
     Ok(RecordResiduals {
         excitations: channels.into_iter().map(|c| c.name).collect(),
         external,
         correlations: residual_correlations(e.as_ref(), rest(x.as_ref()).as_ref())?,
-        step_fits: step_fits(rest(measured).as_ref(), rest(predicted).as_ref())?,
+        step_fits,
+        foreseen_by,
     })
+}
+
+/// By the noise model where there is one with a stable predictor, else by an autoregression.
+fn fits_ahead(
+    measured: MatRef<'_, f64>,
+    predicted: MatRef<'_, f64>,
+    noise: Option<&StateSpace<Discrete>>,
+) -> Result<(Vec<Vec<f64>>, Foresight)> {
+    match noise.map(|noise| step_fits_by_noise(measured, predicted, noise)) {
+        Some(Ok(fits)) => Ok((fits, Foresight::Kalman)),
+        Some(Err(error)) if !matches!(error, Error::Unstable { .. } | Error::Singular { .. }) => Err(error),
+        _ => Ok((step_fits(measured, predicted)?, Foresight::Autoregression)),
+    }
 }
 
 /// Keys of the fits some steps ahead.
@@ -77,7 +118,12 @@ fn step_keys() -> Vec<String> {
 pub(super) fn summary_entry(v: &ModelVerdict) -> Value {
     let entry = |r: &RecordResiduals| {
         let fits: serde_json::Map<_, _> = step_keys().into_iter().zip(r.step_fits.iter().map(|f| json!(f))).collect();
-        json!({"independent": r.independent(), "largest": r.correlations.largest, "step_fits": fits})
+        json!({
+            "independent": r.independent(),
+            "largest": r.correlations.largest,
+            "step_fits": fits,
+            "foreseen_by": r.foreseen_by,
+        })
     };
     v.records
         .iter()
@@ -124,6 +170,7 @@ pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
                     .iter()
                     .map(|f| f.iter().map(|f| f.is_finite().then_some(*f)).collect())
                     .collect(),
+                foreseen_by: r.foreseen_by.words().into(),
             });
         }
     }

@@ -9,7 +9,7 @@ use super::records::LoopRecord;
 use super::verdict::ModelVerdict;
 use crate::control::{ChannelScales, GainLimit, IsoZone, Margins, NuGap, PhaseLimit, coprime_margin, margins, nu_gap};
 use crate::lti::{Discrete, StateSpace};
-use crate::report::data as draw;
+use crate::report::{data as draw, pretty_unit};
 use crate::{Mat, Result};
 use serde_json::{Value, json};
 
@@ -186,8 +186,10 @@ pub(super) fn caption(found: &Identification) -> String {
     match &found.verdict.scales {
         Some(Ok(scales)) => {
             let sizes = scales.inputs().iter().chain(scales.outputs());
-            let each: Vec<String> =
-                channels.zip(sizes).map(|(c, s)| format!("{} {s:.3} {}", c.name, c.unit).trim_end().into()).collect();
+            let each: Vec<String> = channels
+                .zip(sizes)
+                .map(|(c, s)| format!("{} {s:.3} {}", c.name, pretty_unit(&c.unit)).trim_end().into())
+                .collect();
             format!("Channels are scaled for b(G, K) and the nu-gap by their {BASIS}: {}.", each.join(", "))
         }
         Some(Err(reason)) => format!("There is no b(G, K) and no nu-gap, which need scaled channels: {reason}."),

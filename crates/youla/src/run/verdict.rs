@@ -2,6 +2,7 @@
 
 use super::disturbance::without_lines;
 use super::factorise::Factorisation;
+use super::noise_models::noise_model;
 use super::pipeline::Identification;
 use super::records::LoopRecord;
 use super::residual_tests::{RecordResiduals, residual_tests};
@@ -139,7 +140,9 @@ fn verify_model(
     method: Method,
     model: &StateSpace<Discrete>,
 ) -> Result<ModelVerdict> {
-    let records = found.records.verification.iter().map(|r| verify_record(found, model, r)).collect::<Result<_>>()?;
+    let noise = noise_model(found, method, model)?;
+    let verify = |r: &LoopRecord| verify_record(found, model, noise.as_ref(), r);
+    let records = found.records.verification.iter().map(verify).collect::<Result<_>>()?;
     Ok(ModelVerdict {
         method,
         model: model.clone(),
@@ -151,10 +154,11 @@ fn verify_model(
     })
 }
 
-/// One model on one verification record.
+/// One model on one verification record; `noise` is what it says of its noise.
 pub(super) fn verify_record(
     found: &Identification,
     model: &StateSpace<Discrete>,
+    noise: Option<&StateSpace<Discrete>>,
     record: &LoopRecord,
 ) -> Result<RecordVerdict> {
     let lines = record.disturbance.as_ref().map(|w| w.as_ref());
@@ -184,7 +188,7 @@ pub(super) fn verify_record(
             let rest = |m: &Mat<f64>| without_lines(counted(m.as_ref()).as_ref(), lines.as_ref().map(|w| w.as_ref()));
             let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
-            let residuals = Some(residual_tests(found, record, measured.as_ref(), predicted.as_ref(), skip)?);
+            let residuals = Some(residual_tests(found, record, noise, measured.as_ref(), predicted.as_ref(), skip)?);
             Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
         }
         Err(e @ Error::Diverged { .. }) => {

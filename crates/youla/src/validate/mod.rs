@@ -7,13 +7,12 @@ mod exact;
 mod fit;
 mod predict;
 mod residuals;
+mod step_fits;
 
 pub use band::{BandCertificate, BandOptions, certify_band};
 pub use certificate::{LoopCertificate, certify};
 pub use exact::{ExactCertificate, certify_deviation};
 pub use fit::{fit, vaf};
 pub use predict::{LoopExcitation, predict_closed_loop, predict_open_loop};
-pub use residuals::{
-    CrossCorrelogram, LargestCorrelation, PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations,
-    step_fits,
-};
+pub use residuals::{CrossCorrelogram, LargestCorrelation, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations};
+pub use step_fits::{PREDICTION_STEPS, step_fits, step_fits_by_noise};

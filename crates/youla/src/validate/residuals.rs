@@ -1,4 +1,4 @@
-//! Whether what a model leaves of a record is noise: correlations of the residual, and predictions some steps ahead.
+//! Whether what a model leaves of a record is noise: correlations of the residual.
 //!
 //! ```text
 //! r_ee(k) = mean e(t) e(t-k) / var e                    band c / sqrt(N)
@@ -8,9 +8,6 @@
 //! that was fed back, for others the input. Only causal lags, k >= 0, judge the model; lags before zero are shown, and are
 //! correlated where the loop feeds the residual back. A residual that is coloured says that the noise is; one that depends on
 //! past excitation says that the model lacks something.
-//!
-//! Predictions k steps ahead add to the simulation what an autoregression of its residual, found from the first half of the record,
-//! foresees of the residual; the fit (26) counts over the second half.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), section 16.6; M. S. Bartlett, J. R. Stat. Soc. B 8 (1946), 27.
 
@@ -23,12 +20,8 @@ use serde::Serialize;
 
 /// Lags of the correlations on either side.
 pub const RESIDUAL_LAGS: usize = 25;
-/// Steps ahead for which fits are given.
-pub const PREDICTION_STEPS: [usize; 3] = [1, 5, 20];
 /// Probability with which a single correlation of noise lies in its band.
 const LEVEL: f64 = 0.99;
-/// Order of the autoregression of the residual.
-const ORDER: usize = 20;
 
 /// Degrees of freedom with which the distribution of Student is the normal one.
 const MANY: f64 = 1e9;
@@ -137,74 +130,6 @@ pub fn residual_correlations(e: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Result<R
     Ok(ResidualCorrelations { auto, auto_band: c / (n as f64).sqrt(), cross, largest, independent })
 }
 
-/// Fits (26) in percent of predictions [`PREDICTION_STEPS`] ahead and of the simulation alone, over the second half: per number
-/// of steps and output, the simulation last.
-///
-/// # Errors
-/// [`crate::Error::Shape`] where the two differ in shape.
-///
-/// ```
-/// use youla::{Mat, validate::step_fits};
-/// let y = Mat::from_fn(2000, 1, |k, _| (0.01 * k as f64).sin());
-/// let fits = step_fits(y.as_ref(), Mat::zeros(2000, 1).as_ref())?;
-/// assert!(fits[0][0] > 90.0 && fits[3][0] < 1.0); // a sine is foreseen, its simulation by zero is not
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Result<Vec<Vec<f64>>> {
-    check_shape("the simulated record", simulated, (measured.nrows(), measured.ncols()))?;
-    let n = measured.nrows();
-    let half = n / 2;
-    let mut all = vec![vec![f64::NAN; measured.ncols()]; PREDICTION_STEPS.len() + 1];
-    if half < 4 * ORDER {
-        return Ok(all);
-    }
-    for j in 0..measured.ncols() {
-        let v: Vec<f64> = (0..n).map(|k| measured[(k, j)] - simulated[(k, j)]).collect();
-        let mean = (half..n).map(|k| measured[(k, j)]).sum::<f64>() / (n - half) as f64;
-        let spread: f64 = (half..n).map(|k| (measured[(k, j)] - mean).powi(2)).sum();
-        let a = autoregression(&v[..half]);
-        let fit = |foreseen: &dyn Fn(usize) -> f64| {
-            let left: f64 = (half..n).map(|k| (v[k] - foreseen(k)).powi(2)).sum();
-            100.0 * (1.0 - (left / spread).sqrt())
-        };
-        for (place, steps) in PREDICTION_STEPS.into_iter().enumerate() {
-            let weights = ahead(&a, steps);
-            all[place][j] = fit(&|k| weights.iter().enumerate().map(|(i, w)| w * v[k - steps - i]).sum());
-        }
-        all[PREDICTION_STEPS.len()][j] = fit(&|_| 0.0);
-    }
-    Ok(all)
-}
-
-/// Coefficients of `v(k) = sum a(i) v(k-1-i)` by the recursion of Levinson and Durbin.
-fn autoregression(v: &[f64]) -> Vec<f64> {
-    let r: Vec<f64> = (0..=ORDER).map(|lag| v[lag..].iter().zip(v).map(|(x, y)| x * y).sum()).collect();
-    let (mut a, mut error) = (Vec::new(), r[0]);
-    for order in 0..ORDER {
-        if error <= 1e-12 * r[0] {
-            break;
-        }
-        let known: f64 = a.iter().enumerate().map(|(i, a): (usize, &f64)| a * r[order - i]).sum();
-        let reflection = (r[order + 1] - known) / error;
-        let before = a.clone();
-        a.iter_mut().enumerate().for_each(|(i, a)| *a -= reflection * before[order - 1 - i]);
-        a.push(reflection);
-        error *= 1.0 - reflection * reflection;
-    }
-    a
-}
-
-/// Weights of `v(k-steps), v(k-steps-1), ...` in the prediction of v(k).
-fn ahead(a: &[f64], steps: usize) -> Vec<f64> {
-    let mut weights = a.to_vec();
-    for _ in 1..steps {
-        let first = weights.first().copied().unwrap_or(0.0);
-        let next = |i: usize| weights.get(i + 1).copied().unwrap_or(0.0);
-        weights = a.iter().enumerate().map(|(i, a)| first * a + next(i)).collect();
-    }
-    weights
-}
-
 /// Correlations by the fast Fourier transform, without wrapping around.
 struct Transform {
     samples: usize,
@@ -263,21 +188,5 @@ mod tests {
         assert!(refused <= 9, "{refused}");
         let share = outside as f64 / (300.0 * (RESIDUAL_LAGS + 1) as f64);
         assert!((0.003..0.02).contains(&share), "{share}");
-    }
-
-    /// `v(k) = 0.9 v(k-1) + n(k)`: k steps ahead `1 - sqrt(1 - 0.81^k)` of it is foreseen.
-    #[test]
-    fn an_autoregression_is_foreseen() {
-        let mut rng = ChaCha8Rng::seed_from_u64(5);
-        let mut v = 0.0;
-        let y = Mat::from_fn(100_000, 1, |_, _| {
-            v = 0.9 * v + rng.sample::<f64, _>(StandardNormal);
-            v
-        });
-        let fits = step_fits(y.as_ref(), Mat::zeros(100_000, 1).as_ref()).unwrap();
-        for (fit, steps) in fits.iter().zip(PREDICTION_STEPS) {
-            let expected = 100.0 * (1.0 - (1.0 - 0.81f64.powi(steps as i32)).sqrt());
-            assert!((fit[0] - expected).abs() < 1.0, "{steps}: {} and {expected}", fit[0]);
-        }
     }
 }

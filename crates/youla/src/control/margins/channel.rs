@@ -108,7 +108,7 @@ fn gain_limits(real: &[f64], at: impl Fn(f64) -> Result<c64>) -> Result<[Option<
 }
 
 /// `arg L`, from `L = 1 - 1 / S`, within (-pi, pi].
-fn loop_phase(s: c64) -> f64 {
+pub(super) fn loop_phase(s: c64) -> f64 {
     let l = c64::new(1.0, 0.0) - c64::new(1.0, 0.0) / s;
     l.im.atan2(l.re)
 }

@@ -13,13 +13,17 @@
 
 mod channel;
 mod disk;
+mod linear;
 mod structured;
 #[cfg(test)]
 mod tests;
+mod worst;
 mod zone;
 
 pub use channel::{ChannelMargins, DelayLimit, GainLimit, PhaseLimit};
 pub use disk::{DiskMargin, DiskMargins};
+pub(crate) use linear::LinearMargins;
+pub(crate) use worst::WorstMargins;
 pub use zone::IsoZone;
 
 use super::{closed_loop, with_input_port};
@@ -165,14 +169,19 @@ impl<T: TimeDomain> Loop<T> {
         peak_of(&part(self))
     }
 
-    /// `1 / || [I; K] (I - G K)^-1 [I, G] ||`: from (v1, n) to (u - v1, y).
+    /// `1 / || [I; K] (I - G K)^-1 [I, G] ||`.
     pub(super) fn coprime_margin(&self) -> Result<f64> {
+        let peak = self.coprime_peak()?;
+        Ok(if peak.upper > 0.0 { 1.0 / peak.upper } else { 0.0 })
+    }
+
+    /// Peak of `[I; K] (I - G K)^-1 [I, G]`: from (v1, n) to (u - v1, y).
+    fn coprime_peak(&self) -> Result<PeakGain> {
         let s = &self.closed;
         let mut d = s.d().to_owned();
         (0..self.inputs).for_each(|i| d[(i, i)] -= 1.0);
         let gang = StateSpace::new(s.a().to_owned(), s.b().to_owned(), s.c().to_owned(), d, s.time())?;
-        let peak = peak_of(&gang)?;
-        Ok(if peak.upper > 0.0 { 1.0 / peak.upper } else { 0.0 })
+        peak_of(&gang)
     }
 }
 

@@ -58,7 +58,7 @@ fn loops_of_a_satellite_are_robust_one_at_a_time_only() {
 }
 
 /// A stable random loop of an unstable or lightly damped plant under an LQG controller.
-fn random_loop<T: TimeDomain>(seed: u64, time: T) -> (StateSpace<T>, StateSpace<T>) {
+pub(super) fn random_loop<T: TimeDomain>(seed: u64, time: T) -> (StateSpace<T>, StateSpace<T>) {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut draw = |r: usize, c: usize| -> Mat<f64> { Mat::from_fn(r, c, |_, _| StandardNormal.sample(&mut rng)) };
     let a = draw(4, 4);

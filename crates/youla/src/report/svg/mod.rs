@@ -28,6 +28,8 @@ mod tests;
 mod text;
 mod ticks;
 
+pub(crate) use text::pretty_unit;
+
 use super::data::Method;
 use super::figure::{Content, Figure, Panel};
 use crate::{Error, Result};

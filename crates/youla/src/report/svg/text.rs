@@ -63,7 +63,7 @@ pub(super) fn axis_label(axis: &Axis) -> String {
 }
 
 /// The letter u before a letter is the prefix micro, and `deg` the sign.
-fn pretty_unit(unit: &str) -> String {
+pub(crate) fn pretty_unit(unit: &str) -> String {
     let mut rest = unit.chars();
     match (rest.next(), rest.next()) {
         (Some('u'), Some(next)) if next.is_ascii_alphabetic() => format!("µ{}", &unit[1..]),

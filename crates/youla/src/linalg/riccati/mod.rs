@@ -34,8 +34,11 @@ const LARGE: usize = 32;
 /// Relative residual after refinement up to which no other way is tried.
 const GOOD_RESIDUAL: f64 = 1e-12;
 
-/// Rounding that a closed loop bears, relative to its largest pole and to the distance of the nearest to the stability boundary.
-const BORNE: f64 = 1e-4;
+/// Bound on the rounding of the closed loop, relative to its largest pole, up to which the gain is taken from other coordinates.
+const BORNE: f64 = 0.3;
+
+/// Bound beyond which nothing is: both are far above what rounding does, since norms know nothing of cancellation.
+const HIDDEN: f64 = 10.0;
 
 /// Data of a Riccati equation: n states, m inputs.
 #[derive(Debug, Clone, Copy)]
@@ -217,21 +220,19 @@ fn solution(what: &str, normal: &NormalForm) -> Result<Stabilised> {
     finished(what, normal, hamiltonian::stabilising_solution(what, normal)?)
 }
 
-/// The solution by way of [`WithinReach`]; none where the closed loop there is not determined by the data. Its gain is taken
-/// there too where the stability bears the rounding of data and gain: X in other coordinates may be too large in one direction
-/// to hold the others.
+/// The solution by way of [`WithinReach`]; none where rounding hides the closed loop from whoever computes it in the coordinates
+/// of `normal`. Its gain is taken there too where rounding leaves the closed loop as it is: X in other coordinates may be too
+/// large in one direction to hold the others.
 fn within_reach(what: &str, normal: &NormalForm) -> Result<Option<Stabilised>> {
     let Some(problem) = WithinReach::new(what, normal)? else { return Ok(None) };
     let found = solution(what, &problem.normal)?;
     let (x, gain) = (problem.solution(&found.x), problem.gain(&found.gain, normal));
-    let rounding = problem.rounding(&gain, normal);
-    let of_poles = |size: fn(Equation, c64) -> f64, better: fn(f64, f64) -> f64| {
-        found.closed_loop_poles.iter().map(|p| size(normal.equation, *p)).reduce(better).unwrap_or(0.0)
-    };
-    if rounding > BORNE * of_poles(|_, p| p.norm(), f64::max) {
+    let largest = found.closed_loop_poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    let rounding = problem.rounding(&gain, normal) / largest;
+    if rounding > HIDDEN || rounding.is_nan() {
         return Ok(None);
     }
-    if rounding > BORNE * of_poles(|equation, p| -equation.instability(p), f64::min) {
+    if rounding > BORNE {
         return finished(what, normal, x).map(Some);
     }
     let closed_loop = &normal.a - &normal.b * &gain;

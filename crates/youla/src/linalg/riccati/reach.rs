@@ -82,16 +82,14 @@ impl WithinReach {
         self.normal.original_gain(gain) * &self.contraction + normal.s.transpose()
     }
 
-    /// Bound on what rounding of A, B and K does to the closed loop in these coordinates:
+    /// Bound on what the rounding of `A - B K` in the coordinates of `normal` is in these:
     ///
     /// ```text
-    /// eps (|T^-1| |A| |T| + |T^-1| |B| |K T| + |T^-1 B| |K| |T|)      Frobenius norms
+    /// eps |T^-1| (|A| + |B| |K|) |T|      Frobenius norms
     /// ```
     pub(super) fn rounding(&self, gain: &Mat<f64>, normal: &NormalForm) -> f64 {
         let [there, back] = [&self.expansion, &self.contraction].map(|m| m.norm_l2());
-        let (moved_gain, moved_inputs) = (gain * &self.expansion, &self.contraction * &normal.b);
-        let outside = normal.a.norm_l2() * there + normal.b.norm_l2() * moved_gain.norm_l2();
-        f64::EPSILON * (back * outside + moved_inputs.norm_l2() * gain.norm_l2() * there)
+        f64::EPSILON * back * (normal.a.norm_l2() + normal.b.norm_l2() * gain.norm_l2()) * there
     }
 }
 

@@ -12,15 +12,6 @@ use crate::lti::{Partitioned, StateSpace, TimeDomain};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, Scale};
 
-/// Bezout residual beyond which factors of an arbitrary controller are refused.
-const ACCEPTED_RESIDUAL: f64 = 1e-9;
-
-/// Frequencies at which it is computed.
-const FREQUENCIES: usize = 12;
-
-/// Their distance to those of the poles, as a factor: a pole on the stability boundary must not be hit.
-const BESIDE_POLES: f64 = 1.3;
-
 /// The eight coprime factors of (13)-(15), held as the block matrix and its inverse.
 ///
 /// Both systems are stable and each is the inverse of the other. Every formula of the Youla-Jabr-Bongiorno-Kucera
@@ -94,7 +85,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     /// # Errors
     /// [`Error::NotStabilising`] with the closed-loop pole, [`Error::Unstable`] for a bad `f` or `fk`,
     /// [`Error::AlgebraicLoop`] when `I - D Dk` is singular, [`Error::NoSolution`] when it is so nearly singular that the
-    /// factors lose (15) to rounding, shapes and sample times.
+    /// factors lose (15), or G(0) and K, to rounding, shapes and sample times.
     pub fn stacked(
         nominal: &StateSpace<T>,
         controller: &StateSpace<T>,
@@ -117,7 +108,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
             other => other,
         })?;
         require_stabilised(&left, "the nominal model")?;
-        Self::from_parts(nominal.clone(), right, left)?.without_loss()
+        Self::from_parts(nominal.clone(), right, left)?.without_loss(controller)
     }
 
     /// Factors of a nominal plant and **any** stabilising controller, from those of an observer-based one by the shift
@@ -129,7 +120,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     ///
     /// # Errors
     /// [`Error::NotStabilising`] with the pole when the controller does not stabilise the nominal plant (Q is then
-    /// unstable), [`Error::NoSolution`] when the factors lose (15) to rounding, shapes and sample times.
+    /// unstable), [`Error::NoSolution`] when the factors lose (15), or G(0) and K, to rounding, shapes and sample times.
     pub fn shifted_to(&self, controller: &StateSpace<T>) -> Result<Self> {
         check_controller(&self.nominal, controller)?;
         let q = self.j_g()?.lower_lft(controller)?;
@@ -149,38 +140,12 @@ impl<T: TimeDomain> CoprimeFactors<T> {
         };
         let right = upper(1.0)?.then(self.right.system())?;
         let left = self.left.system().then(&upper(-1.0)?)?;
-        Self::from_parts(self.nominal.clone(), right, left)?.without_loss()
+        Self::from_parts(self.nominal.clone(), right, left)?.without_loss(controller)
     }
 
     fn from_parts(nominal: StateSpace<T>, right: StateSpace<T>, left: StateSpace<T>) -> Result<Self> {
         let m = nominal.inputs();
         Ok(CoprimeFactors { right: Partitioned::new(right, m, m)?, left: Partitioned::new(left, m, m)?, nominal })
-    }
-
-    /// The factors, unless their Bezout residual near the frequencies of their poles shows that they were lost in rounding.
-    fn without_loss(self) -> Result<Self> {
-        let time = self.nominal.time();
-        let poles = [self.right.system().poles()?, self.left.system().poles()?].concat();
-        let nyquist = time.sample_time().map(|ts| std::f64::consts::PI / ts);
-        let mut omega: Vec<f64> = poles.into_iter().map(|p| BESIDE_POLES * time.continuous_pole(p).norm()).collect();
-        omega.retain(|w| w.is_finite() && nyquist.is_none_or(|n| *w < n));
-        omega.extend(nyquist);
-        let highest = omega.iter().copied().fold(0.0, f64::max);
-        omega.retain(|w| *w > 1e-8 * highest);
-        omega.sort_by(f64::total_cmp);
-        let count = FREQUENCIES.min(omega.len());
-        // Evenly through the list, both ends included.
-        let chosen: Vec<f64> = (0..count).map(|k| omega[k * (omega.len() - 1) / (count - 1).max(1)]).collect();
-        let residual = self.bezout_residual(&chosen)?;
-        if residual <= ACCEPTED_RESIDUAL {
-            return Ok(self);
-        }
-        let what = "the coprime factorisation of the nominal model and the controller".to_owned();
-        let condition =
-            "the two are so near to a loop that is not well posed or not stable that the Bezout identity is \
-                         lost to rounding"
-                .to_owned();
-        Err(Error::NoSolution { what, condition, residual })
     }
 
     /// The nominal plant G(0).

@@ -85,7 +85,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     /// # Errors
     /// [`Error::NotStabilising`] with the closed-loop pole, [`Error::Unstable`] for a bad `f` or `fk`,
     /// [`Error::AlgebraicLoop`] when `I - D Dk` is singular, [`Error::NoSolution`] when it is so nearly singular that the
-    /// factors lose (15), or G(0) and K, to rounding, shapes and sample times.
+    /// factors lose (15) to rounding, shapes and sample times.
     pub fn stacked(
         nominal: &StateSpace<T>,
         controller: &StateSpace<T>,
@@ -108,7 +108,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
             other => other,
         })?;
         require_stabilised(&left, "the nominal model")?;
-        Self::from_parts(nominal.clone(), right, left)?.without_loss(controller)
+        Self::from_parts(nominal.clone(), right, left)?.without_loss()
     }
 
     /// Factors of a nominal plant and **any** stabilising controller, from those of an observer-based one by the shift
@@ -120,7 +120,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     ///
     /// # Errors
     /// [`Error::NotStabilising`] with the pole when the controller does not stabilise the nominal plant (Q is then
-    /// unstable), [`Error::NoSolution`] when the factors lose (15), or G(0) and K, to rounding, shapes and sample times.
+    /// unstable), [`Error::NoSolution`] when the factors lose (15) to rounding, shapes and sample times.
     pub fn shifted_to(&self, controller: &StateSpace<T>) -> Result<Self> {
         check_controller(&self.nominal, controller)?;
         let q = self.j_g()?.lower_lft(controller)?;
@@ -140,7 +140,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
         };
         let right = upper(1.0)?.then(self.right.system())?;
         let left = self.left.system().then(&upper(-1.0)?)?;
-        Self::from_parts(self.nominal.clone(), right, left)?.without_loss(controller)
+        Self::from_parts(self.nominal.clone(), right, left)?.without_loss()
     }
 
     fn from_parts(nominal: StateSpace<T>, right: StateSpace<T>, left: StateSpace<T>) -> Result<Self> {

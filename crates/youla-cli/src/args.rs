@@ -1,8 +1,9 @@
 //! The command line.
 
-use clap::{Args as ClapArgs, Parser, Subcommand};
+use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use youla::record::ChannelRef;
+use youla::record::{ChannelRef, CsvOptions, Delimiter, HeaderLine};
+use youla::run::Feedback;
 use youla::study::{Method, Shard, StartCase};
 
 /// Identifies a machine while its controller keeps running.
@@ -24,6 +25,7 @@ const EXAMPLES: &str = "\
 Examples:
   youla paper                                  the whole paper: 500 models, three experiments, every figure
   youla demo                                   simulate the gas bearing of the paper and identify it
+  youla init log.csv                           list the columns of a log, ask what they mean, write run.toml
   youla check run.toml                         say what is wrong with the data, before anything is identified
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
@@ -64,6 +66,12 @@ pub(crate) enum Command {
         #[command(flatten)]
         output: OutputFolder,
     },
+    /// Write a first run.toml for a log.
+    ///
+    /// Lists the columns of the file, asks what the flags do not say (on a terminal), and writes a commented run.toml. Nothing is
+    /// guessed: what stays open is left out, and `identify` names the line.
+    #[command(after_help = INIT_EXAMPLES)]
+    Init(InitArgs),
     /// Say what is wrong with the data before anything is identified from them.
     ///
     /// With a run.toml all its records are checked, also against the declared controller; otherwise files with --input and
@@ -106,6 +114,105 @@ Example:
   youla check log.csv --input u --output y --excitation d --sample-time 1e-3 --json
 
 Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a test could not be computed.";
+
+const INIT_EXAMPLES: &str = "\
+Example:
+  youla init log.csv
+  youla init log.csv --input u --output y --time t --reference r --feedback negative
+  youla init arm.dat --input '#1' --output '#2' --sample-time 1 --open-loop --estimate 700";
+
+/// What is known of a log.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct InitArgs {
+    /// The log: text, MATLAB or NumPy.
+    #[arg(value_name = "LOG")]
+    pub(crate) log: PathBuf,
+    /// Inputs of the plant, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) input: Vec<ChannelRef>,
+    /// Outputs of the plant, as the inputs.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) output: Vec<ChannelRef>,
+    /// Column with the time in seconds.
+    #[arg(long, value_name = "NAME", conflicts_with = "sample_time")]
+    pub(crate) time: Option<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "SECONDS")]
+    pub(crate) sample_time: Option<f64>,
+    /// Known excitation added at the plant input, one column per input.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) excitation: Vec<ChannelRef>,
+    /// Known reference, one column per output.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub(crate) reference: Vec<ChannelRef>,
+    /// Sign in which the controller that ran is written down: u = K (r - y) is negative.
+    #[arg(long, value_name = "SIGN", conflicts_with = "open_loop")]
+    pub(crate) feedback: Option<Sign>,
+    /// No controller ran while this was logged.
+    #[arg(long)]
+    pub(crate) open_loop: bool,
+    /// Rows to identify from, from the first on; two thirds unless stated. The rest verifies.
+    #[arg(long, value_name = "ROWS")]
+    pub(crate) estimate: Option<usize>,
+    /// Name of the machine; the name of the file unless stated.
+    #[arg(long)]
+    pub(crate) name: Option<String>,
+    /// What separates the cells of a text file.
+    #[arg(long, value_name = "WHICH", default_value = "detect")]
+    delimiter: CellDelimiter,
+    /// The first line of a text file holds no names although it holds text.
+    #[arg(long)]
+    no_header: bool,
+    /// File to write.
+    #[arg(long, value_name = "FILE", default_value = "run.toml")]
+    pub(crate) out: PathBuf,
+    /// Replace it if it is there.
+    #[arg(long)]
+    pub(crate) force: bool,
+}
+
+impl InitArgs {
+    /// How the log is read, where it is text.
+    pub(crate) fn csv(&self) -> CsvOptions {
+        let delimiter = match self.delimiter {
+            CellDelimiter::Detect => Delimiter::Detect,
+            CellDelimiter::Comma => Delimiter::Comma,
+            CellDelimiter::Semicolon => Delimiter::Semicolon,
+            CellDelimiter::Tab => Delimiter::Tab,
+            CellDelimiter::Whitespace => Delimiter::Whitespace,
+        };
+        let header = if self.no_header { HeaderLine::Absent } else { HeaderLine::Detect };
+        CsvOptions { delimiter, header }
+    }
+}
+
+/// A delimiter on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum CellDelimiter {
+    Detect,
+    Comma,
+    Semicolon,
+    Tab,
+    Whitespace,
+}
+
+/// A sign of feedback on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Sign {
+    /// u = K (r - y)
+    Negative,
+    /// u = K (y - r)
+    Positive,
+}
+
+impl From<Sign> for Feedback {
+    fn from(sign: Sign) -> Self {
+        match sign {
+            Sign::Negative => Feedback::Negative,
+            Sign::Positive => Feedback::Positive,
+        }
+    }
+}
 
 /// What is to be checked.
 #[derive(Debug, ClapArgs)]

@@ -2,6 +2,7 @@
 
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
+use crate::init;
 use crate::output::{Failure, Progress, say};
 use crate::paper;
 use crate::starts;
@@ -32,6 +33,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
             let folder = folder_of(settings);
             identify_and_write(args, output, &folder, RunSettings::read(settings)?, |s| read_records(&s.data, &folder))
         }
+        Command::Init(asked) => init::init(args, asked),
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),

@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod commands;
+mod init;
 mod output;
 mod paper;
 mod starts;

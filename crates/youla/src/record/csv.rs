@@ -135,6 +135,11 @@ fn read_columns(
     Ok((plan, columns))
 }
 
+/// Names of all columns, `#1`, `#2` and so on where the file has none.
+pub(super) fn column_names(path: &Path, options: &CsvOptions) -> Result<Vec<String>> {
+    Ok(Fields::detect(&mut Lines::open(path)?, options)?.names().to_vec())
+}
+
 /// Writes the time in a column `t` and all channels; every number reads back as the same number.
 ///
 /// Units are not written. After an error there is no file.

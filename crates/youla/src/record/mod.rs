@@ -19,6 +19,7 @@ pub(crate) mod scratch;
 mod source;
 mod spectrum;
 mod stream;
+mod survey;
 mod time;
 mod values;
 
@@ -37,6 +38,7 @@ pub use source::{Format, Source, read, read_parts, sha256};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
 pub(crate) use stream::is_npy;
 pub use stream::{JoinedStreams, NpyStream, SampleStream};
+pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource};
 pub use values::{Value, Variable, Variables};
 

@@ -101,7 +101,7 @@ pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
     }
 }
 
-fn resolve(source: &Source) -> Result<Format> {
+pub(super) fn resolve(source: &Source) -> Result<Format> {
     if source.format != Format::Detect {
         return Ok(source.format);
     }

@@ -6,6 +6,7 @@ mod check;
 mod controller_errors;
 mod demo;
 mod disturbance;
+mod draft;
 mod explain;
 mod factorise;
 mod findings;
@@ -41,6 +42,7 @@ pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, 
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
+pub use draft::{Draft, DraftClock, path_from};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};

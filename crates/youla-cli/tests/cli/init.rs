@@ -1,0 +1,74 @@
+//! `youla init`: from a log to a run.toml.
+
+use crate::common::{listing, loop_folder, outcome, refused_by, youla};
+use std::fs;
+use std::process::Command;
+
+const KNOWN: [&str; 8] = ["init", "log.csv", "--input", "u", "--output", "y", "--time", "t"];
+
+fn init(more: &[&'static str]) -> Vec<&'static str> {
+    [&KNOWN[..], &["--out", "new.toml"], more].concat()
+}
+
+#[test]
+fn what_is_not_said_is_not_guessed() {
+    let folder = loop_folder("init-silent", &[]);
+    let before = listing(&folder);
+    let found = youla(&folder, &["init", "log.csv", "--input", "u"]);
+    assert_eq!(found.code, Some(2));
+    assert!(found.stderr.contains("--output, --time or --sample-time, --feedback or --open-loop"), "{}", found.stderr);
+    for part in ["column", "t ", "even steps of 1.000000e-2", "2000"] {
+        assert!(found.stdout.contains(part), "{part:?} is not in: {}", found.stdout);
+    }
+    assert_eq!(listing(&folder), before);
+}
+
+#[test]
+fn a_log_without_a_controller_runs_at_once() {
+    let folder = loop_folder("init-open", &[]);
+    // From d to y the log is that of a stable system without feedback.
+    let arguments =
+        ["init", "log.csv", "--input", "d", "--output", "y", "--time", "t", "--open-loop", "--estimate", "1500"];
+    let found = youla(&folder, &[&arguments[..], &["--out", "new.toml"]].concat());
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    let found = youla(&folder, &["identify", "new.toml", "--out", "run", "--json"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&found.stdout).expect("JSON");
+    let fit = summary["methods"]["hansen"]["fit"]["log-rest"][0].as_f64().expect("a fit");
+    assert!(fit > 80.0, "{fit}");
+}
+
+#[test]
+fn what_is_to_be_filled_in_is_named_with_its_line() {
+    let folder = loop_folder("init-closed", &[]);
+    let found = youla(&folder, &init(&["--excitation", "d", "--feedback", "negative"]));
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    let text = fs::read_to_string(folder.join("new.toml")).expect("written");
+    let unfilled = youla(&folder, &["identify", "new.toml"]);
+    assert_eq!(unfilled.code, Some(2));
+    assert!(unfilled.stderr.contains("new.toml") && unfilled.stderr.contains("numerator"), "{}", unfilled.stderr);
+    let filled = text
+        .replace("domain = \"continuous\"", "domain = \"discrete\"")
+        .replace("# numerator = [2500.0]", "numerator = [0.1]")
+        .replace("# denominator = [1.0, 20.0, 0.0]", "denominator = [1.0, -0.9]")
+        .replace("# numerator = [5.5, 0.3, -5.2]", "numerator = [2.0]")
+        .replace("# denominator = [1.0, -1.1, 0.4]", "denominator = [1.0]");
+    fs::write(folder.join("new.toml"), filled).expect("written");
+    let found = youla(&folder, &["identify", "new.toml", "--out", "run", "--quiet"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+}
+
+#[test]
+fn what_does_not_fit_the_log_is_refused() {
+    let folder = loop_folder("init-refused", &[]);
+    let refuse = |arguments: &[&str], evidence: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
+        refused_by(command.args(arguments).arg("--quiet"), &folder, 2, evidence);
+    };
+    refuse(&init(&["--reference", "v", "--open-loop"]), &["no column \"v\"", "t, u, d, y"]);
+    refuse(&init(&["--reference", "u", "--open-loop"]), &["named twice"]);
+    refuse(&init(&["--open-loop", "--estimate", "2000"]), &["the log has 2000"]);
+    refuse(&["init", "log.csv", "--out", "run.toml"], &["run.toml", "--force"]);
+    let found = outcome(Command::new(env!("CARGO_BIN_EXE_youla")).current_dir(&folder).args(["init", "none.csv"]));
+    assert_eq!(found.code, Some(2));
+}

@@ -93,6 +93,15 @@ pub(crate) enum Command {
     /// The files are read in two passes, three where the data ask for QR, in memory that does not depend on their length.
     #[command(after_help = SUBSPACE_EXAMPLES)]
     Subspace(SubspaceArgs),
+    /// Print the completions of a shell.
+    #[command(after_help = "Example:\n  source <(youla completions bash)")]
+    Completions {
+        /// The shell.
+        shell: clap_complete::Shell,
+    },
+    /// Print the man page.
+    #[command(after_help = "Example:\n  youla man > ~/.local/share/man/man1/youla.1")]
+    Man,
     /// Draw report.html of a run again from its report.json.
     #[command(after_help = "Example:\n  youla report runs/demo-gas-bearing-001")]
     Report {

@@ -3,6 +3,7 @@
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
 use crate::init;
+use crate::manual;
 use crate::output::{Failure, Progress, say};
 use crate::paper;
 use crate::starts;
@@ -33,6 +34,8 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
             let folder = folder_of(settings);
             identify_and_write(args, output, &folder, RunSettings::read(settings)?, |s| read_records(&s.data, &folder))
         }
+        Command::Completions { shell } => manual::completions(*shell),
+        Command::Man => manual::man_page(),
         Command::Init(asked) => init::init(args, asked),
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),

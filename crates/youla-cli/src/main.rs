@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod commands;
 mod init;
+mod manual;
 mod output;
 mod paper;
 mod starts;

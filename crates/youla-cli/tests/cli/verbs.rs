@@ -87,3 +87,17 @@ fn a_report_with_an_impossible_clock_is_refused() {
         assert_eq!(found.stderr.trim_end().lines().count(), 1, "{}", found.stderr);
     }
 }
+
+#[test]
+fn completions_and_man_page_know_every_verb() {
+    let folder = empty_folder("manual");
+    let verbs = ["paper", "demo", "init", "check", "identify", "signals", "subspace", "report"];
+    for arguments in [&["completions", "bash"][..], &["completions", "zsh"], &["completions", "fish"], &["man"]] {
+        let found = youla(&folder, arguments);
+        assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+        for verb in verbs {
+            assert!(found.stdout.contains(verb), "{verb} is not in {arguments:?}");
+        }
+    }
+    assert_eq!(youla(&folder, &["completions", "abacus"]).code, Some(2));
+}

@@ -31,6 +31,8 @@ Examples:
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
+  youla export runs/demo-gas-bearing-001 --to python
+                                               the model as a script for python-control; also npz, matlab, C99
 
 Exit codes: 0 done, 1 `check` found a defect, 2 the input cannot be used, 3 the computation is impossible on this input.";
 
@@ -92,6 +94,9 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+    /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
+    #[command(after_help = crate::export::EXAMPLES)]
+    Export(crate::export::ExportArgs),
 }
 
 const SUBSPACE_EXAMPLES: &str = "\

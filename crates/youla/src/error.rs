@@ -294,6 +294,20 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// A file is there already.
+    #[error("{} exists already; choose another file, or replace it with --force", path.display())]
+    FileExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file or folder holds no model that could be read or exported.
+    #[error("{}: {problem}", path.display())]
+    NotAModel {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// A record is used up by the samples that are dropped at its start.
     #[error(
         "record {record} has {samples} samples, but the first {dropped} are dropped; give a longer record or lower {key}"

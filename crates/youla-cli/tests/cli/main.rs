@@ -6,5 +6,6 @@ mod bad_records;
 mod bad_settings;
 mod common;
 mod contract;
+mod export;
 mod subspace;
 mod verbs;

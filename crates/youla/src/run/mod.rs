@@ -7,6 +7,7 @@ mod controller_errors;
 mod demo;
 mod disturbance;
 mod explain;
+mod export;
 mod factorise;
 mod findings;
 mod folder;
@@ -40,6 +41,7 @@ pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, 
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
+pub use export::{controller_for_export, model_for_export};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::{RunFolder, unused_folder};

@@ -1,5 +1,6 @@
 //! The command line.
 
+use crate::dialect::Dialect;
 use clap::{Args as ClapArgs, Parser, Subcommand};
 use std::path::PathBuf;
 use youla::record::ChannelRef;
@@ -108,6 +109,7 @@ const CHECK_EXAMPLES: &str = "\
 Example:
   youla check run.toml
   youla check log.csv --input u --output y --time t
+  youla check log.csv --input u --output y --time t --delimiter semicolon --decimal comma
   youla check log.csv --input u --output y --excitation d --sample-time 1e-3 --json
 
 Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a test could not be computed.";
@@ -136,6 +138,8 @@ pub(crate) struct CheckArgs {
     /// Column with the time in seconds.
     #[arg(long, value_name = "NAME", requires = "input")]
     pub(crate) time: Option<ChannelRef>,
+    #[command(flatten)]
+    pub(crate) dialect: Dialect,
     /// Thresholds, as in [check] of run.toml.
     #[arg(long, value_name = "FILE", requires = "input")]
     pub(crate) options: Option<PathBuf>,
@@ -162,6 +166,8 @@ pub(crate) struct SubspaceArgs {
     /// Column with the time in seconds, for text files; with --sample-time both must agree.
     #[arg(long, value_name = "NAME")]
     pub(crate) time: Option<ChannelRef>,
+    #[command(flatten)]
+    pub(crate) dialect: Dialect,
     /// Options of the identification, as in [direct] of run.toml.
     #[arg(long, value_name = "FILE")]
     pub(crate) options: Option<PathBuf>,

@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod commands;
+mod dialect;
 mod export;
 mod output;
 mod paper;

@@ -402,6 +402,32 @@ pub enum Error {
         /// What stands there.
         text: String,
     },
+    /// A number of a text file is written with another decimal sign than the one that was declared.
+    #[error(
+        "{}, line {line}, column {column}: {text:?} has a decimal {found}, but the decimal sign is a {declared}; declare \
+         decimal = \"{found}\" if all numbers of the file are written so",
+        path.display()
+    )]
+    DecimalSign {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1 with comments and blank lines.
+        line: usize,
+        /// Name of the column, or `#` and its number.
+        column: String,
+        /// What stands there.
+        text: String,
+        /// The decimal sign that was declared, or the point by default.
+        declared: &'static str,
+        /// The decimal sign that the number has.
+        found: &'static str,
+    },
+    /// The comma is declared both as delimiter and as decimal sign.
+    #[error("{}: the comma cannot be both the delimiter and the decimal sign; declare another delimiter", path.display())]
+    CommaTwice {
+        /// The file.
+        path: PathBuf,
+    },
     /// A line of a text file has more or fewer fields than the first one.
     #[error("{}, line {line}: {found} fields, but the first line has {expected}", path.display())]
     RaggedRow {

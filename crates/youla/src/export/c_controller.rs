@@ -158,14 +158,20 @@ impl Law {
         self.ky.norm_max() > 0.0
     }
 
-    /// Along the loop with the nominal model: both precisions get y, alpha and the applied u of the library's simulation.
+    /// Along the loop with the nominal model, excited at alpha and by output noise of a tenth of y, without which beta would be
+    /// zero: both precisions get y, alpha and the applied u of the library's simulation.
     fn single_error(&self, nominal: &StateSpace<Discrete>, j_k: &Partitioned<Discrete>) -> Result<SingleError> {
         let (m, p) = (nominal.inputs(), nominal.outputs());
-        let alpha = noise(SAMPLES, m);
         let system = closed_loop(nominal, j_k)?;
-        let excitation = block(&[&[alpha.as_ref(), Mat::zeros(SAMPLES, p).as_ref()]]);
-        let log = simulate(&system, excitation.as_ref(), &vec![0.0; system.order()])?;
-        let run = |round| self.run([log.subcols(0, m), log.subcols(m, p), alpha.as_ref()], round);
+        let mut driving = noise(SAMPLES, m + p);
+        let respond = |driving: &Mat<f64>| simulate(&system, driving.as_ref(), &vec![0.0; system.order()]);
+        let calm = respond(&block(&[&[driving.subcols(0, m), Mat::zeros(SAMPLES, p).as_ref()]]))?;
+        for j in 0..p {
+            let rms = calm.col(m + j).norm_l2() / (SAMPLES as f64).sqrt();
+            driving.col_mut(m + j).iter_mut().for_each(|n| *n *= 0.1 * rms);
+        }
+        let log = respond(&driving)?;
+        let run = |round| self.run([log.subcols(0, m), log.subcols(m, p), driving.subcols(0, m)], round);
         Ok(SingleError::between(run(DOUBLE).as_ref(), run(SINGLE).as_ref()))
     }
 

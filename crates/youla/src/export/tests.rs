@@ -83,7 +83,7 @@ fn what_is_not_a_model_is_refused_with_the_reason() {
 #[test]
 fn comments_cannot_be_left() {
     let hostile = text::plain("*/ int x; \"\"\" \\ ??\n%{ \u{202e}@p@ µ");
-    assert_eq!(hostile, "_/ int x; ___ _ ______ __p_ µ");
+    assert_eq!(hostile, "_/ int x; ___ _ _____ __p_ µ");
     assert_eq!((text::identifier("G red"), text::identifier("2x")), ("G_red".into(), "model_2x".into()));
 }
 

@@ -9,6 +9,7 @@ mod choose;
 mod csv;
 mod detrend;
 mod excitation;
+mod hdf;
 mod matfile;
 mod npz;
 mod persistency;
@@ -24,7 +25,7 @@ mod values;
 
 pub(crate) use choose::unknown;
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, CsvStream, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
+pub use csv::{CsvOptions, CsvStream, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{
     Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,

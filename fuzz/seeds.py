@@ -1,6 +1,7 @@
 """Writes the seeds of the fuzz targets to crates/youla/tests/readers/seeds: synthetic, a few hundred bytes each.
-Needs numpy and scipy; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
+Needs numpy, scipy and h5py; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
 import gzip, hashlib, io, json, pathlib
+import h5py
 import numpy as np
 from scipy.io import savemat
 
@@ -26,6 +27,22 @@ def matlab(variables, packed):
     return b'MATLAB 5.0 MAT-file, synthetic'.ljust(116) + out.getvalue()[116:]
 
 
+def matlab73(fill):
+    """An HDF5 file behind the 512 bytes of MATLAB."""
+    out = io.BytesIO()
+    with h5py.File(out, 'w', userblock_size=512) as file:
+        fill(file)
+    data = bytearray(out.getvalue())
+    data[:128] = b'MATLAB 7.3 MAT-file, synthetic'.ljust(116) + bytes(8) + b'\x00\x02IM'
+    return bytes(data)
+
+
+def classed(group, name, data, matlab_class, **options):
+    dataset = group.create_dataset(name, data=data, track_times=False, **options)
+    dataset.attrs['MATLAB_class'] = np.bytes_(matlab_class)
+    return dataset
+
+
 def array(data):
     out = io.BytesIO()
     np.save(out, data)
@@ -36,6 +53,7 @@ table = 't,u,y\n0,1,-0.5\n0.001,2,1e-3\n0.002,3,4\n'
 put('csv', 'comma.csv', table)
 put('csv', 'packed.csv.gz', gzip.compress(table.encode(), mtime=0))
 put('csv', 'semicolon.csv', '# a comment\n' + table.replace(',', ';').replace('\n', '\r\n'))
+put('csv', 'decimal-comma.csv', 't;u;y\n0;1;-0,5\n0,001;2;1e-3\n0,002;3;4,25\n')
 put('csv', 'tabs.txt', '\ufeff' + table.replace(',', '\t'))
 put('csv', 'blanks.txt', '0 1 2\n1 3 4\n\n2 5 6\n')
 put('csv', 'gap.csv', '0,1\n1,1\n2,1\n5,1\n6,1\n')
@@ -45,6 +63,30 @@ cells[0, 0], cells[0, 1] = np.arange(2, dtype=np.int16), 'text'
 variables = {**structure, 'c': cells, 'z': np.array([1 + 2j]), 'flag': np.array([True]), 'i': np.arange(3, dtype=np.uint8)}
 put('mat', 'plain.mat', matlab(variables, False))
 put('mat', 'packed.mat', matlab(variables, True))
+
+
+def structs(file):
+    classed(file, 'ts', np.array([[5e-4]]), 'double')
+    classed(file, 'x', np.arange(6.0).reshape(2, 3), 'double')
+    classed(file, 'name', np.array([[ord(c)] for c in 'rig'], dtype=np.uint16), 'char').attrs['MATLAB_int_decode'] = np.int32(2)
+    classed(file, 'none', np.array([0, 0], dtype=np.uint64), 'double').attrs['MATLAB_empty'] = np.uint8(1)
+    data = file.create_group('Data')
+    data.attrs['MATLAB_class'] = np.bytes_('struct')
+    classed(data, 'u', np.arange(4.0).reshape(1, 4), 'double')
+    classed(data, 'y', np.arange(4, dtype=np.int16).reshape(1, 4), 'int16')
+
+
+def cycle(file):
+    file.create_group('Data')['again'] = file
+
+
+put('mat73', 'structs.mat', matlab73(structs))
+put('mat73', 'cycle.mat', matlab73(cycle))
+put('mat73', 'chunks.mat', matlab73(lambda file: classed(file, 'x', np.arange(1011.0), 'double', chunks=(503,), compression='gzip')))
+put('mat73', 'rows.h5', matlab73(lambda file: file.create_dataset('x', data=np.arange(6.0).reshape(3, 2), track_times=False))[512:])
+put('model', 'model.npz', saved(a=np.eye(2) / 2, b=np.ones((2, 1)), c=np.ones((1, 2)), d=np.zeros((1, 1)), ts=1e-3))
+model = {'a': np.eye(2) / 2, 'b': np.ones((2, 1)), 'c': np.ones((1, 2)), 'd': np.zeros((1, 1)), 'ts': 1e-3}
+put('model', 'model.mat', matlab({**model, 'inputs': np.array([['u']], dtype=object)}, False))
 put('npz', 'two.npz', saved(u=np.arange(4.0), y=np.arange(4, dtype=np.float32).reshape(2, 2)))
 put('npz', 'text.npz', saved(names=np.array(['u', 'y']), n=np.int16(3)))
 put('npy', 'rows.npy', array(np.arange(6.0).reshape(3, 2)))
@@ -71,6 +113,7 @@ put('controller_json', 'lqg.json', json.dumps({'method': 'lqg', 'ts': 1e-3, 'mea
 put('model_json', 'model.json', json.dumps({'name': 'hansen', 'inputs': [channel], 'outputs': [channel], 'ts': 1e-3, **system,
     'poles': [[0.5, 0], [0.25, 0]], 'details': {'order': 2}, 'provenance': {'schema': 1, 'program': 'youla 0.1.0', 'seed': None,
     'sources': [{'path': 'y.csv', 'purpose': 'estimation', 'sha256': ''}], 'options': {'horizon': 20}}}))
+put('model', 'model.json', json.dumps({'name': 'hansen', 'inputs': [channel], 'outputs': [channel], 'ts': 1e-3, **system}))
 clock = {'sample_time': 1e-3, 'samples': 3, 'detail': {'start': 0, 'end': 0}, 'bucket': 1}
 trace = {'steps': [0, 1, 1], 'values': [1.0, None, -2.5]}
 axis = {'label': 'time', 'unit': 's', 'range': [0, 2.5], 'log': False}

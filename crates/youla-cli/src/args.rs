@@ -1,8 +1,9 @@
 //! The command line.
 
+use crate::dialect::Dialect;
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use youla::record::{ChannelRef, CsvOptions, Delimiter, HeaderLine};
+use youla::record::ChannelRef;
 use youla::run::Feedback;
 use youla::study::{Method, Shard, StartCase};
 
@@ -33,6 +34,8 @@ Examples:
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
+  youla export runs/demo-gas-bearing-001 --to python
+                                               the model as a script for python-control; also npz, matlab, C99
 
 Exit codes: 0 done, 1 `check` found a defect, 2 the input cannot be used, 3 the computation is impossible on this input.";
 
@@ -109,6 +112,9 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+    /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
+    #[command(after_help = crate::export::EXAMPLES)]
+    Export(crate::export::ExportArgs),
 }
 
 const SUBSPACE_EXAMPLES: &str = "\
@@ -120,6 +126,7 @@ const CHECK_EXAMPLES: &str = "\
 Example:
   youla check run.toml
   youla check log.csv --input u --output y --time t
+  youla check log.csv --input u --output y --time t --delimiter semicolon --decimal comma
   youla check log.csv --input u --output y --excitation d --sample-time 1e-3 --json
 
 Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a test could not be computed.";
@@ -166,43 +173,14 @@ pub(crate) struct InitArgs {
     /// Name of the machine; the name of the file unless stated.
     #[arg(long)]
     pub(crate) name: Option<String>,
-    /// What separates the cells of a text file.
-    #[arg(long, value_name = "WHICH", default_value = "detect")]
-    delimiter: CellDelimiter,
-    /// The first line of a text file holds no names although it holds text.
-    #[arg(long)]
-    no_header: bool,
+    #[command(flatten)]
+    pub(crate) dialect: Dialect,
     /// File to write.
     #[arg(long, value_name = "FILE", default_value = "run.toml")]
     pub(crate) out: PathBuf,
     /// Replace it if it is there.
     #[arg(long)]
     pub(crate) force: bool,
-}
-
-impl InitArgs {
-    /// How the log is read, where it is text.
-    pub(crate) fn csv(&self) -> CsvOptions {
-        let delimiter = match self.delimiter {
-            CellDelimiter::Detect => Delimiter::Detect,
-            CellDelimiter::Comma => Delimiter::Comma,
-            CellDelimiter::Semicolon => Delimiter::Semicolon,
-            CellDelimiter::Tab => Delimiter::Tab,
-            CellDelimiter::Whitespace => Delimiter::Whitespace,
-        };
-        let header = if self.no_header { HeaderLine::Absent } else { HeaderLine::Detect };
-        CsvOptions { delimiter, header }
-    }
-}
-
-/// A delimiter on the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum CellDelimiter {
-    Detect,
-    Comma,
-    Semicolon,
-    Tab,
-    Whitespace,
 }
 
 /// A sign of feedback on the command line.
@@ -247,6 +225,8 @@ pub(crate) struct CheckArgs {
     /// Column with the time in seconds.
     #[arg(long, value_name = "NAME", requires = "input")]
     pub(crate) time: Option<ChannelRef>,
+    #[command(flatten)]
+    pub(crate) dialect: Dialect,
     /// Thresholds, as in [check] of run.toml.
     #[arg(long, value_name = "FILE", requires = "input")]
     pub(crate) options: Option<PathBuf>,
@@ -273,6 +253,8 @@ pub(crate) struct SubspaceArgs {
     /// Column with the time in seconds, for text files; with --sample-time both must agree.
     #[arg(long, value_name = "NAME")]
     pub(crate) time: Option<ChannelRef>,
+    #[command(flatten)]
+    pub(crate) dialect: Dialect,
     /// Options of the identification, as in [direct] of run.toml.
     #[arg(long, value_name = "FILE")]
     pub(crate) options: Option<PathBuf>,

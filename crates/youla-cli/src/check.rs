@@ -31,6 +31,10 @@ pub(crate) fn check(args: &Args, asked: &CheckArgs) -> Result<bool, Failure> {
 }
 
 fn of_run(asked: &CheckArgs) -> Result<DataCheck, Failure> {
+    if asked.dialect.is_given() {
+        let problem = "a run.toml declares the form of its text files itself, in [data] csv".to_owned();
+        return Err(Error::Settings { path: asked.files[0].clone(), at: None, problem }.into());
+    }
     let [settings] = &asked.files[..] else {
         let what = "the number of run.toml files (give --input and --output for files of data)".into();
         return Err(Error::Ports { what, expected: 1, found: asked.files.len() }.into());
@@ -48,6 +52,7 @@ fn of_files(asked: &CheckArgs) -> Result<DataCheck, Failure> {
         reference: asked.reference.clone(),
         sample_time: asked.sample_time,
         time_column: asked.time.clone(),
+        csv: asked.dialect.options(),
     };
     Ok(check_files(&files, &options)?)
 }

@@ -2,6 +2,7 @@
 
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
+use crate::export;
 use crate::init;
 use crate::manual;
 use crate::output::{Failure, Progress, say};
@@ -40,6 +41,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
+        Command::Export(asked) => export::export(args, asked),
         Command::Paper(asked) => paper::reproduce(args, asked),
         Command::Study(StudyCommand::Starts(asked)) => starts::count(args, asked),
         Command::Study(StudyCommand::Merge { parts, out }) => paper::merge_parts(args, parts, out.as_deref()),

@@ -13,7 +13,7 @@ pub(crate) fn init(args: &Args, asked: &InitArgs) -> Result<(), Failure> {
     if asked.out.exists() && !asked.force {
         return Err(Error::OutputExists { path: asked.out.clone() }.into());
     }
-    let csv = asked.csv();
+    let csv = asked.dialect.options();
     let columns = survey(&asked.log, &csv)?;
     let missing = missing(asked);
     let silent = args.quiet || args.json;
@@ -79,7 +79,7 @@ fn answered(asked: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failu
     Ok(Draft {
         name,
         file: path_from(asked.out.parent().unwrap_or(Path::new("")), &asked.log)?,
-        csv: asked.csv(),
+        csv: asked.dialect.options(),
         clock,
         inputs,
         outputs,

@@ -3,6 +3,8 @@
 mod args;
 mod check;
 mod commands;
+mod dialect;
+mod export;
 mod init;
 mod manual;
 mod output;

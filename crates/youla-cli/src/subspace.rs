@@ -20,6 +20,7 @@ pub(crate) fn identify(args: &Args, asked: &SubspaceArgs) -> Result<(), Failure>
         inputs: asked.input.clone(),
         outputs: asked.output.clone(),
         time: TimeSource { column: asked.time.clone(), ts: asked.sample_time, ..TimeSource::default() },
+        csv: asked.dialect.options(),
     };
     let reading = Reading::new(args.quiet || args.json);
     let found = identify_long(&records, &options, &mut |at| reading.at(at))?;

@@ -294,6 +294,20 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// A file is there already.
+    #[error("{} exists already; choose another file, or replace it with --force", path.display())]
+    FileExists {
+        /// The file.
+        path: PathBuf,
+    },
+    /// A file or folder holds no model that could be read or exported.
+    #[error("{}: {problem}", path.display())]
+    NotAModel {
+        /// The file or folder.
+        path: PathBuf,
+        /// What is wrong.
+        problem: String,
+    },
     /// A record is used up by the samples that are dropped at its start.
     #[error(
         "record {record} has {samples} samples, but the first {dropped} are dropped; give a longer record or lower {key}"
@@ -387,6 +401,32 @@ pub enum Error {
         column: String,
         /// What stands there.
         text: String,
+    },
+    /// A number of a text file is written with another decimal sign than the one that was declared.
+    #[error(
+        "{}, line {line}, column {column}: {text:?} has a decimal {found}, but the decimal sign is a {declared}; declare \
+         decimal = \"{found}\" if all numbers of the file are written so",
+        path.display()
+    )]
+    DecimalSign {
+        /// The file.
+        path: PathBuf,
+        /// Line, counted from 1 with comments and blank lines.
+        line: usize,
+        /// Name of the column, or `#` and its number.
+        column: String,
+        /// What stands there.
+        text: String,
+        /// The decimal sign that was declared, or the point by default.
+        declared: &'static str,
+        /// The decimal sign that the number has.
+        found: &'static str,
+    },
+    /// The comma is declared both as delimiter and as decimal sign.
+    #[error("{}: the comma cannot be both the delimiter and the decimal sign; declare another delimiter", path.display())]
+    CommaTwice {
+        /// The file.
+        path: PathBuf,
     },
     /// A line of a text file has more or fewer fields than the first one.
     #[error("{}, line {line}: {found} fields, but the first line has {expected}", path.display())]

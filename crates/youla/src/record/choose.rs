@@ -89,7 +89,7 @@ impl fmt::Display for ChannelRef {
 }
 
 /// The error for a name that does not exist, with the most similar one that does.
-pub(super) fn unknown(what: &str, name: &str, known: Vec<String>) -> Error {
+pub(crate) fn unknown(what: &str, name: &str, known: Vec<String>) -> Error {
     const LEAST: f64 = 0.5;
     let similarity = |candidate: &String| {
         // Names that differ this much in length are not compared, which would take time and memory by their product.

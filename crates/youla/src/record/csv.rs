@@ -1,7 +1,8 @@
 //! Text files: comma, semicolon, tab or blank separated, plain or gzip, with or without a line of names.
 //!
 //! Lines that begin with `#` or `%` and blank lines are passed over. Only the chosen columns are read as numbers; a cell
-//! of them that is not a finite number is an error with its line and column. The decimal sign is the point.
+//! of them that is not a finite number is an error with its line and column. The decimal sign is the point unless a comma is
+//! declared; numbers written with the other sign are refused with their line.
 
 use super::time::{Clock, TimeSource};
 use super::{ChannelRef, ChannelSpec, Record};
@@ -51,6 +52,34 @@ pub enum HeaderLine {
     Absent,
 }
 
+/// What stands before the decimals of a number; never guessed.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum DecimalSign {
+    /// `0.5`
+    #[default]
+    Point,
+    /// `0,5`; the comma is then no delimiter.
+    Comma,
+}
+
+impl DecimalSign {
+    /// In words, as it is declared.
+    fn key(self) -> &'static str {
+        match self {
+            DecimalSign::Point => "point",
+            DecimalSign::Comma => "comma",
+        }
+    }
+
+    fn other(self) -> Self {
+        match self {
+            DecimalSign::Point => DecimalSign::Comma,
+            DecimalSign::Comma => DecimalSign::Point,
+        }
+    }
+}
+
 /// How to read a text file.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -59,6 +88,8 @@ pub struct CsvOptions {
     pub delimiter: Delimiter,
     /// Whether the first line holds names.
     pub header: HeaderLine,
+    /// The decimal sign of all numbers, also of the time.
+    pub decimal: DecimalSign,
 }
 
 /// Reads `channels`, or all columns but the time where `channels` is empty.
@@ -66,7 +97,8 @@ pub struct CsvOptions {
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`], [`Error::CorruptGzip`], [`Error::NoData`],
 /// [`Error::FormatNotRead`] for zero bytes and for more than 65536 columns,
-/// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
+/// [`Error::Delimiter`], [`Error::RaggedRow`], [`Error::Cell`], [`Error::DecimalSign`] for a number that is written with the sign that was
+/// not declared, [`Error::CommaTwice`] where the comma is declared as delimiter and as decimal sign, [`Error::DuplicateChannel`], [`Error::UnknownChannel`],
 /// and those of the sample time: [`Error::SampleTimeMissing`], [`Error::NonUniformTime`],
 /// [`Error::SampleTimeMismatch`].
 ///

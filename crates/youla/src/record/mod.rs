@@ -9,6 +9,7 @@ mod choose;
 mod csv;
 mod detrend;
 mod excitation;
+mod hdf;
 mod matfile;
 mod npz;
 mod persistency;
@@ -23,13 +24,15 @@ mod survey;
 mod time;
 mod values;
 
+pub(crate) use choose::unknown;
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, CsvStream, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
+pub use csv::{CsvOptions, CsvStream, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{
     Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,
     RampedExcitation, SquareWaves, describe_excitation,
 };
+pub(crate) use matfile::mat_to_bytes;
 pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
 pub use npz::{npz_from_bytes, read_npz};
 pub use persistency::{Persistency, persistency, persistency_order};

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A file name of its own, removed at the end of the test.
-pub(super) struct Scratch(PathBuf);
+pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
-    pub(super) fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.0
     }
 }
@@ -18,7 +18,7 @@ impl Drop for Scratch {
     }
 }
 
-pub(super) fn scratch(extension: &str) -> Scratch {
+pub(crate) fn scratch(extension: &str) -> Scratch {
     static NEXT: AtomicUsize = AtomicUsize::new(0);
     let number = NEXT.fetch_add(1, Ordering::Relaxed);
     Scratch(std::env::temp_dir().join(format!("youla-{}-{number}.{extension}", std::process::id())))

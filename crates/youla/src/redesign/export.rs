@@ -128,7 +128,7 @@ impl ExportedController {
 }
 
 impl FilterData {
-    fn new(system: &StateSpace<Discrete>) -> Self {
+    pub(crate) fn new(system: &StateSpace<Discrete>) -> Self {
         FilterData { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
     }
 

@@ -241,7 +241,7 @@ mod tests {
         for feedback in [Feedback::Negative, Feedback::Positive] {
             let text = draft(Some(feedback)).toml(&columns()).unwrap();
             let error = RunSettings::parse(&text, Path::new("run.toml")).unwrap_err().to_string();
-            assert!(error.contains("numerator") && error.contains("line"), "{error}");
+            assert!(error.starts_with("run.toml:") && error.ends_with("lacks `numerator`"), "{error}");
             let filled = text.replace("# numerator", "numerator").replace("# denominator", "denominator");
             RunSettings::parse(&filled, Path::new("run.toml")).unwrap();
         }
@@ -273,7 +273,10 @@ mod tests {
         check(|d| d.outputs = vec![ChannelRef::Name("mode".into())], "cannot be a channel: line 2");
         check(|d| d.outputs = d.inputs.clone(), "named twice");
         check(|d| d.outputs.clear(), "at least one input");
-        check(|d| d.reference = vec![ChannelRef::Column(1), ChannelRef::Column(5)], "named twice");
+        check(|d| d.reference = vec![ChannelRef::Name("t".into())], "named twice");
+        check(|d| d.reference = vec![ChannelRef::Column(5), ChannelRef::Column(6)], "cannot be a channel");
+        check(|d| d.input_excitation = Vec::from(["d", "t"].map(|c| ChannelRef::Name(c.into()))), "named twice");
+        check(|d| d.inputs.push(ChannelRef::Column(5)), "as many excitations as inputs (2)");
         check(|d| d.estimated = 900, "the log has 900");
         check(|d| d.clock = DraftClock::SampleTime(0.0), "positive number of seconds");
     }

@@ -23,6 +23,8 @@ pub struct LongRecords {
     pub outputs: Vec<ChannelRef>,
     /// Sample time, or for text files the column with the time.
     pub time: TimeSource,
+    /// Form of text files.
+    pub csv: CsvOptions,
 }
 
 /// A model from long records.
@@ -132,7 +134,7 @@ fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>,
         chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
     };
     let (u, y) = (specs(&records.inputs), specs(&records.outputs));
-    let stream = CsvStream::open(file, &u, &y, &records.time, &CsvOptions::default())?;
+    let stream = CsvStream::open(file, &u, &y, &records.time, &records.csv)?;
     let time = stream.time();
     Ok((Box::new(stream), time))
 }

@@ -1,5 +1,6 @@
 //! `[nominal]` and `[controller]` of run.toml: every form in which users have them.
 
+use crate::export::read_model;
 use crate::lti::{Continuous, Discrete, PolynomialMatrix, StateSpace};
 use crate::record::read_mat;
 use crate::rig::{Bearing, degraded};
@@ -79,6 +80,11 @@ pub enum NominalModel {
         /// Continuous or discrete.
         domain: Domain,
     },
+    /// A discrete-time model that was exported or identified: JSON, MATLAB or NumPy file with its sample time.
+    ModelFile {
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
     /// The gas bearing (3)-(6), degraded by factors on all entries of A and B as in (27).
     Bearing {
         /// Parameters; those of the paper when absent.
@@ -116,6 +122,7 @@ impl NominalModel {
                 sampled([a, b, c, d], *domain, time)
             }
             NominalModel::MatFile { file, domain } => mat_model(&folder.join(file), *domain, time),
+            NominalModel::ModelFile { file } => exported(&folder.join(file), time),
             NominalModel::Bearing { parameters, a_factor, b_factor } => {
                 degraded(&parameters.plant()?, *a_factor, *b_factor)?.zoh(time)
             }
@@ -179,6 +186,13 @@ pub enum ControllerSettings {
         /// Path of the file, relative to run.toml.
         file: PathBuf,
     },
+    /// A discrete-time model that was exported or identified, from y to u: JSON, MATLAB or NumPy file with its sample time.
+    ModelFile {
+        /// Sign convention.
+        feedback: Feedback,
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
     /// State feedback and observer gain for the discrete-time nominal model in its own states.
     Observer {
         /// Sign convention.
@@ -224,6 +238,7 @@ impl ControllerSettings {
                 (feedback, StateSpace::new(a, b, c, d, time)?)
             }
             Self::MatFile { feedback, file } => (feedback, mat_model(&folder.join(file), Domain::Discrete, time)?),
+            Self::ModelFile { feedback, file } => (feedback, exported(&folder.join(file), time)?),
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
@@ -246,15 +261,26 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
 fn mat_model(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
     let variables = read_mat(file)?;
     if domain == Domain::Discrete && variables.variables().iter().any(|v| v.name == "ts") {
-        let ts = variables.scalar("ts")?;
-        let agrees = (ts / time.ts() - 1.0).abs() < 1e-6;
-        if !agrees {
-            let what = format!("{} and the data", file.display());
-            return Err(Error::SampleTimeMismatch { what, left: ts, right: time.ts() });
-        }
+        check_sample_time(file, variables.scalar("ts")?, time)?;
     }
     let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| variables.matrix(name));
     sampled([a?, b?, c?, d?], domain, time)
+}
+
+/// A model that states its sample time, which must be that of the data.
+fn exported(file: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let system = read_model(file)?.system;
+    check_sample_time(file, system.time().ts(), time)?;
+    let parts = [system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned());
+    sampled(parts, Domain::Discrete, time)
+}
+
+fn check_sample_time(file: &Path, ts: f64, time: Discrete) -> Result<()> {
+    if (ts / time.ts() - 1.0).abs() < 1e-6 {
+        return Ok(());
+    }
+    let what = format!("{} and the data", file.display());
+    Err(Error::SampleTimeMismatch { what, left: ts, right: time.ts() })
 }
 
 fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
@@ -266,5 +292,35 @@ fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
             found: (1, rows[bad].len()),
         }),
         None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::export::{ModelFormat, NamedModel, export_model};
+    use crate::record::scratch::scratch;
+    use crate::units::Channel;
+
+    /// One file in three formats is the model that was written; another sample time is refused, the sign is stated.
+    #[test]
+    fn a_model_that_was_written_is_read_again() {
+        let time = Discrete::new(1e-3).unwrap();
+        let entry = |x: f64| Mat::from_fn(1, 1, |_, _| x);
+        let system = StateSpace::new(entry(0.9), entry(1.0 / 3.0), entry(2.0), entry(0.1), time).unwrap();
+        let ports = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
+        let model = NamedModel::new("g", system.clone(), ports).unwrap();
+        for format in [ModelFormat::Json, ModelFormat::Mat, ModelFormat::Npz] {
+            let file = scratch(format.extension());
+            std::fs::write(file.path(), export_model(&model, format).unwrap()).unwrap();
+            let nominal = NominalModel::ModelFile { file: file.path().to_owned() };
+            assert_eq!(nominal.realise(Path::new("/"), time).unwrap(), system);
+            let error = nominal.realise(Path::new("/"), Discrete::new(2e-3).unwrap()).unwrap_err();
+            assert!(error.to_string().contains("sample times differ"), "{error}");
+            let text = format!("model_file = {{ feedback = \"negative\", file = {:?} }}", file.path());
+            let settings: ControllerSettings = toml::from_str(&text).unwrap();
+            let Controller::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
+            assert_eq!(k, system.negated());
+        }
     }
 }

@@ -40,6 +40,17 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
             ("a long name of a field", mat(&packed(&matrix([1000, 1], 2, &long_field(3 << 20))))),
             ("cells inside of cells", mat(&(0..80).fold(Vec::new(), |inner, _| matrix([1, 1], 1, &inner)))),
         ],
+        "mat73" => vec![
+            ("an array of 2^40 numbers that are not there", hdf(&[1 << 20, 1 << 20], None)),
+            ("an array of 2^62 numbers that are not there", hdf(&[1 << 31, 1 << 31], None)),
+            ("zeros in one chunk", hdf(&[64 << 20], Some(64 << 20))),
+            ("zeros in many chunks", hdf(&[1 << 40], Some(1 << 16))),
+        ],
+        "model" => vec![
+            ("a huge shape", npz(&npy("(1000000000000, 0)"))),
+            ("zeros", npz(&[npy("(3000000,)"), vec![0; 24 << 20]].concat())),
+            ("deep details", format!("{{\"details\":{}}}", deep("[", "]")).into_bytes()),
+        ],
         "npz" | "npy" => ["(4294967296, 4294967296)", "(1000000000000,)", "(0, 1000000000000)", "(1000000000000, 0)"]
             .into_iter()
             .map(|shape| ("a huge shape", if name == "npz" { npz(&npy(shape)) } else { npy(shape) }))
@@ -110,6 +121,26 @@ fn mat(variable: &[u8]) -> Vec<u8> {
 fn npy(shape: &str) -> Vec<u8> {
     let header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
     [b"\x93NUMPY\x01\x00", &(header.len() as u16).to_le_bytes()[..], header.as_bytes()].concat()
+}
+
+/// The seed with the array x, whose sizes are `from` there, said to be `sizes`; `chunk` takes the place of the size of its chunks.
+fn hdf(sizes: &[u64], chunk: Option<u32>) -> Vec<u8> {
+    let name = if chunk.is_some() { "chunks.mat" } else { "rows.h5" };
+    let mut file = super::seeds::file("mat73", name);
+    let words = |values: &[u64]| values.iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<_>>();
+    let mut replace = |old: Vec<u8>, new: Vec<u8>| {
+        let places: Vec<usize> = (0..=file.len() - old.len()).filter(|at| file[*at..].starts_with(&old)).collect();
+        assert!(!places.is_empty(), "{name} holds {old:?}");
+        places.iter().for_each(|at| file[*at..at + old.len()].copy_from_slice(&new));
+    };
+    match chunk {
+        None => replace(words(&[3, 2]), words(sizes)),
+        Some(chunk) => {
+            replace(words(&[1011]), words(sizes));
+            replace(503_u32.to_le_bytes().to_vec(), chunk.to_le_bytes().to_vec());
+        }
+    }
+    file
 }
 
 fn npz(array: &[u8]) -> Vec<u8> {

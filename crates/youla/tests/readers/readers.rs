@@ -6,8 +6,8 @@ use youla::identify::greybox::{Declaration, DeclaredStructure};
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
 use youla::record::{
-    ChannelRef, CsvOptions, NpyStream, SampleStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
-    npz_from_bytes,
+    ChannelRef, CsvOptions, DecimalSign, NpyStream, SampleStream, TimeSource, Variables, csv_from_bytes,
+    mat_from_bytes, npz_from_bytes,
 };
 use youla::redesign::ExportedController;
 use youla::report::{ReportData, html};
@@ -19,9 +19,11 @@ use youla::study::{PaperSettings, Row};
 pub(crate) type Reader = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const READERS: [Reader; 14] = [
+pub(crate) const READERS: [Reader; 16] = [
     ("csv", csv),
     ("mat", mat),
+    ("mat73", mat),
+    ("model", model),
     ("npz", npz),
     ("npy", npy),
     ("run_toml", run_toml),
@@ -40,18 +42,25 @@ fn path() -> &'static Path {
     Path::new("input")
 }
 
-/// Text, plain or gzip: with a sample time that is given, and with a time column.
+/// Text, plain or gzip: with a sample time that is given, and with a time column; with either decimal sign.
 pub(crate) fn csv(bytes: &[u8]) {
     for time in [TimeSource::ts(1e-3), TimeSource::column(ChannelRef::Column(1))] {
         let _ = csv_from_bytes(bytes, path(), &[], &time, &CsvOptions::default());
+        let comma = CsvOptions { decimal: DecimalSign::Comma, ..CsvOptions::default() };
+        let _ = csv_from_bytes(bytes, path(), &[], &time, &comma);
     }
 }
 
-/// A MATLAB file, and everything that is in it.
+/// A MATLAB file of version 5 or 7.3, and everything that is in it.
 pub(crate) fn mat(bytes: &[u8]) {
     if let Ok(variables) = mat_from_bytes(bytes, path()) {
         look_at(&variables);
     }
+}
+
+/// A model in any of its formats.
+pub(crate) fn model(bytes: &[u8]) {
+    let _ = youla::export::model_from_bytes(bytes, path());
 }
 
 /// A NumPy archive, and everything that is in it.

@@ -10,3 +10,9 @@ pub(crate) fn of(name: &str) -> Vec<Vec<u8>> {
     files.sort();
     files.into_iter().map(|file| std::fs::read(file).unwrap()).collect()
 }
+
+/// One of them.
+pub(crate) fn file(name: &str, file: &str) -> Vec<u8> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/readers/seeds").join(name);
+    std::fs::read(folder.join(file)).unwrap()
+}

@@ -1,7 +1,7 @@
 //! From lines to cells, and from the chosen cells to numbers.
 
 use super::lines::Lines;
-use super::{CsvOptions, Delimiter, HeaderLine};
+use super::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 use crate::{Error, Result};
 use std::collections::HashSet;
 
@@ -11,12 +11,17 @@ const MOST_COLUMNS: usize = 1 << 16;
 /// The form of a text file: its columns and what stands between them.
 pub(super) struct Fields {
     delimiter: Option<u8>,
+    decimal: DecimalSign,
     names: Vec<String>,
 }
 
 impl Fields {
     /// Reads the first line that is not a comment; leaves it to be read again where it holds numbers.
     pub(super) fn detect(lines: &mut Lines, options: &CsvOptions) -> Result<Fields> {
+        let decimal = options.decimal;
+        if decimal == DecimalSign::Comma && options.delimiter == Delimiter::Comma {
+            return Err(Error::CommaTwice { path: lines.path().to_owned() });
+        }
         if !lines.advance()? {
             return Err(no_rows(lines));
         }
@@ -25,7 +30,7 @@ impl Fields {
             return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
         }
         let delimiter = match options.delimiter {
-            Delimiter::Detect => detect_delimiter(lines)?,
+            Delimiter::Detect => detect_delimiter(lines, decimal)?,
             Delimiter::Comma => Some(b','),
             Delimiter::Semicolon => Some(b';'),
             Delimiter::Tab => Some(b'\t'),
@@ -40,16 +45,16 @@ impl Fields {
         let named = match options.header {
             HeaderLine::Present => true,
             HeaderLine::Absent => false,
-            HeaderLine::Detect => cells.iter().all(|cell| cell.parse::<f64>().is_err()),
+            HeaderLine::Detect => !cells.iter().any(|cell| is_number(cell.as_bytes())),
         };
         if !named {
             lines.hold();
-            return Ok(Fields { delimiter, names: (1..=cells.len()).map(|j| format!("#{j}")).collect() });
+            return Ok(Fields { delimiter, decimal, names: (1..=cells.len()).map(|j| format!("#{j}")).collect() });
         }
         let mut names = HashSet::new();
         match cells.iter().find(|cell| !names.insert(*cell)) {
             Some(name) => Err(Error::DuplicateChannel { what: lines.path().display().to_string(), name: name.clone() }),
-            None => Ok(Fields { delimiter, names: cells }),
+            None => Ok(Fields { delimiter, decimal, names: cells }),
         }
     }
 
@@ -112,7 +117,7 @@ impl Selection {
         let mut found = 0;
         for cell in cells.clone() {
             for &position in self.targets.get(found).into_iter().flatten() {
-                match number(cell) {
+                match number(cell, fields.decimal) {
                     Some(value) => put(position, value),
                     None => return Err(self.bad_cell(fields, lines, cells.count(), found, cell)),
                 }
@@ -129,18 +134,26 @@ impl Selection {
             return Error::RaggedRow { path, line, found, expected };
         }
         let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
-        Error::Cell { path, line, column: fields.names[column].clone(), text }
+        let column = fields.names[column].clone();
+        let other = fields.decimal.other();
+        match number(cell, other) {
+            Some(_) => {
+                Error::DecimalSign { path, line, column, text, declared: fields.decimal.key(), found: other.key() }
+            }
+            None => Error::Cell { path, line, column, text },
+        }
     }
 }
 
-/// The only one of comma, semicolon and tab on the line; `None` means blanks.
+/// The only one of comma, semicolon and tab on the line; `None` means blanks. A decimal comma is no delimiter.
 ///
 /// A line of numbers with tabs and blanks is read as blank separated where the count of cells is the same, because a
 /// tab may stand at the end of the line.
-fn detect_delimiter(lines: &Lines) -> Result<Option<u8>> {
+fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
     const CANDIDATES: [(u8, &str); 3] = [(b',', "a comma"), (b';', "a semicolon"), (b'\t', "a tab")];
     let line = lines.current().trim_ascii();
-    let found: Vec<_> = CANDIDATES.iter().filter(|(delimiter, _)| line.contains(delimiter)).collect();
+    let candidates = &CANDIDATES[usize::from(decimal == DecimalSign::Comma)..];
+    let found: Vec<_> = candidates.iter().filter(|(delimiter, _)| line.contains(delimiter)).collect();
     match found[..] {
         [] => Ok(None),
         [(b'\t', _)] => {
@@ -175,10 +188,25 @@ fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
 }
 
 /// A finite number, perhaps in quotes and with blanks around it.
-fn number(cell: &[u8]) -> Option<f64> {
+fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
+    let text = unquoted(cell)?;
+    let value: f64 = match decimal {
+        DecimalSign::Point => text.parse().ok()?,
+        DecimalSign::Comma if text.contains('.') => return None,
+        DecimalSign::Comma => text.replacen(',', ".", 1).parse().ok()?,
+    };
+    Some(value).filter(|x| x.is_finite())
+}
+
+/// Whether a cell of the first line is no name: a number of any kind, with either decimal sign.
+fn is_number(cell: &[u8]) -> bool {
+    unquoted(cell).is_some_and(|text| text.parse::<f64>().is_ok() || text.replacen(',', ".", 1).parse::<f64>().is_ok())
+}
+
+fn unquoted(cell: &[u8]) -> Option<&str> {
     let cell = cell.trim_ascii();
     let cell = cell.strip_prefix(b"\"").and_then(|c| c.strip_suffix(b"\"")).unwrap_or(cell);
-    std::str::from_utf8(cell).ok()?.trim().parse().ok().filter(|x: &f64| x.is_finite())
+    std::str::from_utf8(cell).ok().map(str::trim)
 }
 
 pub(super) fn no_rows(lines: &Lines) -> Error {

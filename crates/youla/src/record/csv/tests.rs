@@ -150,3 +150,81 @@ proptest! {
         }
     }
 }
+
+mod dialects {
+    use super::super::*;
+
+    fn read(text: &str, delimiter: Delimiter, decimal: DecimalSign) -> Result<Record> {
+        let options = CsvOptions { delimiter, decimal, ..Default::default() };
+        csv_from_bytes(text.as_bytes(), "log.csv", &[], &TimeSource::ts(0.1), &options)
+    }
+
+    fn sentence(text: &str, delimiter: Delimiter, decimal: DecimalSign) -> String {
+        read(text, delimiter, decimal).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_decimal_comma_is_read_where_it_is_declared() {
+        let columns = |record: &Record| ["u", "y"].map(|name| record.column(name).unwrap().to_vec());
+        let expected = [vec![0.5, -1.0, 1200.0], vec![-2e-3, 3.25, 0.0]];
+        for (delimiter, between) in [(Delimiter::Semicolon, ";"), (Delimiter::Tab, "\t"), (Delimiter::Whitespace, " ")]
+        {
+            let text = "u;y\n0,5;-2,0e-3\n-1;\"3,25\"\n+1,2e3;,0\n".replace(';', between);
+            for delimiter in [delimiter, Delimiter::Detect] {
+                assert_eq!(columns(&read(&text, delimiter, DecimalSign::Comma).unwrap()), expected, "{between:?}");
+            }
+            let points = text.replace(',', ".");
+            assert_eq!(columns(&read(&points, delimiter, DecimalSign::Point).unwrap()), expected);
+        }
+    }
+
+    #[test]
+    fn the_other_decimal_sign_is_refused_with_its_line() {
+        let (point, comma) = (DecimalSign::Point, DecimalSign::Comma);
+        let detect = Delimiter::Detect;
+        assert_eq!(
+            sentence("# log\nu;y\n1;2\n0,5;1\n", detect, point),
+            "log.csv, line 4, column u: \"0,5\" has a decimal comma, but the decimal sign is a point; declare decimal = \"comma\" if \
+             all numbers of the file are written so"
+        );
+        let mixed = sentence("u;y\n1,5;2\n1,5;2.5\n", detect, comma);
+        assert!(mixed.starts_with("log.csv, line 3, column y: \"2.5\" has a decimal point, but"), "{mixed}");
+        // A first line of numbers is no line of names, whatever their sign.
+        assert!(
+            sentence("0,5;1,5\n1,0;2,0\n", Delimiter::Semicolon, point).starts_with("log.csv, line 1, column #1: ")
+        );
+        assert!(sentence("0.5\t1.5\n", Delimiter::Tab, comma).starts_with("log.csv, line 1, column #1: "));
+        assert_eq!(read("0,5;1,5\n1,0;2,0\n", detect, comma).unwrap().column("#2").unwrap(), [1.5, 2.0]);
+    }
+
+    #[test]
+    fn what_does_not_fit_the_declared_dialect_is_refused() {
+        let (point, comma) = (DecimalSign::Point, DecimalSign::Comma);
+        for (text, delimiter, decimal, expected) in [
+            (
+                "u,y\n1,2\n",
+                Delimiter::Comma,
+                comma,
+                "log.csv: the comma cannot be both the delimiter and the decimal sign",
+            ),
+            (
+                "0,5;1,5\n",
+                Delimiter::Detect,
+                point,
+                "log.csv, line 1: the delimiter is not clear, the line holds a comma and a semi",
+            ),
+            (
+                "u;y\n1.000,5;2\n",
+                Delimiter::Detect,
+                comma,
+                "log.csv, line 2, column u: \"1.000,5\" is not a finite number",
+            ),
+            ("u;y\n1,2,3;2\n", Delimiter::Detect, comma, "log.csv, line 2, column u: \"1,2,3\" is not a finite number"),
+            ("u;y\n1,5;2\n1,5\n", Delimiter::Semicolon, comma, "log.csv, line 3: 1 fields, but the first line has 2"),
+            ("u;y\n1;nan\n", Delimiter::Semicolon, comma, "log.csv, line 2, column y: \"nan\" is not a finite number"),
+        ] {
+            let found = sentence(text, delimiter, decimal);
+            assert!(found.starts_with(expected), "{found}");
+        }
+    }
+}

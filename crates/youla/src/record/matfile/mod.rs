@@ -9,6 +9,7 @@ mod read;
 mod write;
 
 pub use read::{mat_from_bytes, read_mat};
+pub(crate) use write::mat_to_bytes;
 pub use write::{Packing, write_mat};
 
 /// Class of an array, as the flags element states it.

@@ -2,6 +2,7 @@
 
 use super::bytes::{Bytes, Element, Fault};
 use super::{HEADER, class, kind};
+use crate::record::hdf::{hdf_from_bytes, is_hdf};
 use crate::record::{Value, Variable, Variables};
 use crate::{Error, Result};
 use flate2::read::ZlibDecoder;
@@ -12,16 +13,18 @@ use std::path::Path;
 const MAX_DEPTH: usize = 32;
 /// Longest name of a variable or field, in bytes; MATLAB has 63. Paths repeat them.
 const LONGEST_NAME: usize = 1024;
-const HDF5_MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
 
-/// Reads all variables of a MATLAB file of version 5.
+/// Reads all variables of a MATLAB file of version 5 or 7.3.
+///
+/// Of version 7.3 (HDF5) cells, complex arrays and arrays of structs are not read either. An HDF5 file of another program is read
+/// by row.
 ///
 /// Sparse matrices, objects and function handles become [`Value::Unsupported`]; the unnamed element in which MATLAB
 /// keeps the inside of objects is not a variable and is left out.
 ///
 /// # Errors
-/// [`Error::MissingFile`], [`Error::Io`], [`Error::NoData`] for an empty file, [`Error::FormatNotRead`] for versions 4
-/// and 7.3, [`Error::Corrupt`] with the position for a damaged or cut file.
+/// [`Error::MissingFile`], [`Error::Io`], [`Error::NoData`] for an empty file, [`Error::FormatNotRead`] for version 4,
+/// [`Error::Corrupt`] with the position (0 in version 7.3) for a damaged or cut file.
 pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
     let mut bytes = Vec::new();
@@ -30,12 +33,15 @@ pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     mat_from_bytes(&bytes, path)
 }
 
-/// The variables of a MATLAB file of version 5 that is in memory; `path` is named in errors.
+/// The variables of a MATLAB file of version 5 or 7.3 that is in memory; `path` is named in errors.
 ///
 /// # Errors
 /// Those of [`read_mat`] but for the operating system's.
 pub fn mat_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
+    if is_hdf(bytes) {
+        return hdf_from_bytes(bytes, path);
+    }
     let big_endian = check_format(path, bytes)?;
     let body = Bytes { data: &bytes[HEADER..], offset: HEADER, big_endian };
     match variables(body) {
@@ -53,9 +59,6 @@ fn check_format(path: &Path, bytes: &[u8]) -> Result<bool> {
     let not_read = |found, remedy| Err(Error::FormatNotRead { path: path.to_owned(), found, remedy });
     if bytes.is_empty() {
         return Err(Error::NoData { path: path.to_owned(), problem: "the file is empty (0 bytes)" });
-    }
-    if bytes.starts_with(HDF5_MAGIC) || bytes.get(512..).is_some_and(|rest| rest.starts_with(HDF5_MAGIC)) {
-        return not_read("a MATLAB file of version 7.3 (HDF5)", "save it with the option -v7");
     }
     match bytes.get(124..HEADER) {
         Some([0, 1, b'I', b'M']) => Ok(false),

@@ -31,6 +31,19 @@ pub enum Packing {
 /// ```
 pub fn write_mat(path: impl AsRef<Path>, variables: &[Variable], packing: Packing) -> Result<()> {
     let path = path.as_ref();
+    let out = bytes(path, variables, packing)?;
+    std::fs::write(path, out).map_err(|source| Error::Io { path: path.to_owned(), source })
+}
+
+/// The bytes of such a file, nothing packed.
+///
+/// # Errors
+/// Those of [`write_mat`] but for the operating system's.
+pub(crate) fn mat_to_bytes(variables: &[Variable]) -> Result<Vec<u8>> {
+    bytes(Path::new("the MATLAB file"), variables, Packing::Plain)
+}
+
+fn bytes(path: &Path, variables: &[Variable], packing: Packing) -> Result<Vec<u8>> {
     let mut out = header();
     for variable in variables {
         let wrong = |must| Error::WrongVariable {
@@ -44,7 +57,7 @@ pub fn write_mat(path: impl AsRef<Path>, variables: &[Variable], packing: Packin
         }
         append(&mut out, variable, packing).map_err(wrong)?;
     }
-    std::fs::write(path, out).map_err(|source| Error::Io { path: path.to_owned(), source })
+    Ok(out)
 }
 
 /// What a value must be to be written.

@@ -40,6 +40,8 @@ pub struct CheckedFiles {
     pub sample_time: Option<f64>,
     /// Column with the time in seconds.
     pub time_column: Option<ChannelRef>,
+    /// Form of text files.
+    pub csv: CsvOptions,
 }
 
 /// Checks all records that a run.toml names, with its controller; paths are relative to `folder`.
@@ -94,7 +96,7 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
             Vec::new(),
         ],
         time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
-        csv: CsvOptions::default(),
+        csv: files.csv.clone(),
         options: options.clone(),
     };
     let file = |path: &PathBuf| DataFile { file: path.clone(), skip: 0, take: None, segments: Vec::new(), name: None };

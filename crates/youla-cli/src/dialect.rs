@@ -1,0 +1,39 @@
+//! Flags for the form of text files, as in `[data] csv` of run.toml.
+
+use clap::Args as ClapArgs;
+use youla::record::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
+
+/// How text files are written.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct Dialect {
+    /// What stands between two cells of text files: comma, semicolon, tab or whitespace; read off the first line where it is clear.
+    #[arg(long, value_name = "NAME", value_parser = delimiter)]
+    delimiter: Option<Delimiter>,
+    /// Decimal sign of text files: point (default) or comma. Never guessed.
+    #[arg(long, value_name = "NAME", value_parser = decimal)]
+    decimal: Option<DecimalSign>,
+}
+
+impl Dialect {
+    /// As options of the library.
+    pub(crate) fn options(&self) -> CsvOptions {
+        CsvOptions {
+            delimiter: self.delimiter.unwrap_or_default(),
+            header: HeaderLine::default(),
+            decimal: self.decimal.unwrap_or_default(),
+        }
+    }
+
+    /// Whether anything was given.
+    pub(crate) fn is_given(&self) -> bool {
+        self.delimiter.is_some() || self.decimal.is_some()
+    }
+}
+
+fn delimiter(name: &str) -> Result<Delimiter, String> {
+    serde_json::from_value(name.into()).map_err(|e| e.to_string())
+}
+
+fn decimal(name: &str) -> Result<DecimalSign, String> {
+    serde_json::from_value(name.into()).map_err(|e| e.to_string())
+}

@@ -1,0 +1,108 @@
+//! `youla export`: a model or the controller of a run, for another tool.
+
+use crate::args::Args;
+use crate::output::{Failure, say};
+use clap::Args as ClapArgs;
+use std::path::PathBuf;
+use youla::Error;
+use youla::export::{ModelFormat, c_controller, export_model, write_export};
+use youla::run::{controller_for_export, model_for_export};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  youla export runs/demo-gas-bearing-001 --to python     hansen.py, which makes a control.ss of python-control
+  youla export runs/demo-gas-bearing-001 --to npz --model hansen_reduced --out model.npz
+  youla export model.json --to matlab --out g.m
+  youla export runs/demo-gas-bearing-001 --to c-controller --out controller.h
+  youla export runs/demo-gas-bearing-001 --to c-controller --q runs/demo-gas-bearing-001/8-redesign/controller.json";
+
+/// What is exported as what.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExportArgs {
+    /// A run folder, or a model as JSON, MATLAB or NumPy file.
+    #[arg(value_name = "RUN|MODEL")]
+    source: PathBuf,
+    /// mat, json, npz, python, matlab, c (C99 header of the model) or c-controller (C99 header of the controller of a run with the
+    /// ports alpha and beta).
+    #[arg(long, value_name = "FORMAT", value_parser = format)]
+    to: Format,
+    /// Model of the run: hansen by default, or hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller, left, right.
+    #[arg(long, value_name = "NAME")]
+    model: Option<String>,
+    /// With c-controller: Q from beta to alpha, as a model or as the controller.json of a redesign; without it the controller that ran.
+    #[arg(long, value_name = "FILE", conflicts_with = "model")]
+    q: Option<PathBuf>,
+    /// File to write; the name of the model by default, in the working directory.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+    /// Replace the file if there is one.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Either kind of export.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Format {
+    Model(ModelFormat),
+    Controller,
+}
+
+const CONTROLLER: &str = "c-controller";
+
+fn format(name: &str) -> Result<Format, String> {
+    if name == CONTROLLER {
+        return Ok(Format::Controller);
+    }
+    let known: Vec<&str> = ModelFormat::ALL.iter().map(|format| format.key()).chain([CONTROLLER]).collect();
+    let found = ModelFormat::ALL.into_iter().find(|format| format.key() == name);
+    found.map(Format::Model).ok_or_else(|| format!("there is no such format; known are {}", known.join(", ")))
+}
+
+/// Writes the file and says which.
+pub(crate) fn export(args: &Args, asked: &ExportArgs) -> Result<(), Failure> {
+    let misplaced = match asked.to {
+        Format::Model(_) if asked.q.is_some() => Some("--q serves --to c-controller only"),
+        Format::Controller if asked.model.is_some() => {
+            Some("--model does not serve --to c-controller; give a Q by --q")
+        }
+        _ => None,
+    };
+    if let Some(problem) = misplaced {
+        return Err(Error::NotAModel { path: asked.source.clone(), problem: problem.into() }.into());
+    }
+    let (bytes, default, about) = match asked.to {
+        Format::Model(format) => {
+            let model = model_for_export(&asked.source, asked.model.as_deref())?;
+            let about = serde_json::json!({
+                "model": model.name, "order": model.system.order(), "inputs": model.inputs, "outputs": model.outputs,
+            });
+            (export_model(&model, format)?, file_name(&model.name, format.extension()), about)
+        }
+        Format::Controller => {
+            let controller = controller_for_export(&asked.source, asked.q.as_deref())?;
+            let made = c_controller(&controller)?;
+            let about = serde_json::json!({
+                "model": controller.name, "order": made.j_k.system().order(), "single_precision_error": made.single.relative,
+                "inputs": controller.measured, "outputs": controller.commanded,
+            });
+            (made.header.into_bytes(), file_name(&controller.name, "h"), about)
+        }
+    };
+    let path = asked.out.clone().unwrap_or(default);
+    write_export(&path, &bytes, asked.force)?;
+    match (args.json, args.quiet) {
+        (true, _) => {
+            let mut about = about;
+            about["file"] = serde_json::json!(path.display().to_string());
+            say(&about.to_string())
+        }
+        (_, true) => Ok(()),
+        _ => say(&path.display().to_string()),
+    }
+}
+
+/// The name of a model may come from a file: only letters, digits, `-` and `_` of it.
+fn file_name(model: &str, extension: &str) -> PathBuf {
+    let safe = |c: char| if c.is_alphanumeric() || c == '-' { c } else { '_' };
+    format!("{}.{extension}", model.chars().map(safe).collect::<String>()).into()
+}

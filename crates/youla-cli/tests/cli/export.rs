@@ -1,0 +1,116 @@
+//! `youla export`: files, names, refusals.
+
+use crate::common::{Outcome, demo, empty_folder, youla};
+use std::fs;
+use youla::export::read_model;
+
+fn done(found: &Outcome) {
+    assert!(found.code == Some(0) && found.stderr.is_empty(), "{:?} {}", found.code, found.stderr);
+}
+
+#[test]
+fn a_run_is_exported_in_every_format_and_reads_back() {
+    let folder = empty_folder("export");
+    let run = demo().to_str().expect("text");
+    let hansen = read_model(demo().join("5-recombine/hansen.json")).expect("a model");
+    let files = [
+        ("mat", "hansen.mat"),
+        ("json", "hansen.json"),
+        ("npz", "hansen.npz"),
+        ("python", "hansen.py"),
+        ("matlab", "hansen.m"),
+        ("c", "hansen.h"),
+    ];
+    for (format, file) in files {
+        let found = youla(&folder, &["export", run, "--to", format]);
+        done(&found);
+        assert_eq!(found.stdout.trim(), file);
+        let bytes = fs::read(folder.join(file)).expect("written");
+        if ["mat", "json", "npz"].contains(&format) {
+            let back = youla::export::model_from_bytes(&bytes, file).expect("a model");
+            assert_eq!(back.system, hansen.system, "{format}");
+        } else {
+            let text = String::from_utf8(bytes).expect("text");
+            assert!(text.contains("5-recombine/hansen.json, SHA-256 "), "{text}");
+        }
+    }
+    let original = fs::read(demo().join("5-recombine/hansen.json")).expect("readable");
+    let (original, copy): (serde_json::Value, serde_json::Value) = (
+        serde_json::from_slice(&original).expect("JSON"),
+        serde_json::from_slice(&fs::read(folder.join("hansen.json")).expect("written")).expect("JSON"),
+    );
+    assert_eq!(original, copy, "a model of a run keeps its details and provenance");
+}
+
+#[test]
+fn files_are_exported_too_and_say_where_they_come_from() {
+    let folder = empty_folder("export-file");
+    let run = demo().to_str().expect("text");
+    for arguments in [
+        &["export", run, "--to", "npz", "--model", "nominal", "--out", "g.npz"][..],
+        &["export", "g.npz", "--to", "json", "--quiet"],
+        &["export", "g.json", "--to", "mat", "--out", "g.mat"],
+    ] {
+        done(&youla(&folder, arguments));
+    }
+    let nominal = read_model(demo().join("2-factor/nominal.json")).expect("a model");
+    assert_eq!(read_model(folder.join("g.mat")).expect("a model").system, nominal.system);
+    let json: serde_json::Value =
+        serde_json::from_slice(&fs::read(folder.join("g.json")).expect("written")).expect("JSON");
+    assert_eq!(json["provenance"]["sources"][0]["path"], "g.npz");
+    assert_eq!(json["provenance"]["sources"][0]["sha256"].as_str().map(str::len), Some(64));
+}
+
+#[test]
+fn the_controller_of_a_run_goes_to_firmware() {
+    let folder = empty_folder("export-controller");
+    let run = demo().to_str().expect("text");
+    let found = youla(&folder, &["export", run, "--to", "c-controller", "--json"]);
+    done(&found);
+    let about: serde_json::Value = serde_json::from_str(&found.stdout).expect("JSON");
+    let error = about["single_precision_error"].as_f64().expect("a number");
+    assert!(about["file"] == "controller.h" && error > 0.0 && error < 1e-4, "{about}");
+    let header = fs::read_to_string(folder.join("controller.h")).expect("written");
+    assert!(header.contains("controller_command") && header.contains(&format!("at most {error:.1e} of")), "{header}");
+
+    let deviation = demo().join("4-identify/deviation.json");
+    let q = ["export", run, "--to", "c-controller", "--q", deviation.to_str().expect("text"), "--out", "q.h"];
+    done(&youla(&folder, &q));
+    assert!(fs::read_to_string(folder.join("q.h")).expect("written").contains("Controller J_K(Q) with a Q of "));
+}
+
+#[test]
+fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
+    let folder = empty_folder("export-refused");
+    let run = demo().to_str().expect("text");
+    fs::write(folder.join("hansen.npz"), "mine").expect("writable");
+    fs::write(folder.join("odd.json"), "{\"refused\": \"too few samples\"}").expect("writable");
+    let cases: [(&[&str], &str); 8] = [
+        (&["export", run, "--to", "npz"], "hansen.npz exists already; choose another file, or replace it with --force"),
+        (
+            &["export", run, "--to", "npz", "--model", "hansn"],
+            "has no \"hansn\" (did you mean \"hansen\"?); known: hansen, ",
+        ),
+        (&["export", ".", "--to", "npz"], "this is no run folder (there is no summary.json in it)"),
+        (&["export", "none.json", "--to", "npz"], "none.json: no such file"),
+        (&["export", "odd.json", "--to", "npz"], "there is no model; it was refused: too few samples"),
+        (&["export", "odd.json", "--to", "npz", "--model", "hansen"], "a model is chosen by name in a run folder only"),
+        (&["export", "odd.json", "--to", "c-controller"], "this is no run folder"),
+        (&["export", run, "--to", "c", "--q", "odd.json"], "--q serves --to c-controller only"),
+    ];
+    for (arguments, sentence) in cases {
+        let Outcome { code, stderr, .. } = youla(&folder, arguments);
+        assert!(code == Some(2) && stderr.contains(sentence), "{arguments:?}: {code:?} {stderr}");
+    }
+    let Outcome { code, stderr, .. } = youla(&folder, &["export", run, "--to", "fortran"]);
+    assert!(
+        code == Some(2) && stderr.contains("there is no such format; known are mat, json, npz, python, "),
+        "{stderr}"
+    );
+    let mut left: Vec<_> = fs::read_dir(&folder).expect("there").map(|e| e.expect("readable").file_name()).collect();
+    left.sort();
+    assert_eq!(left, ["hansen.npz", "odd.json"]);
+    assert_eq!(fs::read(folder.join("hansen.npz")).expect("there"), b"mine");
+    done(&youla(&folder, &["export", run, "--to", "npz", "--force"]));
+    assert!(read_model(folder.join("hansen.npz")).is_ok());
+}

@@ -1,0 +1,116 @@
+//! Scripts and data in Python and Octave: the same numbers, bit by bit.
+
+use super::{folder, named, output};
+use crate::common::{TS, random_stable, random_system, rng};
+use std::path::{Path, PathBuf};
+use youla::export::{ModelFormat, export_model};
+use youla::lti::{Discrete, StateSpace};
+
+/// Compares what the files of one model hold with its JSON file.
+const CHECK: &str = r#"
+import json, sys
+import numpy as np
+model = json.load(open('hansen.json'))
+n, m, p = len(model['a']), len(model['inputs']), len(model['outputs'])
+shapes = dict(a=(n, n), b=(n, m), c=(p, n), d=(p, m))
+want = {k: np.array(model[k], float).reshape(s) for k, s in shapes.items()}
+def compare(what, found):
+    for key, value in want.items():
+        assert found[key].shape == value.shape, (what, key, found[key].shape)
+        assert np.array_equal(found[key], value), (what, key)
+    assert found['ts'] == model['ts'], what
+if sys.argv[1] == 'npz':
+    compare('npz', np.load('hansen.npz'))
+elif sys.argv[1] == 'mat':
+    import scipy.io
+    mat = scipy.io.loadmat('hansen.mat')
+    compare('mat', {**mat, 'ts': mat['ts'].item()})
+    assert [str(c.item()) for c in mat['inputs'][0]] == [c['name'] for c in model['inputs']]
+else:
+    import hansen
+    G = hansen.G
+    compare('python', dict(a=G.A, b=G.B, c=G.C, d=G.D, ts=G.dt))
+    assert G.name == 'hansen'
+    assert G.input_labels == [c['name'] for c in model['inputs']], G.input_labels
+    assert G.output_labels == [c['name'] for c in model['outputs']]
+print('same', sys.argv[1])
+"#;
+
+/// The same of the MATLAB file and the script.
+const OCTAVE: &str = r"
+file = load('hansen.mat');
+same = @(x, y) isequal(size(x), size(y)) && isequal(x, y);
+if isempty(pkg('list', 'control')), disp('no control'); exit(0); end
+hansen
+assert(same(a, file.a) && same(b, file.b) && same(c, file.c) && same(d, file.d) && ts == file.ts);
+[a, b, c, d, ts] = ssdata(G);
+assert(same(a, file.a) && same(b, file.b) && same(c, file.c) && same(d, file.d));
+% A gain has no sample time there.
+assert(isempty(a) || ts == file.ts);
+assert(isequal(get(G, 'inname')(:), file.inputs(:)));
+disp('same octave');
+";
+
+fn models() -> [(&'static str, StateSpace<Discrete>); 3] {
+    let (rng, time) = (&mut rng(5), Discrete::new(TS / 3.0).unwrap());
+    [
+        ("script-stable", random_stable(rng, (12, 2, 3), time)),
+        ("script-unstable", random_system(rng, (1, 1, 1), 0.1, time)),
+        ("script-gain", random_stable(rng, (0, 2, 1), time)),
+    ]
+}
+
+/// All files of a model in a folder.
+fn written(name: &str, system: &StateSpace<Discrete>) -> PathBuf {
+    let folder = folder(name);
+    for format in ModelFormat::ALL {
+        let file = folder.join(format!("hansen.{}", format.extension()));
+        std::fs::write(file, export_model(&named(system), format).unwrap()).unwrap();
+    }
+    folder
+}
+
+fn python() -> String {
+    std::env::var("PYTHON").unwrap_or_else(|_| "python3".into())
+}
+
+/// Whether Python has a module; says so where it does not.
+fn has(module: &str) -> bool {
+    let program = format!("import importlib.util as u; print(u.find_spec('{module}') is not None)");
+    let there = output(python(), &["-c", &program], Path::new("."), "").is_some_and(|found| found.trim() == "True");
+    if !there {
+        println!("skipped: {} has no {module}", python());
+    }
+    there
+}
+
+#[test]
+fn python_sees_the_same_numbers() {
+    let needs = [("npz", "numpy"), ("mat", "scipy"), ("python", "control")];
+    let there: Vec<&str> =
+        needs.into_iter().filter(|(_, module)| has("numpy") && has(module)).map(|(what, _)| what).collect();
+    for (name, system) in models() {
+        let folder = written(name, &system);
+        for what in &there {
+            let found = output(python(), &["-c", CHECK, what], &folder, "").unwrap();
+            assert_eq!(found.trim(), format!("same {what}"), "{name}");
+        }
+        if there.contains(&"python") {
+            let printed = output(python(), &["hansen.py"], &folder, "").unwrap();
+            assert!(printed.contains("hansen"), "{printed}");
+        }
+    }
+}
+
+#[test]
+fn octave_sees_the_same_numbers() {
+    for (name, system) in models() {
+        let folder = written(&format!("{name}-octave"), &system);
+        let arguments = ["--no-gui", "--norc", "--eval", OCTAVE];
+        let Some(found) = output("octave-cli", &arguments, &folder, "") else { return };
+        match found.trim() {
+            "no control" => println!("skipped: octave has no package control"),
+            found => assert_eq!(found, "same octave", "{name}"),
+        }
+    }
+}

@@ -11,7 +11,7 @@ use youla::run::{Draft, DraftClock, Feedback, path_from};
 /// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
 pub(crate) fn init(args: &Args, asked: &InitArgs) -> Result<(), Failure> {
     if asked.out.exists() && !asked.force {
-        return Err(Error::OutputExists { path: asked.out.clone() }.into());
+        return Err(Error::FileExists { path: asked.out.clone() }.into());
     }
     let csv = asked.dialect.options();
     let columns = survey(&asked.log, &csv)?;

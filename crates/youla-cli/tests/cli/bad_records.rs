@@ -42,7 +42,7 @@ fn files_without_samples() {
 #[test]
 fn files_of_another_kind() {
     let hdf5 = [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 600]].concat();
-    log_refused("hdf5", &hdf5, &["log.csv", "version 7.3 (HDF5)", "-v7"]);
+    log_refused("hdf5", &hdf5, &["log.csv, byte 0", "a readable HDF5 file"]);
     let utf16: Vec<u8> = csv(&log()).encode_utf16().flat_map(u16::to_le_bytes).collect();
     log_refused("utf-16", &utf16, &["log.csv", "zero bytes", "UTF-8"]);
 }
@@ -94,7 +94,7 @@ fn damaged_matlab_files() {
     fs::write(&path, b"").expect("written");
     refused(&folder, 2, &["log.mat: the file is empty (0 bytes)"]);
     fs::write(&path, [b"\x89HDF\r\n\x1a\n".as_slice(), &[0; 600]].concat()).expect("written");
-    refused(&folder, 2, &["log.mat", "version 7.3 (HDF5)", "-v7"]);
+    refused(&folder, 2, &["log.mat, byte 0", "a readable HDF5 file"]);
 }
 
 fn matlab_log(path: &Path, packing: Packing) {

@@ -14,7 +14,7 @@ fn init(more: &[&'static str]) -> Vec<&'static str> {
 fn what_is_not_said_is_not_guessed() {
     let folder = loop_folder("init-silent", &[]);
     let before = listing(&folder);
-    let found = youla(&folder, &["init", "log.csv", "--input", "u"]);
+    let found = youla(&folder, &["init", "log.csv", "--input", "u", "--out", "new.toml"]);
     assert_eq!(found.code, Some(2));
     assert!(found.stderr.contains("--output, --time or --sample-time, --feedback or --open-loop"), "{}", found.stderr);
     for part in ["column", "t ", "even steps of 1.000000e-2", "2000"] {

@@ -248,8 +248,8 @@ mod tests {
         );
         let packed = seed(include_bytes!("../../tests/readers/seeds/mat73/chunks.mat")).unwrap();
         assert_eq!(packed.column("x").unwrap(), (0..1011).map(f64::from).collect::<Vec<_>>());
-        let rows = seed(include_bytes!("../../tests/readers/seeds/mat73/rows.h5")).unwrap();
-        assert_eq!(rows.column("x(:,2)").unwrap(), [1.0, 3.0, 5.0]);
+        // Cut out of a larger file: the addresses in it lead elsewhere.
+        assert!(seed(include_bytes!("../../tests/readers/seeds/mat73/rows.h5")).is_err());
         let cycle = seed(include_bytes!("../../tests/readers/seeds/mat73/cycle.mat")).unwrap_err().to_string();
         assert!(cycle.contains("structs of at most 32 levels"), "{cycle}");
     }

@@ -213,6 +213,6 @@ mod tests {
     #[test]
     fn forms_come_from_the_types() {
         assert_eq!(forms::<Order>(), "fixed, auto");
-        assert_eq!(forms::<ControllerSettings>(), "difference_equation, state_space, mat_file, observer");
+        assert_eq!(forms::<ControllerSettings>(), "difference_equation, state_space, mat_file, model_file, observer");
     }
 }

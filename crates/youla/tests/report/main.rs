@@ -57,7 +57,7 @@ fn several_inputs_and_outputs_are_all_inside() {
         "y_x",
         "Can I trust it?",
         "3.1e−14",
-        "Zone, ISO 14839\u{2011}3",
+        "Zone, ISO\u{a0}14839\u{2011}3",
         "2.314",
         "the loop is unstable",
     ] {

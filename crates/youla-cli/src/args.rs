@@ -34,6 +34,7 @@ Examples:
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
+  youla compare runs/before-001 runs/after-001 two runs side by side
   youla export runs/demo-gas-bearing-001 --to python
                                                the model as a script for python-control; also npz, matlab, C99
 
@@ -112,6 +113,9 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+    /// Hold finished runs against each other: models, modes, distances, fits, settings, on one page.
+    #[command(after_help = crate::compare::EXAMPLES)]
+    Compare(crate::compare::CompareArgs),
     /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
     #[command(after_help = crate::export::EXAMPLES)]
     Export(crate::export::ExportArgs),

@@ -1,0 +1,42 @@
+//! Physical parameters with intervals: stiffness and damping of the bearing, started 30 % off.
+//!
+//! `cargo run --example 04_grey_box`
+
+mod machine;
+
+use youla::Result;
+use youla::identify::greybox::{
+    BearingStructure, GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop, greybox_intervals_in_loop,
+};
+use youla::identify::subspace::Experiment;
+use youla::rig::Bearing;
+
+fn main() -> Result<()> {
+    let machine = machine::bearing()?;
+    let (log, time) = (machine.log(20_000, 0.3, 1)?, machine.plant.time());
+    let truth = BearingStructure::parameters(&Bearing::default());
+    let start: Vec<f64> = truth.iter().map(|v| 0.7 * v).collect();
+
+    // Through the loop, from alpha: consistent whatever the noise, because alpha does not depend on it.
+    let (controller, options) = (machine.factors.j_k()?, GreyBoxOptions::default());
+    let data = [Experiment { u: log.alpha.as_ref(), y: log.y.as_ref() }];
+    let found = greybox_in_loop(&BearingStructure, &start, &controller, LoopOutput::Plant, &data, time, &options)?;
+    let known = greybox_intervals_in_loop(
+        &BearingStructure,
+        &found,
+        &controller,
+        LoopOutput::Plant,
+        &data,
+        time,
+        &options,
+        &IntervalOptions::default(),
+    )?;
+
+    println!("{} steps, {:?}; {:.0} % intervals", found.iterations, found.stop, 100.0 * known.level);
+    for (parameter, truth) in known.parameters.iter().zip(&truth) {
+        let [low, high] = parameter.interval;
+        let holds = if (low..=high).contains(truth) { "holds" } else { "misses" };
+        println!("{:24} {low:12.5e} to {high:12.5e}  {holds} {truth:.5e}", parameter.name);
+    }
+    Ok(())
+}

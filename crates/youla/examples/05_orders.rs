@@ -1,0 +1,35 @@
+//! Which order: poles that stay when the order grows, and the fit that each order buys.
+//!
+//! `cargo run --example 05_orders`
+
+mod machine;
+
+use youla::Result;
+use youla::identify::hansen::{deviation_data, hansen};
+use youla::identify::subspace::stabilisation::{StabilisationOptions, stabilisation};
+use youla::identify::subspace::{Order, SubspaceOptions};
+use youla::validate::{fit, predict_open_loop};
+
+fn main() -> Result<()> {
+    let machine = machine::bearing()?;
+    let (log, fresh) = (machine.log(20_000, 0.3, 1)?, machine.log(10_000, 0.3, 2)?);
+    let signals = [machine.factors.signals(log.u.as_ref(), log.y.as_ref())?];
+    let of_order = |order| SubspaceOptions { horizon: 30, order: Order::Fixed(order), ..Default::default() };
+
+    let options = of_order(20);
+    let data = deviation_data(&machine.factors, &signals, &[], &options)?;
+    let orders: Vec<usize> = (1..=20).collect();
+    let diagram = stabilisation(&data, &orders, &options, &StabilisationOptions::default())?;
+    println!("modes of S that stay over the orders");
+    for cluster in &diagram.clusters {
+        println!("  {:8.2} Hz, damping ratio {:.4}, in {} of 20 orders", cluster.hz, cluster.zeta, cluster.orders);
+    }
+
+    println!("fit of G(S) on fresh data");
+    for order in [2, 4, 6, 8, 12, 16] {
+        let found = hansen(&machine.factors, &signals, &of_order(order))?;
+        let predicted = predict_open_loop(&found.plant, fresh.u.as_ref(), fresh.y.as_ref())?;
+        println!("  S of order {order:2}: {:.2?} %", fit(fresh.y.as_ref(), predicted.as_ref())?);
+    }
+    Ok(())
+}

@@ -1,0 +1,47 @@
+//! From the log to a better controller: identify, reduce in the loop, redesign, and try it on the machine.
+//!
+//! `cargo run --example 07_redesign`
+
+mod machine;
+
+use youla::Result;
+use youla::identify::hansen::hansen;
+use youla::identify::subspace::{Order, SubspaceOptions};
+use youla::redesign::{RedesignOptions, RedesignProblem, redesign};
+use youla::reduce::{ReducedOrder, ReductionLoop, ReductionOptions, reduce_in_loop};
+use youla::validate::certify;
+
+fn main() -> Result<()> {
+    let machine = machine::bearing()?;
+    let log = machine.log(20_000, 0.3, 1)?;
+    let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
+    let options = SubspaceOptions { horizon: 30, order: Order::Fixed(12), ..Default::default() };
+    let found = hansen(&machine.factors, &[signals], &options)?;
+
+    let inside = ReductionLoop::new(&machine.factors, &found.deviation.model)?;
+    let asked = ReductionOptions { order: ReducedOrder::Fixed(6), ..Default::default() };
+    let reduced = reduce_in_loop(&inside, &asked)?.reduction.model;
+    println!("G(S) of order {} reduced to {}", found.plant.order(), reduced.order());
+
+    let rms = |m: &youla::Mat<f64>| -> Vec<f64> {
+        (0..m.ncols()).map(|j| (m.col(j).iter().map(|v| v * v).sum::<f64>() / m.nrows() as f64).sqrt()).collect()
+    };
+    let problem = RedesignProblem {
+        model: &reduced,
+        factors: &machine.factors,
+        deviation: &found.deviation.model,
+        uncertainty: None,
+        input_size: &rms(&log.u),
+        output_size: &rms(&log.y),
+    };
+    let new = redesign(&problem, &RedesignOptions::default())?;
+    println!(
+        "least damping of the loop: {:.3}, predicted {:.3}",
+        new.present.least_damping, new.predicted.least_damping
+    );
+
+    // The machine itself, which the design has never seen.
+    let tried = certify(&machine.plant, &new.controller.system)?;
+    println!("the new controller stabilises the machine: {}", tried.stable);
+    Ok(())
+}

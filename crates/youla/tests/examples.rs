@@ -1,0 +1,99 @@
+//! Every example runs and shows what it promises.
+#![allow(missing_docs)]
+
+use std::path::Path;
+use std::process::Command;
+
+/// What an example prints. It is built by now where all tests of the package are run.
+fn output(name: &str) -> String {
+    let mut command = Command::new(env!("CARGO"));
+    command.args(["run", "--quiet", "--locked", "--example", name]).current_dir(env!("CARGO_MANIFEST_DIR"));
+    if !cfg!(debug_assertions) {
+        command.arg("--release");
+    }
+    let run = command.output().expect("cargo starts");
+    assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
+    String::from_utf8(run.stdout).expect("text")
+}
+
+/// The number behind the last occurrence of a text.
+fn number_after(text: &str, what: &str) -> f64 {
+    let rest = text.rsplit_once(what).unwrap_or_else(|| panic!("{what} is missing in\n{text}")).1.trim_start();
+    let end = rest.find(|c: char| !"+-.0123456789e".contains(c)).unwrap_or(rest.len());
+    rest[..end].parse().unwrap_or_else(|_| panic!("a number after {what} in\n{text}"))
+}
+
+#[test]
+fn the_scheme_comes_near_to_the_truth() {
+    let text = output("01_scheme");
+    assert!(text.contains("stabilises G(S): true"), "{text}");
+    let (found, truth) = (number_after(&text, "G(S): fit ["), number_after(&text, "truth: fit ["));
+    assert!(found > truth - 1.0, "{text}");
+}
+
+#[test]
+fn a_report_is_written() {
+    let text = output("02_report");
+    let path = text.lines().last().expect("a line").trim_start_matches("open ");
+    assert!(std::fs::read_to_string(Path::new(path)).expect("a report").contains("Can I trust it?"));
+}
+
+/// The unstable pole of the plant is at +30 rad/s.
+#[test]
+fn the_scheme_finds_the_unstable_pole() {
+    let text = output("03_unstable");
+    let miss = |model: &str| (number_after(&text, model) - 30.0).abs();
+    assert!(miss("G(S)") < 2.0 && miss("(u, y)") > 3.0 * miss("G(S)"), "{text}");
+}
+
+/// Intervals of 95 % for 14 parameters: fewer than 11 of them hold with a probability of 2e-4.
+#[test]
+fn intervals_hold_the_physical_parameters() {
+    let text = output("04_grey_box");
+    assert!(
+        text.matches(" holds ").count() >= 11
+            && text.matches(" holds ").count() + text.matches(" misses ").count() == 14,
+        "{text}"
+    );
+}
+
+#[test]
+fn the_modes_of_the_machine_are_settled() {
+    let text = output("05_orders");
+    assert!(
+        text.contains("modes of S")
+            && number_after(&text, "S of order 16: [") > number_after(&text, "S of order  6: ["),
+        "{text}"
+    );
+}
+
+#[test]
+fn every_model_that_the_data_allow_is_stabilised() {
+    assert!(output("06_uncertainty").contains("\n0 of 475 models"));
+}
+
+#[test]
+fn a_new_controller_runs_on_the_machine() {
+    let text = output("07_redesign");
+    assert!(number_after(&text, "predicted") > number_after(&text, "of the loop:"), "{text}");
+    assert!(text.contains("the new controller stabilises the machine: true"));
+}
+
+#[test]
+fn the_controller_runs_sample_by_sample() {
+    let text = output("08_firmware");
+    assert!(number_after(&text, "largest u") < 5.0 && number_after(&text, "single precision") < 1e-4, "{text}");
+}
+
+#[test]
+fn examples_are_short() {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples");
+    for entry in std::fs::read_dir(folder).expect("a folder") {
+        let path = entry.expect("an entry").path();
+        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
+        if name.starts_with('0') {
+            let lines = std::fs::read_to_string(&path).expect("text").lines().count();
+            assert!(lines < 80, "{name}: {lines} lines");
+        }
+    }
+}

@@ -34,6 +34,8 @@ Examples:
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
+  youla plot runs/demo-gas-bearing-001 bode --width 8.5
+                                               figures for a paper, from the same data
   youla export runs/demo-gas-bearing-001 --to python
                                                the model as a script for python-control; also npz, matlab, C99
 
@@ -112,6 +114,12 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+    /// Draw figures of a run for papers: SVG, PNG, and the numbers as CSV.
+    ///
+    /// Without a figure the figures that the run has are listed. Sizes are those on paper; text has 9 points in every size. SVG and PNG
+    /// hold the same font on every machine.
+    #[command(after_help = crate::plot::EXAMPLES)]
+    Plot(crate::plot::PlotArgs),
     /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
     #[command(after_help = crate::export::EXAMPLES)]
     Export(crate::export::ExportArgs),

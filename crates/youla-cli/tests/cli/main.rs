@@ -8,5 +8,6 @@ mod common;
 mod contract;
 mod export;
 mod init;
+mod plot;
 mod subspace;
 mod verbs;

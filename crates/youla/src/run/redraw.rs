@@ -13,12 +13,16 @@ use std::path::{Path, PathBuf};
 /// [`Error::MissingFile`] where there is no `report.json`, [`Error::NotAReport`] where it is of another kind,
 /// [`Error::Io`]; the old report stays then.
 pub fn redraw(run: &Path) -> Result<PathBuf> {
-    let data = run.join("report.json");
-    let mut text = String::new();
-    open(&data)?.read_to_string(&mut text).map_err(|source| Error::Io { path: data.clone(), source })?;
-    let report: ReportData =
-        serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })?;
+    let report = read_report(run)?;
     let path = run.join("report.html");
     replace_file(&path, &html(&report)?)?;
     Ok(path)
+}
+
+/// What the report of a run shows, from its `report.json`.
+pub(super) fn read_report(run: &Path) -> Result<ReportData> {
+    let data = run.join("report.json");
+    let mut text = String::new();
+    open(&data)?.read_to_string(&mut text).map_err(|source| Error::Io { path: data.clone(), source })?;
+    serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data, source })
 }

@@ -36,6 +36,7 @@ Examples:
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
   youla plot runs/demo-gas-bearing-001 bode --width 8.5
                                                figures for a paper, from the same data
+  youla compare runs/before-001 runs/after-001 two runs side by side
   youla export runs/demo-gas-bearing-001 --to python
                                                the model as a script for python-control; also npz, matlab, C99
 
@@ -120,6 +121,9 @@ pub(crate) enum Command {
     /// hold the same font on every machine.
     #[command(after_help = crate::plot::EXAMPLES)]
     Plot(crate::plot::PlotArgs),
+    /// Hold finished runs against each other: models, modes, distances, fits, settings, on one page.
+    #[command(after_help = crate::compare::EXAMPLES)]
+    Compare(crate::compare::CompareArgs),
     /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
     #[command(after_help = crate::export::EXAMPLES)]
     Export(crate::export::ExportArgs),

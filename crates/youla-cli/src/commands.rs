@@ -2,6 +2,7 @@
 
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
+use crate::compare;
 use crate::export;
 use crate::init;
 use crate::manual;
@@ -42,6 +43,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
+        Command::Compare(asked) => compare::run(args, asked),
         Command::Export(asked) => export::export(args, asked),
         Command::Plot(asked) => plot::plot(args, asked),
         Command::Paper(asked) => paper::reproduce(args, asked),

@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod commands;
+mod compare;
 mod dialect;
 mod export;
 mod init;

@@ -24,7 +24,7 @@ pub(crate) struct PlotArgs {
     /// A run folder.
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// data, signals, order, stabilisation, verification, residuals, bode, nyquist, poles, hankel, reduction, redesign, or all; without
+    /// data, signals, order, stabilisation, verification, residuals, bode, nyquist, singular-values, poles, hankel, reduction, redesign, or all; without
     /// one, those that the run has are listed.
     #[arg(value_name = "FIGURE")]
     figure: Option<String>,
@@ -117,6 +117,6 @@ fn list(args: &Args, asked: &PlotArgs) -> Result<(), Failure> {
             say(&serde_json::Value::from(all.collect::<Vec<_>>()).to_string())
         }
         (_, true) => Ok(()),
-        _ => figures.iter().try_for_each(|figure| say(&format!("{:<14} {}", figure.key(), figure.about()))),
+        _ => figures.iter().try_for_each(|figure| say(&format!("{:<16} {}", figure.key(), figure.about()))),
     }
 }

@@ -5,6 +5,7 @@ mod bad_problem;
 mod bad_records;
 mod bad_settings;
 mod common;
+mod compare;
 mod contract;
 mod export;
 mod init;

@@ -197,55 +197,88 @@ function span(values) {
   return low <= high ? [low, high] : [0, 0];
 }
 
+const opacityOf = coherence => coherence == null ? 0.1 : 0.08 + 0.92 * Math.min(1, Math.max(0, (coherence - 0.2) / 0.7)) ** 2;
+const percent = level => `${+(100 * level).toPrecision(4)} %`;
+
+// Bode and Nyquist diagrams of one pair of output and input, and the singular values of all together.
 function frequency(host) {
-  const { hz, models, indirect, bands } = report.frequency;
+  const { models, indirect, singular = [] } = report.frequency;
   const pairs = [];
   for (const { output, input } of [...models, ...indirect]) if (!pairs.some(p => p.output === output && p.input === input)) pairs.push({ output, input });
   pairs.sort((a, b) => a.output - b.output || a.input - b.input);
   const nameOf = (list, k, word) => list[k]?.name ?? `${word} ${k + 1}`;
   const title = p => `${nameOf(report.outputs, p.output, "output")} from ${nameOf(report.inputs, p.input, "input")}`;
-  let pair = pairs[0];
+  let pair = pairs[0], view = 0;
+  const views = [["Bode", bode], ["Nyquist", nyquistMap], ...(singular.length ? [["Singular values", singularValues]] : [])];
+  const plotHost = element("div"), controls = element("div", { class: "controls" });
+  host.append(controls, plotHost);
+  const figure = mount(plotHost, () => views[view][1](plotHost, title(pair), pair));
+  controls.append(chooser("View", views.map(v => v[0]), k => { view = k; of.hidden = views[k][1] === singularValues; figure.draw(); }));
+  const of = pairs.length > 1 ? chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); }) : element("span");
+  controls.append(of);
+}
+
+// A stack with its caption, as one figure.
+function captioned(host, caption, build) {
+  const plotHost = element("div");
+  host.replaceChildren(plotHost, element("p", { class: "caption" }, caption));
+  const plot = build(plotHost);
+  return { ...plot, destroy() { plot.destroy(); host.replaceChildren(); } };
+}
+
+function bode(host, title, pair) {
+  const { hz, models, indirect, bands } = report.frequency;
   const same = curve => curve.output === pair.output && curve.input === pair.input;
-  const plotHost = element("div"), caption = element("p", { class: "caption" });
-  const tell = () => {
-    const some = indirect.some(same);
-    caption.textContent = `Frequency response, ${title(pair)}.` + (some ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "") + (bands.some(same) ? ` Filled: where the magnitude of ${bands.filter(same).map(b => methodOf(b.method).label).join(" and of ")} lies with a probability of ${+(100 * bands.find(same).level).toPrecision(4)} % at each frequency.` : "");
-  };
-  const controls = element("div", { class: "controls" });
-  host.append(controls, plotHost, caption);
-  const figure = mount(plotHost, () => {
-    const measured = indirect.filter(same), shown = models.filter(same), regions = bands.filter(same);
-    const opacity = m => m.coherence.map(c => c == null ? 0.1 : 0.08 + 0.92 * Math.min(1, Math.max(0, (c - 0.2) / 0.7)) ** 2);
-    const curves = part => [
-      ...measured.map(m => ({ id: "indirect", x: m.hz, y: m[part], style: INDIRECT, opacity: opacity(m) })),
-      ...shown.map(m => ({ id: m.method, x: hz, y: m[part], style: methodOf(m.method).style })),
-    ];
-    const units = [report.outputs[pair.output]?.unit, report.inputs[pair.input]?.unit];
-    const gain = units[0] && units[1] ? ` re ${prettyUnit(units[0])}/${prettyUnit(units[1])}` : "";
-    return stack(plotHost, {
-      label: `Bode diagram, ${title(pair)}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
-      x: { label: "Frequency", unit: "Hz", log: true }, shades: measured.flatMap(lowCoherence),
-      legend: [...regions.map(b => ({ id: `band-${b.method}`, name: `${methodOf(b.method).label}, ${+(100 * b.level).toPrecision(4)} %`, style: bandStyle(b) })), ...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
-      panels: [
-        { label: "Magnitude", unit: "dB", axisUnit: `dB${gain}`, height: 280, curves: [...regions.map(band), ...curves("magnitude_db")] },
-        { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
-        ...(measured.length ? [{ label: "Coherence γ²", short: "γ²", unit: "", height: 84, fixed: [0, 1.04],
-          curves: measured.map(m => ({ id: "indirect", x: m.hz, y: m.coherence, style: { ...INDIRECT, points: false, width: 1.2 } })) }] : []),
-      ],
-    });
-  });
-  if (pairs.length > 1) controls.append(chooser("Response of", pairs.map(title), k => { pair = pairs[k]; figure.draw(); tell(); }));
-  tell();
+  const measured = indirect.filter(same), shown = models.filter(same), regions = bands.filter(same);
+  const caption = `Frequency response, ${title}.` + (measured.length ? ` Points: indirect non-parametric response, estimated with the external excitation and without any model; the fainter a point, the lower its coherence. In shaded bands coherence is below ${FADED} and the points say little.` : "") +
+    (regions.length ? ` Filled: where the magnitude of ${regions.map(b => methodOf(b.method).label).join(" and of ")} lies with a probability of ${percent(regions[0].level)} at each frequency.` : "");
+  const curves = part => [
+    ...measured.map(m => ({ id: "indirect", x: m.hz, y: m[part], style: INDIRECT, opacity: m.coherence.map(opacityOf) })),
+    ...shown.map(m => ({ id: m.method, x: hz, y: m[part], style: methodOf(m.method).style })),
+  ];
+  return captioned(host, caption, plotHost => stack(plotHost, {
+    label: `Bode diagram, ${title}: magnitude and phase of ${shown.map(m => methodOf(m.method).label).join(", ")}${measured.length ? ", and the indirect response with its coherence" : ""}.`,
+    x: { label: "Frequency", unit: "Hz", log: true }, shades: measured.flatMap(lowCoherence),
+    legend: [...regions.map(bandEntry), ...(measured.length ? [{ id: "indirect", name: "indirect", style: INDIRECT }] : []), ...shown.map(m => ({ id: m.method, name: methodOf(m.method).label, style: methodOf(m.method).style }))],
+    panels: [
+      { label: "Magnitude", unit: "dB", axisUnit: gainUnit(pair), height: 280, curves: [...regions.map(b => band(b, `band-${b.method}`)), ...curves("magnitude_db")] },
+      { label: "Phase", unit: "deg", height: 200, steps: [5, 15, 30, 45, 90, 180, 360, 720], curves: curves("phase_deg") },
+      ...(measured.length ? [{ label: "Coherence γ²", short: "γ²", unit: "", height: 84, fixed: [0, 1.04],
+        curves: measured.map(m => ({ id: "indirect", x: m.hz, y: m.coherence, style: { ...INDIRECT, points: false, width: 1.2 } })) }] : []),
+    ],
+  }));
+}
+
+function gainUnit({ output, input }) {
+  const units = [report.outputs[output]?.unit, report.inputs[input]?.unit];
+  return units[0] && units[1] ? `dB re ${prettyUnit(units[0])}/${prettyUnit(units[1])}` : "dB";
+}
+
+// The principal gains: how strongly the plant answers in its strongest and its weakest direction.
+function singularValues(host) {
+  const { hz, singular } = report.frequency;
+  const regions = singular.filter(s => s.level != null), shown = [...new Set(singular.map(s => s.method))];
+  const caption = "Singular values of the response of all outputs from all inputs, in the units of the channels." +
+    (regions.length ? ` Filled: where those of ${[...new Set(regions.map(s => methodOf(s.method).label))].join(" and of ")} lie with a probability of ${percent(regions[0].level)} at each frequency; where two of them meet, the bounds say little.` : "");
+  return captioned(host, caption, plotHost => stack(plotHost, {
+    label: `Singular values over frequency: ${shown.map(key => methodOf(key).label).join(", ")}.`,
+    x: { label: "Frequency", unit: "Hz", log: true },
+    legend: [...regions.filter(s => s.place === 0).map(bandEntry), ...shown.map(key => ({ id: key, name: methodOf(key).label, style: methodOf(key).style }))],
+    panels: [{ label: "Singular values", unit: "dB", height: 340, curves: [...regions.map(s => band(s, `band-${s.method}`)),
+      ...singular.map(s => ({ id: s.method, x: hz, y: s.value_db, style: methodOf(s.method).style }))] }],
+  }));
 }
 
 // The scheme's own band has a colour of its own, that of another method its colour, faint.
 const faint = b => b.method !== "hansen";
 const bandStyle = b => ({ ...methodOf(b.method).style, width: 6, dash: [], points: false, ...(faint(b) ? {} : { colour: "--band" }) });
 
-// The region between the bounds of a magnitude, filled under the curves.
-function band(b) {
+const bandEntry = b => ({ id: `band-${b.method}`, name: `${methodOf(b.method).label}, ${percent(b.level)}`, style: bandStyle(b) });
+
+// The region between bounds, filled under the curves.
+function band(b, id) {
   const { hz } = report.frequency;
-  return { id: `band-${b.method}`, x: hz, y: b.high_db, style: bandStyle(b), draw: u => clipped(u, ctx => {
+  return { id, x: hz, y: b.high_db, style: bandStyle(b), draw: u => clipped(u, ctx => {
     const at = (values, k) => [u.valToPos(hz[k], "x", true), u.valToPos(values[k], "y", true)];
     const known = hz.map((_, k) => k).filter(k => b.low_db[k] != null && b.high_db[k] != null);
     ctx.fillStyle = colour(bandStyle(b).colour);

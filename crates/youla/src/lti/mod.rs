@@ -3,6 +3,7 @@
 mod connect;
 mod discretise;
 mod eigen;
+mod gains;
 mod initial;
 pub(crate) mod modes;
 mod norms;
@@ -17,6 +18,7 @@ mod zeros;
 
 pub(crate) use eigen::Eigen;
 pub use eigen::SharedMode;
+pub(crate) use gains::Gains;
 pub(crate) use initial::simulate_best;
 pub use modes::Mode;
 pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings, largest_singular_value};

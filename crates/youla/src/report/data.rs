@@ -34,8 +34,14 @@ pub struct ReportData {
     pub sample_time: Option<f64>,
     /// Models that are compared, in the order in which they are listed and drawn.
     pub methods: Vec<Method>,
-    /// The answer to "can I trust it?", in about five lines.
+    /// Tables that stand first, in place of the verdict: what a comparison of runs says.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub overview: Vec<EvidenceTable>,
+    /// The answer to "can I trust it?", in five lines.
     pub verdict: Vec<Verdict>,
+    /// What else was found, in lines of the same kind.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub further: Vec<Verdict>,
     /// What the user should know besides.
     pub notes: Vec<Note>,
     /// Fits on verification data.
@@ -191,6 +197,8 @@ pub enum Evidence {
     Stabilisation,
     /// Measured against predicted.
     Verification,
+    /// Tests of the residuals.
+    Residuals,
     /// Frequency responses.
     Frequency,
     /// Poles and modes.
@@ -557,9 +565,33 @@ pub struct FrequencyResponse {
     pub indirect: Vec<Indirect>,
     /// Bounds of magnitudes on the grid of the models.
     pub bands: Vec<Band>,
+    /// Singular values of models with several inputs and outputs, on the grid of the models.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub singular: Vec<SingularValue>,
 }
 
-/// Bounds of the magnitude of one model from one input to one output.
+/// One singular value of the response of one model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SingularValue {
+    /// Key of the method.
+    pub method: String,
+    /// Its place, 0 for the largest.
+    pub place: usize,
+    /// Its course, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub value_db: Vec<f64>,
+    /// Probability with which the bounds should hold the truth, at each frequency; absent without bounds.
+    pub level: Option<f64>,
+    /// Lower bound, dB; empty without bounds.
+    #[serde(with = "numbers::seven_digits")]
+    pub low_db: Vec<f64>,
+    /// Upper bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub high_db: Vec<f64>,
+}
+
+/// Bounds of the response of one model from one input to one output.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Band {
     /// Key of the method.
@@ -576,6 +608,10 @@ pub struct Band {
     /// Upper bound, dB.
     #[serde(with = "numbers::seven_digits")]
     pub high_db: Vec<f64>,
+    /// Region of the complex value: per frequency the entries rr, ri, ii of V in `d' V^-1 d <= 1`, d the real and imaginary
+    /// part of the distance from the response.
+    #[serde(default, with = "numbers::seven_digits", skip_serializing_if = "Vec::is_empty")]
+    pub region: Vec<f64>,
 }
 
 /// Response of one model from one input to one output.
@@ -616,13 +652,16 @@ pub struct Indirect {
     pub coherence: Vec<f64>,
 }
 
-/// Poles of one model, in z or, without a sample time, in rad/s.
+/// Poles and zeros of one model, in z or, without a sample time, in rad/s.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Poles {
     /// Key of the method.
     pub method: String,
     /// Real and imaginary parts.
     pub poles: Vec<[f64; 2]>,
+    /// Those of the finite invariant zeros, where the model has as many inputs as outputs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zeros: Vec<[f64; 2]>,
 }
 
 /// A mode of one model.

@@ -10,8 +10,10 @@ use super::{phase, tables};
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../../assets/report.html");
-const FIGURES: [&str; 3] = [
+const FIGURES: [&str; 5] = [
+    include_str!("../../assets/figures/plane.js"),
     include_str!("../../assets/figures/poles.js"),
+    include_str!("../../assets/figures/nyquist.js"),
     include_str!("../../assets/figures/stabilisation.js"),
     include_str!("../../assets/figures/report.js"),
 ];

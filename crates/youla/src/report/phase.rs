@@ -85,7 +85,7 @@ mod tests {
             coherence: vec![1.0; 100],
         };
         let models = vec![model("direct", &shifted), model("hansen", &wrapped)];
-        let mut response = FrequencyResponse { hz, models, indirect: vec![measured], bands: Vec::new() };
+        let mut response = FrequencyResponse { hz, models, indirect: vec![measured], ..FrequencyResponse::default() };
         align(&mut response, |key| if key == "hansen" { Role::Hansen } else { Role::Direct });
         for phase in [&response.models[0].phase_deg, &response.models[1].phase_deg, &response.indirect[0].phase_deg] {
             assert!(phase.iter().zip(&smooth).all(|(a, b)| (a - b).abs() < 1e-9));

@@ -139,18 +139,15 @@ impl RunCertificate {
         let band = self.band.as_ref()?;
         let level = 100.0 * band.level;
         let [low, high] = band.radius.bounds;
-        let interval =
-            format!("largest pole of the loop {:.5}, {level:.0} % interval {low:.5} to {high:.5}", band.radius.value);
+        let interval = format!("{level:.0} % interval of it {low:.5} to {high:.5}");
         Some(if band.holds() {
             format!(
-                "The controller stabilises every one of the {} models within the {level:.0} % region of S, at worst with a pole \
-                 of magnitude {:.5} ({interval}).",
+                "The controller stabilises every one of the {} models within the {level:.0} % region of S, at worst with {:.5} ({interval}).",
                 band.within, band.worst_within
             )
         } else {
             format!(
-                "The controller does not stabilise {} of the {} models within the {level:.0} % region of S, at worst with a pole \
-                 of magnitude {:.5} ({interval}).",
+                "The controller does not stabilise {} of the {} models within the {level:.0} % region of S, at worst with {:.5} ({interval}).",
                 band.unstable_within, band.within, band.worst_within
             )
         })

@@ -3,6 +3,7 @@
 mod artefacts;
 mod certificate;
 mod check;
+mod compare;
 mod controller_errors;
 mod demo;
 mod disturbance;
@@ -41,6 +42,7 @@ mod write;
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use certificate::{CertificateSettings, RunCertificate};
 pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, further, read_check_options};
+pub use compare::{Comparison, Distance, compare};
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};

@@ -1,27 +1,25 @@
 //! What the report of a run shows: plain data, drawn by [`crate::report`].
 
+mod frequency;
+
 use super::artefacts::pairs;
 use super::certificate::RunCertificate;
-use super::findings::{notes, verdict_lines};
+use super::findings::{further_lines, notes, verdict_lines};
 use super::grey_box::GreyBoxRun;
 use super::pipeline::{Identification, StageTimes};
 use super::records::{LoopRecord, channels_of};
 use super::redesign;
 use super::residual_tests::drawn as drawn_residuals;
-use super::response::{decibel, log_grid, model_responses};
 use super::robustness;
 use super::settings::Prediction;
 use super::stabilisation::drawn;
 use super::verdict::{Method, ModelVerdict};
 use crate::check::{Finding, Severity};
-use crate::identify::subspace::ResponseBand;
 use crate::identify::subspace::SubspaceModel;
-use crate::lti::FrequencyResponse;
 use crate::report::data::{self as draw, ReportData, Role, SignalKind};
 use crate::report::{Timeline, Trace};
 use crate::units::Channel;
-use crate::{Mat, Result, c64};
-use std::f64::consts::TAU;
+use crate::{Mat, Result};
 
 /// Collects what the report of a run shows; `run` names the run folder.
 ///
@@ -39,7 +37,9 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         outputs: found.records.outputs.clone(),
         sample_time: Some(found.records.time.ts()),
         methods: found.verdict.models.iter().map(|v| method(v.method)).collect(),
+        overview: Vec::new(),
         verdict: verdict_lines(found),
+        further: further_lines(found),
         notes: notes(found),
         fits: fits(found),
         findings: findings(found),
@@ -54,8 +54,8 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
             .map(|(k, r)| verification(found, k, r))
             .collect::<Result<_>>()?,
         residuals: drawn_residuals(found),
-        frequency: Some(frequency(found)?),
-        poles: found.verdict.models.iter().map(poles).collect(),
+        frequency: Some(frequency::drawn(found)?),
+        poles: found.verdict.models.iter().map(poles).collect::<Result<_>>()?,
         modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
         parameters: structure(found).map_or_else(|| Ok(Vec::new()), GreyBoxRun::rows)?,
         physical: structure(found).map(GreyBoxRun::shown),
@@ -241,92 +241,10 @@ fn verification(found: &Identification, k: usize, record: &LoopRecord) -> Result
     Ok(draw::Verification { record: record.name.clone(), prediction: prediction.into(), clock, outputs })
 }
 
-fn frequency(found: &Identification) -> Result<draw::FrequencyResponse> {
-    let responses = model_responses(found, log_grid(found))?;
-    let pairs = |method: Method, r: &FrequencyResponse| {
-        let entry = |(output, input): (usize, usize)| {
-            let values = r.entry(output, input);
-            draw::ModelResponse {
-                method: method.key().into(),
-                output,
-                input,
-                magnitude_db: magnitude(&values),
-                phase_deg: phase(&values),
-            }
-        };
-        ports(found).map(entry).collect::<Vec<_>>()
-    };
-    let models = responses.models.iter().flat_map(|(m, r)| pairs(*m, r)).collect();
-    let indirect = match &found.indirect {
-        None | Some(Err(_)) => Vec::new(),
-        Some(Ok(m)) => {
-            let hz: Vec<f64> = m.response.omega.iter().map(|w| w / TAU).collect();
-            let entry = |(output, input): (usize, usize)| {
-                let values = m.response.entry(output, input);
-                draw::Indirect {
-                    output,
-                    input,
-                    hz: hz.clone(),
-                    magnitude_db: magnitude(&values),
-                    phase_deg: phase(&values),
-                    coherence: m.coherence_y.col_as_slice(output).to_vec(),
-                }
-            };
-            ports(found).map(entry).collect()
-        }
-    };
-    Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect, bands: bands(found)? })
-}
-
-/// Bounds of the magnitudes of G(S) and of the physical structure. A bound of zero is drawn far below the curve.
-fn bands(found: &Identification) -> Result<Vec<draw::Band>> {
-    let mut all = Vec::new();
-    if let Some(uncertainty) = &found.uncertainty {
-        let level = found.settings.hansen.uncertainty.level;
-        all.extend(bands_of(found, Method::Hansen, &uncertainty.plant.response, level));
-    }
-    if let Some(known) = structure(found).and_then(|run| run.intervals.as_ref().ok()) {
-        let omega: Vec<f64> = log_grid(found).iter().map(|f| TAU * f).collect();
-        all.extend(bands_of(found, Method::GreyBox, &known.response(&omega)?, known.level));
-    }
-    Ok(all)
-}
-
-fn bands_of(found: &Identification, method: Method, band: &ResponseBand, level: f64) -> Vec<draw::Band> {
-    let entry = |(output, input): (usize, usize)| {
-        let places = 0..band.response.omega.len();
-        let bounds: Vec<[f64; 2]> = places.map(|k| band.magnitude[band.place(k, output, input)]).collect();
-        draw::Band {
-            method: method.key().into(),
-            output,
-            input,
-            level,
-            low_db: bounds.iter().map(|b| decibel(b[0].max(LEAST_BOUND * b[1]))).collect(),
-            high_db: bounds.iter().map(|b| decibel(b[1])).collect(),
-        }
-    };
-    ports(found).map(entry).collect()
-}
-
-/// Lowest bound that is drawn, over the upper one.
-const LEAST_BOUND: f64 = 1e-3;
-
-/// All pairs of output and input.
-fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (p, m) = (found.records.outputs.len(), found.records.inputs.len());
-    (0..p).flat_map(move |i| (0..m).map(move |j| (i, j)))
-}
-
-fn magnitude(values: &[c64]) -> Vec<f64> {
-    values.iter().map(|v| decibel(v.norm())).collect()
-}
-
-fn phase(values: &[c64]) -> Vec<f64> {
-    values.iter().map(|v| v.im.atan2(v.re).to_degrees()).collect()
-}
-
-fn poles(v: &ModelVerdict) -> draw::Poles {
-    draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles) }
+fn poles(v: &ModelVerdict) -> Result<draw::Poles> {
+    let square = v.model.inputs() == v.model.outputs();
+    let zeros = if square { pairs(&v.model.zeros()?) } else { Vec::new() };
+    Ok(draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles), zeros })
 }
 
 fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {

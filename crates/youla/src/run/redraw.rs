@@ -19,10 +19,13 @@ pub fn redraw(run: &Path) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// What the report of a run shows, from its `report.json`.
+/// The `report.json` of a run folder.
+///
+/// # Errors
+/// [`Error::MissingFile`], [`Error::NotAReport`], [`Error::Io`].
 pub(super) fn read_report(run: &Path) -> Result<ReportData> {
     let data = run.join("report.json");
     let mut text = String::new();
     open(&data)?.read_to_string(&mut text).map_err(|source| Error::Io { path: data.clone(), source })?;
-    serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data, source })
+    serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })
 }

@@ -83,14 +83,34 @@ pub(super) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result
     }
 }
 
-/// Frequencies in Hz, logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just below
-/// Nyquist.
-pub(super) fn log_grid(found: &Identification) -> Vec<f64> {
+/// Modes with less damping have frequencies of their own.
+const LIGHT: f64 = 0.1;
+
+/// Angles in degrees of the response of a mode, seen from its peak, at which it is evaluated.
+const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
+
+/// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
+/// below Nyquist, and around each lightly damped mode of the nominal model and of G(S), at `f (1 + zeta tan(angle))`: between
+/// the points of the logarithmic grid a peak would be cut off.
+///
+/// # Errors
+/// [`Error::NoConvergence`] of the eigenvalues.
+pub(super) fn grid(found: &Identification) -> Result<Vec<f64>> {
     let settings = &found.settings.frequency_response;
     let nyquist = 0.5 / found.records.time.ts();
-    let from = settings.from_hz.unwrap_or(nyquist / 300.0);
-    let (last, ratio) = (settings.points.max(2) - 1, 0.999 * nyquist / from);
-    (0..=last).map(|k| from * ratio.powf(k as f64 / last as f64)).collect()
+    let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
+    let last = settings.points.max(2) - 1;
+    let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
+    for model in [&found.factorisation.nominal, &found.hansen.plant] {
+        for mode in model.modes()?.into_iter().filter(|m| m.pole.im != 0.0 && m.zeta.abs() < LIGHT) {
+            let width = mode.zeta.abs().max(1e-5);
+            hz.extend(AROUND_A_PEAK.iter().map(|angle| mode.hz * (1.0 + width * angle.to_radians().tan())));
+        }
+    }
+    hz.retain(|f| (from..=to).contains(f));
+    hz.sort_by(f64::total_cmp);
+    hz.dedup_by(|b, a| *b - *a < 1e-9 * *a);
+    Ok(hz)
 }
 
 /// Magnitude in dB.

@@ -4,7 +4,7 @@ use super::artefacts::{SCHEMA, pairs};
 use super::certificate::RunCertificate;
 use super::pipeline::{Identification, StageTimes};
 use super::redesign;
-use super::response::{decibel, log_grid, model_responses};
+use super::response::{decibel, grid, model_responses};
 use super::robustness;
 use super::uncertainty::{summary_entry, with_deviations};
 use super::verdict::{Method, ModelVerdict};
@@ -113,7 +113,7 @@ fn fits(v: &ModelVerdict) -> Value {
 
 fn response_entry(found: &Identification) -> Result<Value> {
     let measured = found.indirect.as_ref().and_then(|r| r.as_ref().ok());
-    let hz = measured.map_or_else(|| log_grid(found), |m| m.response.omega.iter().map(|w| w / TAU).collect());
+    let hz = measured.map_or_else(|| grid(found), |m| Ok(m.response.omega.iter().map(|w| w / TAU).collect()))?;
     let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
     let mut entry = Map::new();
     if let Some(m) = measured {

@@ -1,7 +1,7 @@
 //! The uncertainty of S and G(S) in a run: regions of their frequency responses and intervals of their modes.
 
 use super::pipeline::Identification;
-use super::response::log_grid;
+use super::response::grid;
 use crate::Result;
 use crate::identify::subspace::{ModeBand, ResponseBand, Uncertainty};
 use serde_json::{Value, json};
@@ -35,7 +35,7 @@ pub(super) fn run_uncertainty(found: &Identification) -> Result<Option<RunUncert
     let (Some(s), Some(plant)) = (&found.hansen.deviation.uncertainty, &found.hansen.uncertainty) else {
         return Ok(None);
     };
-    let hz = log_grid(found);
+    let hz = grid(found)?;
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let of = |uncertainty: &Uncertainty| -> Result<Option<SystemUncertainty>> {
         let Some(response) = uncertainty.response(&omega)? else { return Ok(None) };
@@ -54,7 +54,7 @@ pub(super) fn run_uncertainty(found: &Identification) -> Result<Option<RunUncert
 pub(super) fn grey_box_uncertainty(found: &Identification) -> Result<Option<(Vec<f64>, SystemUncertainty)>> {
     let run = found.grey_box.as_ref().and_then(|run| run.as_ref().ok());
     let Some(known) = run.and_then(|run| run.intervals.as_ref().ok()) else { return Ok(None) };
-    let hz = log_grid(found);
+    let hz = grid(found)?;
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     Ok(Some((hz, SystemUncertainty { response: known.response(&omega)?, modes: known.modes()? })))
 }

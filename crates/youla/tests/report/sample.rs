@@ -152,6 +152,11 @@ fn report(plan: &Plan) -> ReportData {
         sample_time: Some(ts),
         methods: models.iter().map(|(method, _)| method.clone()).collect(),
         verdict: verdict(),
+        further: vec![Verdict {
+            status: Status::Bad,
+            text: "The peak sensitivity of the loop is 7.46.".into(),
+            evidence: Evidence::Margins,
+        }],
         notes: vec![
             Note { status: Status::Caution, text: "Input u was saturated in 0.3 % of the samples; the measured input was used.".into() },
             Note { status: Status::Info, text: "The first 500 samples of each record were skipped.".into() },
@@ -262,7 +267,8 @@ fn report(plan: &Plan) -> ReportData {
             gap_to_nominal: Some(0.0),
             gap_to_hansen: Some(1.0),
         });
-        data.poles.push(Poles { method: method.key.clone(), poles });
+        let zeros = if outputs == inputs { vec![[0.9, 0.1], [0.9, -0.1], [-2.5, 0.0]] } else { Vec::new() };
+        data.poles.push(Poles { method: method.key.clone(), poles, zeros });
     }
     for (method, label) in [("hansen", "S from alpha to beta"), ("direct", "G from u to y")] {
         let values = (0..24).map(|k| if k < 8 { 40.0 * 0.55f64.powi(k) } else { 0.04 * 0.96f64.powi(k) }).collect();
@@ -415,6 +421,9 @@ fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: us
         for input in 0..inputs {
             for (method, model) in models {
                 let values: Vec<c64> = hz.iter().map(|&f| model.response(f, output, input)).collect();
+                if method.key == "hansen" {
+                    response.bands.push(region(output, input, &values));
+                }
                 response.models.push(ModelResponse {
                     method: method.key.clone(),
                     output,
@@ -444,7 +453,25 @@ fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: us
             response.indirect.push(indirect);
         }
     }
+    if outputs.min(inputs) > 1 {
+        response.singular = (0..outputs.min(inputs)).map(|place| singular(&hz, place)).collect();
+    }
     response
+}
+
+/// A region of 5 % about each value.
+fn region(output: usize, input: usize, values: &[c64]) -> Band {
+    let db = |factor: f64| values.iter().map(|g| 20.0 * (factor * g.norm()).log10()).collect();
+    let circle = |g: &c64| [(0.05 * g.norm()).powi(2), 0.0, (0.05 * g.norm()).powi(2)];
+    let region = values.iter().flat_map(circle).collect();
+    Band { method: "hansen".into(), output, input, level: 0.95, low_db: db(0.95), high_db: db(1.05), region }
+}
+
+/// Made up: one curve above the other.
+fn singular(hz: &[f64], place: usize) -> SingularValue {
+    let value_db: Vec<f64> = hz.iter().map(|f| 20.0 - 10.0 * place as f64 - 5.0 * f.log10()).collect();
+    let (low_db, high_db) = value_db.iter().map(|v| (v - 1.0, v + 1.0)).unzip();
+    SingularValue { method: "hansen".into(), place, value_db, level: Some(0.95), low_db, high_db }
 }
 
 fn fit(measured: &[f64], residual: &[f64]) -> f64 {

@@ -109,7 +109,8 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
     text
 }
 
-fn percent(level: f64) -> String {
+/// A probability in percent.
+pub(super) fn percent(level: f64) -> String {
     let text = format!("{:.2}", 100.0 * level);
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
 }

@@ -95,6 +95,7 @@ impl FigureChoice {
         if let Some(frequency) = &mut data.frequency {
             frequency.models.retain(|model| keys.contains(&model.method));
             frequency.bands.retain(|band| keys.contains(&band.method));
+            frequency.singular.retain(|one| keys.contains(&one.method));
         }
     }
 }

@@ -8,6 +8,7 @@
 //! | `verification` | measured, predicted, residual |
 //! | `residuals` | correlations with the band of noise |
 //! | `bode`, `nyquist` | frequency responses |
+//! | `singular` | singular values over frequency |
 //! | `poles`, `pole_grid` | pole map and its grid |
 //! | `reduction` | error over order |
 //! | `choice` | the part of a run that is drawn |
@@ -20,6 +21,7 @@ mod pole_grid;
 mod poles;
 mod reduction;
 mod residuals;
+mod singular;
 mod stabilisation;
 #[cfg(test)]
 mod tests;
@@ -53,7 +55,9 @@ pub enum RunFigure {
     Bode,
     /// The same as loci.
     Nyquist,
-    /// Poles.
+    /// Singular values over frequency.
+    SingularValues,
+    /// Poles and zeros.
     Poles,
     /// Hankel singular values.
     Hankel,
@@ -65,7 +69,7 @@ pub enum RunFigure {
 
 impl RunFigure {
     /// All of them, in the order of the page.
-    pub const ALL: [RunFigure; 12] = [
+    pub const ALL: [RunFigure; 13] = [
         RunFigure::Data,
         RunFigure::Signals,
         RunFigure::Order,
@@ -74,6 +78,7 @@ impl RunFigure {
         RunFigure::Residuals,
         RunFigure::Bode,
         RunFigure::Nyquist,
+        RunFigure::SingularValues,
         RunFigure::Poles,
         RunFigure::Hankel,
         RunFigure::Reduction,
@@ -91,6 +96,7 @@ impl RunFigure {
             RunFigure::Residuals => "residuals",
             RunFigure::Bode => "bode",
             RunFigure::Nyquist => "nyquist",
+            RunFigure::SingularValues => "singular-values",
             RunFigure::Poles => "poles",
             RunFigure::Hankel => "hankel",
             RunFigure::Reduction => "reduction",
@@ -108,8 +114,9 @@ impl RunFigure {
             RunFigure::Verification => "measured, predicted and the residuals beneath",
             RunFigure::Residuals => "correlations of the residuals with the 99 % band of noise",
             RunFigure::Bode => "magnitude with bands, phase, and the coherence of the indirect response",
-            RunFigure::Nyquist => "the same responses as loci",
-            RunFigure::Poles => "poles with lines of constant frequency and damping ratio",
+            RunFigure::Nyquist => "the same responses as loci, with their regions",
+            RunFigure::SingularValues => "singular values of the whole response over frequency",
+            RunFigure::Poles => "poles and zeros with lines of constant frequency and damping ratio",
             RunFigure::Hankel => "Hankel singular values of the model that was reduced",
             RunFigure::Reduction => "error of the reduction over its order",
             RunFigure::Redesign => "the loop with the present and the new controller",
@@ -163,6 +170,7 @@ fn drawings(chosen: &Chosen, kind: RunFigure) -> Vec<RunDrawing> {
         RunFigure::Residuals => residuals::figures(chosen),
         RunFigure::Bode => bode::figures(chosen),
         RunFigure::Nyquist => nyquist::figures(chosen),
+        RunFigure::SingularValues => singular::figure(chosen),
         RunFigure::Poles => poles::figure(chosen),
         RunFigure::Hankel => order::hankel(chosen),
         RunFigure::Reduction => reduction::figure(chosen),

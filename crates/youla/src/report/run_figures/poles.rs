@@ -1,10 +1,12 @@
-//! Poles in the plane of z or s, near the boundary of stability and as a whole.
+//! Poles and invariant zeros in the plane of z or s, near the boundary of stability and as a whole.
 
 use super::choice::Chosen;
 use super::pole_grid::{Plane, grid};
 use super::{RunFigure, axis, key, span};
 use crate::report::data::Poles;
 use crate::report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
+
+const ZEROS: &str = " Filled: invariant zeros.";
 
 /// One figure of one or two panels.
 pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
@@ -25,7 +27,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
     vec![Figure {
         key: key(RunFigure::Poles, &[]),
         title: "Poles".into(),
-        caption: caption.into(),
+        caption: format!("{caption}{}", if sets.iter().any(|set| !set.zeros.is_empty()) { ZEROS } else { "" }),
         layout: Layout::Beside,
         panels: views(&plane, &all).into_iter().map(|(title, view)| panel(&plane, sets, title, view)).collect(),
     }]
@@ -39,6 +41,14 @@ fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> P
         y: set.poles.iter().map(|pole| pole[1]).collect(),
         ..Curve::default()
     };
+    let zeros = |set: &Poles| Curve {
+        method: set.method.clone(),
+        note: "zeros".into(),
+        drawn: Drawn::Dots,
+        x: set.zeros.iter().map(|zero| zero[0]).collect(),
+        y: set.zeros.iter().map(|zero| zero[1]).collect(),
+        ..Curve::default()
+    };
     let letter = if plane.sample_time.is_some() { "z" } else { "s" };
     let unit = if plane.sample_time.is_some() { "" } else { "rad/s" };
     let drawn = |part: &str, range| Axis { range: Some(range), ..axis(format!("{part} {letter}"), unit) };
@@ -46,7 +56,9 @@ fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> P
         title: title.into(),
         x: drawn("Re", x),
         y: drawn("Im", y),
-        content: Content::Curves(sets.iter().map(curve).collect()),
+        content: Content::Curves(
+            sets.iter().filter(|set| !set.zeros.is_empty()).map(zeros).chain(sets.iter().map(curve)).collect(),
+        ),
         guides: grid(plane, [x, y]),
         equal: true,
         ..Panel::default()

@@ -79,6 +79,7 @@ fn report() -> ReportData {
         level: 0.95,
         low_db: hz.iter().map(|f| -2.0 - 0.4 * f).collect(),
         high_db: hz.iter().map(|f| 2.0 - 0.4 * f).collect(),
+        region: hz.iter().flat_map(|_| [4e-4, 1e-4, 2e-4]).collect(),
     };
     let pole = |order: usize, hz: f64, standing| StabilisationPole {
         order,
@@ -141,9 +142,20 @@ fn report() -> ReportData {
             models: vec![model("nominal", 0), model("hansen", 0), model("hansen", 1)],
             indirect: vec![indirect(0), indirect(1)],
             bands: vec![band(0), band(1)],
-            ..FrequencyResponse::default()
+            singular: vec![SingularValue {
+                method: "hansen".into(),
+                value_db: vec![3.0; hz.len()],
+                level: Some(0.95),
+                low_db: vec![2.0; hz.len()],
+                high_db: vec![4.0; hz.len()],
+                ..SingularValue::default()
+            }],
         }),
-        poles: vec![Poles { method: "hansen".into(), poles: vec![[0.9, 0.3], [0.9, -0.3], [0.5, 0.0]] }],
+        poles: vec![Poles {
+            method: "hansen".into(),
+            poles: vec![[0.9, 0.3], [0.9, -0.3], [0.5, 0.0]],
+            zeros: vec![[0.2, 0.0]],
+        }],
         reduction: Some(Reduction {
             label: "G(S) by balanced truncation".into(),
             hankel: vec![3.0, 1.0, 0.2],
@@ -175,7 +187,7 @@ fn of<'a>(curves: &'a [Curve], method: &str) -> &'a Curve {
 fn every_figure_is_whole_in_every_size_and_always_the_same() {
     let data = report();
     let kinds = run_figures(&data).unwrap();
-    assert_eq!(kinds, RunFigure::ALL[..11]);
+    assert_eq!(kinds, RunFigure::ALL[..12]);
     for kind in kinds {
         for RunDrawing { figure, methods } in run_drawings(&data, kind, &FigureChoice::default()).unwrap() {
             for width_cm in [17.0, 8.5] {
@@ -213,7 +225,7 @@ fn responses_are_those_of_the_report() {
 
     let nyquist = &drawn(RunFigure::Nyquist, &FigureChoice::default())[0].figure;
     assert!(nyquist.panels[0].equal);
-    let locus = of(curves(nyquist, 0), "hansen");
+    let locus = curves(nyquist, 0).iter().find(|curve| curve.method == "hansen" && curve.note.is_empty()).unwrap();
     assert_eq!(locus.along, frequency.hz);
     for (k, (re, im)) in locus.x.iter().zip(&locus.y).enumerate() {
         let (db, deg) = (20.0 * re.hypot(*im).log10(), im.atan2(*re).to_degrees());
@@ -221,6 +233,17 @@ fn responses_are_those_of_the_report() {
         let turns = (deg - frequency.models[1].phase_deg[k]) / 360.0;
         assert!((turns - turns.round()).abs() < 1e-9);
     }
+    // Every point of an ellipse has d' V^-1 d = 1, V = [4 1; 1 2] 1e-4.
+    let region = curves(nyquist, 0).iter().find(|curve| curve.note == "95 %").unwrap();
+    for ((x, y), hz) in region.x.iter().zip(&region.y).zip(&region.along).filter(|((_, y), _)| y.is_finite()) {
+        let k = locus.along.iter().position(|f| f == hz).unwrap();
+        let (a, b) = (x - locus.x[k], y - locus.y[k]);
+        let size = (2.0 * a * a - 2.0 * a * b + 4.0 * b * b) / 7.0 / 1e-4;
+        assert!((size - 1.0).abs() < 1e-9, "{size}");
+    }
+    let singular = &drawn(RunFigure::SingularValues, &FigureChoice::default())[0].figure;
+    assert_eq!(curves(singular, 0)[0].y, frequency.singular[0].value_db);
+    assert_eq!(singular.panels[0].regions[0].low, frequency.singular[0].low_db);
 }
 
 #[test]
@@ -259,7 +282,9 @@ fn orders_poles_and_errors_are_those_of_the_report() {
     assert_eq!(of(curves(reduction, 0), "hansen_reduced").y, [0.3, 0.15, 0.3 / 3.0]);
     assert_eq!(reduction.panels[0].shades, [[0.5, 1.5]]);
     let poles = &drawn(RunFigure::Poles, &FigureChoice::default())[0].figure;
-    assert_eq!(of(curves(poles, 0), "hansen").x, [0.9, 0.9, 0.5]);
+    let [zeros, own] = curves(poles, 0) else { panic!("zeros and poles") };
+    assert_eq!((&own.x[..], &own.y[..]), (&[0.9, 0.9, 0.5][..], &[0.3, -0.3, 0.0][..]));
+    assert_eq!((zeros.note.as_str(), &zeros.x[..]), ("zeros", &[0.2][..]));
     let diagram = &drawn(RunFigure::Stabilisation, &FigureChoice::default())[0].figure;
     assert_eq!(
         (&of(curves(diagram, 1), "hansen").along[..], &of(curves(diagram, 1), "new").along[..]),

@@ -159,6 +159,9 @@ fn declared(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<Sta
     }
 }
 
+/// What stands for a record in findings on the settings.
+pub(super) const OF_SETTINGS: &str = "run.toml";
+
 /// Whether the direct method is one that feedback biases.
 fn method_finding(settings: &RunSettings) -> Option<Finding> {
     let direct = settings.direct.as_ref().filter(|direct| !direct.weight.is_for_closed_loops())?;
@@ -168,7 +171,7 @@ fn method_finding(settings: &RunSettings) -> Option<Finding> {
         "[direct] weight = \"{weight}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
     );
     let advice = "Take weight = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
-    Some(finding(Severity::Caution, "run.toml", what, advice))
+    Some(finding(Severity::Caution, OF_SETTINGS, what, advice))
 }
 
 /// A finding on the method or the record as a whole.

@@ -4,11 +4,11 @@ use super::super::delays::Shifted;
 use super::super::sampled::SampledSlope;
 use super::GreyBoxIntervals;
 use crate::identify::subspace::uncertainty::{
-    ellipse, magnitude_interval, mode_change, response_changes, two_sided_student, zero_changes,
+    Reach, ellipse, mode_change, response_changes, two_sided_student, zero_changes,
 };
 use crate::identify::subspace::{BlockInfluence, ModeBand, ResponseBand};
 use crate::lti::{Discrete, Eigen, Mode, StateSpace, frequency_response};
-use crate::{Mat, Result, c64};
+use crate::{Mat, Result};
 
 impl GreyBoxIntervals {
     /// The frequency response of the plant at the angular frequencies `omega`, rad/s, with its regions.
@@ -17,24 +17,9 @@ impl GreyBoxIntervals {
     /// As [`frequency_response`].
     pub fn response(&self, omega: &[f64]) -> Result<ResponseBand> {
         let response = frequency_response(&self.model, omega)?;
-        let half = self.half_width();
-        let (mut covariance, mut magnitude) = (Vec::new(), Vec::new());
-        for (w, at) in omega.iter().zip(response.iter()) {
-            let slopes = response_changes(&self.model, &self.slopes, *w);
-            let values = at.col_iter().flat_map(|column| column.iter().copied().collect::<Vec<c64>>());
-            for (entry, value) in values.enumerate() {
-                let parts: Vec<[f64; 2]> = slopes.iter().map(|slope| [slope[entry].re, slope[entry].im]).collect();
-                let v = self.variances(&parts);
-                covariance.push(v);
-                magnitude.push(magnitude_interval(value, &v, half));
-            }
-        }
-        Ok(ResponseBand {
-            response,
-            covariance,
-            magnitude,
-            ellipse: ellipse(self.level, self.degrees_of_freedom as f64),
-        })
+        let reach = Reach { student: self.half_width(), ellipse: ellipse(self.level, self.degrees_of_freedom as f64) };
+        let changes = |w: f64| response_changes(&self.model, &self.slopes, w);
+        ResponseBand::by_changes(response, changes, |slopes| self.variances(slopes), reach)
     }
 
     /// The modes of the plant with their intervals, in the order of [`StateSpace::modes`]; those of delays have none.

@@ -150,14 +150,28 @@ impl Bootstrap {
     /// As [`frequency_response`].
     pub fn response(&self, omega: &[f64]) -> Result<ResponseBand> {
         let response = frequency_response(&self.model, omega)?;
-        let all: Vec<Vec<c64>> =
-            self.replicates.par_iter().filter_map(|r| Some(values(&frequency_response(r, omega).ok()?))).collect();
+        let drawn: Vec<FrequencyResponse> =
+            self.replicates.par_iter().filter_map(|r| frequency_response(r, omega).ok()).collect();
+        let all: Vec<Vec<c64>> = drawn.iter().map(values).collect();
         let places = values(&response).len();
         let of = |place: usize| all.iter().map(|r| r[place]).collect::<Vec<c64>>();
         let covariance = (0..places).map(|place| covariance(&of(place))).collect();
         let magnitude =
             (0..places).map(|place| interval(of(place).iter().map(|g| g.norm()).collect(), self.level)).collect();
-        Ok(ResponseBand { response, covariance, magnitude, ellipse: ellipse(self.level, all.len() as f64 - 1.0) })
+        let gains = self.gains(&response, &drawn)?;
+        let ellipse = ellipse(self.level, all.len() as f64 - 1.0);
+        Ok(ResponseBand { response, covariance, magnitude, gains, ellipse })
+    }
+
+    /// The singular values of a response with percentiles over those of the replicates, rank by rank.
+    fn gains(&self, response: &FrequencyResponse, drawn: &[FrequencyResponse]) -> Result<Vec<Vec<[f64; 3]>>> {
+        let drawn: Vec<Vec<Vec<f64>>> = drawn.iter().map(FrequencyResponse::gains).collect::<Result<_>>()?;
+        let bounds = |k: usize, j: usize, value: f64| {
+            let [low, high] = interval(drawn.iter().map(|d| d[k][j]).collect(), self.level);
+            [value, low, high]
+        };
+        let found = response.gains()?.into_iter().enumerate();
+        Ok(found.map(|(k, at)| at.into_iter().enumerate().map(|(j, value)| bounds(k, j, value)).collect()).collect())
     }
 
     /// The modes in the order of [`StateSpace::modes`], with percentiles over the nearest modes of the replicates.

@@ -17,6 +17,7 @@ mod student;
 mod tests;
 mod zeros;
 
+pub(crate) use band::Reach;
 pub use band::{ModeBand, ResponseBand};
 pub use bootstrap::Bootstrap;
 pub use delta::{BlockInfluence, Delta};
@@ -24,7 +25,7 @@ pub use evidence::Evidence;
 pub use figures::{Draw, Interval};
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 pub(super) use poles::pole_deviations;
-pub(crate) use response::{magnitude_interval, mode_change, response_changes};
+pub(crate) use response::{mode_change, response_changes};
 pub(crate) use student::{ellipse, student, two_sided_student};
 pub(crate) use zeros::zero_changes;
 

@@ -5,12 +5,11 @@
 //! dlambda = w' dA v / (w' v)  for the left and right eigenvectors of a pole
 //! ```
 
-use super::band::{ModeBand, ResponseBand};
+use super::band::{ModeBand, Reach, ResponseBand};
 use super::delta::{BlockInfluence, Delta};
 use crate::lti::{Discrete, Eigen, Mode, StateSpace, TimeDomain, frequency_response};
 use crate::{Mat, MatRef, Result, c64};
 use faer::prelude::*;
-use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 impl Delta {
@@ -20,22 +19,12 @@ impl Delta {
     /// As [`frequency_response`].
     pub fn response(&self, omega: &[f64]) -> Result<ResponseBand> {
         let response = frequency_response(&self.model, omega)?;
-        let size = self.model.outputs() * self.model.inputs();
-        let covariance: Vec<[f64; 3]> = omega
-            .par_iter()
-            .flat_map_iter(|w| {
-                let changes = self.response_changes(*w);
-                (0..size).map(move |entry| {
-                    let parts: Vec<Vec<f64>> = changes.iter().map(|d| vec![d[entry].re, d[entry].im]).collect();
-                    let v = self.covariance(&parts);
-                    [v[(0, 0)], v[(0, 1)], v[(1, 1)]]
-                })
-            })
-            .collect();
-        let values = response.iter().flat_map(|at| at.col_iter().flat_map(|c| c.iter().copied()).collect::<Vec<_>>());
-        let student = self.student();
-        let magnitude = values.zip(&covariance).map(|(g, v)| magnitude_interval(g, v, student)).collect();
-        Ok(ResponseBand { response, covariance, magnitude, ellipse: self.ellipse() })
+        let covariance = |changes: &[[f64; 2]]| {
+            let v = self.covariance(&changes.iter().map(|c| c.to_vec()).collect::<Vec<_>>());
+            [v[(0, 0)], v[(0, 1)], v[(1, 1)]]
+        };
+        let reach = Reach { student: self.student(), ellipse: self.ellipse() };
+        ResponseBand::by_changes(response, |w| self.response_changes(w), covariance, reach)
     }
 
     /// The change of the response with each block at one frequency, rad/s; p m numbers, column by column.
@@ -83,7 +72,7 @@ pub(crate) fn response_changes(model: &StateSpace<Discrete>, changes: &[BlockInf
 }
 
 /// `|g| -+ t sigma`, sigma that of the part of the error along g.
-pub(crate) fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
+pub(super) fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2] {
     let size = g.norm();
     let (r, i) = if size > 0.0 { (g.re / size, g.im / size) } else { (1.0, 0.0) };
     let half = student * (r * r * v[0] + 2.0 * r * i * v[1] + i * i * v[2]).max(0.0).sqrt();

@@ -1,0 +1,71 @@
+//! `youla compare`: finished runs beside each other.
+
+use crate::args::Args;
+use crate::output::{Failure, say};
+use crate::table::aligned;
+use clap::Args as ClapArgs;
+use std::path::PathBuf;
+use youla::Error;
+use youla::export::write_export;
+use youla::report::data::EvidenceTable;
+use youla::report::html;
+use youla::run::{Comparison, compare};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  youla compare runs/before-001 runs/after-001
+  youla compare runs/order-*-001 --model hansen_reduced --out orders.html";
+
+/// Which runs.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct CompareArgs {
+    /// Run folders, the first of which the others are held against.
+    #[arg(value_name = "RUN", required = true, num_args = 2..)]
+    runs: Vec<PathBuf>,
+    /// Model of each run: hansen, or hansen_reduced, direct, grey_box, nominal.
+    #[arg(long, value_name = "NAME", default_value = "hansen")]
+    model: String,
+    /// Page to write; its data stand beside it as JSON.
+    #[arg(long, value_name = "FILE", default_value = "comparison.html")]
+    out: PathBuf,
+    /// Replace the files if they are there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Writes page and data and prints the tables.
+pub(crate) fn run(args: &Args, asked: &CompareArgs) -> Result<(), Failure> {
+    let data = asked.out.with_extension("json");
+    for path in [&asked.out, &data] {
+        if path.exists() && !asked.force {
+            return Err(Error::FileExists { path: path.clone() }.into());
+        }
+    }
+    let found = compare(&asked.runs, &asked.model)?;
+    let json = serde_json::to_string(&found).map_err(|source| Error::ReportData { source })?;
+    write_export(&data, json.as_bytes(), asked.force)?;
+    write_export(&asked.out, html(&found.report)?.as_bytes(), asked.force)?;
+    match (args.json, args.quiet) {
+        (true, _) => say(&json),
+        (_, true) => Ok(()),
+        _ => say(&text(&found, asked)),
+    }
+}
+
+fn text(found: &Comparison, asked: &CompareArgs) -> String {
+    let mut text = String::new();
+    for table in &found.report.overview {
+        text += &format!("{}\n{}\n", table.title, as_text(table));
+    }
+    for note in &found.report.notes {
+        text += &format!("caution: {}\n", note.text);
+    }
+    text + &format!("report: {}", asked.out.display())
+}
+
+fn as_text(table: &EvidenceTable) -> String {
+    match table.rows.is_empty() {
+        true => format!("{}\n", table.text),
+        false => aligned(&[std::slice::from_ref(&table.columns), &table.rows].concat()),
+    }
+}

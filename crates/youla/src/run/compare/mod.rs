@@ -1,0 +1,102 @@
+//! Several finished runs beside each other: fits, modes, responses and settings, and the distance of the models.
+//!
+//! A comparison is a report whose methods are the runs, so that one page draws both. Everything comes from the run folders
+//! (`report.json`, `summary.json`, the models); nothing is identified again.
+
+mod distances;
+mod figures;
+mod run;
+mod settings;
+mod tables;
+
+pub use distances::Distance;
+
+use crate::report::data::{Method, ReportData, Role, Source};
+use crate::{Error, Result};
+use run::FinishedRun;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Roles give each run a colour, dash and marker of its own.
+const ROLES: [Role; 6] =
+    [Role::Hansen, Role::Direct, Role::HansenReduced, Role::Pem, Role::HansenPem, Role::PemMultiStart];
+
+/// What a comparison found.
+#[derive(Debug, Clone, Serialize)]
+pub struct Comparison {
+    /// Names of the runs.
+    pub runs: Vec<String>,
+    /// Key of the model that is compared.
+    pub model: String,
+    /// The nu-gap of each pair, the first run of a pair before the second.
+    pub distances: Vec<Distance>,
+    /// The page as data.
+    pub report: ReportData,
+}
+
+/// Compares one model (`hansen`, `hansen_reduced`, `direct`, `nominal`, `grey_box`) of several runs of one machine.
+///
+/// Responses are evaluated again from the models on the frequencies of all runs together. Runs must have the same numbers of
+/// inputs and outputs; differing names, units, records and sample times are said on the page.
+///
+/// # Errors
+/// [`Error::OutOfRange`] for fewer than two runs, [`Error::NotAReport`], [`Error::MissingFile`], [`Error::NotAModel`] for
+/// folders that are no finished runs, [`Error::UnknownChannel`] for a model that a run does not hold, [`Error::Ports`] where the
+/// runs have different numbers of channels; those of the frequency responses.
+///
+/// ```no_run
+/// let found = youla::run::compare(&["runs/before-001".into(), "runs/after-001".into()], "hansen")?;
+/// std::fs::write("comparison.html", youla::report::html(&found.report)?).expect("the folder can be written");
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn compare(folders: &[PathBuf], model: &str) -> Result<Comparison> {
+    if folders.len() < 2 {
+        let what = "the number of runs to compare".into();
+        return Err(Error::OutOfRange { what, value: folders.len() as f64, must: "at least 2" });
+    }
+    let runs = run::read(folders, model)?;
+    let distances = distances::distances(&runs);
+    let report = page(&runs, model, &distances)?;
+    Ok(Comparison { runs: runs.into_iter().map(|r| r.name).collect(), model: model.to_owned(), distances, report })
+}
+
+fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<ReportData> {
+    let first = &runs[0].report;
+    let label = |key: &str| first.methods.iter().find(|m| m.key == key).map_or(key.to_owned(), |m| m.label.clone());
+    let same_time = runs.iter().all(|r| r.report.sample_time == first.sample_time);
+    Ok(ReportData {
+        title: format!("Comparison of {} runs", runs.len()),
+        summary: format!("{} of each run, side by side.", label(model)),
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        sources: runs.iter().flat_map(sources).collect(),
+        inputs: first.inputs.clone(),
+        outputs: first.outputs.clone(),
+        sample_time: first.sample_time.filter(|_| same_time),
+        methods: runs.iter().enumerate().map(|(k, r)| method(k, r)).collect(),
+        overview: vec![
+            tables::overview(runs, model),
+            tables::modes(runs, model),
+            distances::table(runs, distances),
+            settings::differences(runs)?,
+        ],
+        notes: tables::notes(runs),
+        fits: runs.iter().flat_map(|r| r.fits(model)).collect(),
+        verification: figures::verification(runs, model),
+        frequency: Some(figures::frequency(runs, model)?),
+        poles: runs.iter().map(|r| figures::poles(r, same_time)).collect::<Result<_>>()?,
+        modes: runs.iter().flat_map(|r| r.modes(model)).collect(),
+        certificates: runs.iter().flat_map(|r| r.certificates(model)).collect(),
+        margins: runs.iter().flat_map(|r| r.margins(model)).collect(),
+        margins_caption: "The gaps are those of each run to its own nominal model and G(S), in its own scales.".into(),
+        ..ReportData::default()
+    })
+}
+
+fn method(place: usize, run: &FinishedRun) -> Method {
+    Method::new(&run.key, &run.name, ROLES.get(place).copied().unwrap_or(Role::Other))
+}
+
+fn sources(run: &FinishedRun) -> Vec<Source> {
+    let of = |s: &Source| Source { purpose: format!("{}: {}", run.name, s.purpose), ..s.clone() };
+    run.report.sources.iter().map(of).collect()
+}

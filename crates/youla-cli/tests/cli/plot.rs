@@ -132,6 +132,9 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
         let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
         refused_by(command.args(arguments).args(["--out", "new/figures"]), &folder, 2, evidence);
     }
+    fs::create_dir_all(folder.join("taken/hankel.csv")).expect("a folder");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
+    refused_by(command.args(["plot", run, "hankel", "--out", "taken"]), &folder, 2, &["taken/hankel.csv"]);
     fs::write(folder.join("file"), "mine").expect("writable");
     let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
     refused_by(command.args(["plot", run, "hankel", "--out", "file/figures"]), &folder, 2, &["file/figures"]);

@@ -149,7 +149,14 @@ pub(super) fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Resul
     let written = fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source });
     let written = written.and_then(|()| {
         files.iter().try_for_each(|(name, bytes)| {
-            fs::write(partial(name), bytes).map_err(|source| Error::Io { path: folder.join(name), source })
+            // A file cannot take the place of a folder, which would be found only when others have been moved.
+            let place = match folder.join(name).is_dir() {
+                true => Err(std::io::ErrorKind::IsADirectory.into()),
+                false => Ok(()),
+            };
+            place
+                .and_then(|()| fs::write(partial(name), bytes))
+                .map_err(|source| Error::Io { path: folder.join(name), source })
         })
     });
     let moved = written.and_then(|()| {

@@ -86,13 +86,14 @@ pub(super) fn draw(
     draw_lines(canvas, curves, (x, y), frame, &strips, (styles, legend));
     for curve in curves.iter().filter(|curve| matches!(curve.drawn, Drawn::Dots | Drawn::Marks)) {
         let style = styles.of(&curve.method);
+        let marker = if curve.drawn == Drawn::Dots { style.marker.solid() } else { style.marker };
         let mut path = Path::default();
         for (at, value) in points(curve, x) {
             if let Place::Inside(height) = y.place(value) {
-                style.marker.add(&mut path, (at, height), LARGE);
+                marker.add(&mut path, (at, height), LARGE);
             }
         }
-        let paint = style.marker.large(style.colour, curve.drawn == Drawn::Dots);
+        let paint = marker.large(style.colour, curve.drawn == Drawn::Dots);
         canvas.path(path, &Paint { of: Some((&curve.method, "marks")), ..paint });
     }
 }

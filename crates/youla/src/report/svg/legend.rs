@@ -177,7 +177,8 @@ impl<'a> Legend<'a> {
             draw_marker(canvas, style.marker, middle, 2.0 * POINT, &paint);
         }
         if swatch.dots || swatch.marks {
-            draw_marker(canvas, style.marker, middle, LARGE, &style.marker.large(style.colour, swatch.dots));
+            let marker = if swatch.dots { style.marker.solid() } else { style.marker };
+            draw_marker(canvas, marker, middle, LARGE, &marker.large(style.colour, swatch.dots));
         }
     }
 }

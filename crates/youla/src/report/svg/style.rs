@@ -142,9 +142,18 @@ impl Marker {
         }
     }
 
+    /// A shape that can be filled, and so be told from its outline.
+    pub(super) fn solid(self) -> Self {
+        match self {
+            Marker::Plus => Marker::Up,
+            Marker::Cross => Marker::Down,
+            other => other,
+        }
+    }
+
     /// The same for large points, filled or as outlines.
     pub(super) fn large(self, colour: &str, filled: bool) -> Paint<'_> {
-        let fill = if filled && !matches!(self, Marker::Plus | Marker::Cross) { colour } else { "" };
+        let fill = if filled { colour } else { "" };
         Paint { fill, stroke: colour, width: 0.7, ..Paint::default() }
     }
 

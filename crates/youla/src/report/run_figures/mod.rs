@@ -129,7 +129,7 @@ impl RunFigure {
 pub struct RunDrawing {
     /// The figure; its key names its files.
     pub figure: Figure,
-    /// As [`super::svg`] and [`super::figure_csv`] take them.
+    /// As [`super::svg()`] and [`super::figure_csv`] take them.
     pub methods: Vec<Method>,
 }
 

@@ -101,7 +101,7 @@ pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
 /// The same in another size or without the font.
 ///
 /// # Errors
-/// Those of [`svg`]; [`Error::OutOfRange`] for a size without room for the panels and their labels.
+/// Those of [`svg()`]; [`Error::OutOfRange`] for a size without room for the panels and their labels.
 ///
 /// ```
 /// use youla::report::{Figure, Print, figure::Panel, svg_for};

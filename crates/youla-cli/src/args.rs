@@ -34,6 +34,8 @@ Examples:
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
   youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
+  youla plot runs/demo-gas-bearing-001 bode --width 8.5
+                                               figures for a paper, from the same data
   youla compare runs/before-001 runs/after-001 two runs side by side
   youla export runs/demo-gas-bearing-001 --to python
                                                the model as a script for python-control; also npz, matlab, C99
@@ -113,6 +115,12 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
+    /// Draw figures of a run for papers: SVG, PNG, and the numbers as CSV.
+    ///
+    /// Without a figure the figures that the run has are listed. Sizes are those on paper; text has 9 points in every size. SVG and PNG
+    /// hold the same font on every machine.
+    #[command(after_help = crate::plot::EXAMPLES)]
+    Plot(crate::plot::PlotArgs),
     /// Hold finished runs against each other: models, modes, distances, fits, settings, on one page.
     #[command(after_help = crate::compare::EXAMPLES)]
     Compare(crate::compare::CompareArgs),

@@ -8,6 +8,7 @@ use crate::init;
 use crate::manual;
 use crate::output::{Failure, Progress, say};
 use crate::paper;
+use crate::plot;
 use crate::starts;
 use crate::subspace;
 use crate::table;
@@ -44,6 +45,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         Command::Report { run } => report(args, run),
         Command::Compare(asked) => compare::run(args, asked),
         Command::Export(asked) => export::export(args, asked),
+        Command::Plot(asked) => plot::plot(args, asked),
         Command::Paper(asked) => paper::reproduce(args, asked),
         Command::Study(StudyCommand::Starts(asked)) => starts::count(args, asked),
         Command::Study(StudyCommand::Merge { parts, out }) => paper::merge_parts(args, parts, out.as_deref()),

@@ -10,6 +10,8 @@ mod init;
 mod manual;
 mod output;
 mod paper;
+mod plot;
+mod raster;
 mod starts;
 mod subspace;
 mod table;

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use youla::identify::subspace::Weight;
 use youla::report::data::{Method, Role};
-use youla::report::figure::{Axis, Content, Curve, Drawn, Figure, Panel};
+use youla::report::figure::{Axis, Content, Curve, Figure, Panel};
 use youla::report::{figure_csv, svg};
 use youla::{Mat, Result};
 
@@ -53,13 +53,8 @@ fn main() -> Result<()> {
         println!("{samples:7} {}", row.join(" "));
     }
     let x = SAMPLES.map(|samples| samples as f64).to_vec();
-    let curve = |method: &Method, y: Vec<f64>| Curve {
-        method: method.key.clone(),
-        note: String::new(),
-        drawn: Drawn::Line,
-        x: x.clone(),
-        y,
-    };
+    let curve =
+        |method: &Method, y: Vec<f64>| Curve { method: method.key.clone(), x: x.clone(), y, ..Curve::default() };
     let mut curves: Vec<Curve> = estimated.iter().zip(errors).map(|(method, errors)| curve(method, errors)).collect();
     curves.push(curve(&methods[4], x.iter().map(|n| 0.15 * (16_000.0 / n).sqrt()).collect()));
     let axis = |label: &str| Axis { label: label.into(), log: true, ..Axis::default() };

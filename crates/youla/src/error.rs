@@ -480,6 +480,12 @@ pub enum Error {
         /// What to do instead.
         remedy: &'static str,
     },
+    /// Of a figure of a run nothing is left to draw.
+    #[error("nothing of the figure {figure:?} is chosen; choose other outputs, inputs, records or methods")]
+    NothingToDraw {
+        /// Its name.
+        figure: String,
+    },
     /// A channel, column or variable was asked for that does not exist.
     #[error("{what} has no {name:?}{}; known: {}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default(), Names(known))]
     UnknownChannel {

@@ -9,5 +9,6 @@ mod compare;
 mod contract;
 mod export;
 mod init;
+mod plot;
 mod subspace;
 mod verbs;

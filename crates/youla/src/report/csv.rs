@@ -1,19 +1,22 @@
 //! The numbers behind a figure or a table, for other programs.
 
 use super::data::Method;
-use super::figure::{Cells, Content, Curve, Figure, Panel, Sample};
+use super::figure::{Cells, Content, Curve, Figure, Panel, Region, Sample};
 use super::story::Table;
 
 /// All columns that a figure may have; a file holds those of the kinds of panel that the figure has.
-const COLUMNS: [&str; 12] =
-    ["panel", "method", "note", "x", "y", "value", "row", "column", "winner", "strength", "text", "detail"];
+const COLUMNS: [&str; 15] = [
+    "panel", "method", "note", "x", "y", "along", "low", "high", "value", "row", "column", "winner", "strength",
+    "text", "detail",
+];
 
 /// One line of a file, by the places of its columns.
 type Line = Vec<(usize, String)>;
 
 /// The numbers of a figure as CSV.
 ///
-/// One line per point of a curve (`panel,method,note,x,y`), value of a box (`panel,method,note,value`) or cell of a map
+/// One line per point of a curve (`panel,method,note,x,y`, and `along` where a curve of the file has it), place of an area
+/// (`panel,method,note,x,low,high`), value of a box (`panel,method,note,value`) or cell of a map
 /// (`panel,row,column,winner,strength,text,detail`); a figure with several kinds of panel has the columns of all of them,
 /// empty where they do not apply. All values are there, none is thinned. Methods appear by their labels, panels by their
 /// titles or, where these do not tell them apart, by their numbers from 1. Numbers are the shortest that read back as they
@@ -34,7 +37,7 @@ pub fn figure_csv(figure: &Figure, methods: &[Method]) -> String {
     };
     let names = panel_names(&figure.panels);
     let lines = figure.panels.iter().zip(&names).flat_map(|(panel, name)| lines(panel, name, &label));
-    let present = |place: &usize| figure.panels.iter().any(|panel| columns(&panel.content).contains(place));
+    let present = |place: &usize| figure.panels.iter().any(|panel| columns(panel).contains(place));
     let kept: Vec<usize> = (0..COLUMNS.len()).filter(present).collect();
     let header = kept.iter().map(|&place| COLUMNS[place].to_owned()).collect();
     written(std::iter::once(header).chain(lines.map(|line| {
@@ -82,13 +85,26 @@ fn panel_names(panels: &[Panel]) -> Vec<String> {
 }
 
 /// Places of the columns that a kind of panel has.
-fn columns(content: &Content) -> &'static [usize] {
+fn columns(panel: &Panel) -> Vec<usize> {
+    let mut places = of_content(&panel.content).to_vec();
+    if matches!(&panel.content, Content::Curves(curves) if curves.iter().any(|curve| !curve.along.is_empty())) {
+        places.push(5);
+    }
+    if !panel.regions.is_empty() {
+        places.extend(OF_REGIONS);
+    }
+    places
+}
+
+fn of_content(content: &Content) -> &'static [usize] {
     match content {
         Content::Curves(_) => &[0, 1, 2, 3, 4],
-        Content::Boxes(_) => &[0, 1, 2, 5],
-        Content::Cells(_) => &[0, 6, 7, 8, 9, 10, 11],
+        Content::Boxes(_) => &[0, 1, 2, 8],
+        Content::Cells(_) => &[0, 9, 10, 11, 12, 13, 14],
     }
 }
+
+const OF_REGIONS: [usize; 6] = [0, 1, 2, 3, 6, 7];
 
 fn lines(panel: &Panel, name: &str, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     let fields: Vec<Vec<String>> = match &panel.content {
@@ -96,15 +112,33 @@ fn lines(panel: &Panel, name: &str, label: &dyn Fn(&str) -> String) -> Vec<Line>
         Content::Boxes(samples) => samples.iter().flat_map(|sample| values(sample, label)).collect(),
         Content::Cells(cells) => map(cells, label),
     };
-    let places = columns(&panel.content);
-    let line =
-        |fields: Vec<String>| places.iter().copied().zip(std::iter::once(name.to_owned()).chain(fields)).collect();
-    fields.into_iter().map(line).collect()
+    let regions = panel.regions.iter().flat_map(|region| edges(region, label));
+    let line = |places: &[usize], fields: Vec<String>| -> Line {
+        places.iter().copied().zip(std::iter::once(name.to_owned()).chain(fields)).collect()
+    };
+    // A fifth field belongs to a point of a curve.
+    let places: Vec<usize> = match of_content(&panel.content) {
+        places @ [0, 1, 2, 3, 4] => places.iter().copied().chain([5]).collect(),
+        places => places.to_vec(),
+    };
+    fields.into_iter().map(|f| line(&places, f)).chain(regions.map(|f| line(&OF_REGIONS, f))).collect()
 }
 
 fn points(curve: &Curve, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
-    let line = |(x, y): (&f64, &f64)| vec![label(&curve.method), curve.note.clone(), number(*x), number(*y)];
-    curve.x.iter().zip(&curve.y).map(line).collect()
+    let along = curve.along.iter().copied().map(Some).chain(std::iter::repeat(None));
+    let line = |((x, y), along): ((&f64, &f64), Option<f64>)| {
+        let point = [number(*x), number(*y)].into_iter().chain(along.map(number));
+        [label(&curve.method), curve.note.clone()].into_iter().chain(point).collect()
+    };
+    curve.x.iter().zip(&curve.y).zip(along).map(line).collect()
+}
+
+fn edges(region: &Region, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
+    let edges = region.low.iter().zip(&region.high);
+    let line = |(x, (low, high)): (&f64, (&f64, &f64))| {
+        vec![label(&region.method), region.note.clone(), number(*x), number(*low), number(*high)]
+    };
+    region.x.iter().zip(edges).map(line).collect()
 }
 
 fn values(sample: &Sample, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
@@ -143,7 +177,7 @@ fn written(lines: impl Iterator<Item = Vec<String>>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::{Cell, Drawn};
+    use super::super::figure::Cell;
     use super::super::story::Row;
     use super::*;
 
@@ -161,7 +195,7 @@ mod tests {
         let y = vec![0.1 + 0.2, f64::NAN, -1.0 / 3.0, 1e300, 5e-324, -0.0, f64::NEG_INFINITY];
         let x: Vec<f64> = (0..y.len()).map(|k| k as f64 * 0.1).collect();
         let curve =
-            Curve { method: "pem".into(), note: "a, \"b\"".into(), drawn: Drawn::Line, x: x.clone(), y: y.clone() };
+            Curve { method: "pem".into(), note: "a, \"b\"".into(), x: x.clone(), y: y.clone(), ..Curve::default() };
         let figure = Figure { panels: vec![panel("one", Content::Curves(vec![curve]))], ..Figure::default() };
         let lines = read(&figure_csv(&figure, &[Method::pem()]));
         assert_eq!(lines[0], ["panel", "method", "note", "x", "y"]);
@@ -190,6 +224,19 @@ mod tests {
         );
         assert_eq!(lines[1], ["1", "", "", "", "r", "c", "Hansen G(S)", "0.5", "+12", "clear"]);
         assert_eq!(lines[2], ["2", "unknown", "", "2", "", "", "", "", "", ""]);
+    }
+
+    #[test]
+    fn areas_and_what_belongs_to_a_point_have_columns_of_their_own() {
+        let curve = Curve { method: "pem".into(), x: vec![1.0], y: vec![2.0], along: vec![3.0], ..Curve::default() };
+        let region =
+            Region { method: "pem".into(), note: "95 %".into(), x: vec![1.0], low: vec![-1.5], high: vec![f64::NAN] };
+        let content = Content::Curves(vec![curve]);
+        let panels = vec![Panel { title: "one".into(), content, regions: vec![region], ..Panel::default() }];
+        let lines = read(&figure_csv(&Figure { panels, ..Figure::default() }, &[Method::pem()]));
+        assert_eq!(lines[0], ["panel", "method", "note", "x", "y", "along", "low", "high"]);
+        assert_eq!(lines[1], ["one", "PEM", "", "1", "2", "3", "", ""]);
+        assert_eq!(lines[2], ["one", "PEM", "95 %", "1", "", "", "-1.5", ""]);
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Key of the measured signal in curves; all other keys are those of [`super::data::Method`].
+/// Key of the measured signal in curves; all other keys are those of [`super::data::Method`], or say themselves what they are.
 pub const MEASURED: &str = "measured";
 
 /// One figure of one or more panels.
@@ -44,6 +44,68 @@ pub struct Panel {
     pub y: Axis,
     /// What is drawn.
     pub content: Content,
+    /// Areas behind the curves; they are data as the curves are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub regions: Vec<Region>,
+    /// Lines for orientation, which are no data.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub guides: Vec<Guide>,
+    /// Parts of the horizontal axis that are shaded.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub shades: Vec<[f64; 2]>,
+    /// Whether a unit is as long on one axis as on the other; one range is then widened.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub equal: bool,
+    /// Height over that of a usual panel of the figure; 1 where it is absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub height: Option<f64>,
+}
+
+/// The area between two curves.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Region {
+    /// Key of a method, which gives the colour.
+    pub method: String,
+    /// Added to the label of the method, for example "95 %"; mostly not empty, which tells it from the curve.
+    pub note: String,
+    /// Where; ascending.
+    pub x: Vec<f64>,
+    /// Lower edge, NaN where there is none.
+    #[serde(with = "super::numbers")]
+    pub low: Vec<f64>,
+    /// Upper edge, NaN where there is none.
+    #[serde(with = "super::numbers")]
+    pub high: Vec<f64>,
+}
+
+/// A line for orientation: a circle, a level, a line of a grid.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Guide {
+    /// What it is.
+    pub kind: GuideKind,
+    /// Where.
+    pub x: Vec<f64>,
+    /// Where.
+    pub y: Vec<f64>,
+    /// What it says; may be empty. It is left out where there is no room.
+    pub label: String,
+    /// Middle of the label, in the values of both axes.
+    pub at: [f64; 2],
+}
+
+/// How a line for orientation is drawn.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum GuideKind {
+    /// As the grid.
+    #[default]
+    Grid,
+    /// A boundary, for example of stability.
+    Boundary,
+    /// A level or place, dashed.
+    Level,
 }
 
 /// One axis.
@@ -79,7 +141,7 @@ impl Default for Content {
 }
 
 /// One curve or cloud of points.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Curve {
     /// Key of a method, or [`MEASURED`].
@@ -94,16 +156,24 @@ pub struct Curve {
     /// model that could not be identified.
     #[serde(with = "super::numbers")]
     pub y: Vec<f64>,
+    /// What else belongs to each point and is written beside it, for example the frequency along a locus; mostly empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub along: Vec<f64>,
 }
 
 /// How a curve is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Drawn {
     /// Joined by a line.
+    #[default]
     Line,
-    /// Points.
+    /// Points; what is beyond the range or has no value stands at the edge.
     Points,
+    /// Few large filled points; none beyond the range.
+    Dots,
+    /// Few large outlined points; none beyond the range.
+    Marks,
 }
 
 /// The values behind one box: median, quartiles, whiskers to the last values within 1.5 quartile ranges, points beyond.

@@ -5,7 +5,8 @@ use minijinja::{Value, context};
 
 use super::data::{ReportData, Role};
 use super::page::{self, ALL_POINTS};
-use super::{phase, svg, tables};
+use super::svg::{Print, svg_for};
+use super::{phase, tables};
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../../assets/report.html");
@@ -32,12 +33,14 @@ const FIGURES: [&str; 5] = [
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn html(data: &ReportData) -> Result<String> {
+    // The page allows no fonts but those of the reader's system.
+    let in_page = Print { embed_font: false, ..Print::default() };
     let content = context! {
         report => Serde(without_curves(data)),
         fits => Serde(tables::fit_rows(data)),
         modes => Serde(tables::mode_rows(data)),
         has => parts(data),
-        redesign_svg => data.redesign.as_ref().map(|new| svg(&new.figure, &new.loops)).transpose()?,
+        redesign_svg => data.redesign.as_ref().map(|new| svg_for(&new.figure, &new.loops, &in_page)).transpose()?,
     };
     page::render(TEMPLATE, content, &FIGURES, &prepared_for_drawing(data))
 }

@@ -11,6 +11,7 @@
 //! | `decimate` | minimum and maximum per bucket |
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
+//! | `run_figures` | the figures of a run for print |
 //! | `svg` | a figure for print |
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
@@ -31,6 +32,7 @@ mod numbers;
 mod page;
 mod paper;
 mod phase;
+mod run_figures;
 mod starts;
 pub mod story;
 mod story_html;
@@ -47,9 +49,10 @@ pub(crate) use page::with_minus;
 pub use paper::{
     Claim, ClaimOutcome, paper_claims, paper_figures, paper_story, paper_summary, paper_tables, story_methods,
 };
+pub use run_figures::{FigureChoice, RunDrawing, RunFigure, run_drawings, run_figures};
 pub use starts::{Starts, starts_methods, starts_story};
 pub use story::Story;
 pub use story_html::story_html;
 pub(crate) use svg::pretty_unit;
-pub use svg::svg;
+pub use svg::{FIGURE_FONT, Print, svg, svg_for};
 pub use trace::{Timeline, Trace};

@@ -42,7 +42,17 @@ fn without_panels(figure: &Figure) -> Figure {
 }
 
 fn without_content(panel: &Panel) -> Panel {
-    Panel { title: panel.title.clone(), x: panel.x.clone(), y: panel.y.clone(), content: Content::default() }
+    Panel {
+        title: panel.title.clone(),
+        x: panel.x.clone(),
+        y: panel.y.clone(),
+        content: Content::default(),
+        regions: panel.regions.clone(),
+        guides: panel.guides.clone(),
+        shades: panel.shades.clone(),
+        equal: panel.equal,
+        height: panel.height,
+    }
 }
 
 fn lines(figure: &Figure) -> impl Iterator<Item = &Curve> {
@@ -80,6 +90,7 @@ fn thinned(curve: &Curve, axis: &Axis, most: usize) -> Curve {
         drawn: curve.drawn,
         x: numbers::for_drawing(kept.iter().map(|point| curve.x[point.0]), DIGITS_OF_POSITIONS),
         y: numbers::for_drawing(kept.iter().map(|point| point.1), DIGITS_OF_VALUES),
+        along: kept.iter().filter_map(|point| curve.along.get(point.0).copied()).collect(),
     }
 }
 
@@ -101,6 +112,7 @@ mod tests {
             drawn,
             x: (0..samples).map(|k| k as f64 * 1e-4).collect(),
             y: (0..samples).map(|k| (k as f64 * 0.7).sin() / 3.0).collect(),
+            ..Curve::default()
         };
         let content = Content::Curves(vec![line(Drawn::Line, samples), line(Drawn::Points, samples)]);
         Figure {

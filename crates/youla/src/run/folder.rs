@@ -141,6 +141,38 @@ pub(super) fn replace_file(path: &Path, text: &str) -> Result<()> {
     })
 }
 
+/// Writes files beside their final places and moves them there when all are whole; after an error none is changed.
+pub(super) fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>> {
+    let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
+    let parents: Vec<PathBuf> = folder.ancestors().take_while(new).map(Path::to_owned).collect();
+    let partial = |name: &str| folder.join(format!(".{name}.partial-{}", std::process::id()));
+    let written = fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source });
+    let written = written.and_then(|()| {
+        files.iter().try_for_each(|(name, bytes)| {
+            // A file cannot take the place of a folder, which would be found only when others have been moved.
+            let place = match folder.join(name).is_dir() {
+                true => Err(std::io::ErrorKind::IsADirectory.into()),
+                false => Ok(()),
+            };
+            place
+                .and_then(|()| fs::write(partial(name), bytes))
+                .map_err(|source| Error::Io { path: folder.join(name), source })
+        })
+    });
+    let moved = written.and_then(|()| {
+        let place = |(name, _): &(String, Vec<u8>)| {
+            let path = folder.join(name);
+            fs::rename(partial(name), &path).map_err(|source| Error::Io { path: path.clone(), source }).map(|()| path)
+        };
+        files.iter().map(place).collect::<Result<Vec<_>>>()
+    });
+    moved.inspect_err(|_| {
+        // Best effort: the error that led here is the one to report. Only folders that are empty go.
+        files.iter().for_each(|(name, _)| drop(fs::remove_file(partial(name))));
+        let _ = parents.iter().try_for_each(fs::remove_dir);
+    })
+}
+
 /// The first folder `runs/<name>-<number>` below `parent` that does not exist yet.
 pub fn unused_folder(parent: &Path, name: &str) -> PathBuf {
     let slug: String = name

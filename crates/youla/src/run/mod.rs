@@ -21,6 +21,7 @@ mod noise_models;
 mod page;
 mod paper;
 mod pipeline;
+mod plot;
 mod records;
 mod redesign;
 mod redraw;
@@ -59,6 +60,7 @@ pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel,
 pub use page::page;
 pub use paper::{Configuration, PaperProgress, PaperStage, WrittenPaper, merge, paper};
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
+pub use plot::{Plot, plot, plottable, write_plots};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use reduction::RunReduction;

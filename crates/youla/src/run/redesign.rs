@@ -5,7 +5,7 @@ use super::response::decibel;
 use crate::lti::{SharedMode, frequency_response};
 use crate::redesign::{Candidate, ExportedController, LoopFigures, Redesign, RedesignProblem, redesign};
 use crate::report::data as draw;
-use crate::report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
+use crate::report::figure::{Axis, Content, Curve, Figure, Layout, Panel};
 use crate::{Error, Result};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -129,7 +129,7 @@ pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
         let response = frequency_response(&figures.response, &omega)?;
         let gain = response.iter().map(|g| g.singular_values().map_or(f64::NAN, |s| s.first().copied().unwrap_or(0.0)));
         let y = gain.map(decibel).collect();
-        Ok(Curve { method: method.key.clone(), note: String::new(), drawn: Drawn::Line, x: hz.clone(), y })
+        Ok(Curve { method: method.key.clone(), x: hz.clone(), y, ..Curve::default() })
     };
     let [present, new] = loops();
     let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), range: None, log };
@@ -138,6 +138,7 @@ pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
         x: axis("Frequency", "Hz", true),
         y: axis("Largest gain", "dB", false),
         content: Content::Curves(vec![curve(&present, &redesign.present)?, curve(&new, &redesign.predicted)?]),
+        ..Panel::default()
     };
     Ok(Figure {
         key: "response".into(),

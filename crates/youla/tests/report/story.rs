@@ -26,7 +26,7 @@ fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
 }
 
 fn panel(title: &str, y: Axis, content: Content) -> Panel {
-    Panel { title: title.into(), x: axis("time", "s", Some([0.4, 0.6])), y, content }
+    Panel { title: title.into(), x: axis("time", "s", Some([0.4, 0.6])), y, content, ..Panel::default() }
 }
 
 fn figure(key: &str, layout: Layout, panels: Vec<Panel>) -> Block {
@@ -36,7 +36,7 @@ fn figure(key: &str, layout: Layout, panels: Vec<Panel>) -> Block {
 
 fn curve(method: &str, drawn: Drawn, samples: usize) -> Curve {
     let (x, y) = (0..samples).map(|k| (k as f64 * 2e-4, 90.0 - 0.3 * (k % 400) as f64)).unzip();
-    Curve { method: method.into(), note: String::new(), drawn, x, y }
+    Curve { method: method.into(), drawn, x, y, ..Curve::default() }
 }
 
 /// Two panels of five long lines.

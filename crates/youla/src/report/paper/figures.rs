@@ -28,7 +28,7 @@ pub(super) fn fit_axis(axis_name: &str) -> Axis {
 
 /// A line of a method.
 pub(super) fn line(method: Method, note: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { method: method.key().into(), note: note.into(), drawn: Drawn::Line, x, y }
+    Curve { method: method.key().into(), note: note.into(), drawn: Drawn::Line, x, y, ..Curve::default() }
 }
 
 /// Points of a method.

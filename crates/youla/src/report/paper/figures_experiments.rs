@@ -103,7 +103,8 @@ pub(super) fn starts(experiment: &Experiment) -> Figure {
         let (x, y) = over(&|s| s.fit[i]);
         let level = line(Method::Hansen, "", span.to_vec(), vec![fit_of(experiment, Method::Hansen)[i]; 2]);
         let curves = vec![points(Method::Pem, "per start", x, y), level];
-        Panel { title: AXES[i].into(), x: factor_axis(), y: fit_axis(AXES[i]), content: Content::Curves(curves) }
+        let (x, y, content) = (factor_axis(), fit_axis(AXES[i]), Content::Curves(curves));
+        Panel { title: AXES[i].into(), x, y, content, ..Panel::default() }
     };
     let (x, y) = over(&|s| s.cost / lowest);
     let criterion = Panel {
@@ -111,6 +112,7 @@ pub(super) fn starts(experiment: &Experiment) -> Figure {
         x: factor_axis(),
         y: logarithmic("over the lowest", ""),
         content: Content::Curves(vec![points(Method::Pem, "per start", x, y)]),
+        ..Panel::default()
     };
     Figure {
         key: "pem-starts".into(),
@@ -168,7 +170,7 @@ fn displacement(experiment: &Experiment, rows: std::ops::Range<usize>, view: [f6
 }
 
 fn measured_curve(x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { method: MEASURED.into(), note: String::new(), drawn: Drawn::Line, x, y }
+    Curve { method: MEASURED.into(), x, y, ..Curve::default() }
 }
 
 fn time_panel(i: usize, label: &str, view: [f64; 2], curves: Vec<Curve>) -> Panel {
@@ -177,6 +179,7 @@ fn time_panel(i: usize, label: &str, view: [f64; 2], curves: Vec<Curve>) -> Pane
         x: ranged("time", "s", view),
         y: axis(&format!("{label} {}", AXES[i]), "um"),
         content: Content::Curves(curves),
+        ..Panel::default()
     }
 }
 
@@ -238,6 +241,7 @@ pub(super) fn excitation(paper: &Paper) -> Figure {
         drawn: Drawn::Line,
         x: hz.iter().skip(1).copied().collect(),
         y: channel.density.iter().skip(1).copied().collect(),
+        ..Curve::default()
     };
     Figure {
         key: "excitation-spectrum".into(),
@@ -251,6 +255,7 @@ pub(super) fn excitation(paper: &Paper) -> Figure {
             x: logarithmic("frequency", "Hz"),
             y: logarithmic("density", "V^2/Hz"),
             content: Content::Curves(channels.iter().zip(&AXES).map(curve).collect()),
+            ..Panel::default()
         }],
     }
 }

@@ -70,6 +70,7 @@ pub(super) fn figure_5(paper: &Paper) -> Figure {
             x: Axis::default(),
             y: ranged(&format!("fit {name}"), "%", view),
             content: Content::Boxes(samples),
+            ..Panel::default()
         }
     });
     Figure {
@@ -107,7 +108,7 @@ fn medians(paper: &Paper, method: Method, i: usize) -> Curve {
 fn panel(paper: &Paper, title: &str, y: Axis, curves: Vec<Curve>) -> Panel {
     let [low, high] = paper.settings.study.theta;
     let x = if high > low { ranged("theta", "", [low, high]) } else { axis("theta", "") };
-    Panel { title: title.into(), x, y, content: Content::Curves(curves) }
+    Panel { title: title.into(), x, y, content: Content::Curves(curves), ..Panel::default() }
 }
 
 /// Where the lower whisker of a box may end, 100 for no values.

@@ -102,6 +102,7 @@ fn drawn(paper: &Paper, cells: &[MapCell], key: &str, title: &str, caption: Stri
             rows: labels(&grid.noise),
             cells: cells.iter().filter(|c| c.place[0] == weight).map(cell).collect(),
         }),
+        ..Panel::default()
     };
     Figure {
         key: key.into(),

@@ -33,6 +33,7 @@ pub(super) fn arrived(counts: &[StartCount]) -> Figure {
                 rows: cases.iter().map(|case| case.key().to_owned()).collect(),
                 cells,
             }),
+            ..Panel::default()
         }],
     }
 }

@@ -4,6 +4,7 @@ use ::svg::Document;
 use ::svg::node::element::{self, Element};
 use ::svg::node::{Node, Value};
 
+use super::font;
 use super::path::{Path, hundredths, number, place};
 
 /// Ink of text and frames, and of the grid.
@@ -13,8 +14,6 @@ pub(super) const GRID: &str = "#e3e6e9";
 
 /// Points per millimetre.
 pub(super) const PER_MM: f64 = 72.0 / 25.4;
-
-const FACES: &str = "Helvetica, Arial, 'Liberation Sans', sans-serif";
 
 /// A rectangle on the page.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -50,6 +49,8 @@ pub(super) struct Paint<'a> {
     pub(super) stroke: &'a str,
     pub(super) width: f64,
     pub(super) dash: &'a [f64],
+    /// Of the filling, 0 to 1; without one it is opaque.
+    pub(super) opacity: Option<f64>,
     /// Kept in the file, so that a curve can be found: method and kind of shape.
     pub(super) of: Option<(&'a str, &'static str)>,
 }
@@ -60,10 +61,15 @@ pub(super) struct Canvas {
 }
 
 impl Canvas {
-    pub(super) fn new(title: &str, description: &str) -> Self {
-        let mut document = Document::new().set("font-family", FACES).set("role", "img");
+    pub(super) fn new(title: &str, description: &str, embed_font: bool) -> Self {
+        let mut document = Document::new().set("font-family", font::FACES).set("role", "img");
         document.append(element::Title::new(clean(title)));
         document.append(element::Description::new().add(::svg::node::Text::new(clean(description))));
+        if embed_font {
+            let mut style = Element::new("style");
+            style.append(::svg::node::Text::new(font::embedded()));
+            document.append(style);
+        }
         document.append(Element::new("rect").painted_white());
         Canvas { document }
     }
@@ -86,9 +92,10 @@ impl Canvas {
         }
     }
 
-    /// The same in bold.
-    pub(super) fn title(&mut self, text: &str, x: f64, y: f64, size: f64) {
-        let node = text_node(text, size, Anchor::Start).with("font-weight", "bold");
+    /// The same in the middle and with the paper around it, to stand on lines.
+    pub(super) fn text_on_lines(&mut self, text: &str, x: f64, y: f64, size: f64) {
+        let node = text_node(text, size, Anchor::Middle).with("stroke", "#ffffff").with("stroke-width", "2");
+        let node = node.with("paint-order", "stroke").with("stroke-linejoin", "round").with("fill", SOFT);
         self.document.append(node.with("x", place(x)).with("y", place(y)));
     }
 
@@ -154,6 +161,9 @@ fn text_node(text: &str, size: f64, anchor: Anchor) -> Element {
 
 fn painted(mut node: Element, paint: &Paint) -> Element {
     node.assign("fill", if paint.fill.is_empty() { "none" } else { paint.fill });
+    if let Some(opacity) = paint.opacity {
+        node.assign("fill-opacity", place(opacity));
+    }
     if !paint.stroke.is_empty() {
         node.assign("stroke", paint.stroke);
         node.assign("stroke-width", place(paint.width));

@@ -16,6 +16,10 @@ pub(super) const POINT: f64 = 1.0;
 const ROW: f64 = 4.2;
 /// Between the range and the first row.
 const GAP: f64 = 1.2;
+/// Half-width of a large point.
+pub(super) const LARGE: f64 = 1.9;
+/// Points of more than this number are smaller.
+const MANY: usize = 1000;
 
 /// The clouds that have something at an edge, by their place among the curves.
 #[derive(Debug, Default, PartialEq)]
@@ -79,6 +83,29 @@ pub(super) fn draw(
     for (cloud, curve) in curves.iter().enumerate().filter(|(_, curve)| curve.drawn == Drawn::Points) {
         draw_cloud(canvas, cloud, curve, (x, y), frame, &strips, (styles, legend));
     }
+    draw_lines(canvas, curves, (x, y), frame, &strips, (styles, legend));
+    for curve in curves.iter().filter(|curve| matches!(curve.drawn, Drawn::Dots | Drawn::Marks)) {
+        let style = styles.of(&curve.method);
+        let marker = if curve.drawn == Drawn::Dots { style.marker.solid() } else { style.marker };
+        let mut path = Path::default();
+        for (at, value) in points(curve, x) {
+            if let Place::Inside(height) = y.place(value) {
+                marker.add(&mut path, (at, height), LARGE);
+            }
+        }
+        let paint = marker.large(style.colour, curve.drawn == Drawn::Dots);
+        canvas.path(path, &Paint { of: Some((&curve.method, "marks")), ..paint });
+    }
+}
+
+fn draw_lines(
+    canvas: &mut Canvas,
+    curves: &[Curve],
+    (x, y): (&Scale, &Scale),
+    frame: Frame,
+    strips: &Strips,
+    (styles, legend): (&Styles, &Legend),
+) {
     let (below, above) = strips.heights();
     let inner = Frame { top: frame.top + above, height: frame.height - below - above, ..frame };
     for curve in curves.iter().filter(|curve| curve.drawn == Drawn::Line) {
@@ -116,17 +143,20 @@ fn draw_cloud(
 ) {
     let style = styles.of(&curve.method);
     let [mut inside, mut beyond, mut missing] = [(); 3].map(|()| Path::default());
+    let size = if curve.x.len() > MANY { 0.65 * POINT } else { POINT };
     for (at, value) in points(curve, x) {
         match y.place(value) {
-            Place::Inside(height) => style.marker.add(&mut inside, (at, height), POINT),
+            Place::Inside(height) => style.marker.add(&mut inside, (at, height), size),
             Place::Below => Marker::Down.add(&mut beyond, (at, strips.row_below(cloud, frame)), 1.4),
             Place::Above => Marker::Up.add(&mut beyond, (at, strips.row_above(cloud, frame)), 1.4),
             Place::Missing => Marker::Cross.add(&mut missing, (at, strips.row_below(cloud, frame)), 1.2),
         }
     }
     let hollow = legend.nth_cloud(&curve.method, &curve.note) > 0;
+    let mut paint = style.marker.paint(style.colour, hollow);
+    paint.width *= size / POINT;
     for (path, paint, kind) in [
-        (inside, style.marker.paint(style.colour, hollow), "points"),
+        (inside, paint, "points"),
         (beyond, Marker::Down.paint(style.colour, hollow), "beyond"),
         (missing, Marker::Cross.paint(style.colour, false), "missing"),
     ] {

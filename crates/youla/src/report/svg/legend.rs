@@ -2,7 +2,8 @@
 
 use super::boxes;
 use super::canvas::{Anchor, Canvas, Frame, Paint, SOFT};
-use super::curves::POINT;
+use super::curves::{LARGE, POINT};
+use super::ground::REGION;
 use super::path::Path;
 use super::style::{Marker, Styles, tint};
 use super::text::{self, LABEL};
@@ -25,8 +26,11 @@ const POINTS: usize = 32_000;
 struct Swatch {
     line: bool,
     points: bool,
+    dots: bool,
+    marks: bool,
     sample: bool,
     cell: bool,
+    region: bool,
 }
 
 #[derive(Debug, PartialEq)]
@@ -56,9 +60,11 @@ impl<'a> Legend<'a> {
         for panel in &figure.panels {
             match &panel.content {
                 Content::Curves(curves) => curves.iter().for_each(|curve| {
-                    let line = curve.drawn == Drawn::Line;
+                    let is = |drawn| curve.drawn == drawn;
+                    let (line, points, dots, marks) =
+                        (is(Drawn::Line), is(Drawn::Points), is(Drawn::Dots), is(Drawn::Marks));
                     legend.lines += usize::from(line);
-                    legend.add(&curve.method, &curve.note, Swatch { line, points: !line, ..Swatch::default() });
+                    legend.add(&curve.method, &curve.note, Swatch { line, points, dots, marks, ..Swatch::default() });
                 }),
                 Content::Boxes(samples) => samples.iter().for_each(|sample| {
                     legend.add(&sample.method, &sample.note, Swatch { sample: true, ..Swatch::default() });
@@ -70,6 +76,9 @@ impl<'a> Legend<'a> {
                 }
             }
         }
+        for region in figure.panels.iter().flat_map(|panel| &panel.regions) {
+            legend.add(&region.method, &region.note, Swatch { region: true, ..Swatch::default() });
+        }
         legend.entries.sort_by_key(|entry| (styles.order(entry.method), !entry.note.is_empty()));
         legend
     }
@@ -79,6 +88,9 @@ impl<'a> Legend<'a> {
             Some(Entry { swatch: known, .. }) => {
                 known.line |= swatch.line;
                 known.points |= swatch.points;
+                known.dots |= swatch.dots;
+                known.marks |= swatch.marks;
+                known.region |= swatch.region;
                 known.sample |= swatch.sample;
                 known.cell |= swatch.cell;
             }
@@ -149,6 +161,9 @@ impl<'a> Legend<'a> {
         if swatch.cell {
             canvas.rectangle(area, &Paint { fill: &tint(style.colour, 1.0), ..Paint::default() });
         }
+        if swatch.region {
+            canvas.rectangle(area, &Paint { fill: style.colour, opacity: Some(REGION), ..Paint::default() });
+        }
         if swatch.sample {
             boxes::swatch(canvas, area, style.colour);
         }
@@ -160,6 +175,10 @@ impl<'a> Legend<'a> {
         if swatch.points {
             let paint = style.marker.paint(style.colour, self.nth_cloud(method, note) > 0);
             draw_marker(canvas, style.marker, middle, 2.0 * POINT, &paint);
+        }
+        if swatch.dots || swatch.marks {
+            let marker = if swatch.dots { style.marker.solid() } else { style.marker };
+            draw_marker(canvas, marker, middle, LARGE, &marker.large(style.colour, swatch.dots));
         }
     }
 }

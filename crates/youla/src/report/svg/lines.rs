@@ -12,9 +12,14 @@ type Point = (f64, f64);
 ///
 /// A value without neighbours is a dot.
 pub(super) fn path(curve: &Curve, x: &Scale, y: &Scale, frame: Frame, points: usize) -> Path {
-    let mut path = Path::default();
     let kept = thinned(&curve.y, points);
-    let places: Vec<Point> = kept.iter().map(|&(row, value)| (x.at(curve.x[row]), y.at(value))).collect();
+    joined(kept.iter().map(|&(row, value)| (x.at(curve.x[row]), y.at(value))), frame)
+}
+
+/// Places joined by a line within `frame`, with a gap where one is not finite.
+pub(super) fn joined(places: impl Iterator<Item = Point>, frame: Frame) -> Path {
+    let mut path = Path::default();
+    let places: Vec<Point> = places.collect();
     for piece in places.split(|(x, y)| !(x.is_finite() && y.is_finite())) {
         add(&mut path, piece, frame);
     }

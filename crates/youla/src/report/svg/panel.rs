@@ -7,7 +7,7 @@ use super::scale::{Place, Scale};
 use super::style::Styles;
 use super::text::{self, LABEL, LEADING, TICK};
 use super::ticks::{Tick, ticks};
-use super::{boxes, cells};
+use super::{boxes, cells, ground};
 use crate::report::figure::{Content, Curve, Drawn, Panel};
 
 /// Length of a tick, and from it to its label.
@@ -15,7 +15,7 @@ const TICK_LENGTH: f64 = 2.5;
 const TO_LABEL: f64 = 2.0;
 /// Least distances of labels along the axes.
 const APART_X: f64 = 14.0;
-const APART_Y: f64 = 20.0;
+const APART_Y: f64 = 17.0;
 /// Free at each end of the data, as a share.
 const MARGIN: f64 = 0.04;
 
@@ -29,8 +29,11 @@ pub(super) struct Labels {
 /// A panel and its scales, of which only the values are known yet.
 pub(super) struct Prepared<'a> {
     pub(super) panel: &'a Panel,
+    /// Widened where both axes are equal.
     x: Scale,
     y: Scale,
+    /// As the data or the axes say.
+    own: (Scale, Scale),
     /// Heights of the strips at the lower and the upper edge.
     strips: (f64, f64),
 }
@@ -43,11 +46,14 @@ impl<'a> Prepared<'a> {
                 Content::Curves(curves) => Some(curves.as_slice()),
                 _ => None,
             });
-        let margin = if everything.clone().flatten().any(|curve| curve.drawn == Drawn::Points) { 0.02 } else { 0.0 };
-        let x = Scale::new(&panel.x, everything.flat_map(|curves| curves::values(curves, |curve| &curve.x)), margin);
+        let margin = if everything.clone().flatten().any(|curve| curve.drawn != Drawn::Line) { 0.02 } else { 0.0 };
+        let across = panel.regions.iter().flat_map(|region| region.x.iter().copied());
+        let across = everything.flat_map(|curves| curves::values(curves, |curve| &curve.x)).chain(across);
+        let x = Scale::new(&panel.x, across, margin);
         let (y, strips) = match &panel.content {
             Content::Curves(curves) => {
-                let y = Scale::new(&panel.y, curves::values(curves, |curve| &curve.y), MARGIN);
+                let up = curves::values(curves, |curve| &curve.y).chain(ground::values(panel));
+                let y = Scale::new(&panel.y, up, MARGIN);
                 (y, Strips::of(curves, &x, &y).heights())
             }
             Content::Boxes(samples) => {
@@ -56,7 +62,16 @@ impl<'a> Prepared<'a> {
             }
             Content::Cells(_) => (Scale::new(&panel.y, std::iter::empty(), 0.0), (0.0, 0.0)),
         };
-        Prepared { panel, x, y, strips }
+        Prepared { panel, x, y, own: (x, y), strips }
+    }
+
+    /// Widens one of the ranges where a unit is to be as long on both axes of a frame of this size.
+    pub(super) fn fit(&mut self, width: f64, height: f64) {
+        let ((x, y), height) = (self.own, height - self.strips.0 - self.strips.1);
+        if self.panel.equal && !x.log && !y.log && width > 0.0 && height > 0.0 {
+            let ratio = (x.high - x.low) / width / ((y.high - y.low) / height);
+            (self.x, self.y) = if ratio < 1.0 { (x.widened(1.0 / ratio), y) } else { (x, y.widened(ratio)) };
+        }
     }
 
     /// What stands at the edges of its frame.
@@ -82,7 +97,15 @@ impl<'a> Prepared<'a> {
     pub(super) fn height(&self, usual: f64) -> f64 {
         match &self.panel.content {
             Content::Cells(cells) => cells::ROW * cells.rows.len() as f64,
-            _ => usual,
+            _ => usual * self.share(),
+        }
+    }
+
+    /// Its height over the usual one; 0 where it has one of its own.
+    pub(super) fn share(&self) -> f64 {
+        match &self.panel.content {
+            Content::Cells(_) => 0.0,
+            _ => self.panel.height.filter(|share| *share > 0.0 && share.is_finite()).unwrap_or(1.0),
         }
     }
 
@@ -134,8 +157,12 @@ impl<'a> Prepared<'a> {
         match &self.panel.content {
             Content::Curves(curves) => {
                 let below = ticks_along(&x);
+                ground::draw_shades(canvas, self.panel, &x, frame);
                 self.draw_grid(canvas, frame, &ticks_up(&y), &below);
+                let inner = Frame { top: y.end, height: y.length(), ..frame };
+                ground::draw(canvas, self.panel, (&x, &y), inner, styles);
                 curves::draw(canvas, curves, (&x, &y), frame, (styles, legend));
+                ground::draw_labels(canvas, &self.panel.guides, (&x, &y), inner);
                 draw_ticks_below(canvas, frame, &x, &below, labels.below);
             }
             Content::Boxes(samples) => {
@@ -168,7 +195,7 @@ impl<'a> Prepared<'a> {
     fn draw_titles(&self, canvas: &mut Canvas, frame: Frame, labels: Labels, styles: &Styles) {
         let title = text::wrapped(&self.panel.title, LABEL, frame.width * 0.92);
         for (k, line) in title.iter().rev().enumerate() {
-            canvas.title(line, frame.left, frame.top - 4.0 - k as f64 * LABEL * LEADING, LABEL);
+            canvas.text(line, frame.left, frame.top - 4.0 - k as f64 * LABEL * LEADING, LABEL, Anchor::Start);
         }
         if labels.below {
             let first = frame.bottom() + self.height_of_marks_below(frame.width, styles) + LABEL;

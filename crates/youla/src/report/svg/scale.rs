@@ -6,12 +6,25 @@ use crate::{Error, Result};
 /// Beyond this no difference of two numbers overflows.
 const LARGEST: f64 = 1e300;
 
+/// Steps between the numbers at an axis.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) enum Steps {
+    /// 1, 2 or 5 times a power of ten.
+    #[default]
+    Any,
+    /// The same, whole.
+    Whole,
+    /// Parts and multiples of a turn.
+    Degrees,
+}
+
 /// One axis: values `low` to `high` from `start` to `end` on the page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
     pub(super) low: f64,
     pub(super) high: f64,
     pub(super) log: bool,
+    pub(super) steps: Steps,
     pub(super) start: f64,
     pub(super) end: f64,
 }
@@ -32,8 +45,15 @@ pub(super) enum Place {
 impl Scale {
     /// The range of the axis or, where it has none, that of the data and `margin` of it at each end.
     pub(super) fn new(axis: &Axis, data: impl Iterator<Item = f64>, margin: f64) -> Self {
+        let data: Vec<f64> = data.filter(|value| value.is_finite() && (!axis.log || *value > 0.0)).collect();
+        let usable = data.iter().copied();
+        let whole = !data.is_empty() && usable.clone().all(|value| value.fract() == 0.0);
+        let steps = match axis.unit.as_str() {
+            "deg" => Steps::Degrees,
+            _ if whole => Steps::Whole,
+            _ => Steps::Any,
+        };
         let [low, high] = axis.range.unwrap_or_else(|| {
-            let usable = data.filter(|value| value.is_finite() && (!axis.log || *value > 0.0));
             if axis.log {
                 let [low, high] = padded(usable.map(f64::log10), LARGEST.log10(), margin);
                 [low.clamp(-300.0, 299.0), high.clamp(-299.0, 300.0)].map(|exponent| 10f64.powf(exponent))
@@ -41,7 +61,13 @@ impl Scale {
                 padded(usable, LARGEST, margin)
             }
         });
-        Scale { low, high, log: axis.log, start: 0.0, end: 1.0 }
+        Scale { low, high, log: axis.log, steps, start: 0.0, end: 1.0 }
+    }
+
+    /// The same middle with a range that is `times` as long; not for a logarithmic axis.
+    pub(super) fn widened(self, times: f64) -> Self {
+        let (middle, half) = (0.5 * self.low + 0.5 * self.high, 0.5 * (self.high - self.low) * times);
+        Scale { low: middle - half, high: middle + half, ..self }
     }
 
     /// The same values between other places.

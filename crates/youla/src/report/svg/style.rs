@@ -13,6 +13,22 @@ const OTHER_STYLES: [Style; 4] = [
     style("#8c564b", 0.8, &[1.0, 1.0], Marker::Square),
     style("#6a51a3", 0.8, &[5.0, 1.5, 1.0, 1.5, 1.0, 1.5], Marker::Diamond),
 ];
+/// What is no method and stands before all of them in the legend, and after them.
+const BEFORE: [(&str, Style); 6] = [
+    (MEASURED, MEASURED_STYLE),
+    ("output", MEASURED_STYLE),
+    ("input", style("#59616b", 0.5, &[], Marker::Square)),
+    ("excitation", style("#c77f00", 0.5, &[], Marker::Diamond)),
+    ("indirect", style("#e69f00", 0.7, &[], Marker::Circle)),
+    ("band of noise", style("#59616b", 0.6, &[2.0, 1.5], Marker::Square)),
+];
+const AFTER: [(&str, Style); 5] = [
+    ("new", style("#59616b", 0.7, &[], Marker::Plus)),
+    ("unstable", style("#b3261e", 0.7, &[], Marker::Cross)),
+    ("two standard deviations", style("#7f868e", 0.5, &[], Marker::Plus)),
+    ("open loop", style("#59616b", 0.8, &[4.0, 1.5], Marker::Square)),
+    ("bound", style("#16191d", 0.7, &[1.2, 1.5], Marker::Down)),
+];
 /// Dashes of further curves of one method, told apart by their notes.
 const FURTHER_DASHES: [&[f64]; 3] = [&[1.2, 1.2], &[4.0, 1.0, 1.0, 1.0], &[7.0, 2.0]];
 
@@ -59,7 +75,10 @@ impl<'a> Styles<'a> {
         if key == MEASURED {
             return MEASURED_STYLE;
         }
-        let Some(place) = self.place(key) else { return OTHER_STYLES[0] };
+        let Some(place) = self.place(key) else {
+            let known = BEFORE.iter().chain(&AFTER).find(|(name, _)| *name == key);
+            return known.map_or(OTHER_STYLES[0], |(_, style)| *style);
+        };
         let others = self.methods[..place].iter().filter(|method| method.role == Role::Other).count();
         match self.methods[place].role {
             Role::Nominal => style("#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
@@ -89,7 +108,13 @@ impl<'a> Styles<'a> {
 
     /// Place in the order in which methods are listed: the measured signal first, unknown ones last.
     pub(super) fn order(&self, key: &str) -> usize {
-        if key == MEASURED { 0 } else { self.place(key).map_or(usize::MAX, |place| place + 1) }
+        let before = BEFORE.iter().any(|(name, _)| *name == key);
+        match self.place(key) {
+            _ if key == MEASURED => 0,
+            Some(place) => place + 1,
+            None if before => 0,
+            None => usize::MAX,
+        }
     }
 
     fn place(&self, key: &str) -> Option<usize> {
@@ -112,9 +137,24 @@ impl Marker {
     pub(super) fn paint(self, colour: &str, hollow: bool) -> Paint<'_> {
         match self {
             Marker::Plus | Marker::Cross => Paint { stroke: colour, width: 0.6, ..Paint::default() },
-            _ if hollow => Paint { stroke: colour, width: 0.4, ..Paint::default() },
+            _ if hollow => Paint { stroke: colour, width: 0.5, ..Paint::default() },
             _ => Paint { fill: colour, ..Paint::default() },
         }
+    }
+
+    /// A shape that can be filled, and so be told from its outline.
+    pub(super) fn solid(self) -> Self {
+        match self {
+            Marker::Plus => Marker::Up,
+            Marker::Cross => Marker::Down,
+            other => other,
+        }
+    }
+
+    /// The same for large points, filled or as outlines.
+    pub(super) fn large(self, colour: &str, filled: bool) -> Paint<'_> {
+        let fill = if filled { colour } else { "" };
+        Paint { fill, stroke: colour, width: 0.7, ..Paint::default() }
     }
 
     /// Adds the shape of half-width `r` around a point.

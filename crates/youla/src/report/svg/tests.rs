@@ -3,7 +3,7 @@
 use roxmltree::{Document, Node};
 
 use super::*;
-use crate::report::figure::{Axis, Cell, Cells, Curve, Drawn, Layout, MEASURED, Sample};
+use crate::report::figure::{Axis, Cell, Cells, Curve, Drawn, Guide, Layout, MEASURED, Region, Sample};
 
 fn methods() -> Vec<Method> {
     vec![Method::nominal(), Method::pem(), Method::direct(), Method::hansen()]
@@ -15,11 +15,12 @@ fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
 
 fn curve(method: &str, drawn: Drawn, y: &[f64]) -> Curve {
     let x = (0..y.len()).map(|k| k as f64).collect();
-    Curve { method: method.into(), note: String::new(), drawn, x, y: y.to_vec() }
+    Curve { method: method.into(), drawn, x, y: y.to_vec(), ..Curve::default() }
 }
 
 fn panel(content: Content, range: Option<[f64; 2]>) -> Panel {
-    Panel { title: "horizontal".into(), x: axis("time", "s", None), y: axis("position", "um", range), content }
+    let (x, y) = (axis("time", "s", None), axis("position", "um", range));
+    Panel { title: "horizontal".into(), x, y, content, ..Panel::default() }
 }
 
 fn figure(panels: Vec<Panel>) -> Figure {
@@ -237,4 +238,81 @@ fn texts_stay_on_the_page_and_clear_of_each_other() {
             }
         }
     }
+}
+
+/// Places of round marks.
+fn centres(node: &Node) -> Vec<[f64; 2]> {
+    let number = |text: &str| text.parse::<f64>().unwrap();
+    let place = |piece: &str| {
+        let (start, _) = piece.split_once('a').unwrap();
+        let (x, y) = start.split_once(' ').unwrap();
+        [number(x) + curves::LARGE, number(y)]
+    };
+    node.attribute("d").unwrap().split('M').skip(1).map(place).collect()
+}
+
+#[test]
+fn equal_axes_have_one_scale_in_every_size() {
+    let marks = Curve { x: vec![0.0, 1.0, 0.0], ..curve("hansen", Drawn::Marks, &[0.0, 0.0, 1.0]) };
+    let equal = Panel { equal: true, ..panel(Content::Curves(vec![marks]), None) };
+    for (width_cm, height_cm) in [(17.0, None), (8.5, None), (8.5, Some(5.0)), (6.0, Some(12.0))] {
+        let print = Print { width_cm, height_cm, embed_font: false };
+        let file = svg_for(&figure(vec![equal.clone()]), &methods(), &print).unwrap();
+        let document = Document::parse(&file).unwrap();
+        let found = centres(&shapes(&document, "hansen", "marks")[0]);
+        let (across, up) = (found[1][0] - found[0][0], found[0][1] - found[2][1]);
+        assert!(across > 20.0 && (across - up).abs() < 0.03, "{across} {up} at {width_cm} x {height_cm:?}");
+    }
+}
+
+#[test]
+fn figures_have_the_size_that_is_asked_for_and_their_font() {
+    let content = || Content::Curves(vec![curve("hansen", Drawn::Line, &[1.0, 2.0, 3.0])]);
+    let three = || figure((0..3).map(|_| panel(content(), None)).collect());
+    for (width_cm, height_cm) in [(17.0, Some(20.0)), (8.5, Some(9.0)), (12.25, Some(30.0))] {
+        let print = Print { width_cm, height_cm, ..Print::default() };
+        let file = svg_for(&three(), &methods(), &print).unwrap();
+        let document = Document::parse(&file).unwrap();
+        let size =
+            |name| document.root_element().attribute(name).unwrap().trim_end_matches("mm").parse::<f64>().unwrap();
+        assert_eq!((size("width"), size("height")), (10.0 * width_cm, 10.0 * height_cm.unwrap()));
+        assert!(file.contains("@font-face{font-family:'Youla Figures';src:url(data:font/woff2;base64,d09GMg"));
+        let sizes: Vec<_> = document.descendants().filter_map(|node| node.attribute("font-size")).collect();
+        assert!(!sizes.is_empty() && sizes.iter().all(|size| ["9", "8"].contains(size)), "{sizes:?}");
+    }
+    let refused = |width_cm, height_cm| {
+        svg_for(&three(), &methods(), &Print { width_cm, height_cm, ..Print::default() }).unwrap_err()
+    };
+    for (width, height) in [(3.0, None), (f64::NAN, None), (17.0, Some(3.0)), (17.0, Some(f64::INFINITY))] {
+        assert!(matches!(refused(width, height), Error::OutOfRange { .. }), "{width} {height:?}");
+    }
+}
+
+#[test]
+fn areas_shades_and_lines_stand_behind_the_curves() {
+    let region = Region {
+        method: "hansen".into(),
+        note: "95 %".into(),
+        x: vec![0.0, 1.0, 2.0, 3.0, 4.0],
+        low: vec![0.0, 0.5, f64::NAN, 0.0, f64::NEG_INFINITY],
+        high: vec![1.0, 1.5, 2.0, 3.0, 4.0],
+    };
+    let guide = Guide { x: vec![1.0; 2], y: vec![0.0, 3.0], label: "level".into(), at: [1.0, 2.0], ..Guide::default() };
+    let curves = Content::Curves(vec![curve("hansen", Drawn::Line, &[0.5, 1.0, 1.5, 2.0, 2.5])]);
+    let drawn_panel = Panel {
+        regions: vec![region],
+        guides: vec![guide],
+        shades: vec![[2.0, 9.0], [5.0, 4.0]],
+        ..panel(curves, Some([-1.0, 3.5]))
+    };
+    let file = drawn(&figure(vec![drawn_panel.clone()]));
+    let document = Document::parse(&file).unwrap();
+    assert_eq!(pieces(&shapes(&document, "hansen", "region")[0]), 2);
+    assert!(texts(&document).contains(&"level") && texts(&document).contains(&"Hansen G(S), 95 %"));
+    assert_eq!(document.descendants().filter(|node| node.attribute("fill") == Some("#eef2f6")).count(), 1);
+    let places = |kind: &str| file.find(&format!("data-kind=\"{kind}\"")).unwrap();
+    assert!(places("region") < places("line"));
+    let mut short = drawn_panel;
+    short.regions[0].low.pop();
+    assert!(matches!(svg(&figure(vec![short]), &methods()), Err(Error::Shape { expected: (5, 1), found: (4, 1), .. })));
 }

@@ -1,5 +1,6 @@
 //! Text: how wide it is, where it breaks, how units are written.
 
+use super::font;
 use crate::report::figure::Axis;
 
 /// Size of titles, axis labels and legend, points.
@@ -11,26 +12,9 @@ pub(super) const REMARK: f64 = 7.0;
 /// From one line of text to the next, in sizes.
 pub(super) const LEADING: f64 = 1.2;
 
-/// Width of a text in Helvetica.
-///
-/// The reader's program chooses the face, so that more than an estimate is not to be had.
+/// Width of a text in the font of the figures.
 pub(super) fn width(text: &str, size: f64) -> f64 {
-    text.chars().map(em).sum::<f64>() * size
-}
-
-fn em(c: char) -> f64 {
-    match c {
-        'i' | 'j' | 'l' | '\'' | '|' => 0.23,
-        ' ' | 'f' | 't' | 'I' | '.' | ',' | ':' | ';' | '/' | '!' | '[' | ']' => 0.28,
-        'r' | '(' | ')' | '-' => 0.34,
-        'c' | 'k' | 's' | 'v' | 'x' | 'y' | 'z' | 'J' => 0.5,
-        'w' | 'C' | 'D' | 'H' | 'N' | 'R' | 'U' => 0.73,
-        'G' | 'O' | 'Q' => 0.78,
-        'm' | 'M' | '%' => 0.86,
-        'W' => 0.95,
-        'A'..='Z' => 0.66,
-        _ => 0.56,
-    }
+    text.chars().map(font::em).sum::<f64>() * size
 }
 
 /// Breaks a text at spaces into lines of at most `most` points; a word alone may be wider.

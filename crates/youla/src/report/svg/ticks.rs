@@ -1,6 +1,6 @@
 //! Which values are written at an axis.
 
-use super::scale::Scale;
+use super::scale::{Scale, Steps};
 use super::text::{minus, power_of_ten};
 
 /// One value at an axis; without a label it is only marked.
@@ -14,7 +14,7 @@ pub(super) struct Tick {
 pub(super) fn ticks(scale: &Scale, most: usize) -> Vec<Tick> {
     let most = most.max(2);
     if !scale.log {
-        return linear(scale.low, scale.high, most);
+        return linear(scale.low, scale.high, most, scale.steps);
     }
     let decades = scale.low.log10().ceil() as i32..=scale.high.log10().floor() as i32;
     match decades.clone().count() {
@@ -23,8 +23,15 @@ pub(super) fn ticks(scale: &Scale, most: usize) -> Vec<Tick> {
     }
 }
 
-fn linear(low: f64, high: f64, most: usize) -> Vec<Tick> {
-    let step = nice_step((high - low) / most as f64);
+fn linear(low: f64, high: f64, most: usize, steps: Steps) -> Vec<Tick> {
+    const TURNS: [f64; 8] = [5.0, 15.0, 30.0, 45.0, 90.0, 180.0, 360.0, 720.0];
+    let raw = (high - low) / most as f64;
+    let turn = TURNS.into_iter().find(|turn| *turn >= raw * (1.0 - 1e-9)).filter(|_| raw > 2.0);
+    let step = match (steps, turn) {
+        (Steps::Degrees, Some(turn)) => turn,
+        (Steps::Whole, _) => nice_step(raw).max(1.0),
+        _ => nice_step(raw),
+    };
     let first = (low / step - 1e-9).ceil();
     let values = (0..=most).map(|k| (first + k as f64) * step).take_while(|value| *value <= high + 1e-9 * step);
     labelled(values.collect(), step)
@@ -88,7 +95,7 @@ fn within_a_decade(scale: &Scale, most: usize) -> Vec<Tick> {
         .filter(|value| (scale.low..=scale.high).contains(value))
         .collect();
     if values.len() < 3 {
-        return linear(scale.low, scale.high, most);
+        return linear(scale.low, scale.high, most, Steps::Any);
     }
     values.into_iter().flat_map(|value| labelled(vec![value], 10f64.powf(value.log10().floor()))).collect()
 }
@@ -98,7 +105,7 @@ mod tests {
     use super::*;
 
     fn labels(low: f64, high: f64, log: bool, most: usize) -> Vec<String> {
-        let scale = Scale { low, high, log, start: 0.0, end: 1.0 };
+        let scale = Scale { low, high, log, steps: Steps::Any, start: 0.0, end: 1.0 };
         ticks(&scale, most).into_iter().map(|tick| tick.label).filter(|label| !label.is_empty()).collect()
     }
 
@@ -108,6 +115,17 @@ mod tests {
         assert_eq!(labels(0.0, 1.0, false, 5), ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]);
         assert_eq!(labels(-3e-5, 3e-5, false, 4), ["−2×10⁻⁵", "0", "2×10⁻⁵"]);
         assert_eq!(labels(0.0, 4e6, false, 4), ["0", "1×10⁶", "2×10⁶", "3×10⁶", "4×10⁶"]);
+    }
+
+    #[test]
+    fn angles_and_counts_have_steps_of_their_own() {
+        let labels = |low: f64, high: f64, steps| {
+            let scale = Scale { low, high, log: false, steps, start: 0.0, end: 1.0 };
+            ticks(&scale, 5).into_iter().map(|tick| tick.label).collect::<Vec<_>>()
+        };
+        assert_eq!(labels(-370.0, 10.0, Steps::Degrees), ["−360", "−270", "−180", "−90", "0"]);
+        assert_eq!(labels(-1.0, 1.0, Steps::Degrees), ["−1.0", "−0.5", "0.0", "0.5", "1.0"]);
+        assert_eq!(labels(1.0, 3.0, Steps::Whole), ["1", "2", "3"]);
     }
 
     #[test]
@@ -123,7 +141,7 @@ mod tests {
         for (low, high, log) in
             [(1e300, 1.1e300, false), (-1e300, 1e300, false), (1.0, 1.0 + 1e-14, false), (1e-307, 1e300, true)]
         {
-            let found = ticks(&Scale { low, high, log, start: 0.0, end: 1.0 }, 5);
+            let found = ticks(&Scale { low, high, log, steps: Steps::Whole, start: 0.0, end: 1.0 }, 5);
             assert!(found.len() <= 6 && found.iter().all(|tick| tick.value <= high * (1.0 + 1e-9)), "{found:?}");
         }
     }

@@ -1,0 +1,82 @@
+//! Figures of a finished run for papers, from its data.
+
+use super::folder::replace_files;
+use super::redraw::read_report;
+use crate::record::unknown;
+use crate::report::{
+    FigureChoice, Print, ReportData, RunDrawing, RunFigure, figure_csv, run_drawings, run_figures, svg_for,
+};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+
+/// Every figure that the run has.
+const ALL: &str = "all";
+
+/// A figure as it is written.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plot {
+    /// Name of its files without ending.
+    pub name: String,
+    /// Title.
+    pub title: String,
+    /// What it shows, for the caption in the paper.
+    pub caption: String,
+    /// The drawing.
+    pub svg: String,
+    /// Its numbers.
+    pub csv: String,
+}
+
+/// The figures that a finished run has, in the order of its page.
+///
+/// # Errors
+/// [`Error::MissingFile`] where there is no `report.json`, [`Error::NotAReport`] where it is of another kind, [`Error::Io`].
+pub fn plottable(run: &Path) -> Result<Vec<RunFigure>> {
+    run_figures(&read_report(run)?)
+}
+
+/// Draws a figure of a finished run by its name, or `all` that it has, from its `report.json`. Nothing is written.
+///
+/// # Errors
+/// Those of [`plottable`]; [`Error::UnknownChannel`] for a figure, output, input, record or method that the run does not have,
+/// with those it has; [`Error::NothingToDraw`] where nothing of the figure is chosen; [`Error::OutOfRange`] for a size that is
+/// too small.
+pub fn plot(run: &Path, figure: &str, choice: &FigureChoice, print: &Print) -> Result<Vec<Plot>> {
+    let report = read_report(run)?;
+    let drawings = wanted(run, &report, figure)?
+        .into_iter()
+        .map(|kind| run_drawings(&report, kind, choice))
+        .collect::<Result<Vec<_>>>()?
+        .concat();
+    if drawings.is_empty() {
+        return Err(Error::NothingToDraw { figure: figure.to_owned() });
+    }
+    let drawn = |RunDrawing { figure, methods }: &RunDrawing| {
+        let svg = svg_for(figure, methods, print).map_err(|error| error.within(format!("figure {}", figure.key)))?;
+        let (title, caption) = (figure.title.clone(), figure.caption.clone());
+        Ok(Plot { name: figure.key.clone(), title, caption, svg, csv: figure_csv(figure, methods) })
+    };
+    drawings.iter().map(drawn).collect()
+}
+
+fn wanted(run: &Path, report: &ReportData, figure: &str) -> Result<Vec<RunFigure>> {
+    let there = run_figures(report)?;
+    if figure == ALL {
+        return Ok(there);
+    }
+    match there.iter().find(|kind| kind.key() == figure) {
+        Some(kind) => Ok(vec![*kind]),
+        None => {
+            let known = there.iter().map(|kind| kind.key()).chain([ALL]).map(String::from).collect();
+            Err(unknown(&format!("the run {}", run.display()), figure, known))
+        }
+    }
+}
+
+/// Writes files into a folder, which is made, and returns their paths. Files of the same names are replaced; after an error none is.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn write_plots(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>> {
+    replace_files(folder, files)
+}

@@ -47,8 +47,8 @@ impl Equation {
         };
         match self.kind {
             0 | 1 => riccati(),
-            2 => lyapunov(m[0], m[1]).map(|found| found.relative_residual),
-            3 => discrete_lyapunov(m[0], m[1]).map(|found| found.relative_residual),
+            2 => lyapunov(m[0], m[1]).map(|found| found.residual),
+            3 => discrete_lyapunov(m[0], m[1]).map(|found| found.residual),
             _ => sylvester("X", m[0], m[1], m[2]).map(|found| found.relative_residual),
         }
     }

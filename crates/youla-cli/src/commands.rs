@@ -2,6 +2,7 @@
 
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
+use crate::excite;
 use crate::export;
 use crate::init;
 use crate::manual;
@@ -41,6 +42,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
+        Command::Excite(asked) => excite::make(args, asked),
         Command::Export(asked) => export::export(args, asked),
         Command::Paper(asked) => paper::reproduce(args, asked),
         Command::Study(StudyCommand::Starts(asked)) => starts::count(args, asked),

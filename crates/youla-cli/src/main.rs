@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod commands;
 mod dialect;
+mod excite;
 mod export;
 mod init;
 mod manual;

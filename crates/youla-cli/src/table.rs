@@ -113,7 +113,7 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
 }
 
 /// Columns as wide as their widest cell, the first left, the others right.
-fn aligned(rows: &[Vec<String>]) -> String {
+pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |j: usize| rows.iter().map(|r| r[j].chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..columns).map(width).collect();

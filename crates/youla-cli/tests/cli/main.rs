@@ -6,6 +6,7 @@ mod bad_records;
 mod bad_settings;
 mod common;
 mod contract;
+mod excite;
 mod export;
 mod init;
 mod subspace;

@@ -98,6 +98,15 @@ pub(crate) enum Command {
     /// The files are read in two passes, three where the data ask for QR, in memory that does not depend on their length.
     #[command(after_help = SUBSPACE_EXAMPLES)]
     Subspace(SubspaceArgs),
+    /// Print the JSON schema of run.toml, for editors.
+    #[command(
+        after_help = "Example:\n  youla schema > run.schema.json\n\nand, as the first line of run.toml: #:schema run.schema.json"
+    )]
+    Schema {
+        /// Print the reference of all keys in Markdown instead.
+        #[arg(long)]
+        markdown: bool,
+    },
     /// Print the completions of a shell.
     #[command(after_help = "Example:\n  source <(youla completions bash)")]
     Completions {

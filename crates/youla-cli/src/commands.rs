@@ -14,7 +14,7 @@ use crate::table;
 use std::path::{Path, PathBuf};
 use youla::run::{
     RunFolder, RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, redraw,
-    signal_records, unused_folder, write_run, write_signals,
+    settings_reference, settings_schema, signal_records, unused_folder, write_run, write_signals,
 };
 
 /// Runs the verb that was asked for; false where a check found a defect.
@@ -38,6 +38,7 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         }
         Command::Completions { shell } => manual::completions(*shell),
         Command::Man => manual::man_page(),
+        Command::Schema { markdown } => schema(*markdown),
         Command::Init(asked) => init::init(args, asked),
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
@@ -87,6 +88,13 @@ fn signals(args: &Args, settings: &Path, out: &Path) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+fn schema(markdown: bool) -> Result<(), Failure> {
+    match markdown {
+        true => say(settings_reference().trim_end()),
+        false => say(&format!("{:#}", settings_schema())),
+    }
 }
 
 fn report(args: &Args, run: &Path) -> Result<(), Failure> {

@@ -9,5 +9,6 @@ mod contract;
 mod excite;
 mod export;
 mod init;
+mod schema;
 mod subspace;
 mod verbs;

@@ -22,7 +22,7 @@ use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
 
 /// What is known of S before it is identified.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeviationOptions {
     /// How the noise of beta is modelled.
@@ -44,7 +44,7 @@ impl Default for DeviationOptions {
 }
 
 /// How the noise of beta is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
     /// Not at all for a stable S: B and D from the simulated beta.

@@ -22,7 +22,7 @@ use parse::{Fields, Selection};
 pub use stream::CsvStream;
 
 /// What stands between two cells.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Delimiter {
     /// Read it off the first line: the only one of comma, semicolon and tab that it holds, else blanks. A line that
@@ -40,7 +40,7 @@ pub enum Delimiter {
 }
 
 /// Whether the first line holds the names of the columns.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeaderLine {
     /// It does when none of its cells is a number.
@@ -53,7 +53,7 @@ pub enum HeaderLine {
 }
 
 /// What stands before the decimals of a number; never guessed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecimalSign {
     /// `0.5`
@@ -81,7 +81,7 @@ impl DecimalSign {
 }
 
 /// How to read a text file.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CsvOptions {
     /// What stands between two cells.

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 /// with displacement l in um, command u and actuator state m in V; index 0 is horizontal, 1 vertical. The matrices carry
 /// their sign (stiffness and damping are negative definite). The paper prints units that are wrong by 1e6; these fit its
 /// numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bearing {
     /// K of (10), 1/s^2.

@@ -26,9 +26,11 @@ mod records;
 mod redesign;
 mod redraw;
 mod reduction;
+mod reference;
 mod residual_tests;
 mod response;
 mod robustness;
+mod schema;
 mod segments;
 mod settings;
 mod signals;
@@ -63,8 +65,10 @@ pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, ident
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
 pub use reduction::RunReduction;
+pub use reference::settings_reference;
 pub use residual_tests::{Foresight, RecordResiduals};
 pub use robustness::Robustness;
+pub use schema::settings_schema;
 pub use segments::RecordSegment;
 pub use settings::{
     Construction, DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,

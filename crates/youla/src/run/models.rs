@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The domain in which matrices or polynomials are given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Domain {
     /// In s, rad/s; discretised by a zero-order hold at the sample time of the data.
@@ -20,7 +20,7 @@ pub enum Domain {
 }
 
 /// A transfer function: one polynomial for one input and output, or a matrix `[row][column]` of polynomials.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "expected a list of coefficients, or a matrix [row][column] of such lists")]
 pub enum Polynomials {
     /// Coefficients of the only entry.
@@ -47,7 +47,7 @@ impl Polynomials {
 }
 
 /// The nominal model G(0).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NominalModel {
     /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
@@ -131,7 +131,7 @@ impl NominalModel {
 }
 
 /// Which sign the controller was written down with; never guessed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Feedback {
     /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
@@ -153,7 +153,7 @@ impl Feedback {
 
 /// The controller that ran while the data were logged, at the sample time of the data, in one of its usual forms. The
 /// sign convention is mandatory in each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ControllerSettings {
     /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single

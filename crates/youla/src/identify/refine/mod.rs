@@ -37,7 +37,7 @@ const LEFT: f64 = 1e-6;
 /// let options = RefineOptions { noise: RefineNoise::Innovation, ..Default::default() };
 /// assert!(options.stable);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefineOptions {
     /// The model of the noise.
@@ -71,7 +71,7 @@ impl Default for RefineOptions {
 }
 
 /// The model of the noise in a refinement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefineNoise {
     /// White noise at the outputs: the simulation is fitted.

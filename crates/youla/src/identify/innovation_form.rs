@@ -31,8 +31,8 @@ pub struct DeviationOptions {
     pub iterations: usize,
     /// Relative change of K_s below which it has settled.
     pub tolerance: f64,
-    /// How S is refined by the prediction-error method afterwards; not at all when absent. A caller of
-    /// [`hansen_structured`] does that by [`super::hansen_refine::refine_hansen`].
+    // The caller of `hansen_structured` does that by `refine_hansen`.
+    /// How S is refined by the prediction-error method afterwards; not at all when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<RefineOptions>,
 }

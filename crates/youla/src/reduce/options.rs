@@ -53,7 +53,7 @@ pub enum ReducedOrder {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReductionOptions {
-    /// Method.
+    /// How states are removed.
     pub method: ReductionMethod,
     /// Number of states that are kept.
     pub order: ReducedOrder,
@@ -64,10 +64,11 @@ pub struct ReductionOptions {
     /// factors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stability_boundary: Option<f64>,
-    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent.
+    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent. A run takes the rms of its estimation records
+    /// for normalised coprime factors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub output_scale: Option<Vec<f64>>,
-    /// Sizes of the inputs, one per input, that matter equally; 1 each when absent.
+    /// Sizes of the inputs, one per input; 1 each, or the rms, when absent, as for the outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_scale: Option<Vec<f64>>,
 }

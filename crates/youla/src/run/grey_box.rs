@@ -22,7 +22,7 @@ use serde_json::{Value, json};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GreyBoxSettings {
-    /// The structure; its keys stand in `docs/grey-box.md`.
+    /// The structure; explained in `docs/grey-box.md`.
     pub structure: Declaration,
     /// Whether the initial values of the parameters are a second start, beside the projection of G(S).
     #[serde(default = "yes")]

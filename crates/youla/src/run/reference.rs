@@ -69,8 +69,16 @@ impl<'a> Page<'a> {
         }
         let own = self.resolve(schema);
         // What is said of the key and of its type may be the same.
-        if !path.is_empty() && !text_of(own).is_empty() && text_of(own) != about {
-            self.text += &format!("\n{}\n", text_of(own));
+        if !path.is_empty() {
+            // "Choices of `reduce`." is for those who call it from Rust.
+            let new = |p: &&str| {
+                !p.starts_with(about.trim_end_matches('.'))
+                    && !p.starts_with("Choices of ")
+                    && !p.starts_with("Options of ")
+            };
+            for paragraph in text_of(own).split("\n\n").filter(new) {
+                self.text += &format!("\n{paragraph}\n");
+            }
         }
         let below = match own["properties"].as_object() {
             Some(keys) => self.keys(path, keys, &own["required"]),
@@ -90,11 +98,15 @@ impl<'a> Page<'a> {
             let default = match &schema["default"] {
                 _ if needed(key) => "required".to_owned(),
                 Value::Null => String::new(),
-                value if self.table(schema).is_some() && value.is_object() => String::new(),
+                value if value.as_object().is_some_and(Map::is_empty) => String::new(),
+                value if value.is_object() && self.resolve(schema)["properties"].is_object() => String::new(),
                 value => format!("`{}`", toml_of(value)),
             };
-            let meaning = [text_of(schema).to_owned(), self.choices(schema)].concat();
-            let cells = [format!("`{key}`"), self.kind(schema), default, meaning];
+            let (kind, choices) = match self.only_tables(schema) {
+                true => ("table".to_owned(), String::new()),
+                false => (self.kind(schema), self.choices(schema)),
+            };
+            let cells = [format!("`{key}`"), kind, default, text_of(schema).to_owned() + &choices];
             let cells = cells.map(|cell| cell.replace('|', "\\|").replace("\n\n", "<br>"));
             self.text += &format!("| {} |\n", cells.join(" | "));
             let bare = path.trim_matches(['[', ']']);
@@ -143,6 +155,17 @@ impl<'a> Page<'a> {
         (own["properties"].is_object() || nested).then_some((brackets, inner))
     }
 
+    /// A choice of forms that all have keys of their own: each has its heading.
+    fn only_tables(&self, schema: &'a Value) -> bool {
+        let forms = self.resolve(schema)["oneOf"].as_array();
+        forms.is_some_and(|forms| {
+            forms.iter().all(|form| {
+                let inner = form["properties"].as_object().and_then(|keys| keys.values().next());
+                inner.is_some_and(|inner| self.resolve(inner)["properties"].is_object())
+            })
+        })
+    }
+
     /// What may stand behind a key.
     fn kind(&self, schema: &'a Value) -> String {
         let own = self.resolve(schema);
@@ -164,15 +187,23 @@ impl<'a> Page<'a> {
         match schema["type"].as_str() {
             Some("string") => "text".into(),
             Some("array") => match (&schema["minItems"], &schema["maxItems"]) {
-                (Value::Number(least), Value::Number(most)) if least == most => {
-                    format!("list of {least}: {}", self.kind(&schema["items"]))
-                }
-                _ => format!("list of {}", self.kind(&schema["items"])),
+                (Value::Number(least), Value::Number(most)) if least == most => match self.kind(&schema["items"]) {
+                    of if of.starts_with(char::is_numeric) => format!("{least} x {of}"),
+                    of => format!("{least} {of}s"),
+                },
+                _ => match self.kind(&schema["items"]) {
+                    of if of == "number" => "list of numbers".into(),
+                    of if of == "list of numbers" => "matrix".into(),
+                    of if of == "matrix" => "matrix of lists of numbers".into(),
+                    of => format!("list of {of}"),
+                },
             },
             Some("object") => match (schema["properties"].as_object(), &schema["required"]) {
                 // A form of a choice.
                 (Some(keys), Value::Array(_)) if keys.len() == 1 => {
-                    let key = |(key, inner): (&String, &'a Value)| format!("{{ {key} = {} }}", self.kind(inner));
+                    let key = |(key, inner): (&String, &'a Value)| {
+                        format!("`{{ {key} = {} }}`", self.kind(inner).replace('`', ""))
+                    };
                     keys.iter().map(key).collect()
                 }
                 (None, _) if schema["additionalProperties"].is_object() => {

@@ -68,13 +68,25 @@ fn without_null(map: &mut Map<String, Value>) {
 /// A doc comment as text: paragraphs of one line, without examples and links to items.
 fn words(text: &str) -> String {
     let mut prose = String::new();
-    // Every second piece stands between fences.
-    for piece in text.split("```").step_by(2) {
-        prose += piece;
+    // Every second piece stands between fences: formulas stay, examples go.
+    for (k, piece) in text.split("```").enumerate() {
+        match piece.strip_prefix("text\n").filter(|_| k % 2 == 1) {
+            Some(formulas) => {
+                let lines: Vec<String> = formulas.lines().filter(|l| !l.trim().is_empty()).map(code).collect();
+                prose += &lines.join(", ");
+            }
+            None if k % 2 == 0 => prose += piece,
+            None => {}
+        }
     }
     let paragraphs = prose.split("\n\n").map(|p| p.split_whitespace().collect::<Vec<_>>().join(" "));
     let paragraphs: Vec<String> = paragraphs.filter(|p| !p.is_empty()).map(|p| without_links(&p)).collect();
     paragraphs.join("\n\n")
+}
+
+/// One formula without its alignment.
+fn code(line: &str) -> String {
+    format!("`{}`", line.split_whitespace().collect::<Vec<_>>().join(" "))
 }
 
 /// ``[`a::B`](c)`` and ``[`a::B`]`` as `` `B` ``.
@@ -99,10 +111,8 @@ mod tests {
 
     #[test]
     fn doc_comments_become_text() {
-        assert_eq!(
-            words("One\ntwo [`a::B`](x) and [`Self::c`].\n\n```\ncode\n```\nEnd."),
-            "One two `B` and `c`.\n\nEnd."
-        );
+        let text = "One\ntwo [`a::B`](x) and [`Self::c`].\n\n```\ncode\n```\nEnd:\n\n```text\nx   = 1\ny = 2\n```";
+        assert_eq!(words(text), "One two `B` and `c`.\n\nEnd:\n\n`x = 1`, `y = 2`");
     }
 
     /// Every key of every table says what it is.

@@ -64,7 +64,7 @@ pub struct RunSettings {
     /// Thresholds of the check of the data.
     #[serde(default)]
     pub check: CheckOptions,
-    /// Frequency responses.
+    /// Frequency responses in the report.
     #[serde(default)]
     pub frequency_response: FrequencySettings,
     /// Seed of a simulated record; absent for measured data.
@@ -79,7 +79,7 @@ pub struct DataSettings {
     /// Sample time in seconds; this or `time_column` must be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time: Option<f64>,
-    /// Column with the time in seconds.
+    /// Column with the time in seconds; with `sample_time` both must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<ChannelRef>,
     /// Greatest deviation of a time step, as a part of the sample time.
@@ -98,7 +98,7 @@ pub struct DataSettings {
     /// Known reference r, one channel per output.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reference: Vec<ChannelSpec>,
-    /// Known excitation alpha of Fig. 3, one channel per input.
+    /// Known excitation alpha of Fig. 3, one channel per input; not together with `input_excitation`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alpha: Vec<ChannelSpec>,
     /// How text files are read.

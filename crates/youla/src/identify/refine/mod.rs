@@ -50,9 +50,10 @@ pub struct RefineOptions {
     pub initial_state: InitialState,
     /// Largest number of steps.
     pub max_iterations: usize,
-    /// [`GreyBoxOptions::offset_tolerance`].
+    /// Converged where the distance to the minimum of the linearised criterion is below this share of the radius of the confidence
+    /// region, as in [`super::greybox::GreyBoxOptions::offset_tolerance`].
     pub offset_tolerance: f64,
-    /// [`GreyBoxOptions::step_tolerance`].
+    /// Smallest step, relative to the parameters, as in [`super::greybox::GreyBoxOptions::step_tolerance`].
     pub step_tolerance: f64,
 }
 

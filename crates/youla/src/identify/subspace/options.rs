@@ -27,7 +27,7 @@ pub struct SubspaceOptions {
     /// Both from the data instead, by the order of a vector autoregression; `horizon` and `past` have no meaning then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub automatic_horizon: Option<AutomaticHorizon>,
-    /// Order of the model.
+    /// Order of the model, of S in `[hansen]`; a rule proposes one when absent.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,

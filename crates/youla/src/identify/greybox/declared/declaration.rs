@@ -9,7 +9,7 @@ use std::path::Path;
 /// Matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)` where a sample time is given, with entries that are numbers or expressions of named parameters.
 ///
 /// With a template, what is given here replaces what the template says: single keys of parameters, derived quantities,
-/// whole matrices. Without one, `a`, `b`, `c` and an initial value of every parameter are needed. All keys stand in
+/// whole matrices. Without one, `a`, `b`, `c` and an initial value of every parameter are needed. See
 /// `docs/grey-box.md`.
 ///
 /// ```

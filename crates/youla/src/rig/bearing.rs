@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the mass-spring-damper model (1) with first-order actuators (7), per unit mass:
 ///
 /// ```text
-/// l'' = damping l' + stiffness l + actuator_gain m        m' = actuator_pole (u - m)
+/// l'' = damping l' + stiffness l + actuator_gain m
+/// m' = actuator_pole (u - m)
 /// ```
 ///
 /// with displacement l in um, command u and actuator state m in V; index 0 is horizontal, 1 vertical. The matrices carry

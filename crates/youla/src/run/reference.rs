@@ -72,7 +72,8 @@ impl<'a> Page<'a> {
         if !path.is_empty() {
             // "Choices of `reduce`." is for those who call it from Rust.
             let new = |p: &&str| {
-                !p.starts_with(about.trim_end_matches('.'))
+                !p.is_empty()
+                    && (about.is_empty() || !p.starts_with(about.trim_end_matches('.')))
                     && !p.starts_with("Choices of ")
                     && !p.starts_with("Options of ")
             };

@@ -30,6 +30,8 @@ Examples:
   youla check run.toml                         say what is wrong with the data, before anything is identified
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
+  youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --limit-output 30
+                                               an excitation for the running machine that keeps its limits
   youla signals run.toml --out signals         alpha and beta as CSV, to go on in another tool
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
@@ -99,6 +101,15 @@ pub(crate) enum Command {
     /// The files are read in two passes, three where the data ask for QR, in memory that does not depend on their length.
     #[command(after_help = SUBSPACE_EXAMPLES)]
     Subspace(SubspaceArgs),
+    /// Print the JSON schema of run.toml, for editors.
+    #[command(
+        after_help = "Example:\n  youla schema > run.schema.json\n\nand, as the first line of run.toml: #:schema run.schema.json"
+    )]
+    Schema {
+        /// Print the reference of all keys in Markdown instead.
+        #[arg(long)]
+        markdown: bool,
+    },
     /// Print the completions of a shell.
     #[command(after_help = "Example:\n  source <(youla completions bash)")]
     Completions {
@@ -127,6 +138,12 @@ pub(crate) enum Command {
     /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
     #[command(after_help = crate::export::EXAMPLES)]
     Export(crate::export::ExportArgs),
+    /// Write an excitation for the machine under its controller, with what the nominal loop will do under it.
+    ///
+    /// The sequence goes to the port alpha of the controller, or to the plant input. It is held against limits of inputs and outputs by
+    /// the nominal model, and says how well it will determine the modes.
+    #[command(after_help = crate::excite::EXAMPLES)]
+    Excite(Box<crate::excite::ExciteArgs>),
 }
 
 const SUBSPACE_EXAMPLES: &str = "\

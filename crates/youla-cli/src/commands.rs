@@ -3,6 +3,7 @@
 use crate::args::{Args, Command, OutputFolder, StudyCommand};
 use crate::check;
 use crate::compare;
+use crate::excite;
 use crate::export;
 use crate::init;
 use crate::manual;
@@ -15,7 +16,7 @@ use crate::table;
 use std::path::{Path, PathBuf};
 use youla::run::{
     RunFolder, RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, redraw,
-    signal_records, unused_folder, write_run, write_signals,
+    settings_reference, settings_schema, signal_records, unused_folder, write_run, write_signals,
 };
 
 /// Runs the verb that was asked for; false where a check found a defect.
@@ -39,11 +40,13 @@ fn other(args: &Args, command: &Command) -> Result<(), Failure> {
         }
         Command::Completions { shell } => manual::completions(*shell),
         Command::Man => manual::man_page(),
+        Command::Schema { markdown } => schema(*markdown),
         Command::Init(asked) => init::init(args, asked),
         Command::Signals { settings, out } => signals(args, settings, out),
         Command::Subspace(asked) => subspace::identify(args, asked),
         Command::Report { run } => report(args, run),
         Command::Compare(asked) => compare::run(args, asked),
+        Command::Excite(asked) => excite::make(args, asked),
         Command::Export(asked) => export::export(args, asked),
         Command::Plot(asked) => plot::plot(args, asked),
         Command::Paper(asked) => paper::reproduce(args, asked),
@@ -89,6 +92,13 @@ fn signals(args: &Args, settings: &Path, out: &Path) -> Result<(), Failure> {
         }
     }
     Ok(())
+}
+
+fn schema(markdown: bool) -> Result<(), Failure> {
+    match markdown {
+        true => say(settings_reference().trim_end()),
+        false => say(&format!("{:#}", settings_schema())),
+    }
 }
 
 fn report(args: &Args, run: &Path) -> Result<(), Failure> {

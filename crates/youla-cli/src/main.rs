@@ -5,6 +5,7 @@ mod check;
 mod commands;
 mod compare;
 mod dialect;
+mod excite;
 mod export;
 mod init;
 mod manual;

@@ -583,6 +583,23 @@ pub enum Error {
         /// Ratio of the largest to the smallest singular value.
         condition: f64,
     },
+    /// An excitation would drive the nominal loop beyond a limit.
+    #[error(
+        "the predicted magnitude of {channel} is {predicted:.4}{unit}, beyond its limit of {limit}{unit}; {} would just keep all limits",
+        Amplitudes(holding)
+    )]
+    BeyondLimit {
+        /// The input or output that passes its limit by most.
+        channel: String,
+        /// Largest magnitude that the nominal loop predicts.
+        predicted: f64,
+        /// Largest magnitude that is allowed.
+        limit: f64,
+        /// The unit, behind a blank; empty where there is none.
+        unit: String,
+        /// Amplitude of each input that would just keep all limits.
+        holding: Vec<f64>,
+    },
     // ---- identification ----------------------------------------------------------------------------------------
     /// A record is too short for the model that was asked for.
     #[error("{what}: {found} samples are too few, at least {needed} are needed")]
@@ -870,6 +887,25 @@ struct Seconds(f64);
 impl std::fmt::Display for Seconds {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}", format!("{:.9e}", self.0).parse().unwrap_or(self.0))
+    }
+}
+
+/// Prints the amplitudes of all inputs.
+struct Amplitudes<'a>(&'a [f64]);
+
+impl std::fmt::Display for Amplitudes<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        // Rounded down: what is typed must keep the limit.
+        let down = |x: &f64| {
+            let unit = 10f64.powf(x.abs().log10().floor() - 3.0);
+            if unit > 0.0 {
+                format!("{:.4e}", (x / unit).floor() * unit).parse::<f64>().unwrap_or(*x).to_string()
+            } else {
+                x.to_string()
+            }
+        };
+        let all: Vec<String> = self.0.iter().map(down).collect();
+        write!(f, "{} {}", if all.len() == 1 { "an amplitude of" } else { "amplitudes of" }, all.join(", "))
     }
 }
 

@@ -10,7 +10,7 @@
 //! Modules depend on each other in one direction only, in the order in which data flow:
 //!
 //! ```text
-//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> redesign -> export -> study -> report -> run
+//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> redesign -> export -> excite -> study -> report -> run
 //! ```
 //!
 //! | module | holds |
@@ -27,6 +27,7 @@
 //! | [`validate`] | fit, variance accounted for, residual tests, certificates of the loop, prediction of fresh data |
 //! | [`redesign`] | a new controller on the identified model, with its prediction and its data for firmware |
 //! | [`export`] | models for other tools: JSON, MATLAB, NumPy, scripts, C99 headers of the model and of the controller |
+//! | [`excite`] | excitation for a machine under its controller: sequence, predicted displacement, accuracy of the modes |
 //! | [`study`] | the paper: its 500 models, its three experiments, the map of which method wins where |
 //! | [`report`] | results as data and as one offline page |
 //! | [`run`] | run.toml in, run folder out: the driver of the program |
@@ -74,6 +75,7 @@
 pub mod check;
 pub mod control;
 pub mod error;
+pub mod excite;
 pub mod export;
 pub mod factor;
 pub mod identify;

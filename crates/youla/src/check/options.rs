@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 ///
 /// Tests with a distribution hold at `significance` standard deviations; measured records have residuals that are not quite
 /// white and not quite normal, so that it is far out, and a share that must be exceeded stands beside it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckOptions {
     /// Limits of channels that are known, by name: lowest and highest value. A sample at or beyond one is clipped.

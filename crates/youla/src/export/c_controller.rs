@@ -13,6 +13,7 @@ use super::c::{check_ports, comment, constant, finished, products, update};
 use super::precision::{DOUBLE, Round, SAMPLES, SINGLE, SingleError, add, noise};
 use super::text::{PROGRAM, identifier, labels, number, plain};
 use crate::control::closed_loop;
+use crate::factor::shear;
 use crate::linalg::{block, eye};
 use crate::lti::{Discrete, Partitioned, StateSpace, simulate};
 use crate::units::Channel;
@@ -77,7 +78,7 @@ pub fn c_controller(export: &ControllerExport) -> Result<CController> {
     let (m, p) = (export.nominal.inputs(), export.nominal.outputs());
     check_ports(m, p)?;
     check(export, m, p)?;
-    let left = shifted(export, m, p)?;
+    let left = shifted(export)?;
     let j_k = Partitioned::new(left.clone(), m, m)?.exchange_first()?.with_inputs_swapped()?;
     let law = Law::new(&left, m);
     let single = law.single_error(&export.nominal, &j_k)?;
@@ -102,17 +103,8 @@ fn check(export: &ControllerExport, m: usize, p: usize) -> Result<()> {
 }
 
 /// `[I -Q; 0 I] left`.
-fn shifted(export: &ControllerExport, m: usize, p: usize) -> Result<StateSpace<Discrete>> {
-    let Some(q) = &export.q else { return Ok(export.left.clone()) };
-    let n = q.order();
-    let upper = StateSpace::new(
-        q.a().to_owned(),
-        block(&[&[Mat::zeros(n, m).as_ref(), q.b()]]),
-        block(&[&[(Scale(-1.0) * q.c()).as_ref()], &[Mat::zeros(p, n).as_ref()]]),
-        block(&[&[eye(m).as_ref(), (Scale(-1.0) * q.d()).as_ref()], &[Mat::zeros(p, m).as_ref(), eye(p).as_ref()]]),
-        q.time(),
-    )?;
-    export.left.then(&upper)
+fn shifted(export: &ControllerExport) -> Result<StateSpace<Discrete>> {
+    export.q.as_ref().map_or_else(|| Ok(export.left.clone()), |q| export.left.then(&shear(&q.negated())?))
 }
 
 /// The matrices of the generated code.

@@ -1,6 +1,8 @@
 //! Models for other tools: as data (JSON, MATLAB, NumPy), as scripts (python-control, MATLAB) and as C99 headers of the model
 //! and of the controller `J_K(Q)` of (21), (22), so that firmware runs the experiment itself.
 //!
+//! Sequences for an experiment go out as text, MATLAB file and C99 header.
+//!
 //! Every number is written with as many digits as it takes to read back the same bits.
 
 mod c;
@@ -11,11 +13,13 @@ mod npz;
 mod precision;
 mod python;
 mod read;
+mod sequence;
 mod text;
 
 pub use c_controller::{CController, ControllerExport, c_controller};
 pub use precision::SingleError;
 pub use read::{model_from_bytes, read_model};
+pub use sequence::{SequenceFormat, export_sequence};
 
 use crate::lti::{Discrete, StateSpace};
 use crate::record::{Value, Variable, mat_to_bytes};

@@ -125,21 +125,8 @@ impl<T: TimeDomain> CoprimeFactors<T> {
         check_controller(&self.nominal, controller)?;
         let q = self.j_g()?.lower_lft(controller)?;
         require_stabilised(&q, "the nominal model")?;
-        let (m, p) = (self.inputs(), self.outputs());
-        let upper = |sign: f64| {
-            StateSpace::new(
-                q.a().to_owned(),
-                block(&[&[Mat::zeros(q.order(), m).as_ref(), q.b()]]),
-                block(&[&[(Scale(sign) * q.c()).as_ref()], &[Mat::zeros(p, q.order()).as_ref()]]),
-                block(&[
-                    &[eye(m).as_ref(), (Scale(sign) * q.d()).as_ref()],
-                    &[Mat::zeros(p, m).as_ref(), eye(p).as_ref()],
-                ]),
-                q.time(),
-            )
-        };
-        let right = upper(1.0)?.then(self.right.system())?;
-        let left = self.left.system().then(&upper(-1.0)?)?;
+        let right = shear(&q)?.then(self.right.system())?;
+        let left = self.left.system().then(&shear(&q.negated())?)?;
         Self::from_parts(self.nominal.clone(), right, left)?.without_loss()
     }
 
@@ -212,6 +199,18 @@ impl<T: TimeDomain> CoprimeFactors<T> {
     pub fn v_t(&self) -> StateSpace<T> {
         self.left.part(0, 0)
     }
+}
+
+/// `[I Q; 0 I]` of a Q from p to m signals.
+pub(crate) fn shear<T: TimeDomain>(q: &StateSpace<T>) -> Result<StateSpace<T>> {
+    let (n, m, p) = (q.order(), q.outputs(), q.inputs());
+    StateSpace::new(
+        q.a().to_owned(),
+        block(&[&[Mat::zeros(n, m).as_ref(), q.b()]]),
+        block(&[&[q.c()], &[Mat::zeros(p, n).as_ref()]]),
+        block(&[&[eye(m).as_ref(), q.d()], &[Mat::zeros(p, m).as_ref(), eye(p).as_ref()]]),
+        q.time(),
+    )
 }
 
 fn check_controller<T: TimeDomain>(nominal: &StateSpace<T>, controller: &StateSpace<T>) -> Result<()> {

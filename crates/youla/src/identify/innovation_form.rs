@@ -22,7 +22,7 @@ use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
 
 /// What is known of S before it is identified.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeviationOptions {
     /// How the noise of beta is modelled.
@@ -31,8 +31,8 @@ pub struct DeviationOptions {
     pub iterations: usize,
     /// Relative change of K_s below which it has settled.
     pub tolerance: f64,
-    /// How S is refined by the prediction-error method afterwards; not at all when absent. A caller of
-    /// [`hansen_structured`] does that by [`super::hansen_refine::refine_hansen`].
+    // The caller of `hansen_structured` does that by `refine_hansen`.
+    /// How S is refined by the prediction-error method afterwards; not at all when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub refine: Option<RefineOptions>,
 }
@@ -44,7 +44,7 @@ impl Default for DeviationOptions {
 }
 
 /// How the noise of beta is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
     /// Not at all for a stable S: B and D from the simulated beta.

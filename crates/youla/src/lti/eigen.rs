@@ -41,14 +41,25 @@ impl Eigen {
         sum
     }
 
-    /// Frobenius norm of the residue `C v w' B` of pole number k.
-    fn residue<T: TimeDomain>(&self, k: usize, model: &StateSpace<T>) -> f64 {
+    /// The eigenvalues, in no order.
+    pub(crate) fn poles(&self) -> &[c64] {
+        &self.poles
+    }
+
+    /// The residue of pole number k as `c b`: `c = C v` (p values) and `b = w' B` (m values).
+    pub(crate) fn directions<T: TimeDomain>(&self, k: usize, model: &StateSpace<T>) -> (Vec<c64>, Vec<c64>) {
         let n = self.scale.len();
         let along = |entry: &dyn Fn(usize) -> c64| (0..n).fold(c64::new(0.0, 0.0), |sum, i| sum + entry(i));
         let outputs = (0..model.outputs()).map(|r| along(&|i| self.right[(i, k)] * self.scale[i] * model.c()[(r, i)]));
         let inputs = (0..model.inputs()).map(|r| along(&|i| self.left[(k, i)] / self.scale[i] * model.b()[(i, r)]));
-        let square = |sum: f64, v: c64| sum + v.norm_sqr();
-        (outputs.fold(0.0, square) * inputs.fold(0.0, square)).sqrt()
+        (outputs.collect(), inputs.collect())
+    }
+
+    /// Frobenius norm of the residue `C v w' B` of pole number k.
+    fn residue<T: TimeDomain>(&self, k: usize, model: &StateSpace<T>) -> f64 {
+        let (c, b) = self.directions(k, model);
+        let square = |sum: f64, v: &c64| sum + v.norm_sqr();
+        (c.iter().fold(0.0, square) * b.iter().fold(0.0, square)).sqrt()
     }
 }
 

@@ -26,7 +26,7 @@ pub enum ChannelRef {
 }
 
 /// A channel of the record and where it comes from.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
     /// Name in the record.
@@ -103,11 +103,23 @@ pub(crate) fn unknown(what: &str, name: &str, known: Vec<String>) -> Error {
 }
 
 /// The form in configuration files.
-#[derive(Serialize, Deserialize)]
+#[derive(Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "expected a name, or the number of a column")]
 enum Written {
+    /// Number of a column, counted from 1.
     Column(usize),
+    /// Name of a column or variable; `#3` is the third column.
     Text(String),
+}
+
+impl schemars::JsonSchema for ChannelRef {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        "ChannelRef".into()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        Written::json_schema(generator)
+    }
 }
 
 impl From<Written> for ChannelRef {

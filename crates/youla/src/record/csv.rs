@@ -22,7 +22,7 @@ use parse::{Fields, Selection};
 pub use stream::CsvStream;
 
 /// What stands between two cells.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Delimiter {
     /// Read it off the first line: the only one of comma, semicolon and tab that it holds, else blanks. A line that
@@ -40,7 +40,7 @@ pub enum Delimiter {
 }
 
 /// Whether the first line holds the names of the columns.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum HeaderLine {
     /// It does when none of its cells is a number.
@@ -53,7 +53,7 @@ pub enum HeaderLine {
 }
 
 /// What stands before the decimals of a number; never guessed.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum DecimalSign {
     /// `0.5`
@@ -81,7 +81,7 @@ impl DecimalSign {
 }
 
 /// How to read a text file.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CsvOptions {
     /// What stands between two cells.
@@ -183,7 +183,8 @@ pub fn write_csv(record: &Record, path: impl AsRef<Path>) -> Result<()> {
     if record.channels().iter().any(|c| c.name == TIME) {
         return Err(Error::DuplicateChannel { what: path.display().to_string(), name: TIME.to_owned() });
     }
-    write_rows(record, path).map_err(|source| {
+    let written = std::fs::File::create(path).and_then(|file| write_rows(record, std::io::BufWriter::new(file)));
+    written.map_err(|source| {
         // Best effort: the error that led here is the one to report.
         let _ = std::fs::remove_file(path);
         Error::Io { path: path.to_owned(), source }
@@ -193,8 +194,22 @@ pub fn write_csv(record: &Record, path: impl AsRef<Path>) -> Result<()> {
 /// Name of the time column that is written.
 const TIME: &str = "t";
 
-fn write_rows(record: &Record, path: &Path) -> std::io::Result<()> {
-    let mut writer = ::csv::Writer::from_path(path)?;
+/// The bytes of such a file, behind the given comments, one a line.
+///
+/// # Errors
+/// As [`write_csv`].
+pub(crate) fn csv_to_bytes(record: &Record, comments: &[String]) -> Result<Vec<u8>> {
+    if record.channels().iter().any(|c| c.name == TIME) {
+        return Err(Error::DuplicateChannel { what: record.name().to_owned(), name: TIME.to_owned() });
+    }
+    let mut bytes: Vec<u8> = comments.iter().flat_map(|line| format!("# {line}\n").into_bytes()).collect();
+    let path = Path::new(record.name()).to_owned();
+    write_rows(record, &mut bytes).map_err(|source| Error::Io { path, source })?;
+    Ok(bytes)
+}
+
+fn write_rows(record: &Record, to: impl std::io::Write) -> std::io::Result<()> {
+    let mut writer = ::csv::Writer::from_writer(to);
     writer.write_record([TIME].into_iter().chain(record.channels().iter().map(|c| c.name.as_str())))?;
     let mut cell = String::new();
     for k in 0..record.samples() {

@@ -8,7 +8,7 @@ use faer::Mat;
 use serde::{Deserialize, Serialize};
 
 /// What to take out of every channel.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Detrend {
     /// Nothing.

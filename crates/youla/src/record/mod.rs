@@ -26,8 +26,10 @@ mod values;
 
 pub(crate) use choose::unknown;
 pub use choose::{ChannelRef, ChannelSpec};
+pub(crate) use csv::csv_to_bytes;
 pub use csv::{CsvOptions, CsvStream, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 pub use detrend::{Detrend, Detrended, Trend};
+pub(crate) use excitation::fade;
 pub use excitation::{
     Chirp, Excitation, ExcitationReport, ExcitationReportOptions, ExcitedChannel, Multisine, PowerBand, Prbs,
     RampedExcitation, SquareWaves, describe_excitation,

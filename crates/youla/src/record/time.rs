@@ -22,7 +22,7 @@ pub struct TimeSource {
 }
 
 /// What to do where samples are missing, by the time column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gaps {
     /// Refuse the file and name the row.

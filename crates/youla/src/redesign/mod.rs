@@ -29,7 +29,7 @@ use crate::{Error, ErrorKind, Mat, Result};
 use serde::{Deserialize, Serialize};
 
 /// What is designed anew.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RedesignMethod {
     /// F and L on the identified model.
@@ -40,7 +40,7 @@ pub enum RedesignMethod {
 }
 
 /// Choices of [`redesign`], the table `[redesign]` of run.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RedesignOptions {
     /// What is designed anew.

@@ -5,7 +5,7 @@ use crate::{Error, Mat, Result};
 use serde::{Deserialize, Serialize};
 
 /// How a model is reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReductionMethod {
     /// Weak states are dropped (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17).
@@ -33,7 +33,7 @@ impl std::fmt::Display for ReductionMethod {
 }
 
 /// How many states are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ReducedOrder {
     /// All that are controllable and observable to working precision: removes exact cancellations only.
@@ -50,10 +50,10 @@ pub enum ReducedOrder {
 }
 
 /// Choices of [`super::reduce`], [`super::reduce_weighted`] and [`super::reduce_in_loop`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ReductionOptions {
-    /// Method.
+    /// How states are removed.
     pub method: ReductionMethod,
     /// Number of states that are kept.
     pub order: ReducedOrder,
@@ -64,10 +64,11 @@ pub struct ReductionOptions {
     /// factors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stability_boundary: Option<f64>,
-    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent.
+    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent. A run takes the rms of its estimation records
+    /// for normalised coprime factors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub output_scale: Option<Vec<f64>>,
-    /// Sizes of the inputs, one per input, that matter equally; 1 each when absent.
+    /// Sizes of the inputs, one per input; 1 each, or the rms, when absent, as for the outputs.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub input_scale: Option<Vec<f64>>,
 }

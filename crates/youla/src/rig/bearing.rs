@@ -9,13 +9,14 @@ use serde::{Deserialize, Serialize};
 /// Parameters of the mass-spring-damper model (1) with first-order actuators (7), per unit mass:
 ///
 /// ```text
-/// l'' = damping l' + stiffness l + actuator_gain m        m' = actuator_pole (u - m)
+/// l'' = damping l' + stiffness l + actuator_gain m
+/// m' = actuator_pole (u - m)
 /// ```
 ///
 /// with displacement l in um, command u and actuator state m in V; index 0 is horizontal, 1 vertical. The matrices carry
 /// their sign (stiffness and damping are negative definite). The paper prints units that are wrong by 1e6; these fit its
 /// numbers.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bearing {
     /// K of (10), 1/s^2.

@@ -15,7 +15,7 @@ use crate::{Mat, MatRef, Result};
 use serde::{Deserialize, Serialize};
 
 /// Lines of known frequency in the outputs; either frequencies or a tacho channel.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DisturbanceSettings {
     /// Constant frequencies, Hz.
@@ -38,7 +38,7 @@ impl Default for DisturbanceSettings {
 }
 
 /// Unit of a speed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum TachoUnit {
     /// Revolutions per minute.

@@ -2,11 +2,12 @@
 
 use super::artefacts::{Provenance, SCHEMA};
 use super::records::SourceFile;
-use crate::export::{ControllerExport, NamedModel, read_model};
+use crate::export::{ControllerExport, NamedModel, model_from_bytes, read_model};
 use crate::lti::{Discrete, StateSpace};
-use crate::record::{sha256, unknown};
+use crate::record::{open, sha256, unknown};
 use crate::redesign::ExportedController;
 use crate::{Error, Result};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The model files of a run folder; the first is what a run is exported as.
@@ -71,11 +72,13 @@ pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerE
 
 /// Q from either kind of file.
 fn parameter(path: &Path) -> Result<StateSpace<Discrete>> {
-    let text = std::fs::read(path).unwrap_or_default();
-    match serde_json::from_slice::<ExportedController>(&text) {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    match serde_json::from_slice::<ExportedController>(&bytes) {
         Ok(ExportedController { q: Some(q), ts, .. }) => q.system(Discrete::new(ts)?),
         Ok(_) => Err(not(path, "this controller was not designed by its Q")),
-        Err(_) => Ok(read_model(path)?.system),
+        Err(_) => Ok(model_from_bytes(&bytes, path)?.system),
     }
 }
 

@@ -19,10 +19,10 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 
 /// What is known of the plant's physics, the table `[grey_box]` of run.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GreyBoxSettings {
-    /// The structure; its keys stand in `docs/grey-box.md`.
+    /// The structure; explained in `docs/grey-box.md`.
     pub structure: Declaration,
     /// Whether the initial values of the parameters are a second start, beside the projection of G(S).
     #[serde(default = "yes")]
@@ -43,7 +43,7 @@ pub struct GreyBoxSettings {
 }
 
 /// A structure to compare with that of `[grey_box.structure]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AlternativeStructure {
     /// Name in tables.

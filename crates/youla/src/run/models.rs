@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
 /// The domain in which matrices or polynomials are given.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Domain {
     /// In s, rad/s; discretised by a zero-order hold at the sample time of the data.
@@ -20,7 +20,7 @@ pub enum Domain {
 }
 
 /// A transfer function: one polynomial for one input and output, or a matrix `[row][column]` of polynomials.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "expected a list of coefficients, or a matrix [row][column] of such lists")]
 pub enum Polynomials {
     /// Coefficients of the only entry.
@@ -47,12 +47,12 @@ impl Polynomials {
 }
 
 /// The nominal model G(0).
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum NominalModel {
     /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
     TransferFunction {
-        /// Continuous or discrete.
+        /// The domain in which it is given.
         domain: Domain,
         /// Numerator coefficients.
         numerator: Polynomials,
@@ -61,7 +61,7 @@ pub enum NominalModel {
     },
     /// State-space matrices, row by row.
     StateSpace {
-        /// Continuous or discrete.
+        /// The domain in which it is given.
         domain: Domain,
         /// A, n x n.
         a: Vec<Vec<f64>>,
@@ -73,11 +73,11 @@ pub enum NominalModel {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         d: Option<Vec<Vec<f64>>>,
     },
-    /// Variables `a`, `b`, `c`, `d` of a MATLAB v5 file.
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3.
     MatFile {
         /// Path of the file, relative to run.toml.
         file: PathBuf,
-        /// Continuous or discrete.
+        /// The domain in which it is given.
         domain: Domain,
     },
     /// A discrete-time model that was exported or identified: JSON, MATLAB or NumPy file with its sample time.
@@ -90,9 +90,9 @@ pub enum NominalModel {
         /// Parameters; those of the paper when absent.
         #[serde(default)]
         parameters: Bearing,
-        /// Factor on A.
+        /// Factor on all entries of A, `1 - theta` in (27).
         a_factor: f64,
-        /// Factor on B.
+        /// Factor on all entries of B.
         b_factor: f64,
     },
 }
@@ -131,7 +131,7 @@ impl NominalModel {
 }
 
 /// Which sign the controller was written down with; never guessed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Feedback {
     /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
@@ -153,13 +153,13 @@ impl Feedback {
 
 /// The controller that ran while the data were logged, at the sample time of the data, in one of its usual forms. The
 /// sign convention is mandatory in each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum ControllerSettings {
     /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single
     /// denominator is common to all entries.
     DifferenceEquation {
-        /// Sign convention.
+        /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
         /// Numerator coefficients.
         numerator: Polynomials,
@@ -168,38 +168,38 @@ pub enum ControllerSettings {
     },
     /// Discrete-time matrices, row by row.
     StateSpace {
-        /// Sign convention.
+        /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
-        /// Ak.
+        /// A of the controller, row by row.
         a: Vec<Vec<f64>>,
-        /// Bk.
+        /// B of the controller.
         b: Vec<Vec<f64>>,
-        /// Ck.
+        /// C of the controller.
         c: Vec<Vec<f64>>,
-        /// Dk.
+        /// D of the controller.
         d: Vec<Vec<f64>>,
     },
-    /// Variables `a`, `b`, `c`, `d` of a MATLAB v5 file, discrete-time.
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3, discrete-time.
     MatFile {
-        /// Sign convention.
+        /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
         /// Path of the file, relative to run.toml.
         file: PathBuf,
     },
     /// A discrete-time model that was exported or identified, from y to u: JSON, MATLAB or NumPy file with its sample time.
     ModelFile {
-        /// Sign convention.
+        /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
         /// Path of the file, relative to run.toml.
         file: PathBuf,
     },
     /// State feedback and observer gain for the discrete-time nominal model in its own states.
     Observer {
-        /// Sign convention.
+        /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
-        /// m x n.
+        /// State feedback F, m x n, row by row.
         state_feedback: Vec<Vec<f64>>,
-        /// n x p.
+        /// Observer gain L, n x p, row by row.
         observer_gain: Vec<Vec<f64>>,
     },
 }

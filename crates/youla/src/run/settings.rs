@@ -20,7 +20,7 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// The whole of run.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RunSettings {
     /// Name of the machine or of the experiment; titles and file names use it.
@@ -64,7 +64,7 @@ pub struct RunSettings {
     /// Thresholds of the check of the data.
     #[serde(default)]
     pub check: CheckOptions,
-    /// Frequency responses.
+    /// Frequency responses in the report.
     #[serde(default)]
     pub frequency_response: FrequencySettings,
     /// Seed of a simulated record; absent for measured data.
@@ -73,13 +73,13 @@ pub struct RunSettings {
 }
 
 /// Records and the meaning of their channels.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataSettings {
     /// Sample time in seconds; this or `time_column` must be given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_time: Option<f64>,
-    /// Column with the time in seconds.
+    /// Column with the time in seconds; with `sample_time` both must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<ChannelRef>,
     /// Greatest deviation of a time step, as a part of the sample time.
@@ -98,7 +98,7 @@ pub struct DataSettings {
     /// Known reference r, one channel per output.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reference: Vec<ChannelSpec>,
-    /// Known excitation alpha of Fig. 3, one channel per input.
+    /// Known excitation alpha of Fig. 3, one channel per input; not together with `input_excitation`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alpha: Vec<ChannelSpec>,
     /// How text files are read.
@@ -122,7 +122,7 @@ fn default_tolerance() -> f64 {
 }
 
 /// One file, or a part of it.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct DataFile {
     /// Path, relative to run.toml.
@@ -153,7 +153,7 @@ impl DataFile {
 }
 
 /// How the factors of an arbitrary controller are built (`CoprimeFactors::stacked` or `shifted_to`).
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Construction {
     /// Right factors of plant and controller stacked, then inverted.
@@ -164,7 +164,7 @@ pub enum Construction {
 }
 
 /// Options of the coprime factors.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FactorSettings {
     /// For controllers that are not given as observer gains.
@@ -188,7 +188,7 @@ impl Default for FactorSettings {
 }
 
 /// Options of the stabilisation diagrams.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StabilisationSettings {
     /// Largest order; when absent, twice the order of the model and at least 20, as far as the horizon allows.
@@ -199,7 +199,7 @@ pub struct StabilisationSettings {
 }
 
 /// How a model predicts a verification record.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Prediction {
     /// The model under the actual controller, driven by the known excitations alone. The only fair test for unstable or
@@ -211,7 +211,7 @@ pub enum Prediction {
 }
 
 /// Options of the verification.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct VerificationSettings {
     /// What drives the models.
@@ -221,7 +221,7 @@ pub struct VerificationSettings {
 }
 
 /// Options of the frequency responses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrequencySettings {
     /// Samples per window of the non-parametric estimate (Welch, Hann).

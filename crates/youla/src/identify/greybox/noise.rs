@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 /// let free = NoiseModel::Innovation(InnovationStart::default());
 /// assert_ne!(free, NoiseModel::OutputError);
 /// ```
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum NoiseModel {
     /// White noise at the outputs: the prediction is the simulation.
@@ -26,7 +26,7 @@ pub enum NoiseModel {
 }
 
 /// Where the search for the gain K begins.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct InnovationStart {
     /// K in the states of the sampled structure, n x p, row by row; zero when empty.
@@ -48,7 +48,7 @@ impl InnovationStart {
 /// let drift = NoiseFilter { a: vec![vec![0.9]], b: vec![vec![1.0]], c: vec![vec![0.9]] };
 /// assert_eq!(drift.a[0][0], 0.9);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NoiseFilter {
     /// A, row by row.

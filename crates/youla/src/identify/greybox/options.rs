@@ -13,7 +13,7 @@ use serde::{Deserialize, Serialize};
 /// let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
 /// assert_eq!(options.max_iterations, 50);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GreyBoxOptions {
     /// Largest number of steps. From nominal models of the bearing that are up to 60 % wrong the search takes 5 to 20; one

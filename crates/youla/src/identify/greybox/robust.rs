@@ -23,7 +23,7 @@ const DEVIATION_OVER_MEDIAN: f64 = 1.4826;
 const ROUNDS: usize = 50;
 
 /// How residuals count.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Loss {
     /// By their square: the maximum-likelihood estimate for normal noise.

@@ -37,7 +37,7 @@ const LEFT: f64 = 1e-6;
 /// let options = RefineOptions { noise: RefineNoise::Innovation, ..Default::default() };
 /// assert!(options.stable);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct RefineOptions {
     /// The model of the noise.
@@ -50,9 +50,10 @@ pub struct RefineOptions {
     pub initial_state: InitialState,
     /// Largest number of steps.
     pub max_iterations: usize,
-    /// [`GreyBoxOptions::offset_tolerance`].
+    /// Converged where the distance to the minimum of the linearised criterion is below this share of the radius of the confidence
+    /// region, as in [`super::greybox::GreyBoxOptions::offset_tolerance`].
     pub offset_tolerance: f64,
-    /// [`GreyBoxOptions::step_tolerance`].
+    /// Smallest step, relative to the parameters, as in [`super::greybox::GreyBoxOptions::step_tolerance`].
     pub step_tolerance: f64,
 }
 
@@ -71,7 +72,7 @@ impl Default for RefineOptions {
 }
 
 /// The model of the noise in a refinement.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum RefineNoise {
     /// White noise at the outputs: the simulation is fitted.

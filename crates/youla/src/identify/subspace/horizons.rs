@@ -18,7 +18,7 @@ use faer::MatRef;
 use serde::{Deserialize, Serialize};
 
 /// Choice of past and future by the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutomaticHorizon {
     /// Largest past to consider, block rows.

@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 /// let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(8), ..Default::default() };
 /// assert_eq!(options.horizon, 20);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SubspaceOptions {
     /// Weight of the singular value decomposition, and with it the name of the method.
@@ -27,7 +27,7 @@ pub struct SubspaceOptions {
     /// Both from the data instead, by the order of a vector autoregression; `horizon` and `past` have no meaning then.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub automatic_horizon: Option<AutomaticHorizon>,
-    /// Order of the model.
+    /// Order of the model, of S in `[hansen]`; a rule proposes one when absent.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,
@@ -89,7 +89,7 @@ impl SubspaceOptions {
 /// on the past inputs and outputs of the one-step predictor, take A, C and K from the states, and B and D from the
 /// one-step predictions. They need a plant without D or a controller without direct path, and a past p with `(A - K C)^p`
 /// small; their parameters are many, so that for open-loop data the first three have less variance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Weight {
     /// PO-MOESP: `W1 = I`, `W2` the projection onto the complement of the future inputs; A from the shift of the
@@ -126,7 +126,7 @@ impl Weight {
 /// let aic = Order::Auto(AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(8) });
 /// assert_eq!(SubspaceOptions { order: aic, ..Default::default() }.order, aic);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Order {
     /// The order given.
@@ -142,7 +142,7 @@ impl Default for Order {
 }
 
 /// Choice of the order by a rule.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct AutoOrder {
     /// Largest order to consider; the horizon may allow less.
@@ -170,7 +170,7 @@ impl AutoOrder {
 }
 
 /// A rule that proposes an order; the formulas stand in `order.rs` and `order_models.rs`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum OrderRule {
     /// Singular value criterion: the first canonical correlation that is left out, squared, and `d(n) log(T) / T`.
@@ -194,7 +194,7 @@ impl OrderRule {
 }
 
 /// Direct path from input to output.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Feedthrough {
     /// D = 0 exactly, as for a plant behind a zero-order hold.
@@ -230,7 +230,7 @@ impl Feedthrough {
 }
 
 /// How the triangular factor of the block-Hankel data is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Factorisation {
     /// From the Gram matrix where the condition number of the data allows it (up to 1e4 with columns of unit length), else
@@ -254,7 +254,7 @@ pub struct DataFactor {
 }
 
 /// What to do with an unstable estimate of A. A stable one is never touched, however lightly damped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Stability {
     /// Refuse it with its worst pole.
@@ -267,7 +267,7 @@ pub enum Stability {
 }
 
 /// Scaling of the channels inside of the method.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChannelScaling {
     /// The units of the record.
@@ -278,7 +278,7 @@ pub enum ChannelScaling {
 }
 
 /// The state at the first sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum InitialState {
     /// Estimated, one per experiment.

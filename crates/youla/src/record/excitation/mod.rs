@@ -13,6 +13,7 @@ pub use chirp::Chirp;
 pub use multisine::Multisine;
 pub use prbs::Prbs;
 pub use ramp::RampedExcitation;
+pub(crate) use ramp::fade;
 pub use report::{ExcitationReport, ExcitationReportOptions, ExcitedChannel, PowerBand, describe_excitation};
 pub use square::SquareWaves;
 

@@ -26,13 +26,16 @@ pub struct Multisine {
     /// Highest angular frequency, rad/s; up to below the Nyquist frequency where nothing is stated.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub omega_max: Option<f64>,
+    /// Bands without lines, lowest and highest angular frequency each, rad/s; empty for none.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub omitted: Vec<[f64; 2]>,
     /// Greatest absolute value.
     pub amplitude: f64,
 }
 
 impl Default for Multisine {
     fn default() -> Self {
-        Multisine { period: 4096, omega_min: 0.0, omega_max: None, amplitude: 1.0 }
+        Multisine { period: 4096, omega_min: 0.0, omega_max: None, omitted: Vec::new(), amplitude: 1.0 }
     }
 }
 
@@ -68,7 +71,11 @@ impl Multisine {
         }
         let step = TAU / (self.period as f64 * time.ts());
         let highest = self.omega_max.unwrap_or(f64::INFINITY);
-        let in_band = |line: &usize| (self.omega_min..=highest).contains(&(*line as f64 * step));
+        let omitted = |omega: f64| self.omitted.iter().any(|[low, high]| (*low..=*high).contains(&omega));
+        let in_band = |line: &usize| {
+            let omega = *line as f64 * step;
+            (self.omega_min..=highest).contains(&omega) && !omitted(omega)
+        };
         let lines: Vec<usize> = (1..self.period.div_ceil(2)).filter(in_band).collect();
         let what = "the number of lines of a multisine between its lowest and highest frequency";
         check(what, lines.len() as f64, lines.len() >= channels, "at least one for each channel; lengthen the period")?;

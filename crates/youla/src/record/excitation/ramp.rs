@@ -47,12 +47,18 @@ impl RampedExcitation {
         let what = format!("the ramp of an excitation of {samples} samples");
         check(&what, self.ramp, fits, "at least 0 and at most half the signal, in seconds")?;
         let mut signal = self.excitation.generate(samples, channels, time, rng)?;
-        if ramp > 0.0 {
-            for column in signal.col_iter_mut() {
-                column.iter_mut().enumerate().for_each(|(k, value)| *value *= weight(k, samples, ramp));
-            }
-        }
+        fade(&mut signal, ramp);
         Ok(signal)
+    }
+}
+
+/// Every channel times w(k), with the ramp in samples; untouched without one.
+pub(crate) fn fade(signal: &mut Mat<f64>, ramp: f64) {
+    let samples = signal.nrows();
+    if ramp > 0.0 {
+        for column in signal.col_iter_mut() {
+            column.iter_mut().enumerate().for_each(|(k, value)| *value *= weight(k, samples, ramp));
+        }
     }
 }
 

@@ -9,7 +9,7 @@ use std::path::Path;
 /// Matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)` where a sample time is given, with entries that are numbers or expressions of named parameters.
 ///
 /// With a template, what is given here replaces what the template says: single keys of parameters, derived quantities,
-/// whole matrices. Without one, `a`, `b`, `c` and an initial value of every parameter are needed. All keys stand in
+/// whole matrices. Without one, `a`, `b`, `c` and an initial value of every parameter are needed. See
 /// `docs/grey-box.md`.
 ///
 /// ```
@@ -32,7 +32,7 @@ use std::path::Path;
 /// assert_eq!(structure.model(&structure.start())?.b()[(0, 0)], 60.0);
 /// # Ok::<(), youla::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Declaration {
     /// A declaration that comes with the library, which this one amends.
@@ -61,7 +61,7 @@ pub struct Declaration {
 }
 
 /// An entry of a matrix.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(untagged, expecting = "expected a number or a text with an expression")]
 pub enum Entry {
     /// A fixed number.
@@ -71,7 +71,7 @@ pub enum Entry {
 }
 
 /// A parameter.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ParameterDeclaration {
     /// Where the search starts, or the value of a fixed parameter.

@@ -14,10 +14,10 @@ use std::path::Path;
 /// assert_eq!(structure.names(), ["damping", "stiffness"]);
 /// # Ok::<(), youla::Error>(())
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Template {
-    /// The gas bearing (3)-(6): [`super::super::BearingStructure`] with the values of the paper.
+    /// The gas bearing (3)-(6) with the values of the paper.
     Bearing,
     /// One mass between a spring and a damper, from force to displacement.
     MassSpringDamper,

@@ -38,7 +38,7 @@ use serde::{Deserialize, Serialize};
 const MOST_LAGS: usize = 500;
 
 /// What the covariance takes the residuals for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ResidualAssumption {
     /// White where they pass the test, else coloured.
@@ -56,7 +56,7 @@ pub enum ResidualAssumption {
 /// let options = youla::identify::greybox::IntervalOptions::default();
 /// assert_eq!((options.level, options.lags), (0.95, None));
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntervalOptions {
     /// Probability with which an interval or region should hold the truth.

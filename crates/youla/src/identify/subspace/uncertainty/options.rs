@@ -4,7 +4,7 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// How the uncertainty of an estimate is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum UncertaintyMethod {
     /// Not at all.
@@ -25,7 +25,7 @@ pub enum UncertaintyMethod {
 /// let options = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
 /// assert_eq!(options.level, 0.95);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertaintyOptions {
     /// The method.

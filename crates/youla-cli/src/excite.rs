@@ -1,0 +1,276 @@
+//! `youla excite`: an excitation for a machine that runs under its controller.
+
+use crate::args::Args;
+use crate::commands::folder_of;
+use crate::output::{Failure, say};
+use crate::table::aligned;
+use clap::{Args as ClapArgs, ValueEnum};
+use std::fmt::Write;
+use std::path::PathBuf;
+use youla::excite::{ExciteOptions, InputOrder, Length, Notch, Shape};
+use youla::export::SequenceFormat;
+use youla::run::{ExcitationPort, RunExcitation, RunSettings, excite_run, write_excitation};
+
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --limit-output 30
+  youla excite run.toml --shape prbs --amplitude 0.5 --band 20,400 --duration 4 --ramp 0.2 --notch-rpm 2500 --to csv,c,mat
+  youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --noise 0.2 --damping-deviation 0.002
+                                               how well the modes will be known, and how long it takes to know them so well";
+
+/// What is asked of an excitation.
+#[derive(Debug, ClapArgs)]
+pub(crate) struct ExciteArgs {
+    /// Settings, as for `identify`; the data files need not exist where [data] states the sample time.
+    #[arg(value_name = "RUN.TOML")]
+    settings: PathBuf,
+    /// Shape of the sequence.
+    #[arg(long, value_enum, default_value = "multisine")]
+    shape: ShapeName,
+    /// Greatest absolute value in the unit of the input; one for all inputs, or one each, separated by commas.
+    #[arg(long, value_name = "A", required = true, value_delimiter = ',', allow_negative_numbers = true)]
+    amplitude: Vec<f64>,
+    /// Lowest and highest frequency, Hz.
+    #[arg(
+        long,
+        value_name = "LOW,HIGH",
+        required = true,
+        value_delimiter = ',',
+        num_args = 1,
+        allow_negative_numbers = true
+    )]
+    band: Vec<f64>,
+    /// Length in seconds.
+    #[arg(
+        long,
+        value_name = "S",
+        required_unless_present = "samples",
+        conflicts_with = "samples",
+        allow_negative_numbers = true
+    )]
+    duration: Option<f64>,
+    /// Length in samples.
+    #[arg(long, value_name = "N")]
+    samples: Option<usize>,
+    /// Seed; the same seed gives the same sequence.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Time in which the amplitude grows at the start and falls at the end, seconds.
+    #[arg(long, value_name = "S", default_value_t = 0.0, allow_negative_numbers = true)]
+    ramp: f64,
+    /// Keep once and twice this speed free, in revolutions per minute.
+    #[arg(long, value_name = "RPM", conflicts_with = "notch_hz", allow_negative_numbers = true)]
+    notch_rpm: Option<f64>,
+    /// Keep once and twice this speed free, in Hz.
+    #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
+    notch_hz: Option<f64>,
+    /// Width of each band that is kept free, Hz.
+    #[arg(long, value_name = "HZ", default_value_t = 4.0, allow_negative_numbers = true)]
+    notch_width: f64,
+    /// Excite one input after the other; else all at a time with independent signals.
+    #[arg(long)]
+    one_at_a_time: bool,
+    /// Periods of a multisine or PRBS within the length.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    periods: usize,
+    /// Where it enters; by default where run.toml declares an excitation, else alpha for observer gains and input for other controllers.
+    #[arg(long, value_enum)]
+    port: Option<PortName>,
+    /// Largest predicted magnitude of the outputs; one for all, or one each.
+    #[arg(long, value_name = "Y", value_delimiter = ',', allow_negative_numbers = true)]
+    limit_output: Vec<f64>,
+    /// Largest predicted magnitude of the inputs; one for all, or one each.
+    #[arg(long, value_name = "U", value_delimiter = ',', allow_negative_numbers = true)]
+    limit_input: Vec<f64>,
+    /// Scale an excitation that would pass a limit to one that just keeps it; else it is refused.
+    #[arg(long)]
+    scale_to_limit: bool,
+    /// Relative error of the nominal model for which the prediction is repeated.
+    #[arg(long, value_name = "THETA", default_value_t = 0.1, allow_negative_numbers = true)]
+    model_error: f64,
+    /// Standard deviation of the white noise of the outputs; one for all, or one each.
+    #[arg(
+        long,
+        value_name = "N",
+        value_delimiter = ',',
+        conflicts_with = "noise_record",
+        allow_negative_numbers = true
+    )]
+    noise: Vec<f64>,
+    /// A log of the running machine without excitation, with the outputs of run.toml, to take the noise from.
+    #[arg(long, value_name = "LOG")]
+    noise_record: Option<PathBuf>,
+    /// Standard deviation of the damping ratios that is wanted: says how long it takes. Needs --noise or --noise-record.
+    #[arg(long, value_name = "D", allow_negative_numbers = true)]
+    damping_deviation: Option<f64>,
+    /// csv, c, mat, separated by commas.
+    #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "csv", value_parser = format)]
+    to: Vec<SequenceFormat>,
+    /// Folder for alpha.csv, alpha.h, alpha.mat and excite.svg; made if need be.
+    #[arg(long, value_name = "DIR", default_value = "excite")]
+    out: PathBuf,
+    /// Replace the files if there are any.
+    #[arg(long)]
+    force: bool,
+}
+
+/// A shape on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum ShapeName {
+    /// Square waves of random length.
+    Square,
+    /// Pseudo-random binary sequence.
+    Prbs,
+    /// Sum of sines with a low crest.
+    Multisine,
+    /// Sine of rising frequency.
+    Chirp,
+}
+
+/// A port on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum PortName {
+    /// u = F xh + alpha
+    Alpha,
+    /// u = K y + alpha
+    Input,
+}
+
+fn format(name: &str) -> Result<SequenceFormat, String> {
+    let found = SequenceFormat::ALL.into_iter().find(|format| format.key() == name);
+    found.ok_or_else(|| "there is no such format; known are csv, c, mat".to_owned())
+}
+
+/// Makes the excitation, writes its files and says what it does.
+pub(crate) fn make(args: &Args, asked: &ExciteArgs) -> Result<(), Failure> {
+    let folder = folder_of(&asked.settings);
+    let settings = RunSettings::read(&asked.settings)?;
+    let port = asked.port.map(|port| match port {
+        PortName::Alpha => ExcitationPort::Alpha,
+        PortName::Input => ExcitationPort::Input,
+    });
+    let found = excite_run(&settings, &folder, &options(asked)?, port, asked.noise_record.as_deref())?;
+    let files = write_excitation(&found, &asked.to, &asked.out, asked.force)?;
+    if args.json {
+        let mut about = serde_json::json!(found.excited.summary);
+        about["port"] = serde_json::json!(found.port);
+        about["files"] = files.iter().map(|path| path.display().to_string()).collect();
+        say(&about.to_string())
+    } else if args.quiet {
+        Ok(())
+    } else {
+        let mut text = text(&found);
+        files.iter().for_each(|path| text += &format!("\n{}", path.display()));
+        say(&text)
+    }
+}
+
+fn options(asked: &ExciteArgs) -> Result<ExciteOptions, Failure> {
+    let [low, high] = asked.band[..] else {
+        let what = "the number of frequencies of --band".into();
+        return Err(youla::Error::Ports { what, expected: 2, found: asked.band.len() }.into());
+    };
+    let speed = asked.notch_hz.or(asked.notch_rpm.map(|rpm| rpm / 60.0));
+    Ok(ExciteOptions {
+        shape: match asked.shape {
+            ShapeName::Square => Shape::Square,
+            ShapeName::Prbs => Shape::Prbs,
+            ShapeName::Multisine => Shape::Multisine,
+            ShapeName::Chirp => Shape::Chirp,
+        },
+        amplitude: asked.amplitude.clone(),
+        band: [low, high],
+        length: match (asked.samples, asked.duration) {
+            (Some(samples), _) => Length::Samples(samples),
+            (None, seconds) => Length::Seconds(seconds.unwrap_or(0.0)),
+        },
+        seed: asked.seed,
+        ramp: asked.ramp,
+        notch: speed.map(|hz| Notch { width: asked.notch_width, ..Notch::at(hz) }),
+        inputs: if asked.one_at_a_time { InputOrder::OneAtATime } else { InputOrder::Together },
+        periods: asked.periods,
+        limit_input: asked.limit_input.clone(),
+        limit_output: asked.limit_output.clone(),
+        scale_to_limit: asked.scale_to_limit,
+        model_error: asked.model_error,
+        noise: asked.noise.clone(),
+        damping_deviation: asked.damping_deviation,
+    })
+}
+
+fn text(found: &RunExcitation) -> String {
+    let s = &found.excited.summary;
+    let mut text = found.about().join("\n");
+    text += "\n\n";
+    let mut rows = vec![["input", "peak", "rms", "crest", "energy in the band"].map(str::to_owned).to_vec()];
+    for input in &s.inputs {
+        let crest = input.crest.map_or("-".to_owned(), |c| format!("{c:.2}"));
+        let share = format!("{:.1} %", 100.0 * input.in_band);
+        rows.push(vec![input.channel.label(), format!("{:.4}", input.peak), format!("{:.4}", input.rms), crest, share]);
+    }
+    text += &aligned(&rows);
+    if let Some(factor) = s.scaled_by {
+        let _ = writeln!(text, "\nscaled by {factor:.4} to keep the limits");
+    }
+    for notch in &s.notches {
+        let share = notch.share.iter().fold(0.0_f64, |most, x| most.max(*x));
+        let level = notch.decibels.iter().flatten().fold(f64::NEG_INFINITY, |most, x| most.max(*x));
+        let [low, high] = notch.band;
+        let _ = write!(text, "\nleft from {low:.2} to {high:.2} Hz: {:.1e} of the energy", share);
+        if level.is_finite() {
+            let _ = write!(text, ", {level:.0} dB against the band");
+        }
+    }
+    text += if s.notches.is_empty() { "\n" } else { "\n\n" };
+    text += &predicted(found);
+    text += &accuracy(found);
+    text
+}
+
+fn predicted(found: &RunExcitation) -> String {
+    let s = &found.excited.summary;
+    let wrong = &s.model_error;
+    let theta = 100.0 * wrong.theta;
+    let mut rows = vec![vec![
+        "predicted, nominal loop".to_owned(),
+        "largest".to_owned(),
+        "limit".to_owned(),
+        format!("with a model off by {theta} %"),
+    ]];
+    for p in &s.predicted {
+        let limit = p.limit.map_or("-".to_owned(), |l| l.to_string());
+        rows.push(vec![p.channel.label(), format!("{:.4}", p.peak), limit, format!("{:.4}", p.with_model_error)]);
+    }
+    let mut text = aligned(&rows);
+    text += "The excitation alone: noise, unbalance and the point of operation come on top of it.\n";
+    if !wrong.a_varied {
+        text += "Only B was varied: the model has no matrix A in continuous time.\n";
+    }
+    if !wrong.unstable.is_empty() {
+        let _ = writeln!(text, "caution: the loop is not stable with {}", wrong.unstable.join(", "));
+    }
+    text
+}
+
+fn accuracy(found: &RunExcitation) -> String {
+    let s = &found.excited.summary;
+    if s.noise.is_empty() {
+        return String::new();
+    }
+    let mut header = ["mode of the nominal model", "Hz", "+-", "damping", "+-"].map(str::to_owned).to_vec();
+    header.extend(s.damping_deviation.map(|wanted| format!("length for +- {wanted}")));
+    let mut rows = vec![header];
+    for (k, mode) in s.modes.iter().enumerate() {
+        let digits = |x: Option<f64>| x.map_or("not determined".to_owned(), |x| format!("{x:.2e}"));
+        let mut row = vec![(k + 1).to_string(), format!("{:.2}", mode.hz), digits(mode.hz_deviation)];
+        row.extend([format!("{:.5}", mode.zeta), digits(mode.zeta_deviation)]);
+        if s.damping_deviation.is_some() {
+            row.push(mode.needed.map_or("-".to_owned(), |needed| format!("{needed:.2} s")));
+        }
+        rows.push(row);
+    }
+    let noise: Vec<String> = s.noise.iter().map(|n| format!("{n:.4}")).collect();
+    let mut text = format!("\n{}", aligned(&rows));
+    let _ = writeln!(text, "The best that an unbiased estimate can reach with output noise of {}.", noise.join(", "));
+    text
+}

@@ -36,7 +36,7 @@ fn time_axis() -> Axis {
 }
 
 fn line(method: &str, x: Vec<f64>, y: Vec<f64>) -> Curve {
-    Curve { method: method.into(), note: String::new(), drawn: Drawn::Line, x, y }
+    Curve { method: method.into(), drawn: Drawn::Line, x, y, ..Curve::default() }
 }
 
 fn over_time(found: &RunExcitation) -> Panel {
@@ -48,6 +48,7 @@ fn over_time(found: &RunExcitation) -> Panel {
         x: time_axis(),
         y: Axis { label: "α".into(), unit: common_unit(&found.columns), ..Axis::default() },
         content: Content::Curves(found.columns.iter().enumerate().map(one).collect()),
+        ..Panel::default()
     }
 }
 
@@ -80,6 +81,7 @@ fn over_frequency(found: &RunExcitation) -> Panel {
         x: Axis { label: "frequency".into(), unit: "Hz".into(), range: Some(range), log: true },
         y: Axis { label: "over its mean in the band".into(), unit: "dB".into(), range: Some(DECIBELS), log: false },
         content: Content::Curves(drawn),
+        ..Panel::default()
     }
 }
 
@@ -98,5 +100,6 @@ fn predicted(found: &RunExcitation, channel: &Channel, values: Vec<f64>, limit: 
         x: time_axis(),
         y: Axis { label: channel.name.clone(), unit: channel.unit.clone(), ..Axis::default() },
         content: Content::Curves(drawn),
+        ..Panel::default()
     }
 }

@@ -5,6 +5,8 @@
 //! which is stable, driven by a signal that is free of noise, and stands for the true plant G(S). This library factorises,
 //! filters, identifies S, recombines it to G(S), reduces it and says what the result is worth.
 //!
+#![doc = include_str!("../assets/docs/flow.svg")]
+//!
 //! # Data flow
 //!
 //! Modules depend on each other in one direction only, in the order in which data flow:

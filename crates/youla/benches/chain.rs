@@ -3,6 +3,8 @@
 //! Every reference (a copy, a matrix product, the obvious loop) is measured in the same run, on the same data, next to the work
 //! that it belongs to. The ratios are what to compare between machines. One thread, unless the line says otherwise.
 
+mod timing;
+
 use faer::linalg::matmul::matmul;
 use faer::prelude::*;
 use faer::{Accum, Mat, MatRef, Par, Scale, c64};
@@ -12,7 +14,7 @@ use rand_distr::StandardNormal;
 use std::f64::consts::PI;
 use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
+use timing::{median, middle};
 use youla::Result;
 use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceData, SubspaceOptions, subspace};
 use youla::linalg::{RiccatiProblem, Triangle, care, dare, discrete_lyapunov, eye, lyapunov};
@@ -301,20 +303,4 @@ fn line<T>(name: &str, reference: Option<f64>, work: impl FnMut() -> T) -> f64 {
 fn print_line(name: &str, seconds: f64, ratio: Option<f64>) {
     let ratio = ratio.map_or(String::new(), |r| format!("{r:10.3} x"));
     println!("  {name:<46} {:10.4} ms{ratio}", 1e3 * seconds);
-}
-
-/// Median time in seconds of as many calls as fit into half a second, 3 to 1001 of them, after one to warm up.
-fn median<T>(mut work: impl FnMut() -> T) -> f64 {
-    let mut call = || {
-        let start = Instant::now();
-        black_box(work());
-        start.elapsed().as_secs_f64()
-    };
-    let calls = (0.5 / call()).clamp(3.0, 1001.0) as usize;
-    middle((0..calls).map(|_| call()).collect())
-}
-
-fn middle(mut seconds: Vec<f64>) -> f64 {
-    seconds.sort_by(f64::total_cmp);
-    seconds[seconds.len() / 2]
 }

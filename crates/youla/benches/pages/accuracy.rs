@@ -3,6 +3,7 @@
 use crate::bearing_loop::{self, Coverage, Design, Loop};
 use crate::equations::{Equation, KINDS};
 use crate::page::{head, table};
+use crate::timing::middle;
 use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
@@ -25,7 +26,7 @@ fn equations() -> Result<String> {
             rows.push(vec![
                 (*name).into(),
                 n.to_string(),
-                scientific(middle(&residuals)),
+                scientific(middle(residuals.clone())),
                 scientific(largest(&residuals)),
             ]);
         }
@@ -63,7 +64,7 @@ fn plants() -> Result<String> {
                 Ok(distance(&truth, &frequency_response(&found.plant, &omega)?))
             })
             .collect::<Result<Vec<_>>>()?;
-        rows.push(vec![format!("{noise} um"), scientific(middle(&errors)), scientific(largest(&errors))]);
+        rows.push(vec![format!("{noise} um"), scientific(middle(errors.clone())), scientific(largest(&errors))]);
     }
     let about = "Largest error of the response of G(S) over 10 to 600 Hz, relative to the largest response, from 20 000 samples of the loop \
                  around the bearing whose nominal model has all entries of A halved; five seeds each. The outputs are about 1 um.";
@@ -109,12 +110,6 @@ fn distance(truth: &FrequencyResponse, found: &FrequencyResponse) -> f64 {
 fn grid(factors: &CoprimeFactors<Discrete>) -> Vec<f64> {
     let nyquist = std::f64::consts::PI / factors.nominal().time().ts();
     (0..200).map(|k| nyquist * f64::from(k) / 200.0).collect()
-}
-
-fn middle(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted[sorted.len() / 2]
 }
 
 fn largest(values: &[f64]) -> f64 {

@@ -6,6 +6,9 @@ mod equations;
 mod page;
 mod speed;
 
+#[path = "../timing/mod.rs"]
+mod timing;
+
 #[path = "../../tests/common/bearing_loop.rs"]
 mod bearing_loop;
 #[path = "../../tests/common/mod.rs"]

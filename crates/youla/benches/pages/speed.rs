@@ -2,11 +2,10 @@
 
 use crate::equations::{Equation, KINDS};
 use crate::page::{head, table};
+use crate::timing::{median, middle};
 use faer::Mat;
 use std::f64::consts::PI;
-use std::hint::black_box;
 use std::path::Path;
-use std::time::Instant;
 use youla::Result;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
@@ -80,21 +79,6 @@ fn stages() -> Result<String> {
     let about = "Milliseconds of `youla demo` (20 000 and 10 000 samples, 2 inputs, 2 outputs, with uncertainty, certificate, reduction, \
                  redesign and report), medians of five runs.";
     Ok(table("A whole run", about, &["stage", "time"], &rows))
-}
-
-fn median<T>(mut work: impl FnMut() -> T) -> f64 {
-    let mut call = || {
-        let start = Instant::now();
-        black_box(work());
-        start.elapsed().as_secs_f64()
-    };
-    let calls = (0.5 / call()).clamp(3.0, 1001.0) as usize;
-    middle((0..calls).map(|_| call()).collect())
-}
-
-fn middle(mut seconds: Vec<f64>) -> f64 {
-    seconds.sort_by(f64::total_cmp);
-    seconds[seconds.len() / 2]
 }
 
 fn milliseconds(seconds: f64) -> String {

@@ -18,15 +18,7 @@
  * C99 without any dependency. Double precision, or single with -DYOULA_REAL=float, which
  * @single@.
  */
-#ifndef YOULA_@P@_H
-#define YOULA_@P@_H
-
-#ifndef YOULA_REAL
-#define YOULA_REAL double
-#endif
-
-typedef YOULA_REAL @p@_real;
-
+@real@
 enum { @p@_states = @n@, @p@_inputs = @m@, @p@_outputs = @q@ };
 
 /* The state x of the left factors; set it to zero by @p@_reset. */

@@ -6,15 +6,7 @@
  *
  * C99 without any dependency. Double precision, or single with -DYOULA_REAL=float.
  */
-#ifndef YOULA_@P@_H
-#define YOULA_@P@_H
-
-#ifndef YOULA_REAL
-#define YOULA_REAL double
-#endif
-
-typedef YOULA_REAL @p@_real;
-
+@real@
 enum { @p@_samples = @n@, @p@_inputs = @m@ };
 
 /* Seconds between two samples. */

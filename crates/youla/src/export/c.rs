@@ -7,6 +7,8 @@ use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, MatRef, Result};
 
 const TEMPLATE: &str = include_str!("../../assets/export/model.h");
+/// The guard and the type of numbers, with which every header begins.
+const REAL: &str = include_str!("../../assets/export/real.h");
 
 pub(super) fn c(model: &NamedModel) -> Result<String> {
     let g = &model.system;
@@ -74,7 +76,8 @@ pub(super) fn update(name: &str, n: usize, terms: &[(&str, &str, usize)], unused
 
 /// Names and sizes.
 pub(super) fn finished(text: &str, name: &str, n: usize, m: usize, p: usize) -> String {
-    text.replace("@p@", name)
+    text.replace("@real@", REAL)
+        .replace("@p@", name)
         .replace("@P@", &name.to_ascii_uppercase())
         .replace("@n@", &n.to_string())
         .replace("@x@", &n.max(1).to_string())

@@ -1,6 +1,6 @@
 //! A sequence for an experiment, one column for each input: text, MATLAB file, C99 header.
 
-use super::c::comment;
+use super::c::{comment, finished};
 use super::text::{PROGRAM, identifier, labels, number, plain, rows};
 use crate::record::{Record, Value, Variable, csv_to_bytes, mat_to_bytes};
 use crate::units::Channel;
@@ -77,14 +77,11 @@ fn header(record: &Record, about: &[String]) -> Result<String> {
         return Err(Error::OutOfRange { what, value: record.samples() as f64, must: "at most 2^31 - 1" });
     }
     let name = identifier(record.name());
-    Ok(TEMPLATE
+    let text = TEMPLATE
         .replace("@heading@", &comment(about))
         .replace("@ts@", &number(record.time().ts()))
-        .replace("@values@", &rows(record.data(), "{", "},"))
-        .replace("@p@", &name)
-        .replace("@P@", &name.to_ascii_uppercase())
-        .replace("@n@", &record.samples().to_string())
-        .replace("@m@", &record.channels().len().to_string()))
+        .replace("@values@", &rows(record.data(), "{", "},"));
+    Ok(finished(&text, &name, record.samples(), record.channels().len(), 0))
 }
 
 fn mat(record: &Record, about: &[String]) -> Result<Vec<u8>> {

@@ -16,8 +16,7 @@ pub use kalman::{NoiseCovariance, ObserverGain, kalman};
 pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
 pub use margin::peak_sensitivity;
 pub use margins::{
-    ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, channel_margins,
-    margins,
+    ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, margins,
 };
 pub(crate) use margins::{LinearMargins, WorstMargins};
 pub use observer_controller::observer_controller;

@@ -26,16 +26,6 @@ pub(super) fn householder(x: &mut [f64]) -> (f64, f64) {
 
 /// `m := P m`, where P acts on the rows from `row` on, restricted to the given columns.
 pub(super) fn reflect_rows(m: &mut Mat<f64>, v: &[f64], tau: f64, row: usize, columns: Range<usize>) {
-    if let &[_, v1, v2] = v {
-        // The reflector of a double shift: no loop, no bounds.
-        for j in columns {
-            if let [x0, x1, x2] = &mut m.col_as_slice_mut(j)[row..row + 3] {
-                let w = tau * (*x0 + v1 * *x1 + v2 * *x2);
-                (*x0, *x1, *x2) = (*x0 - w, *x1 - w * v1, *x2 - w * v2);
-            }
-        }
-        return;
-    }
     for j in columns {
         let x = &mut m.col_as_slice_mut(j)[row..row + v.len()];
         let w = tau * x.iter().zip(v).map(|(x, v)| x * v).sum::<f64>();
@@ -47,9 +37,6 @@ pub(super) fn reflect_rows(m: &mut Mat<f64>, v: &[f64], tau: f64, row: usize, co
 
 /// `m := m P`, where P acts on the columns from `column` on, restricted to the given rows.
 pub(super) fn reflect_columns(m: &mut Mat<f64>, v: &[f64], tau: f64, column: usize, rows: Range<usize>) {
-    if let &[_, v1, v2] = v {
-        return reflect_three_columns(m, [tau * v1, tau * v2], [v1, v2], tau, column, rows);
-    }
     let mut w = vec![0.0; rows.len()];
     for (k, v) in v.iter().enumerate() {
         for (w, x) in w.iter_mut().zip(&m.col_as_slice(column + k)[rows.clone()]) {
@@ -61,28 +48,6 @@ pub(super) fn reflect_columns(m: &mut Mat<f64>, v: &[f64], tau: f64, column: usi
         for (x, w) in m.col_as_slice_mut(column + k)[rows.clone()].iter_mut().zip(&w) {
             *x -= factor * w;
         }
-    }
-}
-
-/// The same for the reflector of a double shift, in one pass over the three columns.
-fn reflect_three_columns(m: &mut Mat<f64>, scaled: [f64; 2], v: [f64; 2], tau: f64, column: usize, rows: Range<usize>) {
-    let (_, right) = m.as_mut().split_at_col_mut(column);
-    let (first, right) = right.split_at_col_mut(1);
-    let (second, right) = right.split_at_col_mut(1);
-    let columns = (first.col_mut(0), second.col_mut(0), right.col_mut(0));
-    let (Some(x0), Some(x1), Some(x2)) =
-        (columns.0.try_as_col_major_mut(), columns.1.try_as_col_major_mut(), columns.2.try_as_col_major_mut())
-    else {
-        return;
-    };
-    let x0 = &mut x0.as_slice_mut()[rows.clone()];
-    let x1 = &mut x1.as_slice_mut()[rows.clone()];
-    let x2 = &mut x2.as_slice_mut()[rows];
-    for ((x0, x1), x2) in x0.iter_mut().zip(x1).zip(x2) {
-        let w = *x0 + v[0] * *x1 + v[1] * *x2;
-        *x0 -= tau * w;
-        *x1 -= scaled[0] * w;
-        *x2 -= scaled[1] * w;
     }
 }
 

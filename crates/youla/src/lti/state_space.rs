@@ -93,6 +93,11 @@ impl<T: TimeDomain> StateSpace<T> {
         self.d.nrows()
     }
 
+    /// Whether it is the gain 0: no states, no feedthrough.
+    pub(crate) fn is_zero(&self) -> bool {
+        self.order() == 0 && self.d.norm_max() == 0.0
+    }
+
     /// Eigenvalues of A.
     ///
     /// # Errors

@@ -76,13 +76,14 @@ pub(super) fn residual_tests(
     ];
     let known: Vec<_> =
         known.into_iter().filter_map(|(x, specs)| x.as_ref().filter(|x| moving(x)).map(|x| (x, specs))).collect();
-    let external = !known.is_empty();
-    let (x, channels) = match external {
-        true => {
+    // Without feedback the inputs come from outside.
+    let external = !known.is_empty() || found.factorisation.controller.is_zero();
+    let (x, channels) = match known.is_empty() {
+        false => {
             let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();
             (block(&[&parts]), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
         }
-        false => (record.u.clone(), found.records.inputs.clone()),
+        true => (record.u.clone(), found.records.inputs.clone()),
     };
     let rest = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
     let e = rest((measured - predicted).as_ref());

@@ -124,19 +124,6 @@ pub fn margins<T: TimeDomain>(plant: &StateSpace<T>, controller: &StateSpace<T>)
     })
 }
 
-/// The margins of one channel at a time alone, those of the inputs and those of the outputs, as in [`Margins`]: a tenth of the
-/// work of [`margins`], which goes into the disks of all channels at once.
-///
-/// # Errors
-/// As [`margins`].
-pub fn channel_margins<T: TimeDomain>(
-    plant: &StateSpace<T>,
-    controller: &StateSpace<T>,
-) -> Result<[Vec<ChannelMargins>; 2]> {
-    let closed = Loop::new(plant, controller)?;
-    Ok([channel::each(&closed.input_sensitivity())?, channel::each(&closed.output_sensitivity())?])
-}
-
 /// A stable loop, (v1, n) to (u, y): an excitation at the plant input and noise at the plant output.
 pub(super) struct Loop<T: TimeDomain> {
     closed: StateSpace<T>,

@@ -73,18 +73,12 @@ fn plants() -> Result<String> {
 
 fn coverage() -> String {
     const RUNS: u64 = 200;
-    let bearing = Loop::new(&Design { a_factor: 1.0, b_factor: 0.7, input_weight: 1000.0, process_noise: 0.01 });
-    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
-    let options = SubspaceOptions {
-        weight: Weight::Cva,
-        horizon: 20,
-        order: Order::Fixed(8),
-        uncertainty,
-        ..bearing_loop::options()
-    };
+    let bearing = Loop::new(&Design { a_factor: 0.97, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 });
+    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, blocks: Some(40), ..Default::default() };
+    let options = SubspaceOptions { horizon: 16, order: Order::Fixed(12), uncertainty, ..bearing_loop::options() };
     let mut found = Coverage::default();
     for seed in 0..RUNS {
-        found.add(&bearing, &bearing.record(6000, 0.3, seed), &options);
+        found.add(&bearing, &bearing.record(6000, 0.1, seed), &options);
     }
     let share = |value: f64| format!("{:.1} %", 100.0 * value);
     let rows = [
@@ -96,7 +90,7 @@ fn coverage() -> String {
     ]
     .map(|(name, value)| vec![name.to_owned(), share(value)]);
     let about = format!(
-        "How often 95 % regions and intervals hold the truth over {RUNS} records of 6000 samples (nominal B times 0.7, output noise 0.3 um). \
+        "How often 95 % regions and intervals hold the truth over {RUNS} records of 6000 samples (nominal A times 0.97, output noise 0.1 um, S of order 12). \
          The deviation of such a share by chance is about 1.5 %. More loops: [uncertainty](../uncertainty.md)."
     );
     table("Coverage", &about, &["what", "held"], &rows)

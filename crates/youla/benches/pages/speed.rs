@@ -7,10 +7,11 @@ use faer::Mat;
 use std::f64::consts::PI;
 use std::path::Path;
 use youla::Result;
+use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::lti::{frequency_response, simulate};
-use youla::rig::Bearing;
+use youla::rig::{Bearing, degraded};
 use youla::run::{Identification, StageClock, demo, identify, write_run};
 
 /// Sample time of the bearing, seconds.
@@ -43,11 +44,13 @@ fn steps() -> Result<String> {
     let plant = Bearing::default().plant()?.zoh(time)?;
     let u = Mat::from_fn(SAMPLES, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
     let y = simulate(&plant, u.as_ref(), &[0.0; 6])?;
+    let nominal = degraded(&Bearing::default().plant()?, 0.9, 1.0)?.zoh(time)?;
     let f = Mat::zeros(2, 6);
-    let factors = youla::factor::CoprimeFactors::observer(&plant, f.as_ref(), f.transpose())?;
+    let factors = CoprimeFactors::observer(&nominal, f.as_ref(), f.transpose())?;
     let signals = [factors.signals(u.as_ref(), y.as_ref())?];
-    let options = |horizon| SubspaceOptions { horizon, order: Order::Fixed(6), ..Default::default() };
+    let options = |horizon| SubspaceOptions { horizon, order: Order::Fixed(12), ..Default::default() };
     let omega: Vec<f64> = (1..=1000).map(|k| 0.999 * PI / TS * f64::from(k) / 1000.0).collect();
+    hansen(&factors, &signals, &options(10))?;
     let row = |name: &str, seconds: f64| vec![name.to_owned(), milliseconds(seconds)];
     let rows = [
         row("simulation", median(|| simulate(&plant, u.as_ref(), &[0.0; 6]))),

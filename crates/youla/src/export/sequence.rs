@@ -56,7 +56,7 @@ impl SequenceFormat {
 /// let record = Record::new("alpha", vec![Channel::new("alpha_u", "V")], values, Discrete::new(1e-3)?)?;
 /// let bytes = export_sequence(&record, SequenceFormat::Csv, &["An example.".into()])?;
 /// let time = TimeSource::column(youla::record::ChannelRef::Name("t".into()));
-/// let back = csv_from_bytes(bytes, "alpha.csv", &[], &time, &CsvOptions::default())?;
+/// let back = csv_from_bytes(&bytes, "alpha.csv", &[], &time, &CsvOptions::default())?;
 /// assert_eq!(back.data(), record.data());
 /// # Ok::<(), youla::Error>(())
 /// ```

@@ -41,9 +41,9 @@ impl FrequencyResponse {
     /// [`Error::NoConvergence`] of a singular value iteration.
     ///
     /// ```
-    /// use youla::lti::{Discrete, StateSpace, frequency_response};
-    /// use youla::mat;
-    /// let system = StateSpace::gain(mat![[0.0, 3.0], [2.0, 0.0]], Discrete::new(1.0)?)?;
+    /// use youla::{Mat, lti::{Discrete, StateSpace, frequency_response}};
+    /// let crossed = Mat::from_fn(2, 2, |i, j| [[0.0, 3.0], [2.0, 0.0]][i][j]);
+    /// let system = StateSpace::gain(crossed, Discrete::new(1.0)?)?;
     /// let gains = frequency_response(&system, &[0.1])?.gains()?;
     /// assert!((gains[0][0] - 3.0).abs() < 1e-14 && (gains[0][1] - 2.0).abs() < 1e-14);
     /// # Ok::<(), youla::Error>(())

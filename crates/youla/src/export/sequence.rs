@@ -51,12 +51,12 @@ impl SequenceFormat {
 ///
 /// ```
 /// use youla::export::{SequenceFormat, export_sequence};
-/// use youla::{Mat, lti::Discrete, record::{CsvOptions, Record, TimeSource, csv_from_bytes}, units::Channel};
+/// use youla::{Mat, lti::Discrete, record::{ChannelSpec, CsvOptions, Record, TimeSource, csv_from_bytes}, units::Channel};
 /// let values = Mat::from_fn(3, 1, |k, _| k as f64 / 3.0);
 /// let record = Record::new("alpha", vec![Channel::new("alpha_u", "V")], values, Discrete::new(1e-3)?)?;
 /// let bytes = export_sequence(&record, SequenceFormat::Csv, &["An example.".into()])?;
-/// let time = TimeSource::column(youla::record::ChannelRef::Name("t".into()));
-/// let back = csv_from_bytes(&bytes, "alpha.csv", &[], &time, &CsvOptions::default())?;
+/// let time = TimeSource::column("t".parse().unwrap());
+/// let back = csv_from_bytes(&bytes, "alpha.csv", &[ChannelSpec::named("alpha_u")], &time, &CsvOptions::default())?;
 /// assert_eq!(back.data(), record.data());
 /// # Ok::<(), youla::Error>(())
 /// ```

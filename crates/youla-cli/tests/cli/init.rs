@@ -36,6 +36,18 @@ fn a_log_without_a_controller_runs_at_once() {
     let summary: serde_json::Value = serde_json::from_str(&found.stdout).expect("JSON");
     let fit = summary["methods"]["hansen"]["fit"]["log-rest"][0].as_f64().expect("a fit");
     assert!(fit > 80.0, "{fit}");
+    let report = fs::read_to_string(folder.join("run/report.json")).expect("written");
+    for (words, said) in [
+        ("No controller ran.", true),
+        ("in open loop", true),
+        ("G(S) is stable", true),
+        ("The controller that ran", false),
+        ("No excitation from outside", false),
+        ("peak sensitivity of the loop", false),
+        ("the declared controller", false),
+    ] {
+        assert_eq!(report.contains(words), said, "{words}");
+    }
 }
 
 #[test]

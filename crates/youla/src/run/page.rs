@@ -73,8 +73,12 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
 fn summary_sentence(found: &Identification) -> String {
     let records = &found.records;
     let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
+    let how = match found.factorisation.controller.is_zero() {
+        true => "in open loop, as what the nominal model lacks,",
+        false => "in closed loop by the modified Hansen scheme",
+    };
     format!(
-        "Identified in closed loop by the modified Hansen scheme from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
+        "Identified {how} from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
         records.estimation.len(),
         plural(records.estimation.len()),
         records.time.ts(),

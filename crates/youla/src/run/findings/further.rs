@@ -14,8 +14,11 @@ pub(in crate::run) fn further_lines(found: &Identification) -> Vec<Verdict> {
         .collect()
 }
 
-/// What the loop of G(S) can bear; nothing where it is unstable, which the line before says.
+/// What the loop of G(S) can bear; nothing where it is unstable, which the answer says, and where no controller ran.
 fn margin_line(found: &Identification) -> Option<Verdict> {
+    if found.factorisation.controller.is_zero() {
+        return None;
+    }
     let robustness = &found.verdict.of(Method::Hansen)?.robustness;
     let margins = robustness.margins.as_ref().ok()?;
     let zone = margins.zone()?;

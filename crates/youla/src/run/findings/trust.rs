@@ -141,9 +141,14 @@ fn information(evidence: &Information) -> (String, Status) {
 fn loop_line(found: &Identification) -> Option<Verdict> {
     let v = found.verdict.of(Method::Hansen)?;
     let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
-    let (of_loop, verb) =
-        if v.certificate.stable { (Status::Good, "stabilises") } else { (Status::Bad, "does not stabilise") };
-    let text = format!("The controller that ran {verb} G(S): the largest pole of the loop has |z| = {worst:.5}.");
+    let (of_loop, verb, adjective) = match v.certificate.stable {
+        true => (Status::Good, "stabilises", "stable"),
+        false => (Status::Bad, "does not stabilise", "unstable"),
+    };
+    let text = match found.factorisation.controller.is_zero() {
+        true => format!("G(S) is {adjective}: its largest pole has |z| = {worst:.5}."),
+        false => format!("The controller that ran {verb} G(S): the largest pole of the loop has |z| = {worst:.5}."),
+    };
     let certificate = found.certificate.as_ref();
     let band = certificate.and_then(|c| Some((c.band_sentence()?, c.band.as_ref()?.holds())));
     let (text, of_band) = match band {

@@ -42,6 +42,7 @@ fn ran(mut command: Command) -> ExitCode {
 
 /// The test runner with pages, browser and packages in place, or what is missing.
 fn prepared() -> Result<Command, String> {
+    node()?;
     let chromium = chromium()?;
     let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("browser");
     install(&folder)?;
@@ -59,6 +60,19 @@ fn prepared() -> Result<Command, String> {
         .current_dir(&folder);
     command.env("YOULA_CHROMIUM", chromium).env("YOULA_PAGES", pages.to_string());
     Ok(command)
+}
+
+/// Oldest version of Node whose test runner and packages serve.
+const NODE: u32 = 20;
+
+fn node() -> Result<(), String> {
+    let run = Command::new("node").arg("--version").output().map_err(|_| "node is not installed".to_owned())?;
+    let version = String::from_utf8_lossy(&run.stdout).trim().to_owned();
+    let major = version.trim_start_matches('v').split('.').next().and_then(|n| n.parse::<u32>().ok());
+    match major {
+        Some(major) if major >= NODE => Ok(()),
+        _ => Err(format!("node is {version:?}, and {NODE} or later is needed")),
+    }
 }
 
 /// `CHROMIUM`, or the first on the path; installed where this is asked for.
@@ -92,8 +106,8 @@ fn install(folder: &Path) -> Result<(), String> {
     if there {
         return Ok(());
     }
-    let (Some(npm), Some(_)) = (on_path("npm"), on_path("node")) else {
-        return Err("npm and node are not installed (Debian: apt-get install npm)".into());
+    let Some(npm) = on_path("npm") else {
+        return Err("npm is not installed (Debian: apt-get install npm)".into());
     };
     let done =
         Command::new(npm).args(["ci", "--no-audit", "--no-fund", "--loglevel=error"]).current_dir(folder).output();

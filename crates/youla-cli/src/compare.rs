@@ -5,11 +5,8 @@ use crate::output::{Failure, say};
 use crate::table::aligned;
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
-use youla::Error;
-use youla::export::write_export;
 use youla::report::data::EvidenceTable;
-use youla::report::html;
-use youla::run::{Comparison, compare};
+use youla::run::{Comparison, compare, write_comparison};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -35,18 +32,10 @@ pub(crate) struct CompareArgs {
 
 /// Writes page and data and prints the tables.
 pub(crate) fn run(args: &Args, asked: &CompareArgs) -> Result<(), Failure> {
-    let data = asked.out.with_extension("json");
-    for path in [&asked.out, &data] {
-        if path.exists() && !asked.force {
-            return Err(Error::FileExists { path: path.clone() }.into());
-        }
-    }
     let found = compare(&asked.runs, &asked.model)?;
-    let json = serde_json::to_string(&found).map_err(|source| Error::ReportData { source })?;
-    write_export(&data, json.as_bytes(), asked.force)?;
-    write_export(&asked.out, html(&found.report)?.as_bytes(), asked.force)?;
+    write_comparison(&found, &asked.out, asked.force)?;
     match (args.json, args.quiet) {
-        (true, _) => say(&json),
+        (true, _) => say(&serde_json::json!(found).to_string()),
         (_, true) => Ok(()),
         _ => say(&text(&found, asked)),
     }

@@ -68,6 +68,7 @@ fn what_cannot_be_compared_is_said() {
         (&["compare", "three", bearing][..], "the number of inputs of"),
         (&["compare", "three", "nowhere"], "nowhere"),
         (&["compare", "three", "two", "--model", "grey_box"], "grey_box"),
+        (&["compare", "three", "two", "--out", "both.json"], "ends in .html"),
         (&["compare", "three", "two", "--out", "run.toml"], "run.toml"),
     ] {
         let found = youla(&folder, arguments);

@@ -2,18 +2,19 @@
 
 use super::excite_figure::figure;
 use super::factorise::factorise;
+use super::folder::{refuse_existing, replace_files};
 use super::models::Controller;
 use super::records::{RunRecords, channels_of, read_records};
 use super::settings::RunSettings;
+use crate::Result;
 use crate::control::with_input_port;
 use crate::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
-use crate::export::{SequenceFormat, export_sequence, write_export};
+use crate::export::{SequenceFormat, export_sequence};
 use crate::lti::{Discrete, Partitioned, StateSpace};
 use crate::record::{Detrend, Format, Record, Source, TimeSource, read};
 use crate::report::data::{Method, Role};
 use crate::report::svg;
 use crate::units::Channel;
-use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -210,15 +211,14 @@ pub fn write_excitation(
     let about = found.about();
     let mut files = Vec::new();
     for format in formats {
-        files.push((folder.join(format!("alpha.{}", format.extension())), export_sequence(&record, *format, &about)?));
+        files.push((format!("alpha.{}", format.extension()), export_sequence(&record, *format, &about)?));
     }
     let (figure, methods) = figure(found);
-    files.push((folder.join("excite.svg"), svg(&figure, &methods)?.into_bytes()));
-    if let Some((path, _)) = files.iter().find(|(path, _)| !replace && path.exists()) {
-        return Err(Error::FileExists { path: path.clone() });
+    files.push(("excite.svg".to_owned(), svg(&figure, &methods)?.into_bytes()));
+    if !replace {
+        refuse_existing(folder, &files)?;
     }
-    std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source })?;
-    files.into_iter().map(|(path, bytes)| write_export(&path, &bytes, replace).map(|()| path)).collect()
+    replace_files(folder, &files)
 }
 
 /// The curves of the picture, in the order of the legend.

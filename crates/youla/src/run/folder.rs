@@ -141,6 +141,17 @@ pub(super) fn replace_file(path: &Path, text: &str) -> Result<()> {
     })
 }
 
+/// Refuses names that a folder holds already.
+///
+/// # Errors
+/// [`Error::FileExists`] with the first.
+pub(super) fn refuse_existing(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<()> {
+    match files.iter().map(|(name, _)| folder.join(name)).find(|path| path.exists()) {
+        Some(path) => Err(Error::FileExists { path }),
+        None => Ok(()),
+    }
+}
+
 /// Writes files beside their final places and moves them there when all are whole; after an error none is changed.
 pub(super) fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>> {
     let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();

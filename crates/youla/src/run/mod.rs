@@ -46,7 +46,7 @@ mod write;
 pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
 pub use certificate::{CertificateSettings, RunCertificate};
 pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, further, read_check_options};
-pub use compare::{Comparison, Distance, compare};
+pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use demo::{Demo, demo};
 pub use disturbance::{DisturbanceSettings, TachoUnit};

@@ -11,11 +11,13 @@ mod tables;
 
 pub use distances::Distance;
 
+use super::folder::{refuse_existing, replace_files};
 use crate::report::data::{Method, ReportData, Role, Source};
+use crate::report::html;
 use crate::{Error, Result};
 use run::FinishedRun;
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Roles give each run a colour, dash and marker of its own.
 const ROLES: [Role; 6] =
@@ -46,7 +48,7 @@ pub struct Comparison {
 ///
 /// ```no_run
 /// let found = youla::run::compare(&["runs/before-001".into(), "runs/after-001".into()], "hansen")?;
-/// std::fs::write("comparison.html", youla::report::html(&found.report)?).expect("the folder can be written");
+/// youla::run::write_comparison(&found, "comparison.html".as_ref(), false)?;
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn compare(folders: &[PathBuf], model: &str) -> Result<Comparison> {
@@ -58,6 +60,26 @@ pub fn compare(folders: &[PathBuf], model: &str) -> Result<Comparison> {
     let distances = distances::distances(&runs);
     let report = page(&runs, model, &distances)?;
     Ok(Comparison { runs: runs.into_iter().map(|r| r.name).collect(), model: model.to_owned(), distances, report })
+}
+
+/// Writes the page of a comparison, and its data as JSON beside it; neither where one of them cannot be written.
+///
+/// # Errors
+/// [`Error::BadName`] for a page that ends in `.json`, as the data do; [`Error::FileExists`] for a file that is there, unless
+/// `replace` is set; [`Error::Io`], and those of [`html`].
+pub fn write_comparison(found: &Comparison, page: &Path, replace: bool) -> Result<()> {
+    let data = page.with_extension("json");
+    let json = serde_json::to_vec(found).map_err(|source| Error::ReportData { source })?;
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    if data == page {
+        return Err(Error::BadName { name: name(page), problem: "is that of the data; a page ends in .html" });
+    }
+    let files = [(name(&data), json), (name(page), html(&found.report)?.into_bytes())];
+    let folder = page.parent().unwrap_or(Path::new(""));
+    if !replace {
+        refuse_existing(folder, &files)?;
+    }
+    replace_files(folder, &files).map(|_| ())
 }
 
 fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<ReportData> {

@@ -14,12 +14,9 @@ pub(crate) struct Gains {
 }
 
 impl Gains {
-    /// Scaled, so that tiny gains do not underflow.
     pub(crate) fn new(value: MatRef<'_, c64>) -> Result<Gains> {
-        let refused = |_| Error::NoConvergence { what: "the singular values of a response".into(), iterations: 0 };
-        let largest = value.norm_max();
-        let scale = if largest > 0.0 { largest } else { 1.0 };
-        let svd = (Scale(c64::new(1.0 / scale, 0.0)) * value).thin_svd().map_err(refused)?;
+        let (scale, scaled) = scaled(value);
+        let svd = scaled.thin_svd().map_err(refused)?;
         let values = svd.S().column_vector().iter().map(|s| scale * s.re).collect();
         Ok(Gains { values, left: svd.U().to_owned(), right: svd.V().to_owned() })
     }
@@ -30,6 +27,26 @@ impl Gains {
         let entry = |(at, d): (usize, &c64)| (self.left[(at % rows, k)].conj() * *d * self.right[(at / rows, k)]).re;
         response.iter().enumerate().map(entry).sum()
     }
+}
+
+/// The largest singular value of a response, zero where it is empty.
+pub(crate) fn largest_singular_value(value: MatRef<'_, c64>) -> Result<f64> {
+    if value.nrows() == 0 || value.ncols() == 0 {
+        return Ok(0.0);
+    }
+    let (scale, scaled) = scaled(value);
+    Ok(scale * scaled.singular_values().map_err(refused)?[0])
+}
+
+/// A response and the factor that it lacks: so small that tiny gains do not underflow.
+fn scaled(value: MatRef<'_, c64>) -> (f64, Mat<c64>) {
+    let largest = value.norm_max();
+    let scale = if largest > 0.0 { largest } else { 1.0 };
+    (scale, Scale(c64::new(1.0 / scale, 0.0)) * value)
+}
+
+fn refused<E>(_: E) -> Error {
+    Error::NoConvergence { what: "the singular values of a response".into(), iterations: 0 }
 }
 
 impl FrequencyResponse {

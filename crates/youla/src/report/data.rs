@@ -213,18 +213,18 @@ pub enum Evidence {
     Margins,
 }
 
-/// How a finding is to be taken.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// How a finding is to be taken, from the lightest to the gravest.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Status {
     /// In order.
     Good,
+    /// Said for completeness.
+    Info,
     /// To be looked at.
     Caution,
     /// Speaks against the model.
     Bad,
-    /// Said for completeness.
-    Info,
 }
 
 /// One line of the answer to "can I trust it?".

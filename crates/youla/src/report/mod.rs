@@ -55,4 +55,5 @@ pub use story::Story;
 pub use story_html::story_html;
 pub(crate) use svg::pretty_unit;
 pub use svg::{FIGURE_FONT, Print, svg, svg_for};
+pub(crate) use tables::SAME_MODE;
 pub use trace::{Timeline, Trace};

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::data::{Mode, ReportData};
 
 /// Modes of different models within this ratio of frequency stand in one row.
-const SAME_MODE: f64 = 1.1;
+pub(crate) const SAME_MODE: f64 = 1.1;
 
 /// One record and output with the fit of each method.
 #[derive(Debug, Serialize, PartialEq)]

@@ -6,7 +6,8 @@ use super::settings::FrequencySettings;
 use super::verdict::Method;
 use crate::lti::{Discrete, FrequencyResponse, frequency_response};
 use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
-use crate::{Error, Mat, Result};
+use crate::report::data as draw;
+use crate::{Error, Mat, Result, c64};
 use std::f64::consts::TAU;
 
 /// Responses on one grid.
@@ -111,6 +112,31 @@ pub(super) fn grid(found: &Identification) -> Result<Vec<f64>> {
     hz.sort_by(f64::total_cmp);
     hz.dedup_by(|b, a| *b - *a < 1e-9 * *a);
     Ok(hz)
+}
+
+/// All pairs of output and input, by output.
+pub(super) fn ports(outputs: usize, inputs: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..outputs).flat_map(move |i| (0..inputs).map(move |j| (i, j)))
+}
+
+/// Magnitude and phase of all pairs of a response, as a report draws them; `key` names the method.
+pub(super) fn drawn(key: &str, response: &FrequencyResponse) -> Vec<draw::ModelResponse> {
+    let first = response.at(0);
+    let entry = |(output, input): (usize, usize)| {
+        let values = response.entry(output, input);
+        let (magnitude_db, phase_deg) = (magnitude(&values), phase(&values));
+        draw::ModelResponse { method: key.to_owned(), output, input, magnitude_db, phase_deg }
+    };
+    ports(first.nrows(), first.ncols()).map(entry).collect()
+}
+
+pub(super) fn magnitude(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| decibel(v.norm())).collect()
+}
+
+/// In degrees, from -180 to 180.
+pub(super) fn phase(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| v.im.atan2(v.re).to_degrees()).collect()
 }
 
 /// Magnitude in dB.

@@ -1,9 +1,8 @@
 //! The response of a system as a function of frequency, infinity included.
 
 use crate::lti::response::HessenbergSystem;
-use crate::lti::{StateSpace, TimeDomain};
-use crate::{Error, Mat, MatRef, Result, c64};
-use faer::Scale;
+use crate::lti::{StateSpace, TimeDomain, largest_singular_value};
+use crate::{Mat, MatRef, Result, c64};
 use std::f64::consts::PI;
 
 /// The response of a system at one frequency at a time.
@@ -39,15 +38,4 @@ impl<T: TimeDomain> Curve<T> {
     pub(crate) fn gain(&self, frequency: f64) -> Result<f64> {
         largest_singular_value(self.at(frequency)?.as_ref())
     }
-}
-
-/// The largest singular value of a response, zero where it is empty; scaled, so that tiny gains do not underflow.
-pub(crate) fn largest_singular_value(value: MatRef<'_, c64>) -> Result<f64> {
-    let refused = |_| Error::NoConvergence { what: "the singular values of a response".into(), iterations: 0 };
-    let largest = value.norm_max();
-    if largest == 0.0 || value.nrows() == 0 || value.ncols() == 0 {
-        return Ok(0.0);
-    }
-    let scaled = Scale(c64::new(1.0 / largest, 0.0)) * value;
-    Ok(largest * scaled.singular_values().map_err(refused)?[0])
 }

@@ -20,7 +20,7 @@ mod reference;
 mod tests;
 
 pub(crate) use crossing::{Part, crossings};
-pub(crate) use curve::{Curve, largest_singular_value};
+pub(crate) use curve::Curve;
 pub(crate) use hamiltonian::continuous_image;
 pub(crate) use level::below_level;
 pub use peak::{PeakGain, PeakOptions, hinf_norm, linf_norm};

@@ -1,6 +1,7 @@
-use super::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, largest_singular_value, linf_norm};
+use super::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
 use crate::Error;
 use crate::linalg::eye;
+use crate::lti::largest_singular_value;
 use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};
 use faer::{Mat, Scale};
 use rand::{RngExt, SeedableRng};

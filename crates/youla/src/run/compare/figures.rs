@@ -4,24 +4,25 @@ use super::run::FinishedRun;
 use crate::Result;
 use crate::lti::{FrequencyResponse, TimeDomain, frequency_response};
 use crate::report::data as draw;
-use crate::run::response::decibel;
+use crate::run::response::{decibel, drawn};
 use std::f64::consts::{PI, TAU};
 
-/// Responses of all models on the frequencies of all runs, with the bounds that each run found.
+/// Responses of all models on the frequencies of all runs, with the bounds that each run found. Beyond the Nyquist frequency of a
+/// run there is nothing.
 pub(super) fn frequency(runs: &[FinishedRun], model: &str) -> Result<draw::FrequencyResponse> {
     let hz = grid(runs);
-    let mut drawn = draw::FrequencyResponse { hz: hz.clone(), ..draw::FrequencyResponse::default() };
+    let mut all = draw::FrequencyResponse { hz: hz.clone(), ..draw::FrequencyResponse::default() };
     for run in runs {
         let nyquist = PI / run.model.system.time().ts();
         let omega: Vec<f64> = hz.iter().map(|f| TAU * f).filter(|w| *w < nyquist).collect();
         let response = frequency_response(&run.model.system, &omega)?;
-        drawn.models.extend(entries(run, &response, hz.len()));
-        drawn.bands.extend(bands(run, model, &hz));
+        all.models.extend(entries(run, &response, hz.len()));
+        all.bands.extend(bands(run, model, &hz));
         if response.at(0).nrows().min(response.at(0).ncols()) > 1 {
-            drawn.singular.extend(singular(run, &response, hz.len())?);
+            all.singular.extend(singular(run, &response, hz.len())?);
         }
     }
-    Ok(drawn)
+    Ok(all)
 }
 
 /// All frequencies of all runs.
@@ -34,37 +35,25 @@ fn grid(runs: &[FinishedRun]) -> Vec<f64> {
 }
 
 fn entries(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Vec<draw::ModelResponse> {
-    let (p, m) = (run.model.system.outputs(), run.model.system.inputs());
-    let entry = |(output, input): (usize, usize)| {
-        let values = response.entry(output, input);
-        draw::ModelResponse {
-            method: run.key.clone(),
-            output,
-            input,
-            magnitude_db: filled(values.iter().map(|g| decibel(g.norm())), length),
-            phase_deg: filled(values.iter().map(|g| g.im.atan2(g.re).to_degrees()), length),
-        }
-    };
-    (0..p).flat_map(|i| (0..m).map(move |j| (i, j))).map(entry).collect()
+    let mut all = drawn(&run.key, response);
+    for entry in &mut all {
+        entry.magnitude_db.resize(length, f64::NAN);
+        entry.phase_deg.resize(length, f64::NAN);
+    }
+    all
 }
 
 fn singular(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> Result<Vec<draw::SingularValue>> {
     let gains = response.gains()?;
     let count = gains.first().map_or(0, Vec::len);
+    let beyond = std::iter::repeat_n(f64::NAN, length - gains.len());
     let one = |place: usize| draw::SingularValue {
         method: run.key.clone(),
         place,
-        value_db: filled(gains.iter().map(|at| decibel(at[place])), length),
+        value_db: gains.iter().map(|at| decibel(at[place])).chain(beyond.clone()).collect(),
         ..draw::SingularValue::default()
     };
     Ok((0..count).map(one).collect())
-}
-
-/// Beyond the Nyquist frequency of a run there is nothing.
-fn filled(values: impl Iterator<Item = f64>, length: usize) -> Vec<f64> {
-    let mut all: Vec<f64> = values.collect();
-    all.resize(length, f64::NAN);
-    all
 }
 
 /// The bounds of a run on the common frequencies, in between by lines in dB over the logarithm of frequency.

@@ -1,10 +1,8 @@
 //! The runs and their modes as tables, and what makes them hard to compare.
 
 use super::run::FinishedRun;
+use crate::report::SAME_MODE;
 use crate::report::data::{EvidenceTable, Fit, Mode, Note, ReportData, Status, Verdict};
-
-/// Modes of different runs within this ratio of frequency are taken for the same.
-const SAME_MODE: f64 = 1.1;
 
 /// One row per run: verdict, order, fit.
 pub(super) fn overview(runs: &[FinishedRun], model: &str) -> EvidenceTable {

@@ -86,8 +86,8 @@ fn data_line(found: &Identification) -> Option<Verdict> {
         (n, _) => (format!("finds {n} defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
     };
     let text = format!("{controller} The check of the data {checked}.");
-    let evidence = if weight(of_controller) > weight(of_check) { Evidence::Signals } else { Evidence::Data };
-    Some(Verdict { status: worse(of_controller, of_check), text, evidence })
+    let evidence = if of_controller > of_check { Evidence::Signals } else { Evidence::Data };
+    Some(Verdict { status: of_controller.max(of_check), text, evidence })
 }
 
 fn controller_sentence(found: &Identification) -> (String, Status) {
@@ -121,7 +121,7 @@ fn deviation_line(found: &Identification) -> Option<Verdict> {
         Some(evidence) => information(evidence),
         None => (".".into(), Status::Good),
     };
-    Some(Verdict { status: worse(of_stability, of_evidence), text: text + &more, evidence: Evidence::Order })
+    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: Evidence::Order })
 }
 
 fn information(evidence: &Information) -> (String, Status) {
@@ -155,18 +155,5 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
         Some((sentence, holds)) => (format!("{text} {sentence}"), if holds { Status::Good } else { Status::Caution }),
         None => (text, Status::Good),
     };
-    Some(Verdict { status: worse(of_loop, of_band), text, evidence: Evidence::Certificate })
-}
-
-fn worse(a: Status, b: Status) -> Status {
-    if weight(b) > weight(a) { b } else { a }
-}
-
-fn weight(status: Status) -> u8 {
-    match status {
-        Status::Good => 0,
-        Status::Info => 1,
-        Status::Caution => 2,
-        Status::Bad => 3,
-    }
+    Some(Verdict { status: of_loop.max(of_band), text, evidence: Evidence::Certificate })
 }

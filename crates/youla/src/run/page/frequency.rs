@@ -1,13 +1,12 @@
 //! Frequency responses of all models: magnitude and phase, principal gains, regions, and the measured ones.
 
 use super::structure;
+use crate::Result;
 use crate::identify::subspace::ResponseBand;
-use crate::lti::FrequencyResponse;
 use crate::report::data as draw;
 use crate::run::pipeline::Identification;
-use crate::run::response::{ModelResponses, decibel, grid, model_responses};
+use crate::run::response::{self, ModelResponses, decibel, grid, magnitude, model_responses, phase};
 use crate::run::verdict::Method;
-use crate::{Result, c64};
 use std::f64::consts::TAU;
 
 /// Lowest bound that is drawn, over the upper one: a bound of zero is drawn far below the curve.
@@ -23,19 +22,10 @@ struct Known<'a> {
 pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(found, grid(found)?)?;
     let known = known(found)?;
-    let models = responses.models.iter().flat_map(|(method, response)| entries(found, *method, response)).collect();
+    let models = responses.models.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
     let bands = known.iter().flat_map(|k| ports(found).map(|port| band(k, port)).collect::<Vec<_>>()).collect();
     let singular = singular(found, &responses, &known)?;
     Ok(draw::FrequencyResponse { hz: responses.hz, models, indirect: indirect(found), bands, singular })
-}
-
-fn entries(found: &Identification, method: Method, response: &FrequencyResponse) -> Vec<draw::ModelResponse> {
-    let entry = |(output, input): (usize, usize)| {
-        let values = response.entry(output, input);
-        let (magnitude_db, phase_deg) = (magnitude(&values), phase(&values));
-        draw::ModelResponse { method: method.key().into(), output, input, magnitude_db, phase_deg }
-    };
-    ports(found).map(entry).collect()
 }
 
 fn indirect(found: &Identification) -> Vec<draw::Indirect> {
@@ -114,15 +104,6 @@ fn bounds_db(bounds: impl Iterator<Item = [f64; 2]>) -> (Vec<f64>, Vec<f64>) {
 }
 
 /// All pairs of output and input.
-fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> + use<> {
-    let (p, m) = (found.records.outputs.len(), found.records.inputs.len());
-    (0..p).flat_map(move |i| (0..m).map(move |j| (i, j)))
-}
-
-fn magnitude(values: &[c64]) -> Vec<f64> {
-    values.iter().map(|v| decibel(v.norm())).collect()
-}
-
-fn phase(values: &[c64]) -> Vec<f64> {
-    values.iter().map(|v| v.im.atan2(v.re).to_degrees()).collect()
+fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> {
+    response::ports(found.records.outputs.len(), found.records.inputs.len())
 }

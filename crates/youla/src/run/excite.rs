@@ -173,7 +173,7 @@ impl RunExcitation {
     /// The sequence as a record named `alpha`.
     ///
     /// # Errors
-    /// [`Error::DuplicateChannel`] where two columns have one name.
+    /// [`crate::Error::DuplicateChannel`] where two columns have one name.
     pub fn record(&self) -> Result<Record> {
         Record::new("alpha", self.columns.clone(), self.excited.alpha.clone(), self.excited.time)
     }
@@ -199,8 +199,8 @@ impl RunExcitation {
 /// Writes `alpha` in the formats asked for and the picture `excite.svg` to `folder`, which is made if need be.
 ///
 /// # Errors
-/// [`Error::FileExists`] for a file that is there, unless `replace` is set; then nothing is written. [`Error::Io`], and those of
-/// [`export_sequence`].
+/// [`crate::Error::FileExists`] for a file that is there, unless `replace` is set; then nothing is written. [`crate::Error::Io`],
+/// and those of [`export_sequence`].
 pub fn write_excitation(
     found: &RunExcitation,
     formats: &[SequenceFormat],

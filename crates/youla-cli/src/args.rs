@@ -169,7 +169,7 @@ Example:
 /// What is known of a log.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct InitArgs {
-    /// The log: text, MATLAB or NumPy.
+    /// The log: text, MATLAB, NumPy or Parquet.
     #[arg(value_name = "LOG")]
     pub(crate) log: PathBuf,
     /// Inputs of the plant, by name or as #3 for the third column, separated by commas.
@@ -233,7 +233,7 @@ impl From<Sign> for Feedback {
 /// What is to be checked.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct CheckArgs {
-    /// A run.toml; or, with --input and --output, text, MATLAB or NumPy files, one record each.
+    /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one record each.
     #[arg(value_name = "FILE", required = true)]
     pub(crate) files: Vec<PathBuf>,
     /// Inputs, by name or as #3 for the third column, separated by commas.

@@ -84,3 +84,25 @@ fn what_does_not_fit_the_log_is_refused() {
     let found = outcome(Command::new(env!("CARGO_BIN_EXE_youla")).current_dir(&folder).args(["init", "none.csv"]));
     assert_eq!(found.code, Some(2));
 }
+
+/// Columns of a table keep their names, whatever stands in them.
+#[test]
+fn a_parquet_log_is_listed_and_checked() {
+    let folder = loop_folder("init-parquet", &[]);
+    let seed = concat!(env!("CARGO_MANIFEST_DIR"), "/../youla/tests/readers/seeds/parquet/zstd.parquet");
+    fs::copy(seed, folder.join("log.parquet")).expect("the seeds are part of the project");
+    let arguments = ["init", "log.parquet", "--input", "u [V]", "--output", "y.1", "--time", "t", "--open-loop"];
+    let found = youla(&folder, &[&arguments[..], &["--out", "new.toml"]].concat());
+    assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
+    for part in ["u [V]          40", "even steps of 1.000000e-3", "row 31 is not a finite number"] {
+        assert!(found.stdout.contains(part), "{part:?} is not in: {}", found.stdout);
+    }
+    let found = youla(&folder, &["check", "new.toml"]);
+    // Forty samples of a parabola do not excite.
+    assert_eq!(found.code, Some(1), "{}", found.stderr);
+    assert!(found.stdout.contains("log-first, u [V]") && found.stdout.contains("log-first, y.1"), "{}", found.stdout);
+    let found =
+        youla(&folder, &["subspace", "log.parquet", "--input", "u [V]", "--output", "y.1", "--sample-time", "1"]);
+    assert_eq!(found.code, Some(2));
+    assert!(found.stderr.contains("binary and not text"), "{}", found.stderr);
+}

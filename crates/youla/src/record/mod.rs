@@ -12,6 +12,7 @@ mod excitation;
 mod hdf;
 mod matfile;
 mod npz;
+mod parquet;
 mod persistency;
 #[allow(clippy::module_inception)]
 mod record;
@@ -37,6 +38,7 @@ pub use excitation::{
 pub(crate) use matfile::mat_to_bytes;
 pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
 pub use npz::{npz_from_bytes, read_npz};
+pub use parquet::{parquet_from_bytes, read_parquet};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, Split};
 pub use source::{Format, Source, read, read_parts, sha256};

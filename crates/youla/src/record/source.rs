@@ -1,6 +1,7 @@
 //! One description of a recorded file for the library, configuration files and the program.
 
 use super::csv::{only, read_csv_parts};
+use super::parquet;
 use super::{ChannelSpec, CsvOptions, Record, TimeSource, read_mat, read_npz};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// By the first bytes of the file (MATLAB, HDF5, zip), else text.
+    /// By the first bytes of the file (MATLAB, HDF5, zip, Parquet), else text.
     #[default]
     Detect,
     /// Text, see [`super::read_csv`].
@@ -21,6 +22,8 @@ pub enum Format {
     Mat,
     /// NumPy archive, see [`read_npz`].
     Npz,
+    /// Parquet, see [`super::read_parquet`].
+    Parquet,
 }
 
 /// A file, its clock and the channels to take from it.
@@ -75,6 +78,11 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
     let variables = match resolve(source)? {
         Format::Mat => read_mat(&source.path)?,
         Format::Npz => read_npz(&source.path)?,
+        Format::Parquet => {
+            let references: Vec<_> =
+                source.channels.iter().map(ChannelSpec::source).chain(source.time.column.clone()).collect();
+            parquet::read_columns(&source.path, &references)?
+        }
         Format::Csv | Format::Detect => {
             return read_csv_parts(&source.path, &source.channels, &source.time, &source.csv);
         }
@@ -110,6 +118,7 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
     read.map_err(|e| Error::Io { path: source.path.clone(), source: e })?;
     Ok(match &start[..] {
         [b'P', b'K', 3, 4, ..] => Format::Npz,
+        start if start.starts_with(parquet::MAGIC) => Format::Parquet,
         start if start.starts_with(b"MATLAB") || start.starts_with(b"\x89HDF") => Format::Mat,
         _ if source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) => Format::Mat,
         _ => Format::Csv,

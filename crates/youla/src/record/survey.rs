@@ -2,11 +2,13 @@
 
 use super::csv::{column_names, read_csv};
 use super::source::{Format, resolve};
-use super::{ChannelRef, ChannelSpec, CsvOptions, Source, TimeSource, Value, Variables, read_mat, read_npz};
+use super::{
+    ChannelRef, ChannelSpec, CsvOptions, Source, TimeSource, Value, Variables, read_mat, read_npz, read_parquet,
+};
 use crate::Result;
 use std::path::Path;
 
-/// Most columns of a matrix in a MATLAB or NumPy file that are listed one by one.
+/// Most columns of a matrix in a file that are listed one by one.
 const MOST_COLUMNS: usize = 64;
 
 /// Greatest deviation of a step of a clock, as a part of the mean step.
@@ -60,6 +62,7 @@ pub fn survey(path: impl AsRef<Path>, csv: &CsvOptions) -> Result<Vec<SurveyedCo
     match resolve(&source)? {
         Format::Mat => Ok(of_variables(&read_mat(path)?)),
         Format::Npz => Ok(of_variables(&read_npz(path)?)),
+        Format::Parquet => Ok(of_variables(&read_parquet(path)?)),
         Format::Csv | Format::Detect => of_text(path, csv),
     }
 }

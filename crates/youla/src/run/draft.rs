@@ -160,7 +160,9 @@ struct Entry {
 fn entries(channels: &[ChannelRef], letter: &str) -> Vec<Entry> {
     let short = |c: &ChannelRef| {
         let text = c.to_string();
-        text.rsplit('.').next().unwrap_or_default().to_owned()
+        let last = text.rsplit('.').next().unwrap_or_default();
+        // A path leads to a name; "y.1" and "speed [1/min.]" are names of columns themselves.
+        if last.starts_with(char::is_alphabetic) { last.to_owned() } else { text }
     };
     let named = |(k, c): (usize, &ChannelRef)| {
         let full = c.to_string();

@@ -7,7 +7,7 @@ use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
 use youla::record::{
     ChannelRef, CsvOptions, DecimalSign, NpyStream, SampleStream, TimeSource, Variables, csv_from_bytes,
-    mat_from_bytes, npz_from_bytes,
+    mat_from_bytes, npz_from_bytes, parquet_from_bytes,
 };
 use youla::redesign::ExportedController;
 use youla::report::{ReportData, html};
@@ -19,13 +19,14 @@ use youla::study::{PaperSettings, Row};
 pub(crate) type Reader = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const READERS: [Reader; 16] = [
+pub(crate) const READERS: [Reader; 17] = [
     ("csv", csv),
     ("mat", mat),
     ("mat73", mat),
     ("model", model),
     ("npz", npz),
     ("npy", npy),
+    ("parquet", parquet),
     ("run_toml", run_toml),
     ("paper_toml", paper_toml),
     ("rig_toml", rig_toml),
@@ -66,6 +67,13 @@ pub(crate) fn model(bytes: &[u8]) {
 /// A NumPy archive, and everything that is in it.
 pub(crate) fn npz(bytes: &[u8]) {
     if let Ok(variables) = npz_from_bytes(bytes, path()) {
+        look_at(&variables);
+    }
+}
+
+/// A Parquet file, and everything that is in it.
+pub(crate) fn parquet(bytes: &[u8]) {
+    if let Ok(variables) = parquet_from_bytes(bytes, path()) {
         look_at(&variables);
     }
 }

@@ -26,7 +26,7 @@ impl Fields {
             return Err(no_rows(lines));
         }
         if lines.current().contains(&0) {
-            let (found, remedy) = ("neither MATLAB, NumPy nor plain text (zero bytes)", "save it as text in UTF-8");
+            let (found, remedy) = ("binary and not text (zero bytes)", "save it as text in UTF-8");
             return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
         }
         let delimiter = match options.delimiter {

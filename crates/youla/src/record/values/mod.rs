@@ -1,4 +1,4 @@
-//! What a MATLAB or NumPy file holds, and records from it.
+//! What a MATLAB, NumPy or Parquet file holds, and records from it.
 
 mod path;
 

@@ -1,4 +1,4 @@
-//! Values by their path, written as in MATLAB: `Data.signals.u`, `runs(2).y`, `names{3}`, `x(:,2)`.
+//! Values by their path, written as in MATLAB: `Data.signals.u`, `runs(2).y`, `names{3}`, `x(:,2)`; `#3` is the third variable.
 
 use super::{Value, Variables};
 use crate::record::choose::unknown;
@@ -89,7 +89,13 @@ impl Variables {
         unknown(&self.path.display().to_string(), path, self.leaves())
     }
 
+    /// A variable by its whole name or its number before a path into one: columns of a table may be named `speed [1/min] (x.1)`.
     fn find(&self, path: &str) -> Option<&Value> {
+        let number = || path.strip_prefix('#')?.parse::<usize>().ok()?.checked_sub(1);
+        let whole = self.variables.iter().find(|variable| variable.name == path);
+        if let Some(variable) = whole.or_else(|| self.variables.get(number()?)) {
+            return Some(&variable.value);
+        }
         let (name, mut rest) = take_name(path);
         let mut value = &self.variables.iter().find(|variable| variable.name == name)?.value;
         while !rest.is_empty() {

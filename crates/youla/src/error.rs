@@ -480,6 +480,16 @@ pub enum Error {
         /// What to do instead.
         remedy: &'static str,
     },
+    /// A figure is asked for a part that it does not tell apart.
+    #[error("the figure {figure:?} cannot be drawn for one {choice} alone; it knows {}", Names(known))]
+    ChoiceOfFigure {
+        /// Its name.
+        figure: &'static str,
+        /// The choice.
+        choice: &'static str,
+        /// Those that it knows.
+        known: Vec<String>,
+    },
     /// Of a figure of a run nothing is left to draw.
     #[error("nothing of the figure {figure:?} is chosen; choose other outputs, inputs, records or methods")]
     NothingToDraw {

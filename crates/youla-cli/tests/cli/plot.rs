@@ -113,7 +113,7 @@ fn sizes_formats_and_places_are_as_asked_for() {
 fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
     let folder = empty_folder("plot-refused");
     let run = demo().to_str().expect("text");
-    let cases: [(&[&str], &[&str]); 10] = [
+    let cases: [(&[&str], &[&str]); 12] = [
         (&["plot", run, "bodee"], &["has no \"bodee\" (did you mean \"bode\"?); known: data, ", "all"]),
         (&["plot", run, "bode", "--output", "y_x"], &["has no \"y_x\"", "known: y_h, y_v"]),
         (&["plot", run, "bode", "--input", "u"], &["known: u_h, u_v"]),
@@ -123,6 +123,11 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
             &["plot", run, "verification", "--record", "estimation"],
             &["nothing of the figure \"verification\" is chosen"],
         ),
+        (
+            &["plot", run, "poles", "--output", "y_h"],
+            &["\"poles\" cannot be drawn for one output alone; it knows methods"],
+        ),
+        (&["plot", run, "hankel", "--methods", "hansen"], &["\"hankel\" cannot be drawn", "it knows nothing"]),
         (&["plot", run, "bode", "--width", "3"], &["the width of the figure in cm", "between 4 and 100"]),
         (&["plot", run, "bode", "--height", "-1"], &["the height of the figure in cm"]),
         (&["plot", run, "data", "--height", "4"], &["figure data", "enough for its panels, labels and legend"]),

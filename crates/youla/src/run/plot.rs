@@ -39,11 +39,11 @@ pub fn plottable(run: &Path) -> Result<Vec<RunFigure>> {
 ///
 /// # Errors
 /// Those of [`plottable`]; [`Error::UnknownChannel`] for a figure, output, input, record or method that the run does not have,
-/// with those it has; [`Error::NothingToDraw`] where nothing of the figure is chosen; [`Error::OutOfRange`] for a size that is
-/// too small.
+/// with those it has; [`Error::ChoiceOfFigure`] for a choice that a figure does not know (`all` takes them where they are
+/// known); [`Error::NothingToDraw`] where nothing of the figure is chosen; [`Error::OutOfRange`] for a size that is too small.
 pub fn plot(run: &Path, figure: &str, choice: &FigureChoice, print: &Print) -> Result<Vec<Plot>> {
     let report = read_report(run)?;
-    let drawings = wanted(run, &report, figure)?
+    let drawings = wanted(run, &report, figure, choice)?
         .into_iter()
         .map(|kind| run_drawings(&report, kind, choice))
         .collect::<Result<Vec<_>>>()?
@@ -59,13 +59,19 @@ pub fn plot(run: &Path, figure: &str, choice: &FigureChoice, print: &Print) -> R
     drawings.iter().map(drawn).collect()
 }
 
-fn wanted(run: &Path, report: &ReportData, figure: &str) -> Result<Vec<RunFigure>> {
+fn wanted(run: &Path, report: &ReportData, figure: &str, choice: &FigureChoice) -> Result<Vec<RunFigure>> {
     let there = run_figures(report)?;
     if figure == ALL {
         return Ok(there);
     }
     match there.iter().find(|kind| kind.key() == figure) {
-        Some(kind) => Ok(vec![*kind]),
+        Some(kind) => match choice.made().find(|field| !kind.chosen_by().contains(field)) {
+            None => Ok(vec![*kind]),
+            Some(choice) => {
+                let known = kind.chosen_by().iter().map(|field| (*field).to_owned()).collect();
+                Err(Error::ChoiceOfFigure { figure: kind.key(), choice, known })
+            }
+        },
         None => {
             let known = there.iter().map(|kind| kind.key()).chain([ALL]).map(String::from).collect();
             Err(unknown(&format!("the run {}", run.display()), figure, known))

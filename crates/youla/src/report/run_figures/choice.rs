@@ -32,6 +32,17 @@ pub(super) struct Chosen {
 }
 
 impl FigureChoice {
+    /// The fields that say something.
+    pub(crate) fn made(&self) -> impl Iterator<Item = &'static str> {
+        let said = [
+            ("output", self.output.is_some()),
+            ("input", self.input.is_some()),
+            ("record", self.record.is_some()),
+            ("methods", self.methods.is_some()),
+        ];
+        said.into_iter().filter(|(_, said)| *said).map(|(field, _)| field)
+    }
+
     pub(super) fn of(&self, data: &ReportData) -> Result<Chosen> {
         let place = |what, name: &Option<String>, channels: &[Channel]| match name {
             None => Ok(None),

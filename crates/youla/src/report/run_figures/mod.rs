@@ -104,6 +104,17 @@ impl RunFigure {
         }
     }
 
+    /// What it can be drawn for alone: the fields of [`FigureChoice`] that it knows.
+    pub fn chosen_by(self) -> &'static [&'static str] {
+        match self {
+            RunFigure::Data | RunFigure::Signals => &["record"],
+            RunFigure::Order | RunFigure::Stabilisation | RunFigure::SingularValues | RunFigure::Poles => &["methods"],
+            RunFigure::Verification | RunFigure::Residuals => &["record", "output", "methods"],
+            RunFigure::Bode | RunFigure::Nyquist => &["output", "input", "methods"],
+            RunFigure::Hankel | RunFigure::Reduction | RunFigure::Redesign => &[],
+        }
+    }
+
     /// What it shows, in a few words.
     pub fn about(self) -> &'static str {
         match self {

@@ -1,8 +1,9 @@
 //! What a chapter asks to be done: its fenced blocks.
 //!
 //! - `console`: lines `$ youla ...`, with `exit code 2` on the line after a command that ends so;
-//! - `edit FILE`: lines `old => new`, where `\n` is a new line;
-//! - `toml`: tables of run.toml.
+//! - `text edit=FILE`: lines `old => new`, where `\n` is a new line;
+//! - `toml`: tables of run.toml;
+//! - `rust,noplayground file=FILE`: one of the examples, which other tests run.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -12,6 +13,7 @@ pub(crate) enum Step {
     Run { arguments: Vec<String>, code: i32 },
     Edit { file: String, from: String, to: String },
     Settings(String),
+    Example { file: String, text: String },
 }
 
 /// The chapters in a folder, by name.
@@ -34,9 +36,15 @@ pub(crate) fn steps(text: &str) -> Vec<Step> {
         let (kind, body) = block.split_once('\n').expect("a kind");
         match kind.split_once(' ').unwrap_or((kind, "")) {
             ("console", _) => found.extend(commands(body)),
-            ("edit", file) => found.extend(body.lines().map(|line| edit(file, line))),
             ("toml", _) => found.push(Step::Settings(body.to_owned())),
-            ("text", _) => {}
+            ("rust,noplayground", file) => {
+                let file = file.strip_prefix("file=").expect("file=FILE").to_owned();
+                found.push(Step::Example { file, text: body.to_owned() });
+            }
+            ("text", rest) => {
+                let file = rest.strip_prefix("edit=");
+                found.extend(file.into_iter().flat_map(|file| body.lines().map(move |line| edit(file, line))));
+            }
             (kind, _) => panic!("a block of the kind {kind:?}"),
         }
     }

@@ -1,5 +1,5 @@
 //! The book, `docs/book`: every command runs in the order of its chapter and ends as the chapter says, every edit finds its text,
-//! every table of settings is one that run.toml takes, every link leads somewhere.
+//! every table of settings is one that run.toml takes, every program is that of the examples, every link leads to a page of the book.
 #![allow(missing_docs)]
 
 mod chapter;
@@ -58,6 +58,10 @@ fn run_chapter(name: &str, steps: &[Step]) {
                 assert_eq!(text.matches(from.as_str()).count(), 1, "{name}: {from:?} in {file}");
                 fs::write(path, text.replace(from, to)).expect("written");
             }
+            Step::Example { file, text } => {
+                let path = docs().join("../crates/youla/examples").join(file);
+                assert_eq!(*text, fs::read_to_string(path).expect("readable"), "{name}: {file} has changed");
+            }
             Step::Settings(text) => {
                 let path = docs().join("../examples/flexible-drive/run.toml");
                 let base = fs::read_to_string(path).expect("readable");
@@ -69,24 +73,27 @@ fn run_chapter(name: &str, steps: &[Step]) {
     }
 }
 
+/// mdBook makes pages of what SUMMARY.md lists and copies the rest of `docs`; a link out of it would lead nowhere.
 #[test]
-fn links_lead_somewhere() {
-    let mut files = chapters(&docs().join("book"));
-    files.push(docs().join("SUMMARY.md"));
-    for path in files {
-        let text = fs::read_to_string(&path).expect("readable");
-        for target in text.split("](").skip(1).filter_map(|rest| rest.split(')').next()) {
-            let file = target.split('#').next().unwrap_or_default();
-            if file.starts_with("http") || file.is_empty() {
-                continue;
-            }
-            let found = path.parent().expect("a folder").join(file);
-            assert!(found.is_file(), "{}: {target}", path.display());
+fn links_lead_to_pages_of_the_book() {
+    let docs = docs().canonicalize().expect("the book");
+    let summary = fs::read_to_string(docs.join("SUMMARY.md")).expect("readable");
+    let linked = |text: &str| -> Vec<String> {
+        let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+        let files = targets.map(|target| target.split('#').next().unwrap_or_default().to_owned());
+        files.filter(|file| !file.starts_with("http") && !file.is_empty()).collect()
+    };
+    let pages: Vec<PathBuf> = linked(&summary).into_iter().map(|page| docs.join(page)).collect();
+    for page in &pages {
+        let text = fs::read_to_string(page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
+        for target in linked(&text) {
+            let found = page.parent().expect("a folder").join(&target).canonicalize();
+            let found = found.unwrap_or_else(|e| panic!("{}: {target}: {e}", page.display()));
+            let page_of_book = found.extension().is_none_or(|e| e != "md") || pages.contains(&found);
+            assert!(found.is_file() && found.starts_with(&docs) && page_of_book, "{}: {target}", page.display());
         }
     }
-    let summary = fs::read_to_string(docs().join("SUMMARY.md")).expect("readable");
-    for path in chapters(&docs().join("book")) {
-        let name = path.file_name().expect("a name").to_string_lossy().into_owned();
-        assert!(summary.contains(&format!("(book/{name})")), "{name} is not in SUMMARY.md");
+    for path in chapters(&docs.join("book")) {
+        assert!(pages.contains(&path), "{} is not in SUMMARY.md", path.display());
     }
 }

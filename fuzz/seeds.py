@@ -107,7 +107,7 @@ log = pa.table({
     'note': ['x'] * 40, 'none': pa.nulls(40, pa.float64())})
 put('parquet', 'snappy.parquet', parquet(log, compression='snappy', row_group_size=25, write_statistics=False))
 put('parquet', 'plain.parquet', parquet(log, compression='none', use_dictionary=False, write_statistics=False))
-put('parquet', 'lz4.parquet', parquet(log, compression='lz4', data_page_version='2.0'))
+put('parquet', 'lz4.parquet', parquet(log, compression='lz4', data_page_version='2.0', write_page_checksum=True))
 put('parquet', 'brotli.parquet', parquet(log.select(['u [V]']), compression='brotli'))
 # What `bombs.rs` makes more of: eight megabytes in one page.
 put('bombs', 'zeros.parquet', parquet(pa.table({'x': np.zeros(1_000_000)}), compression='zstd', use_dictionary=False,

@@ -44,6 +44,9 @@ impl<'a> Cells<'a> {
             let (unpacked, packed) = (size(2)?, size(3)?);
             let (body, rest) = chunk.split_at_checked(packed).ok_or_else(|| format!("a page of {packed} bytes"))?;
             chunk = rest;
+            if header.integer(4).is_some_and(|sum| sum as u32 != check_sum(body)) {
+                return Err("a page that agrees with its check sum".into());
+            }
             if unpacked as u64 > SPARE + UNPACKED * packed as u64 {
                 return Err(format!("fewer than {unpacked} bytes packed in {packed}"));
             }
@@ -152,6 +155,13 @@ impl<'a> Cells<'a> {
     }
 }
 
+/// CRC-32 of a page as it is packed, which a header may state.
+fn check_sum(page: &[u8]) -> u32 {
+    let mut sum = flate2::Crc::new();
+    sum.update(page);
+    sum.sum()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -217,6 +227,17 @@ mod tests {
         refused(double, true, &page(0, 16, &[0xff; 16], 2, &[2, 0, 3, 3]), "part of their page");
         refused(double, true, &page(0, 16, &[0; 16], 2, &[2, 0, 4, 3]), "in runs");
         refused(double, true, &page(3, 16, &[0; 16], 5, &[2, 0, 2, 0, 0, 0]), "a level for each");
+    }
+
+    #[test]
+    fn a_page_that_disagrees_with_its_check_sum_is_refused() {
+        let of = |sum: u32| {
+            let head = fields(&[0, 16, 16, u64::from(sum)]);
+            [&head[..], &[0x1c], &fields(&[2, 0, 3, 3]), &[0, 0], &[7; 16]].concat()
+        };
+        let sum = check_sum(&[7; 16]);
+        assert_eq!(read(Number::Double, false, 0, &of(sum)).unwrap().len(), 2);
+        refused(Number::Double, false, &of(sum ^ 1), "check sum");
     }
 
     #[test]

@@ -92,6 +92,8 @@ def cycle(file):
 put('mat73', 'structs.mat', matlab73(structs))
 put('mat73', 'cycle.mat', matlab73(cycle))
 put('mat73', 'chunks.mat', matlab73(lambda file: classed(file, 'x', np.arange(1011.0), 'double', chunks=(503,), compression='gzip')))
+empty = np.array([2**63, 0], dtype=np.uint64)
+put('mat73', 'empty.mat', matlab73(lambda file: classed(file, 'none', empty, 'double').attrs.create('MATLAB_empty', np.uint8(1))))
 put('mat73', 'rows.h5', matlab73(lambda file: file.create_dataset('x', data=np.arange(6.0).reshape(3, 2), track_times=False))[512:])
 put('model', 'model.npz', saved(a=np.eye(2) / 2, b=np.ones((2, 1)), c=np.ones((1, 2)), d=np.zeros((1, 1)), ts=1e-3))
 model = {'a': np.eye(2) / 2, 'b': np.ones((2, 1)), 'c': np.ones((1, 2)), 'd': np.zeros((1, 1)), 'ts': 1e-3}

@@ -4,7 +4,8 @@ use super::{Value, Variables};
 use crate::record::choose::unknown;
 use crate::{Error, Result};
 
-const MOST_EMPTY_COLUMNS: usize = 1 << 20;
+/// Rows and columns of an array without numbers, which may state any.
+const MOST_EMPTY: usize = 1 << 20;
 
 impl Variables {
     /// The value at a path of variable, fields and indices (counted from 1).
@@ -49,8 +50,9 @@ impl Variables {
     /// [`Error::UnknownChannel`] or [`Error::WrongVariable`].
     pub fn matrix(&self, path: &str) -> Result<faer::Mat<f64>> {
         match self.get(path)? {
-            // An empty array may state any number of columns, each of which would be walked over.
-            Value::Real { dims, data } if dims.len() == 2 && (!data.is_empty() || dims[1] <= MOST_EMPTY_COLUMNS) => {
+            Value::Real { dims, data }
+                if dims.len() == 2 && (!data.is_empty() || dims.iter().all(|size| *size <= MOST_EMPTY)) =>
+            {
                 Ok(faer::MatRef::from_column_major_slice(data, dims[0], dims[1]).to_owned())
             }
             value => Err(Error::WrongVariable {

@@ -220,7 +220,8 @@ pub(super) fn spread(what: &str, given: &[f64], channels: usize, least: f64) -> 
     };
     match all.iter().find(|x| !(x.is_finite() && **x >= least)) {
         Some(bad) => {
-            Err(Error::OutOfRange { what: format!("one of the {what}"), value: *bad, must: "finite and not negative" })
+            let must = if least > 0.0 { "finite and positive" } else { "finite and not negative" };
+            Err(Error::OutOfRange { what: format!("one of the {what}"), value: *bad, must })
         }
         None => Ok(all),
     }

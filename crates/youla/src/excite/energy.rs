@@ -16,10 +16,7 @@ impl Energy {
     /// Padded to at least twice the length: the samples of the density then hold all of it.
     pub(super) fn of(signal: MatRef<'_, f64>, j: usize, time: Discrete) -> Self {
         let length = (2 * signal.nrows()).next_power_of_two();
-        let mut buffer = vec![c64::new(0.0, 0.0); length];
-        buffer.iter_mut().zip(signal.col(j).iter()).for_each(|(to, x)| to.re = *x);
-        FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
-        let density = buffer[..=length / 2].iter().map(|x| x.norm_sqr()).collect();
+        let density = transform(signal, j, length)[..=length / 2].iter().map(|x| x.norm_sqr()).collect();
         Energy { density, step: 1.0 / (length as f64 * time.ts()) }
     }
 
@@ -37,9 +34,22 @@ impl Energy {
         if all > 0.0 { part / all } else { 0.0 }
     }
 
+    /// Mean density in a band.
+    pub(super) fn mean(&self, band: [f64; 2]) -> f64 {
+        let values = self.within(band);
+        values.iter().sum::<f64>() / values.len().max(1) as f64
+    }
+
     /// Mean density in a band over that in another, dB; minus infinity where there is none.
     pub(super) fn decibels(&self, band: [f64; 2], over: [f64; 2]) -> f64 {
-        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
-        10.0 * (mean(self.within(band)) / mean(self.within(over))).log10()
+        10.0 * (self.mean(band) / self.mean(over)).log10()
     }
+}
+
+/// The Fourier transform of one channel, with zeros up to `length`.
+pub(super) fn transform(signal: MatRef<'_, f64>, j: usize, length: usize) -> Vec<c64> {
+    let mut buffer = vec![c64::new(0.0, 0.0); length];
+    buffer.iter_mut().zip(signal.col(j).iter()).for_each(|(to, x)| to.re = *x);
+    FftPlanner::new().plan_fft_forward(length).process(&mut buffer);
+    buffer
 }

@@ -15,11 +15,11 @@
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.4 and 9.4; held against a Monte-Carlo study by
 //! `tests::the_bound_is_what_prediction_error_reaches`.
 
+use super::energy::transform;
 use crate::linalg::reciprocal_condition;
 use crate::lti::{Discrete, Eigen, Mode, StateSpace, TimeDomain, modes::mode};
 use crate::{Mat, MatRef, Result, c64};
 use faer::linalg::solvers::Solve;
-use rustfft::FftPlanner;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
@@ -145,15 +145,7 @@ impl Pole {
 fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], u: MatRef<'_, f64>, noise: &[f64]) -> Mat<f64> {
     let (m, p) = (nominal.inputs(), nominal.outputs());
     let length = u.nrows().next_power_of_two();
-    let fft = FftPlanner::new().plan_fft_forward(length);
-    let spectra: Vec<Vec<c64>> = (0..m)
-        .map(|j| {
-            let mut buffer = vec![c64::new(0.0, 0.0); length];
-            buffer.iter_mut().zip(u.col(j).iter()).for_each(|(to, x)| to.re = *x);
-            fft.process(&mut buffer);
-            buffer
-        })
-        .collect();
+    let spectra: Vec<Vec<c64>> = (0..m).map(|j| transform(u, j, length)).collect();
     let count: usize = poles.iter().map(Pole::parameters).sum();
     let power = |k: usize| spectra.iter().map(|s| s[k].norm_sqr()).sum::<f64>();
     let largest = (0..=length / 2).map(power).fold(0.0, f64::max);

@@ -1,9 +1,9 @@
 //! The sequence: shape, bands that stay free, ramps.
 //!
-//! A multisine leaves out the lines in the bands and those nearer to them than two lines are wide. The other shapes pass a filter without phase, by the Fourier transform of the whole
-//! sequence: 0 within a band, 1 from half its width beyond its edges on, a raised cosine between. The filter looks ahead, which a
-//! sequence that is made before the experiment may; a binary sequence is no longer binary behind it, and is scaled so that its
-//! greatest absolute value is the amplitude again.
+//! A multisine leaves out the lines in the bands and those nearer to them than two lines are wide. The other shapes pass a filter
+//! without phase, by the Fourier transform of the whole sequence: 0 within a band, 1 from half its width beyond its edges on, a
+//! raised cosine between. The filter looks ahead, which a sequence that is made before the experiment may; a binary sequence is no
+//! longer binary behind it, and is scaled so that its greatest absolute value is the amplitude again.
 
 use super::options::{ExciteOptions, InputOrder, Notch, Shape, check, spread};
 use crate::lti::Discrete;

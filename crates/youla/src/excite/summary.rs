@@ -150,11 +150,8 @@ pub(super) fn predicted(
 pub(super) fn spectrum(energies: &[Energy], options: &ExciteOptions) -> ExcitedSpectrum {
     let step = energies.first().map_or(0.0, |e| e.step);
     let lines = energies.first().map_or(0, |e| e.density.len());
-    let [low, high] = options.band;
     let relative = |e: &Energy| {
-        let within = |k: &usize| (low..=high).contains(&(*k as f64 * e.step));
-        let band: Vec<f64> = (0..e.density.len()).filter(within).map(|k| e.density[k]).collect();
-        let mean = band.iter().sum::<f64>() / band.len().max(1) as f64;
+        let mean = e.mean(options.band);
         e.density.iter().map(|d| 10.0 * (d / mean).log10()).collect()
     };
     ExcitedSpectrum {

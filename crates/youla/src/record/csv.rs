@@ -180,10 +180,8 @@ pub(super) fn column_names(path: &Path, options: &CsvOptions) -> Result<Vec<Stri
 /// [`Error::DuplicateChannel`] where a channel is named `t`, [`Error::Io`].
 pub fn write_csv(record: &Record, path: impl AsRef<Path>) -> Result<()> {
     let path = path.as_ref();
-    if record.channels().iter().any(|c| c.name == TIME) {
-        return Err(Error::DuplicateChannel { what: path.display().to_string(), name: TIME.to_owned() });
-    }
-    let written = std::fs::File::create(path).and_then(|file| write_rows(record, std::io::BufWriter::new(file)));
+    refuse_time(record, || path.display().to_string())?;
+    let written = std::fs::File::create(path).and_then(|file| write_rows(record, file));
     written.map_err(|source| {
         // Best effort: the error that led here is the one to report.
         let _ = std::fs::remove_file(path);
@@ -199,13 +197,19 @@ const TIME: &str = "t";
 /// # Errors
 /// As [`write_csv`].
 pub(crate) fn csv_to_bytes(record: &Record, comments: &[String]) -> Result<Vec<u8>> {
-    if record.channels().iter().any(|c| c.name == TIME) {
-        return Err(Error::DuplicateChannel { what: record.name().to_owned(), name: TIME.to_owned() });
-    }
+    refuse_time(record, || record.name().to_owned())?;
     let mut bytes: Vec<u8> = comments.iter().flat_map(|line| format!("# {line}\n").into_bytes()).collect();
     let path = Path::new(record.name()).to_owned();
     write_rows(record, &mut bytes).map_err(|source| Error::Io { path, source })?;
     Ok(bytes)
+}
+
+/// A channel must not have the name of the time.
+fn refuse_time(record: &Record, what: impl FnOnce() -> String) -> Result<()> {
+    match record.channels().iter().any(|c| c.name == TIME) {
+        true => Err(Error::DuplicateChannel { what: what(), name: TIME.to_owned() }),
+        false => Ok(()),
+    }
 }
 
 fn write_rows(record: &Record, to: impl std::io::Write) -> std::io::Result<()> {

@@ -4,7 +4,7 @@
 //! reverse, so that the numbers are by column. An array without that attribute, from another program, is by row. Sizes are believed
 //! only as far as the file could fill them: deflate packs at most 1032 bytes into one.
 
-use super::{Value, Variable, Variables};
+use super::{Value, Variable, Variables, believable};
 use crate::{Error, Result};
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 use std::collections::HashMap;
@@ -16,9 +16,8 @@ const MAX_DEPTH: usize = 32;
 const MOST_VALUES: usize = 10_000;
 /// Longest name of a variable or field, in bytes.
 const LONGEST_NAME: usize = 1024;
-/// Bytes of numbers that any file may hold, and for each byte of the file.
+/// Bytes of numbers that any file may hold.
 const SPARE: u64 = 1 << 25;
-const UNPACKED: u64 = 1032;
 
 /// Whether the bytes begin as those of an HDF5 file, perhaps behind the header of MATLAB.
 pub(super) fn is_hdf(bytes: &[u8]) -> bool {
@@ -31,7 +30,7 @@ pub(super) fn is_hdf(bytes: &[u8]) -> bool {
 /// # Errors
 /// [`Error::Corrupt`] for a damaged file and for one that announces more than it can hold.
 pub(super) fn hdf_from_bytes(bytes: &[u8], path: &Path) -> Result<Variables> {
-    let numbers = SPARE.saturating_add(UNPACKED.saturating_mul(bytes.len() as u64));
+    let numbers = believable(SPARE, bytes.len() as u64);
     let mut budget = Budget { values: MOST_VALUES, numbers };
     let mut read = || {
         let file = File::from_bytes(bytes.to_vec()).map_err(damaged)?;

@@ -59,3 +59,10 @@ pub(crate) fn open(path: &Path) -> Result<File> {
         _ => Error::Io { path: path.to_owned(), source },
     })
 }
+
+/// The bytes of numbers that a file or a part of one may announce: `spare`, and for each of its own what deflate packs into one at
+/// most. Other packings put more into a byte where numbers repeat, hence what is spare.
+fn believable(spare: u64, bytes: u64) -> u64 {
+    const UNPACKED: u64 = 1032;
+    spare.saturating_add(UNPACKED.saturating_mul(bytes))
+}

@@ -12,7 +12,6 @@ use crate::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
 use crate::export::{SequenceFormat, export_sequence};
 use crate::lti::{Discrete, Partitioned, StateSpace};
 use crate::record::{Detrend, Format, Record, Source, TimeSource, read};
-use crate::report::data::{Method, Role};
 use crate::report::svg;
 use crate::units::Channel;
 use serde::{Deserialize, Serialize};
@@ -219,15 +218,4 @@ pub fn write_excitation(
         refuse_existing(folder, &files)?;
     }
     replace_files(folder, &files)
-}
-
-/// The curves of the picture, in the order of the legend.
-pub(super) fn curves(found: &RunExcitation) -> Vec<Method> {
-    let columns = found.columns.iter().map(|c| Method::new(&c.name, &c.name, Role::Other));
-    let fixed = [
-        Method::new("predicted", "predicted by the nominal loop", Role::Hansen),
-        Method::new("limit", "limit", Role::Direct),
-        Method::new("notch", "to be kept free", Role::Nominal),
-    ];
-    columns.chain(fixed).collect()
 }

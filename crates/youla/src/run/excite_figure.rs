@@ -1,7 +1,7 @@
 //! The picture of an excitation: alpha over time, its energy over frequency, and what the nominal loop does under it.
 
-use super::excite::{RunExcitation, curves};
-use crate::report::data::Method;
+use super::excite::RunExcitation;
+use crate::report::data::{Method, Role};
 use crate::report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
 use crate::units::Channel;
 
@@ -29,6 +29,17 @@ pub(super) fn figure(found: &RunExcitation) -> (Figure, Vec<Method>) {
         panels,
     };
     (figure, curves(found))
+}
+
+/// The curves of the picture, in the order of the legend.
+fn curves(found: &RunExcitation) -> Vec<Method> {
+    let columns = found.columns.iter().map(|c| Method::new(&c.name, &c.name, Role::Other));
+    let fixed = [
+        Method::new("predicted", "predicted by the nominal loop", Role::Hansen),
+        Method::new("limit", "limit", Role::Direct),
+        Method::new("notch", "to be kept free", Role::Nominal),
+    ];
+    columns.chain(fixed).collect()
 }
 
 fn time_axis() -> Axis {

@@ -12,7 +12,7 @@ mod pages;
 mod tests;
 mod thrift;
 
-use super::{ChannelRef, Value, Variable, Variables};
+use super::{ChannelRef, Value, Variable, Variables, believable};
 use crate::{Error, Result};
 use footer::Footer;
 use pages::Cells;
@@ -21,9 +21,8 @@ use std::path::Path;
 
 /// The first and last bytes of a file.
 pub(super) const MAGIC: &[u8] = b"PAR1";
-/// Bytes of numbers that any file may hold, and for each byte of the file: runs of equal values take next to nothing.
+/// Bytes of numbers that any file or page may hold: runs of equal values take next to nothing.
 const SPARE: u64 = 1 << 26;
-const UNPACKED: u64 = 1032;
 /// Bytes of the largest footer that is read.
 const LARGEST_FOOTER: u64 = 1 << 24;
 
@@ -125,7 +124,7 @@ fn footer(file: &mut (impl Read + Seek), size: u64) -> Result<Footer, Fault> {
 
 /// The rows of a file of `size` bytes, believed as far as it could fill `columns` with them.
 fn rows(footer: &Footer, size: u64, columns: usize) -> Result<usize, Fault> {
-    let most = SPARE.saturating_add(UNPACKED.saturating_mul(size)) / (8 * columns.max(1) as u64);
+    let most = believable(SPARE, size) / (8 * columns.max(1) as u64);
     let rows = footer.groups.iter().fold(0_u64, |rows, group| rows.saturating_add(group.rows));
     if rows > most {
         return Err(format!("fewer than {rows} rows in {size} bytes"));

@@ -6,7 +6,7 @@
 use super::footer::{Column, Number};
 use super::packing::unpack;
 use super::thrift::Fields;
-use super::{Fault, SPARE, UNPACKED, decode};
+use super::{Fault, SPARE, believable, decode};
 
 /// How the numbers of a page are stored.
 struct Page<'a> {
@@ -47,7 +47,7 @@ impl<'a> Cells<'a> {
             if header.integer(4).is_some_and(|sum| sum as u32 != check_sum(body)) {
                 return Err("a page that agrees with its check sum".into());
             }
-            if unpacked as u64 > SPARE + UNPACKED * packed as u64 {
+            if unpacked as u64 > believable(SPARE, packed as u64) {
                 return Err(format!("fewer than {unpacked} bytes packed in {packed}"));
             }
             match (header.integer(1), header.fields(5), header.fields(7), header.fields(8)) {
@@ -91,16 +91,18 @@ impl<'a> Cells<'a> {
 
     /// Levels stand before what is packed, and may be there for nothing.
     fn second_kind(&mut self, about: &Fields<'_>, body: &[u8], unpacked: usize, packing: i64) -> Result<(), Fault> {
-        let sizes = about.size::<usize>(5).zip(about.size::<usize>(6));
-        let length = sizes.and_then(|(definition, repetition)| definition.checked_add(repetition));
-        let length = length.filter(|length| *length <= body.len().min(unpacked));
-        let (levels, rest) = body.split_at(length.ok_or("levels that are part of their page")?);
-        let definition = about.size(5).unwrap_or(0);
+        let inside = |(definition, repetition): (usize, usize)| {
+            let length = definition.checked_add(repetition)?;
+            (length <= body.len().min(unpacked)).then_some((definition, length))
+        };
+        let sizes = about.size(5).zip(about.size(6)).and_then(inside);
+        let (definition, length) = sizes.ok_or("levels that are part of their page")?;
+        let (levels, rest) = body.split_at(length);
         let packing = if about.bool(7) == Some(false) { 0 } else { packing };
         // A page of empty cells has no bytes at all, which some ways of packing would not give.
-        let size = unpacked - levels.len();
+        let size = unpacked - length;
         let numbers = if size == 0 { Vec::new() } else { unpack(rest, size, packing)? };
-        let levels = self.column.optional.then(|| &levels[levels.len() - definition..]);
+        let levels = self.column.optional.then(|| &levels[length - definition..]);
         let cells = about.size(1).ok_or("a page with its number of cells")?;
         let encoding = about.integer(4).ok_or("a page with its encoding")?;
         self.page(&Page { levels, numbers: &numbers, cells, encoding })

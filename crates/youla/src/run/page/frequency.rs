@@ -21,7 +21,7 @@ struct Known<'a> {
 
 pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(found, grid(found)?)?;
-    let known = known(found)?;
+    let known = known(found, &responses.hz)?;
     let models = responses.models.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
     let bands = known.iter().flat_map(|k| ports(found).map(|port| band(k, port)).collect::<Vec<_>>()).collect();
     let singular = singular(found, &responses, &known)?;
@@ -46,7 +46,7 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
 }
 
 /// The regions of G(S) and of the physical structure, on the grid of the models.
-fn known(found: &Identification) -> Result<Vec<Known<'_>>> {
+fn known<'a>(found: &'a Identification, hz: &[f64]) -> Result<Vec<Known<'a>>> {
     use std::borrow::Cow::{Borrowed, Owned};
     let mut all = Vec::new();
     if let Some(uncertainty) = &found.uncertainty {
@@ -54,7 +54,7 @@ fn known(found: &Identification) -> Result<Vec<Known<'_>>> {
         all.push(Known { method: Method::Hansen, level, band: Borrowed(&uncertainty.plant.response) });
     }
     if let Some(run) = structure(found).and_then(|run| run.intervals.as_ref().ok()) {
-        let omega: Vec<f64> = grid(found)?.iter().map(|f| TAU * f).collect();
+        let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
         all.push(Known { method: Method::GreyBox, level: run.level, band: Owned(run.response(&omega)?) });
     }
     Ok(all)

@@ -24,8 +24,8 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
 /// Modes of G(S) with their standard deviations, where these were asked for.
 fn modes(found: &Identification) -> String {
     let mut text = String::new();
-    let Some(uncertainty) = &found.uncertainty else { return text };
-    for band in uncertainty.plant.modes.iter().filter(|band| band.mode.pole.im > 0.0) {
+    let Some(plant) = &found.uncertainty.plant else { return text };
+    for band in plant.modes.iter().filter(|band| band.mode.pole.im > 0.0) {
         let (mode, hz, zeta) = (band.mode, band.hz_deviation, band.zeta_deviation);
         let _ =
             write!(text, "\nmode of G(S): {:.2} +- {hz:.2} Hz, damping ratio {:.4} +- {zeta:.4}", mode.hz, mode.zeta);

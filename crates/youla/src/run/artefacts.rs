@@ -7,7 +7,7 @@ use super::redesign;
 use super::reduction;
 use super::settings::RunSettings;
 use super::stabilisation::{as_csv, as_json};
-use super::uncertainty::grey_box_uncertainty;
+use super::uncertainty::SystemUncertainty;
 use crate::factor::YoulaSignals;
 use crate::identify::subspace::stabilisation::StabilisationDiagram;
 use crate::identify::subspace::{SubspaceModel, amplitudes};
@@ -259,24 +259,12 @@ impl Writer<'_> {
         self.diagram("4-identify/stabilisation_deviation", found.diagrams.deviation.as_ref(), &named("beta", y))?;
         self.diagram("4-identify/stabilisation_direct", found.diagrams.direct.as_ref(), y)?;
         self.model("5-recombine/hansen", &found.hansen.plant, serde_json::Value::Null)?;
-        if let Some(u) = &found.uncertainty {
-            for (name, of) in [("4-identify", &u.deviation), ("5-recombine", &u.plant)] {
-                let mut file = of.json(&u.hz);
-                file["level"] = serde_json::json!(found.settings.hansen.uncertainty.level);
-                file["provenance"] = serde_json::json!(self.provenance);
-                self.folder.json(&format!("{name}/uncertainty.json"), &file)?;
-            }
-        }
+        let known = &found.uncertainty;
+        self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
+        self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
+        self.uncertainty("4-identify/grey_box_uncertainty.json", &known.grey_box)?;
         match &found.grey_box {
-            Some(Ok(run)) => {
-                self.model("4-identify/grey_box", &run.found.model.model, run.details()?)?;
-                if let Some((hz, band)) = grey_box_uncertainty(found)? {
-                    let mut file = band.json(&hz);
-                    file["level"] = serde_json::json!(run.shown().level);
-                    file["provenance"] = serde_json::json!(self.provenance);
-                    self.folder.json("4-identify/grey_box_uncertainty.json", &file)?;
-                }
-            }
+            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, run.details()?)?,
             Some(Err(e)) => self.folder.json("4-identify/grey_box.json", &refused(e))?,
             None => {}
         }
@@ -380,6 +368,14 @@ impl Writer<'_> {
     fn model(&self, name: &str, model: &StateSpace<Discrete>, details: serde_json::Value) -> Result<()> {
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
         self.model_with(name, model, u, y, details)
+    }
+
+    /// Nothing where there is none.
+    fn uncertainty(&self, name: &str, known: &Option<SystemUncertainty>) -> Result<()> {
+        let Some(known) = known else { return Ok(()) };
+        let mut file = known.json(&self.found.hz);
+        file["provenance"] = serde_json::json!(self.provenance);
+        self.folder.json(name, &file)
     }
 
     fn model_with(

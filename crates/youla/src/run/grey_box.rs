@@ -13,7 +13,6 @@ use crate::identify::greybox::{
 };
 use crate::identify::hansen::HansenModel;
 use crate::identify::hansen_pem::{HansenPem, HansenPemOptions};
-use crate::identify::subspace::ModeBand;
 use crate::report::data::{PhysicalEstimate, PhysicalParameter, PhysicalStructure};
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -214,11 +213,6 @@ impl GreyBoxRun {
             }
         });
         Ok(self.structure.names().into_iter().enumerate().map(parameter).chain(derived).collect())
-    }
-
-    /// The modes of the plant with their intervals; empty where there are none.
-    pub(super) fn modes(&self) -> Result<Vec<ModeBand>> {
-        self.intervals.as_ref().map_or_else(|_| Ok(Vec::new()), GreyBoxIntervals::modes)
     }
 
     /// What the report shows beside the parameters.

@@ -252,11 +252,7 @@ fn poles(v: &ModelVerdict) -> Result<draw::Poles> {
 }
 
 fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
-    let bands = match (v.method, &found.uncertainty, structure(found)) {
-        (Method::Hansen, Some(uncertainty), _) => uncertainty.plant.modes.clone(),
-        (Method::GreyBox, _, Some(run)) => run.modes()?,
-        _ => Vec::new(),
-    };
+    let bands = found.uncertainty.of(v.method).map_or(&[][..], |known| &known.modes);
     let mode = |(k, m): (usize, &crate::lti::Mode)| draw::Mode {
         method: v.method.key().into(),
         hz: m.hz,

@@ -7,7 +7,7 @@ use super::grey_box::{GreyBoxRun, grey_box};
 use super::records::RunRecords;
 use super::redesign::redesigned;
 use super::reduction::{RunReduction, run_reduction};
-use super::response::{check_grid, indirect};
+use super::response::{check_grid, grid, indirect};
 use super::settings::{RunSettings, StabilisationSettings};
 use super::signals::{DeviationSignals, deviation_signals};
 use super::stabilisation::{Diagrams, diagram};
@@ -126,8 +126,10 @@ pub struct Identification {
     pub signals: DeviationSignals,
     /// S and G(S).
     pub hansen: HansenModel,
-    /// The uncertainty of S and G(S), where it was asked for and can be had.
-    pub uncertainty: Option<RunUncertainty>,
+    /// Frequencies of the responses of all models, Hz.
+    pub hz: Vec<f64>,
+    /// The uncertainty of S, of G(S) and of the physical structure.
+    pub uncertainty: RunUncertainty,
     /// `G_red(S)` in its loop where it was asked for, or the reason why there is none.
     pub reduction: Option<Result<RunReduction>>,
     /// The direct model where it was asked for, or the reason why there is none.
@@ -283,6 +285,9 @@ pub fn identify(
     let reduction = clock.run(Stage::Reduce, || {
         settings.reduction.as_ref().map(|options| run_reduction(factors, &hansen, &records, options)) // (29)
     });
+    let hz = grid(&settings.frequency_response, [&factorisation.nominal, &hansen.plant])?;
+    let intervals = grey_box.as_ref().and_then(|run| run.as_ref().ok()?.intervals.as_ref().ok());
+    let uncertainty = run_uncertainty(&hansen, intervals, &hz, settings.hansen.uncertainty.level)?;
     let mut found = Identification {
         verdict: Verdict::default(),
         certificate: None,
@@ -293,14 +298,14 @@ pub fn identify(
         factorisation,
         signals,
         hansen,
-        uncertainty: None,
+        hz,
+        uncertainty,
         reduction,
         direct,
         grey_box,
         diagrams,
         indirect: None,
     };
-    found.uncertainty = run_uncertainty(&found)?;
     // (26), the loop certificate and the response that rests on no model.
     (found.indirect, found.verdict) = clock.run(Stage::Validate, || Ok((indirect(&found), verify(&found)?)))?;
     found.certificate = Some(clock.run(Stage::Certify, || certificate(&found))?);

@@ -4,20 +4,11 @@ use super::pipeline::Identification;
 use super::records::LoopRecord;
 use super::settings::FrequencySettings;
 use super::verdict::Method;
-use crate::lti::{Discrete, FrequencyResponse, frequency_response};
+use crate::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
 use crate::record::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
 use crate::report::data as draw;
 use crate::{Error, Mat, Result, c64};
 use std::f64::consts::TAU;
-
-/// Responses on one grid.
-#[derive(Debug, Clone)]
-pub(super) struct ModelResponses {
-    /// Grid, Hz.
-    pub hz: Vec<f64>,
-    /// One entry per model.
-    pub models: Vec<(Method, FrequencyResponse)>,
-}
 
 /// The indirect response `S_dy S_du^-1` averaged over all estimation records, `None` where no excitation is known.
 ///
@@ -65,11 +56,10 @@ fn is_constant(signals: &Mat<f64>) -> bool {
 ///
 /// # Errors
 /// As [`frequency_response`].
-pub(super) fn model_responses(found: &Identification, hz: Vec<f64>) -> Result<ModelResponses> {
+pub(super) fn model_responses(found: &Identification, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
-    let models = found.verdict.models.iter().map(response).collect::<Result<_>>()?;
-    Ok(ModelResponses { hz, models })
+    found.verdict.models.iter().map(response).collect()
 }
 
 /// Refuses a lowest frequency that leaves no room below Nyquist.
@@ -91,18 +81,17 @@ const LIGHT: f64 = 0.1;
 const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
 
 /// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
-/// below Nyquist, and around each lightly damped mode of the nominal model and of G(S), at `f (1 + zeta tan(angle))`: between
-/// the points of the logarithmic grid a peak would be cut off.
+/// below Nyquist, and around each lightly damped mode of the models (nominal model and G(S)), at `f (1 + zeta tan(angle))`:
+/// between the points of the logarithmic grid a peak would be cut off.
 ///
 /// # Errors
 /// [`Error::NoConvergence`] of the eigenvalues.
-pub(super) fn grid(found: &Identification) -> Result<Vec<f64>> {
-    let settings = &found.settings.frequency_response;
-    let nyquist = 0.5 / found.records.time.ts();
+pub(super) fn grid(settings: &FrequencySettings, models: [&StateSpace<Discrete>; 2]) -> Result<Vec<f64>> {
+    let nyquist = 0.5 / models[0].time().ts();
     let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
     let last = settings.points.max(2) - 1;
     let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
-    for model in [&found.factorisation.nominal, &found.hansen.plant] {
+    for model in models {
         for mode in model.modes()?.into_iter().filter(|m| m.pole.im != 0.0 && m.zeta.abs() < LIGHT) {
             let width = mode.zeta.abs().max(1e-5);
             hz.extend(AROUND_A_PEAK.iter().map(|angle| mode.hz * (1.0 + width * angle.to_radians().tan())));

@@ -4,7 +4,7 @@ use super::artefacts::{SCHEMA, pairs};
 use super::certificate::RunCertificate;
 use super::pipeline::{Identification, StageTimes};
 use super::redesign;
-use super::response::{decibel, grid, model_responses};
+use super::response::{decibel, model_responses};
 use super::robustness;
 use super::uncertainty::{summary_entry, with_deviations};
 use super::verdict::{Method, ModelVerdict};
@@ -83,15 +83,11 @@ fn method_entry(found: &Identification, v: &ModelVerdict) -> Result<Value> {
         "robustness": robustness::summary_entry(&v.robustness),
         "residuals": super::residual_tests::summary_entry(v),
     });
-    if let Some(uncertainty) = found.uncertainty.as_ref().filter(|_| v.method == Method::Hansen) {
-        let modes = uncertainty.plant.modes.iter().map(|band| with_deviations(json!({}), band));
+    if let Some(known) = found.uncertainty.of(v.method) {
+        let modes = known.modes.iter().map(|band| with_deviations(json!({}), band));
         entry["modes"] = modes.collect::<Vec<_>>().into();
     }
     if let (Method::GreyBox, Some(Ok(run))) = (v.method, &found.grey_box) {
-        let modes = run.modes()?;
-        if !modes.is_empty() {
-            entry["modes"] = modes.iter().map(|band| with_deviations(json!({}), band)).collect::<Vec<_>>().into();
-        }
         let shown = run.shown();
         entry["parameters"] = json!(run.rows()?);
         entry["level"] = json!(shown.level);
@@ -113,17 +109,16 @@ fn fits(v: &ModelVerdict) -> Value {
 
 fn response_entry(found: &Identification) -> Result<Value> {
     let measured = found.indirect.as_ref().and_then(|r| r.as_ref().ok());
-    let hz = measured.map_or_else(|| grid(found), |m| Ok(m.response.omega.iter().map(|w| w / TAU).collect()))?;
+    let hz = measured.map_or_else(|| found.hz.clone(), |m| m.response.omega.iter().map(|w| w / TAU).collect());
     let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
     let mut entry = Map::new();
     if let Some(m) = measured {
         entry.insert("indirect_db".into(), json!(db(m.response.entry(0, 0))));
         entry.insert("coherence".into(), json!(m.coherence_y.col_as_slice(0)));
     }
-    let responses = model_responses(found, hz)?;
-    for (method, response) in &responses.models {
+    for (method, response) in model_responses(found, &hz)? {
         entry.insert(format!("{}_db", method.key()), json!(db(response.entry(0, 0))));
     }
-    entry.insert("hz".into(), json!(responses.hz));
+    entry.insert("hz".into(), json!(hz));
     Ok(entry.into())
 }

@@ -1,8 +1,10 @@
-//! The uncertainty of S and G(S) in a run: regions of their frequency responses and intervals of their modes.
+//! The uncertainty of the models of a run: regions of their frequency responses and intervals of their modes.
 
 use super::pipeline::Identification;
-use super::response::grid;
+use super::verdict::Method;
 use crate::Result;
+use crate::identify::greybox::GreyBoxIntervals;
+use crate::identify::hansen::HansenModel;
 use crate::identify::subspace::{ModeBand, ResponseBand, Uncertainty};
 use serde_json::{Value, json};
 use std::f64::consts::TAU;
@@ -10,53 +12,60 @@ use std::f64::consts::TAU;
 /// The uncertainty of one system.
 #[derive(Debug, Clone)]
 pub struct SystemUncertainty {
+    /// Confidence level.
+    pub level: f64,
     /// Frequency response with its regions.
     pub response: ResponseBand,
     /// Modes with their intervals, in the order of the modes of the system.
     pub modes: Vec<ModeBand>,
 }
 
-/// The uncertainty that a run found, on the grid of its frequency responses.
-#[derive(Debug, Clone)]
+/// The uncertainty that a run found, each where it was asked for and can be had.
+#[derive(Debug, Clone, Default)]
 pub struct RunUncertainty {
-    /// Frequencies, Hz.
-    pub hz: Vec<f64>,
     /// Of S.
-    pub deviation: SystemUncertainty,
+    pub deviation: Option<SystemUncertainty>,
     /// Of G(S).
-    pub plant: SystemUncertainty,
+    pub plant: Option<SystemUncertainty>,
+    /// Of the physical structure.
+    pub grey_box: Option<SystemUncertainty>,
 }
 
-/// `None` where it was not asked for or was refused.
+/// On the frequencies in Hz, that of S and G(S) at `level`.
 ///
 /// # Errors
 /// Those of the frequency responses and eigenvalues.
-pub(super) fn run_uncertainty(found: &Identification) -> Result<Option<RunUncertainty>> {
-    let (Some(s), Some(plant)) = (&found.hansen.deviation.uncertainty, &found.hansen.uncertainty) else {
-        return Ok(None);
-    };
-    let hz = grid(found)?;
+pub(super) fn run_uncertainty(
+    hansen: &HansenModel,
+    grey_box: Option<&GreyBoxIntervals>,
+    hz: &[f64],
+    level: f64,
+) -> Result<RunUncertainty> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
-    let of = |uncertainty: &Uncertainty| -> Result<Option<SystemUncertainty>> {
+    let of = |uncertainty: &Option<Uncertainty>| -> Result<Option<SystemUncertainty>> {
+        let Some(uncertainty) = uncertainty else { return Ok(None) };
         let Some(response) = uncertainty.response(&omega)? else { return Ok(None) };
-        Ok(Some(SystemUncertainty { response, modes: uncertainty.modes()? }))
+        Ok(Some(SystemUncertainty { level, response, modes: uncertainty.modes()? }))
     };
-    Ok(match (of(s)?, of(plant)?) {
-        (Some(deviation), Some(plant)) => Some(RunUncertainty { hz, deviation, plant }),
-        _ => None,
+    let physical = |known: &GreyBoxIntervals| -> Result<SystemUncertainty> {
+        Ok(SystemUncertainty { level: known.level, response: known.response(&omega)?, modes: known.modes()? })
+    };
+    Ok(RunUncertainty {
+        deviation: of(&hansen.deviation.uncertainty)?,
+        plant: of(&hansen.uncertainty)?,
+        grey_box: grey_box.map(physical).transpose()?,
     })
 }
 
-/// The same of the physical structure, with its frequencies in Hz; `None` where its parameters have no covariance.
-///
-/// # Errors
-/// Those of the frequency responses and eigenvalues.
-pub(super) fn grey_box_uncertainty(found: &Identification) -> Result<Option<(Vec<f64>, SystemUncertainty)>> {
-    let run = found.grey_box.as_ref().and_then(|run| run.as_ref().ok());
-    let Some(known) = run.and_then(|run| run.intervals.as_ref().ok()) else { return Ok(None) };
-    let hz = grid(found)?;
-    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
-    Ok(Some((hz, SystemUncertainty { response: known.response(&omega)?, modes: known.modes()? })))
+impl RunUncertainty {
+    /// That of the model that a method gave.
+    pub(super) fn of(&self, method: Method) -> Option<&SystemUncertainty> {
+        match method {
+            Method::Hansen => self.plant.as_ref(),
+            Method::GreyBox => self.grey_box.as_ref(),
+            _ => None,
+        }
+    }
 }
 
 impl SystemUncertainty {
@@ -80,7 +89,7 @@ impl SystemUncertainty {
             })
             .collect();
         let modes: Vec<Value> = self.modes.iter().map(|m| with_deviations(json!({}), m)).collect();
-        json!({"hz": hz, "ellipse": self.response.ellipse, "entries": entries, "modes": modes})
+        json!({"level": self.level, "hz": hz, "ellipse": self.response.ellipse, "entries": entries, "modes": modes})
     }
 }
 

@@ -1,29 +1,50 @@
 //! What a chapter asks to be done: its fenced blocks.
 //!
+//! - nothing: lines `youla ...`, and `cargo ...` for the project itself, whose benches and examples must be there;
 //! - `console`: lines `$ youla ...`, with `exit code 2` on the line after a command that ends so;
 //! - `text edit=FILE`: lines `old => new`, where `\n` is a new line;
-//! - `toml`: tables of run.toml;
-//! - `rust,noplayground file=FILE`: one of the examples, which other tests run.
+//! - `toml`: tables of run.toml; with `file=FILE` the whole of it, which is written;
+//! - `rust,noplayground file=FILE`: one of the examples, which other tests run;
+//! - `python`, `matlab`, `c`: run or compiled where the language is there;
+//! - `json keys=FILE`: an extract of a file;
+//! - `sh`: commands for the project;
+//! - `text` alone and `latex` are to be read.
 
-use std::fs;
-use std::path::{Path, PathBuf};
+use crate::blocks::Language;
 
 /// One thing to do.
 pub(crate) enum Step {
-    Run { arguments: Vec<String>, code: i32 },
-    Edit { file: String, from: String, to: String },
+    /// Standard output goes to the file, where one is named.
+    Run {
+        arguments: Vec<String>,
+        code: i32,
+        to: Option<String>,
+    },
+    Edit {
+        file: String,
+        from: String,
+        to: String,
+    },
     Settings(String),
-    Example { file: String, text: String },
-}
-
-/// The chapters in a folder, by name.
-pub(crate) fn chapters(folder: &Path) -> Vec<PathBuf> {
-    let entries = fs::read_dir(folder).expect("the book");
-    let mut found: Vec<PathBuf> = entries.map(|e| e.expect("readable").path()).collect();
-    found.retain(|path| path.extension().is_some_and(|e| e == "md"));
-    found.sort();
-    assert!(!found.is_empty());
-    found
+    Write {
+        file: String,
+        text: String,
+    },
+    Example {
+        file: String,
+        text: String,
+    },
+    Other {
+        language: Language,
+        text: String,
+    },
+    Keys {
+        file: String,
+        text: String,
+    },
+    Project {
+        command: String,
+    },
 }
 
 /// The steps of a chapter in their order.
@@ -36,6 +57,11 @@ pub(crate) fn steps(text: &str) -> Vec<Step> {
         let (kind, body) = block.split_once('\n').expect("a kind");
         match kind.split_once(' ').unwrap_or((kind, "")) {
             ("console", _) => found.extend(commands(body)),
+            ("", _) => found.extend(body.lines().map(plain)),
+            ("toml", file) if !file.is_empty() => {
+                let file = file.strip_prefix("file=").expect("file=FILE").to_owned();
+                found.push(Step::Write { file, text: body.to_owned() });
+            }
             ("toml", _) => found.push(Step::Settings(body.to_owned())),
             ("rust,noplayground", file) => {
                 let file = file.strip_prefix("file=").expect("file=FILE").to_owned();
@@ -45,6 +71,15 @@ pub(crate) fn steps(text: &str) -> Vec<Step> {
                 let file = rest.strip_prefix("edit=");
                 found.extend(file.into_iter().flat_map(|file| body.lines().map(move |line| edit(file, line))));
             }
+            ("python", _) => found.push(Step::Other { language: Language::Python, text: body.to_owned() }),
+            ("matlab", _) => found.push(Step::Other { language: Language::Matlab, text: body.to_owned() }),
+            ("c", _) => found.push(Step::Other { language: Language::C, text: body.to_owned() }),
+            ("json", file) => {
+                let file = file.strip_prefix("keys=").expect("keys=FILE").to_owned();
+                found.push(Step::Keys { file, text: body.to_owned() });
+            }
+            ("sh", _) => found.extend(body.lines().map(|line| Step::Project { command: line.to_owned() })),
+            ("latex", _) => {}
             (kind, _) => panic!("a block of the kind {kind:?}"),
         }
     }
@@ -55,8 +90,7 @@ fn commands(body: &str) -> Vec<Step> {
     let mut found: Vec<Step> = Vec::new();
     for line in body.lines() {
         if let Some(command) = line.strip_prefix("$ youla ") {
-            let arguments = command.split_whitespace().map(|word| word.trim_matches('\'').to_owned()).collect();
-            found.push(Step::Run { arguments, code: 0 });
+            found.push(run(command));
         } else if let Some(stated) = line.strip_prefix("exit code ") {
             let stated = stated.parse().expect("a code");
             match found.last_mut() {
@@ -68,6 +102,20 @@ fn commands(body: &str) -> Vec<Step> {
         }
     }
     found
+}
+
+fn run(command: &str) -> Step {
+    let (command, to) = command.split_once(" > ").map_or((command, None), |(c, to)| (c, Some(to.to_owned())));
+    let arguments = command.split_whitespace().map(|word| word.trim_matches('\'').to_owned()).collect();
+    Step::Run { arguments, code: 0, to }
+}
+
+fn plain(line: &str) -> Step {
+    match line.strip_prefix("youla ") {
+        Some(command) => run(command),
+        None if line.starts_with("cargo ") => Step::Project { command: line.to_owned() },
+        None => panic!("not a command: {line:?}"),
+    }
 }
 
 fn edit(file: &str, line: &str) -> Step {

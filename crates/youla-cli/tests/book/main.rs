@@ -1,10 +1,12 @@
-//! The book, `docs/book`: every command runs in the order of its chapter and ends as the chapter says, every edit finds its text,
-//! every table of settings is one that run.toml takes, every program is that of the examples, every link leads to a page of the book.
+//! The book, all pages of `docs`: every command runs in the order of its page and ends as the page says, every edit finds its text,
+//! every table of settings is one that run.toml takes, every program is that of the examples or compiles, every link leads to a page.
 #![allow(missing_docs)]
 
+mod blocks;
 mod chapter;
+mod readme;
 
-use chapter::{Step, chapters, steps};
+use chapter::{Step, steps};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,26 +17,39 @@ fn docs() -> PathBuf {
 
 #[test]
 fn commands_and_edits_do_what_the_chapters_say() {
-    for path in chapters(&docs().join("book")) {
-        let text = fs::read_to_string(&path).expect("readable");
-        let name = path.file_stem().expect("a name").to_string_lossy().into_owned();
+    let docs = docs();
+    for page in pages(&docs) {
+        let text = fs::read_to_string(docs.join(&page)).expect("readable");
+        let name = page.trim_end_matches(".md");
         if text.contains("../shared/data") || text.contains("examples/qube") {
-            let data = docs().join("../../shared/data");
+            let data = docs.join("../../shared/data");
             if !data.is_dir() {
                 println!("skipped: {name}: the measured data are not beside the project");
                 continue;
             }
         }
-        run_chapter(&name, &steps(&text));
+        run_chapter(&folder_of(name), name, &steps(&text));
     }
 }
 
-/// The chapter in a folder of its own, from which `../shared` and `../../examples` lead to where they lead from the project.
-fn run_chapter(name: &str, steps: &[Step]) {
-    let root = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book").join(name);
-    let _ = fs::remove_dir_all(&root);
-    let folder = root.join("project").join("work");
+#[test]
+fn commands_of_the_readme_work_on_a_log_such_as_it_describes() {
+    let text = fs::read_to_string(docs().join("../README.md")).expect("readable");
+    let folder = folder_of("README");
+    readme::write_scene(&folder);
+    run_chapter(&folder, "README.md", &steps(&text));
+}
+
+/// A folder of its own, empty.
+fn folder_of(name: &str) -> PathBuf {
+    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join("book").join(name);
+    let _ = fs::remove_dir_all(&folder);
     fs::create_dir_all(&folder).expect("a temporary folder");
+    folder
+}
+
+/// From the folder of a chapter `../shared` and `../../examples` lead to where they lead from the project.
+fn run_chapter(folder: &Path, name: &str, steps: &[Step]) {
     let project = docs().join("..").canonicalize().expect("the project");
     let at = |text: &str| {
         text.replace("../../examples", &project.join("examples").display().to_string())
@@ -42,15 +57,16 @@ fn run_chapter(name: &str, steps: &[Step]) {
     };
     for step in steps {
         match step {
-            Step::Run { arguments, code } => {
+            Step::Run { arguments, code, to } => {
                 let arguments: Vec<String> = arguments.iter().map(|a| at(a)).collect();
                 let output = Command::new(env!("CARGO_BIN_EXE_youla"))
-                    .current_dir(&folder)
+                    .current_dir(folder)
                     .args(&arguments)
                     .output()
                     .expect("the program starts");
                 let errors = String::from_utf8_lossy(&output.stderr);
                 assert_eq!(output.status.code(), Some(*code), "{name}: youla {}: {errors}", arguments.join(" "));
+                to.iter().for_each(|file| fs::write(folder.join(file), &output.stdout).expect("written"));
             }
             Step::Edit { file, from, to } => {
                 let path = folder.join(file);
@@ -62,28 +78,39 @@ fn run_chapter(name: &str, steps: &[Step]) {
                 let path = docs().join("../crates/youla/examples").join(file);
                 assert_eq!(*text, fs::read_to_string(path).expect("readable"), "{name}: {file} has changed");
             }
+            Step::Other { language, text } => blocks::run(name, *language, text, folder),
+            Step::Keys { file, text } => {
+                let read = |text: &str| serde_json::from_str(text).unwrap_or_else(|e| panic!("{name}: {e}"));
+                let found = fs::read_to_string(folder.join(file)).expect("readable");
+                blocks::keys_are_of(name, &read(text), &read(&found));
+            }
+            Step::Project { command } => blocks::targets_are_there(name, command, &project),
+            Step::Write { file, text } => fs::write(folder.join(file), text).expect("written"),
             Step::Settings(text) => {
-                let path = docs().join("../examples/flexible-drive/run.toml");
-                let base = fs::read_to_string(path).expect("readable");
-                let without = base.split("[reduction]").next().expect("a part").to_owned();
-                let with = format!("{without}\n{text}");
-                youla::run::RunSettings::parse(&with, Path::new("book")).unwrap_or_else(|e| panic!("{name}: {e}"));
+                let settings = blocks::run_settings(name, text, &project);
+                youla::run::RunSettings::parse(&settings, Path::new(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
             }
         }
     }
+}
+
+/// Pages of the book, relative to `docs`, in the order of SUMMARY.md.
+fn pages(docs: &Path) -> Vec<String> {
+    linked(&fs::read_to_string(docs.join("SUMMARY.md")).expect("readable"))
+}
+
+/// Files that a page links.
+fn linked(text: &str) -> Vec<String> {
+    let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
+    let files = targets.map(|target| target.split('#').next().unwrap_or_default().to_owned());
+    files.filter(|file| !file.starts_with("http") && !file.is_empty()).collect()
 }
 
 /// mdBook makes pages of what SUMMARY.md lists and copies the rest of `docs`; a link out of it would lead nowhere.
 #[test]
 fn links_lead_to_pages_of_the_book() {
     let docs = docs().canonicalize().expect("the book");
-    let summary = fs::read_to_string(docs.join("SUMMARY.md")).expect("readable");
-    let linked = |text: &str| -> Vec<String> {
-        let targets = text.split("](").skip(1).filter_map(|rest| rest.split(')').next());
-        let files = targets.map(|target| target.split('#').next().unwrap_or_default().to_owned());
-        files.filter(|file| !file.starts_with("http") && !file.is_empty()).collect()
-    };
-    let pages: Vec<PathBuf> = linked(&summary).into_iter().map(|page| docs.join(page)).collect();
+    let pages: Vec<PathBuf> = pages(&docs).into_iter().map(|page| docs.join(page)).collect();
     for page in &pages {
         let text = fs::read_to_string(page).unwrap_or_else(|e| panic!("{}: {e}", page.display()));
         for target in linked(&text) {
@@ -93,7 +120,18 @@ fn links_lead_to_pages_of_the_book() {
             assert!(found.is_file() && found.starts_with(&docs) && page_of_book, "{}: {target}", page.display());
         }
     }
-    for path in chapters(&docs.join("book")) {
-        assert!(pages.contains(&path), "{} is not in SUMMARY.md", path.display());
+}
+
+#[test]
+fn every_page_is_in_the_book() {
+    let docs = docs();
+    let pages = pages(&docs);
+    for folder in ["", "book/", "decisions/"] {
+        for entry in fs::read_dir(docs.join(folder)).expect("the book") {
+            let name = entry.expect("readable").file_name().to_string_lossy().into_owned();
+            let page = format!("{folder}{name}");
+            let listed = !name.ends_with(".md") || name == "SUMMARY.md" || pages.contains(&page);
+            assert!(listed, "{page} is not in SUMMARY.md");
+        }
     }
 }

@@ -137,7 +137,8 @@ fn settings_in_the_documents_validate() {
 }
 
 fn blocks(text: &str) -> Vec<&str> {
-    text.split("```toml\n").skip(1).filter_map(|rest| rest.split("```").next()).collect()
+    let after = text.split("```toml").skip(1).filter_map(|rest| rest.split_once('\n'));
+    after.filter_map(|(_, rest)| rest.split("```").next()).collect()
 }
 
 #[test]

@@ -1,0 +1,119 @@
+//! Blocks that are no commands, in the folder of their chapter. Where there is no program for them, a line begins with `skipped`.
+
+use std::fs;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// The language of a block.
+#[derive(Clone, Copy)]
+pub(crate) enum Language {
+    /// With scipy; `PYTHON` names the interpreter.
+    Python,
+    /// In Octave with its package control.
+    Matlab,
+    /// The body of a function with `u`, `y`, `alpha` and `beta` for one sample.
+    C,
+}
+
+/// Exit code of a script that lacks a package.
+const NOT_THERE: i32 = 77;
+
+/// Runs the block, or compiles it.
+pub(crate) fn run(name: &str, language: Language, text: &str, folder: &Path) {
+    let found = match language {
+        Language::Python => {
+            let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
+            let has_scipy = output(&python, &["-c", "import scipy"], folder).is_some_and(|o| o.status.success());
+            has_scipy.then(|| output(&python, &["-c", text], folder)).flatten()
+        }
+        Language::Matlab => {
+            let script = format!("if isempty(pkg('list', 'control')), exit(77); end\npkg load control\n{text}");
+            output("octave-cli", &["--no-history", "--eval", &script], folder)
+        }
+        Language::C => {
+            fs::write(folder.join("block.c"), program(text)).expect("written");
+            output("gcc", &["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "block.c"], folder)
+        }
+    };
+    match found {
+        None => println!("skipped: {name}: nothing here runs\n{text}"),
+        Some(o) if o.status.code() == Some(NOT_THERE) => println!("skipped: {name}: Octave has no package control"),
+        Some(o) => assert!(o.status.success(), "{name}:\n{text}\n{}", String::from_utf8_lossy(&o.stderr)),
+    }
+}
+
+/// `None` where there is no such program.
+fn output(program: &str, arguments: &[&str], folder: &Path) -> Option<Output> {
+    Command::new(program).args(arguments).current_dir(folder).output().ok()
+}
+
+fn program(text: &str) -> String {
+    let (includes, body): (Vec<&str>, Vec<&str>) = text.lines().partition(|line| line.starts_with("#include"));
+    format!(
+        "{}\nextern double u[8], y[8], alpha[8], beta[8];\nvoid block(void);\nvoid block(void)\n{{\n{}\n}}\n",
+        includes.join("\n"),
+        body.join("\n")
+    )
+}
+
+/// Every key that a page shows is one of the file; `<...>` stands for any, and a list shows its first entry.
+pub(crate) fn keys_are_of(place: &str, shown: &serde_json::Value, file: &serde_json::Value) {
+    use serde_json::Value::{Array, Object};
+    match (shown, file) {
+        (Object(shown), Object(file)) => {
+            for (key, value) in shown {
+                let found = if key.starts_with('<') { file.values().next() } else { file.get(key) };
+                let Some(found) = found else {
+                    assert!(key.starts_with('<'), "{place}: no {key}");
+                    continue;
+                };
+                keys_are_of(&format!("{place}.{key}"), value, found);
+            }
+        }
+        (Array(shown), Array(file)) => {
+            for (shown, file) in shown.iter().zip(file).take(1) {
+                keys_are_of(&format!("{place}[0]"), shown, file);
+            }
+        }
+        (Object(_) | Array(_), serde_json::Value::Null) => {}
+        (Object(_) | Array(_), _) | (_, Object(_) | Array(_)) => panic!("{place}: {shown} is {file} in the file"),
+        _ => {}
+    }
+}
+
+/// Benches and examples that a command of cargo names are there.
+pub(crate) fn targets_are_there(place: &str, command: &str, project: &Path) {
+    let words: Vec<&str> = command.split_whitespace().collect();
+    for pair in words.windows(2) {
+        let folder = match pair[0] {
+            "--bench" => "benches",
+            "--example" => "examples",
+            _ => continue,
+        };
+        let at = project.join("crates/youla").join(folder);
+        let there = at.join(format!("{}.rs", pair[1])).is_file() || at.join(pair[1]).join("main.rs").is_file();
+        assert!(there, "{place}: {command}: no {}", pair[1]);
+    }
+}
+
+/// A whole run.toml as it stands; tables of one in place of those of the flexible drive; the declaration of a structure in a
+/// table of its own.
+pub(crate) fn run_settings(place: &str, text: &str, project: &Path) -> String {
+    let read = |text: &str| text.parse::<toml::Table>().unwrap_or_else(|e| panic!("{place}: {e}\n{text}"));
+    let block = read(text);
+    if block.contains_key("name") {
+        return text.to_owned();
+    }
+    let mut with = read(&fs::read_to_string(project.join("examples/flexible-drive/run.toml")).expect("readable"));
+    with.remove("reduction");
+    let structure = ["template", "a"].iter().any(|key| block.contains_key(*key));
+    if structure || block.contains_key("grey_box") {
+        with.extend(read("[grey_box.structure]\ntemplate = \"mass-spring-damper\""));
+    }
+    match with.get_mut("grey_box").and_then(toml::Value::as_table_mut) {
+        Some(grey_box) if structure => drop(grey_box.insert("structure".into(), block.into())),
+        Some(grey_box) => grey_box.extend(block["grey_box"].as_table().expect("a table").clone()),
+        None => with.extend(block),
+    }
+    with.to_string()
+}

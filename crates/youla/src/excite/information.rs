@@ -9,8 +9,8 @@
 //! Whitened by the sensitivity, the loop drops out of the derivative: what counts is the input that alpha makes. The noise colours y by
 //! S_y, which depends on theta too; what that adds is left out, so that the bound is on the safe side. Sums over frequencies hold for
 //! unstable plants as well. The parameters are those of every simple pole: `G = sum of c b / (z - p)` with the pole p, its
-//! direction c at the outputs and b at the inputs, one entry of b held. Delays are known: `G = G_0 diag(z^-d)`, and the parameters
-//! are those of `G_0`. Poles that repeat, with their residues, hidden ones and the feedthrough count as known.
+//! direction c at the outputs and b at the inputs, one entry of b held. Poles that repeat or lie at the origin (delays), with
+//! their residues, hidden ones and the feedthrough count as known.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.4 and 9.4; held against a Monte-Carlo study by
 //! `tests::the_bound_is_what_prediction_error_reaches`.
@@ -23,14 +23,12 @@ use faer::linalg::solvers::Solve;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// A pole nearer to the origin than this belongs to a delay.
+/// A pole nearer to the origin than this is a delay.
 const DELAY: f64 = 0.05;
 /// Poles nearer to each other than this count as one that repeats.
 const APART: f64 = 1e-6;
 /// Part of the largest peak below which a pole does not show.
 const HIDDEN: f64 = 1e-10;
-/// Part of the largest value of an impulse response below which it has not begun.
-const BEGUN: f64 = 1e-12;
 /// Frequencies that are added up in one product.
 const CHUNK: usize = 1024;
 
@@ -64,9 +62,8 @@ struct Pole {
 
 /// The oscillating modes of the nominal model with their accuracies under the input `u` (samples x m, until the loop is at rest).
 pub(super) fn accuracy(nominal: &StateSpace<Discrete>, u: MatRef<'_, f64>, noise: &[f64]) -> Result<Vec<ModeAccuracy>> {
-    let delays = delays(nominal)?;
-    let poles = simple_poles(nominal, &delays)?;
-    let information = information(nominal, &poles, &delays, u, noise);
+    let poles = simple_poles(nominal)?;
+    let information = information(nominal, &poles, u, noise);
     let deviations = deviations(&poles, &information, nominal.time());
     let all = nominal.modes()?;
     let oscillating = all.into_iter().filter(|m| m.pole.im > 0.0 && m.pole.norm() >= DELAY);
@@ -80,28 +77,7 @@ pub(super) fn accuracy(nominal: &StateSpace<Discrete>, u: MatRef<'_, f64>, noise
         .collect())
 }
 
-/// Whole samples by which each input is late beyond the hold, where poles at the origin make it so: the zeros at the start of its
-/// impulse response, but for the one of a plant without direct path.
-fn delays(nominal: &StateSpace<Discrete>) -> Result<Vec<usize>> {
-    let at_origin = nominal.poles()?.iter().filter(|p| p.norm() < DELAY).count();
-    let mut state = nominal.b().to_owned();
-    let mut responses = vec![nominal.d().to_owned()];
-    for _ in 0..=at_origin {
-        responses.push(nominal.c() * &state);
-        state = nominal.a() * &state;
-    }
-    let begins = |j: usize| {
-        let sizes: Vec<f64> = responses.iter().map(|h| h.col(j).norm_max()).collect();
-        let largest = sizes.iter().copied().fold(0.0, f64::max);
-        sizes.iter().position(|size| *size > BEGUN * largest).unwrap_or(0)
-    };
-    let begins: Vec<usize> = (0..nominal.inputs()).map(begins).collect();
-    let direct = begins.iter().sum::<usize>() == at_origin;
-    Ok(begins.into_iter().map(|k| if direct { k } else { k.saturating_sub(1).min(at_origin) }).collect())
-}
-
-/// The poles of `G_0`.
-fn simple_poles(nominal: &StateSpace<Discrete>, delays: &[usize]) -> Result<Vec<Pole>> {
+fn simple_poles(nominal: &StateSpace<Discrete>) -> Result<Vec<Pole>> {
     if nominal.order() == 0 {
         return Ok(Vec::new());
     }
@@ -112,8 +88,7 @@ fn simple_poles(nominal: &StateSpace<Discrete>, delays: &[usize]) -> Result<Vec<
     };
     let size = |v: &[c64]| v.iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
     let candidates = (0..all.len()).filter(|k| all[*k].im >= 0.0 && alone(*k)).map(|k| {
-        let (c, mut b) = eigen.directions(k, nominal);
-        b.iter_mut().zip(delays).for_each(|(b, d)| *b *= all[k].powu(*d as u32));
+        let (c, b) = eigen.directions(k, nominal);
         let held = (0..b.len()).max_by(|i, j| b[*i].norm().total_cmp(&b[*j].norm())).unwrap_or(0);
         Pole { mode: mode(nominal.time(), all[k]), value: all[k], c, b, held }
     });
@@ -167,13 +142,7 @@ impl Pole {
 }
 
 /// I(theta), by Parseval over the padded input.
-fn information(
-    nominal: &StateSpace<Discrete>,
-    poles: &[Pole],
-    delays: &[usize],
-    u: MatRef<'_, f64>,
-    noise: &[f64],
-) -> Mat<f64> {
+fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], u: MatRef<'_, f64>, noise: &[f64]) -> Mat<f64> {
     let (m, p) = (nominal.inputs(), nominal.outputs());
     let length = u.nrows().next_power_of_two();
     let spectra: Vec<Vec<c64>> = (0..m).map(|j| transform(u, j, length)).collect();
@@ -190,11 +159,10 @@ fn information(
         for (i, k) in chunk.iter().enumerate() {
             let twice = if *k == 0 || 2 * k == length { 1.0 } else { 2.0 };
             let weight = (twice / length as f64).sqrt();
-            let z = point(*k);
-            let at: Vec<c64> = spectra.iter().zip(delays).map(|(s, d)| s[*k] * z.powi(-(*d as i32))).collect();
+            let at: Vec<c64> = spectra.iter().map(|s| s[*k]).collect();
             let mut column = 0;
             for pole in poles {
-                pole.columns(z, &at, |values| {
+                pole.columns(point(*k), &at, |values| {
                     for (r, value) in values.iter().enumerate() {
                         rows[(2 * (i * p + r), column)] = weight * value.re / noise[r];
                         rows[(2 * (i * p + r) + 1, column)] = weight * value.im / noise[r];

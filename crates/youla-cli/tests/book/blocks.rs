@@ -27,7 +27,8 @@ pub(crate) fn run(name: &str, language: Language, text: &str, folder: &Path) {
             has_scipy.then(|| output(&python, &["-c", text], folder)).flatten()
         }
         Language::Matlab => {
-            let script = format!("if isempty(pkg('list', 'control')), exit(77); end\npkg load control\n{text}");
+            let script =
+                format!("if isempty(pkg('list', 'control')), exit({NOT_THERE}); end\npkg load control\n{text}");
             output("octave-cli", &["--no-history", "--eval", &script], folder)
         }
         Language::C => {
@@ -100,20 +101,19 @@ pub(crate) fn targets_are_there(place: &str, command: &str, project: &Path) {
 /// table of its own.
 pub(crate) fn run_settings(place: &str, text: &str, project: &Path) -> String {
     let read = |text: &str| text.parse::<toml::Table>().unwrap_or_else(|e| panic!("{place}: {e}\n{text}"));
-    let block = read(text);
+    let mut block = read(text);
     if block.contains_key("name") {
         return text.to_owned();
     }
+    if ["template", "a"].iter().any(|key| block.contains_key(*key)) {
+        block = toml::Table::from_iter([("structure".to_owned(), block.into())]);
+        block = toml::Table::from_iter([("grey_box".to_owned(), block.into())]);
+    } else if let Some(grey_box) = block.get_mut("grey_box").and_then(toml::Value::as_table_mut) {
+        let any = || read("template = \"mass-spring-damper\"").into();
+        grey_box.entry("structure").or_insert_with(any);
+    }
     let mut with = read(&fs::read_to_string(project.join("examples/flexible-drive/run.toml")).expect("readable"));
     with.remove("reduction");
-    let structure = ["template", "a"].iter().any(|key| block.contains_key(*key));
-    if structure || block.contains_key("grey_box") {
-        with.extend(read("[grey_box.structure]\ntemplate = \"mass-spring-damper\""));
-    }
-    match with.get_mut("grey_box").and_then(toml::Value::as_table_mut) {
-        Some(grey_box) if structure => drop(grey_box.insert("structure".into(), block.into())),
-        Some(grey_box) => grey_box.extend(block["grey_box"].as_table().expect("a table").clone()),
-        None => with.extend(block),
-    }
+    with.extend(block);
     with.to_string()
 }

@@ -28,7 +28,10 @@ fn commands_and_edits_do_what_the_chapters_say() {
                 continue;
             }
         }
-        run_chapter(&folder_of(name), name, &steps(&text));
+        let steps = steps(&text);
+        if !steps.is_empty() {
+            run_chapter(&folder_of(name), name, &steps);
+        }
     }
 }
 

@@ -3,9 +3,9 @@
 use crate::dialect::Dialect;
 use clap::{Args as ClapArgs, Parser, Subcommand, ValueEnum};
 use std::path::PathBuf;
-use youla::record::ChannelRef;
-use youla::run::Feedback;
-use youla::study::{Method, Shard, StartCase};
+use youla_io::ChannelRef;
+use youla_paper::study::{Method, Shard, StartCase};
+use youla_run::Feedback;
 
 /// Identifies a machine while its controller keeps running.
 #[derive(Debug, Parser)]

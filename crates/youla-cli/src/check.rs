@@ -5,14 +5,13 @@ use crate::commands::folder_of;
 use crate::output::{Failure, say};
 use std::fs;
 use std::path::Path;
-use youla::Error;
-use youla::check::{Finding, Severity};
-use youla::run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, further, read_check_options};
+use youla_loop::check::{Finding, Severity};
+use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, further, read_check_options};
 
 /// Checks, prints what was found, and says whether there is no defect.
 pub(crate) fn check(args: &Args, asked: &CheckArgs) -> Result<bool, Failure> {
     if let Some(folder) = asked.out.as_ref().filter(|folder| folder.exists()) {
-        return Err(Error::OutputExists { path: folder.clone() }.into());
+        return Err(youla_io::Error::OutputExists { path: folder.clone() }.into());
     }
     let found = if asked.input.is_empty() { of_run(asked)? } else { of_files(asked)? };
     let json =
@@ -33,11 +32,11 @@ pub(crate) fn check(args: &Args, asked: &CheckArgs) -> Result<bool, Failure> {
 fn of_run(asked: &CheckArgs) -> Result<DataCheck, Failure> {
     if asked.dialect.is_given() {
         let problem = "a run.toml declares the form of its text files itself, in [data] csv".to_owned();
-        return Err(Error::Settings { path: asked.files[0].clone(), at: None, problem }.into());
+        return Err(youla_io::Error::Settings { path: asked.files[0].clone(), at: None, problem }.into());
     }
     let [settings] = &asked.files[..] else {
         let what = "the number of run.toml files (give --input and --output for files of data)".into();
-        return Err(Error::Ports { what, expected: 1, found: asked.files.len() }.into());
+        return Err(youla::Error::Ports { what, expected: 1, found: asked.files.len() }.into());
     };
     Ok(check_run(&RunSettings::read(settings)?, &folder_of(settings))?)
 }

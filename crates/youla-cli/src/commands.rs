@@ -14,9 +14,11 @@ use crate::starts;
 use crate::subspace;
 use crate::table;
 use std::path::{Path, PathBuf};
-use youla::run::{
-    RunFolder, RunRecords, RunSettings, Stage, StageClock, demo, factorise_run, identify, read_records, redraw,
-    settings_reference, settings_schema, signal_records, unused_folder, write_run, write_signals,
+use youla_io::folder::{RunFolder, unused_folder};
+use youla_paper::demo;
+use youla_run::{
+    RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_reference,
+    settings_schema, signal_records, write_run, write_signals,
 };
 
 /// Runs the verb that was asked for; false where a check found a defect.
@@ -60,7 +62,7 @@ fn identify_and_write(
     output: &OutputFolder,
     folder: &Path,
     settings: RunSettings,
-    read: impl FnOnce(&RunSettings) -> youla::Result<RunRecords>,
+    read: impl FnOnce(&RunSettings) -> youla_run::Result<RunRecords>,
 ) -> Result<(), Failure> {
     let target = output.out.clone().unwrap_or_else(|| unused_folder(Path::new("."), &settings.name));
     RunFolder::check(&target, output.force)?;

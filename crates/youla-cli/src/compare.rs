@@ -5,8 +5,8 @@ use crate::output::{Failure, say};
 use crate::table::aligned;
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
-use youla::report::data::EvidenceTable;
-use youla::run::{Comparison, compare, write_comparison};
+use youla_report::data::EvidenceTable;
+use youla_run::{Comparison, compare, write_comparison};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:

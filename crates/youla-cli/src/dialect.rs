@@ -1,7 +1,7 @@
 //! Flags for the form of text files, as in `[data] csv` of run.toml.
 
 use clap::Args as ClapArgs;
-use youla::record::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
+use youla_io::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 
 /// How text files are written.
 #[derive(Debug, ClapArgs)]

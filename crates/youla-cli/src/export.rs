@@ -4,9 +4,8 @@ use crate::args::Args;
 use crate::output::{Failure, say};
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
-use youla::Error;
-use youla::export::{ModelFormat, c_controller, export_model, write_export};
-use youla::run::{controller_for_export, model_for_export};
+use youla_io::export::{ModelFormat, c_controller, export_model, write_export};
+use youla_run::{controller_for_export, model_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -68,7 +67,7 @@ pub(crate) fn export(args: &Args, asked: &ExportArgs) -> Result<(), Failure> {
         _ => None,
     };
     if let Some(problem) = misplaced {
-        return Err(Error::NotAModel { path: asked.source.clone(), problem: problem.into() }.into());
+        return Err(youla_io::Error::NotAModel { path: asked.source.clone(), problem: problem.into() }.into());
     }
     let (bytes, default, about) = match asked.to {
         Format::Model(format) => {

@@ -4,14 +4,13 @@ use crate::args::{Args, InitArgs};
 use crate::output::{Failure, say};
 use std::io::{IsTerminal, Write};
 use std::path::Path;
-use youla::Error;
-use youla::record::{ChannelRef, SurveyedColumn, survey};
-use youla::run::{Draft, DraftClock, Feedback, path_from};
+use youla_io::{ChannelRef, SurveyedColumn, survey};
+use youla_run::{Draft, DraftClock, Feedback, path_from};
 
 /// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
 pub(crate) fn init(args: &Args, asked: &InitArgs) -> Result<(), Failure> {
     if asked.out.exists() && !asked.force {
-        return Err(Error::FileExists { path: asked.out.clone() }.into());
+        return Err(youla_io::Error::FileExists { path: asked.out.clone() }.into());
     }
     let csv = asked.dialect.options();
     let columns = survey(&asked.log, &csv)?;
@@ -22,7 +21,7 @@ pub(crate) fn init(args: &Args, asked: &InitArgs) -> Result<(), Failure> {
     }
     if !missing.is_empty() && !std::io::stdin().is_terminal() {
         let problem = format!("what the columns mean is not guessed; say it with {}", missing.join(", "));
-        return Err(Error::Settings { path: asked.log.clone(), at: None, problem }.into());
+        return Err(youla_io::Error::Settings { path: asked.log.clone(), at: None, problem }.into());
     }
     let draft = answered(asked, &columns)?;
     let text = draft.toml(&columns)?;

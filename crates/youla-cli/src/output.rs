@@ -5,38 +5,44 @@ use std::io::Write;
 use std::path::Path;
 use std::process::ExitCode;
 use std::time::Duration;
-use youla::run::{ReadingProgress, Stage};
-use youla::{Error, ErrorKind};
+use youla::ErrorKind;
+use youla_run::{ReadingProgress, Stage};
 
 /// Why the program ends early.
 #[derive(Debug)]
 pub(crate) enum Failure {
-    /// The library refused.
-    Library(Error),
+    /// A crate refused: its sentence and what kind of failure it is.
+    Refused(String, ErrorKind),
     /// Nobody reads the output any more.
     OutputClosed,
 }
 
 impl Failure {
     pub(crate) fn io(path: &Path, source: std::io::Error) -> Self {
-        Failure::Library(Error::Io { path: path.to_owned(), source })
+        youla_io::Error::Io { path: path.to_owned(), source }.into()
     }
 }
 
-impl From<Error> for Failure {
-    fn from(error: Error) -> Self {
-        Failure::Library(error)
-    }
+macro_rules! refused {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Failure::Refused(error.to_string(), error.kind())
+            }
+        }
+    )*};
 }
+
+refused!(youla::Error, youla_io::Error, youla_paper::Error, youla_run::Error);
 
 /// Prints one sentence and gives the exit code: 2 for input that cannot be used, 3 for an impossible computation.
 pub(crate) fn fail(failure: &Failure) -> ExitCode {
     match failure {
         Failure::OutputClosed => ExitCode::SUCCESS,
-        Failure::Library(error) => {
+        Failure::Refused(sentence, kind) => {
             // Without standard error there is nobody to tell.
-            let _ = writeln!(std::io::stderr(), "error: {error}");
-            match error.kind() {
+            let _ = writeln!(std::io::stderr(), "error: {sentence}");
+            match kind {
                 ErrorKind::BadInput => ExitCode::from(2),
                 ErrorKind::Numerical => ExitCode::from(3),
             }

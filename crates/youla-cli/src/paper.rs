@@ -7,9 +7,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
-use youla::rig::RigParameters;
-use youla::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
-use youla::study::{PaperSettings, Shard};
+use youla_paper::rig::RigParameters;
+use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
+use youla_paper::study::{PaperSettings, Shard};
 
 /// Reproduces the paper, or its part.
 pub(crate) fn reproduce(args: &Args, asked: &PaperArgs) -> Result<(), Failure> {

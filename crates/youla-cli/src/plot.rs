@@ -5,8 +5,8 @@ use crate::output::{Failure, say};
 use crate::raster;
 use clap::Args as ClapArgs;
 use std::path::PathBuf;
-use youla::report::{FigureChoice, Print};
-use youla::run::{Plot, plottable, write_plots};
+use youla_report::{FigureChoice, Print};
+use youla_run::{Plot, plottable, write_plots};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -76,7 +76,7 @@ pub(crate) fn plot(args: &Args, asked: &PlotArgs) -> Result<(), Failure> {
         methods: asked.methods.clone(),
     };
     let print = Print { width_cm: asked.width, height_cm: asked.height, ..Print::default() };
-    let plots = youla::run::plot(&asked.run, figure, &choice, &print)?;
+    let plots = youla_run::plot(&asked.run, figure, &choice, &print)?;
     let files = plots.iter().map(|plot| files(plot, asked)).collect::<Result<Vec<_>, Failure>>()?.concat();
     let folder = asked.out.clone().unwrap_or_else(|| asked.run.join("figures"));
     let paths = write_plots(&folder, &files)?;

@@ -4,8 +4,7 @@ use crate::output::Failure;
 use resvg::usvg::{Options, Tree, WriteOptions};
 use resvg::{render, tiny_skia};
 use std::path::Path;
-use youla::Error;
-use youla::report::FIGURE_FONT;
+use youla_report::FIGURE_FONT;
 
 const FAMILY: &str = "Youla Figures";
 /// About 800 MB of memory.
@@ -18,7 +17,7 @@ pub(crate) fn drawn(svg: &str, dpi: u32) -> Result<Vec<u8>, Failure> {
     let pixels = f64::from(width) * f64::from(height);
     if pixels > MOST_PIXELS {
         let (what, must) = ("the number of pixels of a figure".into(), "at most 2e8");
-        return Err(Error::OutOfRange { what, value: pixels, must }.into());
+        return Err(youla::Error::OutOfRange { what, value: pixels, must }.into());
     }
     let mut pixmap = tiny_skia::Pixmap::new(width as u32, height as u32).ok_or_else(|| broken("it has no size"))?;
     pixmap.fill(tiny_skia::Color::WHITE);

@@ -4,8 +4,8 @@ use crate::args::{Args, StartsArgs};
 use crate::output::{Failure, say};
 use crate::paper::Bar;
 use std::path::Path;
-use youla::run::{StartsProgress, WrittenStarts, starts};
-use youla::study::{StartCase, StartsSettings};
+use youla_paper::run_starts::{StartsProgress, WrittenStarts, starts};
+use youla_paper::study::{StartCase, StartsSettings};
 
 /// Counts how often searches arrive.
 pub(crate) fn count(args: &Args, asked: &StartsArgs) -> Result<(), Failure> {
@@ -31,7 +31,7 @@ pub(crate) fn count(args: &Args, asked: &StartsArgs) -> Result<(), Failure> {
 }
 
 fn table(written: &WrittenStarts) -> String {
-    let row = |c: &youla::study::StartCount| {
+    let row = |c: &youla_paper::study::StartCount| {
         let without = if c.without_loop > 0 { format!(", {} without a loop", c.without_loop) } else { String::new() };
         format!("{:<14}{:<20}{:>5} of {:>4} arrived{without}", c.case.key(), c.search.label(), c.arrived, c.items)
     };

@@ -5,15 +5,14 @@ use crate::output::{Failure, Reading, say};
 use crate::table;
 use std::fs;
 use std::path::Path;
-use youla::Error;
-use youla::record::TimeSource;
-use youla::run::{LongRecords, identify_long, long_model_file, read_subspace_options};
+use youla_io::TimeSource;
+use youla_run::{LongRecords, identify_long, long_model_file, read_subspace_options};
 
 /// Identifies, writes the model and prints what it is.
 pub(crate) fn identify(args: &Args, asked: &SubspaceArgs) -> Result<(), Failure> {
     let options = asked.options.as_ref().map(read_subspace_options).transpose()?.unwrap_or_default();
     if let Some(path) = asked.out.as_ref().filter(|path| path.exists()) {
-        return Err(Error::OutputExists { path: path.clone() }.into());
+        return Err(youla_io::Error::OutputExists { path: path.clone() }.into());
     }
     let records = LongRecords {
         files: asked.files.clone(),

@@ -3,8 +3,9 @@
 use std::fmt::Write;
 use std::path::Path;
 use youla::identify::subspace::{Factorisation, InputFit};
-use youla::run::{Identification, LongModel, WrittenPaper, cautions};
-use youla::study::{Experiment, Method, Paper};
+use youla_paper::run::WrittenPaper;
+use youla_paper::study::{Experiment, Method, Paper};
+use youla_run::{Identification, LongModel, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
@@ -34,7 +35,7 @@ fn modes(found: &Identification) -> String {
 }
 
 /// Order, modes, fit and how the data were factored.
-pub(crate) fn subspace(model: &LongModel, peak_memory: Option<f64>) -> youla::Result<String> {
+pub(crate) fn subspace(model: &LongModel, peak_memory: Option<f64>) -> youla_run::Result<String> {
     let found = &model.found;
     let factor = match (found.factor.by, found.factor.condition) {
         (Factorisation::Qr, None) => "QR".to_owned(),

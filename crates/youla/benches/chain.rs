@@ -19,10 +19,10 @@ use youla::Result;
 use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceData, SubspaceOptions, subspace};
 use youla::linalg::{RiccatiProblem, Triangle, care, dare, discrete_lyapunov, eye, lyapunov};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
-use youla::record::{Excitation, SquareWaves};
 use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
-use youla::rig::Bearing;
-use youla::run::{StageClock, demo, identify, write_run};
+use youla::signal::{Excitation, SquareWaves};
+use youla_paper::rig::Bearing;
+use youla_run::{StageClock, demo, identify, write_run};
 
 /// Sample time of the bearing, seconds.
 const TS: f64 = 2e-4;

@@ -13,13 +13,13 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 use std::{env, fs};
-use youla::identify::greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Structure, greybox};
 use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, StateSpace, simulate};
-use youla::record::{Excitation, SquareWaves};
-use youla::rig::Bearing;
+use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
 use youla::{Mat, Result};
+use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Structure, greybox};
+use youla_paper::rig::Bearing;
 
 const TS: f64 = 2e-4;
 const SAMPLES: usize = 20_000;
@@ -136,7 +136,7 @@ fn one(folder: &Path, factor: f64) -> Result<()> {
         Mat::from_fn(rows, 2, |k, j| value(j * rows + k))
     };
     let [u, y, uv, yv] = ["u", "y", "uv", "yv"].map(read);
-    let structure = DeclaredStructure::new(&Declaration::parse(FULL_POLES, "bench".as_ref())?)?;
+    let structure = DeclaredStructure::new(&Declaration::parse(FULL_POLES)?)?;
     let start: Vec<f64> = structure.start().iter().map(|value| factor * value).collect();
     assert_eq!(structure.names().len(), 16);
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..GreyBoxOptions::default() };

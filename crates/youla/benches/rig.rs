@@ -3,7 +3,7 @@
 use std::hint::black_box;
 use std::time::Instant;
 use youla::Result;
-use youla::rig::{BearingRig, Fidelity, Rig, RigParameters};
+use youla_paper::rig::{BearingRig, Fidelity, Rig, RigParameters};
 
 fn main() -> Result<()> {
     let parameters = RigParameters::shipped();

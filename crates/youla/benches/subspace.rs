@@ -15,9 +15,9 @@ use std::time::Instant;
 use std::{env, fs};
 use youla::identify::subspace::{Experiment, Order, SubspaceOptions, Weight, subspace};
 use youla::lti::{Discrete, StateSpace, simulate};
-use youla::record::{Excitation, SquareWaves};
-use youla::rig::Bearing;
+use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, Result};
+use youla_paper::rig::Bearing;
 
 const TS: f64 = 2e-4;
 const ROUNDS: usize = 3;

@@ -7,10 +7,10 @@ mod machine;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
-use youla::export::{ModelFormat, NamedModel, export_model};
 use youla::lti::{Discrete, StateSpace};
-use youla::run::{RunSettings, Stage, StageClock, identify, read_records, write_run};
-use youla::units::Channel;
+use youla::signal::Channel;
+use youla_io::export::{ModelFormat, NamedModel, export_model};
+use youla_run::{RunSettings, Stage, StageClock, identify, read_records, write_run};
 
 const RUN: &str = r#"
 name = "bearing"

@@ -5,11 +5,11 @@
 mod machine;
 
 use youla::Result;
-use youla::identify::greybox::{
+use youla::identify::subspace::Experiment;
+use youla_greybox::{
     BearingStructure, GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop, greybox_intervals_in_loop,
 };
-use youla::identify::subspace::Experiment;
-use youla::rig::Bearing;
+use youla_paper::rig::Bearing;
 
 fn main() -> Result<()> {
     let machine = machine::bearing()?;

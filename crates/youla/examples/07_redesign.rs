@@ -7,9 +7,9 @@ mod machine;
 use youla::Result;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
-use youla::redesign::{RedesignOptions, RedesignProblem, redesign};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionOptions, reduce_in_loop};
 use youla::validate::certify;
+use youla_loop::redesign::{RedesignOptions, RedesignProblem, redesign};
 
 fn main() -> Result<()> {
     let machine = machine::bearing()?;

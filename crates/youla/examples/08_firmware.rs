@@ -5,9 +5,9 @@
 mod machine;
 
 use youla::control::real_time_controller;
-use youla::export::{ControllerExport, c_controller};
 use youla::lti::Simulator;
-use youla::units::Channel;
+use youla::signal::Channel;
+use youla_io::export::{ControllerExport, c_controller};
 use youla_rt::State;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -9,10 +9,10 @@ use common::feedback::Loop;
 use rayon::prelude::*;
 use std::path::Path;
 use youla::identify::subspace::Weight;
-use youla::report::data::{Method, Role};
-use youla::report::figure::{Axis, Content, Curve, Figure, Panel};
-use youla::report::{figure_csv, svg};
 use youla::{Mat, Result};
+use youla_report::data::{Method, Role};
+use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
+use youla_report::{figure_csv, svg};
 
 /// Standard deviation of the white output noise, um; the output is 1.1 um in all.
 const NOISE: f64 = 1.0;

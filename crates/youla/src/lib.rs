@@ -44,8 +44,8 @@
 //! use youla::identify::{hansen::hansen, subspace::{Order, SubspaceOptions}};
 //! use youla::linalg::{block, eye};
 //! use youla::lti::{Discrete, simulate};
-//! use youla::record::{Excitation, SquareWaves};
-//! use youla::rig::{Bearing, degraded};
+//! use youla::signal::{Excitation, SquareWaves};
+//! use youla_paper::rig::{Bearing, degraded};
 //! use youla::{Mat, validate::certify};
 //! # use faer::Scale;
 //! # use {rand::{RngExt, SeedableRng}, rand_chacha::ChaCha8Rng, rand_distr::StandardNormal};
@@ -74,25 +74,14 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 
-pub mod check;
 pub mod control;
 pub mod error;
-pub mod excite;
-pub mod export;
 pub mod factor;
 pub mod identify;
 pub mod linalg;
 pub mod lti;
-mod quantile;
-pub mod record;
-pub mod redesign;
 pub mod reduce;
-pub mod report;
-pub mod rig;
-pub mod run;
-pub mod study;
-mod toml_file;
-pub mod units;
+pub mod signal;
 pub mod validate;
 
 pub use error::{Error, ErrorKind, Result};

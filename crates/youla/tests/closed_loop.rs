@@ -7,12 +7,12 @@ mod common;
 use common::feedback::{Loop, options};
 use youla::Mat;
 use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed};
-use youla::identify::hansen_refine::refine_hansen;
 use youla::identify::innovation_form::{DeviationOptions, Settling, Structure, hansen_structured};
-use youla::identify::refine::{RefineNoise, RefineOptions};
 use youla::identify::subspace::{AutomaticHorizon, Experiment, Order, SubspaceOptions, Weight, lines, subspace};
 use youla::linalg::{block, least_squares};
 use youla::lti::{Discrete, StateSpace};
+use youla_greybox::hansen_refine::refine_hansen;
+use youla_greybox::refine::{RefineNoise, RefineOptions};
 
 /// Errors of G(S) with S of twelve states, free and in innovation form.
 fn free_and_innovation(rig: &Loop, samples: usize, noise: f64, seed: u64) -> [f64; 2] {

@@ -4,7 +4,7 @@
 
 use std::path::Path;
 use youla::identify::subspace::{ModeBand, Uncertainty};
-use youla::run::{Identification, Method, RunSettings, StageClock, identify, read_records};
+use youla_run::{Identification, Method, RunSettings, StageClock, identify, read_records};
 
 fn run() -> Option<Identification> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");

@@ -9,11 +9,11 @@
 #![allow(missing_docs)]
 
 use std::path::Path;
-use youla::identify::greybox::{GreyBoxModel, GreyBoxOptions, LoopOutput, Matrix, Slope, Structure, greybox_in_loop};
 use youla::identify::subspace::Experiment;
 use youla::lti::{Continuous, Discrete, Partitioned, StateSpace};
-use youla::record::{ChannelSpec, TimeSource, read_mat};
 use youla::{Mat, Result};
+use youla_greybox::{GreyBoxModel, GreyBoxOptions, LoopOutput, Matrix, Slope, Structure, greybox_in_loop};
+use youla_io::{ChannelSpec, TimeSource, read_mat};
 
 const TS: f64 = 1e-3;
 const G_TAU: f64 = 35.1507;

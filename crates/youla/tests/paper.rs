@@ -9,9 +9,9 @@ mod common;
 use common::*;
 use youla::control::closed_loop;
 use youla::lti::{Continuous, Mode, StateSpace, TimeDomain, frequency_response};
-use youla::rig::degraded;
 use youla::validate::fit;
 use youla::{Mat, MatRef, c64};
+use youla_paper::rig::degraded;
 
 const EXACT: f64 = 1e-12;
 

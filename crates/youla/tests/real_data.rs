@@ -4,8 +4,8 @@
 
 use std::path::{Path, PathBuf};
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
-use youla::record::Detrend;
-use youla::run::{
+use youla::signal::Detrend;
+use youla_run::{
     Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, signal_records, summary,
 };
 

@@ -11,11 +11,11 @@ use youla::control::real_time_controller;
 use youla::factor::CoprimeFactors;
 use youla::linalg::eye;
 use youla::lti::{Discrete, Simulator, StateSpace};
-use youla::record::{Excitation, SquareWaves};
-use youla::rig::{Bearing, degraded};
-use youla::run::{ControllerSettings, demo};
+use youla::signal::{Excitation, SquareWaves};
 use youla::{Error, Mat, MatRef};
+use youla_paper::rig::{Bearing, degraded};
 use youla_rt::{Controller, Real, State};
+use youla_run::{ControllerSettings, demo};
 
 const SAMPLES: usize = 1_000_000;
 const EXACT: f64 = 1e-12;

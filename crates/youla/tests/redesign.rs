@@ -14,16 +14,16 @@ use youla::identify::subspace::{
 };
 use youla::linalg::eye;
 use youla::lti::{Discrete, PeakOptions, StateSpace, hinf_norm};
-use youla::record::{Excitation, SquareWaves};
-use youla::redesign::{ExportedController, Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
 use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
-use youla::rig::{
+use youla::signal::Channel;
+use youla::signal::{Excitation, SquareWaves};
+use youla::{Mat, MatRef};
+use youla_loop::redesign::{ExportedController, Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
+use youla_paper::rig::{
     Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, Rig, RigParameters,
     bearing_at_speed, degraded, run_experiment,
 };
-use youla::study::without_harmonics;
-use youla::units::Channel;
-use youla::{Mat, MatRef};
+use youla_paper::study::without_harmonics;
 
 const RPM: f64 = 2500.0;
 const SAMPLES: usize = 120_000;

@@ -5,8 +5,8 @@ use std::path::Path;
 use youla::factor::CoprimeFactors;
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionMethod, ReductionOptions, reduce, reduce_in_loop};
-use youla::run::{Identification, StageClock, demo, identify};
 use youla::validate::certify;
+use youla_run::{Identification, StageClock, demo, identify};
 
 fn identified(seed: u64) -> Identification {
     let mut demo = demo(seed).unwrap();

@@ -2,8 +2,8 @@
 #![allow(missing_docs)]
 
 use std::path::Path;
-use youla::identify::refine::{RefineNoise, RefineOptions};
-use youla::run::{Identification, Method, StageClock, demo, identify};
+use youla_greybox::refine::{RefineNoise, RefineOptions};
+use youla_run::{Identification, Method, StageClock, demo, identify};
 
 fn run_demo(seed: u64) -> Identification {
     let demo = demo(seed).unwrap();
@@ -115,9 +115,9 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
 /// G(S) and the prediction-error method reach the fit of the plant itself, and its 14 parameters within four deviations.
 #[test]
 fn a_declared_structure_is_estimated_from_the_scheme_on() {
-    use youla::identify::greybox::{BearingStructure, Declaration, Template};
-    use youla::identify::hansen_pem::PemStart;
-    use youla::run::GreyBoxSettings;
+    use youla_greybox::hansen_pem::PemStart;
+    use youla_greybox::{BearingStructure, Declaration, Template};
+    use youla_run::GreyBoxSettings;
     let mut demo = demo(2).unwrap();
     let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };
     demo.settings.grey_box = Some(GreyBoxSettings { start_from_initial: false, ..GreyBoxSettings::new(structure) });
@@ -129,13 +129,13 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
         assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");
     }
-    let truth = BearingStructure::parameters(&youla::rig::Bearing::default());
+    let truth = BearingStructure::parameters(&youla_paper::rig::Bearing::default());
     let deviations = run.found.model.standard_deviations().unwrap();
     for ((value, deviation), truth) in run.found.model.parameters.iter().zip(deviations).zip(truth) {
         assert!((value - truth).abs() < 4.0 * deviation, "{value} against {truth}, deviation {deviation}");
     }
     let folder = std::env::temp_dir().join(format!("youla-grey-box-{}", std::process::id()));
-    let written = youla::run::write_run(&found, &folder, false, &mut StageClock::new(&mut |_| ()));
+    let written = youla_run::write_run(&found, &folder, false, &mut StageClock::new(&mut |_| ()));
     std::fs::remove_dir_all(&folder).ok();
     written.unwrap();
 }

@@ -7,9 +7,9 @@ use crate::commands::folder_of;
 use crate::output::{Failure, say};
 use clap::{Args as ClapArgs, ValueEnum};
 use std::path::PathBuf;
-use youla::excite::{ExciteOptions, InputOrder, Length, Notch, Shape};
-use youla::export::SequenceFormat;
-use youla::run::{ExcitationPort, RunSettings, excite_run, write_excitation};
+use youla_io::export::SequenceFormat;
+use youla_loop::excite::{ExciteOptions, InputOrder, Length, Notch, Shape};
+use youla_run::{ExcitationPort, RunSettings, excite_run, write_excitation};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:

@@ -2,7 +2,7 @@
 
 use crate::table::aligned;
 use std::fmt::Write;
-use youla::run::RunExcitation;
+use youla_run::RunExcitation;
 
 /// What the excitation is, what the loop will do under it and how well the modes will be known.
 pub(super) fn of(found: &RunExcitation) -> String {

@@ -91,7 +91,7 @@ fn run_chapter(folder: &Path, name: &str, steps: &[Step]) {
             Step::Write { file, text } => fs::write(folder.join(file), text).expect("written"),
             Step::Settings(text) => {
                 let settings = blocks::run_settings(name, text, &project);
-                youla::run::RunSettings::parse(&settings, Path::new(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
+                youla_run::RunSettings::parse(&settings, Path::new(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
             }
         }
     }

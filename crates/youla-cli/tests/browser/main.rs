@@ -131,7 +131,7 @@ fn pages(folder: &Path) -> Value {
     let whole: Value =
         serde_json::from_slice(&fs::read(folder.join("demo/report.json")).expect("written")).expect("JSON");
     redrawn(folder, "partial", without_most(whole));
-    let empty = youla::report::ReportData::default();
+    let empty = youla_report::ReportData::default();
     redrawn(folder, "empty", serde_json::to_value(empty).expect("plain data"));
     let path = |name: &str| folder.join(name).display().to_string();
     json!({

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use youla::record::{ChannelRef, ChannelSpec, Source, TimeSource, read};
+use youla_io::{ChannelRef, ChannelSpec, Source, TimeSource, read};
 
 /// A record by columns.
 #[derive(Clone)]

@@ -3,7 +3,7 @@
 use crate::common::{csv, csv_with_line, log, loop_folder, refused, settings, settings_refused};
 use std::fs;
 use std::path::Path;
-use youla::record::{Packing, Value, Variable, write_mat};
+use youla_io::{Packing, Value, Variable, write_mat};
 
 fn log_refused(name: &str, log: &[u8], evidence: &[&str]) {
     refused(&loop_folder(name, &[("log.csv", log)]), 2, evidence);

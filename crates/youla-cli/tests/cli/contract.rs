@@ -5,9 +5,9 @@ use serde_json::{Map, Value};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use youla::record::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
-use youla::redesign::ExportedController;
-use youla::run::ModelFile;
+use youla_io::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
+use youla_loop::redesign::ExportedController;
+use youla_run::ModelFile;
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).expect("readable")).expect("JSON")

@@ -4,7 +4,7 @@ use crate::common::{Outcome, SETTINGS, demo, empty_folder, settings, youla};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
-use youla::record::{ChannelRef, CsvOptions, TimeSource, read_csv, read_mat};
+use youla_io::{ChannelRef, CsvOptions, TimeSource, read_csv, read_mat};
 
 fn done(found: &Outcome) {
     assert!(found.code == Some(0) && found.stderr.is_empty(), "{:?} {}", found.code, found.stderr);

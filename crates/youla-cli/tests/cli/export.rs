@@ -2,7 +2,7 @@
 
 use crate::common::{Outcome, demo, empty_folder, youla};
 use std::fs;
-use youla::export::read_model;
+use youla_io::export::read_model;
 
 fn done(found: &Outcome) {
     assert!(found.code == Some(0) && found.stderr.is_empty(), "{:?} {}", found.code, found.stderr);
@@ -27,7 +27,7 @@ fn a_run_is_exported_in_every_format_and_reads_back() {
         assert_eq!(found.stdout.trim(), file);
         let bytes = fs::read(folder.join(file)).expect("written");
         if ["mat", "json", "npz"].contains(&format) {
-            let back = youla::export::model_from_bytes(&bytes, file).expect("a model");
+            let back = youla_io::export::model_from_bytes(&bytes, file).expect("a model");
             assert_eq!(back.system, hansen.system, "{format}");
         } else {
             let text = String::from_utf8(bytes).expect("text");

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::OnceLock;
-use youla::study::PaperSettings;
+use youla_paper::study::PaperSettings;
 
 /// The files that hold results, and thus depend on nothing but the configuration.
 pub(crate) const LOOPS: [&str; 2] = ["study.csv", "crossover.csv"];

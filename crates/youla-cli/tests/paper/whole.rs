@@ -2,7 +2,7 @@
 
 use crate::small::whole;
 use std::fs;
-use youla::study::{Method, PaperSettings, Row};
+use youla_paper::study::{Method, PaperSettings, Row};
 
 #[test]
 fn no_model_is_lost() {

@@ -11,8 +11,8 @@ use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::lti::{frequency_response, simulate};
-use youla::rig::{Bearing, degraded};
-use youla::run::{Identification, StageClock, demo, identify, write_run};
+use youla_paper::rig::{Bearing, degraded};
+use youla_run::{Identification, StageClock, demo, identify, write_run};
 
 /// Sample time of the bearing, seconds.
 const TS: f64 = 2e-4;

@@ -8,9 +8,9 @@ use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
-use youla::record::{Excitation, SquareWaves};
-use youla::rig::{Bearing, degraded};
+use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, Result};
+use youla_paper::rig::{Bearing, degraded};
 
 /// A machine, what is believed of it, and the controller that stabilises both.
 pub(crate) struct Machine {

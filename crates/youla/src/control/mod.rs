@@ -18,6 +18,6 @@ pub use margin::peak_sensitivity;
 pub use margins::{
     ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, margins,
 };
-pub(crate) use margins::{LinearMargins, WorstMargins};
+pub use margins::{LinearMargins, WorstMargins};
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;

@@ -202,7 +202,7 @@ impl<T: TimeDomain> CoprimeFactors<T> {
 }
 
 /// `[I Q; 0 I]` of a Q from p to m signals.
-pub(crate) fn shear<T: TimeDomain>(q: &StateSpace<T>) -> Result<StateSpace<T>> {
+pub fn shear<T: TimeDomain>(q: &StateSpace<T>) -> Result<StateSpace<T>> {
     let (n, m, p) = (q.order(), q.outputs(), q.inputs());
     StateSpace::new(
         q.a().to_owned(),

@@ -9,7 +9,7 @@ mod stream;
 mod youla;
 
 pub use coprime::CoprimeFactors;
-pub(crate) use coprime::shear;
+pub use coprime::shear;
 pub use signals::YoulaSignals;
 pub use stable::{Denominator, StableFactors, left_coprime, right_coprime};
 pub use stream::YoulaStream;

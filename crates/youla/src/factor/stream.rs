@@ -3,7 +3,7 @@
 use super::CoprimeFactors;
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, SimulationState, Simulator};
-use crate::record::SampleStream;
+use crate::signal::SampleStream;
 use crate::{Error, Mat, Result};
 use faer::MatMut;
 

@@ -3,15 +3,15 @@
 use crate::{Mat, MatRef};
 
 /// One output over all records.
-pub(super) struct Reproduction {
+pub struct Reproduction {
     /// `100 (1 - |y - yhat| / |y - mean y|)`, eq. (26), percent.
-    pub(super) fit: f64,
+    pub fit: f64,
     /// Root mean square of `y - yhat`.
-    pub(super) residual: f64,
+    pub residual: f64,
 }
 
 /// Per output, from the measured records and the errors `y - yhat` of each.
-pub(super) fn reproduction(measured: &[MatRef<'_, f64>], errors: &[Mat<f64>]) -> Vec<Reproduction> {
+pub fn reproduction(measured: &[MatRef<'_, f64>], errors: &[Mat<f64>]) -> Vec<Reproduction> {
     let samples = errors.iter().map(|e| e.nrows()).sum::<usize>() as f64;
     let output = |i: usize| {
         let values = || measured.iter().flat_map(|y| y.col(i).iter());

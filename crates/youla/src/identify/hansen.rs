@@ -7,13 +7,12 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
-use super::hansen_refine::Refinement;
 use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
 use super::subspace::subspace_stream;
 use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
 use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
 use crate::lti::{Discrete, StateSpace};
-use crate::record::SampleStream;
+use crate::signal::SampleStream;
 use crate::{MatRef, Result};
 
 /// The identified deviation system and the plant that it stands for.
@@ -29,8 +28,6 @@ pub struct HansenModel {
     pub uncertainty: Option<Uncertainty>,
     /// Whether the data contradict the nominal model, where an uncertainty was asked for.
     pub evidence: Option<Result<Evidence, NoUncertainty>>,
-    /// What [`super::hansen_refine::refine_hansen`] changed.
-    pub refinement: Option<Refinement>,
 }
 
 /// Identifies S from the signals of one or more experiments and recombines it to the plant G(S).
@@ -97,7 +94,7 @@ pub fn hansen_stream(
     let mut signals = YoulaStream::new(factors, measured, settle)?;
     let deviation = subspace_stream(&mut signals, factors.nominal().time(), options)?;
     let plant = factors.plant_of(&deviation.model)?;
-    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None, refinement: None })
+    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None })
 }
 
 #[cfg(test)]

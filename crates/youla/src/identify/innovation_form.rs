@@ -10,7 +10,6 @@
 //! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
 
 use super::hansen::HansenModel;
-use super::refine::RefineOptions;
 use super::subspace::{
     NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty, UncertaintyMethod, UncertaintyOptions,
     check_uncertainty,
@@ -31,15 +30,11 @@ pub struct DeviationOptions {
     pub iterations: usize,
     /// Relative change of K_s below which it has settled.
     pub tolerance: f64,
-    // The caller of `hansen_structured` does that by `refine_hansen`.
-    /// How S is refined by the prediction-error method afterwards; not at all when absent.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub refine: Option<RefineOptions>,
 }
 
 impl Default for DeviationOptions {
     fn default() -> Self {
-        DeviationOptions { structure: Structure::Free, iterations: 20, tolerance: 1e-6, refine: None }
+        DeviationOptions { structure: Structure::Free, iterations: 20, tolerance: 1e-6 }
     }
 }
 
@@ -104,7 +99,7 @@ pub fn hansen_structured(
     let uncertainty = deviation.uncertainty.as_ref().map(|u| u.through(|s| factors.plant_of(s))).transpose()?;
     let order = deviation.order.order;
     let evidence = uncertainty.is_some().then(|| data.evidence(order, options));
-    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence, refinement: None })
+    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
 }
 
 fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {

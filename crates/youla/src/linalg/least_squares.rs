@@ -65,7 +65,7 @@ pub fn least_squares(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Resu
 ///
 /// # Errors
 /// As [`least_squares`].
-pub(crate) fn regress(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+pub fn regress(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     let columns = a.ncols();
     if columns == 0 || a.nrows() < columns {
         return Ok(least_squares(what, a, b)?.x);

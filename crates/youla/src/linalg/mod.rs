@@ -16,6 +16,7 @@ mod late;
 mod least_squares;
 mod logm;
 mod lyapunov;
+mod quantile;
 mod reflector;
 mod reorder;
 mod riccati;
@@ -31,16 +32,17 @@ pub(crate) use definite::check_semidefinite;
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
 pub use hessenberg::{Hessenberg, hessenberg};
-pub(crate) use least_squares::regress;
+pub use least_squares::regress;
 pub use least_squares::{LeastSquares, least_squares};
 pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
+pub use quantile::quantile;
 pub use reorder::OrderedSchur;
 pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use schur::{RealSchur, real_schur};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 pub use triangle::Triangle;
-pub(crate) use triangle::{leading_rank, triangular_condition};
+pub use triangle::{leading_rank, triangular_condition};
 
 #[cfg(test)]
 mod levels;

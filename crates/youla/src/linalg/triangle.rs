@@ -90,7 +90,7 @@ fn reduce(mut a: MatMut<'_, f64>) {
 
 /// Number of directions that the first `columns` columns of a factor `r` span: its rows down to the last one that holds
 /// more than rounding there. In echelon form these are the leading rows.
-pub(crate) fn leading_rank(r: MatRef<'_, f64>, columns: usize) -> usize {
+pub fn leading_rank(r: MatRef<'_, f64>, columns: usize) -> usize {
     let leading = r.subcols(0, columns);
     let floor: Vec<f64> = (0..columns).map(|j| 1e-10 * leading.col(j).norm_l2()).collect();
     let significant = |i: &usize| (0..columns).any(|j| leading[(*i, j)].abs() > floor[j]);
@@ -99,7 +99,7 @@ pub(crate) fn leading_rank(r: MatRef<'_, f64>, columns: usize) -> usize {
 
 /// Ratio of the largest to the smallest singular value of a lower triangular matrix whose rows have unit length, by inverse
 /// iteration: at most the true one, and close to it.
-pub(crate) fn triangular_condition(lower: MatRef<'_, f64>) -> f64 {
+pub fn triangular_condition(lower: MatRef<'_, f64>) -> f64 {
     let columns: Vec<Vec<f64>> =
         lower.col_iter().enumerate().map(|(j, column)| column.iter().skip(j).copied().collect()).collect();
     let largest = largest_singular(columns.len(), |v| {

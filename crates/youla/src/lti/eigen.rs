@@ -7,7 +7,7 @@ use crate::{Error, Mat, Result, c64};
 use faer::prelude::*;
 
 /// Eigenvalues with left and right eigenvectors, scaled to `w' v = 1`, computed in balanced coordinates.
-pub(crate) struct Eigen {
+pub struct Eigen {
     poles: Vec<c64>,
     scale: Vec<f64>,
     right: Mat<c64>,
@@ -15,7 +15,7 @@ pub(crate) struct Eigen {
 }
 
 impl Eigen {
-    pub(crate) fn new<T: TimeDomain>(model: &StateSpace<T>) -> Result<Self> {
+    pub fn new<T: TimeDomain>(model: &StateSpace<T>) -> Result<Self> {
         let scale = balance("the state matrix", model.a())?.scale;
         let n = model.order();
         let a = Mat::from_fn(n, n, |i, j| model.a()[(i, j)] * scale[j] / scale[i]);
@@ -28,7 +28,7 @@ impl Eigen {
     }
 
     /// `w' dA v` for the pole nearest to the given one.
-    pub(crate) fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
+    pub fn change(&self, pole: c64, da: &Mat<f64>) -> c64 {
         let near = |k: &usize| (self.poles[*k] - pole).norm();
         let Some(k) = (0..self.poles.len()).min_by(|a, b| near(a).total_cmp(&near(b))) else {
             return c64::new(0.0, 0.0);
@@ -42,12 +42,12 @@ impl Eigen {
     }
 
     /// The eigenvalues, in no order.
-    pub(crate) fn poles(&self) -> &[c64] {
+    pub fn poles(&self) -> &[c64] {
         &self.poles
     }
 
     /// The residue of pole number k as `c b`: `c = C v` (p values) and `b = w' B` (m values).
-    pub(crate) fn directions<T: TimeDomain>(&self, k: usize, model: &StateSpace<T>) -> (Vec<c64>, Vec<c64>) {
+    pub fn directions<T: TimeDomain>(&self, k: usize, model: &StateSpace<T>) -> (Vec<c64>, Vec<c64>) {
         let n = self.scale.len();
         let along = |entry: &dyn Fn(usize) -> c64| (0..n).fold(c64::new(0.0, 0.0), |sum, i| sum + entry(i));
         let outputs = (0..model.outputs()).map(|r| along(&|i| self.right[(i, k)] * self.scale[i] * model.c()[(r, i)]));

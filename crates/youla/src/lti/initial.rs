@@ -6,7 +6,7 @@ use crate::{Mat, MatRef, Result};
 
 /// Outputs from the initial state with `min over x0 of sum |y(k) - C A^k x0 - (response to u)(k)|^2`; y has the shape of what
 /// is simulated.
-pub(crate) fn simulate_best(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: MatRef<'_, f64>) -> Result<Mat<f64>> {
+pub fn simulate_best(model: &StateSpace<Discrete>, u: MatRef<'_, f64>, y: MatRef<'_, f64>) -> Result<Mat<f64>> {
     let forced = simulate(model, u, &vec![0.0; model.order()])?;
     let x0 = initial_state(model, (y - &forced).as_ref());
     simulate(model, u, &x0)

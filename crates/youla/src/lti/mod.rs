@@ -5,7 +5,7 @@ mod discretise;
 mod eigen;
 mod gains;
 mod initial;
-pub(crate) mod modes;
+pub mod modes;
 mod norms;
 mod partitioned;
 mod response;
@@ -16,10 +16,10 @@ mod time;
 mod transfer;
 mod zeros;
 
-pub(crate) use eigen::Eigen;
+pub use eigen::Eigen;
 pub use eigen::SharedMode;
 pub(crate) use gains::{Gains, largest_singular_value};
-pub(crate) use initial::simulate_best;
+pub use initial::simulate_best;
 pub use modes::Mode;
 pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings};
 pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
@@ -33,5 +33,5 @@ pub use transfer::PolynomialMatrix;
 /// The bearing of eqs (3)-(12) at rest, for tests.
 #[cfg(test)]
 pub(crate) fn bearing() -> StateSpace<Continuous> {
-    crate::rig::Bearing::default().plant().expect("the paper's parameters are finite")
+    youla_paper::rig::Bearing::default().plant().expect("the paper's parameters are finite")
 }

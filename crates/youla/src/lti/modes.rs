@@ -43,7 +43,7 @@ impl<T: TimeDomain> StateSpace<T> {
 }
 
 /// The mode of one pole.
-pub(crate) fn mode<T: TimeDomain>(time: T, pole: c64) -> Mode {
+pub fn mode<T: TimeDomain>(time: T, pole: c64) -> Mode {
     let s = time.continuous_pole(pole);
     let size = s.re.hypot(s.im);
     let zeta = match size {

@@ -94,7 +94,7 @@ impl<T: TimeDomain> StateSpace<T> {
     }
 
     /// Whether it is the gain 0: no states, no feedthrough.
-    pub(crate) fn is_zero(&self) -> bool {
+    pub fn is_zero(&self) -> bool {
         self.order() == 0 && self.d.norm_max() == 0.0
     }
 

@@ -57,7 +57,7 @@ mod tests {
     use super::*;
     use crate::control::with_input_port;
     use crate::lti::simulate;
-    use crate::rig::Bearing;
+    use youla_paper::rig::Bearing;
 
     fn bearing() -> StateSpace<Discrete> {
         Bearing::default().plant().unwrap().zoh(Discrete::new(2e-4).unwrap()).unwrap()

@@ -11,7 +11,7 @@ use youla::identify::hansen::{HansenModel, hansen};
 use youla::identify::subspace::{Order, ResponseBand, Stability, SubspaceOptions, Weight};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, Mode, StateSpace, frequency_response, simulate};
-use youla::rig::degraded;
+use youla_paper::rig::degraded;
 
 /// The nominal model and the weights of the controller that is designed on it.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,8 @@ pub(crate) struct Loop {
 impl Loop {
     pub(crate) fn new(design: &Design) -> Self {
         let Design { a_factor, b_factor, input_weight, process_noise } = *design;
-        let nominal = sampled(&degraded(&youla::rig::Bearing::default().plant().unwrap(), a_factor, b_factor).unwrap());
+        let nominal =
+            sampled(&degraded(&youla_paper::rig::Bearing::default().plant().unwrap(), a_factor, b_factor).unwrap());
         let weight = [1.0, 1.0, 10.0 / 1340f64.powi(2), 10.0 / 1340f64.powi(2), 0.0, 0.0];
         let q = Mat::from_fn(6, 6, |i, j| if i == j { weight[i] } else { 0.0 });
         let f = lqr(&nominal, &LqrWeights { q, r: eye(2) * Scale(input_weight), s: None }).unwrap().f;

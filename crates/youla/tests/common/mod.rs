@@ -9,8 +9,8 @@ use rand_distr::StandardNormal;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response, simulate};
-use youla::rig::Bearing;
 use youla::{Mat, MatRef, c64};
+use youla_paper::rig::Bearing;
 
 pub(crate) const TS: f64 = 1.0 / 5000.0;
 

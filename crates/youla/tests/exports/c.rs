@@ -3,12 +3,12 @@
 use super::{folder, named, output};
 use crate::common::{TS, bearing, normal, observer_factors, random_stable, random_system, rng, run, sampled};
 use youla::control::closed_loop;
-use youla::export::{CController, ControllerExport, ModelFormat, c_controller, export_model};
 use youla::factor::CoprimeFactors;
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace};
-use youla::units::Channel;
+use youla::signal::Channel;
 use youla::{Mat, MatRef};
+use youla_io::export::{CController, ControllerExport, ModelFormat, c_controller, export_model};
 
 const EXACT: f64 = 1e-12;
 const WARNINGS: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"];

@@ -12,9 +12,9 @@ use std::ffi::OsStr;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use youla::export::NamedModel;
 use youla::lti::{Discrete, StateSpace};
-use youla::units::Channel;
+use youla::signal::Channel;
+use youla_io::export::NamedModel;
 
 /// A folder of its own below that of temporary files, empty.
 fn folder(name: &str) -> PathBuf {

@@ -3,8 +3,8 @@
 use super::{folder, named, output};
 use crate::common::{TS, random_stable, random_system, rng};
 use std::path::{Path, PathBuf};
-use youla::export::{ModelFormat, export_model};
 use youla::lti::{Discrete, StateSpace};
+use youla_io::export::{ModelFormat, export_model};
 
 /// Compares what the files of one model hold with its JSON file.
 const CHECK: &str = r#"

@@ -2,18 +2,19 @@
 //! reader says of its input does not matter here; that it says something does.
 
 use std::path::{Path, PathBuf};
-use youla::identify::greybox::{Declaration, DeclaredStructure};
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
-use youla::record::{
-    ChannelRef, CsvOptions, DecimalSign, NpyStream, SampleStream, TimeSource, Variables, csv_from_bytes,
-    mat_from_bytes, npz_from_bytes, parquet_from_bytes,
+use youla::signal::SampleStream;
+use youla_greybox::{Declaration, DeclaredStructure};
+use youla_io::{
+    ChannelRef, CsvOptions, DecimalSign, NpyStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
+    npz_from_bytes, parquet_from_bytes,
 };
-use youla::redesign::ExportedController;
-use youla::report::{ReportData, html};
-use youla::rig::RigParameters;
-use youla::run::{ModelFile, RunSettings};
-use youla::study::{PaperSettings, Row};
+use youla_loop::redesign::ExportedController;
+use youla_paper::rig::RigParameters;
+use youla_paper::study::{PaperSettings, Row};
+use youla_report::{ReportData, html};
+use youla_run::{ModelFile, RunSettings};
 
 /// A reader and its name, which is that of its fuzz target and of its folder of seeds.
 pub(crate) type Reader = (&'static str, fn(&[u8]));
@@ -61,7 +62,7 @@ pub(crate) fn mat(bytes: &[u8]) {
 
 /// A model in any of its formats.
 pub(crate) fn model(bytes: &[u8]) {
-    let _ = youla::export::model_from_bytes(bytes, path());
+    let _ = youla_io::export::model_from_bytes(bytes, path());
 }
 
 /// A NumPy archive, and everything that is in it.
@@ -116,12 +117,12 @@ pub(crate) fn rig_toml(bytes: &[u8]) {
 }
 
 pub(crate) fn subspace_toml(bytes: &[u8]) {
-    let _ = youla::run::parse_subspace_options(&String::from_utf8_lossy(bytes), path()).map(|o: SubspaceOptions| o);
+    let _ = youla_run::parse_subspace_options(&String::from_utf8_lossy(bytes), path()).map(|o: SubspaceOptions| o);
 }
 
 /// A structure with its expressions, and its matrices at the start.
 pub(crate) fn structure(bytes: &[u8]) {
-    let Ok(declaration) = Declaration::parse(&String::from_utf8_lossy(bytes), path()) else { return };
+    let Ok(declaration) = Declaration::parse(&String::from_utf8_lossy(bytes)) else { return };
     if let Ok(structure) = DeclaredStructure::new(&declaration) {
         let _ = structure.derived(&structure.start(), None);
     }
@@ -135,7 +136,7 @@ pub(crate) fn row(bytes: &[u8]) {
 /// The options of the check of data, which are read from a file.
 pub(crate) fn check_toml(bytes: &[u8]) {
     let file = written(bytes);
-    let _ = youla::run::read_check_options(&file);
+    let _ = youla_run::read_check_options(&file);
     let _ = std::fs::remove_file(file);
 }
 

@@ -5,8 +5,8 @@
 mod sample;
 mod story;
 
-use youla::report::data::{FrequencyResponse, Method, ReportData};
-use youla::report::html;
+use youla_report::data::{FrequencyResponse, Method, ReportData};
+use youla_report::html;
 
 const FIVE_MEGABYTES: usize = 5_000_000;
 
@@ -87,7 +87,7 @@ fn text_of_the_user_cannot_leave_its_place() {
     data.title = evil.into();
     data.settings = evil.into();
     data.outputs[0].name = evil.into();
-    data.methods.push(Method::new("other", evil, youla::report::data::Role::Other));
+    data.methods.push(Method::new("other", evil, youla_report::data::Role::Other));
     let page = written("report-hostile", &data);
     assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
     assert_eq!(page.matches("</script>").count(), 3);

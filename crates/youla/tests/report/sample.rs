@@ -6,9 +6,9 @@ use faer::c64;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use youla::report::data::*;
-use youla::report::{ReportData, Timeline, Trace};
-use youla::units::Channel;
+use youla::signal::Channel;
+use youla_report::data::*;
+use youla_report::{ReportData, Timeline, Trace};
 
 /// A plant as a sum of modes `gain * w^2 / (s^2 + 2 zeta w s + w^2)`.
 #[derive(Clone)]

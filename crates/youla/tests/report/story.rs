@@ -1,10 +1,10 @@
 //! Stories as files: every section, table and figure is there, nothing else is fetched.
 
 use serde_json::Value;
-use youla::report::data::Method;
-use youla::report::figure::*;
-use youla::report::story::*;
-use youla::report::{Story, story_html};
+use youla_report::data::Method;
+use youla_report::figure::*;
+use youla_report::story::*;
+use youla_report::{Story, story_html};
 
 use super::FIVE_MEGABYTES;
 

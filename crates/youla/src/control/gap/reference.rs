@@ -5,8 +5,8 @@ use crate::Mat;
 use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr, observer_controller};
 use crate::linalg::eye;
 use crate::lti::{Continuous, Discrete, StateSpace};
-use crate::rig::{Bearing, degraded};
 use faer::Scale;
+use youla_paper::rig::{Bearing, degraded};
 
 fn first_order(gain: f64, pole: f64) -> StateSpace<Continuous> {
     StateSpace::new(Scale(pole) * eye(1), eye(1), Scale(gain) * eye(1), Mat::zeros(1, 1), Continuous).unwrap()

@@ -23,7 +23,7 @@ use crate::lti::{Curve, Partitioned, StateSpace, TimeDomain, largest_singular_va
 use crate::{Error, Mat, MatRef, Result, c64};
 
 /// Margins with what their first derivative needs.
-pub(crate) struct LinearMargins<T: TimeDomain> {
+pub struct LinearMargins<T: TimeDomain> {
     controller: Partitioned<T>,
     scales: Option<ChannelScales>,
     points: [Option<Point>; FIGURES],
@@ -42,11 +42,7 @@ impl<T: TimeDomain> LinearMargins<T> {
     ///
     /// # Errors
     /// As [`super::margins()`].
-    pub(crate) fn new(
-        plant: &StateSpace<T>,
-        controller: &StateSpace<T>,
-        scales: Option<&ChannelScales>,
-    ) -> Result<Self> {
+    pub fn new(plant: &StateSpace<T>, controller: &StateSpace<T>, scales: Option<&ChannelScales>) -> Result<Self> {
         let ports = with_input_port(controller)?;
         let closed = closed_loop(plant, &ports)?;
         let curve = Curve::new(&closed)?;
@@ -68,7 +64,7 @@ impl<T: TimeDomain> LinearMargins<T> {
     ///
     /// # Errors
     /// Ports, sample times, [`Error::AlgebraicLoop`] and those of the response.
-    pub(crate) fn at(&self, plant: &StateSpace<T>) -> Result<WorstMargins> {
+    pub fn at(&self, plant: &StateSpace<T>) -> Result<WorstMargins> {
         let curve = Curve::new(&closed_loop(plant, &self.controller)?)?;
         let mut figures = [None; FIGURES];
         for (figure, point) in figures.iter_mut().zip(&self.points) {

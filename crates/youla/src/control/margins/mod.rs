@@ -22,8 +22,8 @@ mod zone;
 
 pub use channel::{ChannelMargins, DelayLimit, GainLimit, PhaseLimit};
 pub use disk::{DiskMargin, DiskMargins};
-pub(crate) use linear::LinearMargins;
-pub(crate) use worst::WorstMargins;
+pub use linear::LinearMargins;
+pub use worst::WorstMargins;
 pub use zone::IsoZone;
 
 use super::{closed_loop, with_input_port};

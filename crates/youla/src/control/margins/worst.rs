@@ -9,21 +9,21 @@ use std::ops::Range;
 
 /// Margins of a loop, each of its worst channel; `None` where there is none.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct WorstMargins {
+pub struct WorstMargins {
     /// Largest peak of the sensitivity of one output.
-    pub(crate) output_sensitivity: Option<f64>,
+    pub output_sensitivity: Option<f64>,
     /// Peak of the sensitivity of all outputs.
-    pub(crate) all_outputs_sensitivity: Option<f64>,
+    pub all_outputs_sensitivity: Option<f64>,
     /// The limit of the gain of a channel below 1 that is highest.
-    pub(crate) lowest_gain: Option<f64>,
+    pub lowest_gain: Option<f64>,
     /// The limit of the gain of a channel above 1 that is lowest.
-    pub(crate) highest_gain: Option<f64>,
+    pub highest_gain: Option<f64>,
     /// Smallest phase margin, degrees.
-    pub(crate) phase_degrees: Option<f64>,
+    pub phase_degrees: Option<f64>,
     /// Smallest delay margin, seconds.
-    pub(crate) delay: Option<f64>,
+    pub delay: Option<f64>,
     /// Normalised coprime margin in scaled channels; `None` without scales.
-    pub(crate) coprime: Option<f64>,
+    pub coprime: Option<f64>,
 }
 
 impl WorstMargins {
@@ -45,7 +45,7 @@ impl WorstMargins {
     ///
     /// # Errors
     /// As [`super::margins()`].
-    pub(crate) fn of<T: TimeDomain>(
+    pub fn of<T: TimeDomain>(
         plant: &StateSpace<T>,
         controller: &StateSpace<T>,
         scales: Option<&ChannelScales>,

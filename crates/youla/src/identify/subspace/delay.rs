@@ -11,13 +11,13 @@ use crate::{Error, Mat, MatRef, Result};
 
 /// Delays per input, in samples.
 #[derive(Clone)]
-pub(in crate::identify) struct Delays {
+pub struct Delays {
     samples: Vec<usize>,
 }
 
 impl Delays {
     /// As given, or none at all.
-    pub(in crate::identify) fn new(given: &[usize], inputs: usize) -> Result<Self> {
+    pub fn new(given: &[usize], inputs: usize) -> Result<Self> {
         if given.is_empty() || given.len() == inputs {
             return Ok(Delays { samples: if given.is_empty() { vec![0; inputs] } else { given.to_vec() } });
         }
@@ -26,7 +26,7 @@ impl Delays {
     }
 
     /// Samples without a shifted input at the start of each record.
-    pub(in crate::identify) fn longest(&self) -> usize {
+    pub fn longest(&self) -> usize {
         self.samples.iter().copied().max().unwrap_or(0)
     }
 
@@ -36,20 +36,20 @@ impl Delays {
     }
 
     /// The inputs as the system without delays sees them, from the first sample on that all of them reach.
-    pub(in crate::identify) fn shift(&self, u: MatRef<'_, f64>) -> Mat<f64> {
+    pub fn shift(&self, u: MatRef<'_, f64>) -> Mat<f64> {
         let longest = self.longest();
         Mat::from_fn(u.nrows() - longest, u.ncols(), |k, j| u[(k + longest - self.samples[j], j)])
     }
 
     /// The delay states at the first sample that is used.
-    pub(in crate::identify) fn states_at_start(&self, experiment: &Experiment<'_>) -> Vec<f64> {
+    pub fn states_at_start(&self, experiment: &Experiment<'_>) -> Vec<f64> {
         let longest = self.longest();
         let of_input = |(j, d): (usize, &usize)| (1..=*d).map(move |back| experiment.u[(longest - back, j)]);
         self.samples.iter().enumerate().flat_map(of_input).collect()
     }
 
     /// The model from the inputs as measured: states of the system, then the delay states input by input.
-    pub(in crate::identify) fn put_before(&self, model: StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    pub fn put_before(&self, model: StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
         if self.states() == 0 {
             return Ok(model);
         }

@@ -1,7 +1,7 @@
 //! Records in memory as a stream.
 
 use super::Experiment;
-use crate::record::SampleStream;
+use crate::signal::SampleStream;
 use crate::{MatRef, Result};
 use faer::MatMut;
 

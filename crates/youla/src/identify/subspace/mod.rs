@@ -14,7 +14,7 @@
 mod batch;
 mod channels;
 mod condense;
-pub(in crate::identify) mod delay;
+pub mod delay;
 mod disturbance;
 mod factorisation;
 mod gram;
@@ -43,7 +43,7 @@ mod statistics;
 mod stream;
 #[cfg(test)]
 mod tests;
-pub(crate) mod uncertainty;
+pub mod uncertainty;
 mod varx;
 
 pub use disturbance::{Line, amplitudes, harmonics, lines};

@@ -15,7 +15,7 @@ use super::sensitivity::{Predictor, Unknowns};
 use super::statistics::Statistics;
 use super::{Factorisation, Order, SubspaceData, SubspaceModel, SubspaceOptions, UncertaintyMethod};
 use crate::lti::Discrete;
-use crate::record::SampleStream;
+use crate::signal::SampleStream;
 use crate::{Error, Mat, Result};
 
 /// The same as [`super::subspace`] for records that need not fit into memory: two to four passes over the stream, in memory

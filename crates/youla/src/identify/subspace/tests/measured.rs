@@ -5,7 +5,7 @@ use super::*;
 
 /// Columns of a file of the shared data; `None`, said aloud, where the data are absent.
 fn load(file: &str, inputs: usize) -> Option<(Mat<f64>, Mat<f64>)> {
-    let text = std::fs::read_to_string(crate::record::scratch::data_folder()?.join(file)).unwrap();
+    let text = std::fs::read_to_string(youla_io::scratch::data_folder()?.join(file)).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect()).collect();
     let columns = rows[0].len();

@@ -2,8 +2,8 @@
 //! offset that is taken off before. All weights.
 
 use super::*;
-use crate::record::{Detrend, Record};
-use crate::units::Channel;
+use crate::signal::Channel;
+use crate::signal::{Detrend, Record};
 
 const WEIGHTS: [Weight; 6] =
     [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::Error;
-use crate::record::SampleStream;
+use crate::signal::SampleStream;
 use faer::MatMut;
 
 /// Experiments that count the passes over them; in one of these the last samples may be lost.

@@ -23,17 +23,17 @@ pub struct ResponseBand {
 
 /// How far regions and intervals reach.
 #[derive(Clone, Copy)]
-pub(crate) struct Reach {
+pub struct Reach {
     /// Half width of an interval over the standard deviation.
-    pub(crate) student: f64,
+    pub student: f64,
     /// Bound of `d' V^-1 d` for the two parts of a complex number.
-    pub(crate) ellipse: f64,
+    pub ellipse: f64,
 }
 
 impl ResponseBand {
     /// To first order: `changes` of the response at a frequency (one entry per cause, column by column), and the covariance
     /// `[11, 12, 22]` of two quantities from their changes with each cause.
-    pub(crate) fn by_changes(
+    pub fn by_changes(
         response: FrequencyResponse,
         changes: impl Fn(f64) -> Vec<Vec<c64>> + Sync,
         covariance: impl Fn(&[[f64; 2]]) -> [f64; 3] + Sync,
@@ -99,7 +99,7 @@ pub struct ModeBand {
 
 impl ModeBand {
     /// From the variances of frequency and damping and the half width of an interval over the deviation.
-    pub(crate) fn new(mode: Mode, variances: [f64; 2], student: f64) -> Self {
+    pub fn new(mode: Mode, variances: [f64; 2], student: f64) -> Self {
         let [hz, zeta] = variances.map(|v| v.max(0.0).sqrt());
         ModeBand {
             mode,

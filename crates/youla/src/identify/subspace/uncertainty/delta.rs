@@ -37,7 +37,7 @@ pub struct BlockInfluence {
 
 impl BlockInfluence {
     /// What lies between two systems with the same states.
-    pub(crate) fn between(experiment: usize, from: &StateSpace<Discrete>, to: &StateSpace<Discrete>) -> Self {
+    pub fn between(experiment: usize, from: &StateSpace<Discrete>, to: &StateSpace<Discrete>) -> Self {
         let (a, b) = (to.a() - from.a(), to.b() - from.b());
         BlockInfluence { experiment, a, b, c: to.c() - from.c(), d: to.d() - from.d() }
     }

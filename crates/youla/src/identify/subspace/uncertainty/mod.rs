@@ -12,12 +12,12 @@ mod inputs;
 mod options;
 mod poles;
 mod response;
-mod student;
+pub mod student;
 #[cfg(test)]
 mod tests;
 mod zeros;
 
-pub(crate) use band::Reach;
+pub use band::Reach;
 pub use band::{ModeBand, ResponseBand};
 pub use bootstrap::Bootstrap;
 pub use delta::{BlockInfluence, Delta};
@@ -25,9 +25,9 @@ pub use evidence::Evidence;
 pub use figures::{Draw, Interval};
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 pub(super) use poles::pole_deviations;
-pub(crate) use response::{mode_change, response_changes};
-pub(crate) use student::{ellipse, student, two_sided_student};
-pub(crate) use zeros::zero_changes;
+pub use response::{mode_change, response_changes};
+pub use student::{ellipse, student, two_sided_student};
+pub use zeros::zero_changes;
 
 use super::channels::View;
 use super::innovation::{Innovation, NoInnovation};

@@ -55,7 +55,7 @@ impl Delta {
 }
 
 /// What changes of a system make of its response at one frequency, rad/s; p m numbers each, column by column.
-pub(crate) fn response_changes(model: &StateSpace<Discrete>, changes: &[BlockInfluence], omega: f64) -> Vec<Vec<c64>> {
+pub fn response_changes(model: &StateSpace<Discrete>, changes: &[BlockInfluence], omega: f64) -> Vec<Vec<c64>> {
     let z = model.time().boundary(omega);
     let (n, m, p) = (model.order(), model.inputs(), model.outputs());
     let a = model.a();
@@ -80,7 +80,7 @@ pub(super) fn magnitude_interval(g: c64, v: &[f64; 3], student: f64) -> [f64; 2]
 }
 
 /// Change of frequency and damping with the pole: `s = ln(z) / ts`.
-pub(crate) fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
+pub fn mode_change(pole: c64, dz: c64, time: Discrete) -> [f64; 2] {
     let s = time.continuous_pole(pole);
     let size = s.norm();
     if !size.is_finite() || size == 0.0 {

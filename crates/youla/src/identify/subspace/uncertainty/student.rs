@@ -2,12 +2,12 @@
 
 /// Quantile of Student's distribution with `nu` degrees of freedom for a two-sided interval of the given level: the series
 /// of Cornish and Fisher (Abramowitz, Stegun, 26.7.5), to four digits from 6 degrees of freedom on.
-pub(crate) fn two_sided_student(level: f64, nu: f64) -> f64 {
+pub fn two_sided_student(level: f64, nu: f64) -> f64 {
     student(0.5 * (1.0 + level), nu)
 }
 
 /// One-sided quantile.
-pub(crate) fn student(probability: f64, nu: f64) -> f64 {
+pub fn student(probability: f64, nu: f64) -> f64 {
     let x = normal(probability);
     let polynomial = |c: &[f64]| c.iter().fold(0.0, |sum, c| sum * x * x + c) * x;
     let terms = [
@@ -21,7 +21,7 @@ pub(crate) fn student(probability: f64, nu: f64) -> f64 {
 
 /// `d' V^-1 d` below this holds with the given probability for a normal d of two components whose covariance V is estimated
 /// with `nu` degrees of freedom (Hotelling): `2 nu / (nu - 1) F(2, nu - 1)`, which has a closed form.
-pub(crate) fn ellipse(level: f64, nu: f64) -> f64 {
+pub fn ellipse(level: f64, nu: f64) -> f64 {
     nu * ((1.0 - level).powf(-2.0 / (nu - 1.0)) - 1.0)
 }
 

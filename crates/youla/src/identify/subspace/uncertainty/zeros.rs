@@ -14,10 +14,7 @@ use crate::lti::{Discrete, Mode, StateSpace};
 use crate::{Error, Mat, Result, c64};
 
 /// The zeros of a system as modes, in the order of their frequencies, with what changes of the system make of each.
-pub(crate) fn zero_changes(
-    model: &StateSpace<Discrete>,
-    changes: &[BlockInfluence],
-) -> Result<Vec<(Mode, Vec<[f64; 2]>)>> {
+pub fn zero_changes(model: &StateSpace<Discrete>, changes: &[BlockInfluence]) -> Result<Vec<(Mode, Vec<[f64; 2]>)>> {
     let (inputs, outputs) = (model.inputs(), model.outputs());
     if inputs != outputs {
         return Err(Error::Ports {

@@ -1,0 +1,186 @@
+//! Hansen's result on a physical structure: a start for the prediction-error method that needs no good nominal model.
+//!
+//! ```text
+//! alpha, beta -> S -> G(S)                                 unbiased in closed loop, (25), of order n + n_S
+//! theta_0 = arg min sum_k |((N + V S) - G_theta (M + U S)) W_k|^2        projection on the structure, no start needed
+//! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    prediction error from theta_0
+//! ```
+//! For white output noise the last line is the maximum-likelihood estimate, in closed loop too; its only weakness, local
+//! minima, is what the lines before it are for. They need not be accurate, only in the valley of the global minimum.
+//!
+//! The projection compares what alpha makes of y by S, `(N + V S) alpha`, with what the structure makes of the u that alpha
+//! causes, `(M + U S) alpha`: it is `|(G(S) - G_theta) u|^2` without a division by `M + U S`, whose zeros next to poles are the
+//! lightly damped ghosts of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
+//! S errs by `(Mt + S Ut) n / alpha`, the error has the same size at all frequencies.
+
+#[cfg(test)]
+mod tests;
+
+pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
+
+use super::projected_pem::{Grid, Projected, Task, falls_behind, fit_of, pem_from_targets, plant_target};
+use crate::Result;
+use crate::{FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed};
+use serde::{Deserialize, Serialize};
+use youla::factor::{CoprimeFactors, YoulaSignals};
+use youla::identify::direct::direct;
+use youla::identify::hansen::{HansenModel, hansen};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, UncertaintyOptions, Weight};
+use youla::lti::{Discrete, StateSpace, frequency_response};
+
+/// Choices of [`hansen_pem`]. The initial states of `hansen` and `pem` are separate choices.
+///
+/// ```
+/// let options = youla_greybox::hansen_pem::HansenPemOptions { frequencies: 200, ..Default::default() };
+/// assert_eq!(options.window, 1024);
+/// ```
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct HansenPemOptions {
+    /// Identification of S.
+    pub hansen: SubspaceOptions,
+    /// Number of frequencies of the projection, from `1 / (window ts)` Hz to 0.9 of the Nyquist frequency, equal ratios.
+    pub frequencies: usize,
+    /// Samples of a segment of the spectrum of alpha; at most a quarter of the shortest record is taken.
+    pub window: usize,
+    /// Time constants that the shortest record is long, of the decay under which responses are compared: ghosts of S that
+    /// live longer than the record are flat then. The modes of the plant should decay faster.
+    pub decay: f64,
+    /// Whether the prediction-error method starts a second time, at the projection of a model that PBSIDopt finds from u and y with
+    /// the horizons of `hansen`. It is consistent in closed loop and sees what noise that is fed back excites, which alpha does
+    /// not: for much noise and strong feedback. A model that cannot be found is left out.
+    pub direct_start: bool,
+    /// The projection.
+    pub projection: ProjectionOptions,
+    /// The prediction-error method.
+    pub pem: GreyBoxOptions,
+}
+
+impl Default for HansenPemOptions {
+    fn default() -> Self {
+        HansenPemOptions {
+            hansen: SubspaceOptions::default(),
+            frequencies: 120,
+            window: 1024,
+            decay: 10.0,
+            direct_start: true,
+            projection: ProjectionOptions::default(),
+            pem: GreyBoxOptions::default(),
+        }
+    }
+}
+
+/// Result of [`hansen_pem`].
+#[derive(Debug)]
+pub struct HansenPem {
+    /// S and G(S).
+    pub hansen: HansenModel,
+    /// Projections of G(S), that with the lowest criterion first.
+    pub projections: Vec<Projection>,
+    /// The searches.
+    pub runs: Vec<PemRun>,
+    /// Which of them won.
+    pub won: PemStart,
+    /// Its model, with the covariance of the parameters.
+    pub model: GreyBoxModel,
+    /// Fit of G(S) to the same records, percent per output; minus infinity where its simulation diverges.
+    pub fit_of_plant: Vec<f64>,
+}
+
+impl HansenPem {
+    /// Whether the structure stays behind G(S), or behind a constant, by more than [`LOST_POINTS`] on an output: the search is
+    /// lost, or the structure does not describe the plant.
+    pub fn lost(&self) -> bool {
+        falls_behind(&self.model.simulation_fit, &self.fit_of_plant)
+    }
+}
+
+/// Identifies S, projects G(S) on the structure and starts the prediction-error method there; `nominal` parameters are a second
+/// start, where they are given, and a hint to the scale of parameters in the projection.
+///
+/// `signals` are those of (28), `experiments` the measured u and y that they were made of.
+///
+/// # Errors
+/// As [`hansen`], [`crate::project`] and [`crate::greybox`]; [`youla::Error::Diverged`] where no start leads to a model.
+///
+/// # Accuracy
+/// See `docs/hansen-pem.md` for how often the result is that of a search started at the true parameters.
+pub fn hansen_pem(
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    experiments: &[Experiment<'_>],
+    structure: &dyn Structure,
+    nominal: Option<&[f64]>,
+    options: &HansenPemOptions,
+) -> Result<HansenPem> {
+    let found = hansen(factors, signals, &options.hansen)?;
+    pem_from_hansen(found, factors, signals, experiments, structure, nominal, options)
+}
+
+/// The same from a result of [`hansen`] or one of its siblings for the same factors and signals.
+///
+/// # Errors
+/// As [`hansen_pem`].
+pub fn pem_from_hansen(
+    found: HansenModel,
+    factors: &CoprimeFactors<Discrete>,
+    signals: &[YoulaSignals],
+    experiments: &[Experiment<'_>],
+    structure: &dyn Structure,
+    nominal: Option<&[f64]>,
+    options: &HansenPemOptions,
+) -> Result<HansenPem> {
+    let time = factors.nominal().time();
+    let target = projection_target(factors, &found.deviation.model, signals, options)?;
+    let fit_of_plant = fit_of(&found.plant, experiments, options.pem.initial_state)?;
+    let direct =
+        if options.direct_start { direct_target(structure, experiments, time, nominal, options).ok() } else { None };
+    let task = Task { structure, nominal, experiments, projection: &options.projection, pem: &options.pem };
+    let Projected { projections, runs, won, model } = pem_from_targets("G(S)", &target, direct, &task)?;
+    Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
+}
+
+/// The response of a model of the order of the structure that PBSIDopt finds from u and y.
+fn direct_target(
+    structure: &dyn Structure,
+    experiments: &[Experiment<'_>],
+    time: Discrete,
+    nominal: Option<&[f64]>,
+    options: &HansenPemOptions,
+) -> Result<FrequencyTarget> {
+    // The order does not depend on the parameters.
+    let probe = nominal.map_or_else(|| vec![1.0; structure.names().len()], <[f64]>::to_vec);
+    let subspace = SubspaceOptions {
+        weight: Weight::PbsidOpt,
+        order: Order::Fixed(structure.model(&probe)?.order()),
+        stability: Stability::Allow,
+        uncertainty: UncertaintyOptions::default(),
+        delays: options.pem.delays.clone(),
+        ..options.hansen.clone()
+    };
+    let model = direct(experiments, time, &subspace)?.model;
+    plant_target(&model, experiments, [options.window, options.frequencies], options.decay, &options.pem)
+}
+
+/// What alpha makes of u and y by S on the grid, with the weights of the criterion of the records.
+///
+/// # Errors
+/// Ports; [`youla::Error::TooFewSamples`] for a record that is too short for a spectrum; [`youla::Error::PoleOnBoundary`].
+pub fn projection_target(
+    factors: &CoprimeFactors<Discrete>,
+    s: &StateSpace<Discrete>,
+    signals: &[YoulaSignals],
+    options: &HansenPemOptions,
+) -> Result<FrequencyTarget> {
+    let (p, m, time) = (factors.outputs(), factors.inputs(), s.time());
+    let alpha: Vec<_> = signals.iter().map(|s| s.alpha.as_ref()).collect();
+    let grid = Grid::new("alpha", &alpha, options.window, options.frequencies, time)?;
+    let weights = grid.weights(&alpha, p, &options.pem)?;
+    let decay = options.decay / grid.shortest;
+    let response = frequency_response(&decayed(&factors.right_factors_of(s)?, decay)?, &grid.omega)?;
+    let part = |first: usize, count: usize| response.iter().map(|g| g.subrows(first, count).to_owned()).collect();
+    FrequencyTarget::of_excitation(&grid.omega, part(0, m), part(m, p), time)?
+        .weighted(weights)?
+        .decaying(decay)?
+        .behind_delays(&options.pem.delays)
+}

@@ -1,0 +1,104 @@
+//! The lines of a text file that hold data, with their numbers, through gzip where the file is compressed.
+
+use crate::{Error, Result};
+use flate2::bufread::MultiGzDecoder;
+use std::io::{BufRead, BufReader, ErrorKind};
+use std::path::{Path, PathBuf};
+
+const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
+const BUFFER: usize = 1 << 17;
+
+/// Reads line by line, so that a file that unpacks to more than the memory is met by its first bad line.
+pub(super) struct Lines {
+    path: PathBuf,
+    reader: Box<dyn BufRead + Send>,
+    gzip: bool,
+    line: Vec<u8>,
+    number: usize,
+    /// The current line is to be handed out again.
+    held: bool,
+}
+
+impl Lines {
+    pub(super) fn open(path: &Path) -> Result<Lines> {
+        Self::over(path, BufReader::with_capacity(BUFFER, crate::open(path)?))
+    }
+
+    /// The lines of what stands in a file or in memory; `path` is named in errors.
+    pub(super) fn over(path: &Path, mut file: impl BufRead + Send + 'static) -> Result<Lines> {
+        let start = file.fill_buf().map_err(|source| Error::Io { path: path.to_owned(), source })?;
+        if start.is_empty() {
+            return Err(Error::NoData { path: path.to_owned(), problem: "the file is empty (0 bytes)" });
+        }
+        let gzip = start.starts_with(&GZIP_MAGIC);
+        Ok(Lines {
+            path: path.to_owned(),
+            reader: unpacked(file, gzip),
+            gzip,
+            line: Vec::new(),
+            number: 0,
+            held: false,
+        })
+    }
+
+    pub(super) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The error of the rest of a gzip file, if it cannot be unpacked to its end or its checksum is wrong.
+    pub(super) fn damage(&mut self) -> Option<Error> {
+        let line = self.number;
+        let rest = if self.gzip { std::io::copy(&mut self.reader, &mut std::io::sink()) } else { Ok(0) };
+        rest.err().map(|source| read_error(&self.path, self.gzip, line, source))
+    }
+
+    /// Number of the current line, counted from 1.
+    pub(super) fn number(&self) -> usize {
+        self.number
+    }
+
+    /// The current line without its end; a tab at its end may close an empty cell and stays.
+    pub(super) fn current(&self) -> &[u8] {
+        let line = self.line.strip_suffix(b"\n").unwrap_or(&self.line);
+        line.strip_suffix(b"\r").unwrap_or(line)
+    }
+
+    /// Hands out the current line once more at the next [`Lines::advance`].
+    pub(super) fn hold(&mut self) {
+        self.held = true;
+    }
+
+    /// Goes to the next line that is neither blank nor a comment; false at the end.
+    pub(super) fn advance(&mut self) -> Result<bool> {
+        if std::mem::take(&mut self.held) {
+            return Ok(true);
+        }
+        loop {
+            self.line.clear();
+            let read = self.reader.read_until(b'\n', &mut self.line);
+            if read.map_err(|source| read_error(&self.path, self.gzip, self.number, source))? == 0 {
+                return Ok(false);
+            }
+            self.number += 1;
+            if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
+                self.line.drain(..3);
+            }
+            if !matches!(self.line.trim_ascii_start().first(), None | Some(b'#' | b'%')) {
+                return Ok(true);
+            }
+        }
+    }
+}
+
+fn unpacked(file: impl BufRead + Send + 'static, gzip: bool) -> Box<dyn BufRead + Send> {
+    if gzip { Box::new(BufReader::with_capacity(BUFFER, MultiGzDecoder::new(file))) } else { Box::new(file) }
+}
+
+fn read_error(path: &Path, gzip: bool, line: usize, source: std::io::Error) -> Error {
+    let damaged = matches!(source.kind(), ErrorKind::InvalidInput | ErrorKind::InvalidData | ErrorKind::UnexpectedEof);
+    if gzip && damaged {
+        Error::CorruptGzip { path: path.to_owned(), line, source }
+    } else {
+        Error::Io { path: path.to_owned(), source }
+    }
+}

@@ -1,0 +1,217 @@
+//! From lines to cells, and from the chosen cells to numbers.
+
+use super::lines::Lines;
+use super::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
+use crate::{Error, Result};
+use std::collections::HashSet;
+
+/// Most columns of a table. Rows are samples; a packed file of some kilobytes may hold millions of cells on one line.
+const MOST_COLUMNS: usize = 1 << 16;
+
+/// The form of a text file: its columns and what stands between them.
+pub(super) struct Fields {
+    delimiter: Option<u8>,
+    decimal: DecimalSign,
+    names: Vec<String>,
+}
+
+impl Fields {
+    /// Reads the first line that is not a comment; leaves it to be read again where it holds numbers.
+    pub(super) fn detect(lines: &mut Lines, options: &CsvOptions) -> Result<Fields> {
+        let decimal = options.decimal;
+        if decimal == DecimalSign::Comma && options.delimiter == Delimiter::Comma {
+            return Err(Error::CommaTwice { path: lines.path().to_owned() });
+        }
+        if !lines.advance()? {
+            return Err(no_rows(lines));
+        }
+        if lines.current().contains(&0) {
+            let (found, remedy) = ("binary and not text (zero bytes)", "save it as text in UTF-8");
+            return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
+        }
+        let delimiter = match options.delimiter {
+            Delimiter::Detect => detect_delimiter(lines, decimal)?,
+            Delimiter::Comma => Some(b','),
+            Delimiter::Semicolon => Some(b';'),
+            Delimiter::Tab => Some(b'\t'),
+            Delimiter::Whitespace => None,
+        };
+        let cells = header_cells(lines, delimiter);
+        if cells.len() > MOST_COLUMNS {
+            let (found, remedy) =
+                ("a table of more than 65536 columns", "write samples as rows and channels as columns");
+            return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
+        }
+        let named = match options.header {
+            HeaderLine::Present => true,
+            HeaderLine::Absent => false,
+            HeaderLine::Detect => !cells.iter().any(|cell| is_number(cell.as_bytes())),
+        };
+        if !named {
+            lines.hold();
+            return Ok(Fields { delimiter, decimal, names: (1..=cells.len()).map(|j| format!("#{j}")).collect() });
+        }
+        let mut names = HashSet::new();
+        match cells.iter().find(|cell| !names.insert(*cell)) {
+            Some(name) => Err(Error::Method(youla::Error::DuplicateChannel {
+                what: lines.path().display().to_string(),
+                name: name.clone(),
+            })),
+            None => Ok(Fields { delimiter, decimal, names: cells }),
+        }
+    }
+
+    pub(super) fn names(&self) -> &[String] {
+        &self.names
+    }
+}
+
+/// The columns to read as numbers.
+pub(super) struct Selection {
+    /// How many.
+    columns: usize,
+    /// The positions in `columns` that each column of the file goes to.
+    targets: Vec<Vec<usize>>,
+}
+
+impl Selection {
+    pub(super) fn new(fields: &Fields, columns: &[usize]) -> Self {
+        let mut targets = vec![Vec::new(); fields.names.len()];
+        for (position, &column) in columns.iter().enumerate() {
+            targets[column].push(position);
+        }
+        Selection { columns: columns.len(), targets }
+    }
+
+    /// Reads all remaining lines; one vector for each chosen column.
+    pub(super) fn read(&self, fields: &Fields, lines: &mut Lines) -> Result<Vec<Vec<f64>>> {
+        let mut out = vec![Vec::new(); self.columns];
+        while self.next(fields, lines, |position, value| out[position].push(value))? {}
+        if out.iter().all(Vec::is_empty) { Err(no_rows(lines)) } else { Ok(out) }
+    }
+
+    /// Reads one line, each number with its position among the chosen columns; false at the end.
+    pub(super) fn next(&self, fields: &Fields, lines: &mut Lines, put: impl FnMut(usize, f64)) -> Result<bool> {
+        if !lines.advance()? {
+            return Ok(false);
+        }
+        let found = match fields.delimiter {
+            Some(delimiter) => self.row(fields, lines, lines.current().split(|&b| b == delimiter), put)?,
+            None => {
+                let cells = lines.current().split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty());
+                self.row(fields, lines, cells, put)?
+            }
+        };
+        if found != self.targets.len() {
+            let (path, line) = (lines.path().to_owned(), lines.number());
+            return Err(Error::RaggedRow { path, line, found, expected: self.targets.len() });
+        }
+        Ok(true)
+    }
+
+    /// Reads the cells of one line and returns their number.
+    fn row<'b>(
+        &self,
+        fields: &Fields,
+        lines: &Lines,
+        cells: impl Iterator<Item = &'b [u8]> + Clone,
+        mut put: impl FnMut(usize, f64),
+    ) -> Result<usize> {
+        let mut found = 0;
+        for cell in cells.clone() {
+            for &position in self.targets.get(found).into_iter().flatten() {
+                match number(cell, fields.decimal) {
+                    Some(value) => put(position, value),
+                    None => return Err(self.bad_cell(fields, lines, cells.count(), found, cell)),
+                }
+            }
+            found += 1;
+        }
+        Ok(found)
+    }
+
+    /// A line with a field too many or too few is reported as that, not as the cell that moved.
+    fn bad_cell(&self, fields: &Fields, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
+        let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.targets.len());
+        if found != expected {
+            return Error::RaggedRow { path, line, found, expected };
+        }
+        let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
+        let column = fields.names[column].clone();
+        let other = fields.decimal.other();
+        match number(cell, other) {
+            Some(_) => {
+                Error::DecimalSign { path, line, column, text, declared: fields.decimal.key(), found: other.key() }
+            }
+            None => Error::Cell { path, line, column, text },
+        }
+    }
+}
+
+/// The only one of comma, semicolon and tab on the line; `None` means blanks. A decimal comma is no delimiter.
+///
+/// A line of numbers with tabs and blanks is read as blank separated where the count of cells is the same, because a
+/// tab may stand at the end of the line.
+fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
+    const CANDIDATES: [(u8, &str); 3] = [(b',', "a comma"), (b';', "a semicolon"), (b'\t', "a tab")];
+    let line = lines.current().trim_ascii();
+    let candidates = &CANDIDATES[usize::from(decimal == DecimalSign::Comma)..];
+    let found: Vec<_> = candidates.iter().filter(|(delimiter, _)| line.contains(delimiter)).collect();
+    match found[..] {
+        [] => Ok(None),
+        [(b'\t', _)] => {
+            let blank_separated = line.split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty()).count();
+            let tab_separated = line.split(|&b| b == b'\t').count();
+            Ok((tab_separated != blank_separated).then_some(b'\t'))
+        }
+        [(delimiter, _)] => Ok(Some(*delimiter)),
+        _ => {
+            let names: Vec<_> = found.iter().map(|(_, name)| *name).collect();
+            Err(Error::Delimiter { path: lines.path().to_owned(), line: lines.number(), found: names.join(" and ") })
+        }
+    }
+}
+
+/// The cells of the first line; names may stand in quotes.
+fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
+    let text = |cell: &[u8]| String::from_utf8_lossy(cell).trim().to_owned();
+    let Some(delimiter) = delimiter else {
+        return lines.current().split(|b| b.is_ascii_whitespace()).filter(|c| !c.is_empty()).map(text).collect();
+    };
+    let mut reader = ::csv::ReaderBuilder::new()
+        .has_headers(false)
+        .delimiter(delimiter)
+        .trim(::csv::Trim::All)
+        .from_reader(lines.current());
+    let mut record = ::csv::ByteRecord::new();
+    match reader.read_byte_record(&mut record) {
+        Ok(true) => record.iter().map(text).collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// A finite number, perhaps in quotes and with blanks around it.
+fn number(cell: &[u8], decimal: DecimalSign) -> Option<f64> {
+    let text = unquoted(cell)?;
+    let value: f64 = match decimal {
+        DecimalSign::Point => text.parse().ok()?,
+        DecimalSign::Comma if text.contains('.') => return None,
+        DecimalSign::Comma => text.replacen(',', ".", 1).parse().ok()?,
+    };
+    Some(value).filter(|x| x.is_finite())
+}
+
+/// Whether a cell of the first line is no name: a number of any kind, with either decimal sign.
+fn is_number(cell: &[u8]) -> bool {
+    unquoted(cell).is_some_and(|text| text.parse::<f64>().is_ok() || text.replacen(',', ".", 1).parse::<f64>().is_ok())
+}
+
+fn unquoted(cell: &[u8]) -> Option<&str> {
+    let cell = cell.trim_ascii();
+    let cell = cell.strip_prefix(b"\"").and_then(|c| c.strip_suffix(b"\"")).unwrap_or(cell);
+    std::str::from_utf8(cell).ok().map(str::trim)
+}
+
+pub(super) fn no_rows(lines: &Lines) -> Error {
+    Error::NoData { path: lines.path().to_owned(), problem: "there is no line with data" }
+}

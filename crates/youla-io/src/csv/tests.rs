@@ -1,0 +1,230 @@
+use super::*;
+use crate::scratch::{data_folder, scratch};
+use proptest::prelude::*;
+use std::io::Write;
+use youla::lti::Discrete;
+
+fn read(text: &[u8], channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
+    let file = scratch("csv");
+    std::fs::write(file.path(), text).unwrap();
+    read_csv(file.path(), channels, time, &CsvOptions::default())
+}
+
+fn second() -> TimeSource {
+    TimeSource::ts(1.0)
+}
+
+#[test]
+fn names_and_numbers_in_every_dialect() {
+    let expected = Mat::from_fn(2, 2, |i, j| (1 + 2 * i + j) as f64);
+    for text in [
+        "a,b\n1,2\n3,4\n",
+        "# note\n\n a , b \r\n1.0, 2e0\r\n% between\r\n3,4",
+        "a;b\n1;2\n3;4\n",
+        "\"a\";\"b\"\n\"1\";\"2\"\n3;4\n",
+        "a\tb\n1\t2\n3\t4\n",
+        "  a  b\n  1\t 2\t\n 3\t 4\t\n",
+        "\u{feff}a,b\n1,2\n3,4\n",
+    ] {
+        let record = read(text.as_bytes(), &[], &second()).unwrap();
+        assert_eq!(record.data(), expected, "{text:?}");
+        assert_eq!(record.channels()[1].name, "b", "{text:?}");
+    }
+    let spec = [ChannelSpec::from("y", ChannelRef::Column(2), "V")];
+    let record = read(b" 1\t2\t\n 3\t4\t\n", &spec, &second()).unwrap();
+    assert_eq!((record.column("y").unwrap(), record.channels()[0].label()), (&[2.0, 4.0][..], "y [V]".to_owned()));
+}
+
+#[test]
+fn errors_say_where() {
+    for (text, part) in [
+        ("a,b\n1,2\n# x\n3,oops\n", "line 4, column b: \"oops\" is not a finite number"),
+        ("a,b\n1,NaN\n", "line 2, column b: \"NaN\""),
+        ("a,b\n1,inf\n", "line 2, column b: \"inf\""),
+        ("a,b\n1,\n", "line 2, column b: \"\""),
+        ("1,2\n1,b\n", "line 2, column #2: \"b\""),
+        ("a,b\n1,2\n3\n", "line 3: 1 fields, but the first line has 2"),
+        ("a,b\n1,2,3\n", "line 2: 3 fields"),
+        ("a,b\n", "there is no line with data"),
+        ("# only\n", "there is no line with data"),
+        ("", "the file is empty (0 bytes)"),
+        ("a,a\n1,2\n", "more than one channel named \"a\""),
+        ("1,5;2,5\n", "line 1: the delimiter is not clear, the line holds a comma and a semicolon"),
+        ("t\n1\n", "there is no column besides the time"),
+        ("a,2\n1,2\n", "line 1, column #1: \"a\""),
+    ] {
+        let time = if text.starts_with('t') { TimeSource::column("t".parse().unwrap()) } else { second() };
+        let message = read(text.as_bytes(), &[], &time).unwrap_err().to_string();
+        assert!(message.contains(part), "{text:?}: {message}");
+    }
+    let error = read_csv("no/such/file.csv", &[], &second(), &CsvOptions::default()).unwrap_err();
+    assert!(matches!(error, Error::MissingFile { .. }), "{error}");
+    let error = read(b"a,b\n1,2\n", &[ChannelSpec::named("aa")], &second()).unwrap_err().to_string();
+    assert!(error.contains("did you mean \"a\"") && error.contains("known: a, b"), "{error}");
+}
+
+#[test]
+fn unchosen_columns_may_hold_text() {
+    let record = read(b"a,note\n1,x\n2,\n", &[ChannelSpec::named("a")], &second()).unwrap();
+    assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
+    let record = read(b"note x\ta\tmore\nx\t1\ty\n\t2\t\n", &[ChannelSpec::named("a")], &second()).unwrap();
+    assert_eq!(record.column("a").unwrap(), [1.0, 2.0]);
+}
+
+#[test]
+fn time_column_and_declaration() {
+    let text = b"t,a\n5.0,1\n5.5,2\n6.0,3\n";
+    let by_column = TimeSource::column("t".parse().unwrap());
+    let record = read(text, &[], &by_column).unwrap();
+    assert_eq!((record.time().ts(), record.start(), record.channels().len()), (0.5, 5.0, 1));
+    let both = TimeSource { ts: Some(0.4), ..by_column.clone() };
+    assert!(matches!(read(text, &[], &both), Err(Error::Method(youla::Error::SampleTimeMismatch { .. }))));
+    let gap = read(b"t,a\n0,1\n1,2\n2,3\n4,4\n5,5\n", &[], &by_column).unwrap_err();
+    assert!(matches!(gap, Error::NonUniformTime { row: 4, dt: 2.0, .. }), "{gap}");
+    assert!(matches!(read(text, &[], &TimeSource::default()), Err(Error::SampleTimeMissing { .. })));
+}
+
+#[test]
+fn written_records_read_back_exactly() {
+    let channels = vec![Channel::new("u,1", ""), Channel::new("y \"q\"", "")];
+    let data = Mat::from_fn(50, 2, |i, j| ((i * 7 + j) as f64 * 0.7).sin() * 10f64.powi(i as i32 * 12 - 300));
+    let time = Discrete::new(2e-4).unwrap();
+    let record = Record::new("r", channels, data, time).unwrap().starting_at(-0.01).unwrap();
+    let file = scratch("csv");
+    write_csv(&record, file.path()).unwrap();
+    let back = read_csv(file.path(), &[], &TimeSource::column("t".parse().unwrap()), &CsvOptions::default()).unwrap();
+    assert_eq!((back.data(), back.channels()), (record.data(), record.channels()));
+    assert_eq!((back.time(), back.start()), (record.time(), record.start()));
+}
+
+#[test]
+fn gzip_is_found_by_its_first_bytes_and_damage_is_named() {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::default());
+    (0..1000).for_each(|k| writeln!(encoder, "{k},{}", k * k).unwrap());
+    let packed = encoder.finish().unwrap();
+    assert_eq!(read(&packed, &[], &second()).unwrap().samples(), 1000);
+    for damaged in [&packed[..packed.len() / 2], &packed[..packed.len() - 4], &packed[..5]] {
+        let error = read(damaged, &[], &second()).unwrap_err();
+        assert!(matches!(error, Error::CorruptGzip { .. }), "{error}");
+    }
+    let mut flipped = packed.clone();
+    flipped[packed.len() - 6] ^= 0x55;
+    assert!(matches!(read(&flipped, &[], &second()), Err(Error::CorruptGzip { .. })));
+}
+
+#[test]
+fn the_real_text_files_load() {
+    let Some(folder) = data_folder() else { return };
+    let numbered = |n: usize| -> Vec<_> {
+        (1..=n).map(|j| ChannelSpec::from(format!("c{j}"), ChannelRef::Column(j), "")).collect()
+    };
+    for (file, columns, samples) in [
+        ("cd_player_arm/CD_player_arm.dat", 4, 2048),
+        ("hair_dryer/dryer.dat", 2, 1000),
+        ("robot_arm/robot_arm.dat", 2, 1024),
+        ("evaporator/evaporator.dat", 6, 6305),
+    ] {
+        let options = CsvOptions::default();
+        let record = read_csv(folder.join(file), &numbered(columns), &second(), &options).unwrap();
+        assert_eq!((record.samples(), record.channels().len()), (samples, columns), "{file}");
+    }
+    let qube = folder.join("qube_pendulum/episodes/qube_20230828T150615_434_696_394.csv.gz");
+    let record = read_csv(qube, &[], &TimeSource::column("t".parse().unwrap()), &CsvOptions::default()).unwrap();
+    assert_eq!((record.samples(), record.channels().len(), record.time().ts()), (10000, 8, 0.002));
+    assert_eq!(record.column("control_output").unwrap()[0], -11.799938031611969);
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 2000, rng_seed: proptest::test_runner::RngSeed::Fixed(3), ..ProptestConfig::default() })]
+
+    /// Whatever the bytes, the outcome is a record of finite numbers or an error that names the file.
+    #[test]
+    fn any_text_is_a_record_or_an_error(text in "[ab12.,;\\t \"\r\n#e\\-]{0,60}", by_column in any::<bool>(), raw in any::<[u8; 3]>()) {
+        let mut bytes = text.into_bytes();
+        if raw[0] < 32 {
+            bytes.extend(raw);
+        }
+        let time = if by_column { TimeSource::column(ChannelRef::Column(1)) } else { second() };
+        if let Err(error) = read(&bytes, &[], &time) {
+            prop_assert!(error.to_string().contains(".csv") || matches!(error, Error::Method(youla::Error::OutOfRange { .. })), "{}", error);
+        }
+    }
+}
+
+mod dialects {
+    use super::super::*;
+
+    fn read(text: &str, delimiter: Delimiter, decimal: DecimalSign) -> Result<Record> {
+        let options = CsvOptions { delimiter, decimal, ..Default::default() };
+        csv_from_bytes(text.as_bytes(), "log.csv", &[], &TimeSource::ts(0.1), &options)
+    }
+
+    fn sentence(text: &str, delimiter: Delimiter, decimal: DecimalSign) -> String {
+        read(text, delimiter, decimal).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_decimal_comma_is_read_where_it_is_declared() {
+        let columns = |record: &Record| ["u", "y"].map(|name| record.column(name).unwrap().to_vec());
+        let expected = [vec![0.5, -1.0, 1200.0], vec![-2e-3, 3.25, 0.0]];
+        for (delimiter, between) in [(Delimiter::Semicolon, ";"), (Delimiter::Tab, "\t"), (Delimiter::Whitespace, " ")]
+        {
+            let text = "u;y\n0,5;-2,0e-3\n-1;\"3,25\"\n+1,2e3;,0\n".replace(';', between);
+            for delimiter in [delimiter, Delimiter::Detect] {
+                assert_eq!(columns(&read(&text, delimiter, DecimalSign::Comma).unwrap()), expected, "{between:?}");
+            }
+            let points = text.replace(',', ".");
+            assert_eq!(columns(&read(&points, delimiter, DecimalSign::Point).unwrap()), expected);
+        }
+    }
+
+    #[test]
+    fn the_other_decimal_sign_is_refused_with_its_line() {
+        let (point, comma) = (DecimalSign::Point, DecimalSign::Comma);
+        let detect = Delimiter::Detect;
+        assert_eq!(
+            sentence("# log\nu;y\n1;2\n0,5;1\n", detect, point),
+            "log.csv, line 4, column u: \"0,5\" has a decimal comma, but the decimal sign is a point; declare decimal = \"comma\" if \
+             all numbers of the file are written so"
+        );
+        let mixed = sentence("u;y\n1,5;2\n1,5;2.5\n", detect, comma);
+        assert!(mixed.starts_with("log.csv, line 3, column y: \"2.5\" has a decimal point, but"), "{mixed}");
+        // A first line of numbers is no line of names, whatever their sign.
+        assert!(
+            sentence("0,5;1,5\n1,0;2,0\n", Delimiter::Semicolon, point).starts_with("log.csv, line 1, column #1: ")
+        );
+        assert!(sentence("0.5\t1.5\n", Delimiter::Tab, comma).starts_with("log.csv, line 1, column #1: "));
+        assert_eq!(read("0,5;1,5\n1,0;2,0\n", detect, comma).unwrap().column("#2").unwrap(), [1.5, 2.0]);
+    }
+
+    #[test]
+    fn what_does_not_fit_the_declared_dialect_is_refused() {
+        let (point, comma) = (DecimalSign::Point, DecimalSign::Comma);
+        for (text, delimiter, decimal, expected) in [
+            (
+                "u,y\n1,2\n",
+                Delimiter::Comma,
+                comma,
+                "log.csv: the comma cannot be both the delimiter and the decimal sign",
+            ),
+            (
+                "0,5;1,5\n",
+                Delimiter::Detect,
+                point,
+                "log.csv, line 1: the delimiter is not clear, the line holds a comma and a semi",
+            ),
+            (
+                "u;y\n1.000,5;2\n",
+                Delimiter::Detect,
+                comma,
+                "log.csv, line 2, column u: \"1.000,5\" is not a finite number",
+            ),
+            ("u;y\n1,2,3;2\n", Delimiter::Detect, comma, "log.csv, line 2, column u: \"1,2,3\" is not a finite number"),
+            ("u;y\n1,5;2\n1,5\n", Delimiter::Semicolon, comma, "log.csv, line 3: 1 fields, but the first line has 2"),
+            ("u;y\n1;nan\n", Delimiter::Semicolon, comma, "log.csv, line 2, column y: \"nan\" is not a finite number"),
+        ] {
+            let found = sentence(text, delimiter, decimal);
+            assert!(found.starts_with(expected), "{found}");
+        }
+    }
+}

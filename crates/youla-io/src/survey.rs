@@ -1,0 +1,152 @@
+//! What a file offers before anything is chosen from it: its columns, their range and which of them could be a clock.
+
+use super::csv::{column_names, read_csv};
+use super::source::{Format, resolve};
+use super::{
+    ChannelRef, ChannelSpec, CsvOptions, Source, TimeSource, Value, Variables, read_mat, read_npz, read_parquet,
+};
+use crate::Result;
+use std::path::Path;
+
+/// Most columns of a matrix in a file that are listed one by one.
+const MOST_COLUMNS: usize = 64;
+
+/// Greatest deviation of a step of a clock, as a part of the mean step.
+const UNIFORM: f64 = 1e-3;
+
+/// A column of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurveyedColumn {
+    /// How it is chosen: a name, `#3`, or a path such as `Data.signals.u`.
+    pub from: String,
+    /// What it holds, or why it cannot be a channel.
+    pub content: std::result::Result<ColumnContent, String>,
+}
+
+/// The numbers of a column.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ColumnContent {
+    /// How many there are.
+    pub rows: usize,
+    /// Smallest.
+    pub low: f64,
+    /// Largest.
+    pub high: f64,
+    /// Mean step where each number exceeds the one before by the same amount, to 1e-3 of it: what a clock does.
+    pub step: Option<f64>,
+}
+
+/// Lists the columns of a file; `csv` says how a text file is to be read.
+///
+/// # Errors
+/// As [`super::read`], but for columns that hold something else than finite numbers: these say so themselves.
+///
+/// ```
+/// let file = std::env::temp_dir().join("youla-survey-example.csv");
+/// std::fs::write(&file, "t,u\n0.0,1\n0.5,-1\n1.0,2\n")?;
+/// let columns = youla_io::survey(&file, &Default::default())?;
+/// assert_eq!(columns[0].content.as_ref().unwrap().step, Some(0.5));
+/// assert_eq!(columns[1].content.as_ref().unwrap().high, 2.0);
+/// # std::fs::remove_file(&file)?;
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub fn survey(path: impl AsRef<Path>, csv: &CsvOptions) -> Result<Vec<SurveyedColumn>> {
+    let path = path.as_ref();
+    let source = Source {
+        path: path.to_owned(),
+        format: Format::Detect,
+        time: TimeSource::default(),
+        channels: Vec::new(),
+        csv: csv.clone(),
+    };
+    match resolve(&source)? {
+        Format::Mat => Ok(of_variables(&read_mat(path)?)),
+        Format::Npz => Ok(of_variables(&read_npz(path)?)),
+        Format::Parquet => Ok(of_variables(&read_parquet(path)?)),
+        Format::Csv | Format::Detect => of_text(path, csv),
+    }
+}
+
+fn of_text(path: &Path, csv: &CsvOptions) -> Result<Vec<SurveyedColumn>> {
+    let names = column_names(path, csv)?;
+    let clock = TimeSource::ts(1.0);
+    if let Ok(record) = read_csv(path, &[], &clock, csv) {
+        let of = |(name, values): (&String, &[f64])| column(name.clone(), values);
+        return Ok(names.iter().zip(record.columns()).map(of).collect());
+    }
+    // One of them is not a number: each column by itself, so that the others are listed.
+    let one = |(k, name): (usize, &String)| {
+        let spec = ChannelSpec::from(name, ChannelRef::Column(k + 1), "");
+        match read_csv(path, &[spec], &clock, csv) {
+            Ok(record) => record.columns().map(|values| column(name.clone(), values)).next(),
+            Err(error) => Some(SurveyedColumn { from: name.clone(), content: Err(error.to_string()) }),
+        }
+    };
+    Ok(names.iter().enumerate().filter_map(one).collect())
+}
+
+/// Vectors, and matrices column by column; single numbers and text are no channels.
+fn of_variables(variables: &Variables) -> Vec<SurveyedColumn> {
+    let mut found = Vec::new();
+    for path in variables.leaves() {
+        let Ok(Value::Real { dims, data }) = variables.get(&path) else { continue };
+        match dims[..] {
+            [rows, columns] if rows.min(columns) == 1 && rows.max(columns) > 1 => found.push(column(path, data)),
+            [rows, columns] if rows > 1 && columns <= MOST_COLUMNS => {
+                found.extend(data.chunks(rows).enumerate().map(|(j, x)| column(format!("{path}(:,{})", j + 1), x)));
+            }
+            _ => {}
+        }
+    }
+    found
+}
+
+fn column(from: String, values: &[f64]) -> SurveyedColumn {
+    if let Some(row) = values.iter().position(|x| !x.is_finite()) {
+        return SurveyedColumn { from, content: Err(format!("row {} is not a finite number", row + 1)) };
+    }
+    let (low, high) =
+        values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)));
+    SurveyedColumn { from, content: Ok(ColumnContent { rows: values.len(), low, high, step: uniform_step(values) }) }
+}
+
+fn uniform_step(values: &[f64]) -> Option<f64> {
+    let (first, last) = (values.first()?, values.last()?);
+    let step = (last - first) / (values.len().checked_sub(1).filter(|n| *n > 0)? as f64);
+    let even = values.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() <= UNIFORM * step);
+    (step > 0.0 && even).then_some(step)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scratch::scratch;
+    use crate::{Packing, Variable, write_mat};
+
+    #[test]
+    fn columns_of_text_are_listed_even_beside_one_that_is_not_numbers() {
+        let file = scratch("csv");
+        std::fs::write(file.path(), "t,mode,y\n0.1,on,3\n0.2,off,-4\n0.3,on,5\n").unwrap();
+        let columns = survey(file.path(), &CsvOptions::default()).unwrap();
+        let names: Vec<&str> = columns.iter().map(|c| c.from.as_str()).collect();
+        assert_eq!(names, ["t", "mode", "y"]);
+        let clock = columns[0].content.as_ref().unwrap();
+        assert!((clock.step.unwrap() - 0.1).abs() < 1e-15);
+        assert!(columns[1].content.as_ref().unwrap_err().contains("line 2"), "{:?}", columns[1]);
+        assert_eq!(columns[2].content, Ok(ColumnContent { rows: 3, low: -4.0, high: 5.0, step: None }));
+    }
+
+    #[test]
+    fn matrices_are_listed_column_by_column_and_settings_are_not() {
+        let file = scratch("mat");
+        let variables = [
+            Variable { name: "fs".into(), value: Value::scalar(2000.0) },
+            Variable { name: "x".into(), value: Value::Real { dims: vec![2, 2], data: vec![1.0, 2.0, 3.0, f64::NAN] } },
+        ];
+        write_mat(file.path(), &variables, Packing::Zlib).unwrap();
+        let columns = survey(file.path(), &CsvOptions::default()).unwrap();
+        assert_eq!(columns.iter().map(|c| c.from.as_str()).collect::<Vec<_>>(), ["x(:,1)", "x(:,2)"]);
+        assert_eq!(columns[0].content.as_ref().unwrap().step, Some(1.0));
+        assert_eq!(columns[1].content, Err("row 2 is not a finite number".into()));
+    }
+}

@@ -1,0 +1,234 @@
+//! The sample time of a file: declared, taken from a time column, or both, in which case they must agree.
+
+use super::ChannelRef;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use youla::lti::Discrete;
+
+/// Where the sample time comes from; one of `column` and `ts` at least.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct TimeSource {
+    /// Column with the time in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub column: Option<ChannelRef>,
+    /// Sample time in seconds.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ts: Option<f64>,
+    /// Greatest deviation of a step of the time column from the sample time, as a part of the sample time.
+    pub tolerance: f64,
+    /// What to do where the time column has a gap.
+    pub gaps: Gaps,
+}
+
+/// What to do where samples are missing, by the time column.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Gaps {
+    /// Refuse the file and name the row.
+    #[default]
+    Refuse,
+    /// Cut it there into records of their own. Steps that are too short, or go back, are refused as before.
+    Split,
+}
+
+impl Default for TimeSource {
+    fn default() -> Self {
+        TimeSource { column: None, ts: None, tolerance: 1e-3, gaps: Gaps::Refuse }
+    }
+}
+
+impl TimeSource {
+    /// A declared sample time in seconds.
+    pub fn ts(ts: f64) -> Self {
+        TimeSource { ts: Some(ts), ..Self::default() }
+    }
+
+    /// A time column in seconds.
+    pub fn column(column: ChannelRef) -> Self {
+        TimeSource { column: Some(column), ..Self::default() }
+    }
+
+    /// The clock and the parts without gaps from the time column, which is there when `self.column` is set.
+    ///
+    /// # Errors
+    /// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`] with the first bad row, [`youla::Error::SampleTimeMismatch`]
+    /// where column and declaration disagree, [`youla::Error::OutOfRange`] for a bad `ts` or `tolerance`.
+    pub(super) fn resolve(&self, what: &str, column: Option<&[f64]>) -> Result<Clock> {
+        if !(self.tolerance >= 0.0 && self.tolerance < 1.0) {
+            let what = format!("{what}: the tolerance of the time column");
+            return Err(Error::Method(youla::Error::OutOfRange {
+                what,
+                value: self.tolerance,
+                must: "at least 0 and below 1",
+            }));
+        }
+        match (column, self.ts) {
+            (None, None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
+            (None, Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, 0.0)),
+            (Some([start]), Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, *start)),
+            (Some([] | [_]), None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
+            (Some(times), declared) => self.measured(what, times, declared),
+        }
+    }
+
+    /// The same from a time column of any length, value by value; the steps are held against the median of the first 65536.
+    ///
+    /// # Errors
+    /// As [`TimeSource::resolve`].
+    pub(super) fn resolve_streamed(&self, what: &str, mut next: impl FnMut() -> Result<Option<f64>>) -> Result<Clock> {
+        let mut times = Vec::new();
+        while times.len() <= STEPS {
+            match next()? {
+                Some(time) => times.push(time),
+                None => return self.resolve(what, Some(&times)),
+            }
+        }
+        let clock = self.resolve(what, Some(&times))?;
+        let ts = self.ts.unwrap_or_else(|| median_step(&times));
+        let (first, mut last, mut count) = (times[0], times[STEPS], times.len());
+        while let Some(time) = next()? {
+            count += 1;
+            let dt = time - last;
+            if !self.is_step(dt, ts) {
+                return Err(Error::NonUniformTime { what: what.to_owned(), row: count, dt, ts });
+            }
+            last = time;
+        }
+        let time = if self.ts.is_some() { clock.time } else { Discrete::new(mean_step(first, last, count))? };
+        Ok(Clock { time, parts: vec![(0, first)] })
+    }
+
+    fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
+        let middle = median_step(times);
+        if let Some(ts) = declared {
+            let time = Discrete::new(ts)?;
+            if (middle - ts).abs() > self.tolerance * ts {
+                let what = format!("{what}, declared sample time and time column");
+                return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: ts, right: middle }));
+            }
+            return Ok(Clock { time, parts: self.parts(what, times, ts)? });
+        }
+        let parts = self.parts(what, times, middle)?;
+        let ends = parts.iter().skip(1).map(|part| part.0).chain([times.len()]);
+        let ranges = parts.iter().map(|part| part.0).zip(ends);
+        // The longest part knows the sample time best.
+        let (from, to) = ranges.fold((0, 0), |best, r| if r.1 - r.0 > best.1 - best.0 { r } else { best });
+        let ts = if to - from > 1 { mean_step(times[from], times[to - 1], to - from) } else { middle };
+        Ok(Clock { time: Discrete::new(ts)?, parts })
+    }
+
+    fn is_step(&self, dt: f64, ts: f64) -> bool {
+        (dt - ts).abs() <= self.tolerance * ts
+    }
+
+    /// First row (from 0) and time of each part without gaps.
+    fn parts(&self, what: &str, times: &[f64], ts: f64) -> Result<Vec<(usize, f64)>> {
+        let mut parts = vec![(0, times[0])];
+        for (k, step) in times.windows(2).enumerate() {
+            let dt = step[1] - step[0];
+            match self.is_step(dt, ts) {
+                true => {}
+                false if self.gaps == Gaps::Split && dt > ts => parts.push((k + 1, step[1])),
+                false => return Err(Error::NonUniformTime { what: what.to_owned(), row: k + 2, dt, ts }),
+            }
+        }
+        Ok(parts)
+    }
+}
+
+/// Steps of a streamed time column of which the median is taken.
+const STEPS: usize = 1 << 16;
+
+/// Sample time, and first row (from 0) and time of each part without gaps.
+#[derive(Debug)]
+pub(super) struct Clock {
+    pub(super) time: Discrete,
+    pub(super) parts: Vec<(usize, f64)>,
+}
+
+impl Clock {
+    fn whole(time: Discrete, start: f64) -> Self {
+        Clock { time, parts: vec![(0, start)] }
+    }
+}
+
+/// The step in the middle of all steps, which a gap or a repeated row does not move.
+fn median_step(times: &[f64]) -> f64 {
+    let mut steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
+    let middle = steps.len() / 2;
+    *steps.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+/// The mean step, as the shortest decimal number within the rounding of the time column.
+fn mean_step(first: f64, last: f64, samples: usize) -> f64 {
+    let steps = (samples - 1) as f64;
+    let mean = (last - first) / steps;
+    let rounding = 2.0 * f64::EPSILON * (first.abs().max(last.abs()) / steps).max(mean.abs() / 2.0);
+    let rounded = (0..17).filter_map(|digits| format!("{mean:.digits$e}").parse::<f64>().ok());
+    rounded.into_iter().find(|r| (r - mean).abs() <= rounding).unwrap_or(mean)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn times(n: usize, ts: f64) -> Vec<f64> {
+        (0..n).map(|k| 0.3 + k as f64 * ts).collect()
+    }
+
+    #[test]
+    fn the_sample_time_survives_the_time_column() {
+        for ts in [0.002, 1.0 / 5000.0, 2.5e-4, 0.08] {
+            let clock = TimeSource::default().resolve("t", Some(&times(1000, ts))).unwrap();
+            assert_eq!(clock.time.ts(), ts);
+        }
+        let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
+        assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_gap_splits_where_this_is_asked_for() {
+        let mut gap = times(100, 0.1);
+        gap.drain(60..63);
+        let split = TimeSource { gaps: Gaps::Split, ..TimeSource::default() };
+        let clock = split.resolve("t", Some(&gap)).unwrap();
+        assert_eq!((clock.parts, clock.time.ts()), (vec![(0, 0.3), (60, 0.3 + 63.0 * 0.1)], 0.1));
+        gap[70] = gap[69];
+        let error = split.resolve("t", Some(&gap)).unwrap_err();
+        assert!(matches!(error, Error::NonUniformTime { row: 71, .. }), "{error}");
+    }
+
+    #[test]
+    fn a_streamed_column_gives_the_same_clock() {
+        for (n, ts) in [(1000, 2e-4), (STEPS + 1, 2e-4), (STEPS + 5000, 1.0 / 3.0)] {
+            let times = times(n, ts);
+            for source in [TimeSource::default(), TimeSource { ts: Some(ts), ..Default::default() }] {
+                let mut next = times.iter().copied();
+                let streamed = source.resolve_streamed("t", || Ok(next.next())).unwrap();
+                let whole = source.resolve("t", Some(&times)).unwrap();
+                assert_eq!((streamed.time, streamed.parts), (whole.time, whole.parts));
+            }
+        }
+        for row in [60, STEPS + 100] {
+            let mut gap = times(STEPS + 1000, 0.1);
+            gap.remove(row);
+            let mut next = gap.iter().copied();
+            let error = TimeSource::default().resolve_streamed("t", || Ok(next.next())).unwrap_err();
+            assert!(matches!(error, Error::NonUniformTime { row: found, .. } if found == row + 1), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_gap_is_reported_at_its_row() {
+        let mut gap = times(100, 0.1);
+        gap.remove(60);
+        let error = TimeSource::default().resolve("t", Some(&gap)).unwrap_err();
+        assert!(matches!(error, Error::NonUniformTime { row: 61, .. }), "{error}");
+        let error = TimeSource::ts(0.1).resolve("t", Some(&times(100, 0.2))).unwrap_err();
+        assert!(matches!(error, Error::Method(youla::Error::SampleTimeMismatch { .. })), "{error}");
+        assert!(TimeSource::default().resolve("t", Some(&[0.0, 0.0, 0.0])).is_err());
+        assert!(TimeSource::default().resolve("t", None).is_err());
+        assert!(TimeSource::default().resolve("t", Some(&[1.0])).is_err());
+    }
+}

@@ -1,0 +1,58 @@
+//! A file of settings as text: errors with line, column and key, and the nearest known name for a misspelt one.
+
+use crate::error::TextPosition;
+use crate::{Error, Result};
+use serde::de::DeserializeOwned;
+use std::path::Path;
+use toml::de::{DeTable, DeValue};
+
+/// Reads the text of a settings file; `path` is named in errors.
+///
+/// # Errors
+/// [`Error::Settings`].
+pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
+    toml::from_str(text).map_err(|e| in_words(&e, text, path))
+}
+
+/// Turns the parser's error into one sentence.
+fn in_words(error: &toml::de::Error, text: &str, path: &Path) -> Error {
+    let offset = error.span().map_or(0, |s| s.start.min(text.len()));
+    let message = error.message();
+    let problem = nearest_name(message).unwrap_or_else(|| match key_at(text, offset) {
+        Some(key) => format!("{key}: {message}"),
+        None => message.to_owned(),
+    });
+    Error::Settings { path: path.to_owned(), at: Some(TextPosition::of(text, offset)), problem }
+}
+
+/// For a key or choice that is not known, the known one that is spelt most like it.
+fn nearest_name(message: &str) -> Option<String> {
+    if !(message.starts_with("unknown field") || message.starts_with("unknown variant")) {
+        return None;
+    }
+    let mut words = message.split('`').skip(1).step_by(2);
+    let unknown = words.next()?;
+    let nearest = words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)))?;
+    Some(format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})"))
+}
+
+/// The dotted key whose value stands at this place of the text.
+fn key_at(text: &str, offset: usize) -> Option<String> {
+    let document = DeTable::parse(text).ok()?;
+    let keys = path_to(document.get_ref(), offset)?;
+    Some(keys.join("."))
+}
+
+/// The keys that lead to the innermost value around `offset`. The span of a table under a header is its header, so that
+/// every table is searched.
+fn path_to<'a>(table: &'a DeTable<'_>, offset: usize) -> Option<Vec<&'a str>> {
+    table.iter().find_map(|(key, value)| {
+        let inner = match value.get_ref() {
+            DeValue::Table(table) => path_to(table, offset),
+            _ => None,
+        };
+        let mut keys = inner.or_else(|| value.span().contains(&offset).then(Vec::new))?;
+        keys.insert(0, key.get_ref());
+        Some(keys)
+    })
+}

@@ -1,0 +1,137 @@
+//! What the controller leaves of the logged input, as it is declared and with one thing changed.
+
+use super::{Change, ControllerRecord};
+use crate::Result;
+use youla::Mat;
+use youla::linalg::least_squares;
+use youla::lti::{Discrete, StateSpace, simulate_best};
+
+/// Signals of the controller: `w = K e`.
+pub(super) struct Log<'a> {
+    record: ControllerRecord<'a>,
+    pub(super) e: Mat<f64>,
+    pub(super) w: Mat<f64>,
+}
+
+impl<'a> Log<'a> {
+    pub(super) fn new(record: ControllerRecord<'a>) -> Self {
+        let e = record.reference.map_or_else(|| record.y.to_owned(), |r| record.y - r);
+        let w = record.input_excitation.map_or_else(|| record.u.to_owned(), |d| record.u - d);
+        Log { record, e, w }
+    }
+
+    pub(super) fn residual(&self, k: &StateSpace<Discrete>, e: &Mat<f64>, w: &Mat<f64>) -> Result<f64> {
+        Ok(relative(&(w - simulate_best(k, e.as_ref(), w.as_ref())?), w))
+    }
+
+    /// Every change with the residual that it leaves.
+    pub(super) fn changes(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
+        let mut all = vec![(Change::Sign, self.residual(&k.negated(), &self.e, &self.w)?)];
+        let d = self.record.input_excitation;
+        for rows in [-1isize, 1] {
+            let (e, w) = shifted(&self.e, &self.w, rows);
+            all.push((Change::Shift(rows), self.residual(k, &e, &w)?));
+            let Some(d) = d else { continue };
+            let (d, u) = shifted(&d.to_owned(), &self.record.u.to_owned(), rows);
+            all.push((Change::InputShift(rows), self.residual(k, &e, &(&u - &d))?));
+        }
+        if let Some(d) = d {
+            all.push((Change::WithoutExcitation, self.residual(k, &self.e, &self.record.u.to_owned())?));
+            all.push((Change::ExcitationSign, self.residual(k, &self.e, &(self.record.u + d))?));
+        }
+        all.extend(self.gains(k)?);
+        let p = self.e.ncols();
+        for (i, j) in (0..p).flat_map(|i| (i + 1..p).map(move |j| (i, j))) {
+            let place = |c: usize| {
+                if c == i {
+                    j
+                } else if c == j {
+                    i
+                } else {
+                    c
+                }
+            };
+            let e = match self.record.reference {
+                // The measured channels are exchanged, the references are not.
+                Some(r) => Mat::from_fn(self.e.nrows(), p, |t, c| self.record.y[(t, place(c))] - r[(t, c)]),
+                None => Mat::from_fn(self.e.nrows(), p, |t, c| self.e[(t, place(c))]),
+            };
+            all.push((Change::Exchanged(i, j), self.residual(k, &e, &self.w)?));
+        }
+        all.extend(self.saturation(k)?);
+        Ok(all)
+    }
+
+    /// One factor for all channels of e, and one for each alone, by least squares.
+    fn gains(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
+        let (n, m, p) = (self.e.nrows(), self.w.ncols(), self.e.ncols());
+        let mut parts = Vec::new();
+        for channel in 0..p {
+            let alone = Mat::from_fn(n, p, |t, c| if c == channel { self.e[(t, c)] } else { 0.0 });
+            parts.push(centred(&youla::lti::simulate(k, alone.as_ref(), &vec![0.0; k.order()])?));
+        }
+        let w = centred(&self.w);
+        // The start, where the state is not known, does not count.
+        let from = n / 20;
+        let stacked = |x: &Mat<f64>| {
+            let rows = n - from;
+            Mat::from_fn(rows * m, 1, |t, _| x[(from + t % rows, t / rows)])
+        };
+        let target = stacked(&w);
+        let sum = parts.iter().fold(Mat::zeros(n, m), |sum, part| sum + part);
+        let mut all = Vec::new();
+        let mut one = |change: &dyn Fn(f64) -> Change, regressor: &Mat<f64>, target: &Mat<f64>| -> Result<()> {
+            let found = least_squares("the gain of the controller", regressor.as_ref(), target.as_ref())?;
+            let left = target - regressor * &found.x;
+            all.push((change(found.x[(0, 0)]), left.norm_l2() / stacked(&w).norm_l2()));
+            Ok(())
+        };
+        one(&Change::Gain, &stacked(&sum), &target)?;
+        // A channel in another unit is a factor on what was measured; the reference keeps its unit.
+        for (channel, part) in parts.iter().enumerate() {
+            let measured = match self.record.reference {
+                Some(_) => {
+                    let alone = Mat::from_fn(n, p, |t, c| if c == channel { self.record.y[(t, c)] } else { 0.0 });
+                    centred(&youla::lti::simulate(k, alone.as_ref(), &vec![0.0; k.order()])?)
+                }
+                None if p > 1 => part.clone(),
+                None => continue,
+            };
+            let others = stacked(&(&sum - &measured));
+            one(&|gain| Change::ChannelGain(channel, gain), &stacked(&measured), &(&target - others))?;
+        }
+        Ok(all)
+    }
+
+    fn saturation(&self, k: &StateSpace<Discrete>) -> Result<Option<(Change, f64)>> {
+        let u = self.record.u;
+        let free = simulate_best(k, self.e.as_ref(), self.w.as_ref())?;
+        let free = self.record.input_excitation.map_or_else(|| free.clone(), |d| &free + d);
+        let limits = |j: usize| {
+            let values = u.col(j);
+            let low = values.iter().copied().fold(f64::INFINITY, f64::min);
+            [low, values.iter().copied().fold(f64::NEG_INFINITY, f64::max)]
+        };
+        let all: Vec<[f64; 2]> = (0..u.ncols()).map(limits).collect();
+        let held = Mat::from_fn(u.nrows(), u.ncols(), |t, j| free[(t, j)].clamp(all[j][0], all[j][1]));
+        let left = relative(&(u - held), &u.to_owned());
+        Ok(all.first().map(|limits| (Change::Saturation(*limits), left)))
+    }
+}
+
+/// `e(k - rows)` beside `w(k)`.
+fn shifted(e: &Mat<f64>, w: &Mat<f64>, rows: isize) -> (Mat<f64>, Mat<f64>) {
+    let count = e.nrows() - rows.unsigned_abs();
+    let (of_e, of_w) = if rows > 0 { (0, rows.unsigned_abs()) } else { (rows.unsigned_abs(), 0) };
+    (e.subrows(of_e, count).to_owned(), w.subrows(of_w, count).to_owned())
+}
+
+fn centred(x: &Mat<f64>) -> Mat<f64> {
+    let mean: Vec<f64> = x.col_iter().map(|c| c.iter().sum::<f64>() / x.nrows() as f64).collect();
+    Mat::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] - mean[j])
+}
+
+fn relative(left: &Mat<f64>, of: &Mat<f64>) -> f64 {
+    let size = centred(of).norm_l2();
+    if size > 0.0 { centred(left).norm_l2() / size } else { f64::INFINITY }
+}

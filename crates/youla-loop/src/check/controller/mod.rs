@@ -1,0 +1,116 @@
+//! Whether the declared controller gives the logged input, and what would make it do so.
+//!
+//! With positive feedback `u = K (y - r) + d` the declared K is simulated on the logged `e = y - r`, from the state that fits best,
+//! and held against `w = u - d`:
+//! ```text
+//! residual = |w - K e| / |w|     (about their means)
+//! ```
+//! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel of e
+//! by least squares, two channels exchanged, the input limited to its own range, d left out or with the other sign. A change
+//! is proposed where it brings the residual below a tenth of what it was and below `controller_caution` twice over, or to nearly nothing.
+//! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
+
+mod log;
+mod words;
+
+pub(super) use words::not_simulated;
+
+use super::CheckOptions;
+use crate::Result;
+use log::Log;
+use youla::MatRef;
+use youla::lti::{Discrete, StateSpace};
+
+/// A change that would make the controller fit the log.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Change {
+    /// The other sign of feedback.
+    Sign,
+    /// y (and r) by so many rows later (positive) or earlier than they stand.
+    Shift(isize),
+    /// u by so many rows earlier (positive) or later than it stands, against y, r and the excitation.
+    InputShift(isize),
+    /// A factor on all channels of `y - r`: a gain of the controller.
+    Gain(f64),
+    /// A factor on one measured output, counted from 0, and not on its reference.
+    ChannelGain(usize, f64),
+    /// Two outputs exchanged.
+    Exchanged(usize, usize),
+    /// The input limited to the range that it has in the log.
+    Saturation([f64; 2]),
+    /// The input was logged before the excitation was added.
+    WithoutExcitation,
+    /// The excitation with the other sign.
+    ExcitationSign,
+}
+
+/// How far the declared controller explains the logged input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ControllerCheck {
+    /// Relative residual.
+    pub residual: f64,
+    /// Whether an excitation at the plant input is declared.
+    pub excited: bool,
+    /// The change that leaves least, and what it leaves, where one would help.
+    pub change: Option<(Change, f64)>,
+}
+
+/// What the controller is held against.
+#[derive(Debug, Clone, Copy)]
+pub struct ControllerRecord<'a> {
+    /// Plant input as applied, samples x m.
+    pub u: MatRef<'a, f64>,
+    /// Measured output, samples x p.
+    pub y: MatRef<'a, f64>,
+    /// Excitation added at the plant input, samples x m.
+    pub input_excitation: Option<MatRef<'a, f64>>,
+    /// Reference, samples x p.
+    pub reference: Option<MatRef<'a, f64>>,
+}
+
+/// Magnitude of a pole up to which a controller that integrates can be simulated.
+const INTEGRATOR: f64 = 1.0 + 1e-6;
+/// A change must leave less than this share of the residual.
+const HELPS: f64 = 0.1;
+
+/// Holds a controller (positive feedback, `u = K y`) against a record.
+///
+/// # Errors
+/// Shapes; [`youla::Error::Unstable`] for a controller that is unstable by itself, which cannot be simulated.
+///
+/// ```
+/// use youla_loop::check::{Change, CheckOptions, ControllerRecord, controller};
+/// use youla::{Mat, lti::{Discrete, StateSpace}};
+/// let gain = Mat::from_fn(1, 1, |_, _| -2.0);
+/// let empty = |rows, columns| Mat::zeros(rows, columns);
+/// let k = StateSpace::new(empty(0, 0), empty(0, 1), empty(1, 0), gain, Discrete::new(0.01)?)?;
+/// let y = Mat::from_fn(500, 1, |k, _| (0.1 * k as f64).sin());
+/// let u = Mat::from_fn(500, 1, |k, _| 2.0 * y[(k, 0)]);
+/// let record = ControllerRecord { u: u.as_ref(), y: y.as_ref(), input_excitation: None, reference: None };
+/// let found = controller(&k, record, &CheckOptions::default())?;
+/// assert_eq!(found.change.unwrap().0, Change::Sign);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn controller(
+    k: &StateSpace<Discrete>,
+    record: ControllerRecord<'_>,
+    options: &CheckOptions,
+) -> Result<ControllerCheck> {
+    if k.worst_pole()?.is_some_and(|pole| pole.norm() > INTEGRATOR) {
+        k.require_stable("the declared controller, to be simulated by itself")?;
+    }
+    let log = Log::new(record);
+    let residual = log.residual(k, &log.e, &log.w)?;
+    let excited = record.input_excitation.is_some();
+    let mut change = None;
+    if residual > options.controller_caution {
+        for (candidate, left) in log.changes(k)? {
+            if change.as_ref().is_none_or(|(_, best)| left < *best) {
+                change = Some((candidate, left));
+            }
+        }
+        let least = HELPS * residual;
+        change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
+    }
+    Ok(ControllerCheck { residual, excited, change })
+}

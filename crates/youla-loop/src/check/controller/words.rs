@@ -1,0 +1,108 @@
+//! The finding on a controller, in words.
+
+use super::{Change, ControllerCheck};
+use crate::Error;
+use crate::check::CheckOptions;
+use crate::check::finding::{Finding, Severity, Test, few};
+use youla::signal::Channel;
+
+/// Factors that are known from units: degrees and radians, revolutions, thousands.
+const UNITS: [(f64, &str); 4] = [
+    (57.295_779_513_082_32, "180 / pi, degrees against radians"),
+    (std::f64::consts::TAU, "2 pi, revolutions against radians"),
+    (1e3, "1000, milli"),
+    (1e6, "1e6, micro"),
+];
+
+impl Change {
+    fn words(&self, outputs: &[Channel]) -> String {
+        let name = |i: usize| outputs.get(i).map_or("an output", |c| c.name.as_str());
+        let rows = |rows: isize| if rows > 0 { "later" } else { "earlier" };
+        let unit = |gain: f64| {
+            let of = |factor: f64| (gain / factor - 1.0).abs() < 0.02 || (gain * factor - 1.0).abs() < 0.02;
+            UNITS.iter().find(|(factor, _)| of(*factor)).map_or(String::new(), |(_, text)| format!(" ({text}?)"))
+        };
+        match self {
+            Change::Sign => {
+                "the other sign: change `feedback` in [controller] to the other of \"negative\" and \"positive\"".into()
+            }
+            Change::Shift(by) => format!("the outputs (and references) one sample {} against the input", rows(*by)),
+            Change::InputShift(by) => {
+                format!("the input one sample {} against all other channels", rows(-*by))
+            }
+            Change::Gain(gain) => format!("{} times the gain{}", few(*gain), unit(*gain)),
+            Change::ChannelGain(i, gain) => format!("{} times {}{}", few(*gain), name(*i), unit(*gain)),
+            Change::Exchanged(i, j) => format!("{} and {} exchanged", name(*i), name(*j)),
+            Change::Saturation([low, high]) => format!("the input limited to {} ... {}", few(*low), few(*high)),
+            Change::WithoutExcitation => "the excitation left out: the input was logged before it was added".into(),
+            Change::ExcitationSign => "the other sign of the excitation".into(),
+        }
+    }
+
+    /// Key in the numbers of a finding, with its value.
+    fn number(&self) -> (&'static str, f64) {
+        match self {
+            Change::Sign => ("sign", -1.0),
+            Change::Shift(rows) => ("shift", *rows as f64),
+            Change::InputShift(rows) => ("input_shift", *rows as f64),
+            Change::Gain(gain) => ("gain", *gain),
+            Change::ChannelGain(_, gain) => ("channel_gain", *gain),
+            Change::Exchanged(..) => ("exchanged", 1.0),
+            Change::Saturation([_, high]) => ("saturation", *high),
+            Change::WithoutExcitation => ("without_excitation", 1.0),
+            Change::ExcitationSign => ("excitation_sign", -1.0),
+        }
+    }
+}
+
+impl ControllerCheck {
+    pub(in crate::check) fn finding(
+        &self,
+        record: &str,
+        outputs: &[Channel],
+        options: &CheckOptions,
+    ) -> Option<Finding> {
+        if self.residual <= options.controller_caution {
+            return None;
+        }
+        let percent = few(100.0 * self.residual);
+        let (severity, what) = match (&self.change, self.excited) {
+            (None, false) => (
+                Severity::Note,
+                format!(
+                    "the declared controller leaves {percent} % of the logged input: that is an excitation which is not \
+                     declared, or the controller is another one"
+                ),
+            ),
+            _ => {
+                let severe = self.residual > options.controller_defect;
+                let severity = if severe { Severity::Defect } else { Severity::Caution };
+                (severity, format!("the declared controller leaves {percent} % of the logged input"))
+            }
+        };
+        let advice = match &self.change {
+            Some((change, left)) => {
+                format!("It would leave {} % with {}", few(100.0 * left), change.words(outputs))
+            }
+            None if self.excited => {
+                "Look for saturation, a delay, another sample time or another controller; no single change of sign, gain, \
+                 shift or channels explains it"
+                    .into()
+            }
+            None => "Log the excitation, or accept that the controller cannot be checked".into(),
+        };
+        let mut finding = Finding::new(Test::Controller, severity, record, what).number("residual", self.residual);
+        if let Some((change, left)) = &self.change {
+            let (key, value) = change.number();
+            finding = finding.number("residual_after", *left).number(key, value);
+        }
+        Some(finding.advice(&advice))
+    }
+}
+
+/// The finding for a controller that could not be simulated.
+pub(in crate::check) fn not_simulated(record: &str, error: &Error) -> Finding {
+    let what = format!("the declared controller cannot be held against the logged input: {error}");
+    Finding::new(Test::Controller, Severity::Note, record, what)
+        .advice("`youla identify` checks it through the coprime factors (controller_mismatch)")
+}

@@ -1,0 +1,202 @@
+//! What the excitation offers: size, crest factor, rank of its Hankel matrix, and the band in which it has power.
+//!
+//! Identification with past and future horizons p and f needs persistency of order p + f ([`youla::signal::persistency`]). Rank is
+//! a question of rounding; the condition number says how much weaker the weakest direction is. The band ends where the
+//! spectrum (Welch) stays 60 dB below its largest value.
+
+use super::CheckOptions;
+use super::finding::{Finding, Severity, Test, few};
+use crate::Result;
+use std::f64::consts::TAU;
+use youla::MatRef;
+use youla::lti::Discrete;
+use youla::signal::Channel;
+use youla::signal::{Welch, cross_spectrum, persistency, persistency_order};
+
+/// What an excitation offers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Excitation {
+    /// Standard deviation of each channel.
+    pub deviations: Vec<f64>,
+    /// Greatest distance from the mean over the standard deviation, of each channel; NaN for a constant one.
+    pub crest: Vec<f64>,
+    /// Block rows of the Hankel matrix.
+    pub order: usize,
+    /// Order of persistency of all channels together, at most `order`.
+    pub reached: usize,
+    /// Condition number of the Hankel matrix.
+    pub condition: f64,
+    /// Per channel, the frequency in Hz from which its power stays 60 dB below its largest; absent where it does not.
+    pub band_end: Vec<Option<f64>>,
+}
+
+/// Power below which a band counts as empty, over the largest.
+const EMPTY: f64 = 1e-6;
+/// Samples of a window of the spectrum, at most.
+const WINDOW: usize = 1024;
+/// Part of the band up to Nyquist that must be empty to be worth a word.
+const WORTH: f64 = 0.1;
+
+/// Describes an excitation, samples x channels; the mean does not count.
+///
+/// # Errors
+/// [`youla::Error::NoConvergence`] of the singular values.
+///
+/// ```
+/// use youla::{Mat, check::excitation, lti::Discrete};
+/// let turn = std::f64::consts::TAU / 100.0;
+/// let sines = Mat::from_fn(2000, 1, |k, _| (5.0 * turn * k as f64).sin() + (13.0 * turn * k as f64).sin());
+/// let found = excitation(sines.as_ref(), Discrete::new(0.01)?, 20)?;
+/// assert_eq!((found.order, found.reached), (20, 4));
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Result<Excitation> {
+    let n = signal.nrows();
+    let mut centred = signal.to_owned();
+    let (mut deviations, mut crest) = (Vec::new(), Vec::new());
+    for j in 0..signal.ncols() {
+        let column = centred.col_as_slice_mut(j);
+        let mean = column.iter().sum::<f64>() / n as f64;
+        column.iter_mut().for_each(|v| *v -= mean);
+        let deviation = (column.iter().map(|v| v * v).sum::<f64>() / n as f64).sqrt();
+        let constant = deviation <= 1e-13 * mean.abs();
+        if constant {
+            column.fill(0.0);
+        }
+        let largest = column.iter().fold(0.0, |l: f64, v| l.max(v.abs()));
+        deviations.push(if constant { 0.0 } else { deviation });
+        crest.push(if constant { f64::NAN } else { largest / deviation });
+    }
+    // More block rows than a third of the samples say nothing of the signal.
+    let order = order.min(n / (3 * signal.ncols().max(1))).max(1);
+    let found = persistency(centred.as_ref(), order)?;
+    let reached =
+        if found.rank == found.needed { order } else { persistency_order(centred.as_ref(), order.saturating_sub(1))? };
+    let window = WINDOW.min(n / 4);
+    let mut band_end = vec![None; signal.ncols()];
+    for (j, end) in band_end.iter_mut().enumerate().filter(|(j, _)| window >= 16 && deviations[*j] > 0.0) {
+        let welch = Welch { window, ..Welch::default() };
+        let density =
+            cross_spectrum(centred.as_ref().subcols(j, 1), centred.as_ref().subcols(j, 1), time, &welch)?.density;
+        let power: Vec<f64> = density.entry(0, 0).iter().map(|s| s.re).collect();
+        let largest = power.iter().copied().fold(0.0, f64::max);
+        let last = power.iter().rposition(|s| *s > EMPTY * largest).unwrap_or(0);
+        if ((last + 1) as f64) < (1.0 - WORTH) * power.len() as f64 {
+            *end = Some(density.omega[last] / TAU);
+        }
+    }
+    Ok(Excitation { deviations, crest, order, reached, condition: found.condition, band_end })
+}
+
+impl Excitation {
+    /// `declared` where the signal is a known excitation and not the input; `may_rest` for a reference.
+    pub(super) fn findings(
+        &self,
+        record: &str,
+        channels: &[Channel],
+        (declared, may_rest): (bool, bool),
+        nyquist: f64,
+        options: &CheckOptions,
+    ) -> Vec<Finding> {
+        let mut all = Vec::new();
+        let dead: Vec<&Channel> =
+            channels.iter().zip(&self.deviations).filter(|(_, d)| **d == 0.0).map(|(c, _)| c).collect();
+        if may_rest && !dead.is_empty() {
+            return all;
+        }
+        for channel in &dead {
+            let what = match declared {
+                true => "it is declared as an excitation, but does not move",
+                false => "the input does not move",
+            };
+            let advice = "Log the signal that was injected, or leave the channel out of run.toml; without excitation nothing can \
+                          be identified";
+            let finding = Finding::new(Test::Excitation, Severity::Defect, record, what.into());
+            all.push(finding.channel(&channel.name).advice(advice));
+        }
+        if !dead.is_empty() {
+            return all;
+        }
+        let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
+        let names = names.join(", ");
+        let numbers = |finding: Finding| {
+            let finding = finding.number("order", self.reached as f64).number("needed", self.order as f64);
+            finding.number("condition", self.condition)
+        };
+        if self.reached < self.order {
+            let what = format!(
+                "it excites persistently of order {}, but past and future horizon need {}",
+                self.reached, self.order
+            );
+            let advice = "Excite with more lines, a longer shift register or noise; or take shorter horizons";
+            all.push(
+                numbers(Finding::new(Test::Excitation, Severity::Defect, record, what).channel(&names)).advice(advice),
+            );
+        } else if self.condition > options.excitation_condition {
+            let what = format!(
+                "the weakest direction of order {} of the excitation has {} times less amplitude than the strongest",
+                self.order,
+                few(self.condition)
+            );
+            let advice = "Expect little to be known where it has no power; keep the horizons short, or excite there";
+            all.push(
+                numbers(Finding::new(Test::Excitation, Severity::Note, record, what).channel(&names)).advice(advice),
+            );
+        }
+        for ((channel, crest), end) in channels.iter().zip(&self.crest).zip(&self.band_end) {
+            if *crest > options.crest {
+                let what = format!("the excitation has a crest factor of {}: few samples hold its energy", few(*crest));
+                let finding = Finding::new(Test::Excitation, Severity::Note, record, what).channel(&channel.name);
+                let advice = "A signal of two levels has 1 and reaches the same energy with less amplitude";
+                all.push(finding.number("crest", *crest).advice(advice));
+            }
+            if let Some(hz) = end {
+                let what = format!(
+                    "from {} Hz to the Nyquist frequency of {} Hz it has hardly any power (60 dB below its largest)",
+                    few(*hz),
+                    few(nyquist)
+                );
+                let finding = Finding::new(Test::Excitation, Severity::Note, record, what).channel(&channel.name);
+                let advice = "Nothing is known of the plant there; a slower sample time would do";
+                all.push(finding.number("band_end_hz", *hz).advice(advice));
+            }
+        }
+        all
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use youla::Mat;
+
+    #[test]
+    fn noise_is_enough_and_a_short_register_is_not() {
+        let time = Discrete::new(1e-3).unwrap();
+        let options = CheckOptions::default();
+        let channels = [Channel::new("d", "V")];
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let noise = Mat::from_fn(4000, 1, |_, _| rng.sample::<f64, _>(StandardNormal));
+        let found = excitation(noise.as_ref(), time, 40).unwrap();
+        assert_eq!((found.reached, &found.band_end[..]), (40, &[None][..]));
+        assert!(found.findings("log", &channels, (true, false), 500.0, &options).is_empty());
+        // x^4 + x^3 + 1: period 15, order 14 without its mean.
+        let mut register = 1u32;
+        let mut bit = || {
+            let new = (register ^ (register >> 1)) & 1;
+            register = (register >> 1) | (new << 3);
+            f64::from(register & 1)
+        };
+        let prbs = Mat::from_fn(4000, 1, |_, _| bit());
+        let found = excitation(prbs.as_ref(), time, 40).unwrap();
+        assert!((14..=15).contains(&found.reached), "{}", found.reached);
+        let findings = found.findings("log", &channels, (true, false), 500.0, &options);
+        assert_eq!(findings[0].severity, Severity::Defect);
+        let zero = excitation(Mat::zeros(4000, 1).as_ref(), time, 40).unwrap();
+        assert!(zero.findings("log", &channels, (true, false), 500.0, &options)[0].what.contains("does not move"));
+        assert!(zero.findings("log", &channels, (true, true), 500.0, &options).is_empty());
+    }
+}

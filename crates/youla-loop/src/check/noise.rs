@@ -1,0 +1,111 @@
+//! How much of each output the excitation explains.
+//!
+//! With the coherence `gamma^2` between the excitation (the input, where the loop is open) and an output, estimated over K windows
+//! and freed of its bias m / K,
+//! ```text
+//! SNR = sum gamma^2 S_y / sum (1 - gamma^2) S_y
+//! ```
+//! over all frequencies but zero. Noise, disturbances and nonlinearities count as noise alike.
+//!
+//! Source: G. C. Carter, C. H. Knapp, A. H. Nuttall, IEEE Trans. Audio Electroacoust. 21 (1973), 337, for the bias.
+
+use super::finding::{Finding, Severity, Test, few};
+use crate::Result;
+use std::f64::consts::TAU;
+use youla::MatRef;
+use youla::lti::Discrete;
+use youla::signal::Channel;
+use youla::signal::{ExcitedRecord, Welch, cross_spectrum, indirect_response};
+
+/// Signal and noise in one output.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Noise {
+    /// Power that the excitation explains over the power that it does not.
+    pub ratio: f64,
+    /// Share of the frequencies at which it explains half of the power or more.
+    pub seen: f64,
+    /// Lowest and highest of these frequencies, Hz; absent where there are none.
+    pub band: Option<[f64; 2]>,
+}
+
+/// Windows in a record, about.
+const WINDOWS: usize = 16;
+/// Samples of a window, at most and at least.
+const WINDOW: [usize; 2] = [32, 2048];
+
+/// Signal-to-noise ratio of every output with respect to an excitation (samples x m). `None` where the record is too short
+/// or the excitation has no power at some frequency.
+///
+/// # Errors
+/// Shapes; [`youla::Error::NotFinite`].
+///
+/// ```
+/// use youla::{Mat, check::noise, lti::Discrete};
+/// let hash = |k: usize| ((k * k * 31 + 7 * k) % 8191) as f64 / 8191.0 - 0.5;
+/// let u = Mat::from_fn(8000, 1, |k, _| hash(k));
+/// let y = Mat::from_fn(8000, 1, |k, _| hash(k) + 0.1 * hash(3 * k + 1));
+/// let found = noise(u.as_ref(), y.as_ref(), Discrete::new(0.01)?)?.unwrap();
+/// assert!((50.0..200.0).contains(&found[0].ratio));
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn noise(excitation: MatRef<'_, f64>, y: MatRef<'_, f64>, time: Discrete) -> Result<Option<Vec<Noise>>> {
+    let window = (y.nrows() / WINDOWS).min(WINDOW[1]);
+    if window < WINDOW[0] {
+        return Ok(None);
+    }
+    let welch = Welch { window, ..Welch::default() };
+    // Its response is the quotient of spectra of the excitation with itself, which is not looked at; coherences are.
+    let record = ExcitedRecord { d: excitation, u: excitation, y };
+    let found = match indirect_response(&[record], time, &welch) {
+        Ok(found) => found,
+        Err(youla::Error::Singular { .. }) => return Ok(None),
+        Err(e) => return Err(e.into()),
+    };
+    let bias = excitation.ncols() as f64 / found.segments as f64;
+    if bias > 0.3 {
+        return Ok(None);
+    }
+    let mut all = Vec::new();
+    for i in 0..y.ncols() {
+        let power = cross_spectrum(y.subcols(i, 1), y.subcols(i, 1), time, &welch)?.density;
+        let (mut signal, mut rest, mut seen) = (0.0, 0.0, Vec::new());
+        for (k, omega) in found.response.omega.iter().enumerate() {
+            let coherence = ((found.coherence_y[(k, i)] - bias) / (1.0 - bias)).clamp(0.0, 1.0);
+            let s = power.at(k + 1)[(0, 0)].re;
+            signal += coherence * s;
+            rest += (1.0 - coherence) * s;
+            if coherence >= 0.5 {
+                seen.push(omega / TAU);
+            }
+        }
+        let band = seen.first().zip(seen.last()).map(|(from, to)| [*from, *to]);
+        let ratio = if rest > 0.0 { signal / rest } else { f64::INFINITY };
+        all.push(Noise { ratio, seen: seen.len() as f64 / found.response.omega.len() as f64, band });
+    }
+    Ok(Some(all))
+}
+
+/// Share of the frequencies, and signal-to-noise ratio, below which an excitation is not seen.
+const UNSEEN: [f64; 2] = [0.02, 0.05];
+
+impl Noise {
+    pub(super) fn finding(&self, record: &str, channel: &Channel) -> Finding {
+        let decibel = 10.0 * self.ratio.log10();
+        let band = self.band.map_or("nowhere".to_owned(), |[from, to]| {
+            format!("at {} % of the frequencies, from {} Hz to {} Hz", few(100.0 * self.seen), few(from), few(to))
+        });
+        let what = format!(
+            "the excitation explains it with a signal-to-noise ratio of {decibel:.1} dB; it explains half of the power {band}"
+        );
+        let (severity, advice) = if self.seen < UNSEEN[0] && self.ratio < UNSEEN[1] {
+            (Severity::Caution, "Excite more strongly or longer: what is hardly seen can hardly be identified")
+        } else {
+            (Severity::Note, "")
+        };
+        Finding::new(Test::Noise, severity, record, what)
+            .channel(&channel.name)
+            .number("snr_db", decibel)
+            .number("seen", self.seen)
+            .advice(advice)
+    }
+}

@@ -1,0 +1,187 @@
+//! All tests but that of the time column on one record.
+
+use super::outside::{constant, of_excitation, of_lines, trends};
+use super::regression::Lagged;
+use super::{
+    CheckOptions, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay, feedback, outliers,
+    quantisation, stuck,
+};
+use crate::{Error, Result};
+use youla::MatRef;
+use youla::lti::{Discrete, StateSpace};
+use youla::signal::Channel;
+
+/// A record as it was logged; row k is time k.
+#[derive(Debug, Clone, Copy)]
+pub struct LoggedRecord<'a> {
+    /// Name in findings.
+    pub name: &'a str,
+    /// Clock of the samples.
+    pub time: Discrete,
+    /// Row of the file, counted from 1, in which the first sample stands.
+    pub first_row: usize,
+    /// Plant input as applied, samples x m.
+    pub u: MatRef<'a, f64>,
+    /// Measured output, samples x p.
+    pub y: MatRef<'a, f64>,
+    /// Known excitation added at the plant input, samples x m.
+    pub input_excitation: Option<MatRef<'a, f64>>,
+    /// Known reference, samples x p.
+    pub reference: Option<MatRef<'a, f64>>,
+    /// Known excitation alpha of Fig. 3, samples x m.
+    pub alpha: Option<MatRef<'a, f64>>,
+}
+
+/// Names and units of the channels of a [`LoggedRecord`]; empty where it has none.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct ChannelNames {
+    /// Of u.
+    pub inputs: Vec<Channel>,
+    /// Of y.
+    pub outputs: Vec<Channel>,
+    /// Of the excitation at the plant input.
+    pub input_excitation: Vec<Channel>,
+    /// Of the reference.
+    pub reference: Vec<Channel>,
+    /// Of alpha.
+    pub alpha: Vec<Channel>,
+}
+
+/// Samples of a record, at least.
+const SHORTEST: usize = 16;
+
+/// Runs all tests but that of the time column on one record; `controller` is the one that ran, with positive feedback, where
+/// it is declared; the controller 0 declares an open loop. Findings come in the order of the tests.
+///
+/// # Errors
+/// [`youla::Error::OutOfRange`] for options outside of their range, and numerical conditions of the tests.
+pub fn check_record(
+    record: &LoggedRecord<'_>,
+    names: &ChannelNames,
+    declared: Option<&StateSpace<Discrete>>,
+    options: &CheckOptions,
+) -> Result<Vec<Finding>> {
+    options.check()?;
+    let declared = declared.filter(|k| !k.is_zero());
+    if record.u.nrows() < SHORTEST {
+        let what = format!("it has {} samples; nothing can be tested below {SHORTEST}", record.u.nrows());
+        return Ok(vec![Finding::new(Test::Timing, Severity::Caution, record.name, what)]);
+    }
+    let mut all = Vec::new();
+    let (m, p) = (record.u.ncols(), record.y.ncols());
+    let moving: Vec<MatRef<'_, f64>> = [record.input_excitation, record.alpha, record.reference]
+        .into_iter()
+        .flatten()
+        .filter(|x| !constant(*x))
+        .collect();
+    let known: usize = moving.iter().map(|x| x.ncols()).sum();
+    let groups = [vec![record.u, record.y], moving].concat();
+    let lagged = Lagged::new(&groups, options.lags);
+    let wrong = match &lagged {
+        Some(lagged) => Some(outliers::of_outputs(lagged, m, p, options)?),
+        None => None,
+    };
+    of_channels(record, names, wrong.as_deref(), options, &mut all);
+    let mut fed_back = declared.is_some();
+    if let Some(lagged) = &lagged {
+        for ((found, _), channel) in wrong.iter().flatten().zip(&names.outputs) {
+            all.extend(found.finding(record.name, record.first_row, channel, options));
+        }
+        all.extend(trends(record, names, lagged, options)?);
+        let feedback = feedback::of_record(lagged, m, p, known, options)?;
+        fed_back |= feedback.detected;
+        let input = names.inputs.get(feedback.input).map_or("u", |c| c.name.as_str());
+        all.extend(feedback.finding(record.name, input, declared.is_some()));
+        let added = record.input_excitation.filter(|d| !constant(*d)).map(|_| m + p);
+        let places = delay::Places { inputs: m, outputs: p, added, known: m + p..m + p + known, feedback: fed_back };
+        let found = delay::of_record(lagged, &places, options)?;
+        all.extend(found.findings(record.name, &names.inputs, &names.outputs, fed_back));
+    }
+    all.extend(of_excitation(record, names, fed_back, options)?);
+    all.extend(of_lines(record, names, fed_back, options));
+    if let Some(k) = declared.filter(|_| record.alpha.is_none()) {
+        match controller(k, of_controller(record), options) {
+            Ok(found) => all.extend(found.finding(record.name, &names.outputs, options)),
+            Err(
+                error @ (Error::Method(youla::Error::Diverged { .. }) | Error::Method(youla::Error::Unstable { .. })),
+            ) => all.push(controller::not_simulated(record.name, &error)),
+            Err(error) => return Err(error),
+        }
+    }
+    all.sort_by_key(|finding| finding.test);
+    Ok(all)
+}
+
+fn of_controller<'a>(record: &LoggedRecord<'a>) -> ControllerRecord<'a> {
+    let LoggedRecord { u, y, input_excitation, reference, .. } = *record;
+    ControllerRecord { u, y, input_excitation, reference }
+}
+
+/// Tests of one channel at a time: limits, standstill, steps.
+fn of_channels(
+    record: &LoggedRecord<'_>,
+    names: &ChannelNames,
+    innovations: Option<&[(Outliers, f64)]>,
+    options: &CheckOptions,
+    all: &mut Vec<Finding>,
+) {
+    for (data, channels, output) in [(record.u, &names.inputs, false), (record.y, &names.outputs, true)] {
+        for (j, channel) in channels.iter().enumerate() {
+            let values: Vec<f64> = data.col(j).iter().copied().collect();
+            let limits = options.limits.get(&channel.name).copied();
+            let found = clipping(&values, limits, options);
+            all.extend(found.findings(record.name, record.first_row, channel, output, values.len()));
+            // A channel at its limit stands still there; that has been said.
+            let held = |value: f64| found.lower.iter().chain(&found.upper).any(|limit| limit.value == value);
+            if let Some(standstill) = stuck(&values, options).filter(|s| !held(s.value)) {
+                all.push(standstill.finding(record.name, record.first_row, channel));
+            }
+            let innovation = innovations.filter(|_| output).and_then(|i| i.get(j)).map(|(_, sigma)| *sigma);
+            if let Some(steps) = quantisation(&values, options).filter(|_| output) {
+                all.extend(steps.finding(record.name, channel, innovation, options));
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use youla::Mat;
+
+    /// `x+ = 0.9 x + 0.3 u`, `y = x + n`, `u = d - 1.5 y`, all noise white: over 200 seeds nothing but notes, and the notes
+    /// that hold.
+    #[test]
+    fn a_clean_loop_is_clean() {
+        let time = Discrete::new(1e-3).unwrap();
+        let empty = |rows, columns| Mat::zeros(rows, columns);
+        let gain = Mat::from_fn(1, 1, |_, _| -1.5);
+        let k = StateSpace::new(empty(0, 0), empty(0, 1), empty(1, 0), gain, time).unwrap();
+        let one = |name: &str| vec![Channel::new(name, "V")];
+        let names =
+            ChannelNames { inputs: one("u"), outputs: one("y"), input_excitation: one("d"), ..Default::default() };
+        let options = CheckOptions { lags: 8, excitation_order: Some(20), ..CheckOptions::default() };
+        for seed in 0..200 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut draw = || rng.sample::<f64, _>(StandardNormal);
+            let (mut x, mut rows) = (0.0, Vec::new());
+            for _ in 0..1200 {
+                let (d, y) = (draw(), x + 0.2 * draw());
+                let u = d - 1.5 * y;
+                rows.push([u, y, d]);
+                x = 0.9 * x + 0.3 * u;
+            }
+            let [u, y, d] = [0, 1, 2].map(|j| Mat::from_fn(1200, 1, |k, _| rows[k][j]));
+            let (input_excitation, name, first_row) = (Some(d.as_ref()), "log", 1);
+            let (u, y) = (u.as_ref(), y.as_ref());
+            let record = LoggedRecord { name, time, first_row, u, y, input_excitation, reference: None, alpha: None };
+            let found = check_record(&record, &names, Some(&k), &options).unwrap();
+            let serious: Vec<_> = found.iter().filter(|f| f.severity > Severity::Note).collect();
+            assert!(serious.is_empty(), "seed {seed}: {serious:?}");
+            assert!(found.iter().any(|f| f.test == Test::Noise), "seed {seed}");
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! A channel that stands still: a sensor that is stuck, a cable that dropped out, a logger that repeats its last value.
+//!
+//! Of N samples of which the share q equals the one before, a constant stretch of L samples has a probability of about
+//! `N q^(L-1)`. Friction and coarse steps make longer ones, but many of them, so that the stretch must also be several times as
+//! long as every other one of the channel.
+
+use super::CheckOptions;
+use super::finding::{Finding, Severity, Test, with_unit};
+use youla::signal::Channel;
+
+/// A constant stretch.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standstill {
+    /// First sample, counted from 0.
+    pub first: usize,
+    /// Its length in samples.
+    pub samples: usize,
+    /// The value.
+    pub value: f64,
+    /// Length of the next longest constant stretch of the channel.
+    pub next: usize,
+}
+
+/// Probability of a stretch by chance in a record.
+const CHANCE: f64 = 1e-4;
+/// Shortest stretch that is looked at.
+const SHORTEST: usize = 4;
+
+/// Looks for the longest constant stretch that is out of proportion. `None` also for a channel that is switched between few
+/// values.
+///
+/// ```
+/// use youla_loop::check::{CheckOptions, stuck};
+/// let mut wave: Vec<f64> = (0..500).map(|k| (0.3 * f64::from(k)).sin()).collect();
+/// wave[200..230].fill(0.25);
+/// let found = stuck(&wave, &CheckOptions::default()).unwrap();
+/// assert_eq!((found.first, found.samples), (200, 30));
+/// ```
+pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
+    let (mut longest, mut next) = ((0usize, 0usize), 0usize);
+    let (mut first, mut repeated) = (0usize, 0usize);
+    for k in 1..=values.len() {
+        if k < values.len() && values[k] == values[k - 1] {
+            repeated += 1;
+            continue;
+        }
+        let length = k - first;
+        if length > longest.1 {
+            next = longest.1;
+            longest = (first, length);
+        } else {
+            next = next.max(length);
+        }
+        first = k;
+    }
+    let (first, samples) = longest;
+    if samples < SHORTEST || samples == values.len() || samples as f64 <= options.stuck_ratio * next as f64 {
+        return None;
+    }
+    // The stretch itself does not count in what is usual.
+    let others = (values.len() - samples) as f64;
+    let share = (repeated + 1 - samples) as f64 / others;
+    let chance = others * share.powf(samples as f64 - 1.0);
+    (chance < CHANCE && several(values, options.switched_levels)).then_some(Standstill {
+        first,
+        samples,
+        value: values[first],
+        next,
+    })
+}
+
+/// Whether a channel has more than `levels` values.
+fn several(values: &[f64], levels: usize) -> bool {
+    let mut seen: Vec<f64> = Vec::new();
+    for v in values {
+        if !seen.contains(v) {
+            seen.push(*v);
+        }
+        if seen.len() > levels {
+            return true;
+        }
+    }
+    false
+}
+
+impl Standstill {
+    pub(super) fn finding(&self, record: &str, first: usize, channel: &Channel) -> Finding {
+        let what = format!(
+            "it stands still at {} for {} samples, while no other constant stretch is longer than {}",
+            with_unit(self.value, &channel.unit),
+            self.samples,
+            self.next
+        );
+        Finding::new(Test::Stuck, Severity::Defect, record, what)
+            .channel(&channel.name)
+            .rows(first + self.first, first + self.first + self.samples - 1)
+            .number("samples", self.samples as f64)
+            .number("next", self.next as f64)
+            .advice("Leave these rows out by `segments`; see whether the sensor or the logger dropped out")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// Noise in steps of twice its deviation repeats itself often; nothing in 200 records, and 40 equal samples in each.
+    #[test]
+    fn chance_makes_short_stretches() {
+        let options = CheckOptions::default();
+        let mut found = 0;
+        for seed in 0..200 {
+            let mut rng = ChaCha8Rng::seed_from_u64(seed);
+            let mut noise: Vec<f64> =
+                (0..3000).map(|_| (rng.sample::<f64, _>(StandardNormal) * 4.0).round() * 0.25).collect();
+            assert_eq!(stuck(&noise, &options), None, "seed {seed}");
+            noise[1000..1040].fill(0.25);
+            found += usize::from(stuck(&noise, &options).is_some_and(|s| s.samples.abs_diff(40) < 4));
+        }
+        assert_eq!(found, 200);
+    }
+}

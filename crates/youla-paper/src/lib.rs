@@ -1,0 +1,15 @@
+//! The paper as a computation: its gas bearing, the digital twin of the rig, its study and its experiments, every figure and table.
+
+pub mod bearing_structure;
+pub mod demo;
+mod error;
+pub mod rig;
+pub mod run;
+pub mod run_starts;
+pub mod story;
+pub mod story_starts;
+pub mod study;
+
+pub use bearing_structure::BearingStructure;
+pub use demo::{Demo, demo};
+pub use error::{Error, Result};

@@ -1,0 +1,105 @@
+//! The page.
+
+use super::claims::paper_claims;
+use super::tables::{plain, row};
+use super::words::{count, short};
+use super::{section_experiments, section_rig, section_settings, section_study, section_timing};
+use crate::Result;
+use crate::study::{Method, Paper};
+use youla_report::data;
+use youla_report::figure::Figure;
+pub(super) use youla_report::story::section;
+use youla_report::story::{Block, Section, Story, Table};
+
+/// The section whose tables differ from run to run.
+const TIMING: &str = "timing";
+
+/// The methods of the page in the order in which they are listed and drawn.
+pub fn story_methods() -> Vec<data::Method> {
+    Method::ALL.into_iter().map(drawn).collect()
+}
+
+fn drawn(method: Method) -> data::Method {
+    match method {
+        Method::Nominal => data::Method::nominal(),
+        Method::Pem => data::Method::pem(),
+        Method::PemMultiStart => data::Method::pem_multi_start(),
+        Method::Direct => data::Method::direct(),
+        Method::Hansen => data::Method::hansen(),
+        Method::HansenReduced => data::Method::hansen_reduced(),
+        Method::HansenPem => data::Method::hansen_pem(),
+    }
+}
+
+/// The whole page, figures and tables in place.
+///
+/// # Errors
+/// Those of the modes of the nominal model and of the rig, and of the harmonics of a record that is too short.
+pub fn paper_story(paper: &Paper) -> Result<Story> {
+    let settings = &paper.settings;
+    Ok(Story {
+        title: "Closed-loop identification of a gas bearing, reproduced".into(),
+        summary: format!(
+            "The study of {}, the three experiments and every figure and table of the paper, computed on a digital twin of the \
+             rig from the paper's description alone, with seed {}. Published numbers stand beside ours.",
+            count(settings.study.models, "nominal model", "nominal models"),
+            settings.seed
+        ),
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        methods: story_methods(),
+        sections: vec![
+            brief(paper),
+            section_rig::rig(paper),
+            section_rig::controller(paper),
+            section_rig::nominal(paper)?,
+            section_study::study(paper),
+            section_study::map(paper),
+            section_experiments::experiments(paper)?,
+            section_experiments::reduction(paper)?,
+            section_timing::timing(paper, TIMING),
+            section_settings::settings(paper),
+        ],
+    })
+}
+
+/// The figures of the page in its order.
+///
+/// # Errors
+/// Those of [`paper_story`].
+pub fn paper_figures(paper: &Paper) -> Result<Vec<Figure>> {
+    let blocks = paper_story(paper)?.sections.into_iter().flat_map(|s| s.blocks);
+    Ok(blocks.filter_map(|b| if let Block::Figure(figure) = b { Some(figure) } else { None }).collect())
+}
+
+/// The tables of the page in its order, without those that hold times: the same paper gives the same tables.
+///
+/// # Errors
+/// Those of [`paper_story`].
+pub fn paper_tables(paper: &Paper) -> Result<Vec<Table>> {
+    let sections = paper_story(paper)?.sections.into_iter().filter(|s| s.key != TIMING);
+    let blocks = sections.flat_map(|s| s.blocks);
+    Ok(blocks.filter_map(|b| if let Block::Table(table) = b { Some(table) } else { None }).collect())
+}
+
+/// What the paper claims and whether it comes out.
+fn brief(paper: &Paper) -> Section {
+    let rows = paper_claims(paper)
+        .into_iter()
+        .map(|c| row([c.source.to_owned(), c.claim.to_owned(), c.outcome.words().to_owned()]));
+    let table = plain(
+        "claims",
+        "Claims of the paper",
+        "What the paper says and whether it comes out here; the numbers stand in the sections below.",
+        &["source", "claim", "here"],
+        rows.collect(),
+    );
+    let text = format!(
+        "The paper compares three ways to identify a gas bearing while its controller runs: prediction error with a physical \
+         structure (PEM), subspace identification of the plant itself (direct), and subspace identification of the Youla \
+         deviation system S (modified Hansen scheme). Its data are not public, so a digital twin stands in for the rig. Every \
+         verdict below is computed from the results of this run, with sensor noise of {} um rms; models are compared by the \
+         fit (26), in percent, of the output that they simulate from the input alone.",
+        short(paper.rig.sensor.noise.value, 3)
+    );
+    section("brief", "In brief", "In brief", vec![Block::Text(text), Block::Table(table)])
+}

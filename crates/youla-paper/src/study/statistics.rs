@@ -1,0 +1,141 @@
+//! What the rows of a campaign say.
+
+use super::method::Method;
+use super::row::{Row, Status};
+
+/// Fit of the worse axis, percent, below which a stable model counts as lost.
+pub const LOST: f64 = 50.0;
+
+impl Row {
+    /// Whether there is no usable model: none, an unstable one, or one that is lost on an axis.
+    pub fn failed(&self) -> bool {
+        self.status != Status::Stable || self.worse_fit() < LOST
+    }
+}
+
+/// Margin in percentage points below which nobody wins.
+pub const TIE: f64 = 1.0;
+
+/// The value below which a share of the values lies, linear between neighbours; values that are not numbers count as lower
+/// than all. NaN for no values.
+pub fn quantile(values: &[f64], share: f64) -> f64 {
+    let number = |v: &f64| if v.is_nan() { f64::NEG_INFINITY } else { *v };
+    let mut sorted: Vec<f64> = values.iter().map(number).collect();
+    sorted.sort_by(f64::total_cmp);
+    youla::linalg::quantile(&sorted, share)
+}
+
+/// The middle value.
+pub fn median(values: &[f64]) -> f64 {
+    quantile(values, 0.5)
+}
+
+/// One method over one tenth of the range of theta.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Decile {
+    /// The method.
+    pub method: Method,
+    /// From and to.
+    pub theta: [f64; 2],
+    /// Loops.
+    pub count: usize,
+    /// Median fit per axis, percent, over all loops; minus infinity where that many gave no model.
+    pub median: [f64; 2],
+    /// Median of the fit of the worse axis, by which methods are compared.
+    pub worse: f64,
+    /// Loops without a model.
+    pub refused: usize,
+    /// Loops with an unstable model.
+    pub unstable: usize,
+    /// Loops with a stable model whose fit is below [`LOST`] on an axis.
+    pub lost: usize,
+}
+
+impl Decile {
+    /// Loops with a usable model.
+    pub fn usable(&self) -> usize {
+        self.count - self.failed()
+    }
+
+    /// Loops without a usable model.
+    pub fn failed(&self) -> usize {
+        self.refused + self.unstable + self.lost
+    }
+}
+
+/// Medians and failures of a method per tenth of the range of theta; every loop is in exactly one.
+pub fn deciles(rows: &[Row], method: Method, range: [f64; 2]) -> Vec<Decile> {
+    let tenth = |theta: f64| (((theta - range[0]) / (range[1] - range[0]) * 10.0) as usize).min(9);
+    let bound = |k: usize| range[0] + (range[1] - range[0]) * k as f64 / 10.0;
+    (0..10)
+        .map(|k| {
+            let inside: Vec<&Row> = rows.iter().filter(|r| r.method == method && tenth(r.theta) == k).collect();
+            summary(method, [bound(k), bound(k + 1)], &inside)
+        })
+        .collect()
+}
+
+/// Medians and failures of a method over all loops.
+pub fn overall(rows: &[Row], method: Method, range: [f64; 2]) -> Decile {
+    summary(method, range, &rows.iter().filter(|r| r.method == method).collect::<Vec<_>>())
+}
+
+fn summary(method: Method, theta: [f64; 2], rows: &[&Row]) -> Decile {
+    let axis = |i: usize| median(&rows.iter().map(|r| r.fit[i]).collect::<Vec<_>>());
+    let count = |predicate: &dyn Fn(&Row) -> bool| rows.iter().filter(|r| predicate(r)).count();
+    Decile {
+        method,
+        theta,
+        count: rows.len(),
+        median: [axis(0), axis(1)],
+        worse: median(&rows.iter().map(|r| r.worse_fit()).collect::<Vec<_>>()),
+        refused: count(&|r| matches!(r.status, Status::Refused | Status::NoController)),
+        unstable: count(&|r| r.status == Status::Unstable),
+        lost: count(&|r| r.status == Status::Stable && r.worse_fit() < LOST),
+    }
+}
+
+/// Who wins a cell of the map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Winner {
+    /// The methods with their median fit of the worse axis, percent, best first.
+    pub ranking: Vec<(Method, f64)>,
+    /// Lead over the second, percentage points; infinite where there is no second.
+    pub margin: f64,
+}
+
+/// Compares the methods by the median over the rows of a cell of the fit of the worse axis; the nominal model does not
+/// compete. `None` where there was no controller.
+pub fn winner(rows: &[&Row]) -> Option<Winner> {
+    let competing: Vec<&&Row> =
+        rows.iter().filter(|r| r.method != Method::Nominal && r.status != Status::NoController).collect();
+    let mut methods: Vec<Method> = competing.iter().map(|r| r.method).collect();
+    methods.sort();
+    methods.dedup();
+    let fits = |m: Method| competing.iter().filter(|r| r.method == m).map(|r| r.worse_fit()).collect::<Vec<_>>();
+    let mut ranking: Vec<(Method, f64)> = methods.into_iter().map(|m| (m, median(&fits(m)))).collect();
+    ranking.sort_by(|a, b| b.1.total_cmp(&a.1));
+    let margin = match ranking.as_slice() {
+        [] => return None,
+        [_] => f64::INFINITY,
+        // Both may be minus infinity.
+        [first, second, ..] if first.1 == second.1 => 0.0,
+        [first, second, ..] => first.1 - second.1,
+    };
+    Some(Winner { ranking, margin })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn quantiles_by_hand() {
+        let values = [3.0, 1.0, f64::NAN, 2.0];
+        assert_eq!(quantile(&values, 1.0 / 3.0), 1.0);
+        assert_eq!(median(&[1.0, 2.0, 4.0, 3.0]), 2.5);
+        assert_eq!(median(&values[..2]), 2.0);
+        assert!(median(&[]).is_nan());
+        assert_eq!(median(&[f64::NAN, f64::NAN, 5.0]), f64::NEG_INFINITY);
+    }
+}

@@ -1,0 +1,55 @@
+//! A run as one self-contained HTML file.
+//!
+//! Results come in as plain data, [`ReportData`], which holds what is drawn and nothing else, and go out as one file that
+//! opens without a network: tables are written by a template, figures are drawn by the embedded plotting library from
+//! the same data as JSON. Long records are reduced to their minimum and maximum per bucket ([`Trace`]) before they enter.
+//!
+//! | file | holds |
+//! |---|---|
+//! | `data` | the structs of the report |
+//! | `trace` | one drawn curve over time and the clock it refers to |
+//! | `decimate` | minimum and maximum per bucket |
+//! | `phase` | the branch on which a phase is drawn |
+//! | `figure` | a figure as data |
+//! | `run_figures` | the figures of a run for print |
+//! | `svg` | a figure for print |
+//! | `csv` | the numbers behind figures and tables |
+//! | `story` | a page of text, tables and figures as data |
+//! | `paper` | the results of the whole paper as such a page |
+//! | `starts` | the study of starts as such a page |
+//! | `tables` | fits by record and output, modes by frequency |
+//! | `page` | template, style, code, data and library put into one file |
+//! | `html` | a run as a page |
+//! | `thin` | figures with as many points as a page takes |
+//! | `story_html` | a story as a page |
+
+mod csv;
+pub mod data;
+mod decimate;
+mod error;
+pub mod figure;
+mod html;
+pub mod numbers;
+mod page;
+mod phase;
+mod run_figures;
+pub mod story;
+mod story_html;
+mod svg;
+mod tables;
+mod thin;
+pub mod trace;
+
+pub use csv::{figure_csv, table_csv};
+pub use data::ReportData;
+pub use error::{Error, Result};
+pub use figure::Figure;
+pub use html::html;
+pub use page::with_minus;
+pub use run_figures::{FigureChoice, RunDrawing, RunFigure, run_drawings, run_figures};
+pub use story::Story;
+pub use story_html::story_html;
+pub use svg::pretty_unit;
+pub use svg::{FIGURE_FONT, Print, svg, svg_for};
+pub use tables::SAME_MODE;
+pub use trace::{Timeline, Trace};

@@ -1,0 +1,67 @@
+//! Numbers in the JSON of a report: `null` stands for a value that is not finite, both ways.
+
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+/// Vectors as they are.
+pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+    let values = Vec::<Option<f64>>::deserialize(deserializer)?;
+    Ok(values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+}
+
+/// Vectors as they are.
+pub fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
+    values.serialize(serializer)
+}
+
+/// Vectors to seven significant digits, more than any figure shows.
+pub(super) mod seven_digits {
+    pub(in super::super) use super::deserialize;
+    use super::{Serializer, rounded};
+
+    pub(in super::super) fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(values.iter().map(|&value| rounded(value, decimals(value))))
+    }
+
+    fn decimals(value: f64) -> i32 {
+        super::decimals(value, 7)
+    }
+}
+
+/// Decimal places that keep `digits` significant digits of `value`; 0 for zero and for values that are not finite.
+pub fn decimals(value: f64, digits: i32) -> i32 {
+    if value == 0.0 || !value.is_finite() { 0 } else { digits - 1 - value.abs().log10().floor() as i32 }
+}
+
+/// `value` to a number of decimal places, which is negative for tens, hundreds and so on.
+///
+/// Powers of ten are exact up to 10^22, so that the quotient is the number nearest to the short decimal; values that would
+/// need a larger one stay as they are.
+pub fn rounded(value: f64, decimals: i32) -> f64 {
+    if decimals.abs() > 22 {
+        return value;
+    }
+    let power = 10f64.powi(decimals.abs());
+    if decimals >= 0 { (value * power).round() / power } else { (value / power).round() * power }
+}
+
+/// Rounded to `digits` significant digits of themselves or of their range, whichever is finer.
+pub fn for_drawing(values: impl Iterator<Item = f64> + Clone, digits: i32) -> Vec<f64> {
+    let finite = values.clone().filter(|value| value.is_finite());
+    let (low, high) = finite.fold((f64::MAX, f64::MIN), |(low, high), value| (low.min(value), high.max(value)));
+    let of_range = if high > low { decimals(high - low, digits) } else { i32::MIN };
+    values.map(|value| rounded(value, decimals(value, digits).max(of_range))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rounding_keeps_the_digits_asked_for() {
+        for (value, digits, expected) in
+            [(123456.789, 4, 123500.0), (-0.00123456, 3, -0.00123), (9.9996, 4, 10.0), (2.5e-300, 5, 2.5e-300)]
+        {
+            assert_eq!(rounded(value, decimals(value, digits)), expected);
+        }
+    }
+}

@@ -1,0 +1,68 @@
+//! What all pages share: one file with template, style, figures' code, plotting library and data.
+//!
+//! The file makes no request (its content security policy forbids it). Data stands in the file as JSON in which every `<`
+//! is written `\u003c`, so that no text of the user can end the script element or open a comment in it.
+
+use minijinja::syntax::SyntaxConfig;
+use minijinja::{Environment, Value, context};
+use serde::Serialize;
+
+use crate::{Error, Result};
+
+/// The frame that each page fills.
+const FRAME: &str = include_str!("../assets/page.html");
+const STYLE: &str = include_str!("../assets/report.css");
+const THEME: &str = include_str!("../assets/figures/theme.js");
+const PLOT: &str = include_str!("../assets/figures/plot.js");
+const PAGE: &str = include_str!("../assets/figures/page.js");
+const UPLOT: &str = include_str!("../assets/uplot/uPlot.iife.min.js");
+const UPLOT_STYLE: &str = include_str!("../assets/uplot/uPlot.min.css");
+const UPLOT_LICENCE: &str = include_str!("../assets/uplot/LICENSE");
+
+/// Most points of all lines of a page together; about 14 bytes each keep the file below 5 MB.
+pub(super) const ALL_POINTS: usize = 260_000;
+
+/// Renders a page.
+///
+/// `template` extends the frame and reads `content`; `figures` is code that draws `data`, which it finds as `report`.
+pub(super) fn render(template: &str, content: Value, figures: &[&str], data: &impl Serialize) -> Result<String> {
+    let json = serde_json::to_string(data).map_err(|source| Error::ReportData { source })?;
+    let page = context! {
+        style => safe(format!("{UPLOT_STYLE}\n{STYLE}")),
+        library => safe(format!("/*!\nuPlot\n{UPLOT_LICENCE}*/\n{UPLOT}")),
+        figures => safe([&[THEME, PLOT], figures, &[PAGE]].concat().concat()),
+        json => safe(json.replace('<', "\\u003c")),
+        ..content
+    };
+    rendered(template, page).map_err(|source| Error::ReportTemplate { source })
+}
+
+fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
+    let mut environment = Environment::new();
+    environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
+    environment.add_filter("fixed", |value: f64, digits: usize| with_minus(format!("{value:.digits$}")));
+    environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
+    environment.add_filter("significant", |value: f64| with_minus(significant(value)));
+    environment.add_filter("printed", with_minus);
+    environment.add_template("page.html", FRAME)?;
+    environment.add_template("content.html", template)?;
+    environment.get_template("content.html")?.render(page)
+}
+
+fn safe(text: String) -> Value {
+    Value::from_safe_string(text)
+}
+
+/// Four significant digits, without an exponent down to 1e-9.
+fn significant(value: f64) -> String {
+    if value.abs() < 1e-9 {
+        return if value == 0.0 { "0".into() } else { format!("{value:.1e}") };
+    }
+    let places = super::numbers::decimals(value, 4).clamp(0, 12) as usize;
+    format!("{value:.places$}")
+}
+
+/// Numbers in tables have a minus sign as wide as a digit.
+pub fn with_minus(number: String) -> String {
+    number.replace('-', "\u{2212}")
+}

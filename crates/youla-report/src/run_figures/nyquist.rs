@@ -1,0 +1,104 @@
+//! Frequency responses as loci: `10^(dB/20) exp(i phase)`, both axes of one scale.
+//!
+//! A region `d' V^-1 d <= 1` is an ellipse `d = L (cos t, sin t)` with `V = L L'`.
+
+use super::bode::{FADED, Pair, is_clear, pairs, percent};
+use super::choice::Chosen;
+use super::{RunFigure, axis};
+use crate::data::{Band, Indirect, ModelResponse};
+use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
+use std::f64::consts::TAU;
+
+/// Most regions of a curve, and points of each.
+const ELLIPSES: usize = 60;
+const AROUND: usize = 32;
+
+/// One figure per pair of output and input.
+pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
+    pairs(chosen, RunFigure::Nyquist).iter().map(figure).collect()
+}
+
+fn figure(pair: &Pair) -> Figure {
+    let points = pair.indirect.iter().map(|measured| measured_points(measured)).filter(|curve| !curve.x.is_empty());
+    let regions = pair.bands.iter().filter_map(|band| ellipses(pair, band));
+    let curves: Vec<Curve> =
+        points.chain(regions).chain(pair.models.iter().map(|model| locus(pair.hz, model))).collect();
+    let ellipses = pair.bands.iter().find(|band| !band.region.is_empty()).map_or(String::new(), |band| {
+        format!(
+            " Ellipses: where the response lies with a probability of {} at each of some frequencies.",
+            percent(band.level)
+        )
+    });
+    let said = match pair.indirect.is_empty() {
+        true => String::new(),
+        false => format!(" Points: indirect non-parametric response where its coherence is at least {FADED}."),
+    };
+    let line =
+        |x: [f64; 2], y: [f64; 2]| Guide { kind: GuideKind::Level, x: x.into(), y: y.into(), ..Guide::default() };
+    const FAR: f64 = 1e12;
+    Figure {
+        key: pair.key.clone(),
+        title: format!("Locus, {}", pair.title),
+        caption: format!("Frequency response, {}, over positive frequencies.{said}{ellipses}", pair.title),
+        layout: Layout::Stacked,
+        panels: vec![Panel {
+            x: axis("Real part", &pair.unit),
+            y: axis("Imaginary part", &pair.unit),
+            content: Content::Curves(curves),
+            guides: vec![line([-FAR, FAR], [0.0, 0.0]), line([0.0, 0.0], [-FAR, FAR])],
+            equal: true,
+            ..Panel::default()
+        }],
+    }
+}
+
+fn locus(hz: &[f64], model: &ModelResponse) -> Curve {
+    let (x, y) = model.magnitude_db.iter().zip(&model.phase_deg).map(|(db, deg)| place(*db, *deg)).unzip();
+    Curve { method: model.method.clone(), x, y, along: hz.to_vec(), ..Curve::default() }
+}
+
+/// The regions at some frequencies as one line with gaps.
+fn ellipses(pair: &Pair, band: &Band) -> Option<Curve> {
+    let model = pair.models.iter().find(|model| model.method == band.method)?;
+    let mut curve = Curve { method: band.method.clone(), note: percent(band.level), ..Curve::default() };
+    let every = (pair.hz.len() / ELLIPSES).max(1);
+    let values = model.magnitude_db.iter().zip(&model.phase_deg).zip(band.region.chunks_exact(3));
+    for (hz, ((db, deg), region)) in pair.hz.iter().zip(values).step_by(every) {
+        let [rr, ri, ii] = [region[0], region[1], region[2]];
+        let along = rr.sqrt();
+        let (lean, rest) = (ri / along, (ii - ri * ri / rr).max(0.0).sqrt());
+        let (re, im) = place(*db, *deg);
+        if !(along > 0.0 && [re, im, lean, rest].iter().all(|value| value.is_finite())) {
+            continue;
+        }
+        for k in 0..=AROUND {
+            let (sine, cosine) = (TAU * k as f64 / AROUND as f64).sin_cos();
+            curve.x.push(re + along * cosine);
+            curve.y.push(im + lean * cosine + rest * sine);
+            curve.along.push(*hz);
+        }
+        curve.x.push(re);
+        curve.y.push(f64::NAN);
+        curve.along.push(*hz);
+    }
+    Some(curve).filter(|curve| !curve.x.is_empty())
+}
+
+fn measured_points(measured: &Indirect) -> Curve {
+    let mut curve = Curve { method: "indirect".into(), drawn: Drawn::Points, ..Curve::default() };
+    let values = measured.magnitude_db.iter().zip(&measured.phase_deg).zip(&measured.coherence);
+    for (hz, ((db, deg), _)) in measured.hz.iter().zip(values).filter(|(_, (_, coherence))| is_clear(**coherence)) {
+        let (real, imaginary) = place(*db, *deg);
+        if real.is_finite() && imaginary.is_finite() {
+            curve.x.push(real);
+            curve.y.push(imaginary);
+            curve.along.push(*hz);
+        }
+    }
+    curve
+}
+
+fn place(db: f64, deg: f64) -> (f64, f64) {
+    let gain = 10f64.powf(db / 20.0);
+    (gain * deg.to_radians().cos(), gain * deg.to_radians().sin())
+}

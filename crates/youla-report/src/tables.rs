@@ -1,0 +1,120 @@
+//! Tables of the report: fits by record and output, modes by frequency, one column per method.
+
+use serde::Serialize;
+
+use super::data::{Mode, ReportData};
+
+/// Modes of different models within this ratio of frequency stand in one row.
+pub const SAME_MODE: f64 = 1.1;
+
+/// One record and output with the fit of each method.
+#[derive(Debug, Serialize, PartialEq)]
+pub(super) struct FitRow {
+    pub(super) record: String,
+    pub(super) output: usize,
+    pub(super) cells: Vec<FitCell>,
+}
+
+/// One fit.
+#[derive(Debug, Clone, Serialize, PartialEq)]
+pub(super) struct FitCell {
+    /// Percent, absent where it was not computed.
+    pub(super) fit: Option<f64>,
+    /// Whether the fit was asked for but the prediction diverged.
+    pub(super) diverged: bool,
+    /// Whether no other method does better in this row.
+    pub(super) best: bool,
+}
+
+/// Fits in the order of records in the data, methods as columns.
+pub(super) fn fit_rows(data: &ReportData) -> Vec<FitRow> {
+    let mut keys: Vec<(&str, usize)> = Vec::new();
+    for fit in &data.fits {
+        if !keys.contains(&(&fit.record, fit.output)) {
+            keys.push((&fit.record, fit.output));
+        }
+    }
+    keys.iter()
+        .map(|&(record, output)| {
+            let cell = |method: &str| {
+                data.fits.iter().find(|f| f.record == record && f.output == output && f.method == method)
+            };
+            let fits: Vec<_> = data.methods.iter().map(|method| cell(&method.key)).collect();
+            let best = fits.iter().flatten().filter_map(|fit| fit.fit).fold(f64::NEG_INFINITY, f64::max);
+            let cells = fits
+                .iter()
+                .map(|entry| {
+                    let fit = entry.and_then(|e| e.fit);
+                    FitCell { fit, diverged: entry.is_some() && fit.is_none(), best: fit == Some(best) }
+                })
+                .collect();
+            FitRow { record: record.to_owned(), output, cells }
+        })
+        .collect()
+}
+
+/// Modes near one frequency, one place per method.
+#[derive(Debug, Serialize, PartialEq)]
+pub(super) struct ModeRow {
+    pub(super) cells: Vec<Option<Mode>>,
+}
+
+/// Modes by rising frequency.
+pub(super) fn mode_rows(data: &ReportData) -> Vec<ModeRow> {
+    let mut modes: Vec<(usize, &Mode)> = data
+        .modes
+        .iter()
+        .filter_map(|mode| Some((data.methods.iter().position(|m| m.key == mode.method)?, mode)))
+        .collect();
+    modes.sort_by(|a, b| a.1.hz.total_cmp(&b.1.hz));
+    let mut rows: Vec<(f64, ModeRow)> = Vec::new();
+    for (column, mode) in modes {
+        let row = rows.iter_mut().find(|(lowest, row)| mode.hz <= lowest * SAME_MODE && row.cells[column].is_none());
+        match row {
+            Some((_, row)) => row.cells[column] = Some(mode.clone()),
+            None => {
+                let mut cells = vec![None; data.methods.len()];
+                cells[column] = Some(mode.clone());
+                rows.push((mode.hz, ModeRow { cells }));
+            }
+        }
+    }
+    rows.into_iter().map(|(_, row)| row).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::data::{Fit, Method};
+    use super::*;
+
+    fn data() -> ReportData {
+        let fit =
+            |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
+        let mode = |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1, deviation: None };
+        ReportData {
+            methods: vec![Method::nominal(), Method::direct(), Method::hansen()],
+            fits: vec![fit("b", "hansen", Some(90.0)), fit("b", "direct", None), fit("a", "hansen", Some(80.0))],
+            modes: vec![mode("hansen", 55.0), mode("direct", 54.0), mode("direct", 56.0), mode("hansen", 120.0)],
+            ..ReportData::default()
+        }
+    }
+
+    #[test]
+    fn fits_keep_the_order_of_the_data() {
+        let rows = fit_rows(&data());
+        assert_eq!(rows.iter().map(|row| row.record.as_str()).collect::<Vec<_>>(), ["b", "a"]);
+        assert_eq!(rows[0].cells[0], FitCell { fit: None, diverged: false, best: false });
+        assert_eq!(rows[0].cells[1], FitCell { fit: None, diverged: true, best: false });
+        assert_eq!(rows[0].cells[2], FitCell { fit: Some(90.0), diverged: false, best: true });
+    }
+
+    #[test]
+    fn modes_of_one_method_never_share_a_place() {
+        let frequencies: Vec<Vec<Option<f64>>> = mode_rows(&data())
+            .iter()
+            .map(|row| row.cells.iter().map(|cell| cell.as_ref().map(|mode| mode.hz)).collect())
+            .collect();
+        let expected = [[None, Some(54.0), Some(55.0)], [None, Some(56.0), None], [None, None, Some(120.0)]];
+        assert_eq!(frequencies, expected);
+    }
+}

@@ -1,0 +1,148 @@
+//! Files as they are read and tested one record at a time.
+
+use super::{CheckedRecord, DataCheck};
+use crate::records::{LoopRecord, channels_of};
+use crate::segments::{Part, parts};
+use crate::settings::DataFile;
+use crate::{Error, Result};
+use rayon::prelude::*;
+use std::path::Path;
+use youla::Mat;
+use youla::lti::{Discrete, StateSpace};
+use youla_io::{ChannelSpec, CsvOptions, Format, Source, TimeSource, read};
+use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
+
+/// What all records of a check share.
+pub(super) struct Job {
+    /// Inputs, outputs, excitation, reference, alpha.
+    pub(super) groups: [Vec<ChannelSpec>; 5],
+    pub(super) time: TimeSource,
+    pub(super) csv: CsvOptions,
+    pub(super) options: CheckOptions,
+}
+
+/// A record with its findings.
+pub(super) type CheckedPart = (CheckedRecord, Vec<Finding>);
+
+pub(super) type DeclaredController<'a> = dyn Fn(Discrete) -> Result<Option<StateSpace<Discrete>>> + Sync + 'a;
+
+/// Name of the time column while a file is read.
+const TIME: &str = "(time)";
+
+pub(super) fn check_all(
+    job: &Job,
+    files: &[&DataFile],
+    folder: &Path,
+    controller: &DeclaredController<'_>,
+) -> Result<DataCheck> {
+    job.options.check()?;
+    let one = |file: &&DataFile| check_file(job, file, folder, controller);
+    let parts: Vec<Result<Vec<CheckedPart>>> = files.par_iter().map(one).collect();
+    let mut all = Vec::new();
+    for part in parts {
+        all.extend(part?.into_iter().map(Ok));
+    }
+    collected(all)
+}
+
+pub(super) fn collected(all: Vec<Result<CheckedPart>>) -> Result<DataCheck> {
+    let mut check = DataCheck { records: Vec::new(), findings: Vec::new() };
+    for one in all {
+        let (record, findings) = one?;
+        check.records.push(record);
+        check.findings.extend(findings);
+    }
+    Ok(check)
+}
+
+fn check_file(
+    job: &Job,
+    file: &DataFile,
+    folder: &Path,
+    controller: &DeclaredController<'_>,
+) -> Result<Vec<CheckedPart>> {
+    let path = folder.join(&file.file);
+    if job.time.column.is_none() && job.time.ts.is_none() {
+        return Err(Error::File(youla_io::Error::SampleTimeMissing { what: path.display().to_string() }));
+    }
+    let clock = job.time.column.iter().map(|place| ChannelSpec::from(TIME, place.clone(), ""));
+    let source = Source {
+        path,
+        format: Format::Detect,
+        // The time column is a channel here; whatever it holds, the rows are read.
+        time: TimeSource::ts(job.time.ts.unwrap_or(1.0)),
+        channels: job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect(),
+        csv: job.csv.clone(),
+    };
+    let found = parts(file, vec![read(&source)?])?;
+    found.iter().map(|part| check_part(job, file, part, controller)).collect()
+}
+
+fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredController<'_>) -> Result<CheckedPart> {
+    let mut findings = Vec::new();
+    let (mut record, mut first, mut time) = (part.record.clone(), part.rows[0], part.record.time());
+    if job.time.column.is_some() {
+        let times = record.column(TIME)?.to_vec();
+        let Some(found) = timing(&times, job.time.ts, job.time.tolerance) else {
+            let what = file.file.display().to_string();
+            return Err(Error::File(youla_io::Error::NonUniformTime {
+                what,
+                row: 2,
+                dt: times.last().unwrap_or(&0.0) - times[0],
+                ts: 0.0,
+            }));
+        };
+        findings = found.findings(&part.name, first);
+        time = Discrete::new(job.time.ts.filter(|_| found.unit.is_none()).unwrap_or(found.step))?;
+        let mut breaks: Vec<usize> = found.gaps.iter().map(|g| g.row).chain(found.repeated).chain(found.back).collect();
+        breaks.sort_unstable();
+        let (from, to) = longest(&breaks, times.len());
+        record = record.trim(from, Some(to - from))?;
+        first += from;
+    }
+    let logged = LoopRecord::from_record(&record, part.name.clone(), job.groups.each_ref())?;
+    let logged = LoopRecord { time, ..logged };
+    let names = names(job.groups.each_ref());
+    let controller = controller(time)?;
+    let (m, p) = (logged.u.ncols(), logged.y.ncols());
+    if let Some(k) = controller.as_ref().filter(|k| (k.outputs(), k.inputs()) != (m, p)) {
+        let (expected, found) = ((m, p), (k.outputs(), k.inputs()));
+        return Err(Error::Method(youla::Error::Shape {
+            what: "[controller], inputs x outputs of the plant".into(),
+            expected,
+            found,
+        }));
+    }
+    findings.extend(check_record(&self::logged(&logged, first), &names, controller.as_ref(), &job.options)?);
+    let rows = [first, first + logged.samples() - 1];
+    let file = file.file.display().to_string();
+    Ok((CheckedRecord { record: part.name.clone(), file, rows, sample_time: time.ts() }, findings))
+}
+
+/// The longest stretch between breaks, which are rows counted from 1; from and up to, counted from 0.
+fn longest(breaks: &[usize], samples: usize) -> (usize, usize) {
+    let starts = std::iter::once(0).chain(breaks.iter().map(|row| row - 1));
+    let ends = breaks.iter().map(|row| row - 1).chain([samples]);
+    starts.zip(ends).fold((0, 0), |best, part| if part.1 - part.0 > best.1 - best.0 { part } else { best })
+}
+
+pub(super) fn logged(record: &LoopRecord, first_row: usize) -> LoggedRecord<'_> {
+    fn of(x: &Option<Mat<f64>>) -> Option<youla::MatRef<'_, f64>> {
+        x.as_ref().map(|x| x.as_ref())
+    }
+    LoggedRecord {
+        name: &record.name,
+        time: record.time,
+        first_row,
+        u: record.u.as_ref(),
+        y: record.y.as_ref(),
+        input_excitation: of(&record.input_excitation),
+        reference: of(&record.reference),
+        alpha: of(&record.alpha),
+    }
+}
+
+pub(super) fn names(groups: [&Vec<ChannelSpec>; 5]) -> ChannelNames {
+    let [inputs, outputs, input_excitation, reference, alpha] = groups.map(|g| channels_of(g));
+    ChannelNames { inputs, outputs, input_excitation, reference, alpha }
+}

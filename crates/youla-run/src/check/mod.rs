@@ -1,0 +1,203 @@
+//! `youla check`: what is wrong with the records of a run, or of files alone, before anything is identified.
+//!
+//! Records are read as they stand, without taking means out and without refusing time columns that are not uniform: what the reader
+//! would refuse is what the check is to describe. Where the time column has gaps or repetitions, the other tests look at the longest
+//! stretch without any.
+
+mod files;
+mod result;
+
+pub use result::{CheckedRecord, DataCheck, further};
+
+use super::models::Controller;
+use super::records::{LoopRecord, RunRecords};
+use super::settings::{DataFile, RunSettings};
+use crate::{Error, Result};
+use files::{Job, check_all, collected, logged, names};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use youla::ErrorKind;
+use youla::control::observer_controller;
+use youla::identify::subspace::SubspaceOptions;
+use youla::lti::{Discrete, StateSpace};
+use youla_io::{ChannelRef, ChannelSpec, CsvOptions, TimeSource};
+use youla_loop::check::{CheckOptions, Finding, Severity, Test, by_severity, check_record};
+
+/// Files to check without a run.toml; channels by name or number.
+#[derive(Debug, Clone, Default)]
+pub struct CheckedFiles {
+    /// The files, one record each.
+    pub files: Vec<PathBuf>,
+    /// Plant inputs.
+    pub inputs: Vec<ChannelRef>,
+    /// Plant outputs.
+    pub outputs: Vec<ChannelRef>,
+    /// Known excitation at the plant input, one per input, or none.
+    pub input_excitation: Vec<ChannelRef>,
+    /// Known reference, one per output, or none.
+    pub reference: Vec<ChannelRef>,
+    /// Sample time in seconds.
+    pub sample_time: Option<f64>,
+    /// Column with the time in seconds.
+    pub time_column: Option<ChannelRef>,
+    /// Form of text files.
+    pub csv: CsvOptions,
+}
+
+/// Checks all records that a run.toml names, with its controller; paths are relative to `folder`.
+///
+/// # Errors
+/// Files that cannot be read, channels that do not exist, a controller that is not one. What a file holds is described, not
+/// refused.
+pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
+    let d = &settings.data;
+    let job = Job {
+        groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),
+        time: TimeSource {
+            column: d.time_column.clone(),
+            ts: d.sample_time,
+            tolerance: d.time_tolerance,
+            ..Default::default()
+        },
+        csv: d.csv.clone(),
+        options: with_order(&settings.check, &settings.hansen),
+    };
+    let files: Vec<&DataFile> = d.estimation.iter().chain(&d.verification).collect();
+    let controller = |time: Discrete| declared(settings, folder, time).map(Some);
+    let mut found = check_all(&job, &files, folder, &controller)?;
+    found.findings.extend(method_finding(settings));
+    by_severity(&mut found.findings);
+    Ok(found)
+}
+
+/// Checks files alone; no controller is known.
+///
+/// # Errors
+/// As [`check_run`]; [`youla_io::Error::SampleTimeMissing`] without sample time and time column; [`youla::Error::Ports`] for excitations that
+/// are not one per input, references that are not one per output.
+pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataCheck> {
+    for (what, found, expected) in [
+        ("the number of excitations", files.input_excitation.len(), files.inputs.len()),
+        ("the number of references", files.reference.len(), files.outputs.len()),
+    ] {
+        if found != 0 && found != expected {
+            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
+        }
+    }
+    let specs = |chosen: &[ChannelRef]| -> Vec<ChannelSpec> {
+        chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
+    };
+    let job = Job {
+        groups: [
+            specs(&files.inputs),
+            specs(&files.outputs),
+            specs(&files.input_excitation),
+            specs(&files.reference),
+            Vec::new(),
+        ],
+        time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
+        csv: files.csv.clone(),
+        options: options.clone(),
+    };
+    let file = |path: &PathBuf| DataFile { file: path.clone(), skip: 0, take: None, segments: Vec::new(), name: None };
+    let all: Vec<DataFile> = files.files.iter().map(file).collect();
+    let mut found = check_all(&job, &all.iter().collect::<Vec<_>>(), Path::new(""), &|_| Ok(None))?;
+    by_severity(&mut found.findings);
+    Ok(found)
+}
+
+/// The same tests on the records of a run as it uses them, for its report; `controller` with positive feedback.
+pub(super) fn check_records(
+    settings: &RunSettings,
+    records: &RunRecords,
+    controller: &StateSpace<Discrete>,
+) -> Result<DataCheck> {
+    let d = &settings.data;
+    let names = names([&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha]);
+    let options = with_order(&settings.check, &settings.hansen);
+    let all: Vec<&LoopRecord> = records.estimation.iter().chain(&records.verification).collect();
+    let one = |record: &&LoopRecord| {
+        let (file, first) = place(settings, records, &record.name);
+        let logged = logged(record, first);
+        // A test that cannot be computed does not end a run.
+        let findings = match check_record(&logged, &names, Some(controller), &options) {
+            Err(error) if error.kind() == ErrorKind::Numerical => {
+                vec![finding(Severity::Note, &record.name, format!("it could not be checked: {error}"), "")]
+            }
+            found => found?,
+        };
+        let rows = [first, first + record.samples() - 1];
+        Ok((CheckedRecord { record: record.name.clone(), file, rows, sample_time: record.time.ts() }, findings))
+    };
+    let mut found = collected(all.par_iter().map(one).collect())?;
+    found.findings.extend(method_finding(settings));
+    by_severity(&mut found.findings);
+    Ok(found)
+}
+/// File and first row of a record of a run.
+fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, usize) {
+    if let Some(segment) = records.segments.iter().find(|s| s.record == name) {
+        return (segment.file.clone(), segment.rows[0]);
+    }
+    let mut files = settings.data.estimation.iter().chain(&settings.data.verification);
+    files.find(|f| f.label() == name).map_or((String::new(), 1), |f| (f.file.display().to_string(), f.skip + 1))
+}
+
+fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
+    let horizons = hansen.automatic_horizon.is_none().then(|| hansen.past() + hansen.horizon);
+    CheckOptions { excitation_order: options.excitation_order.or(horizons), ..options.clone() }
+}
+
+/// The declared controller with positive feedback.
+fn declared(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+    match settings.controller.realise(folder, time)? {
+        Controller::System(k) => Ok(k),
+        Controller::Observer { f, l } => {
+            let nominal = settings.nominal.realise(folder, time)?;
+            Ok(observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?)
+        }
+    }
+}
+
+/// What stands for a record in findings on the settings.
+pub(super) const OF_SETTINGS: &str = "run.toml";
+
+/// Whether the direct method is one that feedback biases.
+fn method_finding(settings: &RunSettings) -> Option<Finding> {
+    let direct = settings.direct.as_ref().filter(|direct| !direct.weight.is_for_closed_loops())?;
+    let weight =
+        serde_json::to_value(direct.weight).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+    let what = format!(
+        "[direct] weight = \"{weight}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
+    );
+    let advice = "Take weight = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
+    Some(finding(Severity::Caution, OF_SETTINGS, what, advice))
+}
+
+/// A finding on the method or the record as a whole.
+fn finding(severity: Severity, record: &str, what: String, advice: &str) -> Finding {
+    Finding {
+        test: Test::Feedback,
+        severity,
+        record: record.to_owned(),
+        channel: None,
+        rows: None,
+        what,
+        numbers: BTreeMap::new(),
+        advice: advice.to_owned(),
+    }
+}
+
+/// Reads the options of a check from a TOML file, as `[check]` has them.
+///
+/// # Errors
+/// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`], [`youla_io::Error::Settings`].
+pub fn read_check_options(path: impl AsRef<Path>) -> Result<CheckOptions> {
+    use std::io::Read;
+    let path = path.as_ref();
+    let mut text = String::new();
+    let read = youla_io::open(path)?.read_to_string(&mut text);
+    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    Ok(youla_io::toml_file::parse(&text, path)?)
+}

@@ -1,0 +1,121 @@
+//! The runs and their modes as tables, and what makes them hard to compare.
+
+use super::run::FinishedRun;
+use youla_report::SAME_MODE;
+use youla_report::data::{EvidenceTable, Fit, Mode, Note, ReportData, Status, Verdict};
+
+/// One row per run: verdict, order, fit.
+pub(super) fn overview(runs: &[FinishedRun], model: &str) -> EvidenceTable {
+    let row = |run: &FinishedRun| {
+        let fits = run.fits(model);
+        vec![
+            run.name.clone(),
+            run.report.title.clone(),
+            verdict(&run.report),
+            run.model.system.order().to_string(),
+            format!("{} s", run.model.system.time().ts()),
+            mean(&fits).map_or("\u{2013}".into(), |fit| format!("{fit:.1} %")),
+        ]
+    };
+    EvidenceTable {
+        title: "Runs".into(),
+        text: String::new(),
+        columns: ["Run", "Machine", "Can it be trusted?", "Order", "Sample time", "Mean fit"].map(str::to_owned).into(),
+        rows: runs.iter().map(row).collect(),
+        caption: "The mean fit is that over all verification records and outputs of a run.".into(),
+    }
+}
+
+fn verdict(report: &ReportData) -> String {
+    let of = |status: Status| report.verdict.iter().filter(|v| v.status == status).collect::<Vec<&Verdict>>();
+    let (bad, caution) = (of(Status::Bad), of(Status::Caution));
+    match (bad.first(), caution.len()) {
+        (Some(line), _) => line.text.clone(),
+        (None, 0) if report.verdict.is_empty() => "no verdict".into(),
+        (None, 0) => "all in order".into(),
+        (None, n) => format!("{n} of {} lines ask for care: {}", report.verdict.len(), caution[0].text),
+    }
+}
+
+fn mean(fits: &[Fit]) -> Option<f64> {
+    let all: Vec<f64> = fits.iter().map(|f| f.fit).collect::<Option<_>>()?;
+    (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+}
+
+/// The oscillating modes of the first run, and how far those of the others are from them.
+pub(super) fn modes(runs: &[FinishedRun], model: &str) -> EvidenceTable {
+    let all: Vec<Vec<Mode>> = runs.iter().map(|r| oscillating(r, model)).collect();
+    let row = |mode: &Mode| -> Vec<String> {
+        let others = all[1..].iter().map(|modes| match nearest(modes, mode) {
+            Some(other) => difference(mode, other),
+            None => "\u{2013}".into(),
+        });
+        [format!("{:.2} Hz, \u{3b6} {:.4}", mode.hz, mode.zeta)].into_iter().chain(others).collect()
+    };
+    EvidenceTable {
+        title: "Differences of modes".into(),
+        text: format!("Oscillating modes of {}, and how those of the other runs differ.", runs[0].name),
+        columns: runs.iter().map(|r| r.name.clone()).collect(),
+        rows: all[0].iter().map(row).collect(),
+        caption: "The nearest mode within 10 % of frequency. In brackets: the difference of frequency and of damping in standard deviations of both runs together, where they are known.".into(),
+    }
+}
+
+fn oscillating(run: &FinishedRun, model: &str) -> Vec<Mode> {
+    let mut modes: Vec<Mode> = run.modes(model).into_iter().filter(|m| m.zeta.abs() < 1.0).collect();
+    modes.sort_by(|a, b| a.hz.total_cmp(&b.hz));
+    modes
+}
+
+fn nearest<'a>(modes: &'a [Mode], to: &Mode) -> Option<&'a Mode> {
+    let ratio = |m: &Mode| (m.hz / to.hz).ln().abs();
+    modes.iter().filter(|m| ratio(m) < SAME_MODE.ln()).min_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+fn difference(from: &Mode, to: &Mode) -> String {
+    let text = format!(
+        "{:+.2} Hz ({:+.2} %), \u{3b6} {:+.4}",
+        to.hz - from.hz,
+        100.0 * (to.hz / from.hz - 1.0),
+        to.zeta - from.zeta
+    );
+    match (from.deviation, to.deviation) {
+        (Some(a), Some(b)) => {
+            let sigmas = |d: f64, k: usize| d.abs() / a[k].hypot(b[k]);
+            format!("{text} [{:.1}, {:.1}]", sigmas(to.hz - from.hz, 0), sigmas(to.zeta - from.zeta, 1))
+        }
+        _ => text,
+    }
+}
+
+/// What makes the runs hard to compare.
+pub(super) fn notes(runs: &[FinishedRun]) -> Vec<Note> {
+    let first = &runs[0];
+    let mut all = Vec::new();
+    let mut add = |text: String| all.push(Note { status: Status::Caution, text });
+    for run in &runs[1..] {
+        let (a, b) = (&first.report, &run.report);
+        if (&a.inputs, &a.outputs) != (&b.inputs, &b.outputs) {
+            add(format!(
+                "{} has channels of other names or units than {}: they are compared by their place.",
+                run.name, first.name
+            ));
+        }
+        if a.sample_time != b.sample_time {
+            add(format!(
+                "{} has another sample time than {}: poles are drawn in the s plane, and there is no nu-gap.",
+                run.name, first.name
+            ));
+        }
+        let files = |r: &ReportData| {
+            r.sources.iter().filter(|s| s.purpose == "verification").map(|s| s.sha256.clone()).collect::<Vec<_>>()
+        };
+        if files(a) != files(b) {
+            add(format!(
+                "{} was verified on other files than {}: fits tell less about the models than about the records.",
+                run.name, first.name
+            ));
+        }
+    }
+    all
+}

@@ -1,0 +1,286 @@
+//! A first run.toml for a log: what the user said of it in the form that `youla identify` reads, with comments, and with what is
+//! still missing left out, so that nothing is run on a guess.
+
+use super::models::Feedback;
+use crate::{Error, Result};
+use minijinja::value::Serde;
+use minijinja::{Environment, context};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use youla_io::{ChannelRef, CsvOptions, SurveyedColumn};
+
+const TEMPLATE: &str = include_str!("../assets/run.toml.j2");
+
+/// What is said of a log.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Draft {
+    /// Name of the machine or experiment.
+    pub name: String,
+    /// The log, as run.toml is to name it.
+    pub file: PathBuf,
+    /// How it is read, where it is text.
+    pub csv: CsvOptions,
+    /// Sample time or time column.
+    pub clock: DraftClock,
+    /// Columns of the plant inputs.
+    pub inputs: Vec<ChannelRef>,
+    /// Columns of the plant outputs.
+    pub outputs: Vec<ChannelRef>,
+    /// Columns of the known excitation at the plant input; may be empty.
+    pub input_excitation: Vec<ChannelRef>,
+    /// Columns of the known reference; may be empty.
+    pub reference: Vec<ChannelRef>,
+    /// Sign of the feedback of the controller that ran; none where none ran.
+    pub feedback: Option<Feedback>,
+    /// Rows to identify from, from the first on; the rest verifies.
+    pub estimated: usize,
+}
+
+/// Where the time comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum DraftClock {
+    /// Sample time in seconds.
+    SampleTime(f64),
+    /// Column with the time in seconds.
+    Column(ChannelRef),
+}
+
+impl Draft {
+    /// What does not fit the columns of the log, in one sentence; `columns` are those of [`youla_io::survey`].
+    pub fn problem(&self, columns: &[SurveyedColumn]) -> Option<String> {
+        let clock = match &self.clock {
+            DraftClock::Column(column) => Some(column),
+            DraftClock::SampleTime(ts) if !(*ts > 0.0 && ts.is_finite()) => {
+                return Some(format!("the sample time is {ts}, but must be a positive number of seconds"));
+            }
+            DraftClock::SampleTime(_) => None,
+        };
+        if self.inputs.is_empty() || self.outputs.is_empty() {
+            return Some("a plant has at least one input and one output".into());
+        }
+        if let Some(problem) = clock.into_iter().chain(self.channels()).find_map(|c| column(c, columns).err()) {
+            return Some(problem);
+        }
+        let all: Vec<&ChannelRef> = clock.into_iter().chain(self.channels()).collect();
+        let twice = all.iter().enumerate().find(|(k, c)| all[..*k].contains(c));
+        if let Some((_, c)) = twice {
+            return Some(format!("the column {:?} is named twice", c.to_string()));
+        }
+        let groups = [
+            ("excitations", &self.input_excitation, "inputs", &self.inputs),
+            ("references", &self.reference, "outputs", &self.outputs),
+        ];
+        for (what, given, of, needed) in groups {
+            if !given.is_empty() && given.len() != needed.len() {
+                let (found, wanted) = (given.len(), needed.len());
+                return Some(format!("there must be as many {what} as {of} ({wanted}), but there are {found}"));
+            }
+        }
+        let rows = self.rows(columns);
+        (!(1..rows).contains(&self.estimated))
+            .then(|| format!("{} rows are to be identified from, but the log has {rows}", self.estimated))
+    }
+
+    /// Rows of the first input.
+    fn rows(&self, columns: &[SurveyedColumn]) -> usize {
+        self.inputs.first().and_then(|c| column(c, columns).ok()).unwrap_or(0)
+    }
+
+    fn channels(&self) -> impl Iterator<Item = &ChannelRef> {
+        [&self.inputs, &self.outputs, &self.input_excitation, &self.reference].into_iter().flatten()
+    }
+
+    /// The text of run.toml.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] naming the log for what [`Draft::problem`] finds.
+    pub fn toml(&self, columns: &[SurveyedColumn]) -> Result<String> {
+        let refused =
+            |problem: String| Error::File(youla_io::Error::Settings { path: self.file.clone(), at: None, problem });
+        if let Some(problem) = self.problem(columns) {
+            return Err(refused(problem));
+        }
+        let excitations = [
+            ("input_excitation", "Known excitation, added at the plant input.", &self.input_excitation),
+            ("reference", "Known reference r.", &self.reference),
+        ];
+        let excitations: Vec<_> = excitations
+            .into_iter()
+            .filter(|(_, _, channels)| !channels.is_empty())
+            .map(|(key, meaning, channels)| context! { key, meaning, channels => Serde(entries(channels, key)) })
+            .collect();
+        let (time, sample_time) = match &self.clock {
+            DraftClock::Column(column) => (Some(column.to_string()), None),
+            DraftClock::SampleTime(ts) => (None, Some(format!("{ts:?}"))),
+        };
+        let stem = self.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let stem = stem.split('.').next().unwrap_or_default().to_owned();
+        let (m, p) = (self.inputs.len(), self.outputs.len());
+        let content = context! {
+            name => self.name.clone(), file => self.file.display().to_string(), time, sample_time,
+            inputs => Serde(entries(&self.inputs, "u")), outputs => Serde(entries(&self.outputs, "y")), excitations,
+            csv => (self.csv != CsvOptions::default()).then_some(Serde(&self.csv)),
+            rows => self.rows(columns), estimated => self.estimated,
+            estimation => format!("{stem}-first"), verification => format!("{stem}-rest"),
+            feedback => self.feedback.map(Serde),
+            zero_plant => zeros(p, m), zero_controller => zeros(m, p),
+        };
+        let mut environment = Environment::new();
+        environment.add_filter("toml", |text: String| toml::Value::String(text).to_string());
+        environment
+            .render_str(TEMPLATE, content)
+            .map_err(|error| refused(format!("run.toml cannot be written: {error:#}")))
+    }
+}
+
+/// Rows of a column that can be a channel, or what is wrong.
+fn column(wanted: &ChannelRef, columns: &[SurveyedColumn]) -> std::result::Result<usize, String> {
+    let found = match wanted {
+        ChannelRef::Name(name) => columns.iter().find(|c| c.from == *name),
+        ChannelRef::Column(number) => number.checked_sub(1).and_then(|k| columns.get(k)),
+    };
+    match found.map(|c| &c.content) {
+        Some(Ok(content)) => Ok(content.rows),
+        Some(Err(problem)) => Err(format!("the column {:?} cannot be a channel: {problem}", wanted.to_string())),
+        None => {
+            let known: Vec<&str> = columns.iter().map(|c| c.from.as_str()).collect();
+            Err(format!("there is no column {:?}; there are {}", wanted.to_string(), known.join(", ")))
+        }
+    }
+}
+
+/// A channel of run.toml.
+#[derive(Debug, Clone, Serialize)]
+struct Entry {
+    name: String,
+    /// Its place, where the name is not the place.
+    from: Option<String>,
+}
+
+/// Names without the path that leads to them, where these differ; `letter` and a number where columns have no names.
+fn entries(channels: &[ChannelRef], letter: &str) -> Vec<Entry> {
+    let short = |c: &ChannelRef| {
+        let text = c.to_string();
+        let last = text.rsplit('.').next().unwrap_or_default();
+        // A path leads to a name; "y.1" and "speed [1/min.]" are names of columns themselves.
+        if last.starts_with(char::is_alphabetic) { last.to_owned() } else { text }
+    };
+    let named = |(k, c): (usize, &ChannelRef)| {
+        let full = c.to_string();
+        if matches!(c, ChannelRef::Column(_)) {
+            let number = if channels.len() > 1 { (k + 1).to_string() } else { String::new() };
+            return Entry { name: format!("{letter}{number}"), from: Some(full) };
+        }
+        let name = short(c);
+        let unique = channels.iter().filter(|other| short(other) == name).count() == 1;
+        let name = if unique { name } else { full.clone() };
+        Entry { from: (name != full).then_some(full), name }
+    };
+    channels.iter().enumerate().map(named).collect()
+}
+
+/// The matrix of zero polynomials as TOML, a plain list for one input and one output.
+fn zeros(rows: usize, columns: usize) -> String {
+    if (rows, columns) == (1, 1) {
+        return "[0.0]".into();
+    }
+    let row = format!("[{}]", vec!["[0.0]"; columns].join(", "));
+    format!("[{}]", vec![row; rows].join(", "))
+}
+
+/// The log as run.toml in `folder` should name it: as it is where it is absolute or `folder` is the present one, else absolute.
+///
+/// # Errors
+/// [`youla_io::Error::Io`] where the present folder cannot be found out.
+pub fn path_from(folder: &Path, file: &Path) -> Result<PathBuf> {
+    if file.is_absolute() || folder.as_os_str().is_empty() || folder == Path::new(".") {
+        return Ok(file.to_owned());
+    }
+    std::path::absolute(file).map_err(|source| Error::File(youla_io::Error::Io { path: file.to_owned(), source }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RunSettings;
+    use youla_io::ColumnContent;
+
+    fn columns() -> Vec<SurveyedColumn> {
+        let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
+        let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
+        let mut all = ["t", "Data.signals.u", "Data.signals.y", "d", "odd \"name\""].map(of).to_vec();
+        all.push(SurveyedColumn { from: "mode".into(), content: Err("line 2: not a number".into()) });
+        all
+    }
+
+    fn draft(feedback: Option<Feedback>) -> Draft {
+        let name = |text: &str| ChannelRef::Name(text.into());
+        Draft {
+            name: "a \"rig\"".into(),
+            file: "log.csv".into(),
+            csv: CsvOptions::default(),
+            clock: DraftClock::Column(name("t")),
+            inputs: vec![name("Data.signals.u")],
+            outputs: vec![name("Data.signals.y")],
+            input_excitation: vec![name("d")],
+            reference: Vec::new(),
+            feedback,
+            estimated: 600,
+        }
+    }
+
+    #[test]
+    fn without_a_controller_it_is_complete() {
+        let text = draft(None).toml(&columns()).unwrap();
+        let settings = RunSettings::parse(&text, Path::new("run.toml")).unwrap();
+        assert_eq!(settings.name, "a \"rig\"");
+        assert_eq!(settings.data.inputs[0].name, "u");
+        assert_eq!(settings.data.inputs[0].source(), ChannelRef::Name("Data.signals.u".into()));
+        assert_eq!((settings.data.estimation[0].take, settings.data.verification[0].skip), (Some(600), 600));
+    }
+
+    #[test]
+    fn with_a_controller_what_is_missing_is_named_with_its_line() {
+        for feedback in [Feedback::Negative, Feedback::Positive] {
+            let text = draft(Some(feedback)).toml(&columns()).unwrap();
+            let error = RunSettings::parse(&text, Path::new("run.toml")).unwrap_err().to_string();
+            assert!(error.starts_with("run.toml:") && error.ends_with("lacks `numerator`"), "{error}");
+            let filled = text.replace("# numerator", "numerator").replace("# denominator", "denominator");
+            RunSettings::parse(&filled, Path::new("run.toml")).unwrap();
+        }
+    }
+
+    #[test]
+    fn several_channels_and_columns_by_number() {
+        let mut several = draft(None);
+        several.inputs = vec![ChannelRef::Column(2), ChannelRef::Column(4)];
+        several.outputs = vec![ChannelRef::Column(3), ChannelRef::Name("odd \"name\"".into())];
+        several.input_excitation.clear();
+        several.clock = DraftClock::SampleTime(5e-4);
+        let settings = RunSettings::parse(&several.toml(&columns()).unwrap(), Path::new("run.toml")).unwrap();
+        assert_eq!(settings.data.sample_time, Some(5e-4));
+        assert_eq!(settings.data.inputs[1].source(), ChannelRef::Column(4));
+        assert_eq!(settings.data.inputs[1].name, "u2");
+        assert_eq!(settings.data.outputs[1].name, "odd \"name\"");
+    }
+
+    #[test]
+    fn what_does_not_fit_the_log_is_said() {
+        let check = |change: fn(&mut Draft), says: &str| {
+            let mut draft = draft(None);
+            change(&mut draft);
+            let error = draft.toml(&columns()).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        };
+        check(|d| d.inputs = vec![ChannelRef::Name("v".into())], "no column \"v\"; there are t, Data.signals.u");
+        check(|d| d.outputs = vec![ChannelRef::Name("mode".into())], "cannot be a channel: line 2");
+        check(|d| d.outputs = d.inputs.clone(), "named twice");
+        check(|d| d.outputs.clear(), "at least one input");
+        check(|d| d.reference = vec![ChannelRef::Name("t".into())], "named twice");
+        check(|d| d.reference = vec![ChannelRef::Column(5), ChannelRef::Column(6)], "cannot be a channel");
+        check(|d| d.input_excitation = Vec::from(["d", "t"].map(|c| ChannelRef::Name(c.into()))), "named twice");
+        check(|d| d.inputs.push(ChannelRef::Column(5)), "as many excitations as inputs (2)");
+        check(|d| d.estimated = 900, "the log has 900");
+        check(|d| d.clock = DraftClock::SampleTime(0.0), "positive number of seconds");
+    }
+}

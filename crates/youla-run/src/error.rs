@@ -1,0 +1,90 @@
+//! Everything that can go wrong with a run, with the evidence.
+
+use std::path::PathBuf;
+use youla::ErrorKind;
+use youla::error::Names;
+
+/// Result of every fallible function of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// Everything that can go wrong, with the evidence.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The method refused its input or its computation.
+    #[error(transparent)]
+    Method(#[from] youla::Error),
+    /// A file could not be read or written.
+    #[error(transparent)]
+    File(#[from] youla_io::Error),
+    /// A physical structure could not be used or estimated.
+    #[error(transparent)]
+    GreyBox(#[from] youla_greybox::Error),
+    /// The check of the data, the excitation or the redesign was impossible.
+    #[error(transparent)]
+    Loop(#[from] youla_loop::Error),
+    /// A report could not be drawn.
+    #[error(transparent)]
+    Report(#[from] youla_report::Error),
+    /// Something failed in a part of a larger task.
+    #[error("{part}: {source}")]
+    Within {
+        /// The part, in the words of the user, for example `[controller]`.
+        part: String,
+        /// What failed.
+        source: Box<Error>,
+    },
+    /// A figure is asked for a part that it does not tell apart.
+    #[error("the figure {figure:?} cannot be drawn for one {choice} alone; it knows {}", Names(known))]
+    ChoiceOfFigure {
+        /// Its name.
+        figure: &'static str,
+        /// The choice.
+        choice: &'static str,
+        /// Those that it knows.
+        known: Vec<String>,
+    },
+    /// Of a figure of a run nothing is left to draw.
+    #[error("nothing of the figure {figure:?} is chosen; choose other outputs, inputs, records or methods")]
+    NothingToDraw {
+        /// Its name.
+        figure: String,
+    },
+    /// Two records of a run have the same name.
+    #[error("two records are named {name:?}; give one of their files another `name`")]
+    DuplicateRecord {
+        /// The name.
+        name: String,
+    },
+    /// A file is not the data of a report.
+    #[error("{}: this is not the report.json of a run: {source}", path.display())]
+    NotAReport {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: serde_json::Error,
+    },
+}
+
+impl Error {
+    /// The same error, said of a part of a larger task.
+    pub fn within(self, part: impl Into<String>) -> Self {
+        Error::Within { part: part.into(), source: Box::new(self) }
+    }
+
+    /// Whether the input is at fault or the computation is impossible on it.
+    pub fn kind(&self) -> ErrorKind {
+        match self {
+            Error::Method(source) => source.kind(),
+            Error::File(source) => source.kind(),
+            Error::GreyBox(source) => source.kind(),
+            Error::Loop(source) => source.kind(),
+            Error::Report(source) => source.kind(),
+            Error::Within { source, .. } => source.kind(),
+            Error::ChoiceOfFigure { .. }
+            | Error::NothingToDraw { .. }
+            | Error::DuplicateRecord { .. }
+            | Error::NotAReport { .. } => ErrorKind::BadInput,
+        }
+    }
+}

@@ -1,0 +1,192 @@
+//! From nominal model and controller of a run to its coprime factors, with balanced states.
+
+use super::models::Controller;
+use super::records::RunRecords;
+use super::settings::{Construction, FactorSettings, RunSettings};
+use crate::{Error, Result};
+use std::path::Path;
+use youla::Mat;
+use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+use youla::factor::CoprimeFactors;
+use youla::linalg::eye;
+use youla::lti::{Discrete, StateSpace};
+
+/// The factors of a run and what they rest on.
+#[derive(Debug, Clone)]
+pub struct Factorisation {
+    /// The nominal model as given, in its own states.
+    pub nominal: StateSpace<Discrete>,
+    /// The eight factors.
+    pub factors: CoprimeFactors<Discrete>,
+    /// The controller that ran, `u = K y` (positive feedback).
+    pub controller: StateSpace<Discrete>,
+    /// Largest relative residual of the Bezout identity (15) up to Nyquist.
+    pub bezout_residual: f64,
+}
+
+/// Builds the factors that the settings of a run describe; paths in them are relative to `folder`.
+///
+/// # Errors
+/// As [`factorise`], and whatever is wrong with the given model or controller.
+pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Factorisation> {
+    let nominal = settings.nominal.realise(folder, records.time)?;
+    let controller = settings.controller.realise(folder, records.time)?;
+    for (what, expected, found) in [
+        ("the number of inputs of the nominal model", records.inputs.len(), nominal.inputs()),
+        ("the number of outputs of the nominal model", records.outputs.len(), nominal.outputs()),
+    ] {
+        if expected != found {
+            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
+        }
+    }
+    factorise(&nominal, &controller, records, &settings.factors)
+}
+
+/// Builds the factors of the nominal model and the controller. States are scaled by powers of two first: entries of
+/// physical models span 1e6, which would cost three to six digits of (15).
+///
+/// # Errors
+/// [`youla::Error::NotStabilising`] with the pole when the controller does not stabilise the nominal model, shapes, and
+/// the conditions of the Riccati equations.
+pub fn factorise(
+    nominal: &StateSpace<Discrete>,
+    controller: &Controller,
+    records: &RunRecords,
+    settings: &FactorSettings,
+) -> Result<Factorisation> {
+    let scale = nominal.state_scales()?;
+    let balanced = nominal.with_scaled_states(&scale);
+    let factors = match controller {
+        Controller::Observer { f, l } => {
+            youla::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+            youla::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+            let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
+            let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
+            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
+        }
+        Controller::System(k) => {
+            let weights = Weights::new(records, settings);
+            match settings.construction {
+                Construction::Stacked => {
+                    let f = weights.state_feedback(&balanced)?;
+                    let fk = controller_feedback(k)?;
+                    CoprimeFactors::stacked(&balanced, k, f.as_ref(), fk.as_ref())?
+                }
+                Construction::Shifted => {
+                    let (f, l) = (weights.state_feedback(&balanced)?, weights.observer_gain(&balanced)?);
+                    CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?.shifted_to(k)?
+                }
+            }
+        }
+    };
+    let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
+    Ok(Factorisation { nominal: nominal.clone(), controller: factors.controller()?, factors, bezout_residual })
+}
+
+/// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.
+fn not_stabilising(error: youla::Error) -> youla::Error {
+    match error {
+        youla::Error::Unstable { pole, .. } => youla::Error::NotStabilising { model: "the nominal model".into(), pole },
+        other => other,
+    }
+}
+
+/// Angular frequencies, logarithmic over four decades below Nyquist.
+fn grid_to_nyquist(time: Discrete, count: usize) -> Vec<f64> {
+    let nyquist = std::f64::consts::PI / time.ts();
+    (0..count).map(|k| nyquist * 10f64.powf(-4.0 + 4.0 * k as f64 / count as f64)).collect()
+}
+
+/// Weights in the units of the machine: inputs and outputs count in their rms on the estimation records.
+struct Weights {
+    u: Vec<f64>,
+    y: Vec<f64>,
+    input_weight: f64,
+    output_noise: f64,
+}
+
+impl Weights {
+    fn new(records: &RunRecords, settings: &FactorSettings) -> Self {
+        let (u, y) = records.sizes();
+        Weights { u, y, input_weight: settings.input_weight, output_noise: settings.output_noise }
+    }
+
+    /// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs.
+    fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+        let outputs = diagonal(self.y.iter().map(|s| 1.0 / (s * s)));
+        let inputs = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
+        let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
+        gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
+    }
+
+    /// Kalman predictor with input noise of the size of the inputs and output noise of the size of the outputs.
+    fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+        let input = diagonal(self.u.iter().map(|s| s * s));
+        let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
+        let gain = || Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l);
+        gain().map_err(|e: Error| e.within("observer gain L of the nominal model"))
+    }
+}
+
+fn diagonal(values: impl Iterator<Item = f64>) -> Mat<f64> {
+    let values: Vec<f64> = values.collect();
+    Mat::from_fn(values.len(), values.len(), |i, j| if i == j { values[i] } else { 0.0 })
+}
+
+/// Feedback of the controller's right factors: zero for a stable controller (U = K, V = I), else an LQR of its own.
+fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
+    if k.is_stable()? {
+        return Ok(Mat::zeros(k.inputs(), k.order()));
+    }
+    let weights = LqrWeights { q: eye(k.order()), r: eye(k.inputs()), s: None };
+    Ok(lqr(k, &weights).map_err(|e| e.within("state feedback of the controller's factors"))?.f)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+    use youla::{demo, models::ControllerSettings};
+
+    /// States that span 1e6 (um, um/s, V) cost no digits of (15), because they are scaled first.
+    #[test]
+    fn states_are_scaled_before_factorising() {
+        let demo = demo(1).unwrap();
+        let found = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
+        assert!(found.bezout_residual < 1e-13, "{:.1e}", found.bezout_residual);
+        assert!(found.factors.nominal() != &found.nominal);
+    }
+
+    /// One controller written down in three ways gives the same loop: observer gains, and its matrices with either sign.
+    #[test]
+    fn forms_and_signs_of_one_controller_agree() {
+        let demo = demo(1).unwrap();
+        let observer = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
+        let k = &observer.controller;
+        let rows = |m: youla::MatRef<'_, f64>, sign: f64| -> Vec<Vec<f64>> {
+            (0..m.nrows()).map(|i| m.row(i).iter().map(|x| sign * x).collect()).collect()
+        };
+        for (feedback, sign) in [(super::super::Feedback::Positive, 1.0), (super::super::Feedback::Negative, -1.0)] {
+            let controller = ControllerSettings::StateSpace {
+                feedback,
+                a: rows(k.a(), 1.0),
+                b: rows(k.b(), 1.0),
+                c: rows(k.c(), sign),
+                d: rows(k.d(), sign),
+            };
+            for construction in [Construction::Stacked, Construction::Shifted] {
+                let factors = FactorSettings { construction, ..demo.settings.factors };
+                let settings = RunSettings { controller: controller.clone(), factors, ..demo.settings.clone() };
+                let found = factorise_run(&settings, &demo.records, Path::new(".")).unwrap();
+                assert!(found.bezout_residual < 1e-12, "{construction:?}: {:.1e}", found.bezout_residual);
+                let omega = grid_to_nyquist(k.time(), 50);
+                let (x, y) = (
+                    youla::lti::frequency_response(k, &omega).unwrap(),
+                    youla::lti::frequency_response(&found.controller, &omega).unwrap(),
+                );
+                let miss = (0..50).map(|i| (x.at(i) - y.at(i)).norm_l2() / x.at(i).norm_l2()).fold(0.0, f64::max);
+                assert!(miss < 1e-9, "{construction:?}: {miss:.1e}");
+            }
+        }
+    }
+}

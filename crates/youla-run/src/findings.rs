@@ -1,0 +1,155 @@
+//! What a run says in words: the answer to "can I trust it?" and the remarks besides.
+
+mod further;
+mod trust;
+
+pub(super) use further::further_lines;
+pub(super) use trust::verdict_lines;
+
+use super::pipeline::Identification;
+use super::segments::RecordSegment;
+use youla::identify::innovation_form::Settling;
+use youla::identify::subspace::{Uncertainty, amplitudes};
+use youla_greybox::Stop;
+use youla_greybox::refine::RefineNoise;
+use youla_report::data::{Evidence, Note, Status};
+
+/// What speaks against the result or asks for a look, in sentences: for a terminal that shows no report.
+///
+/// What the check of the data says at least as a caution comes first.
+pub fn cautions(found: &Identification) -> Vec<String> {
+    let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
+    // What the line on the data counts is said one by one.
+    let trust = verdict_lines(found).into_iter().filter(|line| line.evidence != Evidence::Data);
+    let lines = trust.chain(further_lines(found)).map(|v| weigh(v.status, v.text));
+    let rest = lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten();
+    found.data.sentences().into_iter().chain(rest).collect()
+}
+
+/// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.
+pub(super) fn notes(found: &Identification) -> Vec<Note> {
+    let mut all = Vec::new();
+    let mut add = |status: Status, text: String| all.push(Note { status, text });
+    for refusal in found.refusals() {
+        add(Status::Info, format!("There is no {}: {}.", refusal.what, refusal.error));
+    }
+    let refused = found.hansen.uncertainty.as_ref().and_then(Uncertainty::refusal);
+    if let Some(reason) = refused {
+        add(Status::Caution, format!("There is no uncertainty of S and G(S): {reason}."));
+    }
+    if let Some(Err(reason)) = &found.hansen.evidence {
+        add(Status::Caution, format!("Nothing is said on S = 0: {reason}."));
+    }
+    if let Some(Uncertainty::Bootstrap(bootstrap)) = &found.hansen.deviation.uncertainty {
+        let (unstable, failed) = (bootstrap.unstable, bootstrap.failed);
+        if unstable + failed > 0 {
+            let text = format!("Of the resampled records {unstable} gave an unstable S and {failed} none.");
+            add(Status::Info, text);
+        }
+    }
+    if let Some(Ok(run)) = &found.grey_box {
+        let model = &run.found.model;
+        for sentence in model.undetermined.sentences() {
+            add(Status::Caution, format!("Grey box: {sentence}."));
+        }
+        for bound in &model.at_bounds {
+            add(Status::Caution, format!("Grey box: {} ended at its bound {}.", bound.parameter, bound.value));
+        }
+    }
+    for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
+        let moved = model.map_or(0, |m| m.stability.moved.len());
+        if moved > 0 {
+            add(
+                Status::Caution,
+                format!("{moved} unstable poles of {name} were reflected, because stability = \"constrain\"."),
+            );
+        }
+    }
+    for v in &found.verdict.models {
+        for r in &v.records {
+            if let Err(reason) = &r.predicted {
+                add(Status::Caution, format!("{} has no prediction of {}: {reason}.", v.method.label(), r.record));
+            }
+        }
+    }
+    if let Some(form) = &found.hansen.innovation_form {
+        let (status, settled) = match form.stop {
+            Settling::Settled => (Status::Info, "settled"),
+            Settling::Iterations => (Status::Caution, "had not settled"),
+        };
+        let kalman = form.from_kalman.map_or(String::new(), |x| {
+            format!(" It differs from the Kalman gain of the subspace method by {:.0} % of its size.", 100.0 * x)
+        });
+        let text = format!(
+            "S is in innovation form: its gain K_s {settled} after {} refits (last change {:.1e}) and misses the response of \
+             beta to output noise by {:.1} %.{kalman}",
+            form.iterations,
+            form.change,
+            100.0 * form.misfit
+        );
+        add(status, text);
+    }
+    if let Some(refined) = &found.refinement {
+        let (status, ended) = match refined.stop {
+            Stop::Iterations => (Status::Caution, " and stopped at the limit"),
+            _ => (Status::Info, ""),
+        };
+        let noise = match refined.noise {
+            RefineNoise::OutputError => "the simulated beta",
+            RefineNoise::Innovation => "beta predicted one step ahead",
+        };
+        let fits = |fit: &[f64]| fit.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" and ");
+        let text = format!(
+            "S was refined on {noise}: {} steps{ended} took the criterion from {:.5e} to {:.5e}, and the fit of the simulated \
+             beta from {} % to {} %. S is {}.",
+            refined.iterations,
+            refined.cost_before,
+            refined.cost,
+            fits(&refined.fit_before),
+            fits(&refined.fit),
+            if refined.stable { "stable, so that the controller stabilises G(S)" } else { "not stable" },
+        );
+        add(status, text);
+    }
+    if !found.records.segments.is_empty() {
+        let part = |s: &RecordSegment| format!("{} is rows {} to {} of {}", s.record, s.rows[0], s.rows[1], s.file);
+        let parts: Vec<String> = found.records.segments.iter().map(part).collect();
+        add(
+            Status::Info,
+            format!("Records that are parts of a file, each an experiment by itself: {}.", parts.join("; ")),
+        );
+    }
+    if let Some(text) = disturbance_note(found) {
+        add(Status::Info, text);
+    }
+    let settle = found.signals.settle;
+    if settle > 0 {
+        let text = format!(
+            "The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."
+        );
+        add(Status::Info, text);
+    }
+    all
+}
+
+/// The known lines that were taken out of beta, with their amplitudes in each output, largest over the records.
+fn disturbance_note(found: &Identification) -> Option<String> {
+    let labels = found.settings.data.disturbance.as_ref()?.labels();
+    let all: Vec<_> = found.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
+    let of_line = |(j, label): (usize, &String)| {
+        let largest = |i: usize| all.iter().map(|lines| lines[j][i].amplitude).fold(0.0, f64::max);
+        let outputs = found.records.outputs.iter().enumerate();
+        let each: Vec<String> = outputs.map(|(i, c)| format!("{:.3} {} in {}", largest(i), c.unit, c.name)).collect();
+        format!("{label}: {}", each.join(", "))
+    };
+    let lines: Vec<String> = labels.iter().enumerate().map(of_line).collect();
+    Some(format!(
+        "Known lines were taken out before identification, and out of measured and predicted outputs alike before each fit; \
+         their amplitudes in beta, largest over the records: {}.",
+        lines.join("; ")
+    ))
+}
+
+fn direct(found: &Identification) -> Option<&youla::identify::subspace::SubspaceModel> {
+    found.direct.as_ref()?.as_ref().ok()
+}

@@ -1,0 +1,86 @@
+//! What else a run says besides the answer to "can I trust it?": what the loop can bear, reduction, physics, redesign.
+
+use crate::pipeline::Identification;
+use crate::verdict::Method;
+use youla::control::IsoZone;
+use youla_greybox::hansen_pem::PemStart;
+use youla_report::data::{Evidence, Status, Verdict};
+
+/// Lines below the answer, each with its evidence.
+pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
+    [margin_line, redesign_line, reduction_line, grey_box_line, factor_line]
+        .iter()
+        .filter_map(|line| line(found))
+        .collect()
+}
+
+/// What the loop of G(S) can bear; nothing where it is unstable, which the answer says, and where no controller ran.
+fn margin_line(found: &Identification) -> Option<Verdict> {
+    if found.factorisation.controller.is_zero() {
+        return None;
+    }
+    let robustness = &found.verdict.of(Method::Hansen)?.robustness;
+    let margins = robustness.margins.as_ref().ok()?;
+    let zone = margins.zone()?;
+    let worst = margins.outputs.iter().map(|c| c.sensitivity.value).fold(0.0, f64::max);
+    let disk = margins.output_disks.balanced;
+    let highest = disk.highest_gain.map_or("any higher factor".into(), |g| format!("{g:.2}"));
+    let text = format!(
+        "With G(S) the peak sensitivity of the loop is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
+         all outputs at once; the gains of all outputs may change by factors from {:.2} to {highest}, or their phases by {:.0} \
+         degrees.",
+        margins.output_sensitivity.value, disk.lowest_gain, disk.phase_degrees
+    );
+    let status = match zone {
+        IsoZone::A | IsoZone::B => Status::Good,
+        IsoZone::C => Status::Caution,
+        IsoZone::D => Status::Bad,
+    };
+    Some(Verdict { status, text, evidence: Evidence::Margins })
+}
+
+fn redesign_line(found: &Identification) -> Option<Verdict> {
+    let new = found.redesign.as_ref()?.as_ref().ok()?;
+    let status = if new.gains_damping() { Status::Good } else { Status::Caution };
+    Some(Verdict { status, text: crate::redesign::sentence(new), evidence: Evidence::Redesign })
+}
+
+/// Whether the controller stabilises the reduced model, and what the reduction costs in the loop.
+fn reduction_line(found: &Identification) -> Option<Verdict> {
+    Some(found.reduction.as_ref()?.as_ref().ok()?.verdict())
+}
+
+/// Whether the physical structure explains what G(S) explains.
+fn grey_box_line(found: &Identification) -> Option<Verdict> {
+    let run = found.grey_box.as_ref()?.as_ref().ok()?;
+    let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
+    let (model, plant) = (fit(&run.found.model.fit), fit(&run.found.fit_of_plant));
+    let start = match run.found.won {
+        PemStart::Projection => "the projection of G(S)",
+        PemStart::Nominal => "its initial values",
+        PemStart::Direct => "the projection of a model of u and y by PBSIDopt",
+    };
+    let text = format!(
+        "The physical structure explains the estimation records with a fit of {model} per output, G(S) {plant} (found from {start})."
+    );
+    let (status, text) = match run.found.lost() {
+        true => (
+            Status::Caution,
+            text + " It stays behind: the search is lost, or the structure does not describe the plant.",
+        ),
+        false => (Status::Good, text),
+    };
+    let (doubt, residuals) = match &run.intervals {
+        Ok(known) => (!known.residuals.independent() || known.coloured == known.residuals.white(), known.verdict()),
+        Err(reason) => (true, format!("There are no intervals: {reason}.")),
+    };
+    let status = if doubt { Status::Caution } else { status };
+    Some(Verdict { status, text: format!("{text} {residuals}"), evidence: Evidence::Fits })
+}
+
+fn factor_line(found: &Identification) -> Option<Verdict> {
+    let residual = found.factorisation.bezout_residual;
+    let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
+    let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
+    Some(Verdict { status, text, evidence: Evidence::Certificate })
+}

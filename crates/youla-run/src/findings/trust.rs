@@ -1,0 +1,159 @@
+//! The answer to "can I trust it?" in five lines: fresh data, what is left of them, data and controller, S, the loop.
+
+use crate::check::OF_SETTINGS;
+use crate::pipeline::Identification;
+use crate::residual_tests::RecordResiduals;
+use crate::verdict::{Method, ModelVerdict};
+use youla::identify::subspace::Evidence as Information;
+use youla_loop::check::{Finding, Severity};
+use youla_report::data::{Evidence, Status, Verdict};
+
+/// The five lines, each with its evidence.
+pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
+    [fit_line, residual_line, data_line, deviation_line, loop_line].iter().filter_map(|line| line(found)).collect()
+}
+
+/// Mean fit over all verification records and outputs.
+fn mean_fit(v: &ModelVerdict) -> f64 {
+    let all: Vec<f64> = v.records.iter().flat_map(|r| r.fit.iter().copied()).collect();
+    all.iter().sum::<f64>() / all.len() as f64
+}
+
+fn fit_line(found: &Identification) -> Option<Verdict> {
+    if found.records.verification.is_empty() {
+        let text = "No verification record was given: nothing shows how the model does on fresh data.".into();
+        return Some(Verdict { status: Status::Caution, text, evidence: Evidence::Fits });
+    }
+    let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
+    let of = |method: Method| found.verdict.of(method).map(mean_fit);
+    let (hansen, nominal) = (of(Method::Hansen)?, of(Method::Nominal)?);
+    let mut text =
+        format!("On fresh data G(S) has a mean fit of {}, the nominal model {}", percent(hansen), percent(nominal));
+    if let Some(direct) = of(Method::Direct) {
+        text += &format!(", direct identification {}", percent(direct));
+    }
+    text.push('.');
+    let better = hansen.is_finite() && (!nominal.is_finite() || hansen > nominal);
+    Some(Verdict { status: if better { Status::Good } else { Status::Bad }, text, evidence: Evidence::Fits })
+}
+
+/// Whether the residual of G(S) depends on what excited the loop; nothing without a verification record.
+fn residual_line(found: &Identification) -> Option<Verdict> {
+    let records = &found.verdict.of(Method::Hansen)?.records;
+    let tested: Vec<_> = records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect();
+    let (status, text) = match tested.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))? {
+        (_, worst) if !worst.external => {
+            let text = "No excitation from outside is known, so that the residuals of G(S) cannot show what it lacks.";
+            (Status::Caution, text.to_owned())
+        }
+        _ if tested.iter().all(|(_, r)| r.correlations.independent) => (
+            Status::Good,
+            "What G(S) leaves of fresh data does not depend on past excitation: these data do not show that anything is missing.".into(),
+        ),
+        (record, worst) => {
+            let at = worst.correlations.largest?;
+            let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
+            let text = format!(
+                "What G(S) leaves of fresh data still depends on past excitation: the residual of {output} in {record} has a \
+                 correlation of {:.3} with {input} {} samples before, {:.0} standard deviations.",
+                size(worst),
+                at.lag,
+                at.deviations.abs()
+            );
+            (Status::Caution, text)
+        }
+    };
+    Some(Verdict { status, text, evidence: Evidence::Residuals })
+}
+
+/// The causal correlation that is largest in its standard deviations.
+fn size(residuals: &RecordResiduals) -> f64 {
+    let tests = &residuals.correlations;
+    let Some(at) = tests.largest else { return 0.0 };
+    let with = tests.cross.iter().find(|c| (c.output, c.input) == (at.output, at.input));
+    with.map_or(0.0, |c| c.values[c.values.len() / 2 + at.lag].abs())
+}
+
+/// What the check of the data says, and whether the declared controller is the one that ran.
+fn data_line(found: &Identification) -> Option<Verdict> {
+    let (controller, of_controller) = controller_sentence(found);
+    let of_data = |f: &Finding, severity: Severity| f.severity == severity && f.record != OF_SETTINGS;
+    let count = |severity: Severity| found.data.grouped().iter().filter(|(f, _)| of_data(f, severity)).count();
+    let (defects, cautions) = (count(Severity::Defect), count(Severity::Caution));
+    let (checked, of_check) = match (defects, cautions) {
+        (0, 0) => ("finds nothing to mend".to_owned(), Status::Good),
+        (0, n) => (format!("asks for care at {n} point{}", if n == 1 { "" } else { "s" }), Status::Caution),
+        (n, _) => (format!("finds {n} defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
+    };
+    let text = format!("{controller} The check of the data {checked}.");
+    let evidence = if of_controller > of_check { Evidence::Signals } else { Evidence::Data };
+    Some(Verdict { status: of_controller.max(of_check), text, evidence })
+}
+
+fn controller_sentence(found: &Identification) -> (String, Status) {
+    let controller = &found.factorisation.controller;
+    match found.signals.controller_mismatch {
+        _ if controller.order() == 0 && controller.d().norm_max() == 0.0 => ("No controller ran.".into(), Status::Good),
+        None => {
+            let text = "No excitation is known that could show whether the declared controller is the one that ran.";
+            (text.into(), Status::Info)
+        }
+        Some(m) => {
+            let (status, words) = match m {
+                m if m < 0.01 => (Status::Good, "is the one that ran"),
+                m if m < 0.1 => (Status::Caution, "nearly explains the logged input"),
+                _ => (Status::Bad, "does not explain the logged input; check sign, delay and saturation"),
+            };
+            (format!("The declared controller {words} (alpha from known excitations to {m:.1e})."), status)
+        }
+    }
+}
+
+/// Order and fit of S, and, where its uncertainty was asked for, whether it is more than noise.
+fn deviation_line(found: &Identification) -> Option<Verdict> {
+    let s = &found.hansen.deviation;
+    let stable = if s.stability.stable { "stable" } else { "unstable" };
+    let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
+    let text =
+        format!("S has order {}, is {stable} and reproduces beta with a fit of {}", s.model.order(), fit.join(", "));
+    let of_stability = if s.stability.stable { Status::Good } else { Status::Bad };
+    let (more, of_evidence) = match found.hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
+        Some(evidence) => information(evidence),
+        None => (".".into(), Status::Good),
+    };
+    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: Evidence::Order })
+}
+
+fn information(evidence: &Information) -> (String, Status) {
+    let figures =
+        format!("t = {:.1}, {:.1} at {:.0} %", evidence.statistic, evidence.threshold, 100.0 * evidence.level);
+    if evidence.against_nominal() {
+        (format!("; each half of the data predicts the other: the nominal model is refuted ({figures})."), Status::Good)
+    } else {
+        let text = format!(
+            "; no half of the data predicts the other: S may be noise, and there is no evidence against the nominal model ({figures})."
+        );
+        (text, Status::Caution)
+    }
+}
+
+/// Whether the controller stabilises G(S) and, where its uncertainty was asked for, every model within the region of S.
+fn loop_line(found: &Identification) -> Option<Verdict> {
+    let v = found.verdict.of(Method::Hansen)?;
+    let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
+    let (of_loop, verb, adjective) = match v.certificate.stable {
+        true => (Status::Good, "stabilises", "stable"),
+        false => (Status::Bad, "does not stabilise", "unstable"),
+    };
+    let text = match found.factorisation.controller.is_zero() {
+        true => format!("G(S) is {adjective}: its largest pole has |z| = {worst:.5}."),
+        false => format!("The controller that ran {verb} G(S): the largest pole of the loop has |z| = {worst:.5}."),
+    };
+    let certificate = found.certificate.as_ref();
+    let band = certificate.and_then(|c| Some((c.band_sentence()?, c.band.as_ref()?.holds())));
+    let (text, of_band) = match band {
+        Some((sentence, holds)) => (format!("{text} {sentence}"), if holds { Status::Good } else { Status::Caution }),
+        None => (text, Status::Good),
+    };
+    Some(Verdict { status: of_loop.max(of_band), text, evidence: Evidence::Certificate })
+}

@@ -1,0 +1,172 @@
+//! Subspace identification straight from files that need not fit into memory: what `youla subspace` does.
+
+use super::artefacts::{ModelFile, Provenance, SCHEMA, subspace_details};
+use super::records::SourceFile;
+use crate::{Error, Result};
+use faer::MatMut;
+use std::path::PathBuf;
+use youla::identify::subspace::{SubspaceModel, SubspaceOptions, subspace_stream};
+use youla::lti::Discrete;
+use youla::signal::Channel;
+use youla::signal::{JoinedStreams, SampleStream};
+use youla_io::{ChannelRef, ChannelSpec, CsvOptions, CsvStream, NpyStream, TimeSource, is_npy, sha256};
+
+/// Files, channels and clock.
+#[derive(Debug, Clone)]
+pub struct LongRecords {
+    /// One experiment each, all of the same form: text (plain or gzip), or NumPy `.npy` of samples x channels.
+    pub files: Vec<PathBuf>,
+    /// The inputs; in a `.npy` file by number.
+    pub inputs: Vec<ChannelRef>,
+    /// The outputs.
+    pub outputs: Vec<ChannelRef>,
+    /// Sample time, or for text files the column with the time.
+    pub time: TimeSource,
+    /// Form of text files.
+    pub csv: CsvOptions,
+}
+
+/// A model from long records.
+#[derive(Debug, Clone)]
+pub struct LongModel {
+    /// The model with its evidence.
+    pub found: SubspaceModel,
+    /// Channels of the inputs.
+    pub inputs: Vec<Channel>,
+    /// Channels of the outputs.
+    pub outputs: Vec<Channel>,
+    /// Samples over all experiments.
+    pub samples: u64,
+    /// Passes over the files.
+    pub passes: usize,
+}
+
+/// Where a reading is: pass (counted from 1) and samples read in it.
+#[derive(Debug, Clone, Copy)]
+pub struct ReadingProgress {
+    /// Number of the pass.
+    pub pass: usize,
+    /// Samples read in it.
+    pub samples: u64,
+}
+
+/// Identifies a model from files in memory that does not depend on their length; `watch` is told of every piece read.
+///
+/// # Errors
+/// As [`subspace_stream`], [`CsvStream::open`] and [`NpyStream::open`]; [`youla::Error::SampleTimeMismatch`] where files differ,
+/// [`youla_io::Error::SampleTimeMissing`] for `.npy` files without a sample time.
+pub fn identify_long(
+    records: &LongRecords,
+    options: &SubspaceOptions,
+    watch: &mut (dyn FnMut(ReadingProgress) + Send),
+) -> Result<LongModel> {
+    let (parts, times): (Vec<_>, Vec<_>) =
+        records.files.iter().map(|file| open(records, file)).collect::<Result<Vec<_>>>()?.into_iter().unzip();
+    let joined = JoinedStreams::new(parts)?;
+    let time = times[0];
+    if let Some((file, other)) = records.files.iter().zip(&times).find(|(_, other)| **other != time) {
+        let what = format!("{} and {}", records.files[0].display(), file.display());
+        return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: time.ts(), right: other.ts() }));
+    }
+    let mut stream = Watched { inner: joined, watch, at: ReadingProgress { pass: 0, samples: 0 } };
+    let found = subspace_stream(&mut stream, time, options)?;
+    let named = |chosen: &[ChannelRef]| chosen.iter().map(|c| Channel::new(c.to_string(), "")).collect();
+    let (inputs, outputs) = (named(&records.inputs), named(&records.outputs));
+    Ok(LongModel { found, inputs, outputs, samples: stream.at.samples, passes: stream.at.pass })
+}
+
+/// The model as an artefact, with SHA-256 of the files (which takes a pass over each) and the options.
+///
+/// # Errors
+/// [`youla_io::Error::Io`]; [`youla::Error::NoConvergence`] of the poles.
+pub fn long_model_file(
+    model: &LongModel,
+    records: &LongRecords,
+    options: &SubspaceOptions,
+) -> Result<ModelFile<SubspaceOptions>> {
+    let source = |file: &PathBuf| {
+        Ok(SourceFile { path: file.display().to_string(), purpose: "estimation".into(), sha256: sha256(file)? })
+    };
+    let provenance = Provenance {
+        schema: SCHEMA,
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        seed: None,
+        sources: records.files.iter().map(source).collect::<Result<_>>()?,
+        options: options.clone(),
+    };
+    let mut details = subspace_details(&model.found);
+    details["fit"] = serde_json::json!(model.found.fit);
+    details["samples"] = model.samples.into();
+    let ports = (model.inputs.clone(), model.outputs.clone());
+    ModelFile::new("subspace", &model.found.model, ports, details, provenance)
+}
+
+/// Reads options for the identification from a TOML file.
+///
+/// # Errors
+/// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`], [`youla_io::Error::Settings`] with the place of what is wrong.
+pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<SubspaceOptions> {
+    use std::io::Read;
+    let path = path.as_ref();
+    let mut text = String::new();
+    let read = youla_io::open(path)?.read_to_string(&mut text);
+    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    parse_subspace_options(&text, path)
+}
+
+/// Parses the text of such a file; `path` is named in errors.
+///
+/// # Errors
+/// [`youla_io::Error::Settings`] with line, column and key.
+pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<SubspaceOptions> {
+    Ok(youla_io::toml_file::parse(text, path)?)
+}
+
+fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {
+    if is_npy(file)? {
+        let Some(ts) = records.time.ts else {
+            return Err(Error::File(youla_io::Error::SampleTimeMissing { what: file.display().to_string() }));
+        };
+        return Ok((Box::new(NpyStream::open(file, &records.inputs, &records.outputs)?), Discrete::new(ts)?));
+    }
+    let specs = |chosen: &[ChannelRef]| -> Vec<ChannelSpec> {
+        chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
+    };
+    let (u, y) = (specs(&records.inputs), specs(&records.outputs));
+    let stream = CsvStream::open(file, &u, &y, &records.time, &records.csv)?;
+    let time = stream.time();
+    Ok((Box::new(stream), time))
+}
+
+/// A stream that tells how far it has been read.
+struct Watched<'a, S> {
+    inner: S,
+    watch: &'a mut (dyn FnMut(ReadingProgress) + Send),
+    at: ReadingProgress,
+}
+
+impl<S: SampleStream> SampleStream for Watched<'_, S> {
+    fn inputs(&self) -> usize {
+        self.inner.inputs()
+    }
+
+    fn outputs(&self) -> usize {
+        self.inner.outputs()
+    }
+
+    fn rewind(&mut self) -> youla::Result<()> {
+        self.at = ReadingProgress { pass: self.at.pass + 1, samples: 0 };
+        self.inner.rewind()
+    }
+
+    fn read(&mut self, rows: MatMut<'_, f64>) -> youla::Result<usize> {
+        let count = self.inner.read(rows)?;
+        self.at.samples += count as u64;
+        (self.watch)(self.at);
+        Ok(count)
+    }
+
+    fn next_experiment(&mut self) -> youla::Result<bool> {
+        self.inner.next_experiment()
+    }
+}

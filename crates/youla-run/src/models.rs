@@ -1,0 +1,313 @@
+//! `[nominal]` and `[controller]` of run.toml: every form in which users have them.
+
+use crate::{Error, Result};
+use faer::Scale;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use youla::Mat;
+use youla::lti::{Continuous, Discrete, PolynomialMatrix, StateSpace};
+use youla_io::export::read_model;
+use youla_io::read_mat;
+
+/// The domain in which matrices or polynomials are given.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Domain {
+    /// In s, rad/s; discretised by a zero-order hold at the sample time of the data.
+    Continuous,
+    /// In z, at the sample time of the data.
+    Discrete,
+}
+
+/// A transfer function: one polynomial for one input and output, or a matrix `[row][column]` of polynomials.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(untagged, expecting = "expected a list of coefficients, or a matrix [row][column] of such lists")]
+pub enum Polynomials {
+    /// Coefficients of the only entry.
+    Single(Vec<f64>),
+    /// Coefficients per entry, `[row][column]`.
+    Matrix(PolynomialMatrix),
+}
+
+impl Polynomials {
+    /// As a matrix with the given shape; a single polynomial stands for every entry.
+    fn spread(&self, rows: usize, columns: usize) -> PolynomialMatrix {
+        match self {
+            Polynomials::Single(c) => vec![vec![c.clone(); columns]; rows],
+            Polynomials::Matrix(m) => m.clone(),
+        }
+    }
+
+    fn shape(&self) -> (usize, usize) {
+        match self {
+            Polynomials::Single(_) => (1, 1),
+            Polynomials::Matrix(m) => (m.len(), m.first().map_or(0, Vec::len)),
+        }
+    }
+}
+
+/// The nominal model G(0).
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum NominalModel {
+    /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
+    TransferFunction {
+        /// The domain in which it is given.
+        domain: Domain,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+    },
+    /// State-space matrices, row by row.
+    StateSpace {
+        /// The domain in which it is given.
+        domain: Domain,
+        /// A, n x n.
+        a: Vec<Vec<f64>>,
+        /// B, n x m.
+        b: Vec<Vec<f64>>,
+        /// C, p x n.
+        c: Vec<Vec<f64>>,
+        /// D, p x m; zero when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        d: Option<Vec<Vec<f64>>>,
+    },
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3.
+    MatFile {
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+        /// The domain in which it is given.
+        domain: Domain,
+    },
+    /// A discrete-time model that was exported or identified: JSON, MATLAB or NumPy file with its sample time.
+    ModelFile {
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
+}
+
+impl NominalModel {
+    /// The discrete-time nominal model at the sample time of the data, in the states in which it was given.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the matrices, polynomials or file.
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+        self.system(folder, time).map_err(|e| e.within("[nominal]"))
+    }
+
+    fn system(&self, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+        match self {
+            NominalModel::TransferFunction { domain, numerator, denominator } => {
+                let (p, m) = numerator.shape();
+                let (num, den) = (numerator.spread(p, m), denominator.spread(p, m));
+                match domain {
+                    Domain::Continuous => Ok(StateSpace::transfer_matrix(&num, &den, Continuous)?.zoh(time)?),
+                    Domain::Discrete => Ok(StateSpace::transfer_matrix(&num, &den, time)?),
+                }
+            }
+            NominalModel::StateSpace { domain, a, b, c, d } => {
+                let (a, b, c) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?);
+                let d = d.as_ref().map_or_else(|| Ok(Mat::zeros(c.nrows(), b.ncols())), |d| matrix("D", d))?;
+                sampled([a, b, c, d], *domain, time)
+            }
+            NominalModel::MatFile { file, domain } => mat_model(&folder.join(file), *domain, time),
+            NominalModel::ModelFile { file } => exported(&folder.join(file), time),
+        }
+    }
+}
+
+/// Which sign the controller was written down with; never guessed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Feedback {
+    /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
+    /// return them.
+    Negative,
+    /// `u = K (y - r)`; for observer gains `u = F x` and `x+ = A x + B u + L (C x + D u - y)`.
+    Positive,
+}
+
+impl Feedback {
+    /// The factor that turns a gain written in this convention into one of positive feedback.
+    fn sign(self) -> f64 {
+        match self {
+            Feedback::Negative => -1.0,
+            Feedback::Positive => 1.0,
+        }
+    }
+}
+
+/// The controller that ran while the data were logged, at the sample time of the data, in one of its usual forms. The
+/// sign convention is mandatory in each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ControllerSettings {
+    /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single
+    /// denominator is common to all entries.
+    DifferenceEquation {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+    },
+    /// Discrete-time matrices, row by row.
+    StateSpace {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// A of the controller, row by row.
+        a: Vec<Vec<f64>>,
+        /// B of the controller.
+        b: Vec<Vec<f64>>,
+        /// C of the controller.
+        c: Vec<Vec<f64>>,
+        /// D of the controller.
+        d: Vec<Vec<f64>>,
+    },
+    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3, discrete-time.
+    MatFile {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
+    /// A discrete-time model that was exported or identified, from y to u: JSON, MATLAB or NumPy file with its sample time.
+    ModelFile {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
+    /// State feedback and observer gain for the discrete-time nominal model in its own states.
+    Observer {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// State feedback F, m x n, row by row.
+        state_feedback: Vec<Vec<f64>>,
+        /// Observer gain L, n x p, row by row.
+        observer_gain: Vec<Vec<f64>>,
+    },
+}
+
+/// A controller in the library's convention, positive feedback.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Controller {
+    /// `u = K y`.
+    System(StateSpace<Discrete>),
+    /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
+    Observer {
+        /// m x n.
+        f: Mat<f64>,
+        /// n x p.
+        l: Mat<f64>,
+    },
+}
+
+impl ControllerSettings {
+    /// The controller with positive feedback.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the matrices, polynomials or file.
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+        self.controller(folder, time).map_err(|e| e.within("[controller]"))
+    }
+
+    fn controller(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+        let (feedback, system) = match self {
+            Self::DifferenceEquation { feedback, numerator, denominator } => {
+                let (p, m) = numerator.shape();
+                (feedback, StateSpace::difference_equation(&numerator.spread(p, m), &denominator.spread(p, m), time)?)
+            }
+            Self::StateSpace { feedback, a, b, c, d } => {
+                let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
+                (feedback, StateSpace::new(a, b, c, d, time)?)
+            }
+            Self::MatFile { feedback, file } => (feedback, mat_model(&folder.join(file), Domain::Discrete, time)?),
+            Self::ModelFile { feedback, file } => (feedback, exported(&folder.join(file), time)?),
+            Self::Observer { feedback, state_feedback, observer_gain } => {
+                let sign = Scale(feedback.sign());
+                let f = sign * matrix("state_feedback", state_feedback)?;
+                return Ok(Controller::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
+            }
+        };
+        Ok(Controller::System(if *feedback == Feedback::Negative { system.negated() } else { system }))
+    }
+}
+
+fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+    match domain {
+        Domain::Continuous => Ok(StateSpace::new(a, b, c, d, Continuous)?.zoh(time)?),
+        Domain::Discrete => Ok(StateSpace::new(a, b, c, d, time)?),
+    }
+}
+
+/// Variables `a`, `b`, `c`, `d` of a MATLAB file. A discrete-time model whose file states a sample time `ts` must have that
+/// of the data.
+fn mat_model(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let variables = read_mat(file)?;
+    if domain == Domain::Discrete && variables.variables().iter().any(|v| v.name == "ts") {
+        check_sample_time(file, variables.scalar("ts")?, time)?;
+    }
+    let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| variables.matrix(name));
+    sampled([a?, b?, c?, d?], domain, time)
+}
+
+/// A model that states its sample time, which must be that of the data.
+fn exported(file: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let system = read_model(file)?.system;
+    check_sample_time(file, system.time().ts(), time)?;
+    let parts = [system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned());
+    sampled(parts, Domain::Discrete, time)
+}
+
+fn check_sample_time(file: &Path, ts: f64, time: Discrete) -> Result<()> {
+    if (ts / time.ts() - 1.0).abs() < 1e-6 {
+        return Ok(());
+    }
+    let what = format!("{} and the data", file.display());
+    Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: ts, right: time.ts() }))
+}
+
+fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
+    let columns = rows.first().map_or(0, Vec::len);
+    match rows.iter().position(|r| r.len() != columns) {
+        Some(bad) => Err(Error::Method(youla::Error::Shape {
+            what: format!("row {} of the matrix {name}", bad + 1),
+            expected: (1, columns),
+            found: (1, rows[bad].len()),
+        })),
+        None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use youla::signal::Channel;
+    use youla_io::export::{ModelFormat, NamedModel, export_model};
+    use youla_io::scratch::scratch;
+
+    /// One file in three formats is the model that was written; another sample time is refused, the sign is stated.
+    #[test]
+    fn a_model_that_was_written_is_read_again() {
+        let time = Discrete::new(1e-3).unwrap();
+        let entry = |x: f64| Mat::from_fn(1, 1, |_, _| x);
+        let system = StateSpace::new(entry(0.9), entry(1.0 / 3.0), entry(2.0), entry(0.1), time).unwrap();
+        let ports = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
+        let model = NamedModel::new("g", system.clone(), ports).unwrap();
+        for format in [ModelFormat::Json, ModelFormat::Mat, ModelFormat::Npz] {
+            let file = scratch(format.extension());
+            std::fs::write(file.path(), export_model(&model, format).unwrap()).unwrap();
+            let nominal = NominalModel::ModelFile { file: file.path().to_owned() };
+            assert_eq!(nominal.realise(Path::new("/"), time).unwrap(), system);
+            let error = nominal.realise(Path::new("/"), Discrete::new(2e-3).unwrap()).unwrap_err();
+            assert!(error.to_string().contains("sample times differ"), "{error}");
+            let text = format!("model_file = {{ feedback = \"negative\", file = {:?} }}", file.path());
+            let settings: ControllerSettings = toml::from_str(&text).unwrap();
+            let Controller::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
+            assert_eq!(k, system.negated());
+        }
+    }
+}

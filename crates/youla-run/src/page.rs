@@ -1,0 +1,292 @@
+//! What the report of a run shows: plain data, drawn by [`youla_report`].
+
+mod frequency;
+
+use super::artefacts::pairs;
+use super::certificate::RunCertificate;
+use super::findings::{further_lines, notes, verdict_lines};
+use super::grey_box::GreyBoxRun;
+use super::pipeline::{Identification, StageTimes};
+use super::records::{LoopRecord, channels_of};
+use super::redesign;
+use super::residual_tests::drawn as drawn_residuals;
+use super::robustness;
+use super::settings::Prediction;
+use super::stabilisation::drawn;
+use super::verdict::{Method, ModelVerdict};
+use crate::Result;
+use youla::Mat;
+use youla::identify::subspace::SubspaceModel;
+use youla::signal::Channel;
+use youla_loop::check::{Finding, Severity};
+use youla_report::data::{self as draw, ReportData, Role, SignalKind};
+use youla_report::{Timeline, Trace};
+
+/// Collects what the report of a run shows; `run` names the run folder.
+///
+/// # Errors
+/// Those of the frequency responses, and settings that TOML cannot hold.
+pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<ReportData> {
+    Ok(ReportData {
+        title: found.settings.name.clone(),
+        summary: summary_sentence(found),
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        run: run.to_owned(),
+        settings: found.settings.to_toml()?,
+        sources: sources(found),
+        inputs: found.records.inputs.clone(),
+        outputs: found.records.outputs.clone(),
+        sample_time: Some(found.records.time.ts()),
+        methods: found.verdict.models.iter().map(|v| method(v.method)).collect(),
+        overview: Vec::new(),
+        verdict: verdict_lines(found),
+        further: further_lines(found),
+        notes: notes(found),
+        fits: fits(found),
+        findings: findings(found),
+        experiments: experiments(found)?,
+        orders: orders(found),
+        stabilisation: diagrams(found),
+        verification: found
+            .records
+            .verification
+            .iter()
+            .enumerate()
+            .map(|(k, r)| verification(found, k, r))
+            .collect::<Result<_>>()?,
+        residuals: drawn_residuals(found),
+        frequency: Some(frequency::drawn(found)?),
+        poles: found.verdict.models.iter().map(poles).collect::<Result<_>>()?,
+        modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
+        parameters: structure(found).map_or_else(|| Ok(Vec::new()), GreyBoxRun::rows)?,
+        physical: structure(found).map(GreyBoxRun::shown),
+        reduction: reduction(found),
+        certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
+        loop_tables: found.certificate.as_ref().map(RunCertificate::tables).unwrap_or_default(),
+        redesign: redesign(found)?,
+        margins: found.verdict.models.iter().map(robustness::row).collect(),
+        margins_caption: robustness::caption(found),
+        bezout_residual: Some(found.factorisation.bezout_residual),
+        stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
+    })
+}
+
+fn summary_sentence(found: &Identification) -> String {
+    let records = &found.records;
+    let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
+    let how = match found.factorisation.controller.is_zero() {
+        true => "in open loop, as what the nominal model lacks,",
+        false => "in closed loop by the modified Hansen scheme",
+    };
+    format!(
+        "Identified {how} from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
+        records.estimation.len(),
+        plural(records.estimation.len()),
+        records.time.ts(),
+        records.inputs.len(),
+        plural(records.inputs.len()),
+        records.outputs.len(),
+        plural(records.outputs.len()),
+    )
+}
+
+fn plural(count: usize) -> &'static str {
+    if count == 1 { "" } else { "s" }
+}
+
+fn sources(found: &Identification) -> Vec<draw::Source> {
+    let source = |s: &super::records::SourceFile| draw::Source {
+        path: s.path.clone(),
+        purpose: s.purpose.clone(),
+        sha256: s.sha256.clone(),
+    };
+    found.records.sources.iter().map(source).collect()
+}
+
+fn method(method: Method) -> draw::Method {
+    let role = match method {
+        Method::Nominal => Role::Nominal,
+        Method::Direct => Role::Direct,
+        Method::Hansen => Role::Hansen,
+        Method::HansenReduced => Role::HansenReduced,
+        Method::GreyBox => Role::HansenPem,
+        Method::TruePlant => Role::Other,
+    };
+    draw::Method::new(method.key(), method.label(), role)
+}
+
+fn fits(found: &Identification) -> Vec<draw::Fit> {
+    let mut all = Vec::new();
+    for v in &found.verdict.models {
+        for r in &v.records {
+            for (output, fit) in r.fit.iter().enumerate() {
+                all.push(draw::Fit {
+                    record: r.record.clone(),
+                    output,
+                    method: v.method.key().into(),
+                    fit: fit.is_finite().then_some(*fit),
+                });
+            }
+        }
+    }
+    all
+}
+
+/// What the check of the data found, the most serious first.
+fn findings(found: &Identification) -> Vec<draw::DataFinding> {
+    let status = |severity: Severity| match severity {
+        Severity::Note => draw::Status::Info,
+        Severity::Caution => draw::Status::Caution,
+        Severity::Defect => draw::Status::Bad,
+    };
+    let one = |(f, more): (&Finding, usize)| draw::DataFinding {
+        status: status(f.severity),
+        test: f.test.key().into(),
+        record: f.record.clone(),
+        channel: f.channel.clone(),
+        rows: f.rows,
+        what: f.what.clone(),
+        advice: f.advice.clone(),
+        further: more,
+    };
+    found.data.grouped().into_iter().map(one).collect()
+}
+
+fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {
+    found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
+}
+
+fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Experiment> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let (u, y) = (&found.records.inputs, &found.records.outputs);
+    let signals = &found.signals.experiments[k];
+    let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
+        channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
+    };
+    let mut drawn = Vec::new();
+    let mut add = |kind: SignalKind, channels: &[Channel], data: &Mat<f64>| -> Result<()> {
+        let dropped = record.samples() - data.nrows();
+        for (j, channel) in channels.iter().enumerate() {
+            // Samples dropped at the start are a gap, so that all signals share one clock.
+            let mut values = vec![f64::NAN; dropped];
+            values.extend_from_slice(data.col_as_slice(j));
+            let trace = Trace::new(&channel.name, &values, &clock)?;
+            drawn.push(draw::Signal { kind, channel: channel.clone(), trace });
+        }
+        Ok(())
+    };
+    let data = &found.settings.data;
+    for (specs, excitation) in [
+        (&data.input_excitation, &record.input_excitation),
+        (&data.reference, &record.reference),
+        (&data.alpha, &record.alpha),
+    ] {
+        if let Some(excitation) = excitation {
+            add(SignalKind::Excitation, &channels_of(specs), excitation)?;
+        }
+    }
+    add(SignalKind::Input, u, &record.u)?;
+    add(SignalKind::Output, y, &record.y)?;
+    add(SignalKind::Alpha, &named("alpha", u), &signals.alpha)?;
+    add(SignalKind::Beta, &named("beta", y), &signals.beta)?;
+    Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
+}
+
+fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
+    let choice = |method: Method, label: &str, s: &SubspaceModel| draw::OrderChoice {
+        method: method.key().into(),
+        label: label.into(),
+        values: s.singular_values.clone(),
+        chosen: s.order.order,
+    };
+    let mut all = vec![choice(Method::Hansen, "S from alpha to beta", &found.hansen.deviation)];
+    if let Some(Ok(direct)) = &found.direct {
+        all.push(choice(Method::Direct, "plant from u to y", direct));
+    }
+    all
+}
+
+fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
+    let scheme = found.diagrams.deviation.as_ref().and_then(|d| d.as_ref().ok());
+    let direct = found.diagrams.direct.as_ref().and_then(|d| d.as_ref().ok());
+    let order_of_direct = found.direct.as_ref().and_then(|d| d.as_ref().ok()).map(|d| d.order.order);
+    let mut all = Vec::new();
+    all.extend(
+        scheme.map(|d| drawn(d, Method::Hansen.key(), "S from alpha to beta", found.hansen.deviation.order.order)),
+    );
+    let direct = direct.zip(order_of_direct);
+    all.extend(direct.map(|(d, order)| drawn(d, Method::Direct.key(), "plant from u to y", order)));
+    all
+}
+
+fn verification(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let prediction = match found.settings.verification.prediction {
+        Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
+        Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
+    };
+    let outputs = (0..record.y.ncols())
+        .map(|output| {
+            let name = &found.records.outputs[output].name;
+            let measured = record.y.col_as_slice(output);
+            let mut predictions = Vec::new();
+            for v in &found.verdict.models {
+                let Ok(predicted) = &v.records[k].predicted else { continue };
+                let values = predicted.col_as_slice(output);
+                let residual: Vec<f64> = measured.iter().zip(values).map(|(y, yp)| y - yp).collect();
+                predictions.push(draw::Prediction {
+                    method: v.method.key().into(),
+                    predicted: Trace::new(name, values, &clock)?,
+                    residual: Trace::new(name, &residual, &clock)?,
+                });
+            }
+            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, measured, &clock)?, predictions })
+        })
+        .collect::<Result<_>>()?;
+    Ok(draw::Verification { record: record.name.clone(), prediction: prediction.into(), clock, outputs })
+}
+
+fn poles(v: &ModelVerdict) -> Result<draw::Poles> {
+    let square = v.model.inputs() == v.model.outputs();
+    let zeros = if square { pairs(&v.model.zeros()?) } else { Vec::new() };
+    Ok(draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles), zeros })
+}
+
+fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
+    let bands = found.uncertainty.of(v.method).map_or(&[][..], |known| &known.modes);
+    let mode = |(k, m): (usize, &youla::lti::Mode)| draw::Mode {
+        method: v.method.key().into(),
+        hz: m.hz,
+        zeta: m.zeta,
+        deviation: bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation]),
+    };
+    Ok(v.modes.iter().enumerate().map(mode).collect())
+}
+
+/// The present and the predicted loop.
+fn redesign(found: &Identification) -> Result<Option<draw::Redesign>> {
+    let Some(Ok(new)) = &found.redesign else { return Ok(None) };
+    let (loops, figure) = (redesign::loops().to_vec(), redesign::figure(new)?);
+    Ok(Some(draw::Redesign { loops, figure, tables: redesign::tables(new) }))
+}
+
+/// The physical structure, where one was estimated.
+fn structure(found: &Identification) -> Option<&GreyBoxRun> {
+    found.grey_box.as_ref()?.as_ref().ok()
+}
+
+fn reduction(found: &Identification) -> Option<draw::Reduction> {
+    Some(found.reduction.as_ref()?.as_ref().ok()?.drawn())
+}
+
+fn certificate(found: &Identification, v: &ModelVerdict) -> draw::Certificate {
+    let from_s = matches!(v.method, Method::Hansen | Method::HansenReduced);
+    draw::Certificate {
+        method: v.method.key().into(),
+        order: v.model.order(),
+        s_order: from_s.then(|| found.hansen.deviation.model.order()),
+        s_stable: from_s.then_some(found.hansen.deviation.stability.stable),
+        stabilised_by_controller: Some(v.certificate.stable),
+        worst_closed_loop_pole: v.certificate.worst_pole.map(|p| [p.re, p.im]),
+    }
+}

@@ -1,0 +1,84 @@
+//! Frequency responses of all models: magnitude and phase, principal gains, regions, and the measured ones.
+
+use crate::Result;
+use crate::pipeline::Identification;
+use crate::response::{self, decibel, magnitude, model_responses, phase};
+use crate::uncertainty::SystemUncertainty;
+use crate::verdict::Method;
+use std::f64::consts::TAU;
+use youla::lti::FrequencyResponse;
+use youla_report::data as draw;
+
+/// Lowest bound that is drawn, over the upper one: a bound of zero is drawn far below the curve.
+const LEAST_BOUND: f64 = 1e-3;
+
+pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
+    let responses = model_responses(found, &found.hz)?;
+    let models = responses.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
+    let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty.of(*method)?)));
+    let bands = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port))).collect();
+    let singular = singular(found, &responses)?;
+    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect: indirect(found), bands, singular })
+}
+
+fn indirect(found: &Identification) -> Vec<draw::Indirect> {
+    let Some(Ok(measured)) = &found.indirect else { return Vec::new() };
+    let hz: Vec<f64> = measured.response.omega.iter().map(|w| w / TAU).collect();
+    let entry = |(output, input): (usize, usize)| {
+        let values = measured.response.entry(output, input);
+        draw::Indirect {
+            output,
+            input,
+            hz: hz.clone(),
+            magnitude_db: magnitude(&values),
+            phase_deg: phase(&values),
+            coherence: measured.coherence_y.col_as_slice(output).to_vec(),
+        }
+    };
+    ports(found).map(entry).collect()
+}
+
+fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> draw::Band {
+    let band = &known.response;
+    let places: Vec<usize> = (0..band.response.omega.len()).map(|k| band.place(k, output, input)).collect();
+    let (low_db, high_db) = bounds_db(places.iter().map(|at| band.magnitude[*at]));
+    let region = places.iter().flat_map(|at| band.covariance[*at].map(|v| v * band.ellipse)).collect();
+    draw::Band { method: method.key().into(), output, input, level: known.level, low_db, high_db, region }
+}
+
+/// Nothing for a single input or output: the one singular value is the length of the row or column.
+fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Result<Vec<draw::SingularValue>> {
+    let places = found.records.inputs.len().min(found.records.outputs.len());
+    if places < 2 {
+        return Ok(Vec::new());
+    }
+    let mut all = Vec::new();
+    for (method, response) in responses {
+        let gains = response.gains()?;
+        let known = found.uncertainty.of(*method);
+        for place in 0..places {
+            let (low_db, high_db) = known.map_or_else(Default::default, |k| {
+                bounds_db(k.response.gains.iter().map(|at| [at[place][1], at[place][2]]))
+            });
+            all.push(draw::SingularValue {
+                method: method.key().into(),
+                place,
+                value_db: gains.iter().map(|at| decibel(at[place])).collect(),
+                level: known.map(|k| k.level),
+                low_db,
+                high_db,
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// Lower and upper bounds in dB.
+fn bounds_db(bounds: impl Iterator<Item = [f64; 2]>) -> (Vec<f64>, Vec<f64>) {
+    bounds.map(|[low, high]| (decibel(low.max(LEAST_BOUND * high)), decibel(high))).unzip()
+}
+
+/// All pairs of output and input.
+fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> {
+    response::ports(found.records.outputs.len(), found.records.inputs.len())
+}

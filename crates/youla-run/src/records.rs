@@ -1,0 +1,211 @@
+//! The records of a run: read, cut, detrended, and split by the meaning of their channels.
+
+use super::disturbance::DisturbanceSettings;
+use super::segments::{Part, RecordSegment, parts};
+use super::settings::{DataFile, DataSettings};
+use crate::{Error, Result};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::path::Path;
+use youla::identify::subspace::Experiment;
+use youla::lti::{Discrete, StateSpace};
+use youla::signal::Channel;
+use youla::signal::Record;
+use youla::{Mat, MatRef};
+use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256};
+
+/// One record of a machine under feedback, samples x channels each.
+#[derive(Debug, Clone)]
+pub struct LoopRecord {
+    /// Name in reports.
+    pub name: String,
+    /// Clock of the samples.
+    pub time: Discrete,
+    /// Plant input as applied, samples x m.
+    pub u: Mat<f64>,
+    /// Measured output, samples x p.
+    pub y: Mat<f64>,
+    /// Known excitation added at the plant input, samples x m.
+    pub input_excitation: Option<Mat<f64>>,
+    /// Known reference, samples x p.
+    pub reference: Option<Mat<f64>>,
+    /// Known excitation alpha of Fig. 3, samples x m.
+    pub alpha: Option<Mat<f64>>,
+    /// Cosine and sine of each known line in the outputs, samples x 2 per line.
+    pub disturbance: Option<Mat<f64>>,
+}
+
+/// A file that was read.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SourceFile {
+    /// Path as given in run.toml.
+    pub path: String,
+    /// `estimation` or `verification`.
+    pub purpose: String,
+    /// SHA-256 of its bytes; empty for simulated records.
+    pub sha256: String,
+}
+
+/// All records of a run.
+#[derive(Debug, Clone)]
+pub struct RunRecords {
+    /// Clock common to all records.
+    pub time: Discrete,
+    /// Plant inputs.
+    pub inputs: Vec<Channel>,
+    /// Plant outputs.
+    pub outputs: Vec<Channel>,
+    /// Records to identify from.
+    pub estimation: Vec<LoopRecord>,
+    /// Records to verify on.
+    pub verification: Vec<LoopRecord>,
+    /// Where they came from.
+    pub sources: Vec<SourceFile>,
+    /// The records that are parts of a file, cut at gaps or as the settings say.
+    pub segments: Vec<RecordSegment>,
+    /// The plant itself, known in simulations only.
+    pub true_plant: Option<StateSpace<Discrete>>,
+}
+
+impl RunRecords {
+    /// Root mean square of each input and of each output over the estimation records, 1 for a channel that is zero throughout.
+    pub fn sizes(&self) -> (Vec<f64>, Vec<f64>) {
+        let estimation = self.estimation.iter();
+        let u = rms(estimation.clone().map(|r| &r.u), self.inputs.len());
+        (u, rms(estimation.map(|r| &r.y), self.outputs.len()))
+    }
+
+    /// The estimation records as (u, y).
+    pub fn experiments(&self) -> Vec<Experiment<'_>> {
+        self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()
+    }
+
+    /// The known lines of the estimation records without their first samples; none where no record has any.
+    pub fn disturbances(&self, dropped: usize) -> Vec<MatRef<'_, f64>> {
+        let known = self.estimation.iter().filter_map(|r| r.disturbance.as_ref());
+        known.map(|w| w.as_ref().subrows(dropped, w.nrows().saturating_sub(dropped))).collect()
+    }
+}
+
+/// Reads all records that the settings name, files in parallel; paths are relative to `folder`.
+///
+/// # Errors
+/// The first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
+pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords> {
+    let purposes = [("estimation", &settings.estimation), ("verification", &settings.verification)];
+    let files: Vec<(&str, &DataFile)> =
+        purposes.iter().flat_map(|(purpose, files)| files.iter().map(move |f| (*purpose, f))).collect();
+    let read: Vec<Result<FileRecords>> =
+        files.par_iter().map(|(purpose, file)| read_file(settings, folder, purpose, file)).collect();
+    let (mut records, mut sources, mut segments) = (Vec::new(), Vec::new(), Vec::new());
+    let mut of_estimation = 0;
+    for (k, one) in read.into_iter().enumerate() {
+        let file = one?;
+        of_estimation += if k < settings.estimation.len() { file.records.len() } else { 0 };
+        records.extend(file.records);
+        sources.push(file.source);
+        segments.extend(file.segments);
+        let (time, last): (Discrete, Discrete) = (records[0].time, records[records.len() - 1].time);
+        if (last.ts() / time.ts() - 1.0).abs() > settings.time_tolerance {
+            let what = format!("{} and {}", sources[0].path, sources[k].path);
+            return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: time.ts(), right: last.ts() }));
+        }
+    }
+    let mut names = HashSet::new();
+    if let Some(twice) = records.iter().find(|r| !names.insert(r.name.clone())) {
+        return Err(Error::DuplicateRecord { name: twice.name.clone() });
+    }
+    let time = records[0].time;
+    let verification = records.split_off(of_estimation);
+    Ok(RunRecords {
+        time,
+        inputs: channels_of(&settings.inputs),
+        outputs: channels_of(&settings.outputs),
+        estimation: records,
+        verification,
+        sources,
+        segments,
+        true_plant: None,
+    })
+}
+
+/// What one file gave.
+struct FileRecords {
+    records: Vec<LoopRecord>,
+    source: SourceFile,
+    segments: Vec<RecordSegment>,
+}
+
+fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataFile) -> Result<FileRecords> {
+    let path = folder.join(&file.file);
+    let groups =
+        [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
+    let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
+    let source = Source {
+        path: path.clone(),
+        format: Format::Detect,
+        time: TimeSource {
+            column: settings.time_column.clone(),
+            ts: settings.sample_time,
+            tolerance: settings.time_tolerance,
+            gaps: settings.gaps,
+        },
+        channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
+        csv: settings.csv.clone(),
+    };
+    let (mut records, mut segments) = (Vec::new(), Vec::new());
+    for Part { record, name, rows, cut } in parts(file, read_parts(&source)?)? {
+        let disturbance = settings.disturbance.as_ref().map(|d| d.signals(&record)).transpose()?;
+        let record = record.detrend(settings.detrend)?.record;
+        if cut {
+            segments.push(RecordSegment { record: name.clone(), file: file.file.display().to_string(), rows });
+        }
+        records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, groups)? });
+    }
+    let source =
+        SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
+    Ok(FileRecords { records, source, segments })
+}
+
+impl LoopRecord {
+    pub(super) fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
+        let matrix = |group: &[ChannelSpec]| {
+            let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();
+            record.matrix(&names)
+        };
+        let optional = |group: &[ChannelSpec]| if group.is_empty() { Ok(None) } else { matrix(group).map(Some) };
+        let [inputs, outputs, input_excitation, reference, alpha] = groups;
+        Ok(LoopRecord {
+            name,
+            time: record.time(),
+            u: matrix(inputs)?,
+            y: matrix(outputs)?,
+            input_excitation: optional(input_excitation)?,
+            reference: optional(reference)?,
+            alpha: optional(alpha)?,
+            disturbance: None,
+        })
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.u.nrows()
+    }
+}
+
+/// Names and units without the places in the files.
+pub(super) fn channels_of(specs: &[ChannelSpec]) -> Vec<Channel> {
+    specs.iter().map(|s| Channel::new(&s.name, &s.unit)).collect()
+}
+
+/// Root mean square of each channel over several records, 1 for a channel that is zero throughout.
+pub(super) fn rms<'a>(records: impl Iterator<Item = &'a Mat<f64>> + Clone, channels: usize) -> Vec<f64> {
+    let samples: usize = records.clone().map(|r| r.nrows()).sum();
+    (0..channels)
+        .map(|j| {
+            let energy: f64 = records.clone().map(|r| r.col(j).squared_norm_l2()).sum();
+            if energy > 0.0 { (energy / samples as f64).sqrt() } else { 1.0 }
+        })
+        .collect()
+}

@@ -1,0 +1,253 @@
+//! The reference of run.toml as a page of text, from its schema.
+
+use super::schema::settings_schema;
+use serde_json::{Map, Value};
+use std::collections::HashMap;
+
+const HEAD: &str = "\
+# All keys of run.toml
+
+<!-- Written by `youla schema --markdown`; do not edit. The texts are the doc comments of the settings. -->
+
+Every key with its type, its default and its meaning. What belongs together and why is explained in [run.toml](../run-toml.md). Lists of
+alternatives are separated by commas; a table that is written within braces may also stand under a heading of its own. `youla schema` prints
+the same as a JSON schema, with which editors complete and check a run.toml:
+
+    youla schema > run.schema.json
+
+and, as the first line of run.toml, `#:schema run.schema.json` (taplo, Even Better TOML).
+";
+
+/// The reference, in Markdown.
+///
+/// ```
+/// assert!(youla_run::settings_reference().contains("## `[data]`"));
+/// ```
+pub fn settings_reference() -> String {
+    let schema = settings_schema();
+    let none = Map::new();
+    let defs = schema["$defs"].as_object().unwrap_or(&none);
+    let mut page = Page { defs, text: HEAD.to_owned(), written: HashMap::new() };
+    page.section("", "", &schema);
+    page.text
+}
+
+struct Page<'a> {
+    defs: &'a Map<String, Value>,
+    text: String,
+    /// Heading under which a definition was written.
+    written: HashMap<String, String>,
+}
+
+/// The name of the definition that a schema refers to.
+fn name_of(schema: &Value) -> Option<&str> {
+    schema["$ref"].as_str()?.strip_prefix("#/$defs/")
+}
+
+fn text_of(schema: &Value) -> &str {
+    schema["description"].as_str().unwrap_or_default()
+}
+
+impl<'a> Page<'a> {
+    fn resolve(&self, schema: &'a Value) -> &'a Value {
+        name_of(schema).and_then(|name| self.defs.get(name)).unwrap_or(schema)
+    }
+
+    /// A table with its keys, or a choice of forms; then what stands below it.
+    fn section(&mut self, path: &str, about: &str, schema: &'a Value) {
+        let heading = if path.is_empty() { "The top level".to_owned() } else { format!("`{path}`") };
+        self.text += &format!("\n## {heading}\n");
+        if !about.is_empty() {
+            self.text += &format!("\n{about}\n");
+        }
+        if let Some(name) = name_of(schema) {
+            if let Some(first) = self.written.get(name) {
+                self.text += &format!("\nThe keys are those of `{first}`.\n");
+                return;
+            }
+            self.written.insert(name.to_owned(), path.to_owned());
+        }
+        let own = self.resolve(schema);
+        // What is said of the key and of its type may be the same.
+        if !path.is_empty() {
+            // "Choices of `reduce`." is for those who call it from Rust.
+            let new = |p: &&str| {
+                !p.is_empty()
+                    && (about.is_empty() || !p.starts_with(about.trim_end_matches('.')))
+                    && !p.starts_with("Choices of ")
+                    && !p.starts_with("Options of ")
+            };
+            for paragraph in text_of(own).split("\n\n").filter(new) {
+                self.text += &format!("\n{paragraph}\n");
+            }
+        }
+        let below = match own["properties"].as_object() {
+            Some(keys) => self.keys(path, keys, &own["required"]),
+            None => self.forms(path, own),
+        };
+        for (path, about, schema) in below {
+            self.section(&path, &about, schema);
+        }
+    }
+
+    fn keys(&mut self, path: &str, keys: &'a Map<String, Value>, required: &Value) -> Vec<(String, String, &'a Value)> {
+        let needed = |key: &str| required.as_array().is_some_and(|all| all.iter().any(|name| name == key));
+        let mut below = Vec::new();
+        self.text += "\n| key | type | default | meaning |\n|---|---|---|---|\n";
+        let (first, rest): (Vec<_>, Vec<_>) = keys.iter().partition(|(key, _)| needed(key));
+        for (key, schema) in first.into_iter().chain(rest) {
+            let default = match &schema["default"] {
+                _ if needed(key) => "required".to_owned(),
+                Value::Null => String::new(),
+                value if value.as_object().is_some_and(Map::is_empty) => String::new(),
+                value if value.is_object() && self.resolve(schema)["properties"].is_object() => String::new(),
+                value => format!("`{}`", toml_of(value)),
+            };
+            let (kind, choices) = match self.only_tables(schema) {
+                true => ("table".to_owned(), String::new()),
+                false => (self.kind(schema), self.choices(schema)),
+            };
+            let cells = [format!("`{key}`"), kind, default, text_of(schema).to_owned() + &choices];
+            let cells = cells.map(|cell| cell.replace('|', "\\|").replace("\n\n", "<br>"));
+            self.text += &format!("| {} |\n", cells.join(" | "));
+            let bare = path.trim_matches(['[', ']']);
+            let place = if bare.is_empty() { key.clone() } else { format!("{bare}.{key}") };
+            if let Some((brackets, table)) = self.table(schema) {
+                let heading = match brackets {
+                    Brackets::One => format!("[{place}]"),
+                    Brackets::Two => format!("[[{place}]]"),
+                    Brackets::Named => format!("[{place}.<name>]"),
+                };
+                below.push((heading, text_of(schema).to_owned(), table));
+            }
+        }
+        below
+    }
+
+    /// The forms of a choice of which each is a table with one key.
+    fn forms(&mut self, path: &str, own: &'a Value) -> Vec<(String, String, &'a Value)> {
+        let bare = path.trim_matches(['[', ']']);
+        let mut below = Vec::new();
+        for form in own["oneOf"].as_array().into_iter().flatten() {
+            for (key, schema) in form["properties"].as_object().into_iter().flatten() {
+                if self.resolve(schema)["properties"].is_object() {
+                    below.push((format!("[{bare}.{key}]"), text_of(form).to_owned(), schema));
+                }
+            }
+        }
+        if !below.is_empty() {
+            let names: Vec<String> = below.iter().map(|(heading, ..)| format!("`{heading}`")).collect();
+            self.text += &format!("\nWhat has keys of its own: {}.\n", names.join(", "));
+        }
+        below
+    }
+
+    /// The table behind a key, where it has keys of its own, and how its heading is written.
+    fn table(&self, schema: &'a Value) -> Option<(Brackets, &'a Value)> {
+        let (brackets, inner) = match self.resolve(schema) {
+            list if list["type"] == "array" => (Brackets::Two, &list["items"]),
+            named if named["additionalProperties"].is_object() => (Brackets::Named, &named["additionalProperties"]),
+            _ => (Brackets::One, schema),
+        };
+        let own = self.resolve(inner);
+        let forms = own["oneOf"].as_array().into_iter().flatten();
+        let keys = |form: &'a Value| form["properties"].as_object().into_iter().flatten();
+        let nested = forms.flat_map(keys).any(|(_, schema)| self.resolve(schema)["properties"].is_object());
+        (own["properties"].is_object() || nested).then_some((brackets, inner))
+    }
+
+    /// A choice of forms that all have keys of their own: each has its heading.
+    fn only_tables(&self, schema: &'a Value) -> bool {
+        let forms = self.resolve(schema)["oneOf"].as_array();
+        forms.is_some_and(|forms| {
+            forms.iter().all(|form| {
+                let inner = form["properties"].as_object().and_then(|keys| keys.values().next());
+                inner.is_some_and(|inner| self.resolve(inner)["properties"].is_object())
+            })
+        })
+    }
+
+    /// What may stand behind a key.
+    fn kind(&self, schema: &'a Value) -> String {
+        let own = self.resolve(schema);
+        if let Some(choices) = own["oneOf"].as_array().or(own["anyOf"].as_array()) {
+            let mut kinds: Vec<String> = choices.iter().map(|choice| self.form(choice)).collect();
+            kinds.dedup();
+            return kinds.join(", ");
+        }
+        self.form(own)
+    }
+
+    fn form(&self, schema: &'a Value) -> String {
+        if !schema["const"].is_null() {
+            return format!("`{}`", schema["const"]);
+        }
+        if let Some(values) = schema["enum"].as_array() {
+            return values.iter().map(|v| format!("`{v}`")).collect::<Vec<_>>().join(", ");
+        }
+        match schema["type"].as_str() {
+            Some("string") => "text".into(),
+            Some("array") => match (&schema["minItems"], &schema["maxItems"]) {
+                (Value::Number(least), Value::Number(most)) if least == most => match self.kind(&schema["items"]) {
+                    of if of.starts_with(char::is_numeric) => format!("{least} x {of}"),
+                    of => format!("{least} {of}s"),
+                },
+                _ => match self.kind(&schema["items"]) {
+                    of if of == "number" => "list of numbers".into(),
+                    of if of == "list of numbers" => "matrix".into(),
+                    of if of == "matrix" => "matrix of lists of numbers".into(),
+                    of => format!("list of {of}"),
+                },
+            },
+            Some("object") => match (schema["properties"].as_object(), &schema["required"]) {
+                // A form of a choice.
+                (Some(keys), Value::Array(_)) if keys.len() == 1 => {
+                    let key = |(key, inner): (&String, &'a Value)| {
+                        format!("`{{ {key} = {} }}`", self.kind(inner).replace('`', ""))
+                    };
+                    keys.iter().map(key).collect()
+                }
+                (None, _) if schema["additionalProperties"].is_object() => {
+                    format!("table by name of {}", self.kind(&schema["additionalProperties"]))
+                }
+                _ => "table".into(),
+            },
+            Some(other) => other.into(),
+            None if name_of(schema).is_some() => self.kind(schema),
+            None => "any".into(),
+        }
+    }
+
+    /// What each choice means.
+    fn choices(&self, schema: &'a Value) -> String {
+        let mut own = self.resolve(schema);
+        if own["type"] == "array" {
+            own = self.resolve(&own["items"]);
+        }
+        let choices = own["oneOf"].as_array().or(own["anyOf"].as_array());
+        let one = |choice: &'a Value| {
+            let text = text_of(choice);
+            if text.is_empty() { String::new() } else { format!("<br>{}: {text}", self.form(choice)) }
+        };
+        choices.into_iter().flatten().map(one).collect()
+    }
+}
+
+/// How the heading of a table is written.
+enum Brackets {
+    One,
+    Two,
+    Named,
+}
+
+/// A default as it would stand in the file.
+fn toml_of(value: &Value) -> String {
+    match value {
+        Value::Object(keys) => {
+            let all: Vec<String> = keys.iter().map(|(key, value)| format!("{key} = {}", toml_of(value))).collect();
+            format!("{{ {} }}", all.join(", "))
+        }
+        Value::Array(values) => format!("[{}]", values.iter().map(toml_of).collect::<Vec<_>>().join(", ")),
+        other => other.to_string(),
+    }
+}

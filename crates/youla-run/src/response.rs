@@ -1,0 +1,135 @@
+//! Frequency responses of a run: every model, and the indirect non-parametric one where the excitation is known.
+
+use super::pipeline::Identification;
+use super::records::LoopRecord;
+use super::settings::FrequencySettings;
+use super::verdict::Method;
+use crate::{Error, Result};
+use std::f64::consts::TAU;
+use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
+use youla::signal::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
+use youla::{Mat, c64};
+use youla_report::data as draw;
+
+/// The indirect response `S_dy S_du^-1` averaged over all estimation records, `None` where no excitation is known.
+///
+/// The excitation d is the signal added at the plant input or injected as alpha where it acts alone; where references move
+/// too, it is the image of all of them in alpha, so that none is mistaken for noise.
+///
+/// The reason where it cannot be had: a record shorter than a window, an excitation without power at a frequency.
+pub(super) fn indirect(found: &Identification) -> Option<Result<IndirectResponse>> {
+    let settings = &found.settings.frequency_response;
+    let records = &found.records.estimation;
+    let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
+    let excitations: Vec<Mat<f64>> = records
+        .iter()
+        .enumerate()
+        .filter_map(|(k, r)| {
+            let alone = [&r.input_excitation, &r.alpha].into_iter().flatten().collect::<Vec<_>>();
+            match alone[..] {
+                [d] if at_rest(r) => Some(d.clone()),
+                _ => found.signals.expected_alpha.get(k).cloned(),
+            }
+        })
+        .collect();
+    if excitations.len() < records.len() {
+        return None;
+    }
+    // The image in alpha starts after the settling samples.
+    let experiments: Vec<_> = records
+        .iter()
+        .zip(&excitations)
+        .map(|(r, d)| {
+            let dropped = r.samples() - d.nrows();
+            let (u, y) = (r.u.subrows(dropped, d.nrows()), r.y.subrows(dropped, d.nrows()));
+            ExcitedRecord { d: d.as_ref(), u, y }
+        })
+        .collect();
+    let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
+    Some(indirect_response(&experiments, found.records.time, &options).map_err(Error::from))
+}
+
+fn is_constant(signals: &Mat<f64>) -> bool {
+    signals.col_iter().all(|c| c.iter().all(|v| *v == c[0]))
+}
+
+/// Responses of all models on the given frequencies in Hz.
+///
+/// # Errors
+/// As [`frequency_response`].
+pub(super) fn model_responses(found: &Identification, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
+    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
+    let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
+    found.verdict.models.iter().map(response).collect()
+}
+
+/// Refuses a lowest frequency that leaves no room below Nyquist.
+pub(super) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result<()> {
+    let nyquist = 0.5 / time.ts();
+    match settings.from_hz {
+        Some(from) if from >= nyquist => {
+            let what = format!("[frequency_response] from_hz, with a Nyquist frequency of {nyquist:.6} Hz,");
+            Err(Error::Method(youla::Error::OutOfRange { what, value: from, must: "below it" }))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Modes with less damping have frequencies of their own.
+const LIGHT: f64 = 0.1;
+
+/// Angles in degrees of the response of a mode, seen from its peak, at which it is evaluated.
+const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
+
+/// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
+/// below Nyquist, and around each lightly damped mode of the models (nominal model and G(S)), at `f (1 + zeta tan(angle))`:
+/// between the points of the logarithmic grid a peak would be cut off.
+///
+/// # Errors
+/// [`youla::Error::NoConvergence`] of the eigenvalues.
+pub(super) fn grid(settings: &FrequencySettings, models: [&StateSpace<Discrete>; 2]) -> Result<Vec<f64>> {
+    let nyquist = 0.5 / models[0].time().ts();
+    let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
+    let last = settings.points.max(2) - 1;
+    let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
+    for model in models {
+        for mode in model.modes()?.into_iter().filter(|m| m.pole.im != 0.0 && m.zeta.abs() < LIGHT) {
+            let width = mode.zeta.abs().max(1e-5);
+            hz.extend(AROUND_A_PEAK.iter().map(|angle| mode.hz * (1.0 + width * angle.to_radians().tan())));
+        }
+    }
+    hz.retain(|f| (from..=to).contains(f));
+    hz.sort_by(f64::total_cmp);
+    hz.dedup_by(|b, a| *b - *a < 1e-9 * *a);
+    Ok(hz)
+}
+
+/// All pairs of output and input, by output.
+pub(super) fn ports(outputs: usize, inputs: usize) -> impl Iterator<Item = (usize, usize)> {
+    (0..outputs).flat_map(move |i| (0..inputs).map(move |j| (i, j)))
+}
+
+/// Magnitude and phase of all pairs of a response, as a report draws them; `key` names the method.
+pub(super) fn drawn(key: &str, response: &FrequencyResponse) -> Vec<draw::ModelResponse> {
+    let first = response.at(0);
+    let entry = |(output, input): (usize, usize)| {
+        let values = response.entry(output, input);
+        let (magnitude_db, phase_deg) = (magnitude(&values), phase(&values));
+        draw::ModelResponse { method: key.to_owned(), output, input, magnitude_db, phase_deg }
+    };
+    ports(first.nrows(), first.ncols()).map(entry).collect()
+}
+
+pub(super) fn magnitude(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| decibel(v.norm())).collect()
+}
+
+/// In degrees, from -180 to 180.
+pub(super) fn phase(values: &[c64]) -> Vec<f64> {
+    values.iter().map(|v| v.im.atan2(v.re).to_degrees()).collect()
+}
+
+/// Magnitude in dB.
+pub(super) fn decibel(magnitude: f64) -> f64 {
+    20.0 * magnitude.log10()
+}

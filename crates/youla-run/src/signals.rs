@@ -1,0 +1,132 @@
+//! alpha and beta of the estimation records, with the transient of the filter dropped and the controller checked.
+
+use super::records::{LoopRecord, RunRecords};
+use crate::{Error, Result};
+use faer::Scale;
+use std::path::{Path, PathBuf};
+use youla::Mat;
+use youla::factor::{CoprimeFactors, YoulaSignals};
+use youla::linalg::block;
+use youla::lti::Discrete;
+use youla::signal::Channel;
+use youla::signal::Record;
+use youla_io::write_csv;
+
+/// Signals of the deviation system for all estimation records.
+#[derive(Debug, Clone)]
+pub struct DeviationSignals {
+    /// One pair per record, after the settling samples.
+    pub experiments: Vec<YoulaSignals>,
+    /// The part of alpha that the known excitations cause, per record, after the settling samples; empty where no
+    /// excitation is known.
+    pub expected_alpha: Vec<Mat<f64>>,
+    /// Samples dropped at the start of each record.
+    pub settle: usize,
+    /// `||alpha - expected|| / ||expected||` over all records: 0 when the declared controller is the one that ran and
+    /// nothing else (saturation, unknown excitation) acted. `None` where no excitation is known.
+    pub controller_mismatch: Option<f64>,
+}
+
+/// Filters every estimation record by the left factors. alpha is always taken from the **measured** u and y, so that
+/// saturation and unknown excitations are accounted for; known excitations serve as a check of the controller.
+///
+/// # Errors
+/// [`youla::Error::TooShort`] for a record that the settling samples use up; shapes.
+pub fn deviation_signals(
+    factors: &CoprimeFactors<Discrete>,
+    records: &[LoopRecord],
+    settle: Option<usize>,
+) -> Result<DeviationSignals> {
+    let settle = settle.map_or_else(|| factors.settling_samples(SETTLED), Ok)?;
+    let mut experiments = Vec::new();
+    let mut expected_alpha = Vec::new();
+    for record in records {
+        if record.samples() <= settle {
+            let (record, samples) = (record.name.clone(), record.samples());
+            return Err(Error::Method(youla::Error::TooShort {
+                record,
+                samples,
+                dropped: settle,
+                key: "`settle` in [factors]",
+            }));
+        }
+        let kept = |m: &Mat<f64>| m.subrows(settle, m.nrows() - settle).to_owned();
+        let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        experiments.push(YoulaSignals { alpha: kept(&signals.alpha), beta: kept(&signals.beta) });
+        if let Some(expected) = expected(factors, record)? {
+            expected_alpha.push(kept(&expected));
+        }
+    }
+    let controller_mismatch = (!expected_alpha.is_empty()).then(|| {
+        let pairs = || experiments.iter().zip(&expected_alpha);
+        let miss: f64 = pairs().map(|(s, e)| (&s.alpha - e).squared_norm_l2()).sum();
+        let size: f64 = pairs().map(|(_, e)| e.squared_norm_l2()).sum();
+        (miss / size).sqrt()
+    });
+    Ok(DeviationSignals { experiments, expected_alpha, settle, controller_mismatch })
+}
+
+/// The signals of every estimation record as records of their own, over all samples:
+///
+/// - `eta_<input> = Vt u - Ut y` and `epsilon_<output> = Mt y - Nt u`, computed from the measured signals;
+/// - `alpha_<input>`, the part of eta that the known excitations cause (eta itself where none is known);
+/// - `beta_<output>`, the innovation (28), which is epsilon plus noise and computed by the same filter.
+///
+/// # Errors
+/// Shapes.
+pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) -> Result<Vec<Record>> {
+    let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
+        channels.iter().map(|c| Channel::new(format!("{prefix}_{}", c.name), &c.unit)).collect()
+    };
+    let (u, y) = (&records.inputs, &records.outputs);
+    let channels = [named("alpha", u), named("beta", y), named("eta", u), named("epsilon", y)].concat();
+    let one = |record: &LoopRecord| {
+        let YoulaSignals { alpha: eta, beta } = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        let alpha = expected(factors, record)?.unwrap_or_else(|| eta.clone());
+        let data = block(&[&[alpha.as_ref(), beta.as_ref(), eta.as_ref(), beta.as_ref()]]);
+        Ok(Record::new(&record.name, channels.clone(), data, record.time)?)
+    };
+    records.estimation.iter().map(one).collect()
+}
+
+/// Writes [`signal_records`] to `folder`, one CSV file each, and returns their paths. The folder is made if need be;
+/// files of other names in it stay.
+///
+/// # Errors
+/// [`youla_io::Error::Io`]; then none of these files is there.
+pub fn write_signals(records: &[Record], folder: &Path) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::File(youla_io::Error::Io { path: folder.to_owned(), source });
+    let made = !folder.exists();
+    std::fs::create_dir_all(folder).map_err(io)?;
+    let paths: Vec<PathBuf> = records.iter().map(|r| folder.join(format!("{}.csv", r.name()))).collect();
+    records.iter().zip(&paths).try_for_each(|(record, path)| write_csv(record, path)).inspect_err(|_| {
+        // Best effort: the error that led here is the one to report.
+        for path in &paths {
+            let _ = std::fs::remove_file(path);
+        }
+        if made {
+            let _ = std::fs::remove_dir(folder);
+        }
+    })?;
+    Ok(paths)
+}
+
+/// Fraction to which the slowest transient of the filter must have decayed.
+const SETTLED: f64 = 1e-3;
+
+/// `alpha + Vt v1 - Ut r` of the known excitations.
+fn expected(factors: &CoprimeFactors<Discrete>, record: &LoopRecord) -> Result<Option<Mat<f64>>> {
+    let outside = match (&record.input_excitation, &record.reference) {
+        (None, None) => None,
+        (v1, r) => {
+            let v1 = v1.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.inputs()));
+            let r = r.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.outputs()));
+            Some(factors.alpha_of_excitation(v1.as_ref(), (Scale(-1.0) * &r).as_ref())?)
+        }
+    };
+    Ok(match (&record.alpha, outside) {
+        (Some(alpha), Some(outside)) => Some(alpha + outside),
+        (Some(alpha), None) => Some(alpha.clone()),
+        (None, outside) => outside,
+    })
+}

@@ -1,0 +1,120 @@
+//! The stabilisation diagrams of a run: drawn from the data that the models come from.
+
+use super::settings::StabilisationSettings;
+use crate::Result;
+use serde_json::{Value, json};
+use youla::identify::subspace::stabilisation::{DiagramPole, StabilisationDiagram, Standing, stabilisation};
+use youla::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
+use youla::signal::Channel;
+use youla_report::data as draw;
+
+/// Orders that a diagram has at least, where the horizon allows them.
+const LEAST_ORDERS: usize = 20;
+
+/// The diagrams of S and of the direct model, or the reasons why there are none; absent where there is no model.
+#[derive(Debug)]
+pub struct Diagrams {
+    /// Of S, from alpha to beta.
+    pub deviation: Option<Result<StabilisationDiagram>>,
+    /// Of the plant, from u to y.
+    pub direct: Option<Result<StabilisationDiagram>>,
+}
+
+/// The diagram beside a model from the same data.
+pub(super) fn diagram(
+    data: &SubspaceData<'_>,
+    found: &SubspaceModel,
+    method: &SubspaceOptions,
+    settings: &StabilisationSettings,
+) -> Result<StabilisationDiagram> {
+    let held = (found.horizon - 1) * found.model.outputs();
+    let usual = (2 * found.order.order).max(LEAST_ORDERS).min(held);
+    let orders: Vec<usize> = (1..=settings.max_order.unwrap_or(usual)).collect();
+    Ok(stabilisation(data, &orders, method, &settings.criteria)?)
+}
+
+/// A diagram as an artefact; numbers that are not finite are null.
+pub(super) fn as_json(diagram: &StabilisationDiagram, outputs: &[Channel]) -> Value {
+    let shape = |shape: &[youla::c64]| shape.iter().map(|x| [x.re, x.im]).collect::<Vec<_>>();
+    let pole = |p: &DiagramPole| {
+        json!({
+            "order": p.order, "pole": [p.pole.re, p.pole.im], "hz": p.hz, "zeta": p.zeta, "hz_deviation": p.hz_deviation,
+            "zeta_deviation": p.zeta_deviation, "stable": p.is_stable(), "standing": p.standing, "cluster": p.cluster,
+            "shape": shape(&p.shape),
+        })
+    };
+    let clusters: Vec<Value> = diagram
+        .clusters
+        .iter()
+        .map(|c| {
+            json!({
+                "hz": c.hz, "zeta": c.zeta, "hz_spread": c.hz_spread, "zeta_spread": c.zeta_spread,
+                "hz_deviation": c.hz_deviation, "zeta_deviation": c.zeta_deviation, "orders": c.orders, "settled": c.settled,
+                "shape": shape(&c.shape),
+            })
+        })
+        .collect();
+    let poles: Vec<Value> = diagram.poles.iter().map(pole).collect();
+    json!({"orders": diagram.orders, "outputs": outputs, "clusters": clusters, "poles": poles})
+}
+
+/// The poles as lines of text; an empty field where there is no number.
+pub(super) fn as_csv(diagram: &StabilisationDiagram) -> String {
+    let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
+    let outputs = diagram.poles.first().map_or(0, |p| p.shape.len());
+    let mut text = String::from("order,pole_re,pole_im,hz,zeta,hz_deviation,zeta_deviation,stable,standing,cluster");
+    (1..=outputs).for_each(|i| text += &format!(",shape_{i}_re,shape_{i}_im"));
+    text.push('\n');
+    for p in &diagram.poles {
+        let standing = match p.standing {
+            Standing::New => "new",
+            Standing::Frequency => "frequency",
+            Standing::Settled => "settled",
+        };
+        let (z, stable) = (p.pole, p.is_stable());
+        let cluster = p.cluster.map(|k| k.to_string()).unwrap_or_default();
+        let (hz, zeta) = (optional(Some(p.hz).filter(|x| x.is_finite())), p.zeta);
+        let deviations = [p.hz_deviation, p.zeta_deviation].map(optional).join(",");
+        text += &format!("{},{},{},{hz},{zeta},{deviations},{stable},{standing},{cluster}", p.order, z.re, z.im);
+        p.shape.iter().for_each(|x| text += &format!(",{},{}", x.re, x.im));
+        text.push('\n');
+    }
+    text
+}
+
+/// A diagram as the report draws it.
+pub(super) fn drawn(diagram: &StabilisationDiagram, method: &str, label: &str, chosen: usize) -> draw::Stabilisation {
+    let pole = |p: &DiagramPole| draw::StabilisationPole {
+        order: p.order,
+        hz: p.hz,
+        zeta: p.zeta,
+        hz_deviation: p.hz_deviation,
+        zeta_deviation: p.zeta_deviation,
+        stable: p.is_stable(),
+        standing: match p.standing {
+            Standing::New => draw::PoleStanding::New,
+            Standing::Frequency => draw::PoleStanding::Frequency,
+            Standing::Settled => draw::PoleStanding::Settled,
+        },
+        cluster: p.cluster,
+    };
+    let clusters = diagram.clusters.iter().map(|c| draw::StabilisationCluster {
+        hz: c.hz,
+        zeta: c.zeta,
+        hz_spread: c.hz_spread,
+        zeta_spread: c.zeta_spread,
+        hz_deviation: c.hz_deviation,
+        zeta_deviation: c.zeta_deviation,
+        orders: c.orders,
+        settled: c.settled,
+        shape: c.shape.iter().map(|x| [x.norm(), x.im.atan2(x.re).to_degrees()]).collect(),
+    });
+    draw::Stabilisation {
+        method: method.into(),
+        label: label.into(),
+        orders: diagram.orders.clone(),
+        chosen,
+        poles: diagram.poles.iter().filter(|p| p.hz.is_finite()).map(pole).collect(),
+        clusters: clusters.collect(),
+    }
+}

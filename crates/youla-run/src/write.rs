@@ -1,0 +1,43 @@
+//! Writes a run folder: data first, then the report drawn from them, summary.json last.
+
+use super::artefacts::write_artefacts;
+use super::page::page;
+use super::pipeline::{Identification, Stage, StageClock};
+use super::summary::summary;
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+use youla_io::folder::RunFolder;
+use youla_report::html;
+
+/// A finished run folder.
+#[derive(Debug, Clone)]
+pub struct WrittenRun {
+    /// Where it is.
+    pub folder: PathBuf,
+    /// What stands in its summary.json.
+    pub summary: serde_json::Value,
+}
+
+/// Writes all artefacts, `report.json`, `report.html` and `summary.json` to `target`. Nothing is left behind on failure.
+///
+/// # Errors
+/// [`youla_io::Error::OutputExists`], [`youla_io::Error::Io`].
+pub fn write_run(
+    found: &Identification,
+    target: &Path,
+    replace: bool,
+    clock: &mut StageClock<'_>,
+) -> Result<WrittenRun> {
+    let folder = RunFolder::create(target, replace)?;
+    clock.run(Stage::Write, || write_artefacts(found, &folder))?;
+    let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let so_far = clock.seconds.clone();
+    clock.run(Stage::Report, || {
+        let page = page(found, &so_far, &name)?;
+        folder.compact_json("report.json", &page)?;
+        Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)
+    })?;
+    let summary = summary(found, &clock.seconds)?;
+    folder.json("summary.json", &summary)?;
+    Ok(WrittenRun { folder: folder.finish()?, summary })
+}

@@ -1,0 +1,20 @@
+//! Measured and simulated signals: labelled, clocked samples x channels; spectra, persistency and excitation signals.
+//!
+//! A record is checked once, at construction, and trusted afterwards: every number is finite, every channel has a name of its
+//! own, and the sample time is known. Nothing is repaired: an unequal length or a NaN is an error that says where it is.
+
+mod channel;
+mod detrend;
+mod excitation;
+mod persistency;
+mod record;
+mod spectrum;
+mod stream;
+
+pub use channel::{Channel, unknown};
+pub use detrend::{Detrend, Detrended, Trend};
+pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
+pub use persistency::{Persistency, persistency, persistency_order};
+pub use record::{Record, Segments, Split};
+pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
+pub use stream::{JoinedStreams, SampleStream};

@@ -15,14 +15,14 @@ use super::closure::Closure;
 use super::linearisation::Linearisation;
 use super::noise::NoiseModel;
 use super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
-use super::sensitivity::{Begin, Samples, condense, residuals, sum_of_squares};
+use super::sensitivity::{InitialCondition, Samples, condense, residuals, sum_of_squares};
 use super::simulated::{Simulated, with_scaled_outputs, with_scaled_slopes};
 use super::steady::{steady_slopes, steady_state};
 use super::structure::Structure;
 use crate::Result;
 use youla::Mat;
 use youla::identify::subspace::{Experiment, InitialState};
-use youla::linalg::{Triangle, leading_rank, least_squares};
+use youla::linalg::{SequentialQr, leading_rank, least_squares};
 use youla::lti::{Discrete, StateSpace};
 
 /// Data and structure, checked and scaled.
@@ -158,7 +158,7 @@ impl<'a> Criterion<'a> {
         let states = point.sampled.order();
         if self.initial > 0 {
             let rest = vec![0.0; states];
-            let begin = Begin { x0: &rest, slopes: None, estimated: self.initial };
+            let begin = InitialCondition { x0: &rest, slopes: None, estimated: self.initial };
             let factor = condense(samples, &point.sampled, &[], &begin)?;
             let rank = leading_rank(factor.as_ref(), self.initial);
             let (r11, r1) = factor.as_ref().subrows(0, rank).split_at_col(self.initial);
@@ -189,10 +189,10 @@ impl<'a> Criterion<'a> {
     /// Residual and Jacobian at a point.
     pub(super) fn linearise(&self, point: &Point) -> Result<Linearisation> {
         let slopes = self.slopes(point, self.plant_slopes(point)?);
-        let mut whole = Triangle::new(self.parameters + 1, self.initial + self.parameters + 1);
+        let mut whole = SequentialQr::new(self.parameters + 1, self.initial + self.parameters + 1);
         for (samples, x0) in self.experiments.iter().zip(&point.initial_states) {
             let moved = self.moved(point, &slopes, x0, samples)?;
-            let begin = Begin { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: self.initial };
+            let begin = InitialCondition { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: self.initial };
             let factor = condense(samples, &point.sampled, &slopes.simulated, &begin)?;
             let skip = leading_rank(factor.as_ref(), self.initial);
             whole.fold_rows(factor.as_ref().submatrix(skip, self.initial, factor.nrows() - skip, self.parameters + 1));

@@ -25,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::direct::direct;
 use youla::identify::hansen::{HansenModel, hansen};
-use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, UncertaintyOptions, Weight};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyOptions};
 use youla::lti::{Discrete, StateSpace, frequency_response};
 
 /// Choices of [`hansen_pem`]. The initial states of `hansen` and `pem` are separate choices.
@@ -151,7 +151,7 @@ fn direct_target(
     // The order does not depend on the parameters.
     let probe = nominal.map_or_else(|| vec![1.0; structure.names().len()], <[f64]>::to_vec);
     let subspace = SubspaceOptions {
-        weight: Weight::PbsidOpt,
+        method: SubspaceMethod::PbsidOpt,
         order: Order::Fixed(structure.model(&probe)?.order()),
         stability: Stability::Allow,
         uncertainty: UncertaintyOptions::default(),

@@ -21,7 +21,6 @@
 //! a lost search several starts (`multi_start.rs`) and an observer that is taken away step by step (`continuation.rs`).
 //! Structures are programmed (`structure.rs`) or declared (`declared/`).
 
-mod bank;
 mod bounds;
 mod checks;
 mod closure;
@@ -40,7 +39,6 @@ mod intervals;
 mod levenberg;
 mod linearisation;
 mod multi_start;
-mod narrow;
 mod noise;
 mod options;
 mod predictor;
@@ -51,7 +49,9 @@ mod result;
 mod robust;
 mod sampled;
 mod sensitivity;
+mod sensitivity_bank;
 mod simulated;
+mod small_qr;
 mod steady;
 mod structure;
 pub mod subspace_pem;

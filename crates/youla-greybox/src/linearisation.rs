@@ -1,6 +1,6 @@
 //! The linearised criterion.
 
-use youla::linalg::{Triangle, leading_rank};
+use youla::linalg::{SequentialQr, leading_rank};
 use youla::{Mat, MatRef};
 
 /// The linearised criterion `1/2 |r - J step|^2` as the triangular factor of `[J r]`.
@@ -35,7 +35,7 @@ impl Linearisation {
             return self.clone();
         }
         let column = |j: usize| parameters.get(j).copied().unwrap_or(self.parameters());
-        let mut whole = Triangle::new(count + 1, rows);
+        let mut whole = SequentialQr::new(count + 1, rows);
         whole.fold_rows(Mat::from_fn(rows, count + 1, |i, j| self.factor[(i, column(j))]).as_ref());
         Linearisation { factor: whole.r().to_owned() }
     }

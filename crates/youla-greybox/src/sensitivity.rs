@@ -8,9 +8,9 @@
 //! so all sensitivities are columns of one matrix (n x columns) under one Ad and share one v (`bank.rs`). The rows
 //! `[y_0 y_theta e]` are folded into their triangular factor piece by piece, so that memory does not grow with the record.
 
-use super::bank::Bank;
-use super::narrow::{NarrowTriangle, dot};
 use super::sampled::SampledSlope;
+use super::sensitivity_bank::Bank;
+use super::small_qr::{SmallQr, dot};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use pulp::{Arch, Simd, WithSimd};
@@ -31,7 +31,7 @@ pub(super) struct Samples {
 }
 
 /// How a simulation begins.
-pub(super) struct Begin<'a> {
+pub(super) struct InitialCondition<'a> {
     /// The initial state.
     pub(super) x0: &'a [f64],
     /// x_theta(0), n x q; zero where `None`.
@@ -48,9 +48,9 @@ pub(super) fn condense(
     samples: &Samples,
     system: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
-    begin: &Begin<'_>,
+    begin: &InitialCondition<'_>,
 ) -> Result<Mat<f64>> {
-    let mut triangle = NarrowTriangle::new(begin.estimated + slopes.len() + 1);
+    let mut triangle = SmallQr::new(begin.estimated + slopes.len() + 1);
     rows(samples, system, slopes, begin, &mut triangle)?;
     Ok(triangle.into_factor())
 }
@@ -61,7 +61,7 @@ pub(super) trait Take {
     fn take(&mut self, piece: &mut [f64], count: usize);
 }
 
-impl Take for NarrowTriangle {
+impl Take for SmallQr {
     #[inline(always)]
     fn take(&mut self, piece: &mut [f64], count: usize) {
         self.fold(piece, count);
@@ -83,7 +83,7 @@ pub(super) fn rows(
     samples: &Samples,
     system: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
-    begin: &Begin<'_>,
+    begin: &InitialCondition<'_>,
     take: &mut impl Take,
 ) -> Result<()> {
     Arch::new().dispatch(Rows { samples, system, slopes, begin, take })
@@ -94,7 +94,7 @@ struct Rows<'a, T> {
     samples: &'a Samples,
     system: &'a StateSpace<Discrete>,
     slopes: &'a [SampledSlope],
-    begin: &'a Begin<'a>,
+    begin: &'a InitialCondition<'a>,
     take: &'a mut T,
 }
 
@@ -128,7 +128,7 @@ impl<T: Take> WithSimd for Rows<'_, T> {
             if !dot(piece, piece).is_finite() {
                 return Err(diverged(first + 1, system));
             }
-            bank.forget_the_vanished();
+            bank.flush_subnormals();
             take.take(piece, rows);
         }
         Ok(())

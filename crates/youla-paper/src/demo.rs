@@ -8,7 +8,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
-use youla::identify::subspace::{Order, Stability, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, Weight};
+use youla::identify::subspace::{
+    Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
+};
 use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::reduce::{ReducedOrder, ReductionOptions};
@@ -146,8 +148,12 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         segments: Vec::new(),
         name: Some(name.into()),
     };
-    let subspace =
-        SubspaceOptions { weight: Weight::Cva, horizon: 40, order: Order::Fixed(10), ..SubspaceOptions::default() };
+    let subspace = SubspaceOptions {
+        method: SubspaceMethod::Cva,
+        horizon: 40,
+        order: Order::Fixed(10),
+        ..SubspaceOptions::default()
+    };
     let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
     RunSettings {
         name: "demo: gas bearing".into(),

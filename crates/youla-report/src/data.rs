@@ -241,7 +241,7 @@ pub struct Verdict {
 /// A remark on the data or the run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Note {
-    /// Weight of the remark.
+    /// SubspaceMethod of the remark.
     pub status: Status,
     /// One sentence.
     pub text: String,
@@ -425,7 +425,7 @@ pub struct StabilisationPole {
     /// Whether the pole is stable.
     pub stable: bool,
     /// What the next lower order says of it.
-    pub standing: PoleStanding,
+    pub standing: PoleStability,
     /// Its cluster, by its place.
     pub cluster: Option<usize>,
 }
@@ -433,13 +433,13 @@ pub struct StabilisationPole {
 /// What the next lower order says of a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum PoleStanding {
+pub enum PoleStability {
     /// It has none of this frequency.
     New,
     /// It has one of this frequency, with another damping ratio or mode shape.
     Frequency,
     /// It has one of this frequency, damping ratio and mode shape.
-    Settled,
+    Stable,
 }
 
 /// Poles of many orders that are close to each other.
@@ -529,10 +529,10 @@ pub struct ResidualTest {
     /// Correlation with each excitation, outputs first: at the lags around 0.
     pub cross: Vec<Correlation>,
     /// Fits in percent, per number of steps and last for the simulation, per output.
-    pub step_fits: Vec<Vec<Option<f64>>>,
+    pub k_step_fits: Vec<Vec<Option<f64>>>,
     /// What foresees the residual of the simulation in them, in words.
     #[serde(default)]
-    pub foreseen_by: String,
+    pub predictor: String,
 }
 
 /// A correlation over lags with the band of noise.

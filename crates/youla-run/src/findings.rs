@@ -1,14 +1,14 @@
 //! What a run says in words: the answer to "can I trust it?" and the remarks besides.
 
-mod further;
+mod extra;
 mod trust;
 
-pub(super) use further::further_lines;
+pub(super) use extra::further_lines;
 pub(super) use trust::verdict_lines;
 
 use super::pipeline::Identification;
 use super::segments::RecordSegment;
-use youla::identify::innovation_form::Settling;
+use youla::identify::innovation_form::Convergence;
 use youla::identify::subspace::{Uncertainty, amplitudes};
 use youla_greybox::Stop;
 use youla_greybox::refine::RefineNoise;
@@ -74,8 +74,8 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     }
     if let Some(form) = &found.hansen.innovation_form {
         let (status, settled) = match form.stop {
-            Settling::Settled => (Status::Info, "settled"),
-            Settling::Iterations => (Status::Caution, "had not settled"),
+            Convergence::Converged => (Status::Info, "settled"),
+            Convergence::Iterations => (Status::Caution, "had not settled"),
         };
         let kalman = form.from_kalman.map_or(String::new(), |x| {
             format!(" It differs from the Kalman gain of the subspace method by {:.0} % of its size.", 100.0 * x)

@@ -6,7 +6,6 @@ mod check;
 mod compare;
 mod controller_errors;
 mod disturbance;
-mod draft;
 mod error;
 mod excite;
 mod excite_figure;
@@ -14,10 +13,10 @@ mod explain;
 mod export;
 mod factorise;
 mod findings;
+mod init;
 
 mod grey_box;
 mod grey_box_loop;
-mod long;
 mod models;
 mod noise_models;
 mod page;
@@ -36,6 +35,7 @@ mod segments;
 mod settings;
 mod signals;
 mod stabilisation;
+mod streaming;
 mod summary;
 mod uncertainty;
 mod verdict;
@@ -47,17 +47,13 @@ pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, 
 pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
 pub use disturbance::{DisturbanceSettings, TachoUnit};
-pub use draft::{Draft, DraftClock, path_from};
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
 pub use export::{controller_for_export, model_for_export};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
 pub use grey_box::{AlternativeStructure, GreyBoxRun, GreyBoxSettings};
-pub use long::{
-    LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
-    read_subspace_options,
-};
+pub use init::{Draft, DraftClock, path_from};
 pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
 pub use page::page;
 pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
@@ -76,6 +72,10 @@ pub use settings::{
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stabilisation::Diagrams;
+pub use streaming::{
+    LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
+    read_subspace_options,
+};
 pub use summary::summary;
 pub use uncertainty::{RunUncertainty, SystemUncertainty};
 pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};

@@ -125,7 +125,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
         draw::EvidenceTable {
             title: "Weights that were tried".into(),
             text: String::new(),
-            columns: ["Weight of u", "Least damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
+            columns: ["SubspaceMethod of u", "Least damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
             rows: redesign.candidates.iter().map(candidate).collect(),
             caption: "Of those within the limits the one with the most damping is taken that stabilises every model within the region of S."
                 .into(),

@@ -11,7 +11,7 @@ use serde_json::{Value, json};
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
 use youla::validate::{
-    PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations, step_fits, step_fits_by_noise,
+    PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations,
 };
 use youla::{Mat, MatRef};
 use youla_report::data as draw;
@@ -27,9 +27,9 @@ pub struct RecordResiduals {
     /// The correlations.
     pub correlations: ResidualCorrelations,
     /// Fits in percent over the second half: per [`PREDICTION_STEPS`] and last for the simulation, per output.
-    pub step_fits: Vec<Vec<f64>>,
+    pub k_step_fits: Vec<Vec<f64>>,
     /// What foresees the residual of the simulation in them.
-    pub foreseen_by: Foresight,
+    pub predictor: Foresight,
 }
 
 /// What foresees the residual of a simulation some steps ahead.
@@ -88,13 +88,13 @@ pub(super) fn residual_tests(
     };
     let rest = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
     let e = rest((measured - predicted).as_ref());
-    let (step_fits, foreseen_by) = fits_ahead(rest(measured).as_ref(), rest(predicted).as_ref(), noise)?;
+    let (k_step_fits, predictor) = fits_ahead(rest(measured).as_ref(), rest(predicted).as_ref(), noise)?;
     Ok(RecordResiduals {
         excitations: channels.into_iter().map(|c| c.name).collect(),
         external,
         correlations: residual_correlations(e.as_ref(), rest(x.as_ref()).as_ref())?,
-        step_fits,
-        foreseen_by,
+        k_step_fits,
+        predictor,
     })
 }
 
@@ -104,12 +104,12 @@ fn fits_ahead(
     predicted: MatRef<'_, f64>,
     noise: Option<&StateSpace<Discrete>>,
 ) -> Result<(Vec<Vec<f64>>, Foresight)> {
-    match noise.map(|noise| step_fits_by_noise(measured, predicted, noise)) {
+    match noise.map(|noise| k_step_fits_by_noise(measured, predicted, noise)) {
         Some(Ok(fits)) => Ok((fits, Foresight::Kalman)),
         Some(Err(error)) if !matches!(error, youla::Error::Unstable { .. } | youla::Error::Singular { .. }) => {
             Err(error.into())
         }
-        _ => Ok((step_fits(measured, predicted)?, Foresight::Autoregression)),
+        _ => Ok((k_step_fits(measured, predicted)?, Foresight::Autoregression)),
     }
 }
 
@@ -121,12 +121,12 @@ fn step_keys() -> Vec<String> {
 /// What summary.json says of a model, by record.
 pub(super) fn summary_entry(v: &ModelVerdict) -> Value {
     let entry = |r: &RecordResiduals| {
-        let fits: serde_json::Map<_, _> = step_keys().into_iter().zip(r.step_fits.iter().map(|f| json!(f))).collect();
+        let fits: serde_json::Map<_, _> = step_keys().into_iter().zip(r.k_step_fits.iter().map(|f| json!(f))).collect();
         json!({
             "independent": r.independent(),
             "largest": r.correlations.largest,
-            "step_fits": fits,
-            "foreseen_by": r.foreseen_by,
+            "k_step_fits": fits,
+            "predictor": r.predictor,
         })
     };
     v.records
@@ -169,12 +169,12 @@ pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
                     .map(|values| draw::Correlation::new(values, r.correlations.auto_band))
                     .collect(),
                 cross: r.correlations.cross.iter().map(|c| draw::Correlation::new(&c.values, c.band)).collect(),
-                step_fits: r
-                    .step_fits
+                k_step_fits: r
+                    .k_step_fits
                     .iter()
                     .map(|f| f.iter().map(|f| f.is_finite().then_some(*f)).collect())
                     .collect(),
-                foreseen_by: r.foreseen_by.words().into(),
+                predictor: r.predictor.words().into(),
             });
         }
     }

@@ -171,7 +171,7 @@ pub enum Construction {
 pub struct FactorSettings {
     /// For controllers that are not given as observer gains.
     pub construction: Construction,
-    /// Weight of the inputs against the outputs in the LQR that chooses F; both are measured in their rms on the
+    /// SubspaceMethod of the inputs against the outputs in the LQR that chooses F; both are measured in their rms on the
     /// estimation records.
     pub input_weight: f64,
     /// Covariance of the output noise against that of the inputs in the Kalman predictor that chooses L (shifted

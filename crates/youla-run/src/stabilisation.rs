@@ -3,7 +3,7 @@
 use super::settings::StabilisationSettings;
 use crate::Result;
 use serde_json::{Value, json};
-use youla::identify::subspace::stabilisation::{DiagramPole, StabilisationDiagram, Standing, stabilisation};
+use youla::identify::subspace::stabilisation::{DiagramPole, PoleStability, StabilisationDiagram, stabilisation};
 use youla::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use youla::signal::Channel;
 use youla_report::data as draw;
@@ -67,9 +67,9 @@ pub(super) fn as_csv(diagram: &StabilisationDiagram) -> String {
     text.push('\n');
     for p in &diagram.poles {
         let standing = match p.standing {
-            Standing::New => "new",
-            Standing::Frequency => "frequency",
-            Standing::Settled => "settled",
+            PoleStability::New => "new",
+            PoleStability::Frequency => "frequency",
+            PoleStability::Stable => "settled",
         };
         let (z, stable) = (p.pole, p.is_stable());
         let cluster = p.cluster.map(|k| k.to_string()).unwrap_or_default();
@@ -92,9 +92,9 @@ pub(super) fn drawn(diagram: &StabilisationDiagram, method: &str, label: &str, c
         zeta_deviation: p.zeta_deviation,
         stable: p.is_stable(),
         standing: match p.standing {
-            Standing::New => draw::PoleStanding::New,
-            Standing::Frequency => draw::PoleStanding::Frequency,
-            Standing::Settled => draw::PoleStanding::Settled,
+            PoleStability::New => draw::PoleStability::New,
+            PoleStability::Frequency => draw::PoleStability::Frequency,
+            PoleStability::Stable => draw::PoleStability::Stable,
         },
         cluster: p.cluster,
     };

@@ -17,7 +17,7 @@ use std::path::Path;
 use timing::{median, middle};
 use youla::Result;
 use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceData, SubspaceOptions, subspace};
-use youla::linalg::{RiccatiProblem, Triangle, care, dare, discrete_lyapunov, eye, lyapunov};
+use youla::linalg::{RiccatiProblem, SequentialQr, care, dare, discrete_lyapunov, eye, lyapunov};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
 use youla::signal::{Excitation, SquareWaves};
@@ -71,8 +71,8 @@ fn triangular_factor() {
     let width = 2 * horizon * channels;
     title(&format!("R of block-Hankel data, {ROWS} x {width}"));
     let record = random(ROWS + 2 * horizon, channels, 1);
-    let ours = line("Triangle::fold", None, || {
-        let mut triangle = Triangle::new(width, PIECE);
+    let ours = line("SequentialQr::fold", None, || {
+        let mut triangle = SequentialQr::new(width, PIECE);
         for start in (0..ROWS).step_by(PIECE) {
             triangle.fold(PIECE, |mut piece| {
                 for column in 0..width {

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 use std::{env, fs};
-use youla::identify::subspace::{Experiment, Order, SubspaceOptions, Weight, subspace};
+use youla::identify::subspace::{Experiment, Order, SubspaceMethod, SubspaceOptions, subspace};
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, Result};
@@ -171,8 +171,12 @@ fn one(folder: &Path, horizon: usize, order: usize) -> Result<()> {
         Mat::from_fn(rows, channels, |k, j| value(j * rows + k))
     };
     let [u, y, uv, yv] = ["u", "y", "uv", "yv"].map(read);
-    let options =
-        SubspaceOptions { weight: Weight::N4sid, horizon, order: Order::Fixed(order), ..SubspaceOptions::default() };
+    let options = SubspaceOptions {
+        method: SubspaceMethod::N4sid,
+        horizon,
+        order: Order::Fixed(order),
+        ..SubspaceOptions::default()
+    };
     let identify = |samples: usize| {
         let experiment = Experiment { u: u.subrows(0, samples), y: y.subrows(0, samples) };
         subspace(&[experiment], Discrete::new(TS)?, &options).map(|found| found.model)

@@ -7,7 +7,7 @@ mod machine;
 use youla::Result;
 use youla::identify::direct::direct;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, Weight};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions};
 use youla::lti::{Discrete, StateSpace};
 
 fn main() -> Result<()> {
@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let scheme = hansen(&machine.factors, &[signals], &options(4))?;
     let record = [Experiment { u: log.u.as_ref(), y: log.y.as_ref() }];
     // An unstable estimate is refused unless it is asked for.
-    let n4sid = SubspaceOptions { weight: Weight::N4sid, stability: Stability::Allow, ..options(2) };
+    let n4sid = SubspaceOptions { method: SubspaceMethod::N4sid, stability: Stability::Allow, ..options(2) };
     let open_loop = direct(&record, machine.plant.time(), &n4sid)?;
 
     println!("largest pole, rad/s (above 0: unstable)");

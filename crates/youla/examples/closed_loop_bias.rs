@@ -8,7 +8,7 @@ mod common;
 use common::feedback::Loop;
 use rayon::prelude::*;
 use std::path::Path;
-use youla::identify::subspace::Weight;
+use youla::identify::subspace::SubspaceMethod;
 use youla::{Mat, Result};
 use youla_report::data::{Method, Role};
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
@@ -29,9 +29,9 @@ fn main() -> Result<()> {
     ];
     let bearing = Loop::new(0.0);
     let estimate = |method: &str, (u, y): &(Mat<f64>, Mat<f64>)| match method {
-        "n4sid" => bearing.identify(Weight::N4sid, u, y),
-        "pbsid-opt" => bearing.identify(Weight::PbsidOpt, u, y),
-        "ssarx" => bearing.identify(Weight::Ssarx, u, y),
+        "n4sid" => bearing.identify(SubspaceMethod::N4sid, u, y),
+        "pbsid-opt" => bearing.identify(SubspaceMethod::PbsidOpt, u, y),
+        "ssarx" => bearing.identify(SubspaceMethod::Ssarx, u, y),
         _ => bearing.hansen(u, y),
     };
     let estimated = &methods[..4];

@@ -11,7 +11,7 @@ mod bearing_loop;
 mod common;
 
 use bearing_loop::{Coverage, Design, Loop};
-use youla::identify::subspace::{UncertaintyMethod, UncertaintyOptions, Weight};
+use youla::identify::subspace::{SubspaceMethod, UncertaintyMethod, UncertaintyOptions};
 
 fn main() {
     let given: Vec<String> = std::env::args().skip(1).collect();
@@ -21,10 +21,10 @@ fn main() {
         _ => UncertaintyMethod::Delta,
     };
     let weight = match given.get(7).map(String::as_str) {
-        Some("moesp") => Weight::Moesp,
-        Some("n4sid") => Weight::N4sid,
-        Some("pbsid-opt") => Weight::PbsidOpt,
-        _ => Weight::Cva,
+        Some("moesp") => SubspaceMethod::Moesp,
+        Some("n4sid") => SubspaceMethod::N4sid,
+        Some("pbsid-opt") => SubspaceMethod::PbsidOpt,
+        _ => SubspaceMethod::Cva,
     };
     let bearing = Loop::new(&Design {
         a_factor: number(1, 1.0),

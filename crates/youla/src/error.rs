@@ -373,7 +373,7 @@ pub enum Error {
     #[error(
         "scaling, factorisation, delays and automatic horizon are part of the factored data; factor the records again to change them"
     )]
-    Refactor,
+    FactorOptionsChanged,
     /// The bootstrap was asked for with a method for closed loops.
     #[error(
         "the bootstrap keeps the inputs as they are, which measurements from a closed loop do not allow; take method = \"delta\""
@@ -433,7 +433,7 @@ impl Error {
             | Error::OrderBeyondHorizon { .. }
             | Error::RecordChanged
             | Error::NeedsMemory { .. }
-            | Error::Refactor
+            | Error::FactorOptionsChanged
             | Error::BootstrapOfClosedLoop
             | Error::SteadyBlackBox
             | Error::Stream(_) => ErrorKind::BadInput,

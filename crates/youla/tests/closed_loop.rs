@@ -7,8 +7,10 @@ mod common;
 use common::feedback::{Loop, options};
 use youla::Mat;
 use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed};
-use youla::identify::innovation_form::{DeviationOptions, Settling, Structure, hansen_structured};
-use youla::identify::subspace::{AutomaticHorizon, Experiment, Order, SubspaceOptions, Weight, lines, subspace};
+use youla::identify::innovation_form::{Convergence, DeviationOptions, Structure, hansen_structured};
+use youla::identify::subspace::{
+    AutomaticHorizon, Experiment, Order, SubspaceMethod, SubspaceOptions, lines, subspace,
+};
 use youla::linalg::{block, least_squares};
 use youla::lti::{Discrete, StateSpace};
 use youla_greybox::hansen_refine::refine_hansen;
@@ -18,11 +20,11 @@ use youla_greybox::refine::{RefineNoise, RefineOptions};
 fn free_and_innovation(rig: &Loop, samples: usize, noise: f64, seed: u64) -> [f64; 2] {
     let (u, y) = rig.record(samples, noise, seed);
     let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-    let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+    let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
     let data = deviation_data(&rig.factors, &signals, &[], &options).unwrap();
     [DeviationOptions::default(), innovation()].map(|deviation| {
         let found = hansen_structured(&rig.factors, &data, &options, &deviation).unwrap();
-        assert!(found.innovation_form.is_none_or(|form| form.stop == Settling::Settled));
+        assert!(found.innovation_form.is_none_or(|form| form.stop == Convergence::Converged));
         rig.error(&found.plant)
     })
 }
@@ -42,8 +44,8 @@ fn only_the_methods_for_open_loops_have_an_error_floor() {
         let by =
             |weight| median([0, 1, 2].map(|k| bearing.error(&bearing.identify(weight, &records[k].0, &records[k].1))));
         let scheme = median([0, 1, 2].map(|k| bearing.error(&bearing.hansen(&records[k].0, &records[k].1))));
-        let direct = [Weight::N4sid, Weight::Cva].map(by);
-        let predictor = [Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS].map(by);
+        let direct = [SubspaceMethod::N4sid, SubspaceMethod::Cva].map(by);
+        let predictor = [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS].map(by);
         (direct, predictor, scheme)
     };
     let [short, medium, long] = [4_000, 16_000, 64_000].map(errors);
@@ -70,11 +72,11 @@ fn an_unstable_bearing_is_found_unstable() {
     assert!((truth.norm() - 1.0084).abs() < 2e-4);
     for seed in 1..=3 {
         let (u, y) = bearing.record(8_000, 0.1, seed);
-        for weight in [Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS] {
+        for weight in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS] {
             let found = outside(&bearing.identify(weight, &u, &y));
-            assert_eq!(found.len(), 1, "{weight:?}, seed {seed}: {found:?}");
+            assert_eq!(found.len(), 1, "{method:?}, seed {seed}: {found:?}");
             let (radius, angle) = ((found[0].norm() - truth.norm()).abs(), (found[0].arg() - truth.arg()).abs());
-            assert!(radius < 6e-4 && angle < 1.5e-3, "{weight:?}, seed {seed}: {radius:e}, {angle:e}");
+            assert!(radius < 6e-4 && angle < 1.5e-3, "{method:?}, seed {seed}: {radius:e}, {angle:e}");
         }
         assert_eq!(outside(&bearing.hansen(&u, &y)).len(), 1);
     }
@@ -93,7 +95,7 @@ fn known_unbalance_takes_no_states() {
             let signals = |(u, y): (Mat<f64>, Mat<f64>)| rig.factors.signals(u.as_ref(), y.as_ref()).unwrap();
             let clean = signals(rig.record(8000, 0.1, seed));
             let disturbed = signals(rig.record_with(8000, 0.1, seed, &unbalance));
-            let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(order), ..options() };
+            let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(order), ..options() };
             let model = |signals: &youla::factor::YoulaSignals, known: &[youla::MatRef<'_, f64>]| {
                 rig.error(
                     &hansen_disturbed(&rig.factors, std::slice::from_ref(signals), known, &options).unwrap().plant,
@@ -144,7 +146,7 @@ fn the_gain_of_the_exact_deviation_system() {
     let expected = t * exact_gain;
     let error = (&form.gain - &expected).norm_l2() / expected.norm_l2();
     assert!(error < 1e-8, "{error:.1e}");
-    assert_eq!(form.stop, Settling::Settled);
+    assert_eq!(form.stop, Convergence::Converged);
 }
 
 /// The noise of beta is modelled as it is: less error than from the simulated beta, at any signal-to-noise ratio.
@@ -163,7 +165,7 @@ fn innovation_form_is_better_in_noise() {
 #[test]
 fn a_refined_deviation_system_errs_less() {
     let rig = Loop::new(0.0);
-    let subspace = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+    let subspace = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
     let errors = [1, 2].map(|seed| {
         let (u, y) = rig.record(4000, 1.0, seed);
         let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
@@ -188,7 +190,7 @@ fn innovation_form_refuses_an_unstable_plant() {
     let rig = Loop::new(0.25);
     let (u, y) = rig.record(8000, 0.1, 1);
     let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-    let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+    let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
     let data = deviation_data(&rig.factors, &signals, &[], &options).unwrap();
     let refused = hansen_structured(&rig.factors, &data, &options, &innovation()).unwrap_err().to_string();
     assert!(refused.contains("A - K_s C of S"), "{refused}");
@@ -199,18 +201,18 @@ fn innovation_form_refuses_an_unstable_plant() {
 #[test]
 fn automatic_horizons_do_nearly_as_well_as_known_ones() {
     let bearing = Loop::new(0.0);
-    for weight in [Weight::PbsidOpt, Weight::Ssarx] {
+    for weight in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
         let automatic_horizon = Some(AutomaticHorizon { max: 150 });
         let options = SubspaceOptions { weight, automatic_horizon, order: Order::Fixed(6), ..options() };
         let errors = [1, 2, 3, 4, 5].map(|seed| {
             let (u, y) = bearing.record(16_000, 1.0, seed);
             let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
             let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
-            assert!(found.past > 30, "{weight:?}: {}", found.past);
+            assert!(found.past > 30, "{method:?}: {}", found.past);
             [bearing.error(&found.model), bearing.error(&bearing.identify(weight, &u, &y))]
         });
         let [automatic, known] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 5.0);
-        println!("{weight:?}: {automatic:.3} against {known:.3}");
-        assert!(automatic < 1.4 * known, "{weight:?}: {automatic:.3} against {known:.3}");
+        println!("{method:?}: {automatic:.3} against {known:.3}");
+        assert!(automatic < 1.4 * known, "{method:?}: {automatic:.3} against {known:.3}");
     }
 }

@@ -10,7 +10,7 @@ use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, real_time_control
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::hansen::{HansenModel, hansen};
 use youla::identify::subspace::{
-    Experiment, InitialState, Order, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, Weight, subspace,
+    Experiment, InitialState, Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
 };
 use youla::linalg::eye;
 use youla::lti::{Discrete, PeakOptions, StateSpace, hinf_norm};
@@ -133,7 +133,7 @@ impl Bench {
         let signals = YoulaSignals { alpha: self.clean(&signals.alpha), beta: self.clean(&signals.beta) };
         let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
         let options = SubspaceOptions {
-            weight: Weight::Cva,
+            method: SubspaceMethod::Cva,
             horizon: 30,
             order: Order::Fixed(12),
             initial_state: InitialState::Estimated,
@@ -149,7 +149,7 @@ impl Bench {
         let log = self.record(&mut disturbed, seed);
         let (v, y) = (self.clean(&log.alpha), self.clean(&log.y));
         let options = SubspaceOptions {
-            weight: Weight::Cva,
+            method: SubspaceMethod::Cva,
             horizon: 30,
             order: Order::Fixed(8),
             initial_state: InitialState::Estimated,

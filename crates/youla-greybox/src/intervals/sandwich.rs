@@ -10,9 +10,9 @@
 
 use super::super::GreyBoxModel;
 use super::super::criterion::{Criterion, Point, Slopes};
-use super::super::narrow::dot;
 use super::super::robust::LIMIT;
-use super::super::sensitivity::{Begin, condense, rows};
+use super::super::sensitivity::{InitialCondition, condense, rows};
+use super::super::small_qr::dot;
 use super::super::uncertainty::{Information, spread};
 use super::lags::History;
 use super::residuals::ResidualSums;
@@ -52,7 +52,7 @@ pub(super) fn residual_sums(
     let (p, m) = (criterion.outputs(), point.sampled.inputs());
     let mut found = ResidualSums::new(p, m, lags);
     for (samples, x0) in criterion.experiments.iter().zip(&point.initial_states) {
-        let begin = Begin { x0, slopes: None, estimated: 0 };
+        let begin = InitialCondition { x0, slopes: None, estimated: 0 };
         found.sums.restart();
         let mut first = 0;
         let mut take = |piece: &mut [f64], count: usize| {
@@ -84,7 +84,7 @@ pub(super) fn middle(
     let mut half = Mat::<f64>::zeros(q, q);
     for (samples, x0) in criterion.experiments.iter().zip(&point.initial_states) {
         let moved = criterion.moved(point, slopes, x0, samples)?;
-        let begin = Begin { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: initial };
+        let begin = InitialCondition { x0, slopes: moved.as_ref().map(|m| m.as_ref()), estimated: initial };
         let removed = if initial == 0 {
             Mat::zeros(0, q)
         } else {

@@ -6,8 +6,8 @@
 //! ```
 //! with the exact derivatives of the zero-order hold (`../sampled.rs`).
 
-use super::super::narrow::NarrowTriangle;
 use super::super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
+use super::super::small_qr::SmallQr;
 use super::super::structure::Structure;
 use super::target::FrequencyTarget;
 use crate::{Error, Result};
@@ -101,7 +101,7 @@ impl<'a> Misfit<'a> {
             }
             write(q, &values);
         }
-        let mut triangle = NarrowTriangle::new(q + 1);
+        let mut triangle = SmallQr::new(q + 1);
         triangle.fold(&mut rows, count);
         Ok(triangle.into_factor())
     }

@@ -34,7 +34,7 @@ pub enum Test {
     Timing,
     /// Values held at a limit ([`super::clipping()`]).
     Clipping,
-    /// A channel that stands still ([`super::stuck()`]).
+    /// A channel that stands still ([`super::flatline()`]).
     Stuck,
     /// Resolution of a channel ([`super::quantisation()`]).
     Quantisation,

@@ -29,7 +29,7 @@ const DELAY: f64 = 0.05;
 /// Poles nearer to each other than this count as one that repeats.
 const APART: f64 = 1e-6;
 /// Part of the largest peak below which a pole does not show.
-const HIDDEN: f64 = 1e-10;
+const WEAKLY_CONTROLLABLE: f64 = 1e-10;
 /// Frequencies that are added up in one product.
 const CHUNK: usize = 1024;
 
@@ -96,7 +96,7 @@ fn simple_poles(nominal: &StateSpace<Discrete>) -> Result<Vec<Pole>> {
     let mut poles: Vec<Pole> = candidates.collect();
     let peak = |p: &Pole| size(&p.c) * size(&p.b) / (1.0 - p.value.norm()).abs().max(1e-12);
     let largest = poles.iter().map(peak).fold(0.0, f64::max);
-    poles.retain(|p| peak(p) > HIDDEN * largest);
+    poles.retain(|p| peak(p) > WEAKLY_CONTROLLABLE * largest);
     Ok(poles)
 }
 

@@ -101,7 +101,7 @@ pub struct RedesignProblem<'a> {
 /// One weight that was tried.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// Weight of the inputs.
+    /// SubspaceMethod of the inputs.
     pub input_weight: f64,
     /// Least damping of the modes that matter; absent where the loop is unstable or the design failed.
     pub least_damping: Option<f64>,
@@ -131,7 +131,7 @@ pub struct NewController {
 pub struct Redesign {
     /// What was designed anew.
     pub method: RedesignMethod,
-    /// Weight that was taken.
+    /// SubspaceMethod that was taken.
     pub input_weight: f64,
     /// The controller.
     pub controller: NewController,

@@ -6,7 +6,7 @@ use super::row::{Row, Status};
 use super::settings::PaperSettings;
 use crate::BearingStructure;
 use crate::rig::Bearing;
-use crate::{Error, Result};
+use crate::Result;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

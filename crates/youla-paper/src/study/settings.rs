@@ -45,9 +45,9 @@ pub struct PaperSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerSettings {
-    /// Weight of a displacement, per um^2.
+    /// SubspaceMethod of a displacement, per um^2.
     pub displacement_weight: f64,
-    /// Weight of a velocity, per (um/s)^2.
+    /// SubspaceMethod of a velocity, per (um/s)^2.
     pub velocity_weight: f64,
     /// Intensity of the noise at the inputs that the observer assumes, V^2.
     pub input_noise: f64,
@@ -93,7 +93,7 @@ pub struct CrossoverSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentSettings {
-    /// Weight of the command, per V^2.
+    /// SubspaceMethod of the command, per V^2.
     pub command_weight: f64,
     /// Samples of the estimation record, and of the open-loop record for the nominal model.
     pub samples: usize,

@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::{RunFigure, axis, key, logarithmic};
-use crate::data::{PoleStanding, Stabilisation, StabilisationPole};
+use crate::data::{PoleStability, Stabilisation, StabilisationPole};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
 
 /// Room above the largest order for the frequencies of the clusters, as a share of all orders.
@@ -73,9 +73,9 @@ fn curves(diagram: &Stabilisation, value: Value) -> Vec<Curve> {
     let own = diagram.method.as_str();
     let mut list: Vec<Curve> = [
         ("unstable", "", None, Drawn::Marks),
-        ("new", "", Some(PoleStanding::New), Drawn::Marks),
-        (own, "frequency repeats", Some(PoleStanding::Frequency), Drawn::Marks),
-        (own, "settled", Some(PoleStanding::Settled), Drawn::Dots),
+        ("new", "", Some(PoleStability::New), Drawn::Marks),
+        (own, "frequency repeats", Some(PoleStability::Frequency), Drawn::Marks),
+        (own, "settled", Some(PoleStability::Stable), Drawn::Dots),
     ]
     .into_iter()
     .map(|(method, note, wanted, drawn)| {
@@ -93,7 +93,7 @@ fn curves(diagram: &Stabilisation, value: Value) -> Vec<Curve> {
 
 /// Two standard deviations to either side of settled poles, one line with gaps.
 fn whiskers(diagram: &Stabilisation, value: Value) -> Option<Curve> {
-    let settled = diagram.poles.iter().filter(|pole| pole.stable && pole.standing == PoleStanding::Settled);
+    let settled = diagram.poles.iter().filter(|pole| pole.stable && pole.standing == PoleStability::Stable);
     let (x, y): (Vec<f64>, Vec<f64>) = settled
         .filter_map(|pole| match value {
             Value::Order => pole.hz_deviation.map(|d| {

@@ -117,7 +117,7 @@ fn report() -> ReportData {
             label: "S".into(),
             orders: vec![1, 2, 3],
             chosen: 2,
-            poles: vec![pole(2, 12.0, PoleStanding::New), pole(3, 12.1, PoleStanding::Settled)],
+            poles: vec![pole(2, 12.0, PoleStability::New), pole(3, 12.1, PoleStability::Stable)],
             clusters: vec![StabilisationCluster {
                 hz: 12.05,
                 zeta: 0.02,

@@ -165,13 +165,13 @@ pub(super) const OF_SETTINGS: &str = "run.toml";
 
 /// Whether the direct method is one that feedback biases.
 fn method_finding(settings: &RunSettings) -> Option<Finding> {
-    let direct = settings.direct.as_ref().filter(|direct| !direct.weight.is_for_closed_loops())?;
-    let weight =
-        serde_json::to_value(direct.weight).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
+    let direct = settings.direct.as_ref().filter(|direct| !direct.method.is_for_closed_loops())?;
+    let method =
+        serde_json::to_value(direct.method).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
     let what = format!(
-        "[direct] weight = \"{weight}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
+        "[direct] method = \"{method}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
     );
-    let advice = "Take weight = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
+    let advice = "Take method = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
     Some(finding(Severity::Caution, OF_SETTINGS, what, advice))
 }
 

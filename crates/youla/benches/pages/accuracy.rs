@@ -7,7 +7,7 @@ use crate::timing::middle;
 use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Order, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, Weight};
+use youla::identify::subspace::{Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions};
 use youla::lti::{Discrete, FrequencyResponse, frequency_response};
 
 /// The page.
@@ -57,7 +57,7 @@ fn plants() -> Result<String> {
     for (noise, horizon, order) in
         [(0.0, 20, Order::Fixed(12)), (0.03, 30, Order::Fixed(12)), (0.3, 30, Order::Fixed(10))]
     {
-        let options = SubspaceOptions { horizon, order, weight: Weight::Moesp, ..Default::default() };
+        let options = SubspaceOptions { horizon, order, method: SubspaceMethod::Moesp, ..Default::default() };
         let errors = (0..5)
             .map(|seed| {
                 let found = hansen(&bearing.factors, &[bearing.record(20_000, noise, seed)], &options)?;

@@ -52,9 +52,9 @@ pub enum Structure {
 /// Why the refits ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Settling {
+pub enum Convergence {
     /// K_s changed by less than the tolerance.
-    Settled,
+    Converged,
     /// The largest number of refits was reached.
     Iterations,
 }
@@ -67,7 +67,7 @@ pub struct InnovationForm {
     /// Refits made.
     pub iterations: usize,
     /// Why they ended.
-    pub stop: Settling,
+    pub stop: Convergence,
     /// Last relative change of K_s.
     pub change: f64,
     /// What `Gamma K_s` misses of the Markov parameters of H, relative: A and C of S can be those of H only as far as this.
@@ -136,7 +136,7 @@ fn refit(
         now = next;
         iterations += 1;
     }
-    let stop = if change <= deviation.tolerance { Settling::Settled } else { Settling::Iterations };
+    let stop = if change <= deviation.tolerance { Convergence::Converged } else { Convergence::Iterations };
     let from_kalman = kalman.map(|kalman| (&now.gain - kalman).norm_l2() / now.gain.norm_l2());
     let asked = options.uncertainty.method != UncertaintyMethod::None;
     model.uncertainty = asked.then_some(Uncertainty::Refused { reason: NoUncertainty::OtherFit });

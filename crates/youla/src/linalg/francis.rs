@@ -2,7 +2,7 @@
 //! The QR transformation, Comput. J. 4 (1961-62), 265 and 332; the test for deflation is that of M. Ahues and F. Tisseur,
 //! LAPACK Working Note 122 (1997).
 
-use super::bulges::{Memory, sweep};
+use super::bulge_chasing::{Memory, sweep};
 use super::schur::standardise;
 use super::shifts::{Shifts, trailing};
 use super::square::Square;

@@ -4,15 +4,15 @@
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
 mod balance;
-mod bulges;
+mod bulge_chasing;
 mod complex_schur;
+mod deferred_reflections;
 mod definite;
 mod expm;
 mod francis;
 mod gramian;
 mod hessenberg;
 mod kronecker;
-mod late;
 mod least_squares;
 mod logm;
 mod lyapunov;
@@ -21,11 +21,11 @@ mod reflector;
 mod reorder;
 mod riccati;
 mod schur;
+mod sequential_qr;
 mod shifts;
 mod square;
 mod substitution;
 mod sylvester;
-mod triangle;
 
 pub use balance::{Balanced, balance};
 pub(crate) use definite::check_semidefinite;
@@ -40,9 +40,9 @@ pub use quantile::quantile;
 pub use reorder::OrderedSchur;
 pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
 pub use schur::{RealSchur, real_schur};
+pub use sequential_qr::SequentialQr;
+pub use sequential_qr::{leading_rank, triangular_condition};
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
-pub use triangle::Triangle;
-pub use triangle::{leading_rank, triangular_condition};
 
 #[cfg(test)]
 mod levels;

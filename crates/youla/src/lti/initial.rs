@@ -1,7 +1,7 @@
 //! The initial state with which a model reproduces a record best.
 
 use super::{Discrete, StateSpace, simulate};
-use crate::linalg::Triangle;
+use crate::linalg::SequentialQr;
 use crate::{Mat, MatRef, Result};
 
 /// Outputs from the initial state with `min over x0 of sum |y(k) - C A^k x0 - (response to u)(k)|^2`; y has the shape of what
@@ -21,7 +21,7 @@ fn initial_state(model: &StateSpace<Discrete>, residual: MatRef<'_, f64>) -> Vec
     }
     let mut powers = FreeResponse::new(model);
     let floor = 1e-9 * powers.largest();
-    let mut triangle = Triangle::new(n + 1, CHUNK * p);
+    let mut triangle = SequentialQr::new(n + 1, CHUNK * p);
     let mut start = 0;
     while start < residual.nrows() && powers.largest() > floor && powers.largest().is_finite() {
         let rows = CHUNK.min(residual.nrows() - start);

@@ -5,14 +5,14 @@ mod band;
 mod certificate;
 mod exact;
 mod fit;
+mod k_step_fits;
 mod predict;
 mod residuals;
-mod step_fits;
 
 pub use band::{BandCertificate, BandOptions, certify_band};
 pub use certificate::{LoopCertificate, certify};
 pub use exact::{ExactCertificate, certify_deviation};
 pub use fit::{fit, vaf};
+pub use k_step_fits::{PREDICTION_STEPS, k_step_fits, k_step_fits_by_noise};
 pub use predict::{LoopExcitation, predict_closed_loop, predict_open_loop};
 pub use residuals::{CrossCorrelogram, LargestCorrelation, RESIDUAL_LAGS, ResidualCorrelations, residual_correlations};
-pub use step_fits::{PREDICTION_STEPS, step_fits, step_fits_by_noise};

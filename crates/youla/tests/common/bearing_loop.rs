@@ -8,7 +8,7 @@ use youla::Mat;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::hansen::{HansenModel, hansen};
-use youla::identify::subspace::{Order, ResponseBand, Stability, SubspaceOptions, Weight};
+use youla::identify::subspace::{Order, ResponseBand, Stability, SubspaceMethod, SubspaceOptions};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, Mode, StateSpace, frequency_response, simulate};
 use youla_paper::rig::degraded;
@@ -19,7 +19,7 @@ pub(crate) struct Design {
     /// Factors on A and B of the nominal model.
     pub(crate) a_factor: f64,
     pub(crate) b_factor: f64,
-    /// Weight of the commands per V^2, against 1 per um^2.
+    /// SubspaceMethod of the commands per V^2, against 1 per um^2.
     pub(crate) input_weight: f64,
     /// Variance of the input noise, V^2, against 1 um^2 of output noise, for the observer.
     pub(crate) process_noise: f64,
@@ -64,7 +64,7 @@ impl Loop {
 
 pub(crate) fn options() -> SubspaceOptions {
     SubspaceOptions {
-        weight: Weight::Cva,
+        method: SubspaceMethod::Cva,
         horizon: 20,
         order: Order::Fixed(8),
         stability: Stability::Allow,

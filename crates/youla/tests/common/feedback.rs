@@ -7,7 +7,7 @@ use youla::Mat;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Experiment, Order, Stability, SubspaceOptions, Weight, subspace};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla_paper::rig::degraded;
@@ -58,7 +58,7 @@ impl Loop {
     }
 
     /// Six states from u and y.
-    pub(crate) fn identify(&self, weight: Weight, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
+    pub(crate) fn identify(&self, method: SubspaceMethod, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let past = weight.is_for_closed_loops().then_some(100);
         let options = SubspaceOptions { weight, past, order: Order::Fixed(6), ..options() };
         let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
@@ -68,7 +68,7 @@ impl Loop {
     /// G(S) with S of twelve states from alpha and beta.
     pub(crate) fn hansen(&self, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let signals = self.factors.signals(u.as_ref(), y.as_ref()).unwrap();
-        let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(12), ..options() };
+        let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
         hansen(&self.factors, &[signals], &options).unwrap().plant
     }
 

@@ -291,7 +291,7 @@ fn diagram(plan: &Plan, method: &str, label: &str) -> Stabilisation {
                 hz_deviation: Some(0.01 * hz),
                 zeta_deviation: None,
                 stable: true,
-                standing: if order < 2 * k + 4 { PoleStanding::New } else { PoleStanding::Settled },
+                standing: if order < 2 * k + 4 { PoleStability::New } else { PoleStability::Stable },
                 cluster: Some(k),
             });
         }
@@ -303,7 +303,7 @@ fn diagram(plan: &Plan, method: &str, label: &str) -> Stabilisation {
             hz_deviation: None,
             zeta_deviation: None,
             stable: wandering > 0.0,
-            standing: PoleStanding::New,
+            standing: PoleStability::New,
             cluster: None,
         });
     }

@@ -11,9 +11,9 @@
 //! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
 
 mod log;
-mod words;
+mod messages;
 
-pub(super) use words::not_simulated;
+pub(super) use messages::not_simulated;
 
 use super::CheckOptions;
 use crate::Result;

@@ -5,7 +5,7 @@ use super::case::StartCase;
 use crate::rig::{Bearing, RigParameters};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use youla::identify::subspace::{InitialState, Order, Stability, SubspaceOptions, Weight};
+use youla::identify::subspace::{InitialState, Order, Stability, SubspaceMethod, SubspaceOptions};
 use youla_greybox::{ContinuationOptions, MultiStartOptions};
 
 /// The choices of [`super::evaluate_starts`].
@@ -49,7 +49,7 @@ impl StartsSettings {
             multi_start: MultiStartOptions { starts: 32, searched: Some(4), pem: pem(), ..Default::default() },
             continuation: ContinuationOptions { pem: pem(), ..Default::default() },
             subspace: SubspaceOptions {
-                weight: Weight::Cva,
+                method: SubspaceMethod::Cva,
                 horizon: 20,
                 order: Order::Fixed(6),
                 stability: Stability::Allow,

@@ -53,17 +53,17 @@ impl Signals {
 
 /// Where the samples are.
 #[derive(Clone)]
-enum Held<'a> {
+enum Storage<'a> {
     /// With the caller, in his units.
-    Given(Vec<View<'a>>),
+    Borrowed(Vec<View<'a>>),
     /// Here, in scaled units.
-    Made(Vec<Signals>),
+    Scaled(Vec<Signals>),
 }
 
 /// All experiments.
 #[derive(Clone)]
 pub(super) struct Channels<'a> {
-    held: Held<'a>,
+    held: Storage<'a>,
     pub(super) inputs: usize,
     pub(super) outputs: usize,
     /// By which the channels of `[u; y]` are divided.
@@ -95,7 +95,7 @@ impl<'a> Channels<'a> {
         let given: Vec<View<'a>> = experiments.iter().map(|e| View::of(e.u, e.y)).collect();
         if disturbances.is_empty() && delays.longest() == 0 {
             let channels = Channels::read(inputs, statistics, given.len(), options.scaling)?;
-            return Ok(Channels { held: Held::Given(given), ..channels });
+            return Ok(Channels { held: Storage::Borrowed(given), ..channels });
         }
         Channels::made(experiments, disturbances, delays, options)
     }
@@ -111,7 +111,7 @@ impl<'a> Channels<'a> {
         let scale = statistics.scales(scaling)?;
         let spread = (inputs..channels).map(|j| statistics.spread(j) / scale[j]).collect();
         let delays = Delays::new(&[], inputs)?;
-        let (held, outputs) = (Held::Given(Vec::new()), channels - inputs);
+        let (held, outputs) = (Storage::Borrowed(Vec::new()), channels - inputs);
         let (w_scale, delayed) = (Vec::new(), vec![Vec::new(); experiments]);
         Ok(Channels { held, inputs, outputs, scale, w_scale, spread, delays, delayed })
     }
@@ -143,31 +143,31 @@ impl<'a> Channels<'a> {
             y: divide(y[e], y_scale),
             w: w.get(e).map_or_else(|| Mat::zeros(y[e].nrows(), 0), |w| divide(*w, &w_scale[e])),
         };
-        let held = Held::Made((0..y.len()).map(signals).collect());
+        let held = Storage::Scaled((0..y.len()).map(signals).collect());
         Ok(Channels { held, w_scale, delays, delayed, ..channels })
     }
 
     /// All samples, divided by [`Self::scale_of_views`] still.
     pub(super) fn views(&self) -> Vec<View<'_>> {
         match &self.held {
-            Held::Given(given) => given.clone(),
-            Held::Made(made) => made.iter().map(Signals::view).collect(),
+            Storage::Borrowed(given) => given.clone(),
+            Storage::Scaled(made) => made.iter().map(Signals::view).collect(),
         }
     }
 
     /// By what the channels of the views are larger than those of the scaled records.
     pub(super) fn scale_of_views(&self) -> Vec<f64> {
         match &self.held {
-            Held::Given(_) => self.scale.clone(),
-            Held::Made(_) => vec![1.0; self.scale.len()],
+            Storage::Borrowed(_) => self.scale.clone(),
+            Storage::Scaled(_) => vec![1.0; self.scale.len()],
         }
     }
 
     /// Scaled copies of all samples.
     pub(super) fn scaled(&self) -> Cow<'_, [Signals]> {
         match &self.held {
-            Held::Made(made) => Cow::Borrowed(made),
-            Held::Given(given) => {
+            Storage::Scaled(made) => Cow::Borrowed(made),
+            Storage::Borrowed(given) => {
                 let (u_scale, y_scale) = self.scale.split_at(self.inputs);
                 let copy =
                     |v: &View<'_>| Signals { u: divide(v.u, u_scale), y: divide(v.y, y_scale), w: v.w.to_owned() };
@@ -255,7 +255,7 @@ impl<'a> Channels<'a> {
     pub(super) fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Channels<'a> {
         let signals = |(e, y): (&Signals, Mat<f64>)| Signals { y, ..e.clone() };
         let made: Vec<Signals> = self.scaled().iter().zip(outputs).map(signals).collect();
-        Channels { held: Held::Made(made), ..self.clone() }
+        Channels { held: Storage::Scaled(made), ..self.clone() }
     }
 
     /// Scaled inputs and outputs without what the known signals explain of them.

@@ -10,7 +10,7 @@ use super::disturbance::{KnownColumns, Regressors};
 use super::modal::{Modes, Rows};
 use super::modal_sums::Sums;
 use super::sensitivity::{KnownShare, Predictor, Sensitivity, Unknowns};
-use crate::linalg::{Triangle, block};
+use crate::linalg::{SequentialQr, block};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 
@@ -109,7 +109,7 @@ pub(super) struct Condenser<'a> {
 enum State<'a> {
     Sums(&'a Modes, Sums<'a>),
     Rows(&'a Modes, Box<Rows>),
-    ByOutputs(Vec<(Sensitivity<'a>, Triangle)>),
+    ByOutputs(Vec<(Sensitivity<'a>, SequentialQr)>),
 }
 
 impl<'a> Condenser<'a> {
@@ -117,7 +117,8 @@ impl<'a> Condenser<'a> {
     pub(super) fn new(regression: &'a Regression<'a>, way: Way, known: KnownColumns) -> Self {
         let (unknowns, predictor) = (regression.unknowns, regression.predictor);
         let beside = unknowns.through() + known.columns() + unknowns.outputs;
-        let output = |i| (Sensitivity::new(predictor, i, unknowns), Triangle::new(unknowns.width_of_output(i), PIECE));
+        let output =
+            |i| (Sensitivity::new(predictor, i, unknowns), SequentialQr::new(unknowns.width_of_output(i), PIECE));
         let state = match (way, &regression.modes) {
             (Way::Sums, Some(modes)) => State::Sums(modes, Sums::new(modes.lambda(), unknowns.inputs, beside)),
             (Way::Rows, Some(modes)) => State::Rows(modes, Box::new(Rows::new(modes, unknowns, beside))),

@@ -7,7 +7,7 @@ use super::channels::{Channels, Signals, View};
 use super::disturbance;
 use super::gram::{self, Gram, GramFactor};
 use super::{DataFactor, Factorisation, SubspaceOptions};
-use crate::linalg::{Triangle, leading_rank};
+use crate::linalg::{SequentialQr, leading_rank};
 use crate::{Error, Result};
 use faer::linalg::matmul::matmul;
 use faer::{Accum, Mat, MatMut, Par, Side};
@@ -20,9 +20,9 @@ const PIECE: usize = 4000;
 const LANES: usize = 16;
 
 /// R of block-Hankel data.
-pub(super) struct DataTriangle {
+pub(super) struct HankelLq {
     r: Mat<f64>,
-    arrangement: Arrangement,
+    arrangement: HankelLayout,
     pub(super) inputs: usize,
     pub(super) outputs: usize,
     /// Block rows of the past and of the future.
@@ -36,7 +36,7 @@ pub(super) struct DataTriangle {
 
 /// In which order the rows of the block-Hankel matrix stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Arrangement {
+pub(super) enum HankelLayout {
     /// `[U_f U_p Y_p Y_f]`.
     InputsFirst,
     /// `[z(k-p) ... z(k) ... z(k+f-1)]`, `z = [u; y]`.
@@ -48,12 +48,12 @@ pub(super) enum Arrangement {
     },
 }
 
-impl Arrangement {
+impl HankelLayout {
     /// From which the method of the options starts.
     pub(super) fn of(options: &SubspaceOptions) -> Self {
-        match options.weight.is_for_closed_loops() {
-            true => Arrangement::Chronological,
-            false => Arrangement::InputsFirst,
+        match options.method.is_for_closed_loops() {
+            true => HankelLayout::Chronological,
+            false => HankelLayout::InputsFirst,
         }
     }
 
@@ -65,8 +65,8 @@ impl Arrangement {
         };
         let (before, after) = (0..past, past..past + horizon);
         match self {
-            Arrangement::Chronological => (0..(past + horizon) * q).collect(),
-            Arrangement::NewestFirst { feedthrough } => {
+            HankelLayout::Chronological => (0..(past + horizon) * q).collect(),
+            HankelLayout::NewestFirst { feedthrough } => {
                 let lags = before.rev().flat_map(|i| block_rows(i..i + 1, 0..q));
                 let (u, y) = (block_rows(after.clone(), 0..m), block_rows(after, m..q));
                 match feedthrough {
@@ -74,7 +74,7 @@ impl Arrangement {
                     false => lags.chain(y).chain(u).collect(),
                 }
             }
-            Arrangement::InputsFirst => block_rows(after.clone(), 0..m)
+            HankelLayout::InputsFirst => block_rows(after.clone(), 0..m)
                 .chain(block_rows(before.clone(), 0..m))
                 .chain(block_rows(before, m..q))
                 .chain(block_rows(after, m..q))
@@ -85,7 +85,7 @@ impl Arrangement {
 
 /// What stands in a column of the block-Hankel matrix.
 pub(super) struct Frame {
-    arrangement: Arrangement,
+    arrangement: HankelLayout,
     inputs: usize,
     outputs: usize,
     past: usize,
@@ -97,7 +97,7 @@ impl Frame {
     pub(super) fn new(
         (inputs, outputs): (usize, usize),
         (past, horizon): (usize, usize),
-        arrangement: Arrangement,
+        arrangement: HankelLayout,
     ) -> Self {
         let places = arrangement.places(inputs, outputs, past, horizon);
         Frame { arrangement, inputs, outputs, past, horizon, places }
@@ -119,23 +119,23 @@ impl Frame {
     }
 
     /// R with the channels of `[u; y]` divided by `scale`.
-    pub(super) fn triangle(self, mut r: Mat<f64>, scale: &[f64], columns: usize, report: DataFactor) -> DataTriangle {
+    pub(super) fn triangle(self, mut r: Mat<f64>, scale: &[f64], columns: usize, report: DataFactor) -> HankelLq {
         let Frame { arrangement, inputs, outputs, past, horizon, places } = self;
         for (column, place) in places.iter().enumerate() {
             let inverse = 1.0 / scale[place % (inputs + outputs)];
             r.col_mut(column).iter_mut().for_each(|value| *value *= inverse);
         }
-        DataTriangle { r, arrangement, inputs, outputs, past, horizon, columns, report }
+        HankelLq { r, arrangement, inputs, outputs, past, horizon, columns, report }
     }
 }
 
-impl DataTriangle {
+impl HankelLq {
     /// R of the data with so many block rows of past and future, by the way that was asked for; `Auto` takes the Gram matrix
     /// where it is well enough conditioned.
     pub(super) fn new(
         data: &Channels<'_>,
         blocks: (usize, usize),
-        arrangement: Arrangement,
+        arrangement: HankelLayout,
         factorisation: Factorisation,
     ) -> Result<Self> {
         let frame = Frame::new((data.inputs, data.outputs), blocks, arrangement);
@@ -149,13 +149,13 @@ impl DataTriangle {
     }
 
     /// In which order the rows stand.
-    pub(super) fn arrangement(&self) -> Arrangement {
+    pub(super) fn arrangement(&self) -> HankelLayout {
         self.arrangement
     }
 
     /// R of the rows that a past and a future no longer than those of the data take, in the given order; the Hankel columns
     /// stay those of the data.
-    pub(super) fn arranged(&self, arrangement: Arrangement, past: usize, horizon: usize) -> Result<Mat<f64>> {
+    pub(super) fn arranged(&self, arrangement: HankelLayout, past: usize, horizon: usize) -> Result<Mat<f64>> {
         for (what, asked, held) in [("the past", past, self.past), ("the horizon", horizon, self.horizon)] {
             if asked > held {
                 let must = "at most that with which the data were factored";
@@ -166,14 +166,14 @@ impl DataTriangle {
             return Ok(self.r.clone());
         }
         let places =
-            |arrangement: Arrangement, past, horizon| arrangement.places(self.inputs, self.outputs, past, horizon);
+            |arrangement: HankelLayout, past, horizon| arrangement.places(self.inputs, self.outputs, past, horizon);
         let held = places(self.arrangement, self.past, self.horizon);
         let mut column_of = vec![0; held.len()];
         held.iter().enumerate().for_each(|(column, place)| column_of[*place] = column);
         let oldest = (self.past - past) * (self.inputs + self.outputs);
         let wanted: Vec<usize> =
             places(arrangement, past, horizon).iter().map(|place| column_of[place + oldest]).collect();
-        let mut triangle = Triangle::new(wanted.len(), self.r.nrows());
+        let mut triangle = SequentialQr::new(wanted.len(), self.r.nrows());
         triangle.fold(self.r.nrows(), |mut rows| {
             wanted.iter().enumerate().for_each(|(j, column)| rows.as_mut().col_mut(j).copy_from(self.r.col(*column)));
         });
@@ -183,14 +183,14 @@ impl DataTriangle {
 
 /// The data with another weight on some of their Hankel columns.
 pub(super) struct BlockWeights<'a> {
-    data: &'a DataTriangle,
+    data: &'a HankelLq,
     places: Vec<usize>,
     /// `R' R`, where R came from the Gram matrix.
     gram: Option<Mat<f64>>,
 }
 
 impl<'a> BlockWeights<'a> {
-    pub(super) fn new(data: &'a DataTriangle) -> Self {
+    pub(super) fn new(data: &'a HankelLq) -> Self {
         let places = data.arrangement.places(data.inputs, data.outputs, data.past, data.horizon);
         let gram = (data.report.by == Factorisation::Gram).then(|| data.r.transpose() * &data.r);
         BlockWeights { data, places, gram }
@@ -203,7 +203,7 @@ impl<'a> BlockWeights<'a> {
         experiment: usize,
         columns: Range<usize>,
         step: f64,
-    ) -> Result<DataTriangle> {
+    ) -> Result<HankelLq> {
         let data = self.data;
         let rows = RowMap::new(experiments.iter().map(Signals::view).collect(), data.past + data.horizon, &self.places);
         let first = rows.first[experiment] + columns.start;
@@ -221,13 +221,13 @@ impl<'a> BlockWeights<'a> {
                 cholesky.L().transpose().to_owned()
             }
             None => {
-                let mut triangle = Triangle::new(self.places.len(), PIECE.min(columns.len()).max(data.r.nrows()));
+                let mut triangle = SequentialQr::new(self.places.len(), PIECE.min(columns.len()).max(data.r.nrows()));
                 triangle.fold_rows(data.r.as_ref());
                 pieces.for_each(|h| triangle.fold_rows((h * faer::Scale(step.sqrt())).as_ref()));
                 triangle.r().to_owned()
             }
         };
-        Ok(DataTriangle { r, ..*data })
+        Ok(HankelLq { r, ..*data })
     }
 }
 
@@ -281,7 +281,7 @@ pub(super) fn choose(by_gram: Option<GramFactor>, factorisation: Factorisation) 
 /// that they took.
 fn factor_beyond_disturbances(views: &[View<'_>], frame: &Frame) -> (Mat<f64>, usize) {
     let (blocks, width) = (frame.blocks(), frame.places.len());
-    let mut whole = Triangle::new(width, width);
+    let mut whole = SequentialQr::new(width, width);
     let mut taken = 0;
     for view in views {
         let span = disturbance::span(gram::of_disturbance(*view, blocks).as_ref());
@@ -300,7 +300,7 @@ fn factor_beyond_disturbances(views: &[View<'_>], frame: &Frame) -> (Mat<f64>, u
 /// Accumulates R by QR, in lanes that are joined at the end.
 pub(super) struct QrLanes {
     width: usize,
-    lanes: Vec<Triangle>,
+    lanes: Vec<SequentialQr>,
 }
 
 impl QrLanes {
@@ -310,14 +310,14 @@ impl QrLanes {
 
     pub(super) fn add(&mut self, rows: &RowMap<'_>) {
         let lanes = rows.total.div_ceil(PIECE).min(LANES);
-        self.lanes.resize_with(lanes.max(self.lanes.len()), || Triangle::new(self.width, 1));
+        self.lanes.resize_with(lanes.max(self.lanes.len()), || SequentialQr::new(self.width, 1));
         self.lanes[..lanes].par_iter_mut().enumerate().for_each(|(lane, triangle)| {
             rows.fold(lane * rows.total / lanes..(lane + 1) * rows.total / lanes, triangle);
         });
     }
 
     pub(super) fn whole(&self) -> Mat<f64> {
-        let mut whole = Triangle::new(self.width, self.width);
+        let mut whole = SequentialQr::new(self.width, self.width);
         self.lanes.iter().for_each(|lane| whole.fold_rows(lane.r()));
         whole.r().to_owned()
     }
@@ -346,7 +346,7 @@ impl<'a> RowMap<'a> {
     }
 
     /// Folds a range of rows into a factor, which has room for them only meanwhile.
-    fn fold(&self, range: Range<usize>, triangle: &mut Triangle) {
+    fn fold(&self, range: Range<usize>, triangle: &mut SequentialQr) {
         let pieces = range.len().div_ceil(PIECE);
         let cut = |k: usize| range.start + k * range.len() / pieces;
         triangle.make_room(range.len().div_ceil(pieces));
@@ -407,11 +407,11 @@ mod tests {
         vec![experiment(9000, 1), experiment(700, 2)]
     }
 
-    fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<DataTriangle> {
+    fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<HankelLq> {
         let records = experiments(noise);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
         let data = Channels::new(&experiments, &[], &SubspaceOptions { horizon, ..Default::default() })?;
-        DataTriangle::new(&data, (horizon, horizon), Arrangement::InputsFirst, by)
+        HankelLq::new(&data, (horizon, horizon), HankelLayout::InputsFirst, by)
     }
 
     /// Rows of R with a positive diagonal.
@@ -450,10 +450,10 @@ mod tests {
         let records = experiments(0.3);
         let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
         let data = Channels::new(&experiments, &[], &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
-        let whole = DataTriangle::new(&data, (9, 9), Arrangement::InputsFirst, Factorisation::Qr).unwrap();
-        let r = whole.arranged(Arrangement::Chronological, 4, 3).unwrap();
+        let whole = HankelLq::new(&data, (9, 9), HankelLayout::InputsFirst, Factorisation::Qr).unwrap();
+        let r = whole.arranged(HankelLayout::Chronological, 4, 3).unwrap();
         // The Gram matrix of the same rows over the same columns.
-        let places = Arrangement::Chronological.places(2, 1, 4, 3);
+        let places = HankelLayout::Chronological.places(2, 1, 4, 3);
         let shifted: Vec<usize> = places.iter().map(|place| place + 5 * 3).collect();
         let scaled = data.scaled();
         let rows = RowMap::new(scaled.iter().map(Signals::view).collect(), 18, &shifted);
@@ -462,6 +462,6 @@ mod tests {
         let gram = hankel.transpose() * &hankel;
         let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
         assert!(error < 1e-13, "{error:.1e}");
-        assert!(whole.arranged(Arrangement::Chronological, 10, 3).is_err());
+        assert!(whole.arranged(HankelLayout::Chronological, 10, 3).is_err());
     }
 }

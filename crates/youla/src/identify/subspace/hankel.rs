@@ -1,7 +1,7 @@
 //! `[U_f; U_p; Y_p; Y_f]' = Q R` for the open-loop methods.
 
 use super::DataFactor;
-use super::factorisation::{Arrangement, DataTriangle};
+use super::factorisation::{HankelLayout, HankelLq};
 use crate::linalg::{leading_rank, triangular_condition};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -28,9 +28,9 @@ pub(super) struct HankelFactor {
 }
 
 impl HankelFactor {
-    pub(super) fn new(data: &DataTriangle, past: usize, horizon: usize) -> Result<Self> {
+    pub(super) fn new(data: &HankelLq, past: usize, horizon: usize) -> Result<Self> {
         let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
-        let r = data.arranged(Arrangement::InputsFirst, past, horizon)?;
+        let r = data.arranged(HankelLayout::InputsFirst, past, horizon)?;
         let all_inputs = (past + horizon) * inputs;
         let before_future = all_inputs + past * outputs;
         let rank = |columns| leading_rank(r.as_ref(), columns);

@@ -10,7 +10,7 @@
 //! that it is at least as long as the past and holds the largest order n asked for.
 
 use super::channels::Channels;
-use super::factorisation::{Arrangement, DataTriangle};
+use super::factorisation::{HankelLayout, HankelLq};
 use super::{Feedthrough, Order, SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::Result;
 use crate::linalg::leading_rank;
@@ -49,8 +49,8 @@ pub(super) fn find(
     options: &SubspaceOptions,
 ) -> Result<HorizonReport> {
     let feedthrough = options.feedthrough != Feedthrough::None;
-    let arrangement = Arrangement::NewestFirst { feedthrough };
-    let triangle = DataTriangle::new(data, (automatic.max, 1), arrangement, options.factorisation)?;
+    let arrangement = HankelLayout::NewestFirst { feedthrough };
+    let triangle = HankelLq::new(data, (automatic.max, 1), arrangement, options.factorisation)?;
     let r = triangle.arranged(arrangement, automatic.max, 1)?;
     let (m, l) = (data.inputs, data.outputs);
     let before = if feedthrough { m } else { 0 };
@@ -99,7 +99,7 @@ impl SubspaceData<'_> {
     ///
     /// # Errors
     /// Those that concern all models: [`crate::Error::OutOfRange`] for a horizon or past longer than those of the factor,
-    /// [`crate::Error::Refactor`], [`crate::Error::NotExciting`]. What concerns one model stands in its place.
+    /// [`crate::Error::FactorOptionsChanged`], [`crate::Error::NotExciting`]. What concerns one model stands in its place.
     ///
     /// ```
     /// use youla::{Mat, lti::Discrete};

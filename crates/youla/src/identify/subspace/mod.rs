@@ -52,7 +52,7 @@ pub use innovation::{Innovation, NoInnovation};
 pub use memory::ExperimentStream;
 pub use options::{
     AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
-    SubspaceOptions, Weight,
+    SubspaceMethod, SubspaceOptions,
 };
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
@@ -67,7 +67,7 @@ pub use uncertainty::{
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use channels::{Channels, check_blocks};
-use factorisation::{Arrangement, DataTriangle};
+use factorisation::{HankelLayout, HankelLq};
 use faer::{Mat, MatRef, c64};
 use output_error::{Base, Condense, Fitted};
 use projected::{Estimate, Projected};
@@ -202,7 +202,7 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// ```
 pub struct SubspaceData<'a> {
     channels: Channels<'a>,
-    triangle: DataTriangle,
+    triangle: HankelLq,
     time: Discrete,
     /// With the horizons that were found, where that was asked for.
     factored: SubspaceOptions,
@@ -241,12 +241,12 @@ impl<'a> SubspaceData<'a> {
         options: &SubspaceOptions,
     ) -> Result<Self> {
         let channels = Channels::new(experiments, disturbances, options)?;
-        let arrangement = Arrangement::of(options);
+        let arrangement = HankelLayout::of(options);
         let automatic =
             options.automatic_horizon.map(|choice| horizons::find(&channels, choice, options)).transpose()?;
         let blocks = automatic.as_ref().map_or((options.past(), options.horizon), |found| (found.past, found.horizon));
         channels.check_lengths(blocks)?;
-        let triangle = DataTriangle::new(&channels, blocks, arrangement, options.factorisation)?;
+        let triangle = HankelLq::new(&channels, blocks, arrangement, options.factorisation)?;
         let factored = SubspaceOptions { past: Some(blocks.0), horizon: blocks.1, ..options.clone() };
         Ok(SubspaceData { channels, triangle, time, factored, automatic_horizon: automatic })
     }
@@ -256,7 +256,7 @@ impl<'a> SubspaceData<'a> {
         let channels = self.channels.with_outputs(outputs);
         let options = &self.factored;
         let blocks = (options.past(), options.horizon);
-        let triangle = DataTriangle::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
+        let triangle = HankelLq::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
         Ok(SubspaceData { channels, triangle, time: self.time, factored: options.clone(), automatic_horizon: None })
     }
 
@@ -264,7 +264,7 @@ impl<'a> SubspaceData<'a> {
     /// past at most those of the factor; scaling, factorisation and delays are part of the factor.
     ///
     /// # Errors
-    /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Refactor`] for another
+    /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::FactorOptionsChanged`] for another
     /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
         let options = self.checked(options)?;
@@ -278,7 +278,7 @@ impl<'a> SubspaceData<'a> {
         if (options.scaling, options.factorisation, &options.delays) != (held.scaling, held.factorisation, &held.delays)
             || automatic && options.automatic_horizon != held.automatic_horizon
         {
-            return Err(Error::Refactor);
+            return Err(Error::FactorOptionsChanged);
         }
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;

@@ -10,7 +10,7 @@
 
 use super::disturbance::KnownColumns;
 use super::sensitivity::{Predictor, Unknowns};
-use crate::linalg::Triangle;
+use crate::linalg::SequentialQr;
 use crate::{Mat, MatRef, c64};
 use faer::prelude::*;
 use faer::{MatMut, RowRef};
@@ -118,7 +118,7 @@ impl Modes {
             rows.col_mut(of_d + j).copy_from(shared.col(groups * n + q));
         }
         rows.col_mut(width - 1).copy_from(shared.col(of_targets + i));
-        let mut triangle = Triangle::new(width, shared.nrows());
+        let mut triangle = SequentialQr::new(width, shared.nrows());
         triangle.fold_rows(rows.as_ref());
         triangle.r().to_owned()
     }
@@ -145,7 +145,7 @@ fn rows_of(gamma: RowRef<'_, c64>, inverse: MatRef<'_, c64>, lambda: &[c64], cho
 /// The triangular factor over `[z of x0 | z of every input | beside]` by QR of its rows, which lanes of samples take in.
 pub(super) struct Rows {
     state: State,
-    triangle: Triangle,
+    triangle: SequentialQr,
 }
 
 impl Rows {
@@ -153,7 +153,7 @@ impl Rows {
     pub(super) fn new(modes: &Modes, unknowns: &Unknowns, beside: usize) -> Self {
         let groups = unknowns.inputs + usize::from(unknowns.initial > 0);
         let width = groups * modes.width() + beside;
-        Rows { state: State::new(&modes.lambda, unknowns), triangle: Triangle::new(width, width) }
+        Rows { state: State::new(&modes.lambda, unknowns), triangle: SequentialQr::new(width, width) }
     }
 
     /// Takes in the next samples.
@@ -179,7 +179,7 @@ impl Rows {
             .into_par_iter()
             .enumerate()
             .map(|(lane, mut state)| {
-                let mut triangle = Triangle::new(width, PIECE);
+                let mut triangle = SequentialQr::new(width, PIECE);
                 for start in (starts[lane]..starts[lane + 1]).step_by(PIECE) {
                     let count = PIECE.min(starts[lane + 1] - start);
                     triangle.fold(count, |piece| state.fill(u, beside, start, piece));
@@ -315,7 +315,7 @@ mod tests {
             let by_modes = modes.by_outputs(rows.factor(), &known.columns, &unknowns, &[1.0; 5]);
             for (i, modal) in by_modes.iter().enumerate() {
                 let target: Vec<f64> = y.col(i).iter().copied().collect();
-                let mut triangle = Triangle::new(unknowns.width_of_output(i), 2500);
+                let mut triangle = SequentialQr::new(unknowns.width_of_output(i), 2500);
                 let mut direct = Sensitivity::new(&predictor, i, &unknowns);
                 let known = known.columns.of_output(known.signals.as_ref(), i);
                 triangle.fold(2500, |piece| direct.fill(u.as_ref(), known.as_ref(), &target, piece));

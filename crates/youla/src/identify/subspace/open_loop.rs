@@ -1,12 +1,12 @@
 //! MOESP, N4SID and CVA: A and C from the projection of the future outputs along the past, beyond the future inputs.
 
-use super::factorisation::DataTriangle;
+use super::factorisation::HankelLq;
 use super::hankel::HankelFactor;
 use super::innovation::{self, Innovation};
 use super::order::Evidence;
 use super::projection::{Projection, canonical_correlations, project};
 use super::realisation::{OutputPair, StateSequences, realise};
-use super::{SubspaceOptions, Weight};
+use super::{SubspaceMethod, SubspaceOptions};
 use crate::{Error, Result};
 use faer::MatRef;
 
@@ -15,16 +15,16 @@ pub(super) struct OpenLoop {
     pub(super) factor: HankelFactor,
     pub(super) projection: Projection,
     pub(super) excitation_rcond: f64,
-    weight: Weight,
+    method: SubspaceMethod,
 }
 
 impl OpenLoop {
-    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+    pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
         let factor = HankelFactor::new(data, options.past(), options.horizon)?;
         let (excitation_rcond, projection) =
-            rayon::join(|| factor.require_excitation(), || project(&factor, options.weight));
+            rayon::join(|| factor.require_excitation(), || project(&factor, options.method));
         let (excitation_rcond, projection) = (excitation_rcond?, projection?);
-        Ok(OpenLoop { factor, projection, excitation_rcond, weight: options.weight })
+        Ok(OpenLoop { factor, projection, excitation_rcond, method: options.method })
     }
 
     pub(super) fn evidence(&self) -> Result<Evidence<'_>> {
@@ -41,7 +41,7 @@ impl OpenLoop {
 
     /// A and C.
     pub(super) fn realise(&self, order: usize) -> Result<OutputPair> {
-        realise(self.weight, &self.factor, self.observability(order)?)
+        realise(self.method, &self.factor, self.observability(order)?)
     }
 
     /// From the residuals of the state and output equations with given A and C.

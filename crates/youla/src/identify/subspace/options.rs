@@ -7,15 +7,15 @@ use serde::{Deserialize, Serialize};
 /// Choices of [`super::subspace`].
 ///
 /// ```
-/// use youla::identify::subspace::{Order, SubspaceOptions, Weight};
-/// let options = SubspaceOptions { weight: Weight::Cva, order: Order::Fixed(8), ..Default::default() };
+/// use youla::identify::subspace::{Order, SubspaceOptions, SubspaceMethod};
+/// let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(8), ..Default::default() };
 /// assert_eq!(options.horizon, 20);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct SubspaceOptions {
-    /// Weight of the singular value decomposition, and with it the name of the method.
-    pub weight: Weight,
+    /// SubspaceMethod of the singular value decomposition, and with it the name of the method.
+    pub method: SubspaceMethod,
     /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the
     /// slowest mode.
     pub horizon: usize,
@@ -51,7 +51,7 @@ pub struct SubspaceOptions {
 impl Default for SubspaceOptions {
     fn default() -> Self {
         SubspaceOptions {
-            weight: Weight::default(),
+            method: SubspaceMethod::default(),
             horizon: 20,
             past: None,
             automatic_horizon: None,
@@ -84,14 +84,14 @@ impl SubspaceOptions {
 
 /// The method: weight `W1 O W2` of the projection O of the future outputs along the past, and the way to A and C.
 ///
-/// [`Moesp`](Weight::Moesp), [`N4sid`](Weight::N4sid) and [`Cva`](Weight::Cva) are for inputs that do not depend on the
+/// [`Moesp`](SubspaceMethod::Moesp), [`N4sid`](SubspaceMethod::N4sid) and [`Cva`](SubspaceMethod::Cva) are for inputs that do not depend on the
 /// noise. The others stay consistent when u contains fed-back noise, and need no knowledge of the controller: they regress
 /// on the past inputs and outputs of the one-step predictor, take A, C and K from the states, and B and D from the
 /// one-step predictions. They need a plant without D or a controller without direct path, and a past p with `(A - K C)^p`
 /// small; their parameters are many, so that for open-loop data the first three have less variance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Weight {
+pub enum SubspaceMethod {
     /// PO-MOESP: `W1 = I`, `W2` the projection onto the complement of the future inputs; A from the shift of the
     /// observability matrix.
     #[default]
@@ -112,10 +112,10 @@ pub enum Weight {
     ParsimS,
 }
 
-impl Weight {
+impl SubspaceMethod {
     /// Whether the method stays consistent when the inputs contain fed-back noise.
     pub fn is_for_closed_loops(self) -> bool {
-        matches!(self, Weight::PbsidOpt | Weight::Ssarx | Weight::ParsimS)
+        matches!(self, SubspaceMethod::PbsidOpt | SubspaceMethod::Ssarx | SubspaceMethod::ParsimS)
     }
 }
 

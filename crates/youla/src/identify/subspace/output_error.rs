@@ -13,7 +13,7 @@ use super::sensitivity::{Predictor, Unknowns, simulate};
 use super::stability::StabilityReport;
 use super::{InitialState, SubspaceOptions};
 use crate::Result;
-use crate::linalg::{Triangle, block, leading_rank, least_squares};
+use crate::linalg::{SequentialQr, block, leading_rank, least_squares};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -96,7 +96,7 @@ fn solve(
     let factors = condense(&predictor, unknowns)?;
     let parts: Vec<Part> = factors.iter().map(|f| join(f, unknowns)).collect();
     let count = unknowns.common();
-    let mut whole = Triangle::new(count + 1, count + 1);
+    let mut whole = SequentialQr::new(count + 1, count + 1);
     parts.iter().for_each(|part| whole.fold_rows(part.common()));
     let r = whole.r();
     let solution = least_squares("the regressors of B and D", r.subcols(0, count), r.subcols(count, 1))?;
@@ -119,7 +119,7 @@ fn solve(
 }
 
 fn is_simulated(stability: &StabilityReport, options: &SubspaceOptions) -> bool {
-    stability.stable && !options.weight.is_for_closed_loops()
+    stability.stable && !options.method.is_for_closed_loops()
 }
 
 fn unknowns(data: &Channels<'_>, pair: &OutputPair, options: &SubspaceOptions) -> Unknowns {
@@ -215,7 +215,7 @@ pub(super) struct Part {
 /// Puts the outputs of one experiment below each other, each with its own row of D.
 pub(super) fn join(outputs: &Factors, unknowns: &Unknowns) -> Part {
     let shared = unknowns.own() + unknowns.of_b();
-    let mut whole = Triangle::new(unknowns.width(), shared + unknowns.inputs + 1);
+    let mut whole = SequentialQr::new(unknowns.width(), shared + unknowns.inputs + 1);
     for (i, r) in outputs.iter().enumerate() {
         let (of_d, above) = (unknowns.direct[i].len(), unknowns.of_d_above(i));
         whole.fold(r.nrows(), |mut rows| {

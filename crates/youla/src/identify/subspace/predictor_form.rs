@@ -7,12 +7,12 @@
 //! u(k) does not bias it. K comes from the covariance of `[K e + rest; e]` by a Riccati equation: this is the K of the
 //! regression where A - K C is stable and the rest is small, and gives a stable predictor always.
 
-use super::factorisation::DataTriangle;
+use super::factorisation::HankelLq;
 use super::innovation::{self, Innovation};
 use super::order::Evidence;
 use super::realisation::OutputPair;
 use super::varx::{StateMap, Varx};
-use super::{SubspaceOptions, Weight, parsim, pbsid, ssarx};
+use super::{SubspaceMethod, SubspaceOptions, parsim, pbsid, ssarx};
 use crate::linalg::{block, regress};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -26,14 +26,14 @@ pub(super) struct PredictorForm {
 }
 
 impl PredictorForm {
-    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+    pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
         let varx = Varx::new(data, options)?;
         let excitation_rcond = varx.require_excitation()?;
         let canonical = ssarx::states(&varx)?;
         let canonical_correlations = canonical.singular_values.clone();
-        let map = match options.weight {
-            Weight::PbsidOpt => pbsid::states(&varx)?,
-            Weight::ParsimS => parsim::states(&varx)?,
+        let map = match options.method {
+            SubspaceMethod::PbsidOpt => pbsid::states(&varx)?,
+            SubspaceMethod::ParsimS => parsim::states(&varx)?,
             _ => canonical,
         };
         Ok(PredictorForm { varx, map, excitation_rcond, canonical_correlations })

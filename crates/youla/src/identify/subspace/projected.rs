@@ -1,6 +1,6 @@
 //! What all orders of one method share: the projection with its singular values, from which a model of any order follows.
 
-use super::factorisation::DataTriangle;
+use super::factorisation::HankelLq;
 use super::innovation::Innovation;
 use super::open_loop::OpenLoop;
 use super::order::Evidence;
@@ -28,8 +28,8 @@ pub(super) struct Estimate {
 
 impl Projected {
     /// The projection by the method, horizon and past of `options`.
-    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
-        Ok(match options.weight.is_for_closed_loops() {
+    pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
+        Ok(match options.method.is_for_closed_loops() {
             true => Projected::Predictor(PredictorForm::new(data, options)?),
             false => Projected::OpenLoop(OpenLoop::new(data, options)?),
         })

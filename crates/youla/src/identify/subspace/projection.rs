@@ -1,6 +1,6 @@
 //! The weighted projection of the future outputs along the past, its singular values and the observability matrix.
 
-use super::Weight;
+use super::SubspaceMethod;
 use super::hankel::{FAR_FROM_DEPENDENT, HankelFactor};
 use crate::linalg::triangular_condition;
 use crate::{Error, Result};
@@ -31,9 +31,9 @@ impl Projection {
 }
 
 /// Singular values and observability matrix for a weight.
-pub(super) fn project(factor: &HankelFactor, weight: Weight) -> Result<Projection> {
-    match weight {
-        Weight::Cva => canonical(factor),
+pub(super) fn project(factor: &HankelFactor, method: SubspaceMethod) -> Result<Projection> {
+    match method {
+        SubspaceMethod::Cva => canonical(factor),
         _ => unweighted(factor),
     }
 }

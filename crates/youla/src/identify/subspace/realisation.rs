@@ -2,7 +2,7 @@
 //!
 //! All sequences are held in the coordinates of the triangular factor: a row per direction instead of one per sample.
 
-use super::Weight;
+use super::SubspaceMethod;
 use super::hankel::HankelFactor;
 use crate::Result;
 use crate::linalg::{block, regress};
@@ -60,9 +60,9 @@ impl<'a> StateSequences<'a> {
 }
 
 /// A and C in the way of the weight.
-pub(super) fn realise(weight: Weight, factor: &HankelFactor, gamma: MatRef<'_, f64>) -> Result<OutputPair> {
-    match weight {
-        Weight::N4sid => regression(&StateSequences::new(factor, gamma)?),
+pub(super) fn realise(method: SubspaceMethod, factor: &HankelFactor, gamma: MatRef<'_, f64>) -> Result<OutputPair> {
+    match method {
+        SubspaceMethod::N4sid => regression(&StateSequences::new(factor, gamma)?),
         _ => shift(gamma, factor.outputs),
     }
 }

@@ -8,7 +8,7 @@ use super::batch::{Batch, Pass, Segment, each_batch};
 use super::channels::{Channels, check_blocks, check_length, check_ports};
 use super::condense::{Condenser, Factors, Regression, Way};
 use super::disturbance::KnownColumns;
-use super::factorisation::{Arrangement, Choice, DataTriangle, Frame, QrLanes, RowMap, choose};
+use super::factorisation::{Choice, Frame, HankelLayout, HankelLq, QrLanes, RowMap, choose};
 use super::gram::{Gram, from_lags, interleaved, lag_sums};
 use super::order;
 use super::sensitivity::{Predictor, Unknowns};
@@ -73,12 +73,12 @@ fn require_passes(options: &SubspaceOptions) -> Result<()> {
 pub(super) fn factor(
     stream: &mut dyn SampleStream,
     options: &SubspaceOptions,
-) -> Result<(DataTriangle, Channels<'static>, Vec<usize>)> {
+) -> Result<(HankelLq, Channels<'static>, Vec<usize>)> {
     check_blocks(options)?;
     let ports = (stream.inputs(), stream.outputs());
     check_ports(ports.0, ports.1)?;
     let blocks = (options.past(), options.horizon);
-    let frame = Frame::new(ports, blocks, Arrangement::of(options));
+    let frame = Frame::new(ports, blocks, HankelLayout::of(options));
     let pass = |lengths| Pass { overlap: frame.blocks() - 1, lengths };
     let mut statistics = Statistics::new(ports.0);
     let mut sums = LagSums::new(ports.0 + ports.1, frame.blocks());

@@ -10,7 +10,7 @@
 //! regressed on the past needs the leading part of it, and a state `x(k) = T [z(k-p); ...; z(k-1)]` is known one sample
 //! later from the columns one block further on.
 
-use super::factorisation::{Arrangement, DataTriangle};
+use super::factorisation::{HankelLayout, HankelLq};
 use super::hankel::require_excitation;
 use super::{DataFactor, Factorisation, SubspaceOptions};
 use crate::linalg::{leading_rank, least_squares};
@@ -54,10 +54,10 @@ pub(super) struct StateMap {
 }
 
 impl Varx {
-    pub(super) fn new(data: &DataTriangle, options: &SubspaceOptions) -> Result<Self> {
+    pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
         let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
         let (past, horizon) = (options.past(), options.horizon);
-        let r = data.arranged(Arrangement::Chronological, past, horizon)?;
+        let r = data.arranged(HankelLayout::Chronological, past, horizon)?;
         let direct = options.feedthrough.inputs_of_outputs(inputs, outputs);
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));
         let mut varx = Varx { r, inputs, outputs, past, horizon, columns, direct, report, xi, d };

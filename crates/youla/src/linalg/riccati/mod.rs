@@ -17,13 +17,13 @@ mod hamiltonian;
 mod modes;
 mod newton;
 mod normal_form;
-mod reach;
+mod weakly_controllable;
 
 use super::{check_finite, check_shape};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use normal_form::{NormalForm, check_symmetric};
-use reach::WithinReach;
+use weakly_controllable::WithinReach;
 
 /// Relative residual beyond which a computed solution is refused.
 const ACCEPTED_RESIDUAL: f64 = 1e-8;
@@ -35,10 +35,10 @@ const LARGE: usize = 32;
 const GOOD_RESIDUAL: f64 = 1e-12;
 
 /// Bound on the rounding of the closed loop, relative to its largest pole, up to which the gain is taken from other coordinates.
-const BORNE: f64 = 0.3;
+const LARGEST_ROUNDING: f64 = 0.3;
 
 /// Bound beyond which nothing is: both are far above what rounding does, since norms know nothing of cancellation.
-const HIDDEN: f64 = 10.0;
+const WEAKLY_CONTROLLABLE: f64 = 10.0;
 
 /// Data of a Riccati equation: n states, m inputs.
 #[derive(Debug, Clone, Copy)]
@@ -47,9 +47,9 @@ pub struct RiccatiProblem<'a> {
     pub a: MatRef<'a, f64>,
     /// Input matrix B, n x m.
     pub b: MatRef<'a, f64>,
-    /// Weight of the states, n x n, symmetric.
+    /// SubspaceMethod of the states, n x n, symmetric.
     pub q: MatRef<'a, f64>,
-    /// Weight of the inputs, m x m, symmetric and positive definite.
+    /// SubspaceMethod of the inputs, m x m, symmetric and positive definite.
     pub r: MatRef<'a, f64>,
     /// Cross term S of the weight `[Q S; S' R]`, n x m; none means zero.
     pub s: Option<MatRef<'a, f64>>,
@@ -229,10 +229,10 @@ fn within_reach(what: &str, normal: &NormalForm) -> Result<Option<Stabilised>> {
     let (x, gain) = (problem.solution(&found.x), problem.gain(&found.gain, normal));
     let largest = found.closed_loop_poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
     let rounding = problem.rounding(&gain, normal) / largest;
-    if rounding > HIDDEN || rounding.is_nan() {
+    if rounding > WEAKLY_CONTROLLABLE || rounding.is_nan() {
         return Ok(None);
     }
-    if rounding > BORNE {
+    if rounding > LARGEST_ROUNDING {
         return finished(what, normal, x).map(Some);
     }
     let closed_loop = &normal.a - &normal.b * &gain;

@@ -5,7 +5,7 @@
 //! join brings a third cluster nearer than the nearer of the two was, so following nearest neighbours finds the same joins
 //! in any order, in a time of the square of the number of poles (Murtagh, The Computer Journal 26, 354, 1983).
 
-use super::{DiagramPole, Linkage, StabilisationOptions, Standing, modal_assurance};
+use super::{DiagramPole, Linkage, PoleStability, StabilisationOptions, modal_assurance};
 use crate::linalg::quantile;
 use crate::lti::{Discrete, TimeDomain};
 use crate::{Mat, c64};
@@ -154,7 +154,7 @@ fn summary(poles: &[DiagramPole], members: &[usize], shape: Vec<c64>) -> ModeClu
         hz_deviation: deviation(|p| p.hz_deviation),
         zeta_deviation: deviation(|p| p.zeta_deviation),
         orders: count(&|_| true),
-        settled: count(&|p| p.standing == Standing::Settled),
+        settled: count(&|p| p.standing == PoleStability::Stable),
         shape,
     }
 }

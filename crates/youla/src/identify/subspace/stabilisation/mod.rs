@@ -69,13 +69,13 @@ pub enum Linkage {
 /// What the next lower order says of a pole.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Standing {
+pub enum PoleStability {
     /// There is none of this frequency.
     New,
     /// There is one of this frequency, with another damping ratio or mode shape.
     Frequency,
     /// There is one of this frequency, damping ratio and mode shape.
-    Settled,
+    Stable,
 }
 
 /// One real pole or one conjugate pair of the model of one order.
@@ -96,7 +96,7 @@ pub struct DiagramPole {
     /// C v, one number per output, the largest of them 1.
     pub shape: Vec<c64>,
     /// What the next lower order says.
-    pub standing: Standing,
+    pub standing: PoleStability,
     /// The cluster of the diagram to which it belongs, by its place.
     pub cluster: Option<usize>,
 }
@@ -231,7 +231,7 @@ fn poles(data: &SubspaceData<'_>, projected: &Projected, order: usize) -> Result
                 hz_deviation: None,
                 zeta_deviation: None,
                 shape: shape(&pair.c, eigen.U(), j, data.channels.y_scale()),
-                standing: Standing::New,
+                standing: PoleStability::New,
                 cluster: None,
             }
         })
@@ -248,15 +248,15 @@ fn shape(c: &Mat<f64>, v: MatRef<'_, c64>, j: usize, y_scale: &[f64]) -> Vec<c64
     if largest.norm() > 0.0 { all.iter().map(|x| x / largest).collect() } else { all }
 }
 
-fn standing(pole: &DiagramPole, lower: &[DiagramPole], options: &StabilisationOptions) -> Standing {
+fn standing(pole: &DiagramPole, lower: &[DiagramPole], options: &StabilisationOptions) -> PoleStability {
     let near = |l: &&DiagramPole| (pole.hz - l.hz).abs() <= options.frequency * l.hz;
     let settled = |l: &DiagramPole| {
         (pole.zeta - l.zeta).abs() <= options.damping * l.zeta.abs()
             && modal_assurance(&pole.shape, &l.shape) >= options.mac
     };
     match lower.iter().any(|l| near(&l)) {
-        false => Standing::New,
-        true if lower.iter().filter(near).any(settled) => Standing::Settled,
-        true => Standing::Frequency,
+        false => PoleStability::New,
+        true if lower.iter().filter(near).any(settled) => PoleStability::Stable,
+        true => PoleStability::Frequency,
     }
 }

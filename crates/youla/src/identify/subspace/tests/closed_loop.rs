@@ -2,7 +2,7 @@
 
 use super::*;
 
-const METHODS: [Weight; 3] = [Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const METHODS: [SubspaceMethod; 3] = [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS];
 
 /// Inputs and outputs of a loop `u = r + g v, v(k) = 0.6 v(k-1) + y(k - delay)` around a system without direct path, with
 /// innovations e.
@@ -41,15 +41,15 @@ fn noisy_loop(samples: usize, delay: usize) -> (StateSpace<Discrete>, Mat<f64>, 
 
 #[test]
 fn noise_free_systems_are_recovered() {
-    for (case, weight) in METHODS.into_iter().enumerate() {
+    for (case, method) in METHODS.into_iter().enumerate() {
         for (m, p, magnitudes) in [(1, 1, &[0.9, 0.7][..]), (2, 3, &[0.98, 0.8, 0.95]), (3, 2, &[0.995, 0.6])] {
             let system = random_system(magnitudes, m, p, true, 10 + case as u64);
             let u = uniform(1500, m, &mut ChaCha8Rng::seed_from_u64(20 + case as u64));
             let y = respond(&system, &u, 0.7, None);
-            let options = SubspaceOptions { weight, past: Some(9), ..fixed(2 * magnitudes.len(), 6) };
+            let options = SubspaceOptions { method, past: Some(9), ..fixed(2 * magnitudes.len(), 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             let error = distance(&found.model, &system);
-            assert!(error < 1e-8, "{weight:?}, {m} x {p}: {error:e}");
+            assert!(error < 1e-8, "{method:?}, {m} x {p}: {error:e}");
             assert!(matches!(found.innovation, Innovation::None { reason: NoInnovation::NoiseFree }));
             assert_eq!((found.past, found.horizon, found.columns), (9, 6, 1500 - 14));
         }
@@ -68,11 +68,11 @@ fn unstable_system_and_several_experiments_without_noise() {
         })
         .collect();
     let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-    for weight in METHODS {
-        let options = SubspaceOptions { weight, stability: Stability::Allow, ..fixed(4, 6) };
+    for method in METHODS {
+        let options = SubspaceOptions { method, stability: Stability::Allow, ..fixed(4, 6) };
         let found = subspace(&experiments, clock(), &options).unwrap();
-        assert!((found.stability.worst.norm() - 1.02).abs() < 1e-7, "{weight:?}: {}", found.stability.worst.norm());
-        assert!(distance(&found.model, &system) < 1e-6, "{weight:?}: {:e}", distance(&found.model, &system));
+        assert!((found.stability.worst.norm() - 1.02).abs() < 1e-7, "{method:?}: {}", found.stability.worst.norm());
+        assert!(distance(&found.model, &system) < 1e-6, "{method:?}: {:e}", distance(&found.model, &system));
         let refused = subspace(&experiments, clock(), &SubspaceOptions { stability: Stability::Require, ..options });
         assert!(matches!(refused, Err(crate::Error::Unstable { .. })));
     }
@@ -84,20 +84,20 @@ fn unstable_system_and_several_experiments_without_noise() {
 fn feedback_does_not_bias() {
     let (plant, gain, u, y) = noisy_loop(40_000, 1);
     let options =
-        |weight| SubspaceOptions { weight, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
-    for weight in METHODS {
-        let found = subspace(&one(&u, &y), clock(), &options(weight)).unwrap();
+        |method| SubspaceOptions { method, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
+    for method in METHODS {
+        let found = subspace(&one(&u, &y), clock(), &options(method)).unwrap();
         let error = distance(&found.model, &plant);
-        assert!(error < 0.03, "{weight:?}: {error}");
+        assert!(error < 0.03, "{method:?}: {error}");
         assert_eq!(found.fit.by, InputFit::Prediction);
         let markov = (found.model.c() * found.innovation.gain().unwrap())[(0, 0)] - (plant.c() * &gain)[(0, 0)];
-        assert!(markov.abs() < 0.03, "{weight:?}: {markov}");
+        assert!(markov.abs() < 0.03, "{method:?}: {markov}");
         let variance = found.innovation.covariance().unwrap()[(0, 0)];
-        assert!((variance / (4.0 / 3.0) - 1.0).abs() < 0.03, "{weight:?}: {variance}");
+        assert!((variance / (4.0 / 3.0) - 1.0).abs() < 0.03, "{method:?}: {variance}");
     }
-    for weight in [Weight::Moesp, Weight::N4sid, Weight::Cva] {
-        let found = subspace(&one(&u, &y), clock(), &options(weight)).unwrap();
-        assert!(distance(&found.model, &plant) > 0.6, "{weight:?}: {}", distance(&found.model, &plant));
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva] {
+        let found = subspace(&one(&u, &y), clock(), &options(method)).unwrap();
+        assert!(distance(&found.model, &plant) > 0.6, "{method:?}: {}", distance(&found.model, &plant));
     }
 }
 
@@ -106,9 +106,9 @@ fn feedback_does_not_bias() {
 #[test]
 fn parsim_needs_a_controller_that_delays() {
     let (plant, _, u, y) = noisy_loop(40_000, 0);
-    let error = |weight| {
+    let error = |method| {
         let options =
-            SubspaceOptions { weight, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
+            SubspaceOptions { method, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
         distance(&subspace(&one(&u, &y), clock(), &options).unwrap().model, &plant)
     };
     let errors = METHODS.map(error);
@@ -118,9 +118,9 @@ fn parsim_needs_a_controller_that_delays() {
 #[test]
 fn automatic_order_is_the_true_one_in_closed_loop() {
     let (plant, _, u, y) = noisy_loop(5000, 1);
-    for weight in METHODS {
+    for method in METHODS {
         let options = SubspaceOptions {
-            weight,
+            method,
             horizon: 10,
             past: Some(20),
             order: Order::Auto(AutoOrder::up_to(8)),
@@ -129,7 +129,7 @@ fn automatic_order_is_the_true_one_in_closed_loop() {
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!((found.order.order, found.order.rule), (2, Some(OrderRule::Svc)), "{:?}", found.order);
         let error = distance(&found.model, &plant);
-        assert!(error < if weight == Weight::ParsimS { 0.25 } else { 0.1 }, "{weight:?}: {error}");
+        assert!(error < if method == SubspaceMethod::ParsimS { 0.25 } else { 0.1 }, "{method:?}: {error}");
         assert_eq!(found.singular_values.len(), 10);
     }
 }
@@ -150,8 +150,8 @@ fn order_and_units_of_the_channels_do_not_matter() {
     let (swap, turn, units) = ([1, 0], [2, 0, 1], [1e-6, 40.0, 3e4]);
     let u2 = Mat::from_fn(u.nrows(), 2, |k, j| 1e3 * u[(k, swap[j])]);
     let y2 = Mat::from_fn(y.nrows(), 3, |k, j| units[j] * y[(k, turn[j])]);
-    for weight in METHODS {
-        let options = SubspaceOptions { weight, past: Some(15), ..fixed(4, 8) };
+    for method in METHODS {
+        let options = SubspaceOptions { method, past: Some(15), ..fixed(4, 8) };
         let run = |u, y| subspace(&one(u, y), clock(), &options).unwrap().model;
         let (plain, other) = (run(&u, &y), run(&u2, &y2));
         let b = Mat::from_fn(4, 2, |i, j| 1e3 * other.b()[(i, swap[j])]);
@@ -159,24 +159,24 @@ fn order_and_units_of_the_channels_do_not_matter() {
         let c = Mat::from_fn(3, 4, |i, j| other.c()[(row(i), j)] / units[row(i)]);
         let d = Mat::from_fn(3, 2, |i, j| 1e3 * other.d()[(row(i), swap[j])] / units[row(i)]);
         let back = StateSpace::new(other.a().to_owned(), b, c, d, clock()).unwrap();
-        assert!(distance(&back, &plain) < 1e-9, "{weight:?}: {:e}", distance(&back, &plain));
+        assert!(distance(&back, &plain) < 1e-9, "{method:?}: {:e}", distance(&back, &plain));
     }
 }
 
 #[test]
 fn factorisations_agree_and_threads_do_not_matter() {
     let (u, y) = noisy_record(17_000);
-    for weight in METHODS {
+    for method in METHODS {
         let run = |factorisation, threads| {
-            let options = SubspaceOptions { weight, past: Some(15), factorisation, ..fixed(4, 8) };
+            let options = SubspaceOptions { method, past: Some(15), factorisation, ..fixed(4, 8) };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let found = pool.install(|| subspace(&one(&u, &y), clock(), &options)).unwrap();
             (found.model, found.innovation.gain().unwrap().to_owned(), found.factor.by)
         };
         let (gram, qr) = (run(Factorisation::Auto, 1), run(Factorisation::Qr, 1));
         assert_eq!((gram.2, qr.2), (Factorisation::Gram, Factorisation::Qr));
-        assert!(distance(&gram.0, &qr.0) < 1e-9, "{weight:?}: {:e}", distance(&gram.0, &qr.0));
-        assert!(gram == run(Factorisation::Auto, 2) && qr == run(Factorisation::Qr, 2), "{weight:?}");
+        assert!(distance(&gram.0, &qr.0) < 1e-9, "{method:?}: {:e}", distance(&gram.0, &qr.0));
+        assert!(gram == run(Factorisation::Auto, 2) && qr == run(Factorisation::Qr, 2), "{method:?}");
     }
 }
 
@@ -187,8 +187,8 @@ fn unstable_poles_are_reflected_where_asked_for() {
     let rng = &mut ChaCha8Rng::seed_from_u64(24);
     let (u, e) = (uniform(600, 1, rng), 0.1 * uniform(600, 1, rng));
     let y = respond(&system, &u, 0.0, Some((&(0.1 * uniform(4, 1, rng)), &e)));
-    for weight in METHODS {
-        let options = SubspaceOptions { weight, stability: Stability::Constrain, ..fixed(4, 8) };
+    for method in METHODS {
+        let options = SubspaceOptions { method, stability: Stability::Constrain, ..fixed(4, 8) };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert!(found.stability.stable && found.stability.moved.len() == 2, "{:?}", found.stability);
         let predictor = found.model.a() - found.innovation.gain().unwrap() * found.model.c();
@@ -202,13 +202,13 @@ fn past_and_future_of_different_length_for_open_loops() {
     let system = random_system(&[0.95, 0.8], 2, 2, true, 33);
     let u = uniform(800, 2, &mut ChaCha8Rng::seed_from_u64(34));
     let y = respond(&system, &u, 0.5, None);
-    for weight in [Weight::Moesp, Weight::N4sid, Weight::Cva] {
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva] {
         for past in [3, 12] {
-            let options = SubspaceOptions { weight, past: Some(past), ..fixed(4, 6) };
+            let options = SubspaceOptions { method, past: Some(past), ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             assert!(
                 distance(&found.model, &system) < 1e-8,
-                "{weight:?}, {past}: {:e}",
+                "{method:?}, {past}: {:e}",
                 distance(&found.model, &system)
             );
             assert_eq!(found.columns, 801 - past - 6);

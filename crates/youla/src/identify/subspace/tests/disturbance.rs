@@ -3,8 +3,14 @@
 use super::*;
 use crate::lti::Discrete;
 
-const WEIGHTS: [Weight; 6] =
-    [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const WEIGHTS: [SubspaceMethod; 6] = [
+    SubspaceMethod::Moesp,
+    SubspaceMethod::N4sid,
+    SubspaceMethod::Cva,
+    SubspaceMethod::PbsidOpt,
+    SubspaceMethod::Ssarx,
+    SubspaceMethod::ParsimS,
+];
 
 /// Two experiments with lines of 0.031 and 0.062 per sample, each with amplitudes of its own; `noise` on the outputs.
 struct Disturbed {
@@ -52,14 +58,14 @@ fn changing(samples: usize) -> Mat<f64> {
 fn lines_are_taken_out_exactly() {
     let system = random_system(&[0.95, 0.8], 2, 2, true, 3);
     let data = Disturbed::new(&system, two_lines, 30.0, 0.0);
-    for weight in WEIGHTS {
-        let found = data.identify(&SubspaceOptions { weight, past: Some(8), ..fixed(4, 7) });
+    for method in WEIGHTS {
+        let found = data.identify(&SubspaceOptions { method, past: Some(8), ..fixed(4, 7) });
         let error = distance(&found.model, &system);
-        assert!(error < 1e-7, "{weight:?}: {error:.1e}");
+        assert!(error < 1e-7, "{method:?}: {error:.1e}");
         for (one, other) in found.disturbances.iter().zip(&data.coefficients) {
-            assert!((one - other).norm_max() < 1e-6, "{weight:?}: {:.1e}", (one - other).norm_max());
+            assert!((one - other).norm_max() < 1e-6, "{method:?}: {:.1e}", (one - other).norm_max());
         }
-        assert!(found.fit.percent.iter().all(|fit| *fit > 99.9999), "{weight:?}: {:?}", found.fit.percent);
+        assert!(found.fit.percent.iter().all(|fit| *fit > 99.9999), "{method:?}: {:?}", found.fit.percent);
         assert_eq!(found.columns, 1200 + 500 - 2 * 14 - 8);
     }
     // Without them four states go to the lines.
@@ -78,12 +84,12 @@ fn unstable_systems_have_their_lines_found_by_prediction() {
     let w = changing(400);
     let a = uniform(4, 2, &mut ChaCha8Rng::seed_from_u64(9));
     let y = respond(&system, &u, 0.1, None) + &w * &a;
-    for weight in [Weight::Moesp, Weight::PbsidOpt] {
-        let options = SubspaceOptions { weight, stability: Stability::Allow, past: Some(8), ..fixed(4, 7) };
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::PbsidOpt] {
+        let options = SubspaceOptions { method, stability: Stability::Allow, past: Some(8), ..fixed(4, 7) };
         let data = SubspaceData::disturbed(&one(&u, &y), &[w.as_ref()], clock(), &options).unwrap();
         let found = data.identify(&options).unwrap();
         assert_ne!(found.fit.by, InputFit::Simulation);
-        assert!(distance(&found.model, &system) < 1e-5, "{weight:?}: {:.1e}", distance(&found.model, &system));
+        assert!(distance(&found.model, &system) < 1e-5, "{method:?}: {:.1e}", distance(&found.model, &system));
         assert!((&found.disturbances[0] - &a).norm_max() < 1e-4);
     }
 }

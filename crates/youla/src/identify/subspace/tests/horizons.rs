@@ -81,7 +81,7 @@ fn an_autoregression_has_its_own_number_of_lags() {
 fn a_weakly_damped_plant_under_output_noise_needs_a_long_past() {
     for (noise, least) in [(0.1, 40), (1.0, 40)] {
         let (u, y, time) = bearing_record(20_000, noise, 5);
-        let options = SubspaceOptions { weight: Weight::Cva, ..automatic(120, 6) };
+        let options = SubspaceOptions { method: SubspaceMethod::Cva, ..automatic(120, 6) };
         let found = subspace(&one(&u, &y), time, &options).unwrap();
         assert!((least..=100).contains(&found.past) && found.horizon == found.past, "{} um: {}", noise, found.past);
         let modes: Vec<_> = found.model.modes().unwrap().into_iter().filter(|m| m.zeta < 0.5).collect();
@@ -101,7 +101,7 @@ fn what_cannot_be_chosen_is_refused() {
     assert!(matches!(run(&automatic(400, 2)), Some(Error::TooFewSamples { .. })));
     assert!(matches!(run(&automatic(20, 200)), Some(Error::TooFewSamples { .. })));
     let data = SubspaceData::new(&one(&u, &y), time, &automatic(10, 4)).unwrap();
-    assert!(matches!(data.identify(&automatic(11, 4)), Err(Error::Refactor)));
+    assert!(matches!(data.identify(&automatic(11, 4)), Err(Error::FactorOptionsChanged)));
     let table = "automatic_horizon = { max = 30 }";
     assert_eq!(toml::from_str::<SubspaceOptions>(table).unwrap().automatic_horizon, Some(AutomaticHorizon { max: 30 }));
 }
@@ -111,7 +111,7 @@ fn what_cannot_be_chosen_is_refused() {
 fn a_scan_gives_the_models_of_each_horizon() {
     let (u, y, time) = bearing_record(6000, 0.1, 3);
     let options =
-        SubspaceOptions { weight: Weight::Cva, horizon: 30, stability: Stability::Allow, ..Default::default() };
+        SubspaceOptions { method: SubspaceMethod::Cva, horizon: 30, stability: Stability::Allow, ..Default::default() };
     let data = SubspaceData::new(&one(&u, &y), time, &options).unwrap();
     let found = data.scan(&[3, 15, 30], &[6, 8], &options).unwrap();
     assert_eq!(found.len(), 6);

@@ -94,10 +94,10 @@ fn zero_initial_state_is_used_where_said() {
 
 #[test]
 fn options_read_from_a_table_and_refuse_unknown_names() {
-    let text = "weight = 'cva'\nhorizon = 30\norder = { fixed = 8 }\nfeedthrough = 'none'\nstability = 'allow'\n";
+    let text = "method = 'cva'\nhorizon = 30\norder = { fixed = 8 }\nfeedthrough = 'none'\nstability = 'allow'\n";
     let options: SubspaceOptions = toml::from_str(text).unwrap();
     let expected = SubspaceOptions {
-        weight: Weight::Cva,
+        method: SubspaceMethod::Cva,
         horizon: 30,
         order: Order::Fixed(8),
         stability: Stability::Allow,
@@ -109,5 +109,5 @@ fn options_read_from_a_table_and_refuse_unknown_names() {
         Order::Auto(AutoOrder::up_to(6))
     );
     assert!(toml::from_str::<SubspaceOptions>("wieght = 'cva'").is_err());
-    assert!(toml::from_str::<SubspaceOptions>("weight = 'cav'").is_err());
+    assert!(toml::from_str::<SubspaceOptions>("method = 'cav'").is_err());
 }

@@ -39,7 +39,7 @@ fn every_rule_on_ten_systems() {
         let records = records(seed, 0.05);
         let chosen = RULES.map(|rule| {
             let options = SubspaceOptions {
-                weight: Weight::Cva,
+                method: SubspaceMethod::Cva,
                 order: by(rule, 8),
                 horizon: 10,
                 stability: Stability::Allow,

@@ -5,17 +5,23 @@ use super::*;
 use crate::signal::Channel;
 use crate::signal::{Detrend, Record};
 
-const WEIGHTS: [Weight; 6] =
-    [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const WEIGHTS: [SubspaceMethod; 6] = [
+    SubspaceMethod::Moesp,
+    SubspaceMethod::N4sid,
+    SubspaceMethod::Cva,
+    SubspaceMethod::PbsidOpt,
+    SubspaceMethod::Ssarx,
+    SubspaceMethod::ParsimS,
+];
 const PAST: usize = 15;
 const HORIZON: usize = 8;
 
-fn options(weight: Weight) -> SubspaceOptions {
-    SubspaceOptions { weight, past: Some(PAST), feedthrough: Feedthrough::None, ..fixed(4, HORIZON) }
+fn options(method: SubspaceMethod) -> SubspaceOptions {
+    SubspaceOptions { method, past: Some(PAST), feedthrough: Feedthrough::None, ..fixed(4, HORIZON) }
 }
 
-fn model(experiments: &[Experiment<'_>], weight: Weight) -> SubspaceModel {
-    subspace(experiments, clock(), &options(weight)).unwrap()
+fn model(experiments: &[Experiment<'_>], method: SubspaceMethod) -> SubspaceModel {
+    subspace(experiments, clock(), &options(method)).unwrap()
 }
 
 /// Two inputs, two outputs, coloured noise.
@@ -36,12 +42,12 @@ fn permuted_and_rescaled_channels_give_the_permuted_and_rescaled_model() {
     let (u, y) = record(2000, 0.1);
     let u2 = Mat::from_fn(u.nrows(), 2, |k, j| [1e4, 0.03][j] * u[(k, 1 - j)]);
     let y2 = Mat::from_fn(y.nrows(), 2, |k, j| [1e-6, 70.0][j] * y[(k, 1 - j)]);
-    for weight in WEIGHTS {
-        let (plain, other) = (model(&one(&u, &y), weight).model, model(&one(&u2, &y2), weight).model);
+    for method in WEIGHTS {
+        let (plain, other) = (model(&one(&u, &y), method).model, model(&one(&u2, &y2), method).model);
         let b = Mat::from_fn(4, 2, |i, j| [0.03, 1e4][j] * other.b()[(i, 1 - j)]);
         let c = Mat::from_fn(2, 4, |i, j| other.c()[(1 - i, j)] / [70.0, 1e-6][i]);
         let back = StateSpace::new(other.a().to_owned(), b, c, Mat::zeros(2, 2), clock()).unwrap();
-        assert!(distance(&back, &plain) < 1e-9, "{weight:?}: {:e}", distance(&back, &plain));
+        assert!(distance(&back, &plain) < 1e-9, "{method:?}: {:e}", distance(&back, &plain));
     }
 }
 
@@ -49,12 +55,12 @@ fn permuted_and_rescaled_channels_give_the_permuted_and_rescaled_model() {
 #[test]
 fn the_origin_of_time_does_not_matter() {
     let (u, y) = record(1500, 0.0);
-    for weight in WEIGHTS {
+    for method in WEIGHTS {
         let late = 40;
         let (all, cut) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], rows(&u, late, 1500));
-        let (first, second) = (model(&all, weight), model(&[Experiment { u: cut, y: rows(&y, late, 1500) }], weight));
+        let (first, second) = (model(&all, method), model(&[Experiment { u: cut, y: rows(&y, late, 1500) }], method));
         let gap = distance(&second.model, &first.model);
-        assert!(gap < 1e-6, "{weight:?}: {gap:e}");
+        assert!(gap < 1e-6, "{method:?}: {gap:e}");
         let state = |found: &SubspaceModel| Mat::from_fn(4, 1, |i, _| found.initial_states[0][i]);
         let mut x = state(&first);
         for k in 0..late {
@@ -62,7 +68,7 @@ fn the_origin_of_time_does_not_matter() {
         }
         let (here, there) = (first.model.c() * x, second.model.c() * state(&second));
         let miss = (&here - &there).norm_l2() / here.norm_l2();
-        assert!(miss < 1e-5, "{weight:?}: {miss:e}");
+        assert!(miss < 1e-5, "{method:?}: {miss:e}");
     }
 }
 
@@ -72,38 +78,38 @@ fn the_origin_of_time_does_not_matter() {
 fn one_experiment_split_in_two() {
     let (u, y) = record(3000, 0.1);
     let (middle, overlap) = (1400, PAST + HORIZON - 1);
-    for weight in WEIGHTS {
+    for method in WEIGHTS {
         let parts = |first_end: usize| {
             [(0, first_end), (middle, 3000)]
                 .map(|(from, to)| Experiment { u: rows(&u, from, to), y: rows(&y, from, to) })
         };
         let (whole, same, cut) =
-            (model(&one(&u, &y), weight), model(&parts(middle + overlap), weight), model(&parts(middle), weight));
+            (model(&one(&u, &y), method), model(&parts(middle + overlap), method), model(&parts(middle), method));
         assert_eq!((same.columns, cut.columns), (whole.columns, whole.columns - overlap));
         for (one, other) in same.poles().iter().zip(whole.poles()) {
             let gap = (*one - *other).norm();
             // The scales of the channels differ by the doubled samples, and with them the weights of MOESP and N4SID.
-            assert!(gap < 1e-3, "{weight:?}: {gap:e}");
+            assert!(gap < 1e-3, "{method:?}: {gap:e}");
         }
-        assert!(distance(&cut.model, &whole.model) < 0.02, "{weight:?}: {:e}", distance(&cut.model, &whole.model));
-        let unscaled = SubspaceOptions { scaling: ChannelScaling::None, ..options(weight) };
+        assert!(distance(&cut.model, &whole.model) < 0.02, "{method:?}: {:e}", distance(&cut.model, &whole.model));
+        let unscaled = SubspaceOptions { scaling: ChannelScaling::None, ..options(method) };
         let run = |experiments: &[Experiment<'_>]| subspace(experiments, clock(), &unscaled).unwrap().model;
         let (one, two) = (run(&one(&u, &y)), run(&parts(middle + overlap)));
         // B sees the doubled samples twice; A and C do not.
         let error = (one.a() - two.a()).norm_max() + (one.c() - two.c()).norm_max();
-        assert!(error < 1e-8, "{weight:?}: {error:e}");
+        assert!(error < 1e-8, "{method:?}: {error:e}");
     }
 }
 
 #[test]
 fn noise_free_parts_give_the_model_of_the_whole() {
     let (u, y) = record(1500, 0.0);
-    let whole: Vec<_> = WEIGHTS.iter().map(|weight| model(&one(&u, &y), *weight).model).collect();
+    let whole: Vec<_> = WEIGHTS.iter().map(|method| model(&one(&u, &y), *method).model).collect();
     let parts = [(0, 500), (500, 700), (700, 1500)];
     let parts = parts.map(|(from, to)| Experiment { u: rows(&u, from, to), y: rows(&y, from, to) });
-    for (weight, whole) in WEIGHTS.into_iter().zip(&whole) {
-        let gap = distance(&model(&parts, weight).model, whole);
-        assert!(gap < 1e-6, "{weight:?}: {gap:e}");
+    for (method, whole) in WEIGHTS.into_iter().zip(&whole) {
+        let gap = distance(&model(&parts, method).model, whole);
+        assert!(gap < 1e-6, "{method:?}: {gap:e}");
     }
 }
 
@@ -117,8 +123,8 @@ fn an_offset_that_is_taken_off_changes_nothing() {
         record.data().to_owned()
     };
     let (u0, y0, u1, y1) = (detrended(&u, 0.0), detrended(&y, 0.0), detrended(&u, 30.0), detrended(&y, -200.0));
-    for weight in WEIGHTS {
-        let gap = distance(&model(&one(&u1, &y1), weight).model, &model(&one(&u0, &y0), weight).model);
-        assert!(gap < 1e-9, "{weight:?}: {gap:e}");
+    for method in WEIGHTS {
+        let gap = distance(&model(&one(&u1, &y1), method).model, &model(&one(&u0, &y0), method).model);
+        assert!(gap < 1e-9, "{method:?}: {gap:e}");
     }
 }

@@ -4,15 +4,15 @@ use super::*;
 
 #[test]
 fn recovers_random_systems() {
-    for (case, weight) in [Weight::Moesp, Weight::N4sid, Weight::Cva].into_iter().enumerate() {
+    for (case, method) in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva].into_iter().enumerate() {
         for (m, p, magnitudes) in [(1, 1, &[0.9, 0.7][..]), (2, 3, &[0.98, 0.8, 0.95]), (3, 2, &[0.995, 0.6])] {
             let system = random_system(magnitudes, m, p, true, 10 + case as u64);
             let u = uniform(1500, m, &mut ChaCha8Rng::seed_from_u64(20 + case as u64));
             let y = respond(&system, &u, 0.7, None);
-            let options = SubspaceOptions { weight, ..fixed(2 * magnitudes.len(), 8) };
+            let options = SubspaceOptions { method, ..fixed(2 * magnitudes.len(), 8) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             let error = distance(&found.model, &system);
-            assert!(error < 1e-8, "{weight:?}, {m} x {p}: {error:e}");
+            assert!(error < 1e-8, "{method:?}, {m} x {p}: {error:e}");
             assert!(found.fit.percent.iter().all(|f| *f > 99.9999), "{:?}", found.fit);
             assert!(matches!(found.innovation, Innovation::None { reason: NoInnovation::NoiseFree }));
             assert_eq!(found.initial_states[0].len(), 2 * magnitudes.len());
@@ -28,9 +28,9 @@ fn automatic_order_is_the_true_one() {
     let e = 0.05 * uniform(3000, 2, rng);
     let gain = Mat::zeros(4, 2);
     let y = respond(&system, &u, 0.0, Some((&gain, &e)));
-    for weight in [Weight::Moesp, Weight::Cva] {
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::Cva] {
         let options =
-            SubspaceOptions { weight, order: Order::Auto(AutoOrder::up_to(10)), horizon: 10, ..Default::default() };
+            SubspaceOptions { method, order: Order::Auto(AutoOrder::up_to(10)), horizon: 10, ..Default::default() };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!((found.order.order, found.order.rule), (4, Some(OrderRule::Svc)));
         assert!(distance(&found.model, &system) < 0.02);
@@ -136,15 +136,15 @@ fn units_of_the_channels_do_not_matter() {
     let (v, w) = ([1e6, 1e-3], [1e-6, 1e2]);
     let u2 = Mat::from_fn(800, 2, |k, q| v[q] * u[(k, q)]);
     let y2 = Mat::from_fn(800, 2, |k, i| w[i] * y[(k, i)]);
-    for weight in [Weight::Moesp, Weight::N4sid, Weight::Cva] {
-        let options = SubspaceOptions { weight, ..fixed(4, 10) };
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva] {
+        let options = SubspaceOptions { method, ..fixed(4, 10) };
         let plain = subspace(&one(&u, &y), clock(), &options).unwrap();
         let scaled = subspace(&one(&u2, &y2), clock(), &options).unwrap();
         let b = Mat::from_fn(4, 2, |i, q| scaled.model.b()[(i, q)] * v[q]);
         let c = Mat::from_fn(2, 4, |i, j| scaled.model.c()[(i, j)] / w[i]);
         let d = Mat::from_fn(2, 2, |i, q| scaled.model.d()[(i, q)] * v[q] / w[i]);
         let back = StateSpace::new(scaled.model.a().to_owned(), b, c, d, clock()).unwrap();
-        assert!(distance(&back, &plain.model) < 1e-9, "{weight:?}");
+        assert!(distance(&back, &plain.model) < 1e-9, "{method:?}");
         let ratio = scaled.innovation.covariance().unwrap()[(0, 1)] / plain.innovation.covariance().unwrap()[(0, 1)];
         assert!((ratio / (w[0] * w[1]) - 1.0).abs() < 1e-8);
     }
@@ -158,7 +158,7 @@ fn canonical_correlations_do_not_depend_on_an_output_transformation() {
     let e = 0.2 * uniform(900, 2, rng);
     let y = respond(&system, &u, 0.0, Some((&Mat::zeros(4, 2), &e)));
     let mixed = &y * Mat::from_fn(2, 2, |i, j| [[3.0, 1.0], [-2.0, 0.5]][i][j]);
-    let options = SubspaceOptions { weight: Weight::Cva, scaling: ChannelScaling::None, ..fixed(4, 8) };
+    let options = SubspaceOptions { method: SubspaceMethod::Cva, scaling: ChannelScaling::None, ..fixed(4, 8) };
     let left = subspace(&one(&u, &y), clock(), &options).unwrap();
     let right = subspace(&one(&u, &mixed), clock(), &options).unwrap();
     for (a, b) in left.singular_values.iter().zip(&right.singular_values) {

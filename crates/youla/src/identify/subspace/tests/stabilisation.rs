@@ -1,18 +1,24 @@
 //! The diagram finds the modes of the bearing and of measured data; its poles are those of the models.
 
-use super::super::stabilisation::{StabilisationOptions, Standing, modal_assurance, stabilisation};
+use super::super::stabilisation::{PoleStability, StabilisationOptions, modal_assurance, stabilisation};
 use super::*;
 use crate::Error;
 
-const WEIGHTS: [Weight; 6] =
-    [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const WEIGHTS: [SubspaceMethod; 6] = [
+    SubspaceMethod::Moesp,
+    SubspaceMethod::N4sid,
+    SubspaceMethod::Cva,
+    SubspaceMethod::PbsidOpt,
+    SubspaceMethod::Ssarx,
+    SubspaceMethod::ParsimS,
+];
 
 /// The poles of each order are those of the model of that order, and the shapes `C v` of its output matrix.
 #[test]
 fn poles_and_shapes_are_those_of_the_models() {
     let (u, y, time) = bearing_record(2000, 0.1, 1);
-    for weight in WEIGHTS {
-        let method = SubspaceOptions { weight, horizon: 10, stability: Stability::Allow, ..Default::default() };
+    for method in WEIGHTS {
+        let method = SubspaceOptions { method, horizon: 10, stability: Stability::Allow, ..Default::default() };
         let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
         let diagram = stabilisation(&data, &[3, 6, 7], &method, &StabilisationOptions::default()).unwrap();
         for order in [3, 6, 7] {
@@ -29,10 +35,10 @@ fn poles_and_shapes_are_those_of_the_models() {
                 });
                 let svd = pencil.svd().unwrap();
                 let least = svd.S().column_vector()[n - 1].re / svd.S().column_vector()[0].re;
-                assert!(least < 1e-9, "{weight:?}, order {order}: {least:e}");
+                assert!(least < 1e-9, "{method:?}, order {order}: {least:e}");
                 let v = svd.V().col(n - 1);
                 let shape: Vec<c64> = (0..2).map(|i| (0..n).map(|k| v[k] * model.c()[(i, k)]).sum::<c64>()).collect();
-                assert!(modal_assurance(&shape, &pole.shape) > 1.0 - 1e-8, "{weight:?}, order {order}");
+                assert!(modal_assurance(&shape, &pole.shape) > 1.0 - 1e-8, "{method:?}, order {order}");
                 assert!((pole.shape.iter().map(|x| x.norm()).fold(0.0, f64::max) - 1.0).abs() < 1e-12);
             }
         }
@@ -49,22 +55,22 @@ fn clusters_find_the_modes_of_the_bearing() {
     let orders: Vec<usize> = (1..=24).collect();
     for seed in 1..=3 {
         let (u, y, time) = bearing_record(20_000, 0.2, seed);
-        for weight in WEIGHTS {
-            let method = SubspaceOptions { weight, horizon: 30, ..Default::default() };
+        for method in WEIGHTS {
+            let method = SubspaceOptions { method, horizon: 30, ..Default::default() };
             let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
             let draw = |share| {
                 let options = StabilisationOptions { share, ..Default::default() };
                 stabilisation(&data, &orders, &method, &options).unwrap().clusters
             };
             let clusters = draw(0.5);
-            assert_eq!((clusters.len(), truth.len()), (2, 2), "{weight:?}, seed {seed}: {clusters:?}");
+            assert_eq!((clusters.len(), truth.len()), (2, 2), "{method:?}, seed {seed}: {clusters:?}");
             for (found, mode) in clusters.iter().zip(&truth) {
                 let errors = ((found.hz - mode.hz).abs(), (found.zeta - mode.zeta).abs());
-                assert!(errors.0 < 0.2 && errors.1 < 0.003, "{weight:?}, seed {seed}: {found:?}");
-                assert!(found.settled >= 18 && found.hz_spread < 0.1, "{weight:?}, seed {seed}: {found:?}");
+                assert!(errors.0 < 0.2 && errors.1 < 0.003, "{method:?}, seed {seed}: {found:?}");
+                assert!(found.settled >= 18 && found.hz_spread < 0.1, "{method:?}, seed {seed}: {found:?}");
             }
             let others = draw(0.0).into_iter().map(|c| c.settled).filter(|settled| *settled < 18).max();
-            assert!(others.is_some_and(|settled| settled <= 7), "{weight:?}, seed {seed}: {others:?}");
+            assert!(others.is_some_and(|settled| settled <= 7), "{method:?}, seed {seed}: {others:?}");
         }
     }
 }
@@ -94,15 +100,15 @@ fn standings_and_clusters_agree_with_the_poles() {
     let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
     let orders: Vec<usize> = (2..=16).collect();
     let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default()).unwrap();
-    assert!(diagram.poles.iter().filter(|p| p.order == 2).all(|p| p.standing == Standing::New));
-    assert!(diagram.poles.iter().any(|p| p.standing == Standing::Settled));
+    assert!(diagram.poles.iter().filter(|p| p.order == 2).all(|p| p.standing == PoleStability::New));
+    assert!(diagram.poles.iter().any(|p| p.standing == PoleStability::Stable));
     for (place, cluster) in diagram.clusters.iter().enumerate() {
         let members: Vec<_> = diagram.poles.iter().filter(|p| p.cluster == Some(place)).collect();
         let mut of_orders: Vec<usize> = members.iter().map(|p| p.order).collect();
         of_orders.dedup();
         assert_eq!(of_orders.len(), cluster.orders);
         let mut settled: Vec<usize> =
-            members.iter().filter(|p| p.standing == Standing::Settled).map(|p| p.order).collect();
+            members.iter().filter(|p| p.standing == PoleStability::Stable).map(|p| p.order).collect();
         settled.dedup();
         assert_eq!(settled.len(), cluster.settled);
         assert!(2 * cluster.settled >= orders.len() && members.iter().all(|p| p.pole.im > 0.0));

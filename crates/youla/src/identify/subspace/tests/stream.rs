@@ -74,9 +74,9 @@ fn close(left: &SubspaceModel, right: &SubspaceModel) {
 fn a_stream_gives_the_model_of_the_memory() {
     let records = records();
     let experiments = views(&records);
-    for weight in [Weight::Moesp, Weight::PbsidOpt] {
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::PbsidOpt] {
         for (factorisation, passes) in [(Factorisation::Auto, 2), (Factorisation::Qr, 2)] {
-            let options = SubspaceOptions { weight, factorisation, ..fixed(4, 6) };
+            let options = SubspaceOptions { method, factorisation, ..fixed(4, 6) };
             let inner = ExperimentStream::new(&experiments).unwrap();
             let mut stream = Handed { inner, passes: 0, lost_in_pass: None };
             let streamed = subspace_stream(&mut stream, clock(), &options).unwrap();
@@ -113,12 +113,12 @@ fn batches_leave_no_seam() {
             })
             .collect();
         let gram = hankel.iter().fold(Mat::zeros(24, 24), |sum, h| sum + h.transpose() * h);
-        let r = triangle.arranged(super::super::factorisation::Arrangement::InputsFirst, 3, 3).unwrap();
+        let r = triangle.arranged(super::super::factorisation::HankelLayout::InputsFirst, 3, 3).unwrap();
         let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
         assert!(error < 1e-12, "{factorisation:?}: {error:.1e}");
     }
-    for weight in [Weight::Moesp, Weight::PbsidOpt] {
-        let found = subspace(&experiments, clock(), &SubspaceOptions { weight, ..options.clone() }).unwrap();
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::PbsidOpt] {
+        let found = subspace(&experiments, clock(), &SubspaceOptions { method, ..options.clone() }).unwrap();
         let (model, gain) = (&found.model, found.innovation.gain());
         let (mut errors, mut count, mut sum, mut squares) = (0.0, 0.0, 0.0, 0.0);
         for ((u, y), x0) in records.iter().zip(&found.initial_states) {
@@ -127,7 +127,7 @@ fn batches_leave_no_seam() {
                 let uk = u.row(k).transpose().as_mat();
                 let error = y.row(k).transpose().as_mat() - model.c() * &x - model.d() * uk;
                 x = model.a() * &x + model.b() * uk;
-                if weight == Weight::PbsidOpt {
+                if method == SubspaceMethod::PbsidOpt {
                     x += gain.unwrap() * &error;
                 }
                 errors += error[(0, 0)].powi(2);
@@ -135,7 +135,7 @@ fn batches_leave_no_seam() {
             }
         }
         let percent = 100.0 * (1.0 - (errors / (squares - sum * sum / count)).sqrt());
-        assert!((percent - found.fit.percent[0]).abs() < 1e-9, "{weight:?}: {percent} {}", found.fit.percent[0]);
+        assert!((percent - found.fit.percent[0]).abs() < 1e-9, "{method:?}: {percent} {}", found.fit.percent[0]);
     }
 }
 

@@ -3,8 +3,14 @@
 use super::*;
 use crate::lti::simulate;
 
-const WEIGHTS: [Weight; 6] =
-    [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const WEIGHTS: [SubspaceMethod; 6] = [
+    SubspaceMethod::Moesp,
+    SubspaceMethod::N4sid,
+    SubspaceMethod::Cva,
+    SubspaceMethod::PbsidOpt,
+    SubspaceMethod::Ssarx,
+    SubspaceMethod::ParsimS,
+];
 
 fn marks() -> Vec<Vec<bool>> {
     vec![vec![true, false], vec![false, false], vec![true, true]]
@@ -25,15 +31,15 @@ fn marked_entries_of_d_are_found_and_the_others_stay_zero() {
     let e = uniform(1500, 3, rng);
     for noise in [0.0, 0.2] {
         let y = respond(&system, &u, 0.3, None) + noise * &e;
-        for weight in WEIGHTS {
+        for method in WEIGHTS {
             let feedthrough = Feedthrough::Entries(marks());
-            let options = SubspaceOptions { weight, past: Some(9), feedthrough, ..fixed(4, 6) };
+            let options = SubspaceOptions { method, past: Some(9), feedthrough, ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap().model;
             let error = distance(&found, &system);
             let limit = if noise > 0.0 { 0.1 } else { 1e-8 };
-            assert!(error < limit, "{weight:?}, noise {noise}: {error:.1e}");
+            assert!(error < limit, "{method:?}, noise {noise}: {error:.1e}");
             for (i, j) in (0..3).flat_map(|i| (0..2).map(move |j| (i, j))) {
-                assert_eq!(found.d()[(i, j)] == 0.0, !marks()[i][j], "{weight:?}: {:?}", found.d());
+                assert_eq!(found.d()[(i, j)] == 0.0, !marks()[i][j], "{method:?}: {:?}", found.d());
             }
         }
     }
@@ -45,17 +51,17 @@ fn all_entries_or_none_are_the_other_choices() {
     let rng = &mut ChaCha8Rng::seed_from_u64(15);
     let u = uniform(700, 2, rng);
     let y = respond(&system, &u, 0.3, None) + 0.1 * uniform(700, 3, rng);
-    let with = |weight, feedthrough| {
-        let options = SubspaceOptions { weight, past: Some(9), feedthrough, ..fixed(4, 6) };
+    let with = |method, feedthrough| {
+        let options = SubspaceOptions { method, past: Some(9), feedthrough, ..fixed(4, 6) };
         subspace(&one(&u, &y), clock(), &options).map(|found| found.model)
     };
-    for weight in WEIGHTS {
+    for method in WEIGHTS {
         for (mark, same) in [(true, Feedthrough::Estimated), (false, Feedthrough::None)] {
             let entries = Feedthrough::Entries(vec![vec![mark; 2]; 3]);
-            assert_eq!(with(weight, entries).unwrap(), with(weight, same).unwrap());
+            assert_eq!(with(method, entries).unwrap(), with(method, same).unwrap());
         }
     }
-    let refused = with(Weight::Moesp, Feedthrough::Entries(vec![vec![true; 3]; 3])).unwrap_err().to_string();
+    let refused = with(SubspaceMethod::Moesp, Feedthrough::Entries(vec![vec![true; 3]; 3])).unwrap_err().to_string();
     assert!(refused.contains("(feedthrough) is 3 x 3, but must be 3 x 2"), "{refused}");
 }
 
@@ -72,13 +78,13 @@ fn spellings_of_feedthrough_and_delays() {
 
 #[test]
 fn delays_are_states_of_the_model() {
-    for (case, weight) in WEIGHTS.into_iter().enumerate() {
+    for (case, method) in WEIGHTS.into_iter().enumerate() {
         let system = random_system(&[0.95, 0.7], 2, 2, case % 2 == 0, 20 + case as u64);
         let rng = &mut ChaCha8Rng::seed_from_u64(30);
         let u = uniform(900, 2, rng);
         let delayed = Mat::from_fn(900, 2, |k, j| if j == 0 && k >= 3 { u[(k - 3, 0)] } else { u[(k, 1)] * j as f64 });
         let y = respond(&system, &delayed, 0.3, None);
-        let options = SubspaceOptions { weight, past: Some(9), delays: vec![3, 0], ..fixed(4, 6) };
+        let options = SubspaceOptions { method, past: Some(9), delays: vec![3, 0], ..fixed(4, 6) };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!((found.order.order, found.model.order(), found.delays.clone()), (4, 7, vec![3, 0]));
         assert_eq!((found.columns, found.poles().len()), (900 - 3 - 14, 7));
@@ -86,7 +92,7 @@ fn delays_are_states_of_the_model() {
         // From the inputs as measured, on from the first sample that all delayed inputs reach.
         let simulated = simulate(&found.model, u.as_ref().subrows(3, 897), &found.initial_states[0]).unwrap();
         let error = (simulated - y.as_ref().subrows(3, 897)).norm_max() / y.norm_max();
-        assert!(error < 1e-7, "{weight:?}: {error:.1e}");
+        assert!(error < 1e-7, "{method:?}: {error:.1e}");
     }
 }
 
@@ -103,7 +109,7 @@ fn unfit_delays_are_refused() {
     assert!(with(vec![0, 33]).contains("after a delay of 33 samples: 40 samples are too few, at least 43"));
     let data = SubspaceData::new(&one(&u, &y), clock(), &fixed(2, 5)).unwrap();
     let other = SubspaceOptions { delays: vec![1, 0], ..fixed(2, 5) };
-    assert!(matches!(data.identify(&other), Err(Error::Refactor)));
+    assert!(matches!(data.identify(&other), Err(Error::FactorOptionsChanged)));
 }
 
 /// Plant and nominal model with a delay of two samples: S has it too, and G(S) from a delayed S is the plant.

@@ -136,9 +136,9 @@ impl Delta {
     pub(super) fn towards(&self, weights: &[(usize, f64)]) -> Result<StateSpace<Discrete>> {
         let m = &self.model;
         let [mut a, mut b, mut c, mut d] = [m.a(), m.b(), m.c(), m.d()].map(|x| x.to_owned());
-        for (j, weight) in weights {
+        for (j, method) in weights {
             let block = &self.blocks[*j];
-            let add = |to: &mut Mat<f64>, change: &Mat<f64>| *to += change * Scale(*weight);
+            let add = |to: &mut Mat<f64>, change: &Mat<f64>| *to += change * Scale(*method);
             add(&mut a, &block.a);
             add(&mut b, &block.b);
             add(&mut c, &block.c);

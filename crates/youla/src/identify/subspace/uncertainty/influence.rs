@@ -9,7 +9,7 @@
 //! What T leaves open changes the states alone, and B is fitted to the A and C so found.
 
 use super::super::channels::Channels;
-use super::super::factorisation::{BlockWeights, DataTriangle};
+use super::super::factorisation::{BlockWeights, HankelLq};
 use super::super::output_error::Base;
 use super::super::projected::Projected;
 use super::super::realisation::OutputPair;
@@ -38,7 +38,7 @@ pub(super) struct PairChange {
 /// The changes for all blocks; blocks in parallel.
 pub(super) fn pair_changes(
     channels: &Channels<'_>,
-    triangle: &DataTriangle,
+    triangle: &HankelLq,
     blocks: &[TimeBlock],
     base: &Base,
     options: &SubspaceOptions,
@@ -59,7 +59,7 @@ pub(super) fn pair_changes(
 }
 
 fn change(
-    heavier: &DataTriangle,
+    heavier: &HankelLq,
     base: &Base,
     gamma: &Mat<f64>,
     options: &SubspaceOptions,

@@ -15,7 +15,7 @@ use super::super::output_error::{Base, Part, join, without_disturbances};
 use super::super::sensitivity::Sensitivity;
 use super::blocks::TimeBlock;
 use super::influence::PairChange;
-use crate::linalg::{Triangle, least_squares};
+use crate::linalg::{SequentialQr, least_squares};
 use crate::{Mat, MatRef, Result};
 use faer::Scale;
 use rayon::prelude::*;
@@ -48,7 +48,7 @@ pub(super) fn input_changes(
         })
         .collect();
     let common = base.unknowns.common();
-    let (mut whole, mut right) = (Triangle::new(common + 1, common + 1), Mat::zeros(common, blocks.len()));
+    let (mut whole, mut right) = (SequentialQr::new(common + 1, common + 1), Mat::zeros(common, blocks.len()));
     for (part, sum) in parts.iter().zip(sums) {
         whole.fold_rows(part.common());
         right += sum?;

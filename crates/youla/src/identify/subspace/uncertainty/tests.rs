@@ -8,8 +8,14 @@ use crate::{MatRef, c64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-const WEIGHTS: [Weight; 6] =
-    [Weight::Moesp, Weight::N4sid, Weight::Cva, Weight::PbsidOpt, Weight::Ssarx, Weight::ParsimS];
+const WEIGHTS: [SubspaceMethod; 6] = [
+    SubspaceMethod::Moesp,
+    SubspaceMethod::N4sid,
+    SubspaceMethod::Cva,
+    SubspaceMethod::PbsidOpt,
+    SubspaceMethod::Ssarx,
+    SubspaceMethod::ParsimS,
+];
 const OMEGA: [f64; 3] = [0.2, 0.45, 1.2];
 
 /// Two outputs, one input, two states with innovations that also drive the states.
@@ -33,9 +39,9 @@ fn truth() -> StateSpace<Discrete> {
     StateSpace::new(a, b, matrix(2, 2, &[1.0, 0.0, 0.0, 0.5]), Mat::zeros(2, 1), Discrete::new(1.0).unwrap()).unwrap()
 }
 
-fn options(weight: Weight) -> SubspaceOptions {
+fn options(method: SubspaceMethod) -> SubspaceOptions {
     SubspaceOptions {
-        weight,
+        method,
         horizon: 6,
         past: Some(8),
         order: Order::Fixed(2),
@@ -76,13 +82,13 @@ fn norm(values: impl Iterator<Item = c64>) -> f64 {
 #[test]
 fn influence_is_the_change_with_the_block_twice() {
     let (u, y) = record(12_000, 1);
-    for weight in WEIGHTS {
-        let found = identify(&[(u.as_ref(), y.as_ref())], &options(weight));
+    for method in WEIGHTS {
+        let found = identify(&[(u.as_ref(), y.as_ref())], &options(method));
         let delta = delta(&found);
         let count = delta.blocks.len();
         assert_eq!(count, 60);
         let base = values(&found.model);
-        let plain = SubspaceOptions { uncertainty: UncertaintyOptions::default(), ..options(weight) };
+        let plain = SubspaceOptions { uncertainty: UncertaintyOptions::default(), ..options(method) };
         for j in [7, 31, 58] {
             let columns = 12_000 + 1 - 14;
             let (start, end) = (j * columns / count, (j + 1) * columns / count + 13);
@@ -90,12 +96,12 @@ fn influence_is_the_change_with_the_block_twice() {
             let twice = values(&identify(&[(u.as_ref(), y.as_ref()), again], &plain).model);
             let (change, influence) = (twice.iter().zip(&base).map(|(t, b)| *t - *b), changes(delta, j));
             let miss = norm(change.clone().zip(&influence).map(|(a, b)| a - *b)) / norm(change);
-            assert!(miss < 0.2, "{weight:?}, block {j}: {miss}");
+            assert!(miss < 0.2, "{method:?}, block {j}: {miss}");
         }
         let all: Vec<Vec<c64>> = (0..count).map(|j| changes(delta, j)).collect();
         let sum = norm((0..6).map(|k| all.iter().fold(c64::new(0.0, 0.0), |sum, d| sum + d[k])));
         let size = all.iter().map(|d| norm(d.iter().copied())).sum::<f64>();
-        assert!(sum < 2e-3 * size, "{weight:?}: {:e}", sum / size);
+        assert!(sum < 2e-3 * size, "{method:?}: {:e}", sum / size);
     }
 }
 
@@ -103,17 +109,17 @@ fn influence_is_the_change_with_the_block_twice() {
 #[test]
 fn both_factorisations_and_several_experiments() {
     let (u, y) = record(4000, 2);
-    for weight in WEIGHTS {
+    for method in WEIGHTS {
         let cut = [(u.subrows(0, 2500), y.subrows(0, 2500)), (u.subrows(2500, 1500), y.subrows(2500, 1500))];
         let [gram, qr] = [Factorisation::Gram, Factorisation::Qr]
-            .map(|factorisation| identify(&cut, &SubspaceOptions { factorisation, ..options(weight) }));
+            .map(|factorisation| identify(&cut, &SubspaceOptions { factorisation, ..options(method) }));
         let (gram, qr) = (delta(&gram), delta(&qr));
         let experiments: Vec<usize> = gram.blocks.iter().map(|b| b.experiment).collect();
         assert_eq!((experiments.iter().filter(|e| **e == 0).count(), experiments.len()), (38, 60));
         for j in [0, 20, 59] {
             let (one, other) = (changes(gram, j), changes(qr, j));
             let miss = norm(one.iter().zip(&other).map(|(a, b)| *a - *b)) / norm(one.iter().copied());
-            assert!(miss < 1e-6, "{weight:?}, block {j}: {miss:e}");
+            assert!(miss < 1e-6, "{method:?}, block {j}: {miss:e}");
         }
     }
 }
@@ -123,11 +129,11 @@ fn both_factorisations_and_several_experiments() {
 #[test]
 fn variances_are_those_of_many_records() {
     let truth = truth();
-    for weight in WEIGHTS {
+    for method in WEIGHTS {
         let (mut claimed, mut seen) = ([0.0; 2], [0.0; 2]);
         for seed in 0..60 {
             let (u, y) = record(1500, 100 + seed);
-            let found = identify(&[(u.as_ref(), y.as_ref())], &options(weight));
+            let found = identify(&[(u.as_ref(), y.as_ref())], &options(method));
             let band = delta(&found).response(&OMEGA).unwrap();
             let right = frequency_response(&truth, &OMEGA).unwrap();
             for (k, i) in (0..3).flat_map(|k| [(k, 0), (k, 1)]) {
@@ -142,7 +148,7 @@ fn variances_are_those_of_many_records() {
         }
         for (what, limit) in [(0, 0.3), (1, 0.5)] {
             let ratio = claimed[what] / seen[what];
-            assert!((ratio - 1.0).abs() < limit, "{weight:?}, {what}: {ratio}");
+            assert!((ratio - 1.0).abs() < limit, "{method:?}, {what}: {ratio}");
         }
     }
 }
@@ -151,24 +157,24 @@ fn variances_are_those_of_many_records() {
 #[test]
 fn bootstrap_agrees_and_refuses() {
     let (u, y) = record(2000, 5);
-    let bootstrap = |weight| SubspaceOptions {
+    let bootstrap = |method| SubspaceOptions {
         uncertainty: UncertaintyOptions { method: UncertaintyMethod::Bootstrap, replicates: 100, ..Default::default() },
-        ..options(weight)
+        ..options(method)
     };
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| identify(&[(u.as_ref(), y.as_ref())], &bootstrap(Weight::Cva)))
+        pool.install(|| identify(&[(u.as_ref(), y.as_ref())], &bootstrap(SubspaceMethod::Cva)))
     };
     let (found, again) = (run(1), run(3));
     let [band, second] = [&found, &again].map(|f| f.uncertainty.as_ref().unwrap().response(&OMEGA).unwrap().unwrap());
     assert_eq!(band.magnitude, second.magnitude);
-    let by_delta = identify(&[(u.as_ref(), y.as_ref())], &options(Weight::Cva));
+    let by_delta = identify(&[(u.as_ref(), y.as_ref())], &options(SubspaceMethod::Cva));
     let delta = delta(&by_delta).response(&OMEGA).unwrap();
     let trace = |band: &ResponseBand| band.covariance.iter().map(|v| v[0] + v[2]).sum::<f64>();
     let ratio = trace(&delta) / trace(&band);
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
     let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
-    let refused = subspace(&experiment, Discrete::new(1.0).unwrap(), &bootstrap(Weight::PbsidOpt));
+    let refused = subspace(&experiment, Discrete::new(1.0).unwrap(), &bootstrap(SubspaceMethod::PbsidOpt));
     assert!(matches!(refused, Err(crate::Error::BootstrapOfClosedLoop)));
 }
 
@@ -196,18 +202,18 @@ fn delays_turn_the_influences() {
     let (u, y) = record(3000, 8);
     let late = 3;
     let y = Mat::from_fn(3000, 2, |k, i| if k < late { 0.0 } else { y[(k - late, i)] });
-    for weight in [Weight::Cva, Weight::PbsidOpt] {
-        let delayed = SubspaceOptions { delays: vec![late], ..options(weight) };
+    for method in [SubspaceMethod::Cva, SubspaceMethod::PbsidOpt] {
+        let delayed = SubspaceOptions { delays: vec![late], ..options(method) };
         let delayed = identify(&[(u.as_ref(), y.as_ref())], &delayed);
         let by_hand = (u.subrows(0, 3000 - late), y.subrows(late, 3000 - late));
-        let plain = identify(&[by_hand], &options(weight));
+        let plain = identify(&[by_hand], &options(method));
         assert_eq!((delayed.model.order(), plain.model.order()), (5, 2));
         for j in [0, 30, 59] {
             let turned = changes(delta(&plain), j).into_iter().enumerate();
             let turned = turned.map(|(k, d)| d * c64::from_polar(1.0, -OMEGA[k / 2] * late as f64));
             let found = changes(delta(&delayed), j);
             let miss = norm(turned.zip(&found).map(|(a, b)| a - *b)) / norm(found.iter().copied());
-            assert!(miss < 1e-9, "{weight:?}, block {j}: {miss:e}");
+            assert!(miss < 1e-9, "{method:?}, block {j}: {miss:e}");
         }
     }
 }
@@ -219,16 +225,16 @@ fn known_lines_leave_the_deviations_as_they_are() {
     let time = Discrete::new(1.0).unwrap();
     let w = lines(&[0.11, 0.22], 4000, time).unwrap();
     let disturbed = &y + &w * Mat::from_fn(4, 2, |j, i| 6.0 - (j + 3 * i) as f64);
-    for weight in [Weight::Cva, Weight::PbsidOpt] {
+    for method in [SubspaceMethod::Cva, SubspaceMethod::PbsidOpt] {
         let trace = |found: &SubspaceModel| -> f64 {
             delta(found).response(&OMEGA).unwrap().covariance.iter().map(|v| v[0] + v[2]).sum()
         };
-        let clean = identify(&[(u.as_ref(), y.as_ref())], &options(weight));
+        let clean = identify(&[(u.as_ref(), y.as_ref())], &options(method));
         let experiment = [Experiment { u: u.as_ref(), y: disturbed.as_ref() }];
-        let data = SubspaceData::disturbed(&experiment, &[w.as_ref()], time, &options(weight)).unwrap();
-        let known = data.identify(&options(weight)).unwrap();
+        let data = SubspaceData::disturbed(&experiment, &[w.as_ref()], time, &options(method)).unwrap();
+        let known = data.identify(&options(method)).unwrap();
         let ratio = trace(&known) / trace(&clean);
-        assert!((ratio - 1.0).abs() < 0.05, "{weight:?}: {ratio}");
+        assert!((ratio - 1.0).abs() < 0.05, "{method:?}: {ratio}");
     }
 }
 
@@ -236,8 +242,8 @@ fn known_lines_leave_the_deviations_as_they_are() {
 #[test]
 fn the_diagram_knows_the_deviations_of_the_modes() {
     let (u, y) = record(4000, 10);
-    for weight in [Weight::Moesp, Weight::Ssarx] {
-        let options = options(weight);
+    for method in [SubspaceMethod::Moesp, SubspaceMethod::Ssarx] {
+        let options = options(method);
         let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
         let data = SubspaceData::new(&experiment, Discrete::new(1.0).unwrap(), &options).unwrap();
         let mode = delta(&data.identify(&options).unwrap()).modes().unwrap()[0];
@@ -251,7 +257,7 @@ fn the_diagram_knows_the_deviations_of_the_modes() {
         let pole = diagram.poles.iter().find(|p| p.order == 2).unwrap();
         assert!((pole.hz / mode.mode.hz - 1.0).abs() < 1e-9);
         for (one, other) in [(pole.hz_deviation, mode.hz_deviation), (pole.zeta_deviation, mode.zeta_deviation)] {
-            assert!((one.unwrap() / other - 1.0).abs() < 1e-3, "{weight:?}: {one:?} {other}");
+            assert!((one.unwrap() / other - 1.0).abs() < 1e-3, "{method:?}: {one:?} {other}");
         }
         assert!(diagram.clusters.iter().all(|cluster| cluster.hz_deviation.is_some()));
     }

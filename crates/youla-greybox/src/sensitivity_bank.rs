@@ -8,7 +8,7 @@
 //! The instructions are those of the widest registers of the processor.
 
 use super::sampled::SampledSlope;
-use super::sensitivity::Begin;
+use super::sensitivity::InitialCondition;
 use faer::MatRef;
 use pulp::Simd;
 use youla::lti::{Discrete, StateSpace};
@@ -48,7 +48,7 @@ struct Block {
 
 impl Bank {
     /// Sensitivities to the initial states that are estimated, then to the parameters of `slopes`.
-    pub(super) fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], begin: &Begin<'_>) -> Self {
+    pub(super) fn new(system: &StateSpace<Discrete>, slopes: &[SampledSlope], begin: &InitialCondition<'_>) -> Self {
         let (n, p, initial) = (system.order(), system.outputs(), begin.estimated);
         let columns = initial + slopes.len();
         let group = |first: usize| {
@@ -89,7 +89,7 @@ impl Bank {
         }
     }
 
-    pub(super) fn forget_the_vanished(&mut self) {
+    pub(super) fn flush_subnormals(&mut self) {
         let values = self.groups.iter_mut().flat_map(|group| group.states.iter_mut().flatten());
         values.filter(|v| v.abs() < VANISHED).for_each(|v| *v = 0.0);
     }

@@ -2,7 +2,7 @@
 //! diagonal (K. Braman, R. Byers and R. Mathias, The multishift QR algorithm, part I, SIAM J. Matrix Anal. Appl. 23 (2002),
 //! 929). It moves from window to window; the rest of the matrix follows late.
 
-use super::late::{Path, Strip, reflect_columns_late, reflect_rows_late};
+use super::deferred_reflections::{Path, Strip, reflect_columns_late, reflect_rows_late};
 use super::shifts::Shifts;
 use super::square::{LANES, Square};
 use pulp::Simd;

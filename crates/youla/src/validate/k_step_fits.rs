@@ -28,13 +28,13 @@ const ORDER: usize = 20;
 /// [`crate::Error::Shape`] where the two differ in shape.
 ///
 /// ```
-/// use youla::{Mat, validate::step_fits};
+/// use youla::{Mat, validate::k_step_fits};
 /// let y = Mat::from_fn(2000, 1, |k, _| (0.01 * k as f64).sin());
-/// let fits = step_fits(y.as_ref(), Mat::zeros(2000, 1).as_ref())?;
+/// let fits = k_step_fits(y.as_ref(), Mat::zeros(2000, 1).as_ref())?;
 /// assert!(fits[0][0] > 90.0 && fits[3][0] < 1.0); // a sine is foreseen, its simulation by zero is not
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Result<Vec<Vec<f64>>> {
+pub fn k_step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Result<Vec<Vec<f64>>> {
     check_shape("the simulated record", simulated, (measured.nrows(), measured.ncols()))?;
     let v = (measured - simulated).to_owned();
     let weights: Vec<Vec<Vec<f64>>> = (0..v.ncols())
@@ -57,7 +57,7 @@ pub fn step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Resul
 /// [`crate::Error::Unstable`] where the inverse of H is not stable.
 ///
 /// ```
-/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, validate::step_fits_by_noise};
+/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, validate::k_step_fits_by_noise};
 /// // v(k) = 0.9 v(k-1) + e(k), that is K = C A = 0.9.
 /// let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
 /// let h = StateSpace::new(number(0.9), number(0.9), eye(1), eye(1), Discrete::new(1.0)?)?;
@@ -66,11 +66,11 @@ pub fn step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Resul
 ///     v = 0.9 * v + (0.3 * (k * k) as f64).sin();
 ///     v
 /// });
-/// let fits = step_fits_by_noise(y.as_ref(), Mat::zeros(2000, 1).as_ref(), &h)?;
+/// let fits = k_step_fits_by_noise(y.as_ref(), Mat::zeros(2000, 1).as_ref(), &h)?;
 /// assert!(fits[0][0] > fits[1][0] && fits[1][0] > fits[3][0]);
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn step_fits_by_noise(
+pub fn k_step_fits_by_noise(
     measured: MatRef<'_, f64>,
     simulated: MatRef<'_, f64>,
     noise: &StateSpace<Discrete>,
@@ -169,7 +169,7 @@ mod tests {
             v = 0.9 * v + rng.sample::<f64, _>(StandardNormal);
             v
         });
-        let fits = step_fits(y.as_ref(), Mat::zeros(100_000, 1).as_ref()).unwrap();
+        let fits = k_step_fits(y.as_ref(), Mat::zeros(100_000, 1).as_ref()).unwrap();
         for (fit, steps) in fits.iter().zip(PREDICTION_STEPS) {
             let expected = 100.0 * (1.0 - (1.0 - 0.81f64.powi(steps as i32)).sqrt());
             assert!((fit[0] - expected).abs() < 1.0, "{steps}: {} and {expected}", fit[0]);
@@ -192,8 +192,8 @@ mod tests {
         let h = StateSpace::new(number(0.9), number(0.3), eye(1), eye(1), time).unwrap();
         let larger = h.then(&h).unwrap().then(&h.inverse().unwrap()).unwrap().map_output(&number(2.0));
         let none = Mat::zeros(100_000, 1);
-        let fits = step_fits_by_noise(y.as_ref(), none.as_ref(), &h).unwrap();
-        let same = step_fits_by_noise(y.as_ref(), none.as_ref(), &larger).unwrap();
+        let fits = k_step_fits_by_noise(y.as_ref(), none.as_ref(), &h).unwrap();
+        let same = k_step_fits_by_noise(y.as_ref(), none.as_ref(), &larger).unwrap();
         let remains = |steps: usize| 1.0 + (1..steps).map(|i| (0.3 * 0.9f64.powi(i as i32 - 1)).powi(2)).sum::<f64>();
         let all = 1.0 + 0.09 / 0.19;
         for ((fit, same), steps) in fits.iter().zip(&same).zip(PREDICTION_STEPS) {
@@ -208,7 +208,7 @@ mod tests {
         let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
         let h = StateSpace::new(number(0.5), number(2.0), eye(1), eye(1), Discrete::new(1.0).unwrap()).unwrap();
         let y = Mat::from_fn(400, 1, |k, _| (k as f64).sin());
-        let refused = step_fits_by_noise(y.as_ref(), y.as_ref(), &h);
+        let refused = k_step_fits_by_noise(y.as_ref(), y.as_ref(), &h);
         assert!(matches!(refused, Err(crate::Error::Unstable { .. })), "{refused:?}");
     }
 }

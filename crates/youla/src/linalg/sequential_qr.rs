@@ -14,23 +14,23 @@ const STEPS: usize = 6;
 /// Accumulates the triangular factor of a matrix with `width` columns.
 ///
 /// ```
-/// use youla::{Mat, linalg::Triangle};
-/// let mut triangle = Triangle::new(1, 2);
+/// use youla::{Mat, linalg::SequentialQr};
+/// let mut triangle = SequentialQr::new(1, 2);
 /// triangle.fold(2, |mut rows| { rows[(0, 0)] = 3.0; rows[(1, 0)] = 4.0; });
 /// assert!((triangle.r()[(0, 0)].abs() - 5.0).abs() < 1e-15);
 /// ```
 #[derive(Debug, Clone)]
-pub struct Triangle {
+pub struct SequentialQr {
     /// R in the first rows, room for new rows below.
     work: Mat<f64>,
     /// Rows of R that hold something.
     used: usize,
 }
 
-impl Triangle {
+impl SequentialQr {
     /// An empty factor of `width` columns that takes up to `capacity` (at least 1) new rows at a time.
     pub fn new(width: usize, capacity: usize) -> Self {
-        Triangle { work: Mat::zeros(width + capacity.max(1), width), used: 0 }
+        SequentialQr { work: Mat::zeros(width + capacity.max(1), width), used: 0 }
     }
 
     /// Takes up to `capacity` (at least 1) new rows at a time from now on; what is there stays.
@@ -188,7 +188,7 @@ mod tests {
     #[test]
     fn gram_matrix_is_kept() {
         let h = random(157, 6, 1);
-        let mut triangle = Triangle::new(6, 10);
+        let mut triangle = SequentialQr::new(6, 10);
         triangle.fold_rows(h.as_ref());
         let r = triangle.r();
         let gram = h.transpose() * &h;
@@ -202,7 +202,7 @@ mod tests {
         for i in 0..80 {
             h[(i, 2)] = h[(i, 0)] - 3.0 * h[(i, 1)];
         }
-        let mut triangle = Triangle::new(4, 30);
+        let mut triangle = SequentialQr::new(4, 30);
         triangle.fold_rows(h.as_ref());
         let ranks: Vec<usize> = (0..=4).map(|k| leading_rank(triangle.r(), k)).collect();
         assert_eq!(ranks, [0, 1, 2, 2, 3]);

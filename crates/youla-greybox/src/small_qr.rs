@@ -1,7 +1,7 @@
 //! The triangular factor of a tall matrix of few columns, `[R; rows] = Q R+` by Householder reflections that leave the zeros
 //! of R alone (G. H. Golub and C. F. Van Loan, Matrix Computations, 4th ed., section 5.2).
 //!
-//! [`youla::linalg::Triangle`] does the same for wide matrices; with a dozen columns its blocking costs more than it saves,
+//! [`youla::linalg::SequentialQr`] does the same for wide matrices; with a dozen columns its blocking costs more than it saves,
 //! and here each reflection is two passes over contiguous columns in the cache.
 
 use faer::Mat;
@@ -10,14 +10,14 @@ use faer::Mat;
 const LANES: usize = 8;
 
 /// R, in the making.
-pub(super) struct NarrowTriangle {
+pub(super) struct SmallQr {
     /// width x width.
     r: Mat<f64>,
 }
 
-impl NarrowTriangle {
+impl SmallQr {
     pub(super) fn new(width: usize) -> Self {
-        NarrowTriangle { r: Mat::zeros(width, width) }
+        SmallQr { r: Mat::zeros(width, width) }
     }
 
     pub(super) fn into_factor(self) -> Mat<f64> {
@@ -69,7 +69,7 @@ mod tests {
     fn gram_matrix_is_kept() {
         let value = |i: usize, j: usize| ((i * i * (j + 2)) as f64 + 1.0).sin() * [1.0, 1e-6, 1e6, 0.0][j];
         let h = Mat::from_fn(157, 4, value);
-        let mut triangle = NarrowTriangle::new(4);
+        let mut triangle = SmallQr::new(4);
         for (first, count) in [(0, 3), (3, 100), (103, 54)] {
             let mut rows: Vec<f64> = (0..4).flat_map(|j| (first..first + count).map(move |i| value(i, j))).collect();
             triangle.fold(&mut rows, count);

@@ -18,11 +18,12 @@ use crate::factor::CoprimeFactors;
 use crate::linalg::{least_squares, observability};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::{Error, Mat, Result};
-use serde::{Deserialize, Serialize};
 
 /// What is known of S before it is identified.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct DeviationOptions {
     /// How the noise of beta is modelled.
     pub structure: Structure,
@@ -39,8 +40,10 @@ impl Default for DeviationOptions {
 }
 
 /// How the noise of beta is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Structure {
     /// Not at all for a stable S: B and D from the simulated beta.
     #[default]
@@ -50,8 +53,9 @@ pub enum Structure {
 }
 
 /// Why the refits ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Convergence {
     /// K_s changed by less than the tolerance.
     Converged,

@@ -2,11 +2,12 @@
 
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Mat, Result};
-use serde::{Deserialize, Serialize};
 
 /// How a model is reduced.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ReductionMethod {
     /// Weak states are dropped (B. C. Moore, IEEE Trans. Autom. Control 26 (1981), 17).
     #[default]
@@ -33,8 +34,10 @@ impl std::fmt::Display for ReductionMethod {
 }
 
 /// How many states are kept.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ReducedOrder {
     /// All that are controllable and observable to working precision: removes exact cancellations only.
     #[default]
@@ -50,8 +53,10 @@ pub enum ReducedOrder {
 }
 
 /// Choices of [`super::reduce`], [`super::reduce_weighted`] and [`super::reduce_in_loop`].
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct ReductionOptions {
     /// How states are removed.
     pub method: ReductionMethod,
@@ -62,14 +67,14 @@ pub struct ReductionOptions {
     /// Poles at or beyond this boundary are kept as they are and only the rest is reduced: a modulus from 0 to 1 in discrete, a
     /// real part of at most 0 in continuous time. Absent: everything is reduced, and must be stable but for normalised coprime
     /// factors.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub stability_boundary: Option<f64>,
     /// Sizes of the outputs, one per output, that matter equally; 1 each when absent. A run takes the rms of its estimation records
     /// for normalised coprime factors.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub output_scale: Option<Vec<f64>>,
     /// Sizes of the inputs, one per input; 1 each, or the rms, when absent, as for the outputs.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub input_scale: Option<Vec<f64>>,
 }
 

@@ -5,11 +5,12 @@
 use super::Record;
 use crate::Result;
 use faer::Mat;
-use serde::{Deserialize, Serialize};
 
 /// What to take out of every channel.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Detrend {
     /// Nothing.
     None,
@@ -21,7 +22,8 @@ pub enum Detrend {
 }
 
 /// The line that was taken out of one channel.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Trend {
     /// Its value at the first sample, in the unit of the channel.
     pub offset: f64,

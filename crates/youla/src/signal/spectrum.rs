@@ -14,7 +14,6 @@ use faer::prelude::*;
 use faer::{Mat, MatRef, c64};
 use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use std::ops::Range;
 use std::sync::Arc;
@@ -23,8 +22,9 @@ use std::sync::Arc;
 const CHUNK: usize = 8;
 
 /// How a record is cut into segments.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Welch {
     /// Length of a segment in samples; the frequencies are `1 / (window ts)` Hz apart.
     pub window: usize,

@@ -8,11 +8,12 @@ use crate::identify::subspace::{Draw, Interval, Uncertainty};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// Choices of [`certify_band`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct BandOptions {
     /// Models that are drawn; a bootstrap has its replicates instead.
     pub draws: usize,
@@ -27,7 +28,8 @@ impl Default for BandOptions {
 }
 
 /// What a controller does to the models within a region.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct BandCertificate {
     /// Level of region and interval.
     pub level: f64,

@@ -16,7 +16,6 @@ use crate::linalg::check_shape;
 use crate::{MatRef, Result};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
-use serde::Serialize;
 
 /// Lags of the correlations on either side.
 pub const RESIDUAL_LAGS: usize = 25;
@@ -27,7 +26,8 @@ const LEVEL: f64 = 0.99;
 const MANY: f64 = 1e9;
 
 /// Correlations of the residual of one model on one record.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct ResidualCorrelations {
     /// Per output, at the lags 0 to [`RESIDUAL_LAGS`].
     pub auto: Vec<Vec<f64>>,
@@ -42,7 +42,8 @@ pub struct ResidualCorrelations {
 }
 
 /// Correlation of the residual of one output with one excitation.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct CrossCorrelogram {
     /// Output, counted from 0.
     pub output: usize,
@@ -55,7 +56,8 @@ pub struct CrossCorrelogram {
 }
 
 /// Where a residual depends most on the past of an excitation.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize))]
 pub struct LargestCorrelation {
     /// Output, counted from 0.
     pub output: usize,

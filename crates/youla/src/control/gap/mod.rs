@@ -29,13 +29,13 @@ use crate::linalg::{block, eigenvalues, eye};
 use crate::lti::{Continuous, PeakGain, PeakOptions, StateSpace, TimeDomain, continuous_image, hinf_norm};
 use crate::{Error, Mat, Result};
 use faer::Scale;
-use serde::{Deserialize, Serialize};
 
 /// Pointwise gap from which two plants count as farthest apart: det Phi is zero there to working precision.
 const FARTHEST: f64 = 1.0 - 1e-12;
 
 /// The nu-gap of two plants.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct NuGap {
     /// The nu-gap, 0 to 1.
     pub value: f64,

@@ -3,10 +3,10 @@
 
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Mat, Result};
-use serde::{Deserialize, Serialize};
 
 /// The size of each channel, in its unit; all positive.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ChannelScales {
     inputs: Vec<f64>,
     outputs: Vec<f64>,

@@ -9,14 +9,14 @@ use super::disk::{DiskMargin, of_gain};
 use super::{IsoZone, peak_of, shifted};
 use crate::lti::{Curve, Part, PeakGain, StateSpace, TimeDomain, crossings};
 use crate::{Result, c64};
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Gain of a loop that is none.
 const NO_GAIN: f64 = 1e-9;
 
 /// A factor on the gain of a channel at which the loop has a pole on the stability boundary.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct GainLimit {
     /// The factor.
     pub factor: f64,
@@ -25,7 +25,8 @@ pub struct GainLimit {
 }
 
 /// A shift of phase at which the loop has a pole on the stability boundary.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PhaseLimit {
     /// The shift, either way, degrees.
     pub degrees: f64,
@@ -34,7 +35,8 @@ pub struct PhaseLimit {
 }
 
 /// A delay at which the loop has a pole on the stability boundary.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DelayLimit {
     /// The delay, seconds.
     pub seconds: f64,
@@ -43,7 +45,8 @@ pub struct DelayLimit {
 }
 
 /// Margins of one channel, the other loops closed.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ChannelMargins {
     /// The loop is stable for factors between this, below 1 and maybe negative, and `highest_gain`; `None`: no factor is too low.
     pub lowest_gain: Option<GainLimit>,

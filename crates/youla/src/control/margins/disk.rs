@@ -12,10 +12,10 @@ use super::structured::structured_peak;
 use super::{peak_of, shifted};
 use crate::Result;
 use crate::lti::{PeakGain, StateSpace, TimeDomain};
-use serde::{Deserialize, Serialize};
 
 /// A disk of factors for which a loop is stable.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DiskMargin {
     /// Size of the disk, alpha.
     pub alpha: f64,
@@ -32,7 +32,8 @@ pub struct DiskMargin {
 }
 
 /// Disk margins of several channels at once.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DiskMargins {
     /// sigma = 0.
     pub balanced: DiskMargin,

@@ -31,10 +31,10 @@ use crate::linalg::eye;
 use crate::lti::{PeakGain, PeakOptions, StateSpace, TimeDomain, hinf_norm};
 use crate::{Error, Result};
 use faer::Scale;
-use serde::{Deserialize, Serialize};
 
 /// Margins of a stable loop, m plant inputs and p plant outputs.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Margins {
     /// Each plant input by itself, the other loops closed; m entries.
     pub inputs: Vec<ChannelMargins>,

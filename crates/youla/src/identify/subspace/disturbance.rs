@@ -14,7 +14,6 @@
 use crate::lti::Discrete;
 use crate::{Error, Mat, MatRef, Result};
 use faer::Side;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Eigenvalues of the Gram matrix of the disturbances' Hankel data below this share of the largest are left in the data: 1e-5
@@ -69,7 +68,8 @@ fn check_frequency(what: &str, hz: f64, time: Discrete) -> Result<()> {
 }
 
 /// A line of one output: `amplitude cos(theta - phase)`, theta the angle of its cosine and sine.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Line {
     /// In the unit of the output.
     pub amplitude: f64,

@@ -15,11 +15,12 @@ use super::{Feedthrough, Order, SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::Result;
 use crate::linalg::leading_rank;
 use faer::MatRef;
-use serde::{Deserialize, Serialize};
 
 /// Choice of past and future by the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct AutomaticHorizon {
     /// Largest past to consider, block rows.
     pub max: usize,
@@ -32,7 +33,8 @@ impl Default for AutomaticHorizon {
 }
 
 /// Past and future as the data propose them.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct HorizonReport {
     /// Block rows of the past; equal to the largest one considered where more might have been better.
     pub past: usize,

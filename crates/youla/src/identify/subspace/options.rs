@@ -2,7 +2,6 @@
 
 use super::{AutomaticHorizon, UncertaintyOptions};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 
 /// Choices of [`super::subspace`].
 ///
@@ -11,8 +10,10 @@ use serde::{Deserialize, Serialize};
 /// let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(8), ..Default::default() };
 /// assert_eq!(options.horizon, 20);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct SubspaceOptions {
     /// SubspaceMethod of the singular value decomposition, and with it the name of the method.
     pub method: SubspaceMethod,
@@ -22,10 +23,10 @@ pub struct SubspaceOptions {
     /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the
     /// predictor and should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable
     /// plant K is small, and this is the decay of the plant itself.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub past: Option<usize>,
     /// Both from the data instead, by the order of a vector autoregression; `horizon` and `past` have no meaning then.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub automatic_horizon: Option<AutomaticHorizon>,
     /// Order of the model, of S in `[hansen]`; a rule proposes one when absent.
     pub order: Order,
@@ -33,7 +34,7 @@ pub struct SubspaceOptions {
     pub feedthrough: Feedthrough,
     /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model
     /// has them as states with poles at 0, after those of [`Self::order`].
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub delays: Vec<usize>,
     /// How the block-Hankel data are factored.
     pub factorisation: Factorisation,
@@ -44,7 +45,7 @@ pub struct SubspaceOptions {
     /// The state at the first sample of each experiment.
     pub initial_state: InitialState,
     /// Whether and how the uncertainty of the estimate is found.
-    #[serde(skip_serializing_if = "UncertaintyOptions::is_default")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "UncertaintyOptions::is_default"))]
     pub uncertainty: UncertaintyOptions,
 }
 
@@ -89,8 +90,10 @@ impl SubspaceOptions {
 /// on the past inputs and outputs of the one-step predictor, take A, C and K from the states, and B and D from the
 /// one-step predictions. They need a plant without D or a controller without direct path, and a past p with `(A - K C)^p`
 /// small; their parameters are many, so that for open-loop data the first three have less variance.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum SubspaceMethod {
     /// PO-MOESP: `W1 = I`, `W2` the projection onto the complement of the future inputs; A from the shift of the
     /// observability matrix.
@@ -126,8 +129,10 @@ impl SubspaceMethod {
 /// let aic = Order::Auto(AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(8) });
 /// assert_eq!(SubspaceOptions { order: aic, ..Default::default() }.order, aic);
 /// ```
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case", deny_unknown_fields))]
 pub enum Order {
     /// The order given.
     Fixed(usize),
@@ -142,8 +147,10 @@ impl Default for Order {
 }
 
 /// Choice of the order by a rule.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct AutoOrder {
     /// Largest order to consider; the horizon may allow less.
     pub max: usize,
@@ -170,8 +177,10 @@ impl AutoOrder {
 }
 
 /// A rule that proposes an order; the formulas stand in `order.rs` and `order_models.rs`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum OrderRule {
     /// Singular value criterion: the first canonical correlation that is left out, squared, and `d(n) log(T) / T`.
     #[default]
@@ -194,8 +203,10 @@ impl OrderRule {
 }
 
 /// Direct path from input to output.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Feedthrough {
     /// D = 0 exactly, as for a plant behind a zero-order hold.
     #[default]
@@ -230,8 +241,10 @@ impl Feedthrough {
 }
 
 /// How the triangular factor of the block-Hankel data is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Factorisation {
     /// From the Gram matrix where the condition number of the data allows it (up to 1e4 with columns of unit length), else
     /// by QR.
@@ -244,7 +257,8 @@ pub enum Factorisation {
 }
 
 /// How the block-Hankel data were factored.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DataFactor {
     /// [`Factorisation::Gram`] or [`Factorisation::Qr`].
     pub by: Factorisation,
@@ -254,8 +268,10 @@ pub struct DataFactor {
 }
 
 /// What to do with an unstable estimate of A. A stable one is never touched, however lightly damped.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Stability {
     /// Refuse it with its worst pole.
     #[default]
@@ -267,8 +283,10 @@ pub enum Stability {
 }
 
 /// Scaling of the channels inside of the method.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum ChannelScaling {
     /// The units of the record.
     None,
@@ -278,8 +296,10 @@ pub enum ChannelScaling {
 }
 
 /// The state at the first sample.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum InitialState {
     /// Estimated, one per experiment.
     #[default]

@@ -10,10 +10,10 @@
 
 use super::{AutoOrder, Order, OrderRule};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 
 /// What one rule proposes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OrderCandidate {
     /// The rule.
     pub rule: OrderRule,
@@ -22,7 +22,8 @@ pub struct OrderCandidate {
 }
 
 /// What a rule makes of one order.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OrderValue {
     /// The order.
     pub order: usize,
@@ -32,7 +33,8 @@ pub struct OrderValue {
 }
 
 /// The order of the model and its alternatives.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OrderReport {
     /// Number of states.
     pub order: usize,

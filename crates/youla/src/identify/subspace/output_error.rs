@@ -16,11 +16,11 @@ use crate::Result;
 use crate::linalg::{SequentialQr, block, leading_rank, least_squares};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// The outputs to which B, D and x0 were fitted.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum InputFit {
     /// Simulated from the inputs alone.
     Simulation,
@@ -32,7 +32,8 @@ pub enum InputFit {
 }
 
 /// How B and D were found and how well the model reproduces the outputs it was found from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct OutputFit {
     /// What was fitted.
     pub by: InputFit,

@@ -14,7 +14,6 @@ use super::curve::Curve;
 use super::hamiltonian::Crossings;
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 
 /// Steps before the tolerance is widened, by a factor of two with every further one.
 const PATIENCE: usize = 12;
@@ -26,8 +25,9 @@ const LIMIT: usize = 60;
 const ON_BOUNDARY: f64 = 4.0 * f64::EPSILON;
 
 /// Choices of [`hinf_norm`] and [`linf_norm`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct PeakOptions {
     /// Relative distance of the two bounds, 1e-12 to 1.
     pub tolerance: f64,
@@ -40,7 +40,8 @@ impl Default for PeakOptions {
 }
 
 /// The largest gain of a system over frequency.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PeakGain {
     /// The gain at `frequency`: a lower bound that is attained.
     pub value: f64,

@@ -7,11 +7,11 @@ use super::{check_amplitude, check_frequency};
 use crate::Result;
 use crate::lti::Discrete;
 use faer::Mat;
-use serde::{Deserialize, Serialize};
 
 /// A sweep from one frequency to another.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Chirp {
     /// Angular frequency at the start, rad/s.
     pub omega_start: f64,

@@ -19,12 +19,12 @@ use crate::lti::Discrete;
 use crate::{Error, Result};
 use faer::Mat;
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// A kind of excitation and its options.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(tag = "kind", rename_all = "kebab-case"))]
 pub enum Excitation {
     /// Square waves of random length.
     SquareWaves(SquareWaves),

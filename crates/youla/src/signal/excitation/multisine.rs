@@ -12,22 +12,22 @@ use crate::lti::Discrete;
 use faer::{Mat, c64};
 use rand::{Rng, RngExt};
 use rustfft::FftPlanner;
-use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
 /// A periodic signal with a flat line spectrum within a band.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Multisine {
     /// Period in samples; the lines are multiples of `2 pi / (period ts)` rad/s.
     pub period: usize,
     /// Lowest angular frequency, rad/s; the line zero is never used.
     pub omega_min: f64,
     /// Highest angular frequency, rad/s; up to below the Nyquist frequency where nothing is stated.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub omega_max: Option<f64>,
     /// Bands without lines, lowest and highest angular frequency each, rad/s; empty for none.
-    #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub omitted: Vec<[f64; 2]>,
     /// Greatest absolute value.
     pub amplitude: f64,

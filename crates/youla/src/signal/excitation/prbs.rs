@@ -10,11 +10,11 @@ use super::{check, check_amplitude};
 use crate::Result;
 use faer::Mat;
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
 
 /// Sequence of maximal length; the channels are the same sequence, shifted by equal parts of its period.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Prbs {
     /// Length n of the register, 2 to 20; the period is `hold (2^n - 1)` samples.
     pub order: usize,

@@ -8,7 +8,6 @@ use crate::Result;
 use crate::lti::Discrete;
 use faer::Mat;
 use rand::Rng;
-use serde::{Deserialize, Serialize};
 
 /// An excitation with a ramp. In a file the ramp stands beside the options of the excitation.
 ///
@@ -23,13 +22,14 @@ use serde::{Deserialize, Serialize};
 /// assert_eq!((alpha[(0, 0)], alpha[(50, 0)].abs(), alpha[(100, 0)].abs()), (0.0, 0.25, 0.5));
 /// # Ok::<(), youla::Error>(())
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct RampedExcitation {
     /// The signal at its full amplitude.
-    #[serde(flatten)]
+    #[cfg_attr(feature = "serde", serde(flatten))]
     pub excitation: Excitation,
     /// Time in seconds in which the amplitude grows linearly from 0 at the start, and falls to 0 at the end; 0 for none.
-    #[serde(default, skip_serializing_if = "is_zero")]
+    #[cfg_attr(feature = "serde", serde(default, skip_serializing_if = "is_zero"))]
     pub ramp: f64,
 }
 
@@ -68,6 +68,7 @@ fn weight(k: usize, samples: usize, ramp: f64) -> f64 {
     (to_the_nearer_end / ramp).min(1.0)
 }
 
+#[cfg(feature = "serde")]
 fn is_zero(ramp: &f64) -> bool {
     *ramp == 0.0
 }

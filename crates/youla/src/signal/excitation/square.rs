@@ -4,11 +4,11 @@ use super::{check, check_amplitude};
 use crate::Result;
 use faer::Mat;
 use rand::{Rng, RngExt};
-use serde::{Deserialize, Serialize};
 
 /// Square waves whose half periods are drawn from a range; a single fixed period would not excite persistently.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct SquareWaves {
     /// Shortest half period in samples.
     pub hold_min: usize,

@@ -22,11 +22,12 @@ use super::{SubspaceData, SubspaceOptions, UncertaintyMethod};
 use crate::lti::modes::mode;
 use crate::{Error, Mat, MatRef, Result, c64};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 
 /// When poles of different orders count as the same.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct StabilisationOptions {
     /// Largest change of the frequency from one order to the next, as a part of it.
     pub frequency: f64,
@@ -56,8 +57,10 @@ impl Default for StabilisationOptions {
 }
 
 /// Distance of two clusters.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum Linkage {
     /// Mean over all pairs of their poles.
     #[default]
@@ -67,8 +70,9 @@ pub enum Linkage {
 }
 
 /// What the next lower order says of a pole.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum PoleStability {
     /// There is none of this frequency.
     New,

@@ -1,11 +1,12 @@
 //! The choices for the uncertainty of a subspace estimate.
 
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 
 /// How the uncertainty of an estimate is found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
 pub enum UncertaintyMethod {
     /// Not at all.
     #[default]
@@ -25,15 +26,17 @@ pub enum UncertaintyMethod {
 /// let options = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
 /// assert_eq!(options.level, 0.95);
 /// ```
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Debug, Clone, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct UncertaintyOptions {
     /// The method.
     pub method: UncertaintyMethod,
     /// Probability with which an interval or region should hold the truth.
     pub level: f64,
     /// Blocks of time, for the delta method; absent: the Hankel columns over three times past and horizon, within 20 and 60.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub blocks: Option<usize>,
     /// Simulated records, for the bootstrap.
     pub replicates: usize,
@@ -49,6 +52,7 @@ impl Default for UncertaintyOptions {
 
 impl UncertaintyOptions {
     /// Whether nothing was chosen.
+    #[cfg(feature = "serde")]
     pub(in super::super) fn is_default(&self) -> bool {
         *self == UncertaintyOptions::default()
     }

@@ -77,6 +77,8 @@
 pub mod control;
 pub mod error;
 pub mod factor;
+#[cfg(test)]
+mod fixtures;
 pub mod identify;
 pub mod linalg;
 pub mod lti;

@@ -106,8 +106,8 @@ pub(super) fn power_of_two(size: f64, value: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::Error;
+    use crate::fixtures::bearing;
     use crate::linalg::balance;
-    use crate::lti::bearing;
 
     /// Largest difference between entries in the state coordinates that balance the second system.
     fn scaled_error<T: TimeDomain>(found: &StateSpace<T>, exact: &StateSpace<T>, scale: &[f64]) -> f64 {

@@ -15,6 +15,10 @@ pub struct Eigen {
 }
 
 impl Eigen {
+    /// Right and left eigenvectors of A, which is balanced first.
+    ///
+    /// # Errors
+    /// [`crate::Error::NoConvergence`] of the eigenvalues.
     pub fn new<T: TimeDomain>(model: &StateSpace<T>) -> Result<Self> {
         let scale = balance("the state matrix", model.a())?.scale;
         let n = model.order();

@@ -77,7 +77,7 @@ mod tests {
 
     #[test]
     fn gains_are_singular_values() {
-        let response = frequency_response(&crate::lti::bearing(), &[10.0, 300.0, 5000.0]).unwrap();
+        let response = frequency_response(&crate::fixtures::bearing(), &[10.0, 300.0, 5000.0]).unwrap();
         for (at, gains) in response.iter().zip(response.gains().unwrap()) {
             let squares: f64 = gains.iter().map(|g| g * g).sum();
             let norm = at.norm_l2().powi(2);

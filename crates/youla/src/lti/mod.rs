@@ -29,9 +29,3 @@ pub use simulate::{SimulationState, Simulator, simulate};
 pub use state_space::StateSpace;
 pub use time::{Continuous, Discrete, TimeDomain};
 pub use transfer::PolynomialMatrix;
-
-/// The bearing of eqs (3)-(12) at rest, for tests.
-#[cfg(test)]
-pub(crate) fn bearing() -> StateSpace<Continuous> {
-    youla_paper::rig::Bearing::default().plant().expect("the paper's parameters are finite")
-}

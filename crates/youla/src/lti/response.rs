@@ -203,8 +203,9 @@ fn size(v: c64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::bearing;
     use crate::linalg::eye;
-    use crate::lti::{Continuous, Discrete, bearing};
+    use crate::lti::{Continuous, Discrete};
     use faer::prelude::*;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;

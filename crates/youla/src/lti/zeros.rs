@@ -112,8 +112,9 @@ fn range(a: MatRef<'_, f64>, floor: f64) -> Result<(Mat<f64>, usize)> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::fixtures::bearing;
     use crate::linalg::eye;
-    use crate::lti::{Continuous, Discrete, bearing};
+    use crate::lti::{Continuous, Discrete};
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};

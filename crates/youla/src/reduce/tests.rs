@@ -2,8 +2,9 @@
 
 use super::*;
 use crate::control::normalised_right_factors;
+use crate::fixtures::bearing;
 use crate::linalg::{block, block_diagonal, eye};
-use crate::lti::{Continuous, Discrete, bearing, frequency_response};
+use crate::lti::{Continuous, Discrete, frequency_response};
 use crate::{Error, Mat, MatRef};
 use faer::Scale;
 use rand::SeedableRng;

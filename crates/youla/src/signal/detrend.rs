@@ -74,7 +74,7 @@ fn trend(values: &[f64], ts: f64, kind: Detrend) -> Trend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{lti::Discrete, units::Channel};
+    use crate::{lti::Discrete, signal::Channel};
 
     #[test]
     fn a_line_is_removed_and_returned() {

@@ -57,10 +57,9 @@ mod tests {
     use super::*;
     use crate::control::with_input_port;
     use crate::lti::simulate;
-    use youla_paper::rig::Bearing;
 
     fn bearing() -> StateSpace<Discrete> {
-        Bearing::default().plant().unwrap().zoh(Discrete::new(2e-4).unwrap()).unwrap()
+        crate::fixtures::bearing().zoh(Discrete::new(2e-4).unwrap()).unwrap()
     }
 
     fn noise(samples: usize, channels: usize) -> Mat<f64> {

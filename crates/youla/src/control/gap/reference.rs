@@ -3,10 +3,10 @@
 use super::{ChannelScales, coprime_margin, nu_gap};
 use crate::Mat;
 use crate::control::{LqrWeights, NoiseCovariance, kalman, lqr, observer_controller};
+use crate::fixtures::{bearing, degraded};
 use crate::linalg::eye;
 use crate::lti::{Continuous, Discrete, StateSpace};
 use faer::Scale;
-use youla_paper::rig::{Bearing, degraded};
 
 fn first_order(gain: f64, pole: f64) -> StateSpace<Continuous> {
     StateSpace::new(Scale(pole) * eye(1), eye(1), Scale(gain) * eye(1), Mat::zeros(1, 1), Continuous).unwrap()
@@ -47,7 +47,7 @@ fn examples_of_feedback_systems() {
 fn gaps_of_the_degraded_bearing() {
     let scales = ChannelScales::new(vec![1.0; 2], vec![3.3; 2]).unwrap();
     let model = |theta: f64| {
-        let plant = degraded(&Bearing::default().plant().unwrap(), 1.0 - theta, 1.0).unwrap();
+        let plant = degraded(&bearing(), 1.0 - theta, 1.0).unwrap();
         plant.zoh(Discrete::new(2e-4).unwrap()).unwrap().balanced().unwrap()
     };
     // b(G_nom, K) of an LQG design falls from 0.37 to 0.28: outputs weighted by 1 per um^2, commands by 100 per V^2, 1 V^2 of noise at

@@ -156,7 +156,7 @@ fn loops_are_stable_just_inside_and_unstable_just_outside() {
         let (plant, controller) = random_loop(seed, Discrete::new(1e-2).unwrap());
         check_loop(&plant, &controller, &mut rng);
     }
-    let bearing = crate::lti::bearing().zoh(Discrete::new(2e-4).unwrap()).unwrap();
+    let bearing = crate::fixtures::bearing().zoh(Discrete::new(2e-4).unwrap()).unwrap();
     let weights = LqrWeights::on_outputs(&bearing, eye(2).as_ref(), (Scale(20.0) * eye(2)).as_ref()).unwrap();
     let noise = NoiseCovariance::at_inputs(&bearing, eye(2).as_ref(), (Scale(0.1) * eye(2)).as_ref()).unwrap();
     let (f, l) = (lqr(&bearing, &weights).unwrap().f, kalman(&bearing, &noise).unwrap().l);

@@ -1,7 +1,6 @@
 //! The zones of ISO 14839-3, Mechanical vibration: vibration of rotating machinery equipped with active magnetic bearings,
 //! part 3: evaluation of stability margin.
 
-
 /// Zone by the peak of the sensitivity of an axis, its own loop opened and all others closed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]

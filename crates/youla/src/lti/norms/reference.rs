@@ -3,7 +3,8 @@
 //! entries by formula, so that they can be computed again elsewhere.
 
 use super::{PeakOptions, h2_norm, hankel_norm, hinf_norm};
-use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain, bearing};
+use crate::fixtures::bearing;
+use crate::lti::{Continuous, Discrete, StateSpace, TimeDomain};
 use faer::{Mat, Scale};
 
 /// n states, m inputs, p outputs; A is `scale` times a matrix of small numbers plus `shift` times the identity.

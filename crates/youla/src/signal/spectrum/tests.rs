@@ -3,8 +3,6 @@ use crate::lti::{StateSpace, frequency_response, simulate};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use youla_io::scratch::data_folder;
-use youla_io::{ChannelRef, ChannelSpec, TimeSource, read_mat};
 
 fn noise(samples: usize, channels: usize, seed: u64) -> Mat<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
@@ -98,24 +96,4 @@ fn threads_do_not_change_a_bit() {
         spectrum.density.iter().flat_map(|s| entries(s).collect::<Vec<_>>()).collect::<Vec<_>>()
     };
     assert_eq!(run(1), run(3));
-}
-
-/// Figures of the data set: anti-resonance 39 to 42 Hz, resonance 53.0 to 55.4 Hz.
-#[test]
-fn the_flexible_drive_resonates_where_it_should() {
-    let Some(folder) = data_folder() else { return };
-    let channels = ["d", "u", "y"].map(|n| ChannelSpec::from(n, ChannelRef::Name(format!("Data.signals.{n}")), ""));
-    let file = read_mat(folder.join("flexible_drive/fs2000/cycle1.mat")).unwrap();
-    let record = file.record(&channels, &TimeSource::ts(5e-4)).unwrap();
-    let [d, u, y] = ["d", "u", "y"].map(|n| record.matrix(&[n]).unwrap());
-    let welch = Welch { window: 4000, ..Welch::default() };
-    let found = respond(&d, &u, &y, record.time(), &welch).unwrap();
-    let curve: Vec<(f64, f64)> =
-        found.response.omega.iter().map(|w| w / TAU).zip(found.response.entry(0, 0).iter().map(|g| g.norm())).collect();
-    let between = |lo: f64, hi: f64| curve.iter().copied().filter(move |(f, _)| (lo..=hi).contains(f));
-    let (low, _) = between(30.0, 50.0).min_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-    let (high, _) = between(45.0, 70.0).max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
-    assert!((39.0..=42.0).contains(&low), "anti-resonance at {low} Hz");
-    assert!((53.0..=55.4).contains(&high), "resonance at {high} Hz");
-    println!("anti-resonance {low} Hz, resonance {high} Hz, {} segments", found.segments);
 }

@@ -1,7 +1,6 @@
 mod closed_loop;
 mod disturbance;
 mod horizons;
-mod measured;
 mod options;
 mod orders;
 mod properties;
@@ -95,7 +94,7 @@ fn bearing_record(samples: usize, noise: f64, seed: u64) -> (Mat<f64>, Mat<f64>,
     use rand_distr::StandardNormal;
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
     let time = Discrete::new(1.0 / 5000.0).unwrap();
-    let plant = youla_paper::rig::Bearing::default().plant().unwrap().balanced().unwrap().zoh(time).unwrap();
+    let plant = crate::fixtures::bearing().balanced().unwrap().zoh(time).unwrap();
     let levels = Mat::from_fn(samples.div_ceil(8), 2, |_, _| if rng.random::<bool>() { 0.5 } else { -0.5 });
     let u = Mat::from_fn(samples, 2, |k, j| levels[(k / 8, j)]);
     let clean = crate::lti::simulate(&plant, u.as_ref(), &[0.0; 6]).unwrap();

@@ -50,7 +50,7 @@ fn poles_and_shapes_are_those_of_the_models() {
 /// whatever follows the noise at 7 or less.
 #[test]
 fn clusters_find_the_modes_of_the_bearing() {
-    let plant = youla_paper::rig::Bearing::default().plant().unwrap();
+    let plant = crate::fixtures::bearing();
     let truth: Vec<_> = plant.modes().unwrap().into_iter().filter(|m| m.zeta < 0.5).collect();
     let orders: Vec<usize> = (1..=24).collect();
     for seed in 1..=3 {

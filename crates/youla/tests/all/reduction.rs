@@ -1,12 +1,12 @@
 //! What each method makes of a noisy G(S): 16 states to 6 on the simulated bearing with half of A, in open and closed loop.
-#![allow(missing_docs)]
 
 use std::path::Path;
 use youla::factor::CoprimeFactors;
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionMethod, ReductionOptions, reduce, reduce_in_loop};
 use youla::validate::certify;
-use youla_run::{Identification, StageClock, demo, identify};
+use youla_paper::demo;
+use youla_run::{Identification, StageClock, identify};
 
 fn identified(seed: u64) -> Identification {
     let mut demo = demo(seed).unwrap();

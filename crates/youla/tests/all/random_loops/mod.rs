@@ -1,14 +1,11 @@
-//! 10 000 random loops, continuous and discrete: every one factorises with a Bezout residual of at most 1e-8, from which G
+//! 1000 random loops, or as many as `YOULA_LOOPS` says, continuous and discrete: every one factorises with a Bezout residual of at most 1e-8, from which G
 //! and K come back, or is refused with the condition that forbids it, and the condition is found out here by other means
 //! (`judge.rs`). What is drawn is told in `draw.rs`.
-#![allow(missing_docs)]
 
-#[path = "../common/mod.rs"]
-mod common;
 mod draw;
 mod judge;
 
-use common::{random_stable, rng};
+use crate::common::{random_stable, rng};
 use draw::{Drawn, foreign, plant};
 use judge::{NEAR, Nearness, condition_of_loop, worst_of_feedback, worst_of_loop};
 use rand::RngExt;
@@ -20,7 +17,8 @@ use youla::factor::CoprimeFactors;
 use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};
 use youla::{Error, Mat, Result};
 
-const LOOPS: u64 = 10_000;
+/// Loops where `YOULA_LOOPS` does not say another number.
+const LOOPS: u64 = 1000;
 const RESIDUAL: f64 = 1e-8;
 
 /// The six constructions: their factors hold.
@@ -45,7 +43,8 @@ type Refused = Box<(Error, Nearness)>;
 #[test]
 fn every_loop_factorises_or_is_refused_for_a_reason() {
     let discrete = Discrete::new(0.1).unwrap();
-    let outcomes: Vec<Outcome> = (0..LOOPS)
+    let loops = std::env::var("YOULA_LOOPS").map_or(LOOPS, |number| number.parse().unwrap());
+    let outcomes: Vec<Outcome> = (0..loops)
         .into_par_iter()
         .map(|seed| if seed % 2 == 0 { one_loop(seed, Continuous) } else { one_loop(seed, discrete) })
         .collect();
@@ -58,9 +57,9 @@ fn every_loop_factorises_or_is_refused_for_a_reason() {
         }
     }
     let shown = failures.len().min(20);
-    assert!(failures.is_empty(), "{} of {LOOPS} loops, such as\n{}", failures.len(), failures[..shown].join("\n"));
+    assert!(failures.is_empty(), "{} of {loops} loops, such as\n{}", failures.len(), failures[..shown].join("\n"));
     // Nothing of this passes by refusing everything.
-    let share = |names: &[&str]| names.iter().filter_map(|name| shares.get(name)).sum::<usize>() as f64 / LOOPS as f64;
+    let share = |names: &[&str]| names.iter().filter_map(|name| shares.get(name)).sum::<usize>() as f64 / loops as f64;
     assert!(share(&ACCEPTED) > 0.65, "{shares:?}");
     for (name, least) in ACCEPTED.iter().zip([0.14, 0.1, 0.14, 0.14, 0.05, 0.05]) {
         assert!(share(&[name]) > least, "{name}: {shares:?}");

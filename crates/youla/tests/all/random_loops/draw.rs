@@ -1,6 +1,6 @@
 //! Random plants and random controllers: what a user may bring, the ordinary and the awkward.
 
-use super::common::{normal, random_system};
+use crate::common::{normal, random_system};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use youla::Mat;

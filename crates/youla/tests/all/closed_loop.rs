@@ -1,10 +1,7 @@
 //! Identification of the bearing from its closed loop: what feedback does to the methods for open loops, and what not to
 //! those that start from the predictor nor to the modified Hansen scheme.
-#![allow(missing_docs)]
 
-mod common;
-
-use common::feedback::{Loop, options};
+use crate::common::feedback::{Loop, options};
 use youla::Mat;
 use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed};
 use youla::identify::innovation_form::{Convergence, DeviationOptions, Structure, hansen_structured};
@@ -42,7 +39,7 @@ fn only_the_methods_for_open_loops_have_an_error_floor() {
     let errors = |samples: usize| {
         let records = [1, 2, 3].map(|seed| bearing.record(samples, 1.0, seed));
         let by =
-            |weight| median([0, 1, 2].map(|k| bearing.error(&bearing.identify(weight, &records[k].0, &records[k].1))));
+            |method| median([0, 1, 2].map(|k| bearing.error(&bearing.identify(method, &records[k].0, &records[k].1))));
         let scheme = median([0, 1, 2].map(|k| bearing.error(&bearing.hansen(&records[k].0, &records[k].1))));
         let direct = [SubspaceMethod::N4sid, SubspaceMethod::Cva].map(by);
         let predictor = [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS].map(by);
@@ -72,8 +69,8 @@ fn an_unstable_bearing_is_found_unstable() {
     assert!((truth.norm() - 1.0084).abs() < 2e-4);
     for seed in 1..=3 {
         let (u, y) = bearing.record(8_000, 0.1, seed);
-        for weight in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS] {
-            let found = outside(&bearing.identify(weight, &u, &y));
+        for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS] {
+            let found = outside(&bearing.identify(method, &u, &y));
             assert_eq!(found.len(), 1, "{method:?}, seed {seed}: {found:?}");
             let (radius, angle) = ((found[0].norm() - truth.norm()).abs(), (found[0].arg() - truth.arg()).abs());
             assert!(radius < 6e-4 && angle < 1.5e-3, "{method:?}, seed {seed}: {radius:e}, {angle:e}");
@@ -201,15 +198,15 @@ fn innovation_form_refuses_an_unstable_plant() {
 #[test]
 fn automatic_horizons_do_nearly_as_well_as_known_ones() {
     let bearing = Loop::new(0.0);
-    for weight in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
+    for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
         let automatic_horizon = Some(AutomaticHorizon { max: 150 });
-        let options = SubspaceOptions { weight, automatic_horizon, order: Order::Fixed(6), ..options() };
+        let options = SubspaceOptions { method, automatic_horizon, order: Order::Fixed(6), ..options() };
         let errors = [1, 2, 3, 4, 5].map(|seed| {
             let (u, y) = bearing.record(16_000, 1.0, seed);
             let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
             let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
             assert!(found.past > 30, "{method:?}: {}", found.past);
-            [bearing.error(&found.model), bearing.error(&bearing.identify(weight, &u, &y))]
+            [bearing.error(&found.model), bearing.error(&bearing.identify(method, &u, &y))]
         });
         let [automatic, known] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 5.0);
         println!("{method:?}: {automatic:.3} against {known:.3}");

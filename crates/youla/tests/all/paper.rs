@@ -2,11 +2,8 @@
 //!
 //! Identities hold to 1e-12 relative (states balanced; continuous, or at 5 kHz). Numbers that the paper does not print
 //! follow from its eqs (9)-(12).
-#![allow(missing_docs)]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use youla::control::closed_loop;
 use youla::lti::{Continuous, Mode, StateSpace, TimeDomain, frequency_response};
 use youla::validate::fit;

@@ -1,11 +1,6 @@
 //! What the uncertainty of the Hansen scheme claims, held against many simulated records of the bearing.
-#![allow(missing_docs)]
 
-#[path = "common/bearing_loop.rs"]
-mod bearing_loop;
-mod common;
-
-use bearing_loop::{Coverage, Design, Loop, options};
+use crate::common::bearing_loop::{Coverage, Design, Loop, options};
 use rayon::prelude::*;
 use youla::c64;
 use youla::identify::hansen::hansen;

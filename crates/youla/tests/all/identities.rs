@@ -5,11 +5,8 @@
 //! unstable plants. Where a random plant is so close to one that nothing stabilises (an unstable pole beside a zero) that
 //! its factors have a condition number k = ||right|| ||left|| above 1e4, the tolerance is 1e-13 k. Negative controls show
 //! that a wrong sign cannot pass.
-#![allow(missing_docs)]
 
-mod common;
-
-use common::*;
+use crate::common::*;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use youla::Mat;

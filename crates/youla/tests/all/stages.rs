@@ -1,9 +1,9 @@
 //! The whole chain on the simulated bearing: seeded statistics and independence of the number of threads.
-#![allow(missing_docs)]
 
 use std::path::Path;
 use youla_greybox::refine::{RefineNoise, RefineOptions};
-use youla_run::{Identification, Method, StageClock, demo, identify};
+use youla_paper::demo;
+use youla_run::{Identification, Method, StageClock, identify};
 
 fn run_demo(seed: u64) -> Identification {
     let demo = demo(seed).unwrap();
@@ -116,7 +116,8 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
 #[test]
 fn a_declared_structure_is_estimated_from_the_scheme_on() {
     use youla_greybox::hansen_pem::PemStart;
-    use youla_greybox::{BearingStructure, Declaration, Template};
+    use youla_greybox::{Declaration, Template};
+    use youla_paper::BearingStructure;
     use youla_run::GreyBoxSettings;
     let mut demo = demo(2).unwrap();
     let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };

@@ -1,0 +1,13 @@
+//! What the method promises: identities, published values, seeded statistics on simulated loops and on measured records.
+#![allow(missing_docs)]
+
+mod closed_loop;
+mod common;
+mod excitation;
+mod identities;
+mod measured;
+mod paper;
+mod random_loops;
+mod reduction;
+mod stages;
+mod uncertainty;

@@ -31,7 +31,7 @@ pub struct DeviationSignals {
 /// saturation and unknown excitations are accounted for; known excitations serve as a check of the controller.
 ///
 /// # Errors
-/// [`youla::Error::TooShort`] for a record that the settling samples use up; shapes.
+/// [`youla::Error::TooFewSamples`] for a record that the settling samples use up; shapes.
 pub fn deviation_signals(
     factors: &CoprimeFactors<Discrete>,
     records: &[LoopRecord],
@@ -42,13 +42,9 @@ pub fn deviation_signals(
     let mut expected_alpha = Vec::new();
     for record in records {
         if record.samples() <= settle {
-            let (record, samples) = (record.name.clone(), record.samples());
-            return Err(Error::Method(youla::Error::TooShort {
-                record,
-                samples,
-                dropped: settle,
-                key: "`settle` in [factors]",
-            }));
+            let what = format!("record {}, of which `settle` in [factors] drops the first {settle}", record.name);
+            let (found, needed) = (record.samples(), settle + 1);
+            return Err(Error::Method(youla::Error::TooFewSamples { what, found, needed }));
         }
         let kept = |m: &Mat<f64>| m.subrows(settle, m.nrows() - settle).to_owned();
         let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;

@@ -178,13 +178,8 @@ pub(super) fn verify_record(
     };
     let skip = found.settings.verification.skip;
     if record.samples() <= skip {
-        let (record, samples) = (record.name.clone(), record.samples());
-        return Err(Error::Method(youla::Error::TooShort {
-            record,
-            samples,
-            dropped: skip,
-            key: "`skip` in [verification]",
-        }));
+        let what = format!("record {}, of which `skip` in [verification] drops the first {skip}", record.name);
+        return Err(Error::Method(youla::Error::TooFewSamples { what, found: record.samples(), needed: skip + 1 }));
     }
     let record_name = record.name.clone();
     match predicted {

@@ -10,6 +10,8 @@ use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
 use youla::signal::RampedExcitation;
 use youla_greybox::GreyBoxOptions;
 
+const NEEDS_LOOP: &str = "the study reduces models without their loop; choose another method or order";
+
 /// The tables of the settings file; its comments say why each value is what it is.
 ///
 /// ```
@@ -165,7 +167,7 @@ impl PaperSettings {
     /// Fails for the first value without meaning.
     ///
     /// # Errors
-    /// [`youla::Error::OutOfRange`] naming the key; [`youla::Error::NeedsLoop`] for a reduction that weighs or measures the loop: the study
+    /// [`youla::Error::OutOfRange`] naming the key; [`youla::Error::Unsupported`] for a reduction that weighs or measures the loop: the study
     /// reduces models alone.
     pub fn check(&self) -> Result<()> {
         let (c, s, x, e) = (&self.controller, &self.study, &self.crossover, &self.experiments);
@@ -199,10 +201,13 @@ impl PaperSettings {
             count(what, samples, 100, 100_000_000)?;
         }
         if self.reduction.method == ReductionMethod::Weighted {
-            return Err(Error::Method(youla::Error::NeedsLoop { what: "[reduction] method = \"weighted\"" }));
+            return Err(Error::Method(youla::Error::Unsupported { what: "[reduction] method = \"weighted\"", instead: NEEDS_LOOP }));
         }
         if matches!(self.reduction.order, ReducedOrder::ClosedLoop(_)) {
-            return Err(Error::Method(youla::Error::NeedsLoop { what: "[reduction] order = { closed-loop = ... }" }));
+            return Err(Error::Method(youla::Error::Unsupported {
+                what: "[reduction] order = { closed-loop = ... }",
+                instead: NEEDS_LOOP,
+            }));
         }
         count("experiments.settle", e.settle, 0, e.samples.min(e.verification_samples) / 2)?;
         count("experiments.harmonics", e.harmonics, 0, 20)

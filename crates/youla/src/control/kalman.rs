@@ -63,8 +63,7 @@ pub struct ObserverGain {
 /// ones left alone. Accuracy: that of [`crate::linalg::care`] and [`crate::linalg::dare`].
 ///
 /// # Errors
-/// [`Error::Shape`], [`Error::NotFinite`], [`Error::NotSymmetric`], [`Error::NotPositiveDefinite`],
-/// [`Error::NotPositiveSemidefinite`] name the covariance;
+/// [`Error::Shape`], [`Error::NotFinite`], [`Error::NotSymmetric`], [`Error::NotPositive`] name the covariance;
 /// [`Error::NotDetectable`] the mode that no output shows, [`Error::NotStabilisable`] the mode on the stability boundary
 /// that no noise moves; [`Error::NoSolution`].
 ///
@@ -167,6 +166,6 @@ mod tests {
         assert!(with_output([[1.0, 1.0]], driven, 1.0).is_ok());
         assert!(matches!(with_output([[0.0, 1.0]], driven, 1.0), Err(Error::NotDetectable { .. })));
         assert!(matches!(with_output([[1.0, 1.0]], [[0.0, 0.0], [0.0, 1.0]], 1.0), Err(Error::NotStabilisable { .. })));
-        assert!(matches!(with_output([[1.0, 1.0]], driven, 0.0), Err(Error::NotPositiveDefinite { .. })));
+        assert!(matches!(with_output([[1.0, 1.0]], driven, 0.0), Err(Error::NotPositive { .. })));
     }
 }

@@ -80,7 +80,7 @@ pub fn flip_feedback_sign(gain: MatRef<'_, f64>) -> Mat<f64> {
 /// [`care`] and [`dare`].
 ///
 /// # Errors
-/// [`crate::Error::Shape`], [`crate::Error::NotFinite`], [`crate::Error::NotSymmetric`], [`crate::Error::NotPositiveDefinite`], [`crate::Error::NotPositiveSemidefinite`] name the weight;
+/// [`crate::Error::Shape`], [`crate::Error::NotFinite`], [`crate::Error::NotSymmetric`], [`crate::Error::NotPositive`] name the weight;
 /// [`crate::Error::NotStabilisable`], [`crate::Error::NotDetectable`] name the mode in the way; [`crate::Error::NoSolution`].
 ///
 /// ```
@@ -151,7 +151,7 @@ mod tests {
     fn indefinite_weights_are_refused() {
         let weights = LqrWeights { q: 0.01 * eye(3), r: eye(1), s: Some(Mat::full(3, 1, 1.0)) };
         let refused = lqr(&plant(Continuous), &weights);
-        assert!(matches!(refused, Err(crate::Error::NotPositiveSemidefinite { .. })));
+        assert!(matches!(refused, Err(crate::Error::NotPositive { .. })));
     }
 
     #[test]

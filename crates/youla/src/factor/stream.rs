@@ -101,13 +101,8 @@ impl<S: SampleStream> SampleStream for YoulaStream<S> {
         let wanted = rows.nrows();
         let count = if self.read < self.settle { 0 } else { self.filtered(rows)? };
         if wanted > 0 && self.read <= self.settle {
-            let record = format!("experiment {}", self.experiment + 1);
-            return Err(Error::TooShort {
-                record,
-                samples: self.read,
-                dropped: self.settle,
-                key: "the number of samples to settle",
-            });
+            let what = format!("experiment {}, of which the first {} samples settle", self.experiment + 1, self.settle);
+            return Err(Error::TooFewSamples { what, found: self.read, needed: self.settle + 1 });
         }
         Ok(count)
     }

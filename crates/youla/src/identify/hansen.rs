@@ -140,6 +140,6 @@ mod tests {
         assert!(gap(&whole.plant, &streamed.plant) < 1e-10);
         assert!(gap(&whole.deviation.model, &streamed.deviation.model) < 1e-10);
         let short = hansen_stream(&factors, stream(), 900, &options);
-        assert!(matches!(short, Err(Error::TooShort { samples: 900, dropped: 900, .. })));
+        assert!(matches!(short, Err(Error::TooFewSamples { found: 900, needed: 901, .. })));
     }
 }

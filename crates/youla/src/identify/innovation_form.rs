@@ -109,8 +109,9 @@ pub fn hansen_structured(
 fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
     check_uncertainty(options)?;
     let refused = |what: &str, value: f64, must| Err(Error::OutOfRange { what: what.into(), value, must });
-    if let Some(delay) = options.delays.iter().find(|delay| **delay > 0) {
-        return refused("a delay with structure = \"innovation\"", *delay as f64, "0: take structure = \"free\"");
+    if options.delays.iter().any(|delay| *delay > 0) {
+        let (what, instead) = ("a delay with structure = \"innovation\"", "take structure = \"free\"");
+        return Err(Error::Unsupported { what, instead });
     }
     if deviation.iterations == 0 {
         return refused("the number of iterations in [deviation]", 0.0, "at least 1");

@@ -36,11 +36,11 @@ impl UnitDiagonal {
 /// Fails unless the matrix is positive semidefinite up to rounding.
 ///
 /// # Errors
-/// [`Error::NotPositiveSemidefinite`] naming `what`.
+/// [`Error::NotPositive`] naming `what`.
 pub(crate) fn check_semidefinite(what: &str, a: MatRef<'_, f64>) -> Result<()> {
     let eigenvalue = UnitDiagonal::of(a).smallest_eigenvalue(what)?;
     if eigenvalue < -1e-10 {
-        return Err(Error::NotPositiveSemidefinite { what: what.to_owned(), eigenvalue });
+        return Err(Error::NotPositive { what: what.to_owned(), must: "positive semidefinite", eigenvalue });
     }
     Ok(())
 }

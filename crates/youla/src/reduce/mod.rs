@@ -102,8 +102,8 @@ impl<T: TimeDomain> Reduction<T> {
 ///
 /// # Errors
 /// [`crate::Error::Unstable`] with the pole where a method needs a stable system: nothing is split off or reflected silently.
-/// [`crate::Error::OrderAboveMinimal`] and [`crate::Error::OrderBelowKept`] for an order that is not possible,
-/// [`crate::Error::NeedsLoop`] for choices that need the loop, [`crate::Error::OutOfRange`] for a number.
+/// [`crate::Error::Order`] for an order that is not possible,
+/// [`crate::Error::Unsupported`] for choices that need the loop, [`crate::Error::OutOfRange`] for a number.
 ///
 /// ```
 /// use youla::{Mat, linalg::eye, lti::{Continuous, StateSpace}};
@@ -128,7 +128,7 @@ pub fn reduce<T: TimeDomain>(system: &StateSpace<T>, options: &ReductionOptions)
 /// not be.
 ///
 /// # Errors
-/// As [`reduce`]; [`crate::Error::Unstable`] for an unstable weight, [`crate::Error::NoErrorBound`] for an order by bound.
+/// As [`reduce`]; [`crate::Error::Unstable`] for an unstable weight, [`crate::Error::Unsupported`] for an order by bound.
 pub fn reduce_weighted<T: TimeDomain>(
     system: &StateSpace<T>,
     weights: &FrequencyWeights<T>,

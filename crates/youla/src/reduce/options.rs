@@ -103,7 +103,12 @@ impl ReductionOptions {
             ReducedOrder::ClosedLoop(limit) if !not_negative(limit) => {
                 return refuse("the closed-loop error", limit, "zero or positive");
             }
-            ReducedOrder::Bound(_) if self.method == ReductionMethod::Weighted => return Err(Error::NoErrorBound),
+            ReducedOrder::Bound(_) if self.method == ReductionMethod::Weighted => {
+                return Err(Error::Unsupported {
+                    what: "order = { bound = ... } with method = \"weighted\"",
+                    instead: "the weighted reduction has no error bound; take order = { fixed = ... } or { closed-loop = ... }",
+                });
+            }
             _ => {}
         }
         if !not_negative(self.minimality) {

@@ -6,9 +6,12 @@ use super::split::{Split, split};
 use super::weighted::{FrequencyWeights, decompose};
 use super::{ReducedOrder, Reduction, ReductionMethod, ReductionOptions};
 use crate::control::normalised_right_factors;
+use crate::error::OrderLimit;
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Mat, Result, c64};
 use std::ops::RangeInclusive;
+
+const NEEDS_LOOP: &str = "it needs the loop of the model with its controller; use reduce_in_loop";
 
 pub(super) struct Reducer<T: TimeDomain> {
     method: ReductionMethod,
@@ -71,7 +74,9 @@ impl<T: TimeDomain> Reducer<T> {
             (ReductionMethod::NormalisedCoprime, _) => {
                 HankelDecomposition::new(normalised_right_factors(&part)?.balanced()?)?
             }
-            (ReductionMethod::Weighted, None) => return Err(Error::NeedsLoop { what: "method = \"weighted\"" }),
+            (ReductionMethod::Weighted, None) => {
+                return Err(Error::Unsupported { what: "method = \"weighted\"", instead: NEEDS_LOOP });
+            }
             (ReductionMethod::Weighted, Some(weights)) => {
                 part.require_stable(UNSTABLE)?;
                 decompose(part.clone(), weights)?
@@ -112,13 +117,17 @@ impl<T: TimeDomain> Reducer<T> {
         let (kept, minimal) = (self.kept.order(), self.minimal_order());
         match choice {
             ReducedOrder::Minimal => Ok(minimal),
-            ReducedOrder::Fixed(order) if order > minimal => Err(Error::OrderAboveMinimal { order, minimal }),
-            ReducedOrder::Fixed(order) if order < kept => Err(Error::OrderBelowKept { order, kept }),
+            ReducedOrder::Fixed(order) if order > minimal => {
+                Err(Error::Order { order, limit: OrderLimit::Minimal(minimal) })
+            }
+            ReducedOrder::Fixed(order) if order < kept => Err(Error::Order { order, limit: OrderLimit::Kept(kept) }),
             ReducedOrder::Fixed(order) => Ok(order),
             ReducedOrder::Bound(bound) => {
                 Ok((kept..minimal).find(|order| self.tail(*order) <= bound).unwrap_or(minimal))
             }
-            ReducedOrder::ClosedLoop(_) => Err(Error::NeedsLoop { what: "order = { closed-loop = ... }" }),
+            ReducedOrder::ClosedLoop(_) => {
+                Err(Error::Unsupported { what: "order = { closed-loop = ... }", instead: NEEDS_LOOP })
+            }
         }
     }
 

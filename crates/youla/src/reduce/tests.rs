@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::control::normalised_right_factors;
+use crate::error::OrderLimit;
 use crate::fixtures::bearing;
 use crate::linalg::{block, block_diagonal, eye};
 use crate::lti::{Continuous, Discrete, frequency_response};
@@ -105,7 +106,7 @@ fn exact_cancellations_are_found_and_removed() {
         assert!(error(&reduced.model, &truth, &omega) < 1e-10 * reduced.hankel[0]);
     }
     let options = ReductionOptions { order: ReducedOrder::Fixed(7), ..Default::default() };
-    assert!(matches!(reduce(&system, &options), Err(Error::OrderAboveMinimal { order: 7, minimal: 6 })));
+    assert!(matches!(reduce(&system, &options), Err(Error::Order { order: 7, limit: OrderLimit::Minimal(6) })));
 }
 
 #[test]
@@ -203,7 +204,7 @@ fn check_split<T: TimeDomain>(system: &StateSpace<T>, boundary: f64, omega: &[f6
     }
     if !minimal.kept.is_empty() {
         let below = ReductionOptions { order: ReducedOrder::Fixed(minimal.kept.len() - 1), ..options };
-        assert!(matches!(reduce(system, &below), Err(Error::OrderBelowKept { .. })));
+        assert!(matches!(reduce(system, &below), Err(Error::Order { limit: OrderLimit::Kept(_), .. })));
     }
 }
 
@@ -320,7 +321,7 @@ fn weights_lower_the_error_where_they_count() {
     };
     assert!(of(&weighted.model) < 0.7 * of(&plain.model), "{} {}", of(&weighted.model), of(&plain.model));
     let bound = ReductionOptions { order: ReducedOrder::Bound(0.1), ..Default::default() };
-    assert!(matches!(reduce_weighted(&system, &weights, &bound), Err(Error::NoErrorBound)));
+    assert!(matches!(reduce_weighted(&system, &weights, &bound), Err(Error::Unsupported { .. })));
     let unstable = FrequencyWeights {
         output: weights.output,
         input: random_unstable(9, Continuous, &mut ChaCha8Rng::seed_from_u64(46)),
@@ -393,9 +394,9 @@ fn empty<T: TimeDomain>(n: usize, m: usize, p: usize, time: T, method: Reduction
 fn choices_that_need_the_loop_are_refused_without_it() {
     let system = bearing();
     let closed = ReductionOptions { order: ReducedOrder::ClosedLoop(0.1), ..Default::default() };
-    assert!(matches!(reduce(&system, &closed), Err(Error::NeedsLoop { .. })));
+    assert!(matches!(reduce(&system, &closed), Err(Error::Unsupported { .. })));
     let weighted = ReductionOptions { method: ReductionMethod::Weighted, ..Default::default() };
-    assert!(matches!(reduce(&system, &weighted), Err(Error::NeedsLoop { .. })));
+    assert!(matches!(reduce(&system, &weighted), Err(Error::Unsupported { .. })));
     for boundary in [0.1, f64::NAN, f64::NEG_INFINITY] {
         let options = ReductionOptions { stability_boundary: Some(boundary), ..Default::default() };
         assert!(matches!(reduce(&system, &options), Err(Error::OutOfRange { .. })), "{boundary}");

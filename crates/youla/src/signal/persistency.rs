@@ -38,8 +38,8 @@ impl Persistency {
         if self.rank == self.needed {
             return Ok(());
         }
-        let (block_rows, rank, needed, condition) = (self.block_rows, self.rank, self.needed, self.condition);
-        Err(Error::InsufficientExcitation { what: what.to_owned(), block_rows, rank, needed, condition })
+        let (block_rows, rank, needed) = (self.block_rows, self.rank, self.needed);
+        Err(Error::InsufficientExcitation { what: what.to_owned(), block_rows, rank, needed })
     }
 }
 

@@ -334,7 +334,10 @@ fn rms_or_one(record: MatRef<'_, f64>, j: usize) -> f64 {
 /// Refuses a horizon, past or initial state without meaning.
 pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
     if options.initial_state == InitialState::SteadyState {
-        return Err(Error::SteadyBlackBox);
+        return Err(Error::Unsupported {
+            what: "initial_state = \"steady-state\" for a black box",
+            instead: "it serves physical structures only; take \"estimated\" or \"zero\"",
+        });
     }
     if let Some(automatic) = options.automatic_horizon {
         return at_least("the largest past", automatic.max, 1, "at least 1 block row");

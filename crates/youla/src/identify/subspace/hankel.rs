@@ -43,7 +43,7 @@ impl HankelFactor {
     pub(super) fn require_excitation(&self) -> Result<f64> {
         let needed = (self.past + self.horizon) * self.inputs;
         let inputs = self.r.as_ref().submatrix(0, 0, needed.min(self.r.nrows()), needed);
-        require_excitation(inputs, self.horizon)
+        require_excitation(inputs, self.inputs)
     }
 
     /// `R32`: what the past inputs and outputs tell about the future outputs beyond the future inputs, transposed.
@@ -90,7 +90,7 @@ impl HankelFactor {
 
 /// Reciprocal condition number of the inputs' Hankel matrix with rows of unit length, from their columns of R: an estimate
 /// where they are far from dependent.
-pub(super) fn require_excitation(inputs: MatRef<'_, f64>, horizon: usize) -> Result<f64> {
+pub(super) fn require_excitation(inputs: MatRef<'_, f64>, channels: usize) -> Result<f64> {
     let needed = inputs.ncols();
     let length: Vec<f64> = inputs.col_iter().map(|column| column.norm_l2().max(f64::MIN_POSITIVE)).collect();
     let unit = Mat::from_fn(inputs.nrows(), needed, |i, j| inputs[(i, j)] / length[j]);
@@ -110,7 +110,12 @@ pub(super) fn require_excitation(inputs: MatRef<'_, f64>, horizon: usize) -> Res
     })?;
     let rank = sigma.iter().filter(|s| **s > 1e-12 * sigma[0]).count();
     if rank < needed {
-        return Err(Error::NotExciting { rank, needed, horizon });
+        return Err(Error::InsufficientExcitation {
+            what: "the set of inputs".into(),
+            block_rows: needed / channels.max(1),
+            rank,
+            needed,
+        });
     }
     Ok(sigma[needed - 1] / sigma[0])
 }

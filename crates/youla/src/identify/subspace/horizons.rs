@@ -101,7 +101,7 @@ impl SubspaceData<'_> {
     ///
     /// # Errors
     /// Those that concern all models: [`crate::Error::OutOfRange`] for a horizon or past longer than those of the factor,
-    /// [`crate::Error::FactorOptionsChanged`], [`crate::Error::NotExciting`]. What concerns one model stands in its place.
+    /// [`crate::Error::Unsupported`], [`crate::Error::InsufficientExcitation`]. What concerns one model stands in its place.
     ///
     /// ```
     /// use youla::{Mat, lti::Discrete};

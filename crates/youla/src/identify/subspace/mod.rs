@@ -148,8 +148,8 @@ impl SubspaceModel {
 ///
 /// # Errors
 /// [`crate::Error::Shape`] where records differ in length or channels, [`crate::Error::NotFinite`],
-/// [`crate::Error::TooFewSamples`], [`crate::Error::ConstantChannel`], [`crate::Error::NotExciting`],
-/// [`crate::Error::OrderBeyondHorizon`], [`crate::Error::OutOfRange`] for a horizon below 2 or an order of 0,
+/// [`crate::Error::TooFewSamples`], [`crate::Error::ConstantChannel`], [`crate::Error::InsufficientExcitation`],
+/// [`crate::Error::Order`], [`crate::Error::OutOfRange`] for a horizon below 2 or an order of 0,
 /// [`crate::Error::Unstable`] unless unstable estimates are allowed.
 ///
 /// # Accuracy
@@ -264,7 +264,7 @@ impl<'a> SubspaceData<'a> {
     /// past at most those of the factor; scaling, factorisation and delays are part of the factor.
     ///
     /// # Errors
-    /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::FactorOptionsChanged`] for another
+    /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Unsupported`] for another
     /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
         let options = self.checked(options)?;
@@ -278,7 +278,10 @@ impl<'a> SubspaceData<'a> {
         if (options.scaling, options.factorisation, &options.delays) != (held.scaling, held.factorisation, &held.delays)
             || automatic && options.automatic_horizon != held.automatic_horizon
         {
-            return Err(Error::FactorOptionsChanged);
+            return Err(Error::Unsupported {
+                what: "another scaling, factorisation, delay or automatic horizon than that of the factored data",
+                instead: "factor the records again",
+            });
         }
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;

@@ -7,6 +7,7 @@ use super::order::Evidence;
 use super::projection::{Projection, canonical_correlations, project};
 use super::realisation::{OutputPair, StateSequences, realise};
 use super::{SubspaceMethod, SubspaceOptions};
+use crate::error::OrderLimit;
 use crate::{Error, Result};
 use faer::MatRef;
 
@@ -55,7 +56,7 @@ impl OpenLoop {
         let (outputs, horizon) = (self.factor.outputs, self.factor.horizon);
         let largest = (horizon - 1) * outputs;
         if order > largest {
-            return Err(Error::OrderBeyondHorizon { order, largest, horizon });
+            return Err(Error::Order { order, limit: OrderLimit::Horizon { largest, horizon } });
         }
         Ok(self.projection.observability(order))
     }

@@ -9,6 +9,7 @@
 //! unusable where measured data have their largest gap after the first value, as they often do.
 
 use super::{AutoOrder, Order, OrderRule};
+use crate::error::OrderLimit;
 use crate::{Error, Result};
 
 /// What one rule proposes.
@@ -87,7 +88,7 @@ pub(super) fn choose(
     let rules = [OrderRule::Svc, OrderRule::Nic, OrderRule::Gap];
     let (order, rule, max, values) = match choice {
         Order::Fixed(order) if order > largest => {
-            return Err(Error::OrderBeyondHorizon { order, largest, horizon: evidence.horizon });
+            return Err(Error::Order { order, limit: OrderLimit::Horizon { largest, horizon: evidence.horizon } });
         }
         Order::Fixed(order) => (order, None, largest, Vec::new()),
         Order::Auto(auto) if auto.rule.needs_models() => {

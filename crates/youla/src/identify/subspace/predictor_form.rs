@@ -13,6 +13,7 @@ use super::order::Evidence;
 use super::realisation::OutputPair;
 use super::varx::{StateMap, Varx};
 use super::{SubspaceMethod, SubspaceOptions, parsim, pbsid, ssarx};
+use crate::error::OrderLimit;
 use crate::linalg::{block, regress};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
@@ -77,7 +78,7 @@ impl<'a> Sequences<'a> {
     fn new(varx: &'a Varx, map: &StateMap, order: usize) -> Result<Self> {
         let largest = map.by_past.ncols();
         if order > largest {
-            return Err(Error::OrderBeyondHorizon { order, largest, horizon: varx.horizon });
+            return Err(Error::Order { order, limit: OrderLimit::Horizon { largest, horizon: varx.horizon } });
         }
         let by_past = map.by_past.as_ref().subcols(0, order);
         Ok(Sequences {

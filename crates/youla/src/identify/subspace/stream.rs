@@ -25,7 +25,7 @@ use crate::{Error, Mat, Result};
 ///
 /// # Errors
 /// As [`super::subspace`], those of the stream, [`Error::RecordChanged`] where two passes give different lengths, and
-/// [`Error::NeedsMemory`] for options that need all samples at once: an automatic horizon, an order by the models of all
+/// [`Error::Unsupported`] for options that need all samples at once: an automatic horizon, an order by the models of all
 /// orders, delays, and an uncertainty.
 ///
 /// ```no_run
@@ -46,13 +46,16 @@ pub fn subspace_stream(
     let data = SubspaceData { channels, triangle, time, factored: options.clone(), automatic_horizon: None };
     let options = data.checked(options)?;
     let projected = data.project(&options)?;
-    let by_models = |_: &_, _| Err(Error::NeedsMemory { what: "an order by the models of all orders" });
+    let by_models =
+        |_: &_, _| Err(Error::Unsupported { what: "an order by the models of all orders", instead: NEEDS_MEMORY });
     let order = order::choose(options.order, projected.evidence()?, by_models)?;
     let scale = data.channels.scale();
     let condense = &mut |p: &Predictor, u: &Unknowns| condense(stream, &lengths, scale, p, u);
     let scaled = data.scaled_model_by(condense, &projected, order.order, &options)?;
     data.finished(&projected, order, scaled, &options)
 }
+
+const NEEDS_MEMORY: &str = "it needs the records in memory: read them as a whole, or leave it out";
 
 /// Refuses options for which all samples would have to be at hand.
 fn require_passes(options: &SubspaceOptions) -> Result<()> {
@@ -64,7 +67,7 @@ fn require_passes(options: &SubspaceOptions) -> Result<()> {
         (options.uncertainty.method != UncertaintyMethod::None, "an uncertainty"),
     ];
     match refused.into_iter().find(|(asked, _)| *asked) {
-        Some((_, what)) => Err(Error::NeedsMemory { what }),
+        Some((_, what)) => Err(Error::Unsupported { what, instead: NEEDS_MEMORY }),
         None => Ok(()),
     }
 }

@@ -97,7 +97,7 @@ impl Varx {
         let (m, q) = (self.inputs, self.channels());
         let inputs =
             Mat::from_fn(self.r.nrows(), (self.past + self.horizon) * m, |i, j| self.r[(i, j / m * q + j % m)]);
-        require_excitation(inputs.as_ref(), self.horizon)
+        require_excitation(inputs.as_ref(), m)
     }
 
     /// The past signals that a state at time k + `later` is read from, transposed: a column per signal.

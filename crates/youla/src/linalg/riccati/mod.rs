@@ -101,7 +101,7 @@ pub struct RiccatiSolution {
 /// units of the states differ by six decades (`tests::scaling_over_six_decades`).
 ///
 /// # Errors
-/// [`Error::Shape`], [`Error::NotFinite`], [`Error::NotSymmetric`] and [`Error::NotPositiveDefinite`] name the matrix;
+/// [`Error::Shape`], [`Error::NotFinite`], [`Error::NotSymmetric`] and [`Error::NotPositive`] name the matrix;
 /// [`Error::NotStabilisable`] and [`Error::NotDetectable`] name the mode for which no stabilising solution exists;
 /// [`Error::NoSolution`] where the computed solution does not hold.
 ///

@@ -120,7 +120,7 @@ fn cholesky(what: &str, r: MatRef<'_, f64>) -> Result<Mat<f64>> {
     let m = r.nrows();
     let unit = UnitDiagonal::of(r);
     let eigenvalue = unit.smallest_eigenvalue(what)?;
-    let refusal = || Error::NotPositiveDefinite { what: what.to_owned(), eigenvalue };
+    let refusal = || Error::NotPositive { what: what.to_owned(), must: "positive definite", eigenvalue };
     if eigenvalue < 100.0 * f64::EPSILON * (m as f64) {
         return Err(refusal());
     }

@@ -288,7 +288,7 @@ fn weights_that_are_no_weights_are_refused() {
         [[1.0, 2.0], [2.0, 1.0]],
         [[-1.0, 0.0], [0.0, 1.0]],
     ] {
-        assert!(matches!(problem(one, r), Err(Error::NotPositiveDefinite { .. })));
+        assert!(matches!(problem(one, r), Err(Error::NotPositive { .. })));
     }
     assert!(matches!(problem([[f64::NAN, 0.0], [0.0, 1.0]], one), Err(Error::NotFinite { .. })));
     let wrong = Owned::without_cross_term(eye(2), eye(3), eye(2), eye(3)).solve(Equation::Discrete);

@@ -127,7 +127,7 @@ pub struct StabilisationDiagram {
 ///
 /// # Errors
 /// [`Error::OutOfRange`] where the orders do not rise from at least 1 or a tolerance is not a positive number,
-/// [`Error::OrderBeyondHorizon`], and those of [`SubspaceData::identify`] before a model is made.
+/// [`Error::Order`], and those of [`SubspaceData::identify`] before a model is made.
 ///
 /// ```
 /// use youla::{Mat, lti::Discrete};

@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::Error;
+use crate::error::OrderLimit;
 
 fn records(system: &StateSpace<Discrete>, samples: usize, seed: u64) -> (Mat<f64>, Mat<f64>) {
     let rng = &mut ChaCha8Rng::seed_from_u64(seed);
@@ -49,7 +50,7 @@ fn poor_excitation_names_the_rank() {
     let y = respond(&system, &square, 0.0, None);
     let refused = subspace(&one(&square, &y), clock(), &fixed(2, 10));
     // A square wave of 12 samples obeys u(k+6) = -u(k).
-    assert!(matches!(refused, Err(Error::NotExciting { rank: 6, needed: 20, horizon: 10 })), "{refused:?}");
+    assert!(matches!(refused, Err(Error::InsufficientExcitation { rank: 6, needed: 20, .. })), "{refused:?}");
 }
 
 #[test]
@@ -63,7 +64,10 @@ fn unfit_records_are_refused() {
     assert!(matches!(run(&rows(&u, 78), &rows(&y, 78), &fixed(2, 10)), Some(Error::TooFewSamples { needed: 79, .. })));
     assert!(run(&rows(&u, 79), &rows(&y, 79), &fixed(2, 10)).is_none());
     assert!(matches!(run(&rows(&u, 150), &y, &fixed(2, 10)), Some(Error::Shape { .. })));
-    assert!(matches!(run(&u, &y, &fixed(10, 10)), Some(Error::OrderBeyondHorizon { largest: 9, .. })));
+    assert!(matches!(
+        run(&u, &y, &fixed(10, 10)),
+        Some(Error::Order { limit: OrderLimit::Horizon { largest: 9, .. }, .. })
+    ));
     assert!(matches!(run(&u, &y, &fixed(0, 10)), Some(Error::OutOfRange { .. })));
     assert!(matches!(run(&u, &y, &fixed(1, 1)), Some(Error::OutOfRange { .. })));
     let mut bad = y.clone();

@@ -3,6 +3,7 @@
 use super::super::stabilisation::{PoleStability, StabilisationOptions, modal_assurance, stabilisation};
 use super::*;
 use crate::Error;
+use crate::error::OrderLimit;
 
 const WEIGHTS: [SubspaceMethod; 6] = [
     SubspaceMethod::Moesp,
@@ -83,7 +84,7 @@ fn what_makes_no_diagram_is_refused() {
     let draw = |orders: &[usize], options| stabilisation(&data, orders, &method, &options).err();
     let usual = StabilisationOptions::default();
     assert!(draw(&[1, 8], usual).is_none());
-    assert!(matches!(draw(&[2, 9], usual), Some(Error::OrderBeyondHorizon { largest: 8, .. })));
+    assert!(matches!(draw(&[2, 9], usual), Some(Error::Order { limit: OrderLimit::Horizon { largest: 8, .. }, .. })));
     for orders in [&[0, 1][..], &[2, 2], &[3, 2]] {
         assert!(matches!(draw(orders, usual), Some(Error::OutOfRange { .. })));
     }

@@ -109,7 +109,7 @@ fn unfit_delays_are_refused() {
     assert!(with(vec![0, 33]).contains("after a delay of 33 samples: 40 samples are too few, at least 43"));
     let data = SubspaceData::new(&one(&u, &y), clock(), &fixed(2, 5)).unwrap();
     let other = SubspaceOptions { delays: vec![1, 0], ..fixed(2, 5) };
-    assert!(matches!(data.identify(&other), Err(Error::FactorOptionsChanged)));
+    assert!(matches!(data.identify(&other), Err(Error::Unsupported { .. })));
 }
 
 /// Plant and nominal model with a delay of two samples: S has it too, and G(S) from a delayed S is the plant.

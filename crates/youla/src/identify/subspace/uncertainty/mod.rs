@@ -121,7 +121,13 @@ impl Uncertainty {
 pub(crate) fn check(options: &SubspaceOptions) -> Result<()> {
     options.uncertainty.check()?;
     let bootstrap = options.uncertainty.method == UncertaintyMethod::Bootstrap;
-    if bootstrap && options.method.is_for_closed_loops() { Err(Error::BootstrapOfClosedLoop) } else { Ok(()) }
+    if bootstrap && options.method.is_for_closed_loops() {
+        return Err(Error::Unsupported {
+            what: "the bootstrap with a method for closed loops",
+            instead: "it keeps the inputs as they are, which feedback does not allow; take uncertainty.method = \"delta\"",
+        });
+    }
+    Ok(())
 }
 
 /// The uncertainty that the options ask for. `innovation` is in scaled units, `model` in those of the record, without the

@@ -175,7 +175,7 @@ fn bootstrap_agrees_and_refuses() {
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
     let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
     let refused = subspace(&experiment, Discrete::new(1.0).unwrap(), &bootstrap(SubspaceMethod::PbsidOpt));
-    assert!(matches!(refused, Err(crate::Error::BootstrapOfClosedLoop)));
+    assert!(matches!(refused, Err(crate::Error::Unsupported { .. })));
 }
 
 /// Without noise there is nothing to judge by, with either method; choices without meaning are refused.

@@ -4,13 +4,19 @@
 //! An outcome that is not an error (an optimiser that reached its limit, an estimate that turned out unstable and was
 //! asked for as it is) is returned as data, never here.
 
+mod display;
+mod limits;
+
+pub use display::{Names, Pole, Seconds};
+pub use limits::OrderLimit;
+
+use display::worst_pole;
 use faer::c64;
-use std::fmt::Write;
 
 /// Result of every fallible function of the library.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Who can mend it: the person who gave the input, or nobody without changing the problem.
+/// Whether another input helps, or only another problem.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ErrorKind {
     /// The input is not acceptable as given; the program exits with code 2.
@@ -127,21 +133,13 @@ pub enum Error {
         /// Its mirror image below the diagonal.
         lower: f64,
     },
-    /// A matrix that must be positive definite is not, or not clear of rounding.
-    #[error("{what} is not positive definite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}")]
-    NotPositiveDefinite {
+    /// A weight or covariance has an eigenvalue below zero, or too near to zero.
+    #[error("{what} is not {must}: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}")]
+    NotPositive {
         /// Which matrix.
         what: String,
-        /// Smallest eigenvalue after scaling to unit diagonal.
-        eigenvalue: f64,
-    },
-    /// A weight or covariance is indefinite.
-    #[error(
-        "{what} is not positive semidefinite: its smallest eigenvalue, scaled to unit diagonal, is {eigenvalue:.1e}"
-    )]
-    NotPositiveSemidefinite {
-        /// Which matrix.
-        what: String,
+        /// `positive definite` or `positive semidefinite`.
+        must: &'static str,
         /// Smallest eigenvalue after scaling to unit diagonal.
         eigenvalue: f64,
     },
@@ -211,52 +209,21 @@ pub enum Error {
         /// The frequency, rad/s.
         omega: f64,
     },
-    /// A record is used up by the samples that are dropped at its start.
-    #[error(
-        "record {record} has {samples} samples, but the first {dropped} are dropped; give a longer record or lower {key}"
-    )]
-    TooShort {
-        /// Which record.
-        record: String,
-        /// Its samples.
-        samples: usize,
-        /// Samples dropped.
-        dropped: usize,
-        /// The option that says so.
-        key: &'static str,
-    },
-    /// More states were asked for than a minimal realisation has.
-    #[error(
-        "a model of order {order} was asked for, but only {minimal} states are controllable and observable to working precision; ask for at most {minimal}"
-    )]
-    OrderAboveMinimal {
+    /// A model cannot have the order that was asked for.
+    #[error("a model of order {order} was asked for, but {limit}")]
+    Order {
         /// The order that was asked for.
         order: usize,
-        /// The order of the minimal realisation.
-        minimal: usize,
+        /// What limits it.
+        limit: OrderLimit,
     },
-    /// Fewer states were asked for than are kept as they are.
-    #[error(
-        "a model of order {order} was asked for, but {kept} poles at or beyond the stability boundary are kept as they are; ask for at least {kept} or move the boundary"
-    )]
-    OrderBelowKept {
-        /// The order that was asked for.
-        order: usize,
-        /// Poles that are kept.
-        kept: usize,
-    },
-    /// An order was to follow from a bound that the method does not have.
-    #[error(
-        "the weighted reduction has no error bound from which an order could follow; take order = {{ fixed = ... }} or {{ closed-loop = ... }}"
-    )]
-    NoErrorBound,
-    /// A choice of the reduction needs the loop.
-    #[error(
-        "{what} needs the loop of the model with its controller, which a reduction of the model alone does not have"
-    )]
-    NeedsLoop {
-        /// The choice.
+    /// A choice that the method does not offer, or not together with the other choices.
+    #[error("{what} is not possible: {instead}")]
+    Unsupported {
+        /// The choice, with its key.
         what: &'static str,
+        /// Why, and what to choose in its place.
+        instead: &'static str,
     },
     /// No order of a reduction is good enough in the loop.
     #[error(
@@ -299,9 +266,10 @@ pub enum Error {
         /// Row, counted from 1.
         row: usize,
     },
-    /// An excitation does not excite enough to identify from it.
+    /// A signal does not excite enough to identify from it.
     #[error(
-        "{what} does not excite enough: its block-Hankel matrix with {block_rows} block rows has rank {rank} of {needed} (condition number {condition:.1e})"
+        "{what} does not excite enough: its block-Hankel matrix with {block_rows} block rows has rank {rank} of {needed}; \
+         use a richer excitation or a shorter horizon"
     )]
     InsufficientExcitation {
         /// The signal.
@@ -312,8 +280,6 @@ pub enum Error {
         rank: usize,
         /// Rank that is needed: s times the number of channels.
         needed: usize,
-        /// Ratio of the largest to the smallest singular value.
-        condition: f64,
     },
     /// A record is too short for the model that was asked for.
     #[error("{what}: {found} samples are too few, at least {needed} are needed")]
@@ -325,19 +291,6 @@ pub enum Error {
         /// Number of samples needed.
         needed: usize,
     },
-    /// The inputs do not excite the system enough for the horizon.
-    #[error(
-        "the inputs are not exciting enough for a horizon of {horizon} block rows: their Hankel matrix has rank {rank}, \
-         but {needed} is needed; use a richer excitation or a shorter horizon"
-    )]
-    NotExciting {
-        /// Numerical rank of the block-Hankel matrix of the inputs.
-        rank: usize,
-        /// Number of its rows, (past + horizon) x inputs.
-        needed: usize,
-        /// Block rows of the future.
-        horizon: usize,
-    },
     /// A channel never changes, so that nothing can be learnt from it.
     #[error("{what} is constant ({value}) in every experiment")]
     ConstantChannel {
@@ -346,42 +299,11 @@ pub enum Error {
         /// The value in the first experiment.
         value: f64,
     },
-    /// The order does not fit into the horizon.
-    #[error(
-        "the order {order} exceeds {largest}, the largest for a horizon of {horizon} block rows: (horizon - 1) x outputs"
-    )]
-    OrderBeyondHorizon {
-        /// Order asked for.
-        order: usize,
-        /// Largest order possible.
-        largest: usize,
-        /// Block rows of the future.
-        horizon: usize,
-    },
     /// A stream gave other samples when it was read again.
     #[error(
         "the records have other lengths in the second pass over them than in the first; keep the files as they are"
     )]
     RecordChanged,
-    /// What was asked for needs all samples at once.
-    #[error("{what} needs the records in memory: read them as a whole, or leave it out")]
-    NeedsMemory {
-        /// What was asked for.
-        what: &'static str,
-    },
-    /// Another scaling, factorisation, delays or automatic horizon than those of the factored data was asked for.
-    #[error(
-        "scaling, factorisation, delays and automatic horizon are part of the factored data; factor the records again to change them"
-    )]
-    FactorOptionsChanged,
-    /// The bootstrap was asked for with a method for closed loops.
-    #[error(
-        "the bootstrap keeps the inputs as they are, which measurements from a closed loop do not allow; take method = \"delta\""
-    )]
-    BootstrapOfClosedLoop,
-    /// A black box is asked for the steady state.
-    #[error("initial_state = \"steady-state\" serves physical structures only; take \"estimated\" or \"zero\"")]
-    SteadyBlackBox,
     /// A stream of samples failed.
     #[error("{0}")]
     Stream(Box<dyn std::error::Error + Send + Sync>),
@@ -413,81 +335,20 @@ impl Error {
             | Error::OutOfRange { .. }
             | Error::SampleTimeMismatch { .. }
             | Error::NotSymmetric { .. }
-            | Error::NotPositiveDefinite { .. }
-            | Error::NotPositiveSemidefinite { .. }
+            | Error::NotPositive { .. }
             | Error::Ports { .. }
             | Error::Polynomial { .. }
             | Error::NotStabilising { .. }
-            | Error::TooShort { .. }
-            | Error::OrderAboveMinimal { .. }
-            | Error::OrderBelowKept { .. }
-            | Error::NoErrorBound
-            | Error::NeedsLoop { .. }
+            | Error::Order { .. }
+            | Error::Unsupported { .. }
             | Error::UnknownChannel { .. }
             | Error::DuplicateChannel { .. }
             | Error::NotFiniteSample { .. }
             | Error::InsufficientExcitation { .. }
             | Error::TooFewSamples { .. }
-            | Error::NotExciting { .. }
             | Error::ConstantChannel { .. }
-            | Error::OrderBeyondHorizon { .. }
             | Error::RecordChanged
-            | Error::NeedsMemory { .. }
-            | Error::FactorOptionsChanged
-            | Error::BootstrapOfClosedLoop
-            | Error::SteadyBlackBox
             | Error::Stream(_) => ErrorKind::BadInput,
-        }
-    }
-}
-
-/// Names the worst pole where there is one.
-fn worst_pole(pole: Option<c64>) -> String {
-    pole.map_or(String::new(), |p| format!("; the worst pole is {}", Pole(p)))
-}
-
-/// Prints a pole as `-1.2 + 3.4i` with its magnitude.
-pub struct Pole(pub c64);
-
-impl std::fmt::Display for Pole {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let c64 { re, im } = self.0;
-        let magnitude = re.hypot(im);
-        if im == 0.0 {
-            write!(f, "{re:.6}")
-        } else {
-            let sign = if im < 0.0 { '-' } else { '+' };
-            write!(f, "{re:.6} {sign} {:.6}i (magnitude {magnitude:.6})", im.abs())
-        }
-    }
-}
-
-/// Prints a time without the last digits, which hold the rounding of a difference.
-pub struct Seconds(pub f64);
-
-impl std::fmt::Display for Seconds {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{}", format!("{:.9e}", self.0).parse().unwrap_or(self.0))
-    }
-}
-
-/// Prints a list of names, the first forty of them, each up to eighty characters.
-pub struct Names<'a>(pub &'a [String]);
-
-impl std::fmt::Display for Names<'_> {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        const SHOWN: usize = 40;
-        for (k, name) in self.0.iter().take(SHOWN).enumerate() {
-            f.write_str(if k == 0 { "" } else { ", " })?;
-            name.chars()
-                .take(80)
-                .map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c })
-                .try_for_each(|c| f.write_char(c))?;
-        }
-        match self.0.len() {
-            0 => f.write_str("nothing"),
-            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
-            _ => Ok(()),
         }
     }
 }

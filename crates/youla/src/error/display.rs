@@ -1,0 +1,55 @@
+//! How poles, times, lists of names and limits of an order are printed.
+
+use faer::c64;
+use std::fmt::Write;
+
+/// Names the worst pole where there is one.
+pub(super) fn worst_pole(pole: Option<c64>) -> String {
+    pole.map_or(String::new(), |p| format!("; the worst pole is {}", Pole(p)))
+}
+
+/// Prints a pole as `-1.2 + 3.4i` with its magnitude.
+pub struct Pole(pub c64);
+
+impl std::fmt::Display for Pole {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let c64 { re, im } = self.0;
+        let magnitude = re.hypot(im);
+        if im == 0.0 {
+            write!(f, "{re:.6}")
+        } else {
+            let sign = if im < 0.0 { '-' } else { '+' };
+            write!(f, "{re:.6} {sign} {:.6}i (magnitude {magnitude:.6})", im.abs())
+        }
+    }
+}
+
+/// Prints a time without the last digits, which hold the rounding of a difference.
+pub struct Seconds(pub f64);
+
+impl std::fmt::Display for Seconds {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}", format!("{:.9e}", self.0).parse().unwrap_or(self.0))
+    }
+}
+
+/// Prints a list of names, the first forty of them, each up to eighty characters.
+pub struct Names<'a>(pub &'a [String]);
+
+impl std::fmt::Display for Names<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const SHOWN: usize = 40;
+        for (k, name) in self.0.iter().take(SHOWN).enumerate() {
+            f.write_str(if k == 0 { "" } else { ", " })?;
+            name.chars()
+                .take(80)
+                .map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c })
+                .try_for_each(|c| f.write_char(c))?;
+        }
+        match self.0.len() {
+            0 => f.write_str("nothing"),
+            n if n > SHOWN => write!(f, " and {} more", n - SHOWN),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! Time of the numerical work beside what the machine can do: `cargo bench -p youla --bench chain`.
+//! Time of the numerical work beside what the machine can do: `cargo bench -p youla-cli --bench chain`.
 //!
 //! Every reference (a copy, a matrix product, the obvious loop) is measured in the same run, on the same data, next to the work
 //! that it belongs to. The ratios are what to compare between machines. One thread, unless the line says otherwise.
@@ -15,14 +15,17 @@ use std::f64::consts::PI;
 use std::hint::black_box;
 use std::path::Path;
 use timing::{median, middle};
-use youla::Result;
 use youla::identify::subspace::{Experiment, Factorisation, Order, SubspaceData, SubspaceOptions, subspace};
 use youla::linalg::{RiccatiProblem, SequentialQr, care, dare, discrete_lyapunov, eye, lyapunov};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
 use youla::signal::{Excitation, SquareWaves};
+use youla_paper::demo;
 use youla_paper::rig::Bearing;
-use youla_run::{StageClock, demo, identify, write_run};
+use youla_run::{StageClock, identify, write_run};
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Sample time of the bearing, seconds.
 const TS: f64 = 2e-4;

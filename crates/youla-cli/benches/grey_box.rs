@@ -1,4 +1,4 @@
-//! The prediction-error method beside what a user writes today: `cargo bench -p youla --bench grey_box [-- control]`.
+//! The prediction-error method beside what a user writes today: `cargo bench -p youla-cli --bench grey_box [-- control]`.
 //!
 //! The bearing with 16 parameters (the actuator poles as a full matrix), 20 000 samples, started at 0.8 and 0.5 of the true values.
 //! The peers are SciPy's least squares with difference quotients around the simulation of SLICOT (`ctrlsys`) and, with the
@@ -13,13 +13,16 @@ use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
 use std::{env, fs};
+use youla::Mat;
 use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
-use youla::{Mat, Result};
 use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Structure, greybox};
 use youla_paper::rig::Bearing;
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 const TS: f64 = 2e-4;
 const SAMPLES: usize = 20_000;

@@ -1,5 +1,5 @@
 //! Matrix equations and ordered Schur forms beside SciPy and SLICOT:
-//! `PYTHON=... OPENBLAS_NUM_THREADS=1 cargo bench -p youla --bench matrix_equations -- [residuals | speed]`.
+//! `PYTHON=... OPENBLAS_NUM_THREADS=1 cargo bench -p youla-cli --bench matrix_equations -- [residuals | speed]`.
 //!
 //! `residuals`: 2000 random and 50 hard problems, n = 2 to 200, are written to a file once; we and the peers solve the same
 //! numbers, and `peers/matrix_equations.py` computes every residual in the same way. `speed`: programs that take turns, three

@@ -1,9 +1,11 @@
-//! Samples per second of the digital twin at its three levels: `cargo bench -p youla --bench rig`.
+//! Samples per second of the digital twin at its three levels: `cargo bench -p youla-cli --bench rig`.
 
 use std::hint::black_box;
 use std::time::Instant;
-use youla::Result;
 use youla_paper::rig::{BearingRig, Fidelity, Rig, RigParameters};
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 fn main() -> Result<()> {
     let parameters = RigParameters::shipped();

@@ -1,4 +1,4 @@
-//! Subspace identification beside SLICOT (ctrlsys, Octave) and SIPPY: `cargo bench -p youla --bench subspace [-- SAMPLES]`.
+//! Subspace identification beside SLICOT (ctrlsys, Octave) and SIPPY: `cargo bench -p youla-cli --bench subspace [-- SAMPLES]`.
 //!
 //! Every program gets the same records as raw numbers and measures the whole call by itself, in a process of its own; the
 //! programs take turns, three rounds. `PYTHON` names an interpreter with numpy, ctrlsys and sippy_unipi, `OCTAVE` one of Octave

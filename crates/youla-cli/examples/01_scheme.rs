@@ -1,6 +1,6 @@
 //! The whole method in ten lines: from a log of the closed loop to a model, held against fresh data.
 //!
-//! `cargo run --example 01_scheme`
+//! `cargo run -p youla-cli --example 01_scheme`
 
 mod machine;
 

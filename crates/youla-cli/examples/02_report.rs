@@ -1,6 +1,6 @@
 //! A run as the program makes it: run.toml and a CSV log in, a folder with report and models out.
 //!
-//! `cargo run --example 02_report`
+//! `cargo run -p youla-cli --example 02_report`
 
 mod machine;
 

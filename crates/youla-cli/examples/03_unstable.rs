@@ -1,6 +1,6 @@
 //! An unstable plant: the scheme finds the unstable pole; a method for open loops, on the same record, is misled by the feedback.
 //!
-//! `cargo run --example 03_unstable`
+//! `cargo run -p youla-cli --example 03_unstable`
 
 mod machine;
 

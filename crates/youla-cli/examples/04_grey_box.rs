@@ -1,15 +1,16 @@
 //! Physical parameters with intervals: stiffness and damping of the bearing, started 30 % off.
 //!
-//! `cargo run --example 04_grey_box`
+//! `cargo run -p youla-cli --example 04_grey_box`
 
 mod machine;
 
-use youla::Result;
 use youla::identify::subspace::Experiment;
-use youla_greybox::{
-    BearingStructure, GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop, greybox_intervals_in_loop,
-};
+use youla_greybox::{GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop, greybox_intervals_in_loop};
+use youla_paper::BearingStructure;
 use youla_paper::rig::Bearing;
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 fn main() -> Result<()> {
     let machine = machine::bearing()?;

@@ -1,6 +1,6 @@
 //! Which order: poles that stay when the order grows, and the fit that each order buys.
 //!
-//! `cargo run --example 05_orders`
+//! `cargo run -p youla-cli --example 05_orders`
 
 mod machine;
 

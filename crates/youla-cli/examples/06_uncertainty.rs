@@ -1,6 +1,6 @@
 //! How sure: standard deviations of modes, and whether the controller stabilises every model that the data allow.
 //!
-//! `cargo run --example 06_uncertainty`
+//! `cargo run -p youla-cli --example 06_uncertainty`
 
 mod machine;
 

@@ -1,15 +1,17 @@
 //! From the log to a better controller: identify, reduce in the loop, redesign, and try it on the machine.
 //!
-//! `cargo run --example 07_redesign`
+//! `cargo run -p youla-cli --example 07_redesign`
 
 mod machine;
 
-use youla::Result;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionOptions, reduce_in_loop};
 use youla::validate::certify;
 use youla_loop::redesign::{RedesignOptions, RedesignProblem, redesign};
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 fn main() -> Result<()> {
     let machine = machine::bearing()?;

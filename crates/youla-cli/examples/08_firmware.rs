@@ -1,6 +1,6 @@
 //! The controller with its ports alpha and beta, sample by sample as firmware runs it, and as a C99 header.
 //!
-//! `cargo run --example 08_firmware`
+//! `cargo run -p youla-cli --example 08_firmware`
 
 mod machine;
 

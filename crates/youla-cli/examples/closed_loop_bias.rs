@@ -1,18 +1,21 @@
 //! Error of the frequency response over the length of the record, under strong feedback and noise: the figure of
-//! docs/closed-loop.md. `cargo run --release -p youla --example closed_loop_bias` writes docs/images/closed-loop-bias.svg and
+//! docs/closed-loop.md. `cargo run --release -p youla-cli --example closed_loop_bias` writes docs/images/closed-loop-bias.svg and
 //! .csv in a few seconds.
 
-#[path = "../tests/common/mod.rs"]
+#[path = "../../youla/tests/common/mod.rs"]
 mod common;
 
 use common::feedback::Loop;
 use rayon::prelude::*;
 use std::path::Path;
+use youla::Mat;
 use youla::identify::subspace::SubspaceMethod;
-use youla::{Mat, Result};
 use youla_report::data::{Method, Role};
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 use youla_report::{figure_csv, svg};
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Standard deviation of the white output noise, um; the output is 1.1 um in all.
 const NOISE: f64 = 1.0;
@@ -74,9 +77,9 @@ fn main() -> Result<()> {
         ..Figure::default()
     };
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/images");
-    let write = |name: &str, text: String| {
+    let write = |name: &str, text: String| -> Result<()> {
         let path = folder.join(name);
-        std::fs::write(&path, text).map_err(|source| youla::Error::Io { path, source })
+        Ok(std::fs::write(path, text)?)
     };
     write("closed-loop-bias.svg", svg(&figure, &methods)?)?;
     write("closed-loop-bias.csv", figure_csv(&figure, &methods))

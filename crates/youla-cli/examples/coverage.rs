@@ -1,13 +1,13 @@
 //! How often the regions and intervals of the Hansen scheme hold the truth, on the simulated bearing.
 //!
 //! ```text
-//! cargo run --release --example coverage -- [delta|bootstrap] [a_factor] [noise/um] [samples] [order] [horizon] [runs] [weight] [b_factor] [input_weight] [process_noise]
+//! cargo run --release -p youla-cli --example coverage -- [delta|bootstrap] [a_factor] [noise/um] [samples] [order] [horizon] [runs] [method] [b_factor] [input_weight] [process_noise]
 //! ```
 #![allow(missing_docs)]
 
-#[path = "../tests/common/bearing_loop.rs"]
+#[path = "../../youla/tests/common/bearing_loop.rs"]
 mod bearing_loop;
-#[path = "../tests/common/mod.rs"]
+#[path = "../../youla/tests/common/mod.rs"]
 mod common;
 
 use bearing_loop::{Coverage, Design, Loop};
@@ -20,7 +20,7 @@ fn main() {
         Some("bootstrap") => UncertaintyMethod::Bootstrap,
         _ => UncertaintyMethod::Delta,
     };
-    let weight = match given.get(7).map(String::as_str) {
+    let subspace = match given.get(7).map(String::as_str) {
         Some("moesp") => SubspaceMethod::Moesp,
         Some("n4sid") => SubspaceMethod::N4sid,
         Some("pbsid-opt") => SubspaceMethod::PbsidOpt,
@@ -33,7 +33,7 @@ fn main() {
         process_noise: number(10, 0.01),
     });
     let options = youla::identify::subspace::SubspaceOptions {
-        weight,
+        method: subspace,
         horizon: number(5, 20.0) as usize,
         order: youla::identify::subspace::Order::Fixed(number(4, 8.0) as usize),
         uncertainty: UncertaintyOptions { method, ..Default::default() },

@@ -1,27 +1,72 @@
 //! `youla check`: what is wrong with the data.
 
-use crate::args::{Args, CheckArgs};
-use crate::commands::folder_of;
-use crate::output::{Failure, say};
+use crate::dialect::Dialect;
+use crate::output::{Failure, Form, say};
+use crate::run_folder::folder_of;
+use clap::Args;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use youla_io::ChannelRef;
 use youla_loop::check::{Finding, Severity};
 use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, further, read_check_options};
 
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla check run.toml
+  youla check log.csv --input u --output y --time t
+  youla check log.csv --input u --output y --time t --delimiter semicolon --decimal comma
+  youla check log.csv --input u --output y --excitation d --sample-time 1e-3 --json
+
+Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a test could not be computed.";
+
+/// What is to be checked.
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one record each.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Inputs, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "output")]
+    input: Vec<ChannelRef>,
+    /// Outputs, as the inputs.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    output: Vec<ChannelRef>,
+    /// Known excitation added at the plant input, one per input.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    excitation: Vec<ChannelRef>,
+    /// Known reference, one per output.
+    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
+    reference: Vec<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "S", requires = "input", allow_negative_numbers = true)]
+    sample_time: Option<f64>,
+    /// Column with the time in seconds.
+    #[arg(long, value_name = "NAME", requires = "input")]
+    time: Option<ChannelRef>,
+    #[command(flatten)]
+    dialect: Dialect,
+    /// Thresholds, as in [check] of run.toml.
+    #[arg(long, value_name = "FILE", requires = "input")]
+    options: Option<PathBuf>,
+    /// Folder for check.json; it must not exist.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
 /// Checks, prints what was found, and says whether there is no defect.
-pub(crate) fn check(args: &Args, asked: &CheckArgs) -> Result<bool, Failure> {
-    if let Some(folder) = asked.out.as_ref().filter(|folder| folder.exists()) {
+pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
+    if let Some(folder) = args.out.as_ref().filter(|folder| folder.exists()) {
         return Err(youla_io::Error::OutputExists { path: folder.clone() }.into());
     }
-    let found = if asked.input.is_empty() { of_run(asked)? } else { of_files(asked)? };
+    let found = if args.input.is_empty() { of_run(args)? } else { of_files(args)? };
     let json =
         serde_json::to_string_pretty(&found.json()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;
-    if let Some(folder) = &asked.out {
+    if let Some(folder) = &args.out {
         let file = folder.join("check.json");
         fs::create_dir_all(folder).map_err(|source| Failure::io(folder, source))?;
         fs::write(&file, json.clone() + "\n").map_err(|source| Failure::io(&file, source))?;
     }
-    match (args.json, args.quiet) {
+    match (form.json, form.quiet) {
         (true, _) => say(&json)?,
         (_, true) => {}
         _ => say(&text(&found))?,
@@ -29,29 +74,29 @@ pub(crate) fn check(args: &Args, asked: &CheckArgs) -> Result<bool, Failure> {
     Ok(found.count(Severity::Defect) == 0)
 }
 
-fn of_run(asked: &CheckArgs) -> Result<DataCheck, Failure> {
-    if asked.dialect.is_given() {
+fn of_run(args: &CheckArgs) -> Result<DataCheck, Failure> {
+    if args.dialect.is_given() {
         let problem = "a run.toml declares the form of its text files itself, in [data] csv".to_owned();
-        return Err(youla_io::Error::Settings { path: asked.files[0].clone(), at: None, problem }.into());
+        return Err(youla_io::Error::Settings { path: args.files[0].clone(), at: None, problem }.into());
     }
-    let [settings] = &asked.files[..] else {
+    let [settings] = &args.files[..] else {
         let what = "the number of run.toml files (give --input and --output for files of data)".into();
-        return Err(youla::Error::Ports { what, expected: 1, found: asked.files.len() }.into());
+        return Err(youla::Error::Ports { what, expected: 1, found: args.files.len() }.into());
     };
     Ok(check_run(&RunSettings::read(settings)?, &folder_of(settings))?)
 }
 
-fn of_files(asked: &CheckArgs) -> Result<DataCheck, Failure> {
-    let options = asked.options.as_ref().map(read_check_options).transpose()?.unwrap_or_default();
+fn of_files(args: &CheckArgs) -> Result<DataCheck, Failure> {
+    let options = args.options.as_ref().map(read_check_options).transpose()?.unwrap_or_default();
     let files = CheckedFiles {
-        files: asked.files.clone(),
-        inputs: asked.input.clone(),
-        outputs: asked.output.clone(),
-        input_excitation: asked.excitation.clone(),
-        reference: asked.reference.clone(),
-        sample_time: asked.sample_time,
-        time_column: asked.time.clone(),
-        csv: asked.dialect.options(),
+        files: args.files.clone(),
+        inputs: args.input.clone(),
+        outputs: args.output.clone(),
+        input_excitation: args.excitation.clone(),
+        reference: args.reference.clone(),
+        sample_time: args.sample_time,
+        time_column: args.time.clone(),
+        csv: args.dialect.options(),
     };
     Ok(check_files(&files, &options)?)
 }

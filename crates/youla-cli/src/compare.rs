@@ -1,9 +1,8 @@
 //! `youla compare`: finished runs beside each other.
 
-use crate::args::Args;
-use crate::output::{Failure, say};
+use crate::output::{Failure, Form, say};
 use crate::table::aligned;
-use clap::Args as ClapArgs;
+use clap::Args;
 use std::path::PathBuf;
 use youla_report::data::EvidenceTable;
 use youla_run::{Comparison, compare, write_comparison};
@@ -14,7 +13,7 @@ Examples:
   youla compare runs/order-*-001 --model hansen_reduced --out orders.html";
 
 /// Which runs.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
     /// Run folders, the first of which the others are held against.
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
@@ -31,17 +30,17 @@ pub(crate) struct CompareArgs {
 }
 
 /// Writes page and data and prints the tables.
-pub(crate) fn run(args: &Args, asked: &CompareArgs) -> Result<(), Failure> {
-    let found = compare(&asked.runs, &asked.model)?;
-    write_comparison(&found, &asked.out, asked.force)?;
-    match (args.json, args.quiet) {
+pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
+    let found = compare(&args.runs, &args.model)?;
+    write_comparison(&found, &args.out, args.force)?;
+    match (form.json, form.quiet) {
         (true, _) => say(&serde_json::json!(found).to_string()),
         (_, true) => Ok(()),
-        _ => say(&text(&found, asked)),
+        _ => say(&text(&found, args)),
     }
 }
 
-fn text(found: &Comparison, asked: &CompareArgs) -> String {
+fn text(found: &Comparison, args: &CompareArgs) -> String {
     let mut text = String::new();
     for table in &found.report.overview {
         text += &format!("{}\n{}\n", table.title, as_text(table));
@@ -49,7 +48,7 @@ fn text(found: &Comparison, asked: &CompareArgs) -> String {
     for note in &found.report.notes {
         text += &format!("caution: {}\n", note.text);
     }
-    text + &format!("report: {}", asked.out.display())
+    text + &format!("report: {}", args.out.display())
 }
 
 fn as_text(table: &EvidenceTable) -> String {

@@ -1,8 +1,7 @@
 //! `youla export`: a model or the controller of a run, for another tool.
 
-use crate::args::Args;
-use crate::output::{Failure, say};
-use clap::Args as ClapArgs;
+use crate::output::{Failure, Form, say};
+use clap::Args;
 use std::path::PathBuf;
 use youla_io::export::{ModelFormat, c_controller, export_model, write_export};
 use youla_run::{controller_for_export, model_for_export};
@@ -16,7 +15,7 @@ Examples:
   youla export runs/demo-gas-bearing-001 --to c-controller --q runs/demo-gas-bearing-001/8-redesign/controller.json";
 
 /// What is exported as what.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Args)]
 pub(crate) struct ExportArgs {
     /// A run folder, or a model as JSON, MATLAB or NumPy file.
     #[arg(value_name = "RUN|MODEL")]
@@ -58,27 +57,25 @@ fn format(name: &str) -> Result<Format, String> {
 }
 
 /// Writes the file and says which.
-pub(crate) fn export(args: &Args, asked: &ExportArgs) -> Result<(), Failure> {
-    let misplaced = match asked.to {
-        Format::Model(_) if asked.q.is_some() => Some("--q serves --to c-controller only"),
-        Format::Controller if asked.model.is_some() => {
-            Some("--model does not serve --to c-controller; give a Q by --q")
-        }
+pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
+    let misplaced = match args.to {
+        Format::Model(_) if args.q.is_some() => Some("--q serves --to c-controller only"),
+        Format::Controller if args.model.is_some() => Some("--model does not serve --to c-controller; give a Q by --q"),
         _ => None,
     };
     if let Some(problem) = misplaced {
-        return Err(youla_io::Error::NotAModel { path: asked.source.clone(), problem: problem.into() }.into());
+        return Err(youla_io::Error::NotAModel { path: args.source.clone(), problem: problem.into() }.into());
     }
-    let (bytes, default, about) = match asked.to {
+    let (bytes, default, about) = match args.to {
         Format::Model(format) => {
-            let model = model_for_export(&asked.source, asked.model.as_deref())?;
+            let model = model_for_export(&args.source, args.model.as_deref())?;
             let about = serde_json::json!({
                 "model": model.name, "order": model.system.order(), "inputs": model.inputs, "outputs": model.outputs,
             });
             (export_model(&model, format)?, file_name(&model.name, format.extension()), about)
         }
         Format::Controller => {
-            let controller = controller_for_export(&asked.source, asked.q.as_deref())?;
+            let controller = controller_for_export(&args.source, args.q.as_deref())?;
             let made = c_controller(&controller)?;
             let about = serde_json::json!({
                 "model": controller.name, "order": made.j_k.system().order(), "single_precision_error": made.single.relative,
@@ -87,9 +84,9 @@ pub(crate) fn export(args: &Args, asked: &ExportArgs) -> Result<(), Failure> {
             (made.header.into_bytes(), file_name(&controller.name, "h"), about)
         }
     };
-    let path = asked.out.clone().unwrap_or(default);
-    write_export(&path, &bytes, asked.force)?;
-    match (args.json, args.quiet) {
+    let path = args.out.clone().unwrap_or(default);
+    write_export(&path, &bytes, args.force)?;
+    match (form.json, form.quiet) {
         (true, _) => {
             let mut about = about;
             about["file"] = serde_json::json!(path.display().to_string());

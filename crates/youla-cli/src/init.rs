@@ -1,55 +1,126 @@
-//! `youla init`: a first run.toml from a log, asked for or by flags.
+//! `youla init`: a first run.toml from a log, args for or by flags.
 
-use crate::args::{Args, InitArgs};
-use crate::output::{Failure, say};
-use std::io::{IsTerminal, Write};
-use std::path::Path;
+use crate::dialect::Dialect;
+use crate::output::{Failure, Form, ask_line, say};
+use clap::{Args, ValueEnum};
+use std::io::IsTerminal;
+use std::path::{Path, PathBuf};
 use youla_io::{ChannelRef, SurveyedColumn, survey};
 use youla_run::{Draft, DraftClock, Feedback, path_from};
 
-/// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
-pub(crate) fn init(args: &Args, asked: &InitArgs) -> Result<(), Failure> {
-    if asked.out.exists() && !asked.force {
-        return Err(youla_io::Error::FileExists { path: asked.out.clone() }.into());
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla init log.csv
+  youla init log.csv --input u --output y --time t --reference r --feedback negative
+  youla init arm.dat --input '#1' --output '#2' --sample-time 1 --open-loop --estimate 700";
+
+/// What is known of a log.
+#[derive(Debug, Args)]
+pub(crate) struct InitArgs {
+    /// The log: text, MATLAB, NumPy or Parquet.
+    #[arg(value_name = "LOG")]
+    log: PathBuf,
+    /// Inputs of the plant, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    input: Vec<ChannelRef>,
+    /// Outputs of the plant, as the inputs.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    output: Vec<ChannelRef>,
+    /// Column with the time in seconds.
+    #[arg(long, value_name = "NAME", conflicts_with = "sample_time")]
+    time: Option<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "SECONDS")]
+    sample_time: Option<f64>,
+    /// Known excitation added at the plant input, one column per input.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    excitation: Vec<ChannelRef>,
+    /// Known reference, one column per output.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    reference: Vec<ChannelRef>,
+    /// Sign in which the controller that ran is written down: u = K (r - y) is negative.
+    #[arg(long, value_name = "SIGN", conflicts_with = "open_loop")]
+    feedback: Option<Sign>,
+    /// No controller ran while this was logged.
+    #[arg(long)]
+    open_loop: bool,
+    /// Rows to identify from, from the first on; two thirds unless stated. The rest verifies.
+    #[arg(long, value_name = "ROWS")]
+    estimate: Option<usize>,
+    /// Name of the machine; the name of the file unless stated.
+    #[arg(long)]
+    name: Option<String>,
+    #[command(flatten)]
+    dialect: Dialect,
+    /// File to write.
+    #[arg(long, value_name = "FILE", default_value = "run.toml")]
+    out: PathBuf,
+    /// Replace it if it is there.
+    #[arg(long)]
+    force: bool,
+}
+
+/// A sign of feedback on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum Sign {
+    /// u = K (r - y)
+    Negative,
+    /// u = K (y - r)
+    Positive,
+}
+
+impl From<Sign> for Feedback {
+    fn from(sign: Sign) -> Self {
+        match sign {
+            Sign::Negative => Feedback::Negative,
+            Sign::Positive => Feedback::Positive,
+        }
     }
-    let csv = asked.dialect.options();
-    let columns = survey(&asked.log, &csv)?;
-    let missing = missing(asked);
-    let silent = args.quiet || args.json;
+}
+
+/// Lists the columns of the log, asks what the flags do not say, and writes run.toml.
+pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
+    if args.out.exists() && !args.force {
+        return Err(youla_io::Error::FileExists { path: args.out.clone() }.into());
+    }
+    let csv = args.dialect.options();
+    let columns = survey(&args.log, &csv)?;
+    let missing = missing(args);
+    let silent = form.quiet || form.json;
     if !silent || !missing.is_empty() {
         say(&table(&columns))?;
     }
     if !missing.is_empty() && !std::io::stdin().is_terminal() {
         let problem = format!("what the columns mean is not guessed; say it with {}", missing.join(", "));
-        return Err(youla_io::Error::Settings { path: asked.log.clone(), at: None, problem }.into());
+        return Err(youla_io::Error::Settings { path: args.log.clone(), at: None, problem }.into());
     }
-    let draft = answered(asked, &columns)?;
+    let draft = answered(args, &columns)?;
     let text = draft.toml(&columns)?;
-    std::fs::write(&asked.out, text).map_err(|source| Failure::io(&asked.out, source))?;
-    if silent { Ok(()) } else { say(&next(asked, &draft)) }
+    std::fs::write(&args.out, text).map_err(|source| Failure::io(&args.out, source))?;
+    if silent { Ok(()) } else { say(&next(args, &draft)) }
 }
 
 /// Flags without which a question is open.
-fn missing(asked: &InitArgs) -> Vec<&'static str> {
+fn missing(args: &InitArgs) -> Vec<&'static str> {
     [
-        (asked.input.is_empty(), "--input"),
-        (asked.output.is_empty(), "--output"),
-        (asked.time.is_none() && asked.sample_time.is_none(), "--time or --sample-time"),
-        (!asked.open_loop && asked.feedback.is_none(), "--feedback or --open-loop"),
+        (args.input.is_empty(), "--input"),
+        (args.output.is_empty(), "--output"),
+        (args.time.is_none() && args.sample_time.is_none(), "--time or --sample-time"),
+        (!args.open_loop && args.feedback.is_none(), "--feedback or --open-loop"),
     ]
     .into_iter()
     .filter_map(|(open, flag)| open.then_some(flag))
     .collect()
 }
 
-fn answered(asked: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failure> {
+fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failure> {
     let list = |given: &[ChannelRef], question: &str| match given {
         [] => ask(question, |text| Ok(names(text))),
         given => Ok(given.to_vec()),
     };
-    let inputs = list(&asked.input, "Inputs of the plant, as applied, separated by commas")?;
-    let outputs = list(&asked.output, "Outputs of the plant, separated by commas")?;
-    let clock = match (&asked.time, asked.sample_time) {
+    let inputs = list(&args.input, "Inputs of the plant, as applied, separated by commas")?;
+    let outputs = list(&args.output, "Outputs of the plant, separated by commas")?;
+    let clock = match (&args.time, args.sample_time) {
         (Some(column), _) => DraftClock::Column(column.clone()),
         (None, Some(ts)) => DraftClock::SampleTime(ts),
         (None, None) => ask("Column with the time in seconds, or the sample time in seconds", |text| {
@@ -59,7 +130,7 @@ fn answered(asked: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failu
             })
         })?,
     };
-    let feedback = match (asked.open_loop, asked.feedback) {
+    let feedback = match (args.open_loop, args.feedback) {
         (true, _) => None,
         (false, Some(feedback)) => Some(feedback.into()),
         (false, None) => ask(
@@ -73,19 +144,19 @@ fn answered(asked: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failu
         )?,
     };
     let rows = columns.iter().filter_map(|c| c.content.as_ref().ok()).map(|c| c.rows).max().unwrap_or(0);
-    let stem = asked.log.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let name = asked.name.clone().unwrap_or_else(|| stem.split('.').next().unwrap_or_default().to_owned());
+    let stem = args.log.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = args.name.clone().unwrap_or_else(|| stem.split('.').next().unwrap_or_default().to_owned());
     Ok(Draft {
         name,
-        file: path_from(asked.out.parent().unwrap_or(Path::new("")), &asked.log)?,
-        csv: asked.dialect.options(),
+        file: path_from(args.out.parent().unwrap_or(Path::new("")), &args.log)?,
+        csv: args.dialect.options(),
         clock,
         inputs,
         outputs,
-        input_excitation: asked.excitation.clone(),
-        reference: asked.reference.clone(),
+        input_excitation: args.excitation.clone(),
+        reference: args.reference.clone(),
         feedback,
-        estimated: asked.estimate.unwrap_or(2 * rows / 3),
+        estimated: args.estimate.unwrap_or(2 * rows / 3),
     })
 }
 
@@ -93,8 +164,7 @@ fn answered(asked: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failu
 fn ask<T>(question: &str, read: impl Fn(&str) -> Result<T, String>) -> Result<T, Failure> {
     let terminal = |source| Failure::io(Path::new("the terminal"), source);
     loop {
-        print!("{question}: ");
-        std::io::stdout().flush().map_err(terminal)?;
+        ask_line(question)?;
         let mut line = String::new();
         if std::io::stdin().read_line(&mut line).map_err(terminal)? == 0 {
             return Err(terminal(std::io::ErrorKind::UnexpectedEof.into()));
@@ -134,10 +204,10 @@ fn table(columns: &[SurveyedColumn]) -> String {
     text
 }
 
-/// What was chosen without being asked for, and what is to be done now.
-fn next(asked: &InitArgs, draft: &Draft) -> String {
-    let file = asked.out.display();
-    let split = match asked.estimate {
+/// What was chosen without being args for, and what is to be done now.
+fn next(args: &InitArgs, draft: &Draft) -> String {
+    let file = args.out.display();
+    let split = match args.estimate {
         Some(_) => String::new(),
         None => format!(
             "Rows 1 to {} identify, the rest verifies: change that in {file}, or give --estimate ROWS.\n",

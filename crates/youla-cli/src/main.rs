@@ -4,6 +4,7 @@ mod args;
 mod check;
 mod commands;
 mod compare;
+mod demo;
 mod dialect;
 mod excite;
 mod export;
@@ -13,7 +14,8 @@ mod output;
 mod paper;
 mod plot;
 mod raster;
-mod starts;
+mod run_folder;
+mod study;
 mod subspace;
 mod table;
 

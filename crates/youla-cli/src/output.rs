@@ -1,5 +1,6 @@
 //! Standard output, progress on the terminal, and how failures end the program.
 
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::path::Path;
@@ -7,6 +8,17 @@ use std::process::ExitCode;
 use std::time::Duration;
 use youla::ErrorKind;
 use youla_run::{ReadingProgress, Stage};
+
+/// How results are printed.
+#[derive(Debug, Clone, Copy, Args)]
+pub(crate) struct Form {
+    /// Print nothing but errors.
+    #[arg(long, short, global = true)]
+    pub(crate) quiet: bool,
+    /// Print the result as JSON (the contents of summary.json) instead of a table.
+    #[arg(long, global = true, conflicts_with = "quiet")]
+    pub(crate) json: bool,
+}
 
 /// Why the program ends early.
 #[derive(Debug)]
@@ -57,6 +69,12 @@ pub(crate) fn say(text: &str) -> Result<(), Failure> {
         std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
         _ => Failure::io(Path::new("standard output"), e),
     })
+}
+
+/// Prints a question and leaves the cursor behind it.
+pub(crate) fn ask_line(question: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    write!(out, "{question}: ").and_then(|()| out.flush()).map_err(|e| Failure::io(Path::new("the terminal"), e))
 }
 
 /// One bar over the stages, on a terminal only.

@@ -1,31 +1,78 @@
 //! `youla paper` and `youla study merge`: settings from the arguments, progress with the remaining time, Table 1 at the end.
 
-use crate::args::{Args, PaperArgs};
-use crate::output::{Failure, say};
+use crate::output::{Failure, Form, say};
 use crate::table;
+use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use youla_paper::rig::RigParameters;
 use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
-use youla_paper::study::{PaperSettings, Shard};
+use youla_paper::study::{Method, PaperSettings, Shard};
+
+pub(crate) const EXAMPLES: &str = "\
+Examples:
+  youla paper                          runs/paper-seed-1-models-500, about half a minute
+  youla paper --models 20              a first look
+  youla paper --shard 1/2 --out part1  half of the loops, here; the other half elsewhere, then
+  youla study merge part1 part2        exactly what one run gives";
+
+/// What is args of the paper.
+#[derive(Debug, Args)]
+pub(crate) struct PaperArgs {
+    /// Settings instead of those that ship with the program.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Parameters of the rig instead of those that ship with the program.
+    #[arg(long, value_name = "FILE")]
+    rig: Option<PathBuf>,
+    /// Seed of everything random; the same seed gives the same results. 1 unless the settings say otherwise.
+    #[arg(long)]
+    seed: Option<u64>,
+    /// Number of nominal models of the study; fewer than 100 get a coarse map. 500 unless the settings say otherwise.
+    #[arg(long, value_name = "N")]
+    models: Option<usize>,
+    /// Methods that study and map compare, separated by commas.
+    #[arg(long, value_delimiter = ',', value_parser = method)]
+    methods: Option<Vec<Method>>,
+    /// Speed of the first experiment.
+    #[arg(long, allow_negative_numbers = true)]
+    rpm: Option<f64>,
+    /// Only this part of the loops of study and map, for example 2/4.
+    #[arg(long, value_name = "I/N")]
+    shard: Option<Shard>,
+    /// Results folder; runs/paper-seed-S-models-N by default.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Write the settings that ship with the program to standard output, to be copied and edited, and do nothing else.
+    #[arg(long, conflicts_with_all = ["settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
+    print_settings: bool,
+    /// The same for the parameters of the rig.
+    #[arg(long, conflicts_with_all = ["print_settings", "settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
+    print_rig: bool,
+}
+
+fn method(name: &str) -> Result<Method, String> {
+    let known: Vec<&str> = Method::ALL.iter().map(|method| method.key()).collect();
+    Method::of_key(name).ok_or_else(|| format!("there is no such method; known are {}", known.join(", ")))
+}
 
 /// Reproduces the paper, or its part.
-pub(crate) fn reproduce(args: &Args, asked: &PaperArgs) -> Result<(), Failure> {
-    if asked.print_settings {
+pub(crate) fn reproduce(form: Form, args: &PaperArgs) -> Result<(), Failure> {
+    if args.print_settings {
         return say(PaperSettings::TOML.trim_end());
     }
-    if asked.print_rig {
+    if args.print_rig {
         return say(RigParameters::TOML.trim_end());
     }
-    let configuration = configuration(asked)?;
-    let target = asked.out.clone().unwrap_or_else(|| default_folder(&configuration));
-    finish(args, &configuration, &target)
+    let configuration = configuration(args)?;
+    let target = args.out.clone().unwrap_or_else(|| default_folder(&configuration));
+    finish(form, &configuration, &target)
 }
 
 /// Joins parts and draws the whole.
-pub(crate) fn merge_parts(args: &Args, parts: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
+pub(crate) fn merge_parts(form: Form, parts: &[PathBuf], out: Option<&Path>) -> Result<(), Failure> {
     let target = match (out, parts.first()) {
         (Some(out), _) => out.to_owned(),
         (None, Some(part)) => {
@@ -35,19 +82,19 @@ pub(crate) fn merge_parts(args: &Args, parts: &[PathBuf], out: Option<&Path>) ->
         (None, None) => PathBuf::new(),
     };
     let configuration = merge(parts, &target)?;
-    finish(args, &configuration, &target)
+    finish(form, &configuration, &target)
 }
 
-fn configuration(asked: &PaperArgs) -> Result<Configuration, Failure> {
-    let mut settings = asked.settings.as_deref().map_or_else(|| Ok(PaperSettings::shipped()), PaperSettings::read)?;
-    let rig = asked.rig.as_deref().map_or_else(|| Ok(RigParameters::shipped()), RigParameters::read)?;
-    settings.seed = asked.seed.unwrap_or(settings.seed);
-    settings.methods = asked.methods.clone().unwrap_or(settings.methods);
-    settings.experiments.rpm = asked.rpm.unwrap_or(settings.experiments.rpm);
-    if let Some(models) = asked.models {
+fn configuration(args: &PaperArgs) -> Result<Configuration, Failure> {
+    let mut settings = args.settings.as_deref().map_or_else(|| Ok(PaperSettings::shipped()), PaperSettings::read)?;
+    let rig = args.rig.as_deref().map_or_else(|| Ok(RigParameters::shipped()), RigParameters::read)?;
+    settings.seed = args.seed.unwrap_or(settings.seed);
+    settings.methods = args.methods.clone().unwrap_or(settings.methods);
+    settings.experiments.rpm = args.rpm.unwrap_or(settings.experiments.rpm);
+    if let Some(models) = args.models {
         settings = settings.with_models(models);
     }
-    Ok(Configuration::new(settings, rig, asked.shard.unwrap_or(Shard::WHOLE)))
+    Ok(Configuration::new(settings, rig, args.shard.unwrap_or(Shard::WHOLE)))
 }
 
 fn default_folder(configuration: &Configuration) -> PathBuf {
@@ -56,13 +103,13 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
     Path::new("runs").join(format!("paper-seed-{seed}-models-{models}{part}"))
 }
 
-fn finish(args: &Args, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
-    let bar = Bar::new(args.quiet || args.json);
+fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
+    let bar = Bar::new(form.quiet || form.json);
     let written = paper(configuration, target, &|progress| bar.tell(progress))?;
     bar.bar.finish_and_clear();
     match &written.paper {
-        _ if args.quiet => Ok(()),
-        Some(_) if args.json => {
+        _ if form.quiet => Ok(()),
+        Some(_) if form.json => {
             let path = target.join("summary.json");
             say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end())
         }

@@ -1,9 +1,8 @@
 //! `youla plot`: figures of a run as SVG, PNG and CSV.
 
-use crate::args::Args;
-use crate::output::{Failure, say};
+use crate::output::{Failure, Form, say};
 use crate::raster;
-use clap::Args as ClapArgs;
+use clap::Args;
 use std::path::PathBuf;
 use youla_report::{FigureChoice, Print};
 use youla_run::{Plot, plottable, write_plots};
@@ -19,7 +18,7 @@ Examples:
                                                 for programs that do not take the font in the file: Inkscape, LaTeX";
 
 /// What is drawn, and how.
-#[derive(Debug, ClapArgs)]
+#[derive(Debug, Args)]
 pub(crate) struct PlotArgs {
     /// A run folder.
     #[arg(value_name = "RUN")]
@@ -67,20 +66,20 @@ pub(crate) struct PlotArgs {
 }
 
 /// Writes the files and says which, or lists the figures.
-pub(crate) fn plot(args: &Args, asked: &PlotArgs) -> Result<(), Failure> {
-    let Some(figure) = &asked.figure else { return list(args, asked) };
+pub(crate) fn plot(form: Form, args: &PlotArgs) -> Result<(), Failure> {
+    let Some(figure) = &args.figure else { return list(form, args) };
     let choice = FigureChoice {
-        output: asked.output.clone(),
-        input: asked.input.clone(),
-        record: asked.record.clone(),
-        methods: asked.methods.clone(),
+        output: args.output.clone(),
+        input: args.input.clone(),
+        record: args.record.clone(),
+        methods: args.methods.clone(),
     };
-    let print = Print { width_cm: asked.width, height_cm: asked.height, ..Print::default() };
-    let plots = youla_run::plot(&asked.run, figure, &choice, &print)?;
-    let files = plots.iter().map(|plot| files(plot, asked)).collect::<Result<Vec<_>, Failure>>()?.concat();
-    let folder = asked.out.clone().unwrap_or_else(|| asked.run.join("figures"));
+    let print = Print { width_cm: args.width, height_cm: args.height, ..Print::default() };
+    let plots = youla_run::plot(&args.run, figure, &choice, &print)?;
+    let files = plots.iter().map(|plot| files(plot, args)).collect::<Result<Vec<_>, Failure>>()?.concat();
+    let folder = args.out.clone().unwrap_or_else(|| args.run.join("figures"));
     let paths = write_plots(&folder, &files)?;
-    match (args.json, args.quiet) {
+    match (form.json, form.quiet) {
         (true, _) => {
             let about = |plot: &Plot| {
                 let files = paths.iter().filter(|path| path.file_stem().is_some_and(|stem| stem == plot.name.as_str()));
@@ -95,23 +94,23 @@ pub(crate) fn plot(args: &Args, asked: &PlotArgs) -> Result<(), Failure> {
 }
 
 /// The files of one figure, the numbers last.
-fn files(plot: &Plot, asked: &PlotArgs) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+fn files(plot: &Plot, args: &PlotArgs) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let mut files = Vec::new();
     let mut add = |ending: &str, bytes: Vec<u8>| files.push((format!("{}.{ending}", plot.name), bytes));
-    if asked.svg || !(asked.png || asked.csv) {
-        let svg = if asked.outlines { raster::outlined(&plot.svg)? } else { plot.svg.clone() };
+    if args.svg || !(args.png || args.csv) {
+        let svg = if args.outlines { raster::outlined(&plot.svg)? } else { plot.svg.clone() };
         add("svg", svg.into_bytes());
     }
-    if asked.png {
-        add("png", raster::drawn(&plot.svg, asked.dpi)?);
+    if args.png {
+        add("png", raster::drawn(&plot.svg, args.dpi)?);
     }
     add("csv", plot.csv.clone().into_bytes());
     Ok(files)
 }
 
-fn list(args: &Args, asked: &PlotArgs) -> Result<(), Failure> {
-    let figures = plottable(&asked.run)?;
-    match (args.json, args.quiet) {
+fn list(form: Form, args: &PlotArgs) -> Result<(), Failure> {
+    let figures = plottable(&args.run)?;
+    match (form.json, form.quiet) {
         (true, _) => {
             let all = figures.iter().map(|f| serde_json::json!({ "figure": f.key(), "about": f.about() }));
             say(&serde_json::Value::from(all.collect::<Vec<_>>()).to_string())

@@ -1,38 +1,72 @@
 //! `youla subspace`: a model straight from files of any length.
 
-use crate::args::{Args, SubspaceArgs};
-use crate::output::{Failure, Reading, say};
+use crate::dialect::Dialect;
+use crate::output::{Failure, Form, Reading, say};
 use crate::table;
+use clap::Args;
 use std::fs;
-use std::path::Path;
-use youla_io::TimeSource;
+use std::path::{Path, PathBuf};
+use youla_io::{ChannelRef, TimeSource};
 use youla_run::{LongRecords, identify_long, long_model_file, read_subspace_options};
 
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla subspace log.csv.gz --input u --output x,y --time t
+  youla subspace long.npy --input '#1,#2' --output '#3,#4' --sample-time 2e-4 --options options.toml --out model.json";
+
+/// Files, channels and clock of `subspace`.
+#[derive(Debug, Args)]
+pub(crate) struct SubspaceArgs {
+    /// Text (plain or gzip) or NumPy .npy (samples x channels); several files are several experiments.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    /// Inputs, by name or as #3 for the third column, separated by commas.
+    #[arg(long, value_name = "NAME", required = true, value_delimiter = ',')]
+    input: Vec<ChannelRef>,
+    /// Outputs, as the inputs.
+    #[arg(long, value_name = "NAME", required = true, value_delimiter = ',')]
+    output: Vec<ChannelRef>,
+    /// Sample time in seconds.
+    #[arg(long, value_name = "S", required_unless_present = "time", allow_negative_numbers = true)]
+    sample_time: Option<f64>,
+    /// Column with the time in seconds, for text files; with --sample-time both must agree.
+    #[arg(long, value_name = "NAME")]
+    time: Option<ChannelRef>,
+    #[command(flatten)]
+    dialect: Dialect,
+    /// Options of the identification, as in [direct] of run.toml.
+    #[arg(long, value_name = "FILE")]
+    options: Option<PathBuf>,
+    /// File for the model as JSON.
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+}
+
 /// Identifies, writes the model and prints what it is.
-pub(crate) fn identify(args: &Args, asked: &SubspaceArgs) -> Result<(), Failure> {
-    let options = asked.options.as_ref().map(read_subspace_options).transpose()?.unwrap_or_default();
-    if let Some(path) = asked.out.as_ref().filter(|path| path.exists()) {
+pub(crate) fn identify(form: Form, args: &SubspaceArgs) -> Result<(), Failure> {
+    let options = args.options.as_ref().map(read_subspace_options).transpose()?.unwrap_or_default();
+    if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
         return Err(youla_io::Error::OutputExists { path: path.clone() }.into());
     }
     let records = LongRecords {
-        files: asked.files.clone(),
-        inputs: asked.input.clone(),
-        outputs: asked.output.clone(),
-        time: TimeSource { column: asked.time.clone(), ts: asked.sample_time, ..TimeSource::default() },
-        csv: asked.dialect.options(),
+        files: args.files.clone(),
+        inputs: args.input.clone(),
+        outputs: args.output.clone(),
+        time: TimeSource { column: args.time.clone(), ts: args.sample_time, ..TimeSource::default() },
+        csv: args.dialect.options(),
     };
-    let reading = Reading::new(args.quiet || args.json);
+    let reading = Reading::new(form.quiet || form.json);
     let found = identify_long(&records, &options, &mut |at| reading.at(at))?;
-    let file = (args.json || asked.out.is_some()).then(|| long_model_file(&found, &records, &options)).transpose()?;
+    let file = (form.json || args.out.is_some()).then(|| long_model_file(&found, &records, &options)).transpose()?;
     reading.finish();
     let json = match &file {
         Some(file) => serde_json::to_string_pretty(file).map_err(|e| Failure::io(Path::new("the model"), e.into()))?,
         None => String::new(),
     };
-    if let Some(path) = &asked.out {
+    if let Some(path) = &args.out {
         write(path, &(json.clone() + "\n"))?;
     }
-    match (args.json, args.quiet) {
+    match (form.json, form.quiet) {
         (true, _) => say(&json),
         (_, true) => Ok(()),
         _ => say(&table::subspace(&found, peak_memory())?),

@@ -1,4 +1,4 @@
-//! The pages of the book on accuracy and speed, measured: `cargo bench -p youla --bench pages` writes `docs/book/accuracy.md` and
+//! The pages of the book on accuracy and speed, measured: `cargo bench -p youla-cli --bench pages` writes `docs/book/accuracy.md` and
 //! `docs/book/speed.md`. Everything is seeded; what differs between machines is time, and the last digits of residuals.
 
 mod accuracy;
@@ -9,9 +9,9 @@ mod speed;
 #[path = "../timing/mod.rs"]
 mod timing;
 
-#[path = "../../tests/common/bearing_loop.rs"]
+#[path = "../../../youla/tests/common/bearing_loop.rs"]
 mod bearing_loop;
-#[path = "../../tests/common/mod.rs"]
+#[path = "../../../youla/tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;

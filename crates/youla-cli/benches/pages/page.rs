@@ -5,7 +5,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 /// The beginning of a page.
 pub(crate) fn head(title: &str, about: &str) -> String {
     format!(
-        "# {title}\n\n{about}\n\nWritten by `cargo bench -p youla --bench pages` on {}, version {}: {}.\n",
+        "# {title}\n\n{about}\n\nWritten by `cargo bench -p youla-cli --bench pages` on {}, version {}: {}.\n",
         today(),
         env!("CARGO_PKG_VERSION"),
         machine()

@@ -6,13 +6,16 @@ use crate::timing::{median, middle};
 use faer::Mat;
 use std::f64::consts::PI;
 use std::path::Path;
-use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::lti::{frequency_response, simulate};
+use youla_paper::demo;
 use youla_paper::rig::{Bearing, degraded};
-use youla_run::{Identification, StageClock, demo, identify, write_run};
+use youla_run::{Identification, StageClock, identify, write_run};
+
+/// Errors of all crates.
+type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;
 
 /// Sample time of the bearing, seconds.
 const TS: f64 = 2e-4;

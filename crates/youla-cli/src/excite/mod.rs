@@ -2,10 +2,9 @@
 
 mod text;
 
-use crate::args::Args;
-use crate::commands::folder_of;
-use crate::output::{Failure, say};
-use clap::{Args as ClapArgs, ValueEnum};
+use crate::output::{Failure, Form, say};
+use crate::run_folder::folder_of;
+use clap::{Args, ValueEnum};
 use std::path::PathBuf;
 use youla_io::export::SequenceFormat;
 use youla_loop::excite::{ExciteOptions, InputOrder, Length, Notch, Shape};
@@ -18,8 +17,8 @@ Example:
   youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --noise 0.2 --damping-deviation 0.002
                                                how well the modes will be known, and how long it takes to know them so well";
 
-/// What is asked of an excitation.
-#[derive(Debug, ClapArgs)]
+/// What is args of an excitation.
+#[derive(Debug, Args)]
 pub(crate) struct ExciteArgs {
     /// Settings, as for `identify`; the data files need not exist where [data] states the sample time.
     #[arg(value_name = "RUN.TOML")]
@@ -142,21 +141,21 @@ fn format(name: &str) -> Result<SequenceFormat, String> {
 }
 
 /// Makes the excitation, writes its files and says what it does.
-pub(crate) fn make(args: &Args, asked: &ExciteArgs) -> Result<(), Failure> {
-    let folder = folder_of(&asked.settings);
-    let settings = RunSettings::read(&asked.settings)?;
-    let port = asked.port.map(|port| match port {
+pub(crate) fn make(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
+    let folder = folder_of(&args.settings);
+    let settings = RunSettings::read(&args.settings)?;
+    let port = args.port.map(|port| match port {
         PortName::Alpha => ExcitationPort::Alpha,
         PortName::Input => ExcitationPort::Input,
     });
-    let found = excite_run(&settings, &folder, &options(asked)?, port, asked.noise_record.as_deref())?;
-    let files = write_excitation(&found, &asked.to, &asked.out, asked.force)?;
-    if args.json {
+    let found = excite_run(&settings, &folder, &options(args)?, port, args.noise_record.as_deref())?;
+    let files = write_excitation(&found, &args.to, &args.out, args.force)?;
+    if form.json {
         let mut about = serde_json::json!(found.excited.summary);
         about["port"] = serde_json::json!(found.port);
         about["files"] = files.iter().map(|path| path.display().to_string()).collect();
         say(&about.to_string())
-    } else if args.quiet {
+    } else if form.quiet {
         Ok(())
     } else {
         let mut text = text::of(&found);
@@ -165,35 +164,35 @@ pub(crate) fn make(args: &Args, asked: &ExciteArgs) -> Result<(), Failure> {
     }
 }
 
-fn options(asked: &ExciteArgs) -> Result<ExciteOptions, Failure> {
-    let [low, high] = asked.band[..] else {
+fn options(args: &ExciteArgs) -> Result<ExciteOptions, Failure> {
+    let [low, high] = args.band[..] else {
         let what = "the number of frequencies of --band".into();
-        return Err(youla::Error::Ports { what, expected: 2, found: asked.band.len() }.into());
+        return Err(youla::Error::Ports { what, expected: 2, found: args.band.len() }.into());
     };
-    let speed = asked.notch_hz.or(asked.notch_rpm.map(|rpm| rpm / 60.0));
+    let speed = args.notch_hz.or(args.notch_rpm.map(|rpm| rpm / 60.0));
     Ok(ExciteOptions {
-        shape: match asked.shape {
+        shape: match args.shape {
             ShapeName::Square => Shape::Square,
             ShapeName::Prbs => Shape::Prbs,
             ShapeName::Multisine => Shape::Multisine,
             ShapeName::Chirp => Shape::Chirp,
         },
-        amplitude: asked.amplitude.clone(),
+        amplitude: args.amplitude.clone(),
         band: [low, high],
-        length: match (asked.samples, asked.duration) {
+        length: match (args.samples, args.duration) {
             (Some(samples), _) => Length::Samples(samples),
             (None, seconds) => Length::Seconds(seconds.unwrap_or(0.0)),
         },
-        seed: asked.seed,
-        ramp: asked.ramp,
-        notch: speed.map(|hz| Notch { width: asked.notch_width, ..Notch::at(hz) }),
-        inputs: if asked.one_at_a_time { InputOrder::OneAtATime } else { InputOrder::Together },
-        periods: asked.periods,
-        limit_input: asked.limit_input.clone(),
-        limit_output: asked.limit_output.clone(),
-        scale_to_limit: asked.scale_to_limit,
-        model_error: asked.model_error,
-        noise: asked.noise.clone(),
-        damping_deviation: asked.damping_deviation,
+        seed: args.seed,
+        ramp: args.ramp,
+        notch: speed.map(|hz| Notch { width: args.notch_width, ..Notch::at(hz) }),
+        inputs: if args.one_at_a_time { InputOrder::OneAtATime } else { InputOrder::Together },
+        periods: args.periods,
+        limit_input: args.limit_input.clone(),
+        limit_output: args.limit_output.clone(),
+        scale_to_limit: args.scale_to_limit,
+        model_error: args.model_error,
+        noise: args.noise.clone(),
+        damping_deviation: args.damping_deviation,
     })
 }

@@ -5,8 +5,8 @@ use serde_json::{Map, Value};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
+use youla_io::export::ExportedController;
 use youla_io::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
-use youla_loop::redesign::ExportedController;
 use youla_run::ModelFile;
 
 fn json(path: &Path) -> Value {

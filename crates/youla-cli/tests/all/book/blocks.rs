@@ -1,11 +1,11 @@
-//! Blocks that are no commands, in the folder of their chapter. Where there is no program for them, a line begins with `skipped`.
+//! Blocks that are no commands, in the folder of their chapter.
 
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 
 /// The language of a block.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 pub(crate) enum Language {
     /// With scipy; `PYTHON` names the interpreter.
     Python,
@@ -15,37 +15,28 @@ pub(crate) enum Language {
     C,
 }
 
-/// Exit code of a script that lacks a package.
-const NOT_THERE: i32 = 77;
-
 /// Runs the block, or compiles it.
 pub(crate) fn run(name: &str, language: Language, text: &str, folder: &Path) {
-    let found = match language {
+    let mut command = match language {
         Language::Python => {
-            let python = std::env::var("PYTHON").unwrap_or_else(|_| "python3".into());
-            let has_scipy = output(&python, &["-c", "import scipy"], folder).is_some_and(|o| o.status.success());
-            has_scipy.then(|| output(&python, &["-c", text], folder)).flatten()
+            let mut python = Command::new(std::env::var("PYTHON").unwrap_or_else(|_| "python3".into()));
+            python.args(["-c", text]);
+            python
         }
         Language::Matlab => {
-            let script =
-                format!("if isempty(pkg('list', 'control')), exit({NOT_THERE}); end\npkg load control\n{text}");
-            output("octave-cli", &["--no-history", "--eval", &script], folder)
+            let mut octave = Command::new("octave-cli");
+            octave.args(["--no-history", "--eval", &format!("pkg load control\n{text}")]);
+            octave
         }
         Language::C => {
             fs::write(folder.join("block.c"), program(text)).expect("written");
-            output("gcc", &["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "block.c"], folder)
+            let mut gcc = Command::new("gcc");
+            gcc.args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "block.c"]);
+            gcc
         }
     };
-    match found {
-        None => println!("skipped: {name}: nothing here runs\n{text}"),
-        Some(o) if o.status.code() == Some(NOT_THERE) => println!("skipped: {name}: Octave has no package control"),
-        Some(o) => assert!(o.status.success(), "{name}:\n{text}\n{}", String::from_utf8_lossy(&o.stderr)),
-    }
-}
-
-/// `None` where there is no such program.
-fn output(program: &str, arguments: &[&str], folder: &Path) -> Option<Output> {
-    Command::new(program).args(arguments).current_dir(folder).output().ok()
+    let found = command.current_dir(folder).output().unwrap_or_else(|e| panic!("{command:?}: {e}"));
+    assert!(found.status.success(), "{name}:\n{text}\n{}", String::from_utf8_lossy(&found.stderr));
 }
 
 fn program(text: &str) -> String {
@@ -91,7 +82,7 @@ pub(crate) fn targets_are_there(place: &str, command: &str, project: &Path) {
             "--example" => "examples",
             _ => continue,
         };
-        let at = project.join("crates/youla").join(folder);
+        let at = project.join("crates/youla-cli").join(folder);
         let there = at.join(format!("{}.rs", pair[1])).is_file() || at.join(pair[1]).join("main.rs").is_file();
         assert!(there, "{place}: {command}: no {}", pair[1]);
     }

@@ -5,12 +5,13 @@
 //! - `text edit=FILE`: lines `old => new`, where `\n` is a new line;
 //! - `toml`: tables of run.toml; with `file=FILE` the whole of it, which is written;
 //! - `rust,noplayground file=FILE`: one of the examples, which other tests run;
-//! - `python`, `matlab`, `c`: run or compiled where the language is there;
+//! - `rust,ignore file=FILE`: lines of one of the examples;
+//! - `python`, `matlab`, `c`: run or compiled by ignored tests, which need the language;
 //! - `json keys=FILE`: an extract of a file;
 //! - `sh`: commands for the project;
 //! - `text` alone and `latex` are to be read.
 
-use crate::blocks::Language;
+use super::blocks::Language;
 
 /// One thing to do.
 pub(crate) enum Step {
@@ -31,6 +32,10 @@ pub(crate) enum Step {
         text: String,
     },
     Example {
+        file: String,
+        text: String,
+    },
+    Excerpt {
         file: String,
         text: String,
     },
@@ -66,6 +71,10 @@ pub(crate) fn steps(text: &str) -> Vec<Step> {
             ("rust,noplayground", file) => {
                 let file = file.strip_prefix("file=").expect("file=FILE").to_owned();
                 found.push(Step::Example { file, text: body.to_owned() });
+            }
+            ("rust,ignore", file) => {
+                let file = file.strip_prefix("file=").expect("file=FILE").to_owned();
+                found.push(Step::Excerpt { file, text: body.to_owned() });
             }
             ("text", rest) => {
                 let file = rest.strip_prefix("edit=");

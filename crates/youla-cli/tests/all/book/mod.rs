@@ -1,12 +1,13 @@
 //! The book, all pages of `docs`: every command runs in the order of its page and ends as the page says, every edit finds its text,
 //! every table of settings is one that run.toml takes, every program is that of the examples or compiles, every link leads to a page.
-#![allow(missing_docs)]
 
 mod blocks;
 mod chapter;
 mod readme;
 
-use chapter::{Step, steps};
+use self::blocks::Language;
+use self::chapter::{Step, steps};
+use crate::common::data;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -17,30 +18,66 @@ fn docs() -> PathBuf {
 
 #[test]
 fn commands_and_edits_do_what_the_chapters_say() {
-    let docs = docs();
-    for page in pages(&docs) {
-        let text = fs::read_to_string(docs.join(&page)).expect("readable");
-        let name = page.trim_end_matches(".md");
-        if text.contains("../shared/data") || text.contains("examples/qube") {
-            let data = docs.join("../../shared/data");
-            if !data.is_dir() {
-                println!("skipped: {name}: the measured data are not beside the project");
-                continue;
-            }
-        }
-        let steps = steps(&text);
-        if !steps.is_empty() {
-            run_chapter(&folder_of(name), name, &steps);
-        }
-    }
+    run_chapters("plain", |text| !needs_data(text), None);
 }
 
 #[test]
-fn commands_of_the_readme_work_on_a_log_such_as_it_describes() {
-    let text = fs::read_to_string(docs().join("../README.md")).expect("readable");
-    let folder = folder_of("README");
-    readme::write_scene(&folder);
-    run_chapter(&folder, "README.md", &steps(&text));
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
+fn chapters_on_measured_data_do_what_they_say() {
+    run_chapters("measured", needs_data, None);
+}
+
+#[test]
+#[ignore = "needs python3 with scipy"]
+fn python_blocks_run() {
+    run_chapters("python", |text| text.contains("```python") && !needs_data(text), Some(Language::Python));
+}
+
+#[test]
+#[ignore = "needs octave-cli with the package control"]
+fn matlab_blocks_run() {
+    run_chapters("matlab", |text| text.contains("```matlab") && !needs_data(text), Some(Language::Matlab));
+}
+
+#[test]
+#[ignore = "needs gcc"]
+fn c_blocks_compile() {
+    run_chapters("c", |text| text.contains("```c\n") && !needs_data(text), Some(Language::C));
+}
+
+/// The pages that are wanted, README.md included; blocks in other languages than `language` are not run.
+fn run_chapters(set: &str, wanted: impl Fn(&str) -> bool, language: Option<Language>) {
+    let docs = docs();
+    for page in pages(&docs).into_iter().chain(["../README.md".to_owned()]) {
+        let text = fs::read_to_string(docs.join(&page)).expect("readable");
+        let steps = steps(&text);
+        if steps.is_empty() || !wanted(&text) {
+            continue;
+        }
+        let name = page.trim_start_matches("../").trim_end_matches(".md");
+        let folder = folder_of(&format!("{set}/{name}"));
+        if name == "README" {
+            readme::write_scene(&folder);
+        }
+        run_chapter(&folder, name, &steps, language);
+    }
+}
+
+/// README.md runs on a log of its own.
+fn needs_data(text: &str) -> bool {
+    !text.starts_with("# youla\n") && (text.contains("../shared/data") || text.contains("examples/qube"))
+}
+
+/// The examples with the place of the measured data in them.
+fn examples(project: &Path) -> PathBuf {
+    let copies = folder_of("examples");
+    for name in ["flexible-drive/run.toml", "flexible-drive/two-inertia.toml", "qube/run.toml"] {
+        let text = fs::read_to_string(project.join("examples").join(name)).expect("readable");
+        let text = text.replace("../../../shared/data", &data().display().to_string());
+        fs::create_dir_all(copies.join(name).parent().expect("a folder")).expect("a temporary folder");
+        fs::write(copies.join(name), text).expect("written");
+    }
+    copies
 }
 
 /// A folder of its own, empty.
@@ -51,12 +88,13 @@ fn folder_of(name: &str) -> PathBuf {
     folder
 }
 
-/// From the folder of a chapter `../shared` and `../../examples` lead to where they lead from the project.
-fn run_chapter(folder: &Path, name: &str, steps: &[Step]) {
+/// From the folder of a chapter `../shared/data` and `../../examples` lead to where they lead from the project.
+fn run_chapter(folder: &Path, name: &str, steps: &[Step], wanted: Option<Language>) {
     let project = docs().join("..").canonicalize().expect("the project");
-    let at = |text: &str| {
-        text.replace("../../examples", &project.join("examples").display().to_string())
-            .replace("../shared", &project.join("../shared").display().to_string())
+    let at = |text: &str| match (text.contains("../../examples"), text.contains("../shared/data")) {
+        (true, _) => text.replace("../../examples", &examples(&project).display().to_string()),
+        (_, true) => text.replace("../shared/data", &data().display().to_string()),
+        _ => text.to_owned(),
     };
     for step in steps {
         match step {
@@ -78,10 +116,17 @@ fn run_chapter(folder: &Path, name: &str, steps: &[Step]) {
                 fs::write(path, text.replace(from, to)).expect("written");
             }
             Step::Example { file, text } => {
-                let path = docs().join("../crates/youla/examples").join(file);
+                let path = docs().join("../crates/youla-cli/examples").join(file);
                 assert_eq!(*text, fs::read_to_string(path).expect("readable"), "{name}: {file} has changed");
             }
-            Step::Other { language, text } => blocks::run(name, *language, text, folder),
+            Step::Excerpt { file, text } => {
+                let path = docs().join("../crates/youla-cli/examples").join(file);
+                let example = fs::read_to_string(path).expect("readable");
+                let flat = |text: &str| text.lines().map(str::trim).collect::<Vec<_>>().join("\n");
+                assert!(flat(&example).contains(flat(text).trim()), "{name}: not lines of {file}");
+            }
+            Step::Other { language, text } if wanted == Some(*language) => blocks::run(name, *language, text, folder),
+            Step::Other { .. } => {}
             Step::Keys { file, text } => {
                 let read = |text: &str| serde_json::from_str(text).unwrap_or_else(|e| panic!("{name}: {e}"));
                 let found = fs::read_to_string(folder.join(file)).expect("readable");

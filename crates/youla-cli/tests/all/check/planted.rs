@@ -1,6 +1,6 @@
 //! One test for each defect: named by the right test, in the right channel, with the right size.
 
-use crate::common::{
+use super::records::{
     DRIVE, QUBE, check, check_file, check_run, drive, dryer, evaporator, folder, joint, near, number, player, qube,
     robot,
 };
@@ -12,8 +12,9 @@ fn scatter(k: usize) -> f64 {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn irregular_sample_time() {
-    let Some(mut log) = qube() else { return };
+    let mut log = qube();
     log.column("t").iter_mut().enumerate().skip(2000).take(400).for_each(|(k, t)| *t += 2e-4 * scatter(k));
     let found = check_run("irregular", QUBE, &log);
     assert_eq!(found.code, 1);
@@ -26,8 +27,9 @@ fn irregular_sample_time() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn missing_rows() {
-    let Some(mut log) = qube() else { return };
+    let mut log = qube();
     log.remove(3000, 3010);
     log.remove(6000, 6001);
     let found = check_run("gap", QUBE, &log);
@@ -38,8 +40,9 @@ fn missing_rows() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn repeated_time_stamps() {
-    let Some(mut log) = joint() else { return };
+    let mut log = joint();
     for k in 0..20 {
         let row = 2000 + 500 * k;
         log.columns.iter_mut().for_each(|c| c.insert(row + 1, c[row]));
@@ -53,8 +56,9 @@ fn repeated_time_stamps() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn clipped_output() {
-    let Some(mut log) = player() else { return };
+    let mut log = player();
     let limit = 1.5 * log.deviation("y1");
     log.column("y1").iter_mut().for_each(|y| *y = y.min(limit));
     let clipped = log.column("y1").iter().filter(|y| **y == limit).count();
@@ -65,8 +69,9 @@ fn clipped_output() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn saturated_input() {
-    let Some(mut log) = qube() else { return };
+    let mut log = qube();
     log.column("plant_input").iter_mut().for_each(|u| *u = u.clamp(-2.0, 2.0));
     let held = log.column("plant_input").iter().filter(|u| **u == 2.0).count();
     let found = check_run("saturated", QUBE, &log);
@@ -78,8 +83,9 @@ fn saturated_input() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn coarse_steps() {
-    let Some(mut log) = robot() else { return };
+    let mut log = robot();
     let step = 0.4 * log.deviation("y1");
     log.column("y1").iter_mut().for_each(|y| *y = (*y / step).round() * step);
     let found = check_file("coarse", &log);
@@ -89,8 +95,9 @@ fn coarse_steps() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn drift() {
-    let Some(mut log) = dryer() else { return };
+    let mut log = dryer();
     let size = 8.0 * log.deviation("y1");
     let rows = log.columns[0].len() as f64;
     log.column("y1").iter_mut().enumerate().for_each(|(k, y)| *y += size * k as f64 / rows);
@@ -100,8 +107,9 @@ fn drift() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn single_outliers() {
-    let Some(mut log) = evaporator() else { return };
+    let mut log = evaporator();
     let size = 4.0 * log.deviation("y1");
     for k in 0..8 {
         log.column("y1")[500 + 700 * k] += if k % 2 == 0 { size } else { -size };
@@ -114,8 +122,9 @@ fn single_outliers() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn stuck_sensor() {
-    let Some(mut log) = player() else { return };
+    let mut log = player();
     let value = log.column("y2")[699];
     log.column("y2")[700..740].fill(value);
     let found = check_file("stuck", &log);
@@ -125,9 +134,10 @@ fn stuck_sensor() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn dropout_under_friction() {
     // Steps and friction make stretches of up to 47 samples in this record.
-    let Some(mut log) = drive() else { return };
+    let mut log = drive();
     log.column("y")[20_000..20_300].fill(0.0);
     let found = check_run("dropout", DRIVE, &log);
     let finding = found.serious("stuck", Some("y"));
@@ -135,8 +145,9 @@ fn dropout_under_friction() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn input_one_sample_late() {
-    let Some(mut log) = drive() else { return };
+    let mut log = drive();
     log.column("u").rotate_right(1);
     let found = check_run("shift", DRIVE, &log);
     let controller = found.serious("controller", None);
@@ -146,8 +157,9 @@ fn input_one_sample_late() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn sign_of_the_controller() {
-    let Some(log) = drive() else { return };
+    let log = drive();
     let found = check_run("sign", &DRIVE.replace("\"negative\"", "\"positive\""), &log);
     let finding = found.serious("controller", None);
     near(number(finding, "residual"), 2.0, 1e-3);
@@ -157,8 +169,9 @@ fn sign_of_the_controller() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn gain_of_the_controller() {
-    let Some(log) = qube() else { return };
+    let log = qube();
     let settings = QUBE.replace("[[[-96.6, 96.0], [-158.0, 155.0]]]", "[[[-115.92, 115.2], [-189.6, 186.0]]]");
     let found = check_run("gain", &settings, &log);
     let finding = found.serious("controller", None);
@@ -167,8 +180,9 @@ fn gain_of_the_controller() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn exchanged_channels() {
-    let Some(log) = qube() else { return };
+    let log = qube();
     let settings = QUBE.replace(
         "{ name = \"theta\", unit = \"rad\" }, { name = \"alpha\", unit = \"rad\" }",
         "{ name = \"theta\", from = \"alpha\" }, { name = \"alpha\", from = \"theta\" }",
@@ -180,8 +194,9 @@ fn exchanged_channels() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn degrees_for_radians() {
-    let Some(mut log) = qube() else { return };
+    let mut log = qube();
     log.column("alpha").iter_mut().for_each(|y| *y = y.to_degrees());
     let found = check_run("degrees", QUBE, &log);
     let finding = found.serious("controller", None);
@@ -191,16 +206,18 @@ fn degrees_for_radians() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn excitation_that_rests() {
-    let Some(mut log) = drive() else { return };
+    let mut log = drive();
     log.column("d").fill(0.0);
     let found = check_run("rests", DRIVE, &log);
     assert!(found.serious("excitation", Some("d"))["what"].as_str().is_some_and(|w| w.contains("does not move")));
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn register_that_is_too_short() {
-    let Some(mut log) = dryer() else { return };
+    let mut log = dryer();
     // A maximum-length sequence of four stages: period 15.
     let mut register = 1u32;
     for u in log.column("u1").iter_mut() {
@@ -215,8 +232,9 @@ fn register_that_is_too_short() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn lines_of_a_rotor() {
-    let Some(mut log) = drive() else { return };
+    let mut log = drive();
     let size = 0.2 * log.deviation("y");
     for (k, y) in log.column("y").iter_mut().enumerate() {
         let turn = std::f64::consts::TAU * 71.3 * 5e-4 * k as f64;
@@ -231,8 +249,9 @@ fn lines_of_a_rotor() {
 }
 
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn time_in_milliseconds() {
-    let Some(mut log) = qube() else { return };
+    let mut log = qube();
     log.column("t").iter_mut().for_each(|t| *t *= 1e3);
     let settings = QUBE.replace("time_column = \"t\"", "time_column = \"t\"\nsample_time = 2e-3");
     let found = check_run("milliseconds", &settings, &log);

@@ -1,6 +1,6 @@
 //! What the program does beside finding: text, files, exit codes, refusals.
 
-use crate::common::folder;
+use super::records::folder;
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Output};

@@ -44,20 +44,17 @@ impl Log {
     }
 }
 
-/// A file of `../shared/data`, where it is there.
-pub(crate) fn data(file: &str) -> Option<PathBuf> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data").join(file);
-    if path.exists() {
-        return Some(path);
-    }
-    println!("skipped: ../shared/data/{file} is not there");
-    None
+/// A file of the measured data.
+pub(crate) fn data(file: &str) -> PathBuf {
+    let path = crate::common::data().join(file);
+    assert!(path.exists(), "{} is missing", path.display());
+    path
 }
 
-fn columns(file: &str, channels: &[(&str, &str)], ts: f64, take: usize) -> Option<Log> {
+fn columns(file: &str, channels: &[(&str, &str)], ts: f64, take: usize) -> Log {
     let place = |from: &str| from.parse::<ChannelRef>().expect("a place");
     let source = Source {
-        path: data(file)?,
+        path: data(file),
         format: Default::default(),
         time: TimeSource::ts(ts),
         channels: channels.iter().map(|(name, from)| ChannelSpec::from(*name, place(from), "")).collect(),
@@ -71,52 +68,52 @@ fn columns(file: &str, channels: &[(&str, &str)], ts: f64, take: usize) -> Optio
         names.push("t".into());
         columns.push((0..rows).map(|k| k as f64 * ts).collect());
     }
-    Some(Log { names, columns })
+    Log { names, columns }
 }
 
 /// 40000 samples of the flexible drive.
-pub(crate) fn drive() -> Option<Log> {
+pub(crate) fn drive() -> Log {
     let places = ["u", "y", "d", "r"].map(|n| (n, format!("Data.signals.{n}")));
     let channels: Vec<(&str, &str)> = places.iter().map(|(n, from)| (*n, from.as_str())).collect();
     columns("flexible_drive/fs2000/cycle1.mat", &channels, 5e-4, 40_000)
 }
 
 /// One episode of the pendulum without its first second.
-pub(crate) fn qube() -> Option<Log> {
+pub(crate) fn qube() -> Log {
     let names = ["t", "target_theta", "target_alpha", "theta", "alpha", "feedforward", "plant_input"];
     let channels: Vec<(&str, &str)> = names.iter().map(|n| (*n, *n)).collect();
     let file = "qube_pendulum/episodes/qube_20230828T150615_434_696_394.csv.gz";
-    let mut log = columns(file, &channels, 2e-3, usize::MAX)?;
+    let mut log = columns(file, &channels, 2e-3, usize::MAX);
     log.remove(0, 500);
-    Some(log)
+    log
 }
 
 /// A record of DaISy with m inputs and p outputs, named u1 ... and y1 ....
-pub(crate) fn daisy(file: &str, m: usize, p: usize) -> Option<Log> {
+pub(crate) fn daisy(file: &str, m: usize, p: usize) -> Log {
     let names: Vec<String> = (1..=m).map(|j| format!("u{j}")).chain((1..=p).map(|j| format!("y{j}"))).collect();
     let places: Vec<String> = (1..=m + p).map(|j| format!("#{j}")).collect();
     let channels: Vec<(&str, &str)> = names.iter().zip(&places).map(|(n, f)| (n.as_str(), f.as_str())).collect();
     columns(file, &channels, 1.0, usize::MAX)
 }
 
-pub(crate) fn dryer() -> Option<Log> {
+pub(crate) fn dryer() -> Log {
     daisy("hair_dryer/dryer.dat", 1, 1)
 }
 
-pub(crate) fn robot() -> Option<Log> {
+pub(crate) fn robot() -> Log {
     daisy("robot_arm/robot_arm.dat", 1, 1)
 }
 
-pub(crate) fn player() -> Option<Log> {
+pub(crate) fn player() -> Log {
     daisy("cd_player_arm/CD_player_arm.dat", 2, 2)
 }
 
-pub(crate) fn evaporator() -> Option<Log> {
+pub(crate) fn evaporator() -> Log {
     daisy("evaporator/evaporator.dat", 3, 3)
 }
 
 /// The prismatic joint: reference, voltage and position.
-pub(crate) fn joint() -> Option<Log> {
+pub(crate) fn joint() -> Log {
     columns("emps/DATA_EMPS.mat", &[("t", "t"), ("u", "vir"), ("y", "qm"), ("r", "qg")], 1e-3, usize::MAX)
 }
 

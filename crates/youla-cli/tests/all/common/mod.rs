@@ -166,14 +166,21 @@ pub(crate) fn settings_refused(name: &str, settings: &str, evidence: &[&str]) {
     refused(&loop_folder(name, &[("run.toml", settings.as_bytes())]), 2, evidence);
 }
 
-/// The run folder of `youla demo`, made once for all tests.
+/// The run folder of `youla demo --machine bearing`, made once for all tests.
 pub(crate) fn demo() -> &'static Path {
     static DEMO: OnceLock<PathBuf> = OnceLock::new();
     DEMO.get_or_init(|| {
         let folder = empty_folder("demo");
-        let found = youla(&folder, &["demo", "--out", "run", "--quiet"]);
+        let found = youla(&folder, &["demo", "--machine", "bearing", "--out", "run", "--quiet"]);
         assert_eq!(found.code, Some(0), "{}", found.stderr);
         assert_eq!(found.stdout + &found.stderr, "", "--quiet prints nothing");
         folder.join("run")
     })
+}
+
+/// The folder with the measured data: `YOULA_DATA`, or `shared/data` beside the project.
+pub(crate) fn data() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let path = std::env::var_os("YOULA_DATA").map_or_else(beside, PathBuf::from);
+    path.canonicalize().unwrap_or_else(|e| panic!("the measured data: {}: {e}", path.display()))
 }

@@ -1,7 +1,7 @@
 //! One clear sentence and exit code 2.
 
+use super::small::{copy_of_whole, paper, settings, whole};
 use crate::common::{Outcome, empty_folder, youla};
-use crate::small::{copy_of_whole, paper, settings, whole};
 use std::fs;
 
 fn refused(outcome: &Outcome, words: &[&str]) {

@@ -1,7 +1,7 @@
 //! A run that was stopped goes on where it was, and ends with the same bytes.
 
+use super::small::{LOOPS, assert_same, command, copy_of_whole, paper, whole};
 use crate::common::empty_folder;
-use crate::small::{LOOPS, assert_same, command, copy_of_whole, paper, whole};
 use std::fs;
 use std::process::Stdio;
 use std::time::Duration;

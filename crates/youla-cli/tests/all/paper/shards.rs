@@ -1,7 +1,7 @@
 //! Parts of the paper, joined.
 
+use super::small::{LOOPS, assert_same, paper};
 use crate::common::{empty_folder, youla};
-use crate::small::{LOOPS, assert_same, paper};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 

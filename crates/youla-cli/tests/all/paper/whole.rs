@@ -1,6 +1,6 @@
 //! What a results folder holds.
 
-use crate::small::whole;
+use super::small::whole;
 use std::fs;
 use youla_paper::study::{Method, PaperSettings, Row};
 

@@ -1,0 +1,97 @@
+//! `youla study`: the study of starts, and parts of the study of the paper.
+
+use crate::output::{Failure, Form, say};
+use crate::paper::{self, Bar};
+use clap::{Args, Subcommand};
+use std::path::{Path, PathBuf};
+use youla_paper::run_starts::{StartsProgress, WrittenStarts, starts};
+use youla_paper::study::{StartCase, StartsSettings};
+
+/// Studies beside the paper, and what is done with parts of its study.
+#[derive(Debug, Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Count how often the prediction-error method arrives, from which start: single, several, continued, or none.
+    ///
+    /// Results stream to the folder as they are found, and a run that was stopped goes on where it was.
+    #[command(after_help = EXAMPLES)]
+    Starts(StartsArgs),
+    /// Join the results folders of all shards and finish the paper from them.
+    #[command(after_help = "Example:\n  youla study merge part1 part2 --out whole")]
+    Merge {
+        /// The results folders of all shards, in any order.
+        #[arg(value_name = "PART", required = true)]
+        parts: Vec<PathBuf>,
+        /// Results folder; runs/paper-seed-S-models-N by default.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  youla study starts                                     all cases; 500 loops at each noise, 100 items of the others
+  youla study starts --cases light-damping --items 20    a first look
+
+Cases: loop-0.2, loop-1.0, light-damping, periodic, far-start, slow-squares.";
+
+/// What is args of the study of starts.
+#[derive(Debug, Args)]
+pub(crate) struct StartsArgs {
+    /// Cases, separated by commas; all by default.
+    #[arg(long, value_delimiter = ',', value_parser = case)]
+    cases: Option<Vec<StartCase>>,
+    /// Items of each case.
+    #[arg(long, value_name = "N")]
+    items: Option<usize>,
+    /// Seed of everything random; the same seed gives the same results.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// Results folder; runs/starts-seed-S by default.
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+}
+
+fn case(name: &str) -> Result<StartCase, String> {
+    let known: Vec<&str> = StartCase::ALL.iter().map(|case| case.key()).collect();
+    StartCase::of_key(name).ok_or_else(|| format!("there is no such case; known are {}", known.join(", ")))
+}
+
+/// Runs either command.
+pub(crate) fn study(form: Form, args: &StudyCommand) -> Result<(), Failure> {
+    match args {
+        StudyCommand::Starts(args) => count(form, args),
+        StudyCommand::Merge { parts, out } => paper::merge_parts(form, parts, out.as_deref()),
+    }
+}
+
+/// Counts how often searches arrive.
+fn count(form: Form, args: &StartsArgs) -> Result<(), Failure> {
+    let cases = args.cases.clone().unwrap_or_else(|| StartCase::ALL.to_vec());
+    let settings = StartsSettings::shipped(&cases, args.items, args.seed);
+    let default = || Path::new("runs").join(format!("starts-seed-{}", args.seed));
+    let target = args.out.clone().unwrap_or_else(default);
+    let bar = Bar::new(form.quiet || form.json);
+    let written = starts(&settings, &target, &|progress| match progress {
+        StartsProgress::Begins(case, items) => bar.begin(case.key(), items),
+        StartsProgress::Done(items) => bar.bar.set_position(items as u64),
+        StartsProgress::Continued { path, items, redone } => bar.continued(path, &format!("{items} items"), redone),
+    })?;
+    bar.bar.finish_and_clear();
+    if form.quiet {
+        return Ok(());
+    }
+    if form.json {
+        let path = target.join("summary.json");
+        return say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end());
+    }
+    say(&table(&written))
+}
+
+fn table(written: &WrittenStarts) -> String {
+    let row = |c: &youla_paper::study::StartCount| {
+        let without = if c.without_loop > 0 { format!(", {} without a loop", c.without_loop) } else { String::new() };
+        format!("{:<14}{:<20}{:>5} of {:>4} arrived{without}", c.case.key(), c.search.label(), c.arrived, c.items)
+    };
+    let lines: Vec<String> = written.counts.iter().map(row).collect();
+    format!("{}\n\n{}", lines.join("\n"), written.folder.join("report.html").display())
+}

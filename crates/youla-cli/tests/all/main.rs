@@ -1,0 +1,16 @@
+//! The program as users run it.
+#![allow(missing_docs)]
+
+mod architecture;
+mod book;
+mod browser;
+mod check;
+mod cli;
+mod common;
+#[path = "../cli/contract.rs"]
+mod contract;
+mod demo;
+mod examples;
+mod paper;
+#[path = "../cli/schema.rs"]
+mod schema;

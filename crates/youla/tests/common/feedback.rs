@@ -59,8 +59,8 @@ impl Loop {
 
     /// Six states from u and y.
     pub(crate) fn identify(&self, method: SubspaceMethod, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
-        let past = weight.is_for_closed_loops().then_some(100);
-        let options = SubspaceOptions { weight, past, order: Order::Fixed(6), ..options() };
+        let past = method.is_for_closed_loops().then_some(100);
+        let options = SubspaceOptions { method, past, order: Order::Fixed(6), ..options() };
         let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
         subspace(&experiment, self.plant.time(), &options).unwrap().model
     }

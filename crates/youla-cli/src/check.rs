@@ -60,7 +60,7 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
     }
     let found = if args.input.is_empty() { of_run(args)? } else { of_files(args)? };
     let json =
-        serde_json::to_string_pretty(&found.json()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;
+        serde_json::to_string_pretty(&found.entry()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;
     if let Some(folder) = &args.out {
         let file = folder.join("check.json");
         fs::create_dir_all(folder).map_err(|source| Failure::io(folder, source))?;

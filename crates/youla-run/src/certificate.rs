@@ -1,59 +1,18 @@
 //! `[certificate]`: what a run states about the loop of its model beyond the poles of the estimate.
 
-use super::controller_errors::{ControllerErrorEffect, controller_errors};
-use super::pipeline::Identification;
+use super::context::RunContext;
+use super::controller_errors::{ControllerErrorEffect, ControllerErrorEntry, controller_errors};
+use super::entries::{BandEntry, IntervalEntry, finite, pairs};
 use super::robustness::channel_scales;
+use super::signals::DeviationSignals;
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
+use std::collections::BTreeMap;
 use youla::control::{LinearMargins, WorstMargins};
+use youla::identify::hansen::HansenModel;
 use youla::identify::subspace::{Interval, Uncertainty};
-use youla::validate::{BandCertificate, BandOptions, ExactCertificate, certify_band, certify_deviation};
+use youla::validate::{BandCertificate, ExactCertificate, certify_band, certify_deviation};
 use youla_report::{data as draw, with_minus};
-
-/// Choices of the certificate.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CertificateSettings {
-    /// Models that are drawn from the region of S, where its uncertainty was asked for.
-    pub band: BandOptions,
-    /// Whether S is identified again with a controller that is described wrongly.
-    pub controller_errors: bool,
-    /// Relative error of the gain of the controller that is tried, both ways.
-    pub gain_error: f64,
-    /// Limit of u that is tried, as a part of the largest |u| of each record and channel.
-    pub saturation: f64,
-}
-
-impl Default for CertificateSettings {
-    fn default() -> Self {
-        CertificateSettings {
-            band: BandOptions::default(),
-            controller_errors: false,
-            gain_error: 0.05,
-            saturation: 0.9,
-        }
-    }
-}
-
-impl CertificateSettings {
-    /// What is wrong with the numbers.
-    pub(super) fn problem(&self) -> Option<String> {
-        let part = |x: f64| x > 0.0 && x < 1.0;
-        match self {
-            _ if self.band.draws < 20 => {
-                Some(format!("[certificate] band.draws is {}, but must be at least 20", self.band.draws))
-            }
-            _ if !part(self.gain_error) => {
-                Some(format!("[certificate] gain_error is {}, but must be above 0 and below 1", self.gain_error))
-            }
-            _ if !part(self.saturation) => {
-                Some(format!("[certificate] saturation is {}, but must be above 0 and below 1", self.saturation))
-            }
-            _ => None,
-        }
-    }
-}
 
 /// What a run states about the loop of G(S) with the controller that ran.
 #[derive(Debug, Clone)]
@@ -73,18 +32,23 @@ pub struct RunCertificate {
 ///
 /// # Errors
 /// Numerical conditions of the estimate itself.
-pub(super) fn certificate(found: &Identification) -> Result<RunCertificate> {
-    let settings = found.settings.certificate.unwrap_or_default();
-    let (factors, deviation) = (&found.factorisation.factors, &found.hansen.deviation);
+pub(super) fn certificate(
+    run: RunContext<'_>,
+    signals: &DeviationSignals,
+    hansen: &HansenModel,
+) -> Result<RunCertificate> {
+    let settings = run.settings.certificate.unwrap_or_default();
+    let (factors, deviation) = (&run.factorisation.factors, &hansen.deviation);
     let exact = certify_deviation(factors, &deviation.model, None)?;
     let band = match &deviation.uncertainty {
         // K stabilises G(S) exactly where S is stable.
         Some(uncertainty) => certify_band(uncertainty, &settings.band, |_| Ok(true), |s| Ok(s.clone()))?,
         None => None,
     };
-    let asked = found.settings.certificate.is_some();
-    let margins = if exact.stable && asked { margins(found)? } else { Vec::new() };
-    let controller_errors = if settings.controller_errors { controller_errors(found, &settings)? } else { Vec::new() };
+    let asked = run.settings.certificate.is_some();
+    let margins = if exact.stable && asked { margins(run, hansen)? } else { Vec::new() };
+    let controller_errors =
+        if settings.controller_errors { controller_errors(run, signals, &settings)? } else { Vec::new() };
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 
@@ -92,10 +56,10 @@ pub(super) fn certificate(found: &Identification) -> Result<RunCertificate> {
 ///
 /// The delta method takes derivatives, and gets them from the responses of a loop at the frequencies where that of the estimate is
 /// critical; a bootstrap takes each replicate exactly.
-fn margins(found: &Identification) -> Result<Vec<(String, Interval)>> {
-    let Some(uncertainty) = &found.hansen.deviation.uncertainty else { return Ok(Vec::new()) };
-    let (factors, controller) = (&found.factorisation.factors, &found.factorisation.controller);
-    let scales = channel_scales(&found.records.estimation).ok();
+fn margins(run: RunContext<'_>, hansen: &HansenModel) -> Result<Vec<(String, Interval)>> {
+    let Some(uncertainty) = &hansen.deviation.uncertainty else { return Ok(Vec::new()) };
+    let (factors, controller) = (&run.factorisation.factors, &run.factorisation.controller);
+    let scales = channel_scales(&run.records.estimation).ok();
     let intervals = match uncertainty {
         Uncertainty::Delta(delta) => {
             let linear = LinearMargins::new(&factors.plant_of(&delta.model)?, controller, scales.as_ref())?;
@@ -133,6 +97,23 @@ fn figures(worst: &WorstMargins) -> Vec<f64> {
     all.map(|figure| figure.unwrap_or(f64::NAN)).to_vec()
 }
 
+/// The certificate in `7-validate/certificate.json` and summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct CertificateEntry {
+    /// Whether S is stable, and with it the loop of G(S).
+    pub stable: bool,
+    /// Poles of S, `[re, im]`.
+    pub deviation_poles: Vec<[f64; 2]>,
+    /// Largest relative difference of the two sides of the identity behind that test.
+    pub identity_residual: Option<f64>,
+    /// The controller on every model within the region of S; `null` without an uncertainty.
+    pub band: Option<BandEntry>,
+    /// Margins with intervals, by name.
+    pub margins: BTreeMap<String, IntervalEntry>,
+    /// What errors in the description of the controller do to the result.
+    pub controller_errors: Vec<ControllerErrorEntry>,
+}
+
 impl RunCertificate {
     /// One sentence on the region of S.
     pub(super) fn band_sentence(&self) -> Option<String> {
@@ -153,26 +134,19 @@ impl RunCertificate {
         })
     }
 
-    /// For `7-validate/certificate.json` and summary.json.
-    pub(super) fn json(&self) -> Value {
-        let margins: serde_json::Map<String, Value> = self
-            .margins
-            .iter()
-            .map(|(name, interval)| (name.replace(',', "").replace(' ', "_"), json!(interval)))
-            .collect();
-        let errors: Vec<Value> = self.controller_errors.iter().map(ControllerErrorEffect::json).collect();
-        json!({
-            "stable": self.exact.stable,
-            "deviation_poles": super::artefacts::pairs(&self.exact.deviation_poles),
-            "identity_residual": self.exact.identity_residual,
-            "band": self.band.map(|band| {
-                let mut entry = json!(band);
-                entry["holds"] = json!(band.holds());
-                entry
-            }),
-            "margins": margins,
-            "controller_errors": errors,
-        })
+    /// As `7-validate/certificate.json` and summary.json hold it.
+    pub(super) fn entry(&self) -> CertificateEntry {
+        let margin = |(name, interval): &(String, Interval)| {
+            (name.replace(',', "").replace(' ', "_"), IntervalEntry::from(interval))
+        };
+        CertificateEntry {
+            stable: self.exact.stable,
+            deviation_poles: pairs(&self.exact.deviation_poles),
+            identity_residual: finite(self.exact.identity_residual),
+            band: self.band.as_ref().map(BandEntry::from),
+            margins: self.margins.iter().map(margin).collect(),
+            controller_errors: self.controller_errors.iter().map(ControllerErrorEntry::from).collect(),
+        }
     }
 
     /// The tables of the report.

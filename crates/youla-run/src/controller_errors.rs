@@ -4,18 +4,17 @@
 //! All variants, and the one without an error that they are compared with, use the factors of an arbitrary controller
 //! ([`youla::factor::CoprimeFactors::stacked`]): the choice of factors alone changes an estimate a little.
 
-use super::certificate::CertificateSettings;
+use super::context::RunContext;
+use super::entries::{OrRefused, finite, finite_all};
 use super::factorise::factorise;
-use super::models::Controller;
-use super::pipeline::Identification;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::{Construction, FactorSettings};
-use super::signals::deviation_signals;
+use super::settings::{CertificateSettings, Construction, Controller, FactorSettings};
+use super::signals::{DeviationSignals, deviation_signals};
 use super::verdict::verify_record;
 use crate::Result;
 use faer::Scale;
 use rayon::prelude::*;
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 use youla::Mat;
 use youla::identify::hansen::{HansenModel, deviation_data};
 use youla::identify::innovation_form::hansen_structured;
@@ -104,10 +103,11 @@ fn mean<'a>(fits: impl Iterator<Item = &'a f64>) -> f64 {
 /// # Errors
 /// Those of the run without an error.
 pub(super) fn controller_errors(
-    found: &Identification,
+    run: RunContext<'_>,
+    signals: &DeviationSignals,
     settings: &CertificateSettings,
 ) -> Result<Vec<ControllerErrorEffect>> {
-    let plain = identified(found, ControllerError::None)?;
+    let plain = identified(run, signals.settle, ControllerError::None)?;
     let modes: Vec<Mode> = plain.plant.modes()?.into_iter().filter(light).collect();
     let errors = [
         ControllerError::None,
@@ -120,9 +120,9 @@ pub(super) fn controller_errors(
     let effect = |error: &ControllerError| {
         let result = match error {
             ControllerError::None => Ok(plain.clone()),
-            error => identified(found, *error),
+            error => identified(run, signals.settle, *error),
         };
-        let outcome = result.and_then(|result| changed(found, &modes, &result)).map_err(|e| e.to_string());
+        let outcome = result.and_then(|result| changed(run, &modes, &result)).map_err(|e| e.to_string());
         ControllerErrorEffect { error: *error, outcome }
     };
     Ok(errors.par_iter().map(effect).collect())
@@ -133,9 +133,9 @@ fn light(mode: &Mode) -> bool {
 }
 
 /// S and G(S) with an error in the description of the controller; an unstable S is a result here.
-fn identified(found: &Identification, error: ControllerError) -> Result<HansenModel> {
-    let (settings, time) = (&found.settings, found.records.time);
-    let controller = &found.factorisation.controller;
+fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Result<HansenModel> {
+    let (settings, time) = (run.settings, run.records.time);
+    let controller = &run.factorisation.controller;
     let described = match error {
         ControllerError::Delay => {
             let m = controller.outputs();
@@ -146,16 +146,13 @@ fn identified(found: &Identification, error: ControllerError) -> Result<HansenMo
         _ => controller.clone(),
     };
     let records = RunRecords {
-        estimation: found.records.estimation.iter().map(|r| altered(r, error, found.signals.settle)).collect(),
-        ..found.records.clone()
+        estimation: run.records.estimation.iter().map(|r| altered(r, error, settle)).collect(),
+        ..run.records.clone()
     };
     let factors = FactorSettings { construction: Construction::Stacked, ..settings.factors };
-    let factors = factorise(&found.factorisation.nominal, &Controller::System(described), &records, &factors)?.factors;
-    let settle = match error {
-        ControllerError::InitialState => Some(0),
-        _ => Some(found.signals.settle),
-    };
-    let signals = deviation_signals(&factors, &records.estimation, settle)?;
+    let factors = factorise(&run.factorisation.nominal, &Controller::System(described), &records, &factors)?.factors;
+    let dropped = if error == ControllerError::InitialState { 0 } else { settle };
+    let signals = deviation_signals(&factors, &records.estimation, Some(dropped))?;
     let lines = records.disturbances(signals.settle);
     let uncertainty = UncertaintyOptions::default();
     let options = SubspaceOptions { uncertainty, stability: Stability::Allow, ..settings.hansen.clone() };
@@ -192,44 +189,88 @@ fn altered(record: &LoopRecord, error: ControllerError, settle: usize) -> LoopRe
     record
 }
 
-fn changed(found: &Identification, modes: &[Mode], result: &HansenModel) -> Result<Changed> {
+fn changed(run: RunContext<'_>, modes: &[Mode], result: &HansenModel) -> Result<Changed> {
     let HansenModel { plant, deviation, .. } = result;
     let own = plant.modes()?;
     let nearest = |mode: &Mode| {
         let distance = |other: &&Mode| (other.pole - mode.pole).norm();
         own.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or([f64::NAN; 2], |m| [m.hz, m.zeta])
     };
-    let fit = found
-        .records
-        .verification
-        .iter()
-        .map(|r| Ok(verify_record(found, plant, None, r)?.fit))
-        .collect::<Result<_>>()?;
+    let fit =
+        run.records.verification.iter().map(|r| Ok(verify_record(run, plant, None, r)?.fit)).collect::<Result<_>>()?;
     Ok(Changed {
         modes: modes.iter().map(|m| [m.hz, m.zeta]).collect(),
         changed: modes.iter().map(nearest).collect(),
         fit,
         deviation_fit: deviation.fit.percent.clone(),
         deviation_radius: deviation.model.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max),
-        stable: youla::validate::certify(plant, &found.factorisation.controller)?.stable,
+        stable: youla::validate::certify(plant, &run.factorisation.controller)?.stable,
     })
 }
 
-impl ControllerErrorEffect {
-    pub(super) fn json(&self) -> Value {
-        let mut entry = json!({"error": self.error.key(), "label": self.error.label()});
-        match &self.outcome {
-            Ok(c) => {
-                let mode = |(m, c): (&[f64; 2], &[f64; 2])| json!({"hz": c[0], "zeta": c[1], "without": {"hz": m[0], "zeta": m[1]}});
-                entry["modes"] = c.modes.iter().zip(&c.changed).map(mode).collect::<Vec<_>>().into();
-                entry["fit"] = json!(c.fit);
-                entry["deviation_fit"] = json!(c.deviation_fit);
-                entry["deviation_radius"] = json!(c.deviation_radius);
-                entry["stabilised_by_controller"] = json!(c.stable);
-            }
-            Err(reason) => entry["refused"] = json!(reason),
+/// The entry of one error in the certificate: its effect, or the reason why there is no model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ControllerErrorEntry {
+    /// Key of the error.
+    pub error: String,
+    /// The error in words.
+    pub label: String,
+    /// The effect, or the reason.
+    #[serde(flatten)]
+    pub effect: OrRefused<EffectEntry>,
+}
+
+/// G(S) from a wrong description of the controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct EffectEntry {
+    /// The lightly damped modes of G(S).
+    pub modes: Vec<ChangedMode>,
+    /// Fit of G(S) per verification record and output, percent.
+    pub fit: Vec<Vec<Option<f64>>>,
+    /// Fit of S on alpha and beta per channel, percent.
+    pub deviation_fit: Vec<Option<f64>>,
+    /// Largest magnitude of a pole of S.
+    pub deviation_radius: f64,
+    /// Whether the controller that ran stabilises G(S).
+    pub stabilised_by_controller: bool,
+}
+
+/// A mode with the error, and without it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ChangedMode {
+    /// Frequency and damping ratio with the error.
+    #[serde(flatten)]
+    pub changed: ModePoint,
+    /// The same without it.
+    pub without: ModePoint,
+}
+
+/// Frequency and damping ratio of a mode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ModePoint {
+    /// Natural frequency, Hz.
+    pub hz: Option<f64>,
+    /// Damping ratio.
+    pub zeta: Option<f64>,
+}
+
+impl From<&ControllerErrorEffect> for ControllerErrorEntry {
+    fn from(effect: &ControllerErrorEffect) -> Self {
+        let point = |[hz, zeta]: [f64; 2]| ModePoint { hz: finite(hz), zeta: finite(zeta) };
+        let entry = |c: &Changed| EffectEntry {
+            modes: (c.modes.iter().zip(&c.changed))
+                .map(|(m, c)| ChangedMode { changed: point(*c), without: point(*m) })
+                .collect(),
+            fit: c.fit.iter().map(|f| finite_all(f)).collect(),
+            deviation_fit: finite_all(&c.deviation_fit),
+            deviation_radius: c.deviation_radius,
+            stabilised_by_controller: c.stable,
+        };
+        ControllerErrorEntry {
+            error: effect.error.key().to_owned(),
+            label: effect.error.label(),
+            effect: OrRefused::new(effect.outcome.as_ref().map(entry)),
         }
-        entry
     }
 }
 

@@ -56,6 +56,14 @@ pub enum Error {
         /// The name.
         name: String,
     },
+    /// A file is not the summary of a run.
+    #[error("{}: this is not the summary.json of a run of this version: {source}", path.display())]
+    NotASummary {
+        /// The file.
+        path: PathBuf,
+        /// The reason.
+        source: serde_json::Error,
+    },
     /// A file is not the data of a report.
     #[error("{}: this is not the report.json of a run: {source}", path.display())]
     NotAReport {
@@ -84,6 +92,7 @@ impl Error {
             Error::ChoiceOfFigure { .. }
             | Error::NothingToDraw { .. }
             | Error::DuplicateRecord { .. }
+            | Error::NotASummary { .. }
             | Error::NotAReport { .. } => ErrorKind::BadInput,
         }
     }

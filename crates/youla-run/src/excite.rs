@@ -2,9 +2,8 @@
 
 use super::excite_figure::figure;
 use super::factorise::factorise;
-use super::models::Controller;
 use super::records::{RunRecords, channels_of, read_records};
-use super::settings::RunSettings;
+use super::settings::{Controller, RunSettings};
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};

@@ -1,8 +1,7 @@
 //! From nominal model and controller of a run to its coprime factors, with balanced states.
 
-use super::models::Controller;
 use super::records::RunRecords;
-use super::settings::{Construction, FactorSettings, RunSettings};
+use super::settings::{Construction, Controller, FactorSettings, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::Mat;

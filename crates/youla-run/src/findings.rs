@@ -6,7 +6,7 @@ mod trust;
 pub(super) use extra::further_lines;
 pub(super) use trust::verdict_lines;
 
-use super::pipeline::Identification;
+use super::identification::Identification;
 use super::segments::RecordSegment;
 use youla::identify::innovation_form::Convergence;
 use youla::identify::subspace::{Uncertainty, amplitudes};

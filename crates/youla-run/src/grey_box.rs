@@ -1,94 +1,19 @@
 //! A physical structure in a run: the prediction-error method, started from the result of the scheme, with intervals, and
 //! beside other structures.
 
-use super::factorise::Factorisation;
+use super::context::RunContext;
+use super::entries::OrRefused;
 use super::grey_box_loop::{Criterion, outputs_without_lines};
-use super::records::RunRecords;
-use super::settings::{Prediction, RunSettings};
+use super::settings::{AlternativeStructure, GreyBoxSettings};
 use super::signals::DeviationSignals;
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use serde_json::{Value, json};
 use youla::identify::hansen::HansenModel;
-use youla_greybox::hansen_pem::{HansenPem, HansenPemOptions};
+use youla_greybox::hansen_pem::{HansenPem, HansenPemOptions, PemRun, PemStart};
 use youla_greybox::{
-    Declaration, DeclaredStructure, GreyBoxIntervals, GreyBoxOptions, IntervalOptions, Structure, compare,
-    likelihood_ratio,
+    Declaration, DeclaredStructure, GreyBoxIntervals, ResidualTest, Stop, Structure, compare, likelihood_ratio,
 };
 use youla_report::data::{PhysicalEstimate, PhysicalParameter, PhysicalStructure};
-
-/// What is known of the plant's physics, the table `[grey_box]` of run.toml.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct GreyBoxSettings {
-    /// The structure; explained in `docs/grey-box.md`.
-    pub structure: Declaration,
-    /// Whether the initial values of the parameters are a second start, beside the projection of G(S).
-    #[serde(default = "yes")]
-    pub start_from_initial: bool,
-    /// What is compared with the outputs: the plant alone, driven by the measured u, or the loop with the declared controller,
-    /// driven by the known excitations.
-    #[serde(default)]
-    pub prediction: Prediction,
-    /// The search.
-    #[serde(default)]
-    pub pem: GreyBoxOptions,
-    /// Intervals of the parameters.
-    #[serde(default)]
-    pub intervals: IntervalOptions,
-    /// Further structures, estimated in the same way and compared.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub alternative: Vec<AlternativeStructure>,
-}
-
-/// A structure to compare with that of `[grey_box.structure]`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct AlternativeStructure {
-    /// Name in tables.
-    pub name: String,
-    /// The structure.
-    pub structure: Declaration,
-    /// Whether one of the two holds the other, as with more or fewer fixed parameters: then the likelihood ratio is tested.
-    #[serde(default)]
-    pub nested: bool,
-}
-
-impl GreyBoxSettings {
-    /// A structure, everything else as when absent.
-    pub fn new(structure: Declaration) -> Self {
-        GreyBoxSettings {
-            structure,
-            start_from_initial: yes(),
-            prediction: Prediction::default(),
-            pem: GreyBoxOptions::default(),
-            intervals: IntervalOptions::default(),
-            alternative: Vec::new(),
-        }
-    }
-
-    /// What is wrong with a structure, beside `inputs` and `outputs` channels.
-    pub(super) fn problem(&self, inputs: usize, outputs: usize) -> Option<String> {
-        let of = |(place, declaration): (String, &Declaration)| match DeclaredStructure::new(declaration) {
-            Err(e) => Some(format!("{place} {e}")),
-            Ok(structure) if structure.ports() != (inputs, outputs) => {
-                let (m, p) = structure.ports();
-                Some(format!("{place} has {m} inputs and {p} outputs, but [data] lists {inputs} and {outputs}"))
-            }
-            Ok(_) => None,
-        };
-        let own = ("[grey_box.structure]".to_owned(), &self.structure);
-        let others = self
-            .alternative
-            .iter()
-            .map(|a| (format!("[grey_box.alternative.structure] of {:?}", a.name), &a.structure));
-        std::iter::once(own).chain(others).find_map(of)
-    }
-}
-
-fn yes() -> bool {
-    true
-}
 
 /// The structure with its estimate.
 #[derive(Debug)]
@@ -105,28 +30,24 @@ pub struct GreyBoxRun {
 
 /// Estimates the structure, where one is declared.
 pub(super) fn grey_box(
-    factorisation: &Factorisation,
+    run: RunContext<'_>,
     signals: &DeviationSignals,
-    records: &RunRecords,
     hansen: &HansenModel,
-    settings: &RunSettings,
 ) -> Option<Result<GreyBoxRun>> {
-    let asked = settings.grey_box.as_ref()?;
-    Some(estimate(factorisation, signals, records, hansen, settings, asked).map_err(|e| e.within("[grey_box]")))
+    let asked = run.settings.grey_box.as_ref()?;
+    Some(estimate(run, signals, hansen, asked).map_err(|e| e.within("[grey_box]")))
 }
 
 fn estimate(
-    factorisation: &Factorisation,
+    run: RunContext<'_>,
     signals: &DeviationSignals,
-    records: &RunRecords,
     hansen: &HansenModel,
-    settings: &RunSettings,
     asked: &GreyBoxSettings,
 ) -> Result<GreyBoxRun> {
-    let outputs = outputs_without_lines(records)?;
+    let outputs = outputs_without_lines(run.records)?;
     let options =
-        HansenPemOptions { hansen: settings.hansen.clone(), pem: asked.pem.clone(), ..HansenPemOptions::default() };
-    let criterion = Criterion::new(asked.prediction, factorisation, signals, records, &outputs, &options)?;
+        HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.pem.clone(), ..HansenPemOptions::default() };
+    let criterion = Criterion::new(asked.prediction, run, signals, &outputs, &options)?;
     let of = |declaration: &Declaration| -> Result<(DeclaredStructure, HansenPem)> {
         let structure = DeclaredStructure::new(declaration)?;
         let nominal = asked.start_from_initial.then(|| structure.start());
@@ -228,29 +149,91 @@ impl GreyBoxRun {
         PhysicalEstimate { level: known.map(|k| k.level), verdict, names, correlations, structures }
     }
 
-    /// Parameters, intervals, searches and what the data do not determine.
-    pub(super) fn details(&self) -> Result<Value> {
+    /// `details` of `4-identify/grey_box.json`: parameters, intervals, searches and what the data do not determine.
+    pub(super) fn details(&self) -> Result<GreyBoxDetails<'_>> {
         let (found, model) = (&self.found, &self.found.model);
-        let runs: Vec<Value> = found
-            .runs
-            .iter()
-            .map(|run| {
-                let failure = run.cost.as_ref().err().map(ToString::to_string);
-                json!({
-                    "start": run.start, "cost_at_start": run.cost_at_start, "cost": run.cost.as_ref().ok(), "failure": failure,
-                })
-            })
-            .collect();
-        let residuals = match &self.intervals {
-            Ok(known) => json!({"test": known.residuals, "colour": known.colour, "coloured": known.coloured}),
-            Err(reason) => json!({"refused": reason.to_string()}),
+        let search = |run: &PemRun| SearchEntry {
+            start: run.start,
+            cost_at_start: run.cost_at_start,
+            cost: run.cost.as_ref().ok().copied(),
+            failure: run.cost.as_ref().err().map(ToString::to_string),
         };
-        let shown = self.shown();
-        Ok(json!({
-            "parameters": self.rows()?, "level": shown.level, "correlations": shown.correlations, "residuals": residuals,
-            "verdict": shown.verdict, "structures": shown.structures, "fit": model.fit, "residual": model.residual,
-            "stop": model.stop, "iterations": model.iterations, "rank": model.rank, "rcond": model.rcond,
-            "undetermined": model.undetermined.sentences(), "runs": runs, "won": found.won, "lost": found.lost(),
-        }))
+        let residuals = self.intervals.as_ref().map(|known| ResidualsEntry {
+            test: &known.residuals,
+            colour: &known.colour,
+            coloured: known.coloured,
+        });
+        Ok(GreyBoxDetails {
+            physical: self.entry()?,
+            residuals: OrRefused::new(residuals),
+            fit: &model.fit,
+            residual: &model.residual,
+            stop: model.stop,
+            iterations: model.iterations,
+            rank: model.rank,
+            rcond: model.rcond,
+            undetermined: model.undetermined.sentences(),
+            runs: found.runs.iter().map(search).collect(),
+            won: found.won,
+        })
     }
+
+    /// What summary.json says of the structure.
+    pub(super) fn entry(&self) -> Result<PhysicalEntry> {
+        let PhysicalEstimate { level, verdict, correlations, structures, .. } = self.shown();
+        let (parameters, lost) = (self.rows()?, self.found.lost());
+        Ok(PhysicalEntry { parameters, level, correlations, verdict, structures, lost })
+    }
+}
+
+/// A physical structure in summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct PhysicalEntry {
+    /// Parameters, then derived quantities: `name`, `unit`, `value`, `deviation`, `interval`, `at_bound`, `derived`.
+    #[schemars(with = "Vec<serde_json::Map<String, serde_json::Value>>")]
+    pub parameters: Vec<PhysicalParameter>,
+    /// Level of the intervals; `null` where there are none.
+    pub level: Option<f64>,
+    /// Correlations of the parameters, row by row.
+    pub correlations: Vec<Vec<f64>>,
+    /// What the intervals rest on, in one sentence.
+    pub verdict: String,
+    /// The structures that were compared, the declared one first.
+    #[schemars(with = "Vec<serde_json::Map<String, serde_json::Value>>")]
+    pub structures: Vec<PhysicalStructure>,
+    /// Whether the fit is clearly below that of G(S): a local minimum, or a structure that does not describe the plant.
+    pub lost: bool,
+}
+
+/// `details` of `4-identify/grey_box.json`.
+#[derive(Serialize)]
+pub(super) struct GreyBoxDetails<'a> {
+    #[serde(flatten)]
+    physical: PhysicalEntry,
+    residuals: OrRefused<ResidualsEntry<'a>>,
+    fit: &'a [f64],
+    residual: &'a [f64],
+    stop: Stop,
+    iterations: usize,
+    rank: usize,
+    rcond: f64,
+    undetermined: Vec<String>,
+    runs: Vec<SearchEntry>,
+    won: PemStart,
+}
+
+#[derive(Serialize)]
+struct ResidualsEntry<'a> {
+    test: &'a ResidualTest,
+    colour: &'a [f64],
+    coloured: bool,
+}
+
+/// One search.
+#[derive(Serialize)]
+struct SearchEntry {
+    start: PemStart,
+    cost_at_start: f64,
+    cost: Option<f64>,
+    failure: Option<String>,
 }

@@ -7,12 +7,13 @@
 //! ```
 //! The second is for plants that integrate or are unstable, whose simulation drifts with every error of u.
 
+use super::context::RunContext;
 use super::disturbance::without_lines;
 use super::factorise::Factorisation;
 use super::records::{LoopRecord, RunRecords};
 use super::settings::Prediction;
 use super::signals::DeviationSignals;
-use crate::{Error, Result};
+use crate::Result;
 use faer::Scale;
 use youla::Mat;
 use youla::control::with_input_port;
@@ -56,12 +57,12 @@ struct Closed {
 impl<'a> Criterion<'a> {
     pub(super) fn new(
         prediction: Prediction,
-        factorisation: &'a Factorisation,
+        run: RunContext<'a>,
         signals: &'a DeviationSignals,
-        records: &'a RunRecords,
         outputs: &'a [Mat<f64>],
         options: &'a HansenPemOptions,
     ) -> Result<Self> {
+        let RunContext { records, factorisation, .. } = run;
         let closed = match prediction {
             Prediction::OpenLoop => None,
             Prediction::ClosedLoop => Some(Closed::new(factorisation, records)?),

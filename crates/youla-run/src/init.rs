@@ -1,7 +1,7 @@
 //! A first run.toml for a log: what the user said of it in the form that `youla identify` reads, with comments, and with what is
 //! still missing left out, so that nothing is run on a guess.
 
-use super::models::Feedback;
+use super::settings::Feedback;
 use crate::{Error, Result};
 use minijinja::value::Serde;
 use minijinja::{Environment, context};

@@ -4,20 +4,23 @@ mod artefacts;
 mod certificate;
 mod check;
 mod compare;
+mod context;
 mod controller_errors;
+mod direct;
 mod disturbance;
+mod entries;
 mod error;
 mod excite;
 mod excite_figure;
-mod explain;
 mod export;
 mod factorise;
 mod findings;
-mod init;
-
+mod folder;
 mod grey_box;
 mod grey_box_loop;
-mod models;
+mod identification;
+mod init;
+mod method;
 mod noise_models;
 mod page;
 mod pipeline;
@@ -28,55 +31,69 @@ mod redraw;
 mod reduction;
 mod reference;
 mod residual_tests;
+mod residual_view;
 mod response;
 mod robustness;
+mod robustness_view;
 mod schema;
+mod scheme;
 mod segments;
 mod settings;
 mod signals;
 mod stabilisation;
+mod stage;
 mod streaming;
+mod subspace_details;
 mod summary;
 mod uncertainty;
 mod verdict;
 mod write;
 
-pub use artefacts::{ModelFile, Provenance, SCHEMA, write_artefacts};
-pub use certificate::{CertificateSettings, RunCertificate};
-pub use check::{CheckedFiles, CheckedRecord, DataCheck, check_files, check_run, further, read_check_options};
+pub use artefacts::{ModelFile, Provenance, SCHEMA};
+pub use certificate::{CertificateEntry, RunCertificate};
+pub use check::{CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, check_files, check_run, further, read_check_options};
 pub use compare::{Comparison, Distance, compare, write_comparison};
-pub use controller_errors::{Changed, ControllerError, ControllerErrorEffect};
-pub use disturbance::{DisturbanceSettings, TachoUnit};
+pub use controller_errors::{
+    Changed, ChangedMode, ControllerError, ControllerErrorEffect, ControllerErrorEntry, EffectEntry, ModePoint,
+};
+pub use entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
 pub use export::{controller_for_export, model_for_export};
 pub use factorise::{Factorisation, factorise, factorise_run};
 pub use findings::cautions;
-pub use grey_box::{AlternativeStructure, GreyBoxRun, GreyBoxSettings};
+pub use folder::write_artefacts;
+pub use grey_box::{GreyBoxRun, PhysicalEntry};
+pub use identification::{Identification, Refusal};
 pub use init::{Draft, DraftClock, path_from};
-pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
+pub use method::Method;
 pub use page::page;
-pub use pipeline::{Identification, Refusal, Stage, StageClock, StageTimes, identify};
+pub use pipeline::identify;
 pub use plot::{Plot, plot, plottable, write_plots};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
 pub use redraw::redraw;
-pub use reduction::RunReduction;
+pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry};
+pub use reduction::{ReductionEntry, RunReduction};
 pub use reference::settings_reference;
-pub use residual_tests::{Foresight, RecordResiduals};
-pub use robustness::Robustness;
-pub use schema::settings_schema;
+pub use residual_tests::{LargestEntry, Predictor, RecordResiduals, ResidualEntry};
+pub use robustness::{DiskEntry, Robustness, RobustnessEntry, ScalesEntry};
+pub use schema::{settings_schema, summary_schema};
 pub use segments::RecordSegment;
 pub use settings::{
-    Construction, DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, Prediction,
-    RunSettings, StabilisationSettings, VerificationSettings,
+    AlternativeStructure, CertificateSettings, Construction, Controller, ControllerSettings, DataFile, DataSettings,
+    DeviationSettings, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings,
+    NominalModel, Polynomials, Prediction, RunSettings, StabilisationSettings, TachoUnit, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stabilisation::Diagrams;
+pub use stage::{Stage, StageClock, StageTimes};
 pub use streaming::{
     LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
     read_subspace_options,
 };
-pub use summary::summary;
-pub use uncertainty::{RunUncertainty, SystemUncertainty};
-pub use verdict::{Method, ModelVerdict, RecordVerdict, Verdict};
+pub use summary::{
+    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary,
+};
+pub use uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
+pub use verdict::{ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

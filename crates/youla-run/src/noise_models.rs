@@ -9,44 +9,48 @@
 //! `(I - G K)^-1 H e`, K the controller, and its predictor has the poles of the controller: it forgets its start only where the
 //! controller is stable by itself, which one that integrates is not. There, none is used.
 
-use super::pipeline::Identification;
 use super::settings::Prediction;
-use super::verdict::Method;
 use crate::Result;
+use youla::factor::CoprimeFactors;
+use youla::identify::hansen::HansenModel;
+use youla::identify::subspace::SubspaceModel;
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
+use youla_greybox::GreyBoxModel;
 
-/// H of a model from the measured input; `None` where there is none.
+/// H of the direct model, from its Kalman gain.
+///
+/// # Errors
+/// Ports.
+pub(super) fn noise_of_direct(prediction: Prediction, direct: &SubspaceModel) -> Result<Option<StateSpace<Discrete>>> {
+    let gain = direct.innovation.gain().filter(|_| prediction == Prediction::OpenLoop);
+    gain.map(|gain| innovations(&direct.model, gain)).transpose()
+}
+
+/// H of a physical structure in innovation form.
+///
+/// # Errors
+/// Ports.
+pub(super) fn noise_of_structure(prediction: Prediction, found: &GreyBoxModel) -> Result<Option<StateSpace<Discrete>>> {
+    let gain = found.gain.as_ref().filter(|_| prediction == Prediction::OpenLoop);
+    gain.map(|gain| innovations(&found.model, gain.as_ref())).transpose()
+}
+
+/// H of G(S), from the gain of S.
 ///
 /// # Errors
 /// Ports, and `Mt + S Ut` without invertible feedthrough.
-pub(super) fn noise_model(
-    found: &Identification,
-    method: Method,
-    model: &StateSpace<Discrete>,
+pub(super) fn noise_of_hansen(
+    prediction: Prediction,
+    factors: &CoprimeFactors<Discrete>,
+    hansen: &HansenModel,
 ) -> Result<Option<StateSpace<Discrete>>> {
-    if found.settings.verification.prediction == Prediction::ClosedLoop {
-        return Ok(None);
-    }
-    match method {
-        Method::Direct => {
-            let direct = found.direct.as_ref().and_then(|d| d.as_ref().ok());
-            direct.and_then(|d| d.innovation.gain()).map(|gain| innovations(model, gain)).transpose()
-        }
-        Method::GreyBox => {
-            let run = found.grey_box.as_ref().and_then(|run| run.as_ref().ok());
-            run.and_then(|run| run.found.model.gain.as_ref()).map(|gain| innovations(model, gain.as_ref())).transpose()
-        }
-        Method::Hansen => {
-            let (hansen, factors) = (&found.hansen, &found.factorisation.factors);
-            let form = hansen.innovation_form.as_ref().map(|form| form.gain.as_ref());
-            let Some(gain) = form.or_else(|| hansen.deviation.innovation.gain()) else { return Ok(None) };
-            let s = &hansen.deviation.model;
-            Ok(factors.noise_of(s, &innovations(s, gain)?).map(Some)?)
-        }
-        Method::Nominal | Method::HansenReduced | Method::TruePlant => Ok(None),
-    }
+    let form = hansen.innovation_form.as_ref().map(|form| form.gain.as_ref());
+    let gain = form.or_else(|| hansen.deviation.innovation.gain()).filter(|_| prediction == Prediction::OpenLoop);
+    let Some(gain) = gain else { return Ok(None) };
+    let s = &hansen.deviation.model;
+    Ok(factors.noise_of(s, &innovations(s, gain)?).map(Some)?)
 }
 
 /// `I + C (z I - A)^-1 K`; states beyond those of the gain are delays of inputs, which noise does not enter.

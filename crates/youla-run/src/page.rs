@@ -2,18 +2,19 @@
 
 mod frequency;
 
-use super::artefacts::pairs;
-use super::certificate::RunCertificate;
+use super::entries::pairs;
 use super::findings::{further_lines, notes, verdict_lines};
 use super::grey_box::GreyBoxRun;
-use super::pipeline::{Identification, StageTimes};
+use super::identification::Identification;
+use super::method::Method;
 use super::records::{LoopRecord, channels_of};
 use super::redesign;
-use super::residual_tests::drawn as drawn_residuals;
-use super::robustness;
+use super::residual_view::drawn as drawn_residuals;
+use super::robustness_view as robustness;
 use super::settings::Prediction;
 use super::stabilisation::drawn;
-use super::verdict::{Method, ModelVerdict};
+use super::stage::StageTimes;
+use super::verdict::ModelVerdict;
 use crate::Result;
 use youla::Mat;
 use youla::identify::subspace::SubspaceModel;
@@ -62,7 +63,7 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
-        loop_tables: found.certificate.as_ref().map(RunCertificate::tables).unwrap_or_default(),
+        loop_tables: found.certificate.tables(),
         redesign: redesign(found)?,
         margins: found.verdict.models.iter().map(robustness::row).collect(),
         margins_caption: robustness::caption(found),

@@ -1,8 +1,8 @@
 //! The records of a run: read, cut, detrended, and split by the meaning of their channels.
 
-use super::disturbance::DisturbanceSettings;
+use super::disturbance::disturbance_signals;
 use super::segments::{Part, RecordSegment, parts};
-use super::settings::{DataFile, DataSettings};
+use super::settings::{DataFile, DataSettings, DisturbanceSettings};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -91,8 +91,9 @@ impl RunRecords {
 /// Reads all records that the settings name, files in parallel; paths are relative to `folder`.
 ///
 /// # Errors
-/// The first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
+/// [`youla_io::Error::Settings`] as of [`DataSettings::check`]; the first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
 pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords> {
+    settings.check()?;
     let purposes = [("estimation", &settings.estimation), ("verification", &settings.verification)];
     let files: Vec<(&str, &DataFile)> =
         purposes.iter().flat_map(|(purpose, files)| files.iter().map(move |f| (*purpose, f))).collect();
@@ -156,7 +157,7 @@ fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataF
     };
     let (mut records, mut segments) = (Vec::new(), Vec::new());
     for Part { record, name, rows, cut } in parts(file, read_parts(&source)?)? {
-        let disturbance = settings.disturbance.as_ref().map(|d| d.signals(&record)).transpose()?;
+        let disturbance = settings.disturbance.as_ref().map(|d| disturbance_signals(d, &record)).transpose()?;
         let record = record.detrend(settings.detrend)?.record;
         if cut {
             segments.push(RecordSegment { record: name.clone(), file: file.file.display().to_string(), rows });

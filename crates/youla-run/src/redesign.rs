@@ -1,13 +1,18 @@
 //! `[redesign]`: a new controller on the model of a run, with what it is worth.
 
-use super::pipeline::Identification;
+use super::context::RunContext;
+use super::entries::{BandEntry, finite};
+use super::records::RunRecords;
+use super::reduction::RunReduction;
 use super::response::decibel;
 use crate::{Error, Result};
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use youla::identify::hansen::HansenModel;
 use youla::lti::{SharedMode, frequency_response};
+use youla::validate::ExactCertificate;
 use youla_io::export::{ExportedController, FilterData, ObserverData};
-use youla_loop::redesign::{Candidate, LoopFigures, Redesign, RedesignProblem, redesign};
+use youla_loop::redesign::{Candidate, LoopFigures, Redesign, RedesignMethod, RedesignProblem, redesign};
 use youla_report::data as draw;
 use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel};
 
@@ -15,15 +20,18 @@ use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel};
 ///
 /// # Errors
 /// As [`redesign`].
-pub(super) fn redesigned(found: &Identification) -> Option<Result<Redesign>> {
-    let options = found.settings.redesign.as_ref()?;
-    let reduced = found.reduction.as_ref().and_then(|r| r.as_ref().ok());
-    let (input, output) = found.records.sizes();
+pub(super) fn redesigned(
+    run: RunContext<'_>,
+    hansen: &HansenModel,
+    reduced: Option<&RunReduction>,
+) -> Option<Result<Redesign>> {
+    let options = run.settings.redesign.as_ref()?;
+    let (input, output) = run.records.sizes();
     let problem = RedesignProblem {
-        model: reduced.map_or(&found.hansen.plant, |r| &r.found.reduction.model),
-        factors: &found.factorisation.factors,
-        deviation: &found.hansen.deviation.model,
-        uncertainty: found.hansen.deviation.uncertainty.as_ref(),
+        model: reduced.map_or(&hansen.plant, |r| &r.found.reduction.model),
+        factors: &run.factorisation.factors,
+        deviation: &hansen.deviation.model,
+        uncertainty: hansen.deviation.uncertainty.as_ref(),
         input_size: &input,
         output_size: &output,
     };
@@ -31,8 +39,8 @@ pub(super) fn redesigned(found: &Identification) -> Option<Result<Redesign>> {
 }
 
 /// The controller as `youla-rt` takes it.
-pub(super) fn exported(found: &Identification, redesign: &Redesign) -> ExportedController {
-    let (u, y) = (found.records.inputs.clone(), found.records.outputs.clone());
+pub(super) fn exported(records: &RunRecords, redesign: &Redesign) -> ExportedController {
+    let (u, y) = (records.inputs.clone(), records.outputs.clone());
     let new = &redesign.controller;
     ExportedController {
         method: redesign.method.key().into(),
@@ -45,32 +53,89 @@ pub(super) fn exported(found: &Identification, redesign: &Redesign) -> ExportedC
     }
 }
 
-/// For `8-redesign/redesign.json` and summary.json.
-pub(super) fn json(redesign: &Redesign) -> Value {
-    json!({
-        "method": redesign.method,
-        "input_weight": redesign.input_weight,
-        "order": redesign.controller.system.order(),
-        "present": figures(&redesign.present),
-        "predicted": figures(&redesign.predicted),
-        "band": redesign.band.map(|band| {
-            let mut entry = json!(band);
-            entry["holds"] = json!(band.holds());
-            entry
-        }),
-        "exact": redesign.exact.as_ref().map(|e| json!({"stable": e.stable, "identity_residual": e.identity_residual})),
-        "candidates": redesign.candidates,
-    })
+/// A redesign in `8-redesign/redesign.json` and summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct RedesignEntry {
+    /// What was designed.
+    pub method: RedesignMethod,
+    /// Weight of the inputs that was taken.
+    pub input_weight: f64,
+    /// States of the new controller.
+    pub order: usize,
+    /// The loop with the controller that ran.
+    pub present: LoopEntry,
+    /// The loop with the new controller, on the model.
+    pub predicted: LoopEntry,
+    /// The new controller on every model within the region of S; `null` without an uncertainty.
+    pub band: Option<BandEntry>,
+    /// The exact test of G(S) with K(Q), for `youla`.
+    pub exact: Option<ExactEntry>,
+    /// All weights that were tried.
+    pub candidates: Vec<Candidate>,
 }
 
-/// As JSON: the modes that matter, the least damping and the peaks.
-fn figures(of: &LoopFigures) -> Value {
-    let shown = |m: &SharedMode| json!({"hz": m.mode.hz, "zeta": m.mode.zeta, "share": m.share});
-    let modes: Vec<Value> = of.modes.iter().filter(|m| m.share >= LoopFigures::LEAST_SHARE).map(shown).collect();
-    json!({
-        "modes": modes, "least_damping": of.least_damping, "peak_response": of.peak_response,
-        "peak_sensitivity": of.peak_sensitivity,
-    })
+/// Figures of a loop.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct LoopEntry {
+    /// Modes with at least 5 % of the response of y to a disturbance at the plant input.
+    pub modes: Vec<SharedModeEntry>,
+    /// Least damping ratio of these modes.
+    pub least_damping: Option<f64>,
+    /// Peak of that response, channels in their rms.
+    pub peak_response: Option<f64>,
+    /// Peak of the output sensitivity.
+    pub peak_sensitivity: Option<f64>,
+}
+
+/// A mode with its share of the response.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct SharedModeEntry {
+    /// Natural frequency, Hz.
+    pub hz: Option<f64>,
+    /// Damping ratio.
+    pub zeta: Option<f64>,
+    /// Share of the response, 0 to 1.
+    pub share: Option<f64>,
+}
+
+/// The exact test by S and Q.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ExactEntry {
+    /// Whether the loop is stable.
+    pub stable: bool,
+    /// Largest relative difference of the two sides of its identity.
+    pub identity_residual: Option<f64>,
+}
+
+/// As `8-redesign/redesign.json` and summary.json hold it.
+pub(super) fn entry(redesign: &Redesign) -> RedesignEntry {
+    let exact = |e: &ExactCertificate| ExactEntry { stable: e.stable, identity_residual: finite(e.identity_residual) };
+    RedesignEntry {
+        method: redesign.method,
+        input_weight: redesign.input_weight,
+        order: redesign.controller.system.order(),
+        present: LoopEntry::from(&redesign.present),
+        predicted: LoopEntry::from(&redesign.predicted),
+        band: redesign.band.as_ref().map(BandEntry::from),
+        exact: redesign.exact.as_ref().map(exact),
+        candidates: redesign.candidates.clone(),
+    }
+}
+
+impl From<&LoopFigures> for LoopEntry {
+    fn from(of: &LoopFigures) -> Self {
+        let mode = |m: &SharedMode| SharedModeEntry {
+            hz: finite(m.mode.hz),
+            zeta: finite(m.mode.zeta),
+            share: finite(m.share),
+        };
+        LoopEntry {
+            modes: of.modes.iter().filter(|m| m.share >= LoopFigures::LEAST_SHARE).map(mode).collect(),
+            least_damping: finite(of.least_damping),
+            peak_response: finite(of.peak_response),
+            peak_sensitivity: finite(of.peak_sensitivity),
+        }
+    }
 }
 
 /// One sentence: what the new controller promises.
@@ -125,7 +190,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
         draw::EvidenceTable {
             title: "Weights that were tried".into(),
             text: String::new(),
-            columns: ["SubspaceMethod of u", "Least damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
+            columns: ["Weight of u", "Least damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
             rows: redesign.candidates.iter().map(candidate).collect(),
             caption: "Of those within the limits the one with the most damping is taken that stabilises every model within the region of S."
                 .into(),

@@ -1,9 +1,9 @@
 //! The reduction of a run: in its loop, scaled where the method needs it; its sweep as artefact, summary and figure.
 
+use super::entries::{finite, pair, pairs};
 use super::records::RunRecords;
 use crate::Result;
-use serde_json::{Value, json};
-use youla::c64;
+use serde::{Deserialize, Serialize};
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::HansenModel;
 use youla::lti::Discrete;
@@ -44,33 +44,69 @@ pub(super) fn run_reduction(
 }
 
 impl RunReduction {
-    /// What the artefact of the reduced model says besides its matrices.
-    pub(super) fn details(&self) -> Value {
+    /// What the artefact of the reduced model holds besides its matrices.
+    pub(super) fn details(&self) -> ReductionDetails<'_> {
         let r = &self.found.reduction;
-        json!({
-            "method": r.method, "hankel_singular_values": r.hankel, "error_bound": r.error_bound,
-            "minimal_order": r.minimal_order, "kept_poles": pairs(&r.kept), "unstable_pole": r.unstable_pole.map(pair),
-            "output_scale": self.options.output_scale, "input_scale": self.options.input_scale,
-            "stabilised": self.found.stabilised, "proposed_order": self.found.proposed_order(),
-        })
+        ReductionDetails {
+            method: r.method,
+            hankel_singular_values: &r.hankel,
+            error_bound: r.error_bound,
+            minimal_order: r.minimal_order,
+            kept_poles: pairs(&r.kept),
+            unstable_pole: r.unstable_pole.map(pair),
+            output_scale: self.options.output_scale.as_deref(),
+            input_scale: self.options.input_scale.as_deref(),
+            stabilised: self.found.stabilised,
+            proposed_order: self.found.proposed_order(),
+        }
     }
 
     /// The entry of summary.json.
-    pub(super) fn summary(&self) -> Value {
+    pub(super) fn entry(&self) -> ReductionEntry {
         let (found, row) = (&self.found, self.found.row());
-        let figure = |of: fn(&SweepRow) -> Option<f64>| row.and_then(of);
-        json!({
-            "method": found.reduction.method,
-            "order": found.order(),
-            "minimal_order": found.reduction.minimal_order,
-            "kept": found.reduction.kept.len(),
-            "error_bound": found.reduction.error_bound,
-            "open_loop_error": figure(|r| r.open_loop),
-            "open_loop_relative": figure(|r| r.open_loop_relative),
-            "closed_loop_relative": figure(|r| r.closed_loop),
-            "stabilised_by_controller": found.stabilised,
-            "proposed_order": found.proposed_order(),
-        })
+        let figure = |of: fn(&SweepRow) -> Option<f64>| row.and_then(of).and_then(finite);
+        ReductionEntry {
+            method: found.reduction.method,
+            order: found.order(),
+            minimal_order: found.reduction.minimal_order,
+            kept: found.reduction.kept.len(),
+            error_bound: found.reduction.error_bound.and_then(finite),
+            open_loop_error: figure(|r| r.open_loop),
+            open_loop_relative: figure(|r| r.open_loop_relative),
+            closed_loop_relative: figure(|r| r.closed_loop),
+            stabilised_by_controller: found.stabilised,
+            proposed_order: found.proposed_order(),
+        }
+    }
+
+    /// `6-reduce/sweep.json`; what is infinite or does not exist is null.
+    pub(super) fn file(&self) -> SweepFile<'_> {
+        let ReductionSweep { method, rows, hankel, kept, minimal_order, plant_norm, response_norm } = &self.found.sweep;
+        let row = |r: &SweepRow| SweepEntry {
+            order: r.order,
+            error_bound: r.error_bound,
+            open_loop_error: r.open_loop,
+            open_loop_relative: r.open_loop_relative,
+            closed_loop_relative: r.closed_loop,
+            stabilised_by_controller: r.stabilised,
+            worst_closed_loop_pole: r.worst_pole.map(pair),
+            failure: r.failure.clone(),
+        };
+        SweepFile {
+            method: *method,
+            minimal_order: *minimal_order,
+            kept_poles: pairs(kept),
+            hankel_singular_values: hankel,
+            output_scale: self.options.output_scale.as_deref(),
+            input_scale: self.options.input_scale.as_deref(),
+            plant_norm: *plant_norm,
+            closed_loop_norm: *response_norm,
+            chosen: self.found.order(),
+            stabilised_by_controller: self.found.stabilised,
+            proposed_order: self.found.proposed_order(),
+            sentence: self.found.sentence(),
+            orders: rows.iter().map(row).collect(),
+        }
     }
 
     /// The sentence of the verdict.
@@ -112,24 +148,74 @@ impl RunReduction {
     }
 }
 
-/// All orders as an artefact; what is infinite or does not exist is null.
-pub(super) fn as_json(run: &RunReduction) -> Value {
-    let ReductionSweep { method, rows, hankel, kept, minimal_order, plant_norm, response_norm } = &run.found.sweep;
-    let row = |r: &SweepRow| {
-        json!({
-            "order": r.order, "error_bound": r.error_bound, "open_loop_error": r.open_loop,
-            "open_loop_relative": r.open_loop_relative, "closed_loop_relative": r.closed_loop,
-            "stabilised_by_controller": r.stabilised, "worst_closed_loop_pole": r.worst_pole.map(pair), "failure": r.failure,
-        })
-    };
-    json!({
-        "method": method, "minimal_order": minimal_order, "kept_poles": pairs(kept), "hankel_singular_values": hankel,
-        "output_scale": run.options.output_scale, "input_scale": run.options.input_scale,
-        "plant_norm": plant_norm, "closed_loop_norm": response_norm,
-        "chosen": run.found.order(), "stabilised_by_controller": run.found.stabilised,
-        "proposed_order": run.found.proposed_order(), "sentence": run.found.sentence(),
-        "orders": rows.iter().map(row).collect::<Vec<_>>(),
-    })
+/// `details` of `6-reduce/hansen_reduced.json`.
+#[derive(Serialize)]
+pub(super) struct ReductionDetails<'a> {
+    method: ReductionMethod,
+    hankel_singular_values: &'a [f64],
+    error_bound: Option<f64>,
+    minimal_order: usize,
+    kept_poles: Vec<[f64; 2]>,
+    unstable_pole: Option<[f64; 2]>,
+    output_scale: Option<&'a [f64]>,
+    input_scale: Option<&'a [f64]>,
+    stabilised: bool,
+    proposed_order: Option<usize>,
+}
+
+/// The reduction in summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ReductionEntry {
+    /// Method.
+    pub method: ReductionMethod,
+    /// States of the reduced model.
+    pub order: usize,
+    /// States of a minimal realisation of G(S).
+    pub minimal_order: usize,
+    /// Poles kept as they are.
+    pub kept: usize,
+    /// Bound of the error; `null` where there is none.
+    pub error_bound: Option<f64>,
+    /// Largest singular value of the error over frequency.
+    pub open_loop_error: Option<f64>,
+    /// The same over that of G(S).
+    pub open_loop_relative: Option<f64>,
+    /// The same of the response from alpha to y; `null` where the controller does not stabilise the reduced model.
+    pub closed_loop_relative: Option<f64>,
+    /// Whether the controller that ran stabilises the reduced model.
+    pub stabilised_by_controller: bool,
+    /// Lowest order that it stabilises, where it does not stabilise this one.
+    pub proposed_order: Option<usize>,
+}
+
+/// `6-reduce/sweep.json`.
+#[derive(Serialize)]
+pub(super) struct SweepFile<'a> {
+    method: ReductionMethod,
+    minimal_order: usize,
+    kept_poles: Vec<[f64; 2]>,
+    hankel_singular_values: &'a [f64],
+    output_scale: Option<&'a [f64]>,
+    input_scale: Option<&'a [f64]>,
+    plant_norm: Option<f64>,
+    closed_loop_norm: Option<f64>,
+    chosen: usize,
+    stabilised_by_controller: bool,
+    proposed_order: Option<usize>,
+    sentence: String,
+    orders: Vec<SweepEntry>,
+}
+
+#[derive(Serialize)]
+struct SweepEntry {
+    order: usize,
+    error_bound: Option<f64>,
+    open_loop_error: Option<f64>,
+    open_loop_relative: Option<f64>,
+    closed_loop_relative: Option<f64>,
+    stabilised_by_controller: bool,
+    worst_closed_loop_pole: Option<[f64; 2]>,
+    failure: Option<String>,
 }
 
 /// All orders as lines of text; an empty field where there is no number.
@@ -144,12 +230,4 @@ pub(super) fn as_csv(sweep: &ReductionSweep) -> String {
         text += &format!("{},{errors},{},{pole}\n", r.order, r.stabilised);
     }
     text
-}
-
-fn pair(pole: c64) -> [f64; 2] {
-    [pole.re, pole.im]
-}
-
-fn pairs(poles: &[c64]) -> Vec<[f64; 2]> {
-    poles.iter().copied().map(pair).collect()
 }

@@ -1,20 +1,15 @@
 //! The residual of every model on every verification record: correlations with what excites the loop, fits some steps ahead.
 
-use super::artefacts::Provenance;
-use super::pipeline::Identification;
+use super::context::RunContext;
+use super::entries::{finite, finite_all};
 use super::records::{LoopRecord, channels_of};
-use super::settings::Prediction;
-use super::verdict::ModelVerdict;
-use crate::{Error, Result};
-use serde::Serialize;
-use serde_json::{Value, json};
+use crate::Result;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
-use youla::validate::{
-    PREDICTION_STEPS, RESIDUAL_LAGS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations,
-};
+use youla::validate::{LargestCorrelation, PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations};
 use youla::{Mat, MatRef};
-use youla_report::data as draw;
 
 /// The residual of one model on one record.
 #[derive(Debug, Clone, Serialize)]
@@ -26,27 +21,27 @@ pub struct RecordResiduals {
     pub external: bool,
     /// The correlations.
     pub correlations: ResidualCorrelations,
-    /// Fits in percent over the second half: per [`PREDICTION_STEPS`] and last for the simulation, per output.
+    /// Fits in percent over the second half: per [`youla::validate::PREDICTION_STEPS`] and last for the simulation, per output.
     pub k_step_fits: Vec<Vec<f64>>,
-    /// What foresees the residual of the simulation in them.
-    pub predictor: Foresight,
+    /// What predicts the residual of the simulation in them.
+    pub predictor: Predictor,
 }
 
-/// What foresees the residual of a simulation some steps ahead.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+/// What predicts the residual of a simulation some steps ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Foresight {
+pub enum Predictor {
     /// The noise model of the model itself, from its Kalman gain or that of S.
     Kalman,
     /// An autoregression of the residual.
     Autoregression,
 }
 
-impl Foresight {
-    fn words(self) -> &'static str {
+impl Predictor {
+    pub(super) fn words(self) -> &'static str {
         match self {
-            Foresight::Kalman => "Kalman gain",
-            Foresight::Autoregression => "autoregression",
+            Predictor::Kalman => "Kalman gain",
+            Predictor::Autoregression => "autoregression",
         }
     }
 }
@@ -58,17 +53,16 @@ impl RecordResiduals {
     }
 }
 
-/// Tests measured less predicted outputs, samples x p, without the first `skip` samples; `noise` is what the model says of
-/// its noise.
+/// Tests measured less predicted outputs, samples x p, without the first samples that do not count; `noise` is what the model
+/// states of its noise.
 pub(super) fn residual_tests(
-    found: &Identification,
+    run: RunContext<'_>,
     record: &LoopRecord,
     noise: Option<&StateSpace<Discrete>>,
     measured: MatRef<'_, f64>,
     predicted: MatRef<'_, f64>,
-    skip: usize,
 ) -> Result<RecordResiduals> {
-    let data = &found.settings.data;
+    let (data, skip) = (&run.settings.data, run.settings.verification.skip);
     let moving = |x: &Mat<f64>| x.col_iter().all(|c| c.iter().any(|v| *v != c[0]));
     let known = [
         (&record.alpha, &data.alpha),
@@ -78,13 +72,13 @@ pub(super) fn residual_tests(
     let known: Vec<_> =
         known.into_iter().filter_map(|(x, specs)| x.as_ref().filter(|x| moving(x)).map(|x| (x, specs))).collect();
     // Without feedback the inputs come from outside.
-    let external = !known.is_empty() || found.factorisation.controller.is_zero();
+    let external = !known.is_empty() || run.factorisation.controller.is_zero();
     let (x, channels) = match known.is_empty() {
         false => {
             let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();
             (block(&[&parts]), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
         }
-        true => (record.u.clone(), found.records.inputs.clone()),
+        true => (record.u.clone(), run.records.inputs.clone()),
     };
     let rest = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
     let e = rest((measured - predicted).as_ref());
@@ -103,95 +97,60 @@ fn fits_ahead(
     measured: MatRef<'_, f64>,
     predicted: MatRef<'_, f64>,
     noise: Option<&StateSpace<Discrete>>,
-) -> Result<(Vec<Vec<f64>>, Foresight)> {
+) -> Result<(Vec<Vec<f64>>, Predictor)> {
     match noise.map(|noise| k_step_fits_by_noise(measured, predicted, noise)) {
-        Some(Ok(fits)) => Ok((fits, Foresight::Kalman)),
+        Some(Ok(fits)) => Ok((fits, Predictor::Kalman)),
         Some(Err(error)) if !matches!(error, youla::Error::Unstable { .. } | youla::Error::Singular { .. }) => {
             Err(error.into())
         }
-        _ => Ok((k_step_fits(measured, predicted)?, Foresight::Autoregression)),
+        _ => Ok((k_step_fits(measured, predicted)?, Predictor::Autoregression)),
     }
 }
 
-/// Keys of the fits some steps ahead.
-fn step_keys() -> Vec<String> {
+/// Keys of the fits some steps ahead, the simulation last.
+pub(super) fn step_keys() -> Vec<String> {
     PREDICTION_STEPS.iter().map(usize::to_string).chain(["simulation".to_owned()]).collect()
 }
 
-/// What summary.json says of a model, by record.
-pub(super) fn summary_entry(v: &ModelVerdict) -> Value {
-    let entry = |r: &RecordResiduals| {
-        let fits: serde_json::Map<_, _> = step_keys().into_iter().zip(r.k_step_fits.iter().map(|f| json!(f))).collect();
-        json!({
-            "independent": r.independent(),
-            "largest": r.correlations.largest,
-            "k_step_fits": fits,
-            "predictor": r.predictor,
-        })
-    };
-    v.records
-        .iter()
-        .filter_map(|r| Some((r.record.clone(), entry(r.residuals.as_ref()?))))
-        .collect::<serde_json::Map<_, _>>()
-        .into()
+/// What summary.json says of the residual of a model on a record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ResidualEntry {
+    /// Whether the residual does not depend on past excitation; `null` where none from outside is known.
+    pub independent: Option<bool>,
+    /// The causal correlation that is largest in its standard deviations.
+    pub largest: Option<LargestEntry>,
+    /// Fits in percent over the second half of the record, per output: some samples ahead, and of the simulation.
+    pub k_step_fits: BTreeMap<String, Vec<Option<f64>>>,
+    /// What predicts the residual in them.
+    pub predictor: Predictor,
 }
 
-/// `7-validate/residuals.json`.
-pub(super) fn artefact(found: &Identification, provenance: &Provenance) -> Value {
-    let models: serde_json::Map<_, _> = found
-        .verdict
-        .models
-        .iter()
-        .map(|v| {
-            let records: serde_json::Map<_, _> =
-                v.records.iter().filter_map(|r| Some((r.record.clone(), json!(r.residuals.as_ref()?)))).collect();
-            (v.method.key().to_owned(), records.into())
-        })
-        .collect();
-    json!({"lags": RESIDUAL_LAGS, "steps": step_keys(), "models": models, "provenance": provenance})
+/// Where a residual depends most on past excitation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct LargestEntry {
+    /// Output, counted from 0.
+    pub output: usize,
+    /// Excitation, counted from 0.
+    pub input: usize,
+    /// Samples by which the excitation is earlier.
+    pub lag: usize,
+    /// In standard deviations.
+    pub deviations: Option<f64>,
 }
 
-/// What the report draws.
-pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
-    let mut tests = Vec::new();
-    for v in &found.verdict.models {
-        for record in &v.records {
-            let Some(r) = &record.residuals else { continue };
-            tests.push(draw::ResidualTest {
-                record: record.record.clone(),
-                method: v.method.key().into(),
-                excitations: r.excitations.clone(),
-                independent: r.independent(),
-                auto: r
-                    .correlations
-                    .auto
-                    .iter()
-                    .map(|values| draw::Correlation::new(values, r.correlations.auto_band))
-                    .collect(),
-                cross: r.correlations.cross.iter().map(|c| draw::Correlation::new(&c.values, c.band)).collect(),
-                k_step_fits: r
-                    .k_step_fits
-                    .iter()
-                    .map(|f| f.iter().map(|f| f.is_finite().then_some(*f)).collect())
-                    .collect(),
-                predictor: r.predictor.words().into(),
-            });
+impl From<&RecordResiduals> for ResidualEntry {
+    fn from(r: &RecordResiduals) -> Self {
+        let largest = |l: LargestCorrelation| LargestEntry {
+            output: l.output,
+            input: l.input,
+            lag: l.lag,
+            deviations: finite(l.deviations),
+        };
+        ResidualEntry {
+            independent: r.independent(),
+            largest: r.correlations.largest.map(largest),
+            k_step_fits: step_keys().into_iter().zip(r.k_step_fits.iter().map(|f| finite_all(f))).collect(),
+            predictor: r.predictor,
         }
     }
-    let of = match found.settings.verification.prediction {
-        Prediction::OpenLoop => "the simulation from the measured input",
-        Prediction::ClosedLoop => "the simulation under the controller from the known excitations",
-    };
-    (!tests.is_empty()).then(|| draw::Residuals {
-        prediction: of.into(),
-        external: found
-            .verdict
-            .models
-            .iter()
-            .flat_map(|v| &v.records)
-            .filter_map(|r| r.residuals.as_ref())
-            .all(|r| r.external),
-        steps: PREDICTION_STEPS.to_vec(),
-        tests,
-    })
 }

@@ -1,9 +1,11 @@
 //! Frequency responses of a run: every model, and the indirect non-parametric one where the excitation is known.
 
-use super::pipeline::Identification;
+use super::context::RunContext;
+use super::method::Method;
 use super::records::LoopRecord;
 use super::settings::FrequencySettings;
-use super::verdict::Method;
+use super::signals::DeviationSignals;
+use super::verdict::Verdict;
 use crate::{Error, Result};
 use std::f64::consts::TAU;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
@@ -16,10 +18,10 @@ use youla_report::data as draw;
 /// The excitation d is the signal added at the plant input or injected as alpha where it acts alone; where references move
 /// too, it is the image of all of them in alpha, so that none is mistaken for noise.
 ///
-/// The reason where it cannot be had: a record shorter than a window, an excitation without power at a frequency.
-pub(super) fn indirect(found: &Identification) -> Option<Result<IndirectResponse>> {
-    let settings = &found.settings.frequency_response;
-    let records = &found.records.estimation;
+/// The error is the reason why there is none: a record shorter than a window, an excitation without power at a frequency.
+pub(super) fn indirect(run: RunContext<'_>, signals: &DeviationSignals) -> Option<Result<IndirectResponse>> {
+    let settings = &run.settings.frequency_response;
+    let records = &run.records.estimation;
     let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
     let excitations: Vec<Mat<f64>> = records
         .iter()
@@ -28,7 +30,7 @@ pub(super) fn indirect(found: &Identification) -> Option<Result<IndirectResponse
             let alone = [&r.input_excitation, &r.alpha].into_iter().flatten().collect::<Vec<_>>();
             match alone[..] {
                 [d] if at_rest(r) => Some(d.clone()),
-                _ => found.signals.expected_alpha.get(k).cloned(),
+                _ => signals.expected_alpha.get(k).cloned(),
             }
         })
         .collect();
@@ -46,7 +48,7 @@ pub(super) fn indirect(found: &Identification) -> Option<Result<IndirectResponse
         })
         .collect();
     let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
-    Some(indirect_response(&experiments, found.records.time, &options).map_err(Error::from))
+    Some(indirect_response(&experiments, run.records.time, &options).map_err(Error::from))
 }
 
 fn is_constant(signals: &Mat<f64>) -> bool {
@@ -57,10 +59,10 @@ fn is_constant(signals: &Mat<f64>) -> bool {
 ///
 /// # Errors
 /// As [`frequency_response`].
-pub(super) fn model_responses(found: &Identification, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
+pub(super) fn model_responses(verdict: &Verdict, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let response = |v: &super::verdict::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
-    found.verdict.models.iter().map(response).collect()
+    verdict.models.iter().map(response).collect()
 }
 
 /// Refuses a lowest frequency that leaves no room below Nyquist.

@@ -1,18 +1,17 @@
-//! What the loop of each model with the controller that ran can bear, and how far the models are from each other in the
+//! What the loop of each model with the controller that ran tolerates, and how far the models are from each other in the
 //! nu-gap.
 //!
 //! Margins are in the units of the record; they do not depend on them. The normalised coprime margin and the nu-gap do: both are
 //! taken in channels that are divided by their root mean square over the estimation records, about the mean of each record.
 
-use super::pipeline::Identification;
+use super::entries::{OrRefused, finite};
+use super::factorise::Factorisation;
 use super::records::LoopRecord;
-use super::verdict::ModelVerdict;
-use crate::{Error, Result};
-use serde_json::{Value, json};
+use crate::Result;
+use serde::{Deserialize, Serialize};
 use youla::Mat;
-use youla::control::{ChannelScales, GainLimit, IsoZone, Margins, NuGap, PhaseLimit, coprime_margin, margins, nu_gap};
+use youla::control::{ChannelScales, DiskMargin, IsoZone, Margins, NuGap, coprime_margin, margins, nu_gap};
 use youla::lti::{Discrete, StateSpace};
-use youla_report::{data as draw, pretty_unit};
 
 /// The robustness of one model. A reason stands where a figure cannot be had.
 #[derive(Debug, Clone)]
@@ -63,13 +62,13 @@ fn rms(records: &[LoopRecord], signal: impl Fn(&LoopRecord) -> &Mat<f64>) -> Vec
     energy.into_iter().map(|e| (e / samples as f64).sqrt()).collect()
 }
 
-/// The robustness of one model of a run.
+/// The robustness of one model of a run; `plant` is G(S).
 pub(super) fn robustness(
-    found: &Identification,
+    Factorisation { nominal, controller, .. }: &Factorisation,
     scales: &Result<ChannelScales, String>,
+    plant: &StateSpace<Discrete>,
     model: &StateSpace<Discrete>,
 ) -> Robustness {
-    let (nominal, controller) = (&found.factorisation.nominal, &found.factorisation.controller);
     let scaled = |plant: &StateSpace<Discrete>| -> Result<StateSpace<Discrete>, String> {
         scales.as_ref().map_err(Clone::clone)?.plant(plant).map_err(|e| e.to_string())
     };
@@ -89,111 +88,135 @@ pub(super) fn robustness(
         }),
         coprime: coprime(),
         gap_to_nominal: gap_to(nominal),
-        gap_to_hansen: gap_to(&found.hansen.plant),
+        gap_to_hansen: gap_to(plant),
     }
 }
 
 /// The entry `robustness` of a model in summary.json.
-pub(super) fn summary_entry(robustness: &Robustness) -> Value {
-    let gap = |gap: &Result<NuGap, String>| gap.as_ref().ok().map(|g| g.value);
-    let mut entry = json!({
-        "refused": robustness.margins.as_ref().err(),
-        "coprime_margin": robustness.coprime.as_ref().ok(),
-        "nu_gap_to_nominal": gap(&robustness.gap_to_nominal),
-        "nu_gap_to_hansen": gap(&robustness.gap_to_hansen),
-    });
-    let shown = robustness.margins.as_ref().ok();
-    let of = |value: &dyn Fn(&Margins) -> Value| shown.map_or(Value::Null, value);
-    entry["peak_sensitivity"] = of(&|m| json!(m.output_sensitivity.value));
-    entry["peak_input_sensitivity"] = of(&|m| json!(m.input_sensitivity.value));
-    entry["peak_complementary_sensitivity"] = of(&|m| json!(m.output_complementary.value));
-    entry["output_peak_sensitivities"] =
-        of(&|m| json!(m.outputs.iter().map(|c| c.sensitivity.value).collect::<Vec<_>>()));
-    entry["iso_14839_zone"] = of(&|m| json!(m.zone()));
-    entry["lowest_gain"] = of(&|m| json!(m.lowest_gain().map(|g| g.factor)));
-    entry["highest_gain"] = of(&|m| json!(m.highest_gain().map(|g| g.factor)));
-    entry["phase_margin_deg"] = of(&|m| json!(m.phase().map(|p| p.degrees)));
-    entry["delay_margin_s"] = of(&|m| json!(m.delay().map(|d| d.seconds)));
-    for (name, disks) in [("input_disk_margin", 0), ("output_disk_margin", 1)] {
-        entry[name] = of(&|m| {
-            let disk = if disks == 0 { m.input_disks.balanced } else { m.output_disks.balanced };
-            json!({
-                "alpha": disk.alpha,
-                "lowest_gain": disk.lowest_gain,
-                "highest_gain": disk.highest_gain,
-                "phase_deg": disk.phase_degrees,
-            })
-        });
-    }
-    entry
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct RobustnessEntry {
+    /// Why there are no margins.
+    pub refused: Option<String>,
+    /// Normalised coprime margin b(G, K), 0 to 1, in scaled channels.
+    pub coprime_margin: Option<f64>,
+    /// nu-gap to G(0), 0 to 1, in scaled channels.
+    pub nu_gap_to_nominal: Option<f64>,
+    /// nu-gap to G(S), 0 to 1, in scaled channels.
+    pub nu_gap_to_hansen: Option<f64>,
+    /// Peak of the output sensitivity, all outputs at once.
+    pub peak_sensitivity: Option<f64>,
+    /// Peak of the input sensitivity.
+    pub peak_input_sensitivity: Option<f64>,
+    /// Peak of the complementary sensitivity.
+    pub peak_complementary_sensitivity: Option<f64>,
+    /// Peak of the sensitivity of each output by itself.
+    pub output_peak_sensitivities: Option<Vec<Option<f64>>>,
+    /// Zone of ISO 14839-3: A to D.
+    #[schemars(with = "Option<String>")]
+    pub iso_14839_zone: Option<IsoZone>,
+    /// Factor below 1 on the gain of one channel at which the loop becomes unstable.
+    pub lowest_gain: Option<f64>,
+    /// Factor above 1 at which it does.
+    pub highest_gain: Option<f64>,
+    /// Smallest phase margin of one channel, degrees.
+    pub phase_margin_deg: Option<f64>,
+    /// Smallest delay margin of one channel, seconds.
+    pub delay_margin_s: Option<f64>,
+    /// Balanced disk margin of all inputs at once.
+    pub input_disk_margin: Option<DiskEntry>,
+    /// Balanced disk margin of all outputs at once.
+    pub output_disk_margin: Option<DiskEntry>,
 }
 
-/// All of it, for the artefact of the stage.
-pub(super) fn artefact(robustness: &Robustness) -> Value {
-    fn or_reason<T: serde::Serialize>(part: &Result<T, String>) -> Value {
-        match part {
-            Ok(value) => json!(value),
-            Err(reason) => json!({"refused": reason}),
+/// A balanced disk margin.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct DiskEntry {
+    /// Its size.
+    pub alpha: Option<f64>,
+    /// Lowest factor on the gain that it allows.
+    pub lowest_gain: Option<f64>,
+    /// Highest factor on the gain that it allows; `null` where no factor is too high.
+    pub highest_gain: Option<f64>,
+    /// Change of phase that it allows, degrees.
+    pub phase_deg: Option<f64>,
+}
+
+impl From<&DiskMargin> for DiskEntry {
+    fn from(disk: &DiskMargin) -> Self {
+        DiskEntry {
+            alpha: finite(disk.alpha),
+            lowest_gain: finite(disk.lowest_gain),
+            highest_gain: disk.highest_gain,
+            phase_deg: finite(disk.phase_degrees),
         }
     }
-    json!({
-        "margins": or_reason(&robustness.margins),
-        "coprime_margin": or_reason(&robustness.coprime),
-        "nu_gap_to_nominal": or_reason(&robustness.gap_to_nominal),
-        "nu_gap_to_hansen": or_reason(&robustness.gap_to_hansen),
-    })
+}
+
+impl From<&Robustness> for RobustnessEntry {
+    fn from(robustness: &Robustness) -> Self {
+        let gap = |gap: &Result<NuGap, String>| gap.as_ref().ok().and_then(|g| finite(g.value));
+        let known = robustness.margins.as_ref().ok();
+        let figure = |of: &dyn Fn(&Margins) -> Option<f64>| known.and_then(of).and_then(finite);
+        let each = |m: &Margins| m.outputs.iter().map(|c| finite(c.sensitivity.value)).collect();
+        RobustnessEntry {
+            refused: robustness.margins.as_ref().err().cloned(),
+            coprime_margin: robustness.coprime.as_ref().ok().copied().and_then(finite),
+            nu_gap_to_nominal: gap(&robustness.gap_to_nominal),
+            nu_gap_to_hansen: gap(&robustness.gap_to_hansen),
+            peak_sensitivity: figure(&|m| Some(m.output_sensitivity.value)),
+            peak_input_sensitivity: figure(&|m| Some(m.input_sensitivity.value)),
+            peak_complementary_sensitivity: figure(&|m| Some(m.output_complementary.value)),
+            output_peak_sensitivities: known.map(each),
+            iso_14839_zone: robustness.zone(),
+            lowest_gain: figure(&|m| m.lowest_gain().map(|g| g.factor)),
+            highest_gain: figure(&|m| m.highest_gain().map(|g| g.factor)),
+            phase_margin_deg: figure(&|m| m.phase().map(|p| p.degrees)),
+            delay_margin_s: figure(&|m| m.delay().map(|d| d.seconds)),
+            input_disk_margin: known.map(|m| DiskEntry::from(&m.input_disks.balanced)),
+            output_disk_margin: known.map(|m| DiskEntry::from(&m.output_disks.balanced)),
+        }
+    }
+}
+
+/// All of it, in `7-validate/verdict.json`.
+#[derive(Serialize)]
+pub(super) struct RobustnessFile<'a> {
+    margins: OrRefused<&'a Margins>,
+    coprime_margin: OrRefused<f64>,
+    nu_gap_to_nominal: OrRefused<&'a NuGap>,
+    nu_gap_to_hansen: OrRefused<&'a NuGap>,
+}
+
+impl<'a> From<&'a Robustness> for RobustnessFile<'a> {
+    fn from(robustness: &'a Robustness) -> Self {
+        RobustnessFile {
+            margins: OrRefused::new(robustness.margins.as_ref()),
+            coprime_margin: OrRefused::new(robustness.coprime.as_ref().copied()),
+            nu_gap_to_nominal: OrRefused::new(robustness.gap_to_nominal.as_ref()),
+            nu_gap_to_hansen: OrRefused::new(robustness.gap_to_hansen.as_ref()),
+        }
+    }
+}
+
+/// The sizes by which channels are scaled for b(G, K) and the nu-gaps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ScalesEntry {
+    /// Of each input, in its unit.
+    pub inputs: Vec<f64>,
+    /// Of each output, in its unit.
+    pub outputs: Vec<f64>,
+    /// How they were found.
+    pub basis: String,
 }
 
 /// The scales of summary.json and of the artefact.
-pub(super) fn scales_entry(scales: &Result<ChannelScales, String>) -> Value {
-    match scales {
-        Ok(scales) => json!({"inputs": scales.inputs(), "outputs": scales.outputs(), "basis": BASIS}),
-        Err(reason) => json!({"refused": reason}),
-    }
+pub(super) fn scales_entry(scales: &Result<ChannelScales, String>) -> OrRefused<ScalesEntry> {
+    OrRefused::new(scales.as_ref().map(|scales| ScalesEntry {
+        inputs: scales.inputs().to_vec(),
+        outputs: scales.outputs().to_vec(),
+        basis: BASIS.to_owned(),
+    }))
 }
 
 /// What the scales are.
-const BASIS: &str = "root mean square over the estimation records, about the mean of each";
-
-/// The row of a model in the report.
-pub(super) fn row(v: &ModelVerdict) -> draw::LoopMargins {
-    let robustness = &v.robustness;
-    let known = robustness.margins.as_ref().ok();
-    let disk = known.map(|m| {
-        let (input, output) = (m.input_disks.balanced, m.output_disks.balanced);
-        if input.alpha < output.alpha { input } else { output }
-    });
-    let factor = |limit: Option<GainLimit>| limit.map(|g| g.factor);
-    draw::LoopMargins {
-        method: v.method.key().into(),
-        refusal: robustness.margins.as_ref().err().cloned(),
-        peak_sensitivity: robustness.peak_sensitivity(),
-        zone: robustness.zone().map(|z| z.to_string()),
-        lowest_gain: known.and_then(|m| factor(m.lowest_gain())),
-        highest_gain: known.and_then(|m| factor(m.highest_gain())),
-        phase_deg: known.and_then(Margins::phase).map(|PhaseLimit { degrees, .. }| degrees),
-        delay_ms: known.and_then(Margins::delay).map(|d| 1e3 * d.seconds),
-        disk: disk.map(|d| d.alpha),
-        disk_phase_deg: disk.map(|d| d.phase_degrees),
-        coprime: robustness.coprime.as_ref().ok().copied(),
-        gap_to_nominal: robustness.gap_to_nominal.as_ref().ok().map(|g| g.value),
-        gap_to_hansen: robustness.gap_to_hansen.as_ref().ok().map(|g| g.value),
-    }
-}
-
-/// The caption of the table: the scales with their channels.
-pub(super) fn caption(found: &Identification) -> String {
-    let channels = found.records.inputs.iter().chain(&found.records.outputs);
-    match &found.verdict.scales {
-        Some(Ok(scales)) => {
-            let sizes = scales.inputs().iter().chain(scales.outputs());
-            let each: Vec<String> = channels
-                .zip(sizes)
-                .map(|(c, s)| format!("{} {s:.3} {}", c.name, pretty_unit(&c.unit)).trim_end().into())
-                .collect();
-            format!("Channels are scaled for b(G, K) and the nu-gap by their {BASIS}: {}.", each.join(", "))
-        }
-        Some(Err(reason)) => format!("There is no b(G, K) and no nu-gap, which need scaled channels: {reason}."),
-        None => String::new(),
-    }
-}
+pub(super) const BASIS: &str = "root mean square over the estimation records, about the mean of each";

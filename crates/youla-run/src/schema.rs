@@ -2,6 +2,7 @@
 //! defaults, `deny_unknown_fields` its `additionalProperties = false`.
 
 use super::settings::RunSettings;
+use super::summary::Summary;
 use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value};
 
@@ -20,6 +21,35 @@ pub fn settings_schema() -> Value {
     tidy(&mut schema);
     schema["title"] = "run.toml of youla".into();
     schema
+}
+
+/// The schema of summary.json, for programs that read it.
+///
+/// ```
+/// let schema = youla_run::summary_schema();
+/// assert!(schema["required"].as_array().is_some_and(|keys| keys.contains(&"methods".into())));
+/// ```
+pub fn summary_schema() -> Value {
+    let mut schema =
+        Value::from(SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<Summary>());
+    plain(&mut schema);
+    schema["title"] = "summary.json of youla".into();
+    schema
+}
+
+/// Doc comments as text, without formats of numbers; everywhere below.
+fn plain(schema: &mut Value) {
+    match schema {
+        Value::Object(map) => {
+            map.remove("format");
+            if let Some(Value::String(text)) = map.get_mut("description") {
+                *text = words(text);
+            }
+            map.values_mut().for_each(plain);
+        }
+        Value::Array(items) => items.iter_mut().for_each(plain),
+        Value::Null | Value::Bool(_) | Value::Number(_) | Value::String(_) => {}
+    }
 }
 
 /// Takes out what TOML does not have (null) and what belongs to Rust (formats of numbers, links between items), everywhere below.

@@ -84,25 +84,6 @@ fn wanted(file: &DataFile, samples: usize) -> Result<Vec<[usize; 2]>> {
     file.segments.iter().map(|[from, to]| Ok([*from, within("the end of a segment", *to)?])).collect()
 }
 
-/// What is wrong with the segments of a file as they stand in the settings, in words.
-pub(super) fn problem(file: &DataFile) -> Option<String> {
-    let name = file.file.display();
-    if !file.segments.is_empty() && (file.skip > 0 || file.take.is_some()) {
-        return Some(format!("{name} has both segments and skip or take; give one of them"));
-    }
-    let mut last = 0;
-    for [from, to] in &file.segments {
-        if *from <= last || to < from {
-            return Some(format!(
-                "{name}: segments must be pairs [first, last] of rows counted from 1, in order and without overlap, but \
-                 [{from}, {to}] is not"
-            ));
-        }
-        last = *to;
-    }
-    None
-}
-
 #[cfg(test)]
 mod tests {
     use std::fmt::Write;

@@ -27,6 +27,24 @@ pub struct DeviationSignals {
     pub controller_mismatch: Option<f64>,
 }
 
+/// Relative miss of alpha from which the declared controller is named as a likely cause of a failure.
+const SUSPICIOUS_MISMATCH: f64 = 0.05;
+
+impl DeviationSignals {
+    /// Where a failure of the scheme happened, with the likely cause when the log contradicts the declared controller.
+    pub(super) fn context(&self) -> String {
+        let place = "[hansen] S from alpha to beta";
+        match self.controller_mismatch {
+            Some(mismatch) if mismatch > SUSPICIOUS_MISMATCH => format!(
+                "{place}, where the declared [controller] misses the known excitations by {:.0} % (check its coefficients, \
+                 sign, delay and saturation)",
+                100.0 * mismatch
+            ),
+            _ => place.to_owned(),
+        }
+    }
+}
+
 /// Filters every estimation record by the left factors. alpha is always taken from the **measured** u and y, so that
 /// saturation and unknown excitations are accounted for; known excitations serve as a check of the controller.
 ///

@@ -1,9 +1,12 @@
 //! The stabilisation diagrams of a run: drawn from the data that the models come from.
 
+use super::entries::{pair, pairs};
 use super::settings::StabilisationSettings;
 use crate::Result;
-use serde_json::{Value, json};
-use youla::identify::subspace::stabilisation::{DiagramPole, PoleStability, StabilisationDiagram, stabilisation};
+use serde::Serialize;
+use youla::identify::subspace::stabilisation::{
+    DiagramPole, ModeCluster, PoleStability, StabilisationDiagram, stabilisation,
+};
 use youla::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use youla::signal::Channel;
 use youla_report::data as draw;
@@ -34,28 +37,74 @@ pub(super) fn diagram(
 }
 
 /// A diagram as an artefact; numbers that are not finite are null.
-pub(super) fn as_json(diagram: &StabilisationDiagram, outputs: &[Channel]) -> Value {
-    let shape = |shape: &[youla::c64]| shape.iter().map(|x| [x.re, x.im]).collect::<Vec<_>>();
-    let pole = |p: &DiagramPole| {
-        json!({
-            "order": p.order, "pole": [p.pole.re, p.pole.im], "hz": p.hz, "zeta": p.zeta, "hz_deviation": p.hz_deviation,
-            "zeta_deviation": p.zeta_deviation, "stable": p.is_stable(), "standing": p.standing, "cluster": p.cluster,
-            "shape": shape(&p.shape),
-        })
-    };
-    let clusters: Vec<Value> = diagram
-        .clusters
-        .iter()
-        .map(|c| {
-            json!({
-                "hz": c.hz, "zeta": c.zeta, "hz_spread": c.hz_spread, "zeta_spread": c.zeta_spread,
-                "hz_deviation": c.hz_deviation, "zeta_deviation": c.zeta_deviation, "orders": c.orders, "settled": c.settled,
-                "shape": shape(&c.shape),
-            })
-        })
-        .collect();
-    let poles: Vec<Value> = diagram.poles.iter().map(pole).collect();
-    json!({"orders": diagram.orders, "outputs": outputs, "clusters": clusters, "poles": poles})
+#[derive(Serialize)]
+pub(super) struct DiagramFile<'a> {
+    orders: &'a [usize],
+    outputs: &'a [Channel],
+    clusters: Vec<ClusterEntry>,
+    poles: Vec<PoleEntry>,
+}
+
+#[derive(Serialize)]
+struct PoleEntry {
+    order: usize,
+    pole: [f64; 2],
+    hz: f64,
+    zeta: f64,
+    hz_deviation: Option<f64>,
+    zeta_deviation: Option<f64>,
+    stable: bool,
+    standing: PoleStability,
+    cluster: Option<usize>,
+    shape: Vec<[f64; 2]>,
+}
+
+#[derive(Serialize)]
+struct ClusterEntry {
+    hz: f64,
+    zeta: f64,
+    hz_spread: f64,
+    zeta_spread: f64,
+    hz_deviation: Option<f64>,
+    zeta_deviation: Option<f64>,
+    orders: usize,
+    settled: usize,
+    shape: Vec<[f64; 2]>,
+}
+
+impl<'a> DiagramFile<'a> {
+    /// Of a diagram with its outputs.
+    pub(super) fn new(diagram: &'a StabilisationDiagram, outputs: &'a [Channel]) -> Self {
+        let pole = |p: &DiagramPole| PoleEntry {
+            order: p.order,
+            pole: pair(p.pole),
+            hz: p.hz,
+            zeta: p.zeta,
+            hz_deviation: p.hz_deviation,
+            zeta_deviation: p.zeta_deviation,
+            stable: p.is_stable(),
+            standing: p.standing,
+            cluster: p.cluster,
+            shape: pairs(&p.shape),
+        };
+        let cluster = |c: &ModeCluster| ClusterEntry {
+            hz: c.hz,
+            zeta: c.zeta,
+            hz_spread: c.hz_spread,
+            zeta_spread: c.zeta_spread,
+            hz_deviation: c.hz_deviation,
+            zeta_deviation: c.zeta_deviation,
+            orders: c.orders,
+            settled: c.settled,
+            shape: pairs(&c.shape),
+        };
+        DiagramFile {
+            orders: &diagram.orders,
+            outputs,
+            clusters: diagram.clusters.iter().map(cluster).collect(),
+            poles: diagram.poles.iter().map(pole).collect(),
+        }
+    }
 }
 
 /// The poles as lines of text; an empty field where there is no number.

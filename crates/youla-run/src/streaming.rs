@@ -1,7 +1,9 @@
 //! Subspace identification straight from files that need not fit into memory: what `youla subspace` does.
 
-use super::artefacts::{ModelFile, Provenance, SCHEMA, subspace_details};
+use super::artefacts::{ModelFile, Provenance, SCHEMA};
+use super::folder::to_value;
 use super::records::SourceFile;
+use super::subspace_details::{LongDetails, SubspaceDetails};
 use crate::{Error, Result};
 use faer::MatMut;
 use std::path::PathBuf;
@@ -94,9 +96,8 @@ pub fn long_model_file(
         sources: records.files.iter().map(source).collect::<Result<_>>()?,
         options: options.clone(),
     };
-    let mut details = subspace_details(&model.found);
-    details["fit"] = serde_json::json!(model.found.fit);
-    details["samples"] = model.samples.into();
+    let subspace = SubspaceDetails::from(&model.found);
+    let details = to_value(&LongDetails { subspace, fit: &model.found.fit, samples: model.samples })?;
     let ports = (model.inputs.clone(), model.outputs.clone());
     ModelFile::new("subspace", &model.found.model, ports, details, provenance)
 }

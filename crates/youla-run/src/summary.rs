@@ -1,124 +1,230 @@
-//! summary.json: the stable contract for scripts.
+//! summary.json: the contract for scripts, as one type.
 
-use super::artefacts::{SCHEMA, pairs};
-use super::certificate::RunCertificate;
-use super::pipeline::{Identification, StageTimes};
-use super::redesign;
-use super::response::{decibel, model_responses};
-use super::robustness;
-use super::uncertainty::{summary_entry, with_deviations};
-use super::verdict::{Method, ModelVerdict};
-use crate::Result;
-use serde_json::{Map, Value, json};
+use super::certificate::CertificateEntry;
+use super::check::DataCheckEntry;
+use super::entries::{Fits, ModeEntry, OrRefused, finite, finite_all, pairs};
+use super::grey_box::PhysicalEntry;
+use super::identification::Identification;
+use super::method::Method;
+use super::redesign::{self, RedesignEntry};
+use super::reduction::ReductionEntry;
+use super::residual_tests::ResidualEntry;
+use super::response::{decibel, model_responses, ports};
+use super::robustness::{RobustnessEntry, ScalesEntry, scales_entry};
+use super::stage::StageTimes;
+use super::uncertainty::UncertaintyEntry;
+use super::verdict::ModelVerdict;
+use crate::{Error, Result};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use youla::c64;
+use std::io::Read;
+use std::path::Path;
+use youla::lti::FrequencyResponse;
 
-/// The summary of a run, schema 1; magnitudes are those of output 1 from input 1.
+/// Version of the layout of summary.json.
+pub const SUMMARY_SCHEMA: u32 = 2;
+
+/// summary.json. A number that does not exist is `null`.
 ///
-/// ```text
-/// {"schema":1, "nominal":{"fit":{record:[per output]}, "robustness"}, "methods":{method:{"order", "s_order", "s_stable",
-///  "stabilised_by_controller", "fit", "modes":[{"hz","zeta"}], "poles":[[re,im]], "robustness"}}, "channel_scales",
-///  "frequency_response":{"hz", "indirect_db", "coherence", "<method>_db"}, "bezout_residual", "seconds":{stage: s}}
-/// ```
-///
-/// With a reduction there is `reduction`: its order, errors in open and closed loop, whether the controller stabilises it.
-/// With an uncertainty there is `uncertainty`, and the modes of `hansen` have deviations and intervals; those of `grey_box` have them
-/// where its parameters have a covariance. It has `parameters`, `level`, `correlations`, `verdict`, `structures` and `lost`.
-/// A method or an indirect response that could not be had is listed under `refused` with its reason. Numbers that do not exist are null.
+/// A method or an indirect response that is impossible is listed under `refused` with its reason.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct Summary {
+    /// Version of this layout: 2.
+    pub schema: u32,
+    /// Name of the machine or experiment.
+    pub name: String,
+    /// The nominal model G(0).
+    pub nominal: Option<ReferenceEntry>,
+    /// The identified models by method: `hansen`, `hansen_reduced`, `direct`, `grey_box`.
+    pub methods: BTreeMap<String, MethodEntry>,
+    /// What was asked for but is impossible, with the reason.
+    pub refused: BTreeMap<String, String>,
+    /// Magnitudes of the frequency responses.
+    pub frequency_response: ResponsesEntry,
+    /// The check of the data.
+    pub data: DataCheckEntry,
+    /// Largest relative residual of the Bezout identity (15) up to Nyquist.
+    pub bezout_residual: Option<f64>,
+    /// Relative difference of alpha from what the known excitations cause; `null` where none is known.
+    pub controller_mismatch: Option<f64>,
+    /// Seconds of each stage.
+    pub seconds: BTreeMap<String, f64>,
+    /// The simulated plant itself, in simulations only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub true_plant: Option<ReferenceEntry>,
+    /// The sizes by which channels are scaled for `coprime_margin` and the nu-gaps.
+    pub channel_scales: OrRefused<ScalesEntry>,
+    /// The loop of G(S).
+    pub certificate: CertificateEntry,
+    /// The new controller, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redesign: Option<RedesignEntry>,
+    /// The reduction, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduction: Option<ReductionEntry>,
+    /// The uncertainty of S, where it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub uncertainty: Option<UncertaintyEntry>,
+}
+
+/// A model that was given, not identified.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ReferenceEntry {
+    /// Fit (26) in percent, per verification record and output.
+    pub fit: Fits,
+    /// Margins and distances.
+    pub robustness: RobustnessEntry,
+}
+
+/// An identified model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct MethodEntry {
+    /// Number of states.
+    pub order: usize,
+    /// Whether the controller that ran stabilises this model.
+    pub stabilised_by_controller: bool,
+    /// Fit (26) in percent, per verification record and output.
+    pub fit: Fits,
+    /// Modes.
+    pub modes: Vec<ModeEntry>,
+    /// Poles in z, `[re, im]`.
+    pub poles: Vec<[f64; 2]>,
+    /// Margins and distances.
+    pub robustness: RobustnessEntry,
+    /// Tests of the residual, per verification record.
+    pub residuals: BTreeMap<String, ResidualEntry>,
+    /// States of S; `hansen` and `hansen_reduced` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub s_order: Option<usize>,
+    /// Whether S is stable; `hansen` and `hansen_reduced` only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub s_stable: Option<bool>,
+    /// The physical structure; `grey_box` only.
+    #[serde(flatten)]
+    pub physical: Option<PhysicalEntry>,
+}
+
+/// One number per frequency, `[output][input][frequency]`.
+pub type PortCurves = Vec<Vec<Vec<Option<f64>>>>;
+
+/// Magnitudes of the frequency responses of all models on one grid, in dB; `[output][input][frequency]`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct ResponsesEntry {
+    /// Frequencies, Hz.
+    pub hz: Vec<f64>,
+    /// The non-parametric response, where an excitation is known; `hz` is then its grid.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub indirect_db: Option<PortCurves>,
+    /// Its coherence, `[output][frequency]`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub coherence: Option<Vec<Vec<Option<f64>>>>,
+    /// `<method>_db` of each model.
+    #[serde(flatten)]
+    pub models: BTreeMap<String, PortCurves>,
+}
+
+/// The summary of a run.
 ///
 /// # Errors
 /// Those of the frequency responses, modes and derived quantities.
-pub fn summary(found: &Identification, seconds: &StageTimes) -> Result<Value> {
-    let mut methods = Map::new();
-    let mut refused = Map::new();
-    for v in &found.verdict.models {
-        if !matches!(v.method, Method::Nominal | Method::TruePlant) {
-            methods.insert(v.method.key().into(), method_entry(found, v)?);
-        }
-    }
-    for refusal in found.refusals() {
-        refused.insert(refusal.key.into(), json!(refusal.error.to_string()));
-    }
-    let mut all = json!({
-        "schema": SCHEMA,
-        "name": found.settings.name,
-        "nominal": {
-            "fit": found.verdict.of(Method::Nominal).map(fits),
-            "robustness": found.verdict.of(Method::Nominal).map(|v| robustness::summary_entry(&v.robustness)),
-        },
-        "methods": methods,
-        "refused": refused,
-        "frequency_response": response_entry(found)?,
-        "data": found.data.json(),
-        "bezout_residual": found.factorisation.bezout_residual,
-        "controller_mismatch": found.signals.controller_mismatch,
-        "seconds": seconds.iter().map(|(s, t)| (s.name().to_owned(), json!(t))).collect::<Map<_, _>>(),
-    });
-    if let Some(v) = found.verdict.of(Method::TruePlant) {
-        all["true_plant"] = json!({"fit": fits(v), "robustness": robustness::summary_entry(&v.robustness)});
-    }
-    if let Some(scales) = &found.verdict.scales {
-        all["channel_scales"] = robustness::scales_entry(scales);
-    }
-    all["certificate"] = json!(found.certificate.as_ref().map(RunCertificate::json));
-    if let Some(Ok(new)) = &found.redesign {
-        all["redesign"] = redesign::json(new);
-    }
-    if let Some(Ok(reduction)) = &found.reduction {
-        all["reduction"] = reduction.summary();
-    }
-    if found.hansen.uncertainty.is_some() {
-        all["uncertainty"] = summary_entry(found);
-    }
-    Ok(all)
+pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
+    let identified = |v: &&ModelVerdict| !matches!(v.method, Method::Nominal | Method::TruePlant);
+    let methods = run.verdict.models.iter().filter(identified);
+    let methods = methods.map(|v| Ok((v.method.key().to_owned(), method_entry(run, v)?)));
+    Ok(Summary {
+        schema: SUMMARY_SCHEMA,
+        name: run.settings.name.clone(),
+        nominal: run.verdict.of(Method::Nominal).map(reference_entry),
+        methods: methods.collect::<Result<_>>()?,
+        refused: run.refusals().into_iter().map(|r| (r.key.to_owned(), r.error.to_string())).collect(),
+        frequency_response: responses_entry(run)?,
+        data: run.data.entry(),
+        bezout_residual: finite(run.factorisation.bezout_residual),
+        controller_mismatch: run.signals.controller_mismatch.and_then(finite),
+        seconds: seconds.iter().map(|(stage, seconds)| (stage.name().to_owned(), *seconds)).collect(),
+        true_plant: run.verdict.of(Method::TruePlant).map(reference_entry),
+        channel_scales: scales_entry(&run.verdict.scales),
+        certificate: run.certificate.entry(),
+        redesign: run.new_controller().map(redesign::entry),
+        reduction: run.reduced().map(|reduction| reduction.entry()),
+        uncertainty: UncertaintyEntry::new(&run.hansen, &run.settings.hansen.uncertainty),
+    })
 }
 
-fn method_entry(found: &Identification, v: &ModelVerdict) -> Result<Value> {
-    let mut entry = json!({
-        "order": v.model.order(),
-        "stabilised_by_controller": v.certificate.stable,
-        "fit": fits(v),
-        "modes": v.modes.iter().map(|m| json!({"hz": m.hz, "zeta": m.zeta})).collect::<Vec<_>>(),
-        "poles": pairs(&v.poles),
-        "robustness": robustness::summary_entry(&v.robustness),
-        "residuals": super::residual_tests::summary_entry(v),
-    });
-    if let Some(known) = found.uncertainty.of(v.method) {
-        let modes = known.modes.iter().map(|band| with_deviations(json!({}), band));
-        entry["modes"] = modes.collect::<Vec<_>>().into();
+impl Summary {
+    /// Reads the summary.json of a run folder.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`]; [`Error::NotASummary`] for another layout.
+    pub fn read(run: &Path) -> Result<Self> {
+        let path = run.join("summary.json");
+        let mut text = String::new();
+        youla_io::open(&path)?
+            .read_to_string(&mut text)
+            .map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
+        serde_json::from_str(&text).map_err(|source| Error::NotASummary { path, source })
     }
-    if let (Method::GreyBox, Some(Ok(run))) = (v.method, &found.grey_box) {
-        let shown = run.shown();
-        entry["parameters"] = json!(run.rows()?);
-        entry["level"] = json!(shown.level);
-        entry["correlations"] = json!(shown.correlations);
-        entry["verdict"] = json!(shown.verdict);
-        entry["structures"] = json!(shown.structures);
-        entry["lost"] = json!(run.found.lost());
-    }
-    if matches!(v.method, Method::Hansen | Method::HansenReduced) {
-        entry["s_order"] = json!(found.hansen.deviation.model.order());
-        entry["s_stable"] = json!(found.hansen.deviation.stability.stable);
-    }
-    Ok(entry)
 }
 
-fn fits(v: &ModelVerdict) -> Value {
-    v.records.iter().map(|r| (r.record.clone(), json!(r.fit))).collect::<Map<_, _>>().into()
+/// As JSON on one line.
+impl std::fmt::Display for Summary {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(&serde_json::to_string(self).map_err(|_| std::fmt::Error)?)
+    }
 }
 
-fn response_entry(found: &Identification) -> Result<Value> {
-    let measured = found.indirect.as_ref().and_then(|r| r.as_ref().ok());
-    let hz = measured.map_or_else(|| found.hz.clone(), |m| m.response.omega.iter().map(|w| w / TAU).collect());
-    let db = |values: Vec<c64>| values.iter().map(|v| decibel(v.norm())).collect::<Vec<f64>>();
-    let mut entry = Map::new();
-    if let Some(m) = measured {
-        entry.insert("indirect_db".into(), json!(db(m.response.entry(0, 0))));
-        entry.insert("coherence".into(), json!(m.coherence_y.col_as_slice(0)));
+fn reference_entry(v: &ModelVerdict) -> ReferenceEntry {
+    ReferenceEntry { fit: fits(v), robustness: RobustnessEntry::from(&v.robustness) }
+}
+
+fn method_entry(run: &Identification, v: &ModelVerdict) -> Result<MethodEntry> {
+    let modes = match run.uncertainty.of(v.method) {
+        Some(known) => known.modes.iter().map(ModeEntry::from).collect(),
+        None => v.modes.iter().map(ModeEntry::from).collect(),
+    };
+    let residuals = v.records.iter().filter_map(|r| Some((r.record.clone(), r.residuals.as_ref()?.into())));
+    let s = matches!(v.method, Method::Hansen | Method::HansenReduced).then_some(&run.hansen.deviation);
+    let structure = run.structure().filter(|_| v.method == Method::GreyBox);
+    Ok(MethodEntry {
+        order: v.model.order(),
+        stabilised_by_controller: v.certificate.stable,
+        fit: fits(v),
+        modes,
+        poles: pairs(&v.poles),
+        robustness: RobustnessEntry::from(&v.robustness),
+        residuals: residuals.collect(),
+        s_order: s.map(|s| s.model.order()),
+        s_stable: s.map(|s| s.stability.stable),
+        physical: structure.map(|structure| structure.entry()).transpose()?,
+    })
+}
+
+fn fits(v: &ModelVerdict) -> Fits {
+    v.records.iter().map(|r| (r.record.clone(), finite_all(&r.fit))).collect()
+}
+
+fn responses_entry(run: &Identification) -> Result<ResponsesEntry> {
+    let measured = run.indirect.as_ref().and_then(|r| r.as_ref().ok());
+    let hz = measured.map_or_else(|| run.hz.clone(), |m| m.response.omega.iter().map(|w| w / TAU).collect());
+    let models = model_responses(&run.verdict, &hz)?;
+    let outputs = 0..run.records.outputs.len();
+    Ok(ResponsesEntry {
+        indirect_db: measured.map(|m| curves(&m.response)),
+        coherence: measured.map(|m| outputs.map(|i| finite_all(m.coherence_y.col_as_slice(i))).collect()),
+        models: models.iter().map(|(method, r)| (format!("{}_db", method.key()), curves(r))).collect(),
+        hz,
+    })
+}
+
+/// Magnitudes in dB, `[output][input][frequency]`.
+fn curves(response: &FrequencyResponse) -> PortCurves {
+    let first = response.at(0);
+    let mut all = vec![Vec::new(); first.nrows()];
+    for (output, input) in ports(first.nrows(), first.ncols()) {
+        let db = response.entry(output, input).iter().map(|v| finite(decibel(v.norm()))).collect();
+        all[output].push(db);
     }
-    for (method, response) in model_responses(found, &hz)? {
-        entry.insert(format!("{}_db", method.key()), json!(db(response.entry(0, 0))));
-    }
-    entry.insert("hz".into(), json!(hz));
-    Ok(entry.into())
+    all
 }

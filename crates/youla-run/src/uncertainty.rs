@@ -1,12 +1,13 @@
 //! The uncertainty of the models of a run: regions of their frequency responses and intervals of their modes.
 
-use super::pipeline::Identification;
-use super::verdict::Method;
+use super::entries::{ModeEntry, OrRefused, finite};
+use super::method::Method;
+use super::response::ports;
 use crate::Result;
-use serde_json::{Value, json};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use youla::identify::hansen::HansenModel;
-use youla::identify::subspace::{ModeBand, ResponseBand, Uncertainty};
+use youla::identify::subspace::{ModeBand, ResponseBand, Uncertainty, UncertaintyMethod, UncertaintyOptions};
 use youla_greybox::GreyBoxIntervals;
 
 /// The uncertainty of one system.
@@ -69,61 +70,120 @@ impl RunUncertainty {
 }
 
 impl SystemUncertainty {
-    /// As JSON: per output and input the response, the bounds of its magnitude and the covariance of its parts.
-    pub(super) fn json(&self, hz: &[f64]) -> Value {
+    /// As `uncertainty.json` holds it: per output and input the response, the bounds of its magnitude and the covariance of its
+    /// parts.
+    pub(super) fn file<'a>(&self, hz: &'a [f64]) -> UncertaintyFile<'a> {
         let first = self.response.response.at(0);
-        let (p, m) = (first.nrows(), first.ncols());
-        let entries: Vec<Value> = (0..p)
-            .flat_map(|i| (0..m).map(move |j| (i, j)))
-            .map(|(i, j)| {
-                let values = self.response.response.entry(i, j);
-                let places = || (0..hz.len()).map(|k| self.response.place(k, i, j));
-                json!({
-                    "output": i,
-                    "input": j,
-                    "real": values.iter().map(|v| v.re).collect::<Vec<_>>(),
-                    "imaginary": values.iter().map(|v| v.im).collect::<Vec<_>>(),
-                    "magnitude": places().map(|k| self.response.magnitude[k]).collect::<Vec<_>>(),
-                    "covariance": places().map(|k| self.response.covariance[k]).collect::<Vec<_>>(),
-                })
-            })
-            .collect();
-        let modes: Vec<Value> = self.modes.iter().map(|m| with_deviations(json!({}), m)).collect();
-        json!({"level": self.level, "hz": hz, "ellipse": self.response.ellipse, "entries": entries, "modes": modes})
-    }
-}
-
-/// Adds frequency and damping with deviations and intervals to an entry on a mode.
-pub(super) fn with_deviations(mut entry: Value, band: &ModeBand) -> Value {
-    entry["hz"] = json!(band.mode.hz);
-    entry["zeta"] = json!(band.mode.zeta);
-    entry["hz_deviation"] = json!(band.hz_deviation);
-    entry["zeta_deviation"] = json!(band.zeta_deviation);
-    entry["hz_interval"] = json!(band.hz);
-    entry["zeta_interval"] = json!(band.zeta);
-    entry
-}
-
-/// What summary.json says beside the modes; null where it was not asked for.
-pub(super) fn summary_entry(found: &Identification) -> Value {
-    let Some(uncertainty) = &found.hansen.uncertainty else { return Value::Null };
-    let options = &found.settings.hansen.uncertainty;
-    let evidence = match &found.hansen.evidence {
-        Some(Ok(e)) => json!({
-            "against_nominal": e.against_nominal(), "statistic": e.statistic, "threshold": e.threshold,
-        }),
-        Some(Err(reason)) => json!({"refused": reason.to_string()}),
-        None => Value::Null,
-    };
-    let mut entry = json!({"method": options.method, "level": options.level, "evidence": evidence});
-    match uncertainty {
-        Uncertainty::Delta(delta) => entry["blocks"] = json!(delta.blocks.len()),
-        Uncertainty::Bootstrap(bootstrap) => {
-            entry["replicates"] = json!(bootstrap.replicates.len());
-            entry["unstable"] = json!(bootstrap.unstable);
-            entry["failed"] = json!(bootstrap.failed);
+        let entry = |(output, input): (usize, usize)| {
+            let values = self.response.response.entry(output, input);
+            let places = || (0..hz.len()).map(|k| self.response.place(k, output, input));
+            ResponseEntry {
+                output,
+                input,
+                real: values.iter().map(|v| v.re).collect(),
+                imaginary: values.iter().map(|v| v.im).collect(),
+                magnitude: places().map(|k| self.response.magnitude[k]).collect(),
+                covariance: places().map(|k| self.response.covariance[k]).collect(),
+            }
+        };
+        UncertaintyFile {
+            level: self.level,
+            hz,
+            ellipse: self.response.ellipse,
+            entries: ports(first.nrows(), first.ncols()).map(entry).collect(),
+            modes: self.modes.iter().map(ModeEntry::from).collect(),
         }
-        Uncertainty::Refused { reason } => entry["refused"] = json!(reason.to_string()),
     }
-    entry
+}
+
+/// `uncertainty.json`.
+#[derive(Serialize)]
+pub(super) struct UncertaintyFile<'a> {
+    level: f64,
+    hz: &'a [f64],
+    ellipse: f64,
+    entries: Vec<ResponseEntry>,
+    modes: Vec<ModeEntry>,
+}
+
+#[derive(Serialize)]
+struct ResponseEntry {
+    output: usize,
+    input: usize,
+    real: Vec<f64>,
+    imaginary: Vec<f64>,
+    magnitude: Vec<[f64; 2]>,
+    covariance: Vec<[f64; 3]>,
+}
+
+/// What summary.json says of the uncertainty beside the modes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct UncertaintyEntry {
+    /// How the uncertainty was found.
+    pub method: UncertaintyMethod,
+    /// Confidence level.
+    pub level: f64,
+    /// The test of S = 0, or the reason why there is none.
+    pub evidence: Option<OrRefused<EvidenceEntry>>,
+    /// Blocks of the data, of the delta method.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<usize>,
+    /// Replicates of a bootstrap.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replicates: Option<usize>,
+    /// Resampled records that gave an unstable S.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unstable: Option<usize>,
+    /// Resampled records that gave no S.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failed: Option<usize>,
+    /// Why there is no uncertainty.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub refused: Option<String>,
+}
+
+/// Whether S is more than noise.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct EvidenceEntry {
+    /// Whether the data contradict the nominal model.
+    pub against_nominal: bool,
+    /// The statistic.
+    pub statistic: Option<f64>,
+    /// Its threshold.
+    pub threshold: Option<f64>,
+}
+
+impl UncertaintyEntry {
+    /// `None` where it was not asked for.
+    pub(super) fn new(hansen: &HansenModel, options: &UncertaintyOptions) -> Option<Self> {
+        let uncertainty = hansen.uncertainty.as_ref()?;
+        let evidence = hansen.evidence.as_ref().map(|evidence| {
+            OrRefused::new(evidence.as_ref().map(|e| EvidenceEntry {
+                against_nominal: e.against_nominal(),
+                statistic: finite(e.statistic),
+                threshold: finite(e.threshold),
+            }))
+        });
+        let (method, level) = (options.method, options.level);
+        let none = UncertaintyEntry {
+            method,
+            level,
+            evidence,
+            blocks: None,
+            replicates: None,
+            unstable: None,
+            failed: None,
+            refused: None,
+        };
+        Some(match uncertainty {
+            Uncertainty::Delta(delta) => UncertaintyEntry { blocks: Some(delta.blocks.len()), ..none },
+            Uncertainty::Bootstrap(bootstrap) => UncertaintyEntry {
+                replicates: Some(bootstrap.replicates.len()),
+                unstable: Some(bootstrap.unstable),
+                failed: Some(bootstrap.failed),
+                ..none
+            },
+            Uncertainty::Refused { reason } => UncertaintyEntry { refused: Some(reason.to_string()), ..none },
+        })
+    }
 }

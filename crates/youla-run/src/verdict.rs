@@ -1,64 +1,24 @@
 //! The evidence on every model of a run: fit (26) on verification records, loop certificate, modes.
 
+use super::context::RunContext;
 use super::disturbance::without_lines;
 use super::factorise::Factorisation;
-use super::noise_models::noise_model;
-use super::pipeline::Identification;
+use super::grey_box::GreyBoxRun;
+use super::method::Method;
+use super::noise_models::{noise_of_direct, noise_of_hansen, noise_of_structure};
 use super::records::LoopRecord;
+use super::reduction::RunReduction;
 use super::residual_tests::{RecordResiduals, residual_tests};
 use super::robustness::{Robustness, channel_scales, robustness};
 use super::settings::Prediction;
 use crate::{Error, Result};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use youla::control::{ChannelScales, with_input_port};
+use youla::identify::hansen::HansenModel;
+use youla::identify::subspace::SubspaceModel;
 use youla::lti::{Discrete, Mode, StateSpace};
 use youla::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
 use youla::{Mat, MatRef, c64};
-
-/// A model of a run.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Method {
-    /// G(0).
-    Nominal,
-    /// Subspace identification from (u, y).
-    Direct,
-    /// G(S).
-    Hansen,
-    /// `G_red(S)`.
-    HansenReduced,
-    /// The physical structure, by the prediction-error method.
-    GreyBox,
-    /// The simulated plant itself; in simulations only.
-    TruePlant,
-}
-
-impl Method {
-    /// Key in summary.json and in file names.
-    pub fn key(self) -> &'static str {
-        match self {
-            Method::Nominal => "nominal",
-            Method::Direct => "direct",
-            Method::Hansen => "hansen",
-            Method::HansenReduced => "hansen_reduced",
-            Method::GreyBox => "grey_box",
-            Method::TruePlant => "true_plant",
-        }
-    }
-
-    /// Name in tables and figures.
-    pub fn label(self) -> &'static str {
-        match self {
-            Method::Nominal => "nominal G(0)",
-            Method::Direct => "direct N4SID",
-            Method::Hansen => "Hansen G(S)",
-            Method::HansenReduced => "reduced G_red(S)",
-            Method::GreyBox => "grey-box PEM",
-            Method::TruePlant => "true plant",
-        }
-    }
-}
 
 /// Prediction of one verification record by one model.
 #[derive(Debug, Clone)]
@@ -95,12 +55,12 @@ pub struct ModelVerdict {
 }
 
 /// The evidence on all models, in the order nominal, direct, Hansen, reduced, grey box.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 pub struct Verdict {
     /// One entry per model that exists.
     pub models: Vec<ModelVerdict>,
-    /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none; `None` before any model.
-    pub scales: Option<Result<ChannelScales, String>>,
+    /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none.
+    pub scales: Result<ChannelScales, String>,
 }
 
 impl Verdict {
@@ -110,64 +70,92 @@ impl Verdict {
     }
 }
 
-/// Holds every model of a run against the verification records and the controller; models in parallel.
+/// The models that a run identified; nominal model and true plant are in its records and factors.
+pub(super) struct Candidates<'a> {
+    /// S and G(S).
+    pub(super) hansen: &'a HansenModel,
+    /// The direct model, where there is one.
+    pub(super) direct: Option<&'a SubspaceModel>,
+    /// The reduced model, where there is one.
+    pub(super) reduction: Option<&'a RunReduction>,
+    /// The physical structure, where it has an estimate.
+    pub(super) grey_box: Option<&'a GreyBoxRun>,
+}
+
+/// A model with what it states of its noise.
+struct Candidate<'a> {
+    method: Method,
+    model: &'a StateSpace<Discrete>,
+    noise: Option<StateSpace<Discrete>>,
+}
+
+impl<'a> Candidates<'a> {
+    /// In the order nominal, direct, Hansen, reduced, grey box, true plant.
+    fn all(&self, run: RunContext<'a>) -> Result<Vec<Candidate<'a>>> {
+        let prediction = run.settings.verification.prediction;
+        let plain = |method, model| Candidate { method, model, noise: None };
+        let mut all = vec![plain(Method::Nominal, &run.factorisation.nominal)];
+        if let Some(direct) = self.direct {
+            let noise = noise_of_direct(prediction, direct)?;
+            all.push(Candidate { method: Method::Direct, model: &direct.model, noise });
+        }
+        let noise = noise_of_hansen(prediction, &run.factorisation.factors, self.hansen)?;
+        all.push(Candidate { method: Method::Hansen, model: &self.hansen.plant, noise });
+        all.extend(self.reduction.map(|r| plain(Method::HansenReduced, &r.found.reduction.model)));
+        if let Some(GreyBoxRun { found, .. }) = self.grey_box {
+            let noise = noise_of_structure(prediction, &found.model)?;
+            all.push(Candidate { method: Method::GreyBox, model: &found.model.model, noise });
+        }
+        all.extend(run.records.true_plant.as_ref().map(|plant| plain(Method::TruePlant, plant)));
+        Ok(all)
+    }
+}
+
+/// Compares every model of a run with the verification records and closes its loop with the controller; models in parallel.
 ///
 /// # Errors
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
-pub(super) fn verify(found: &Identification) -> Result<Verdict> {
-    let mut models = vec![(Method::Nominal, &found.factorisation.nominal)];
-    if let Some(Ok(direct)) = &found.direct {
-        models.push((Method::Direct, &direct.model));
-    }
-    models.push((Method::Hansen, &found.hansen.plant));
-    if let Some(Ok(reduction)) = &found.reduction {
-        models.push((Method::HansenReduced, &reduction.found.reduction.model));
-    }
-    if let Some(Ok(grey_box)) = &found.grey_box {
-        models.push((Method::GreyBox, &grey_box.found.model.model));
-    }
-    if let Some(plant) = &found.records.true_plant {
-        models.push((Method::TruePlant, plant));
-    }
-    let scales = channel_scales(&found.records.estimation).map_err(|e| e.to_string());
+pub(super) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Verdict> {
+    let scales = channel_scales(&run.records.estimation).map_err(|e| e.to_string());
+    let plant = &candidates.hansen.plant;
+    let all = candidates.all(run)?;
     let verdicts: Vec<Result<ModelVerdict>> =
-        models.par_iter().map(|(method, model)| verify_model(found, &scales, *method, model)).collect();
-    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()?, scales: Some(scales) })
+        all.par_iter().map(|candidate| verify_model(run, &scales, plant, candidate)).collect();
+    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()?, scales })
 }
 
 fn verify_model(
-    found: &Identification,
+    run: RunContext<'_>,
     scales: &Result<ChannelScales, String>,
-    method: Method,
-    model: &StateSpace<Discrete>,
+    plant: &StateSpace<Discrete>,
+    Candidate { method, model, noise }: &Candidate<'_>,
 ) -> Result<ModelVerdict> {
-    let noise = noise_model(found, method, model)?;
-    let verify = |r: &LoopRecord| verify_record(found, model, noise.as_ref(), r);
-    let records = found.records.verification.iter().map(verify).collect::<Result<_>>()?;
+    let verify = |r: &LoopRecord| verify_record(run, model, noise.as_ref(), r);
+    let records = run.records.verification.iter().map(verify).collect::<Result<_>>()?;
     Ok(ModelVerdict {
-        method,
-        model: model.clone(),
+        method: *method,
+        model: (*model).clone(),
         poles: model.poles()?,
         modes: model.modes()?,
-        certificate: certify(model, &found.factorisation.controller)?,
-        robustness: robustness(found, scales, model),
+        certificate: certify(model, &run.factorisation.controller)?,
+        robustness: robustness(run.factorisation, scales, plant, model),
         records,
     })
 }
 
 /// One model on one verification record; `noise` is what it says of its noise.
 pub(super) fn verify_record(
-    found: &Identification,
+    run: RunContext<'_>,
     model: &StateSpace<Discrete>,
     noise: Option<&StateSpace<Discrete>>,
     record: &LoopRecord,
 ) -> Result<RecordVerdict> {
     let lines = record.disturbance.as_ref().map(|w| w.as_ref());
     let measured = without_lines(record.y.as_ref(), lines)?;
-    let predicted = match found.settings.verification.prediction {
+    let predicted = match run.settings.verification.prediction {
         Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
         Prediction::ClosedLoop => {
-            let Factorisation { factors, controller, .. } = &found.factorisation;
+            let Factorisation { factors, controller, .. } = run.factorisation;
             let ports = if record.alpha.is_some() { factors.j_k()? } else { with_input_port(controller)? };
             let excitation = LoopExcitation {
                 input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
@@ -176,7 +164,7 @@ pub(super) fn verify_record(
             predict_closed_loop(model, &ports, excitation, measured.as_ref())
         }
     };
-    let skip = found.settings.verification.skip;
+    let skip = run.settings.verification.skip;
     if record.samples() <= skip {
         let what = format!("record {}, of which `skip` in [verification] drops the first {skip}", record.name);
         return Err(Error::Method(youla::Error::TooFewSamples { what, found: record.samples(), needed: skip + 1 }));
@@ -189,7 +177,7 @@ pub(super) fn verify_record(
             let rest = |m: &Mat<f64>| without_lines(counted(m.as_ref()).as_ref(), lines.as_ref().map(|w| w.as_ref()));
             let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
-            let residuals = Some(residual_tests(found, record, noise, measured.as_ref(), predicted.as_ref(), skip)?);
+            let residuals = Some(residual_tests(run, record, noise, measured.as_ref(), predicted.as_ref())?);
             Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
         }
         Err(e @ youla::Error::Diverged { .. }) => {

@@ -1,9 +1,10 @@
 //! Writes a run folder: data first, then the report drawn from them, summary.json last.
 
-use super::artefacts::write_artefacts;
+use super::folder::write_artefacts;
+use super::identification::Identification;
 use super::page::page;
-use super::pipeline::{Identification, Stage, StageClock};
-use super::summary::summary;
+use super::stage::{Stage, StageClock};
+use super::summary::{Summary, summary};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla_io::folder::RunFolder;
@@ -14,8 +15,8 @@ use youla_report::html;
 pub struct WrittenRun {
     /// Where it is.
     pub folder: PathBuf,
-    /// What stands in its summary.json.
-    pub summary: serde_json::Value,
+    /// Its summary.json.
+    pub summary: Summary,
 }
 
 /// Writes all artefacts, `report.json`, `report.html` and `summary.json` to `target`. Nothing is left behind on failure.

@@ -99,7 +99,7 @@ pub struct RedesignProblem<'a> {
 }
 
 /// One weight that was tried.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Candidate {
     /// SubspaceMethod of the inputs.
     pub input_weight: f64,

@@ -7,11 +7,10 @@
 mod files;
 mod result;
 
-pub use result::{CheckedRecord, DataCheck, further};
+pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
-use super::models::Controller;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::{DataFile, RunSettings};
+use super::settings::{Controller, DataFile, RunSettings};
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;
@@ -51,6 +50,7 @@ pub struct CheckedFiles {
 /// Files that cannot be read, channels that do not exist, a controller that is not one. What a file holds is described, not
 /// refused.
 pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
+    settings.check()?;
     let d = &settings.data;
     let job = Job {
         groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),

@@ -4,7 +4,7 @@ use serde::{Deserialize, Serialize};
 use youla_loop::check::{Finding, Severity};
 
 /// A record that was checked.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct CheckedRecord {
     /// Name in findings.
     pub record: String,
@@ -56,16 +56,31 @@ impl DataCheck {
         worth.map(|(f, more)| format!("data, {}{}", f.sentence(), further(more))).collect()
     }
 
-    /// As JSON: `defects`, `cautions`, `notes` (numbers), `records` and `findings`.
-    pub fn json(&self) -> serde_json::Value {
-        let mut all = serde_json::json!(self);
-        for (key, severity) in
-            [("defects", Severity::Defect), ("cautions", Severity::Caution), ("notes", Severity::Note)]
-        {
-            all[key] = self.count(severity).into();
+    /// As `1-record/check.json` and summary.json hold it.
+    pub fn entry(&self) -> DataCheckEntry {
+        DataCheckEntry {
+            records: self.records.clone(),
+            findings: self.findings.clone(),
+            defects: self.count(Severity::Defect),
+            cautions: self.count(Severity::Caution),
+            notes: self.count(Severity::Note),
         }
-        all
     }
+}
+
+/// The check of the data in `1-record/check.json` and summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct DataCheckEntry {
+    /// What was checked.
+    pub records: Vec<CheckedRecord>,
+    /// Findings, the most serious first.
+    pub findings: Vec<Finding>,
+    /// Number of defects.
+    pub defects: usize,
+    /// Number of cautions.
+    pub cautions: usize,
+    /// Number of notes.
+    pub notes: usize,
 }
 
 /// In how many more records a finding was made, in words.

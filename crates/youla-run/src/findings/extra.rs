@@ -1,7 +1,7 @@
 //! What else a run says besides the answer to "can I trust it?": what the loop can bear, reduction, physics, redesign.
 
-use crate::pipeline::Identification;
-use crate::verdict::Method;
+use crate::identification::Identification;
+use crate::method::Method;
 use youla::control::IsoZone;
 use youla_greybox::hansen_pem::PemStart;
 use youla_report::data::{Evidence, Status, Verdict};

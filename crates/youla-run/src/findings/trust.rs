@@ -1,10 +1,12 @@
 //! The answer to "can I trust it?" in five lines: fresh data, what is left of them, data and controller, S, the loop.
 
 use crate::check::OF_SETTINGS;
-use crate::pipeline::Identification;
+use crate::identification::Identification;
+use crate::method::Method;
 use crate::residual_tests::RecordResiduals;
-use crate::verdict::{Method, ModelVerdict};
+use crate::verdict::ModelVerdict;
 use youla::identify::subspace::Evidence as Information;
+use youla::validate::BandCertificate;
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{Evidence, Status, Verdict};
 
@@ -149,8 +151,8 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
         true => format!("G(S) is {adjective}: its largest pole has |z| = {worst:.5}."),
         false => format!("The controller that ran {verb} G(S): the largest pole of the loop has |z| = {worst:.5}."),
     };
-    let certificate = found.certificate.as_ref();
-    let band = certificate.and_then(|c| Some((c.band_sentence()?, c.band.as_ref()?.holds())));
+    let certificate = &found.certificate;
+    let band = certificate.band_sentence().zip(certificate.band.as_ref().map(BandCertificate::holds));
     let (text, of_band) = match band {
         Some((sentence, holds)) => (format!("{text} {sentence}"), if holds { Status::Good } else { Status::Caution }),
         None => (text, Status::Good),

@@ -1,10 +1,10 @@
 //! Frequency responses of all models: magnitude and phase, principal gains, regions, and the measured ones.
 
 use crate::Result;
-use crate::pipeline::Identification;
+use crate::identification::Identification;
+use crate::method::Method;
 use crate::response::{self, decibel, magnitude, model_responses, phase};
 use crate::uncertainty::SystemUncertainty;
-use crate::verdict::Method;
 use std::f64::consts::TAU;
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
@@ -13,7 +13,7 @@ use youla_report::data as draw;
 const LEAST_BOUND: f64 = 1e-3;
 
 pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
-    let responses = model_responses(found, &found.hz)?;
+    let responses = model_responses(&found.verdict, &found.hz)?;
     let models = responses.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
     let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty.of(*method)?)));
     let bands = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port))).collect();

@@ -1,0 +1,31 @@
+//! Direct identification from (u, y), for comparison.
+
+use super::records::RunRecords;
+use super::settings::{RunSettings, StabilisationSettings};
+use super::stabilisation::diagram;
+use crate::Result;
+use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
+
+/// The plant from u and y, and its stabilisation diagram; each `None` where it was not asked for or there is no model.
+pub(super) fn direct(
+    records: &RunRecords,
+    settings: &RunSettings,
+) -> (Option<Result<SubspaceModel>>, Option<Result<StabilisationDiagram>>) {
+    match settings.direct.as_ref().map(|options| model(records, options, &settings.stabilisation)) {
+        None => (None, None),
+        Some(Err(reason)) => (Some(Err(reason)), None),
+        Some(Ok((model, diagram))) => (Some(Ok(model)), Some(diagram)),
+    }
+}
+
+fn model(
+    records: &RunRecords,
+    options: &SubspaceOptions,
+    settings: &StabilisationSettings,
+) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
+    let data = SubspaceData::disturbed(&records.experiments(), &records.disturbances(0), records.time, options)?;
+    let model = data.identify(options)?;
+    let diagram = diagram(&data, &model, options, settings);
+    Ok((model, diagram))
+}

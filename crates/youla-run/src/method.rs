@@ -1,0 +1,47 @@
+//! The models of a run by name.
+
+use serde::{Deserialize, Serialize};
+
+/// A model of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// G(0).
+    Nominal,
+    /// Subspace identification from (u, y).
+    Direct,
+    /// G(S).
+    Hansen,
+    /// `G_red(S)`.
+    HansenReduced,
+    /// The physical structure, by the prediction-error method.
+    GreyBox,
+    /// The simulated plant itself; in simulations only.
+    TruePlant,
+}
+
+impl Method {
+    /// Key in summary.json and in file names.
+    pub fn key(self) -> &'static str {
+        match self {
+            Method::Nominal => "nominal",
+            Method::Direct => "direct",
+            Method::Hansen => "hansen",
+            Method::HansenReduced => "hansen_reduced",
+            Method::GreyBox => "grey_box",
+            Method::TruePlant => "true_plant",
+        }
+    }
+
+    /// Name in tables and figures.
+    pub fn label(self) -> &'static str {
+        match self {
+            Method::Nominal => "nominal G(0)",
+            Method::Direct => "direct N4SID",
+            Method::Hansen => "Hansen G(S)",
+            Method::HansenReduced => "reduced G_red(S)",
+            Method::GreyBox => "grey-box PEM",
+            Method::TruePlant => "true plant",
+        }
+    }
+}

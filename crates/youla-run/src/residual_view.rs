@@ -1,0 +1,51 @@
+//! Tests of the residuals in the report.
+
+use super::identification::Identification;
+use super::settings::Prediction;
+use youla::validate::PREDICTION_STEPS;
+use youla_report::data as draw;
+
+/// What the report draws.
+pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
+    let mut tests = Vec::new();
+    for v in &found.verdict.models {
+        for record in &v.records {
+            let Some(r) = &record.residuals else { continue };
+            tests.push(draw::ResidualTest {
+                record: record.record.clone(),
+                method: v.method.key().into(),
+                excitations: r.excitations.clone(),
+                independent: r.independent(),
+                auto: r
+                    .correlations
+                    .auto
+                    .iter()
+                    .map(|values| draw::Correlation::new(values, r.correlations.auto_band))
+                    .collect(),
+                cross: r.correlations.cross.iter().map(|c| draw::Correlation::new(&c.values, c.band)).collect(),
+                k_step_fits: r
+                    .k_step_fits
+                    .iter()
+                    .map(|f| f.iter().map(|f| f.is_finite().then_some(*f)).collect())
+                    .collect(),
+                predictor: r.predictor.words().into(),
+            });
+        }
+    }
+    let of = match found.settings.verification.prediction {
+        Prediction::OpenLoop => "the simulation from the measured input",
+        Prediction::ClosedLoop => "the simulation under the controller from the known excitations",
+    };
+    (!tests.is_empty()).then(|| draw::Residuals {
+        prediction: of.into(),
+        external: found
+            .verdict
+            .models
+            .iter()
+            .flat_map(|v| &v.records)
+            .filter_map(|r| r.residuals.as_ref())
+            .all(|r| r.external),
+        steps: PREDICTION_STEPS.to_vec(),
+        tests,
+    })
+}

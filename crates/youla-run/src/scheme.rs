@@ -1,0 +1,60 @@
+//! The modified Hansen scheme on the records of a run: S by (25), G(S) by (17), the diagram of S, its refinement.
+
+use super::context::RunContext;
+use super::records::RunRecords;
+use super::signals::DeviationSignals;
+use super::stabilisation::diagram;
+use crate::{Error, Result};
+use youla::identify::hansen::{HansenModel, deviation_data};
+use youla::identify::innovation_form::hansen_structured;
+use youla::identify::subspace::SubspaceOptions;
+use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla_greybox::hansen_refine::{RefinedHansen, Refinement, refine_hansen};
+
+/// What the scheme gives.
+pub(super) struct Scheme {
+    /// S and G(S).
+    pub(super) hansen: HansenModel,
+    /// What the refinement of S changed, where it was asked for.
+    pub(super) refinement: Option<Refinement>,
+    /// The stabilisation diagram of S, or the reason why there is none.
+    pub(super) diagram: Result<StabilisationDiagram>,
+}
+
+/// S, G(S) and the diagram of S.
+///
+/// # Errors
+/// Those of [`hansen_structured`] and of the refinement.
+pub(super) fn scheme(run: RunContext<'_>, signals: &DeviationSignals) -> Result<Scheme> {
+    let (settings, factors) = (run.settings, &run.factorisation.factors);
+    let lines = run.records.disturbances(signals.settle);
+    let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
+    let hansen = hansen_structured(factors, &data, &settings.hansen, &settings.deviation.options())?;
+    let diagram = diagram(&data, &hansen.deviation, &settings.hansen, &settings.stabilisation);
+    let Some(options) = &settings.deviation.refine else { return Ok(Scheme { hansen, refinement: None, diagram }) };
+    let refined = refine_hansen(hansen, factors, &signals.experiments, &lines, options);
+    let RefinedHansen { model, refinement } = refined.map_err(|e| e.within("[deviation.refine]"))?;
+    Ok(Scheme { hansen: model, refinement: Some(refinement), diagram })
+}
+
+/// Refuses a part of a file that is too short for the horizon, by its name.
+///
+/// # Errors
+/// [`youla::Error::TooFewSamples`].
+pub(super) fn require_length(options: &SubspaceOptions, records: &RunRecords, settle: usize) -> Result<()> {
+    let (past, horizon) = (options.past(), options.horizon);
+    let delay = options.delays.iter().copied().max().unwrap_or(0);
+    let needed = [past, horizon, delay, settle].into_iter().fold(0, usize::saturating_add);
+    let of_file = |name: &str| records.segments.iter().any(|segment| segment.record == name);
+    match records.estimation.iter().find(|r| of_file(&r.name) && r.samples() < needed) {
+        None => Ok(()),
+        Some(record) => {
+            let what = format!(
+                "{}, a part of a file, with a horizon of {horizon} and a past of {past} block rows and {settle} samples of \
+                 settling (leave it out by `segments`)",
+                record.name
+            );
+            Err(Error::Method(youla::Error::TooFewSamples { what, found: record.samples(), needed }))
+        }
+    }
+}

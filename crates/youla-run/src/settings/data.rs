@@ -1,0 +1,194 @@
+//! `[data]`: files, channels, clock, and what is taken out of the records.
+
+use super::disturbance::DisturbanceSettings;
+use crate::Result;
+use serde::{Deserialize, Serialize};
+use std::collections::HashSet;
+use std::path::{Path, PathBuf};
+use youla::signal::Detrend;
+use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
+
+/// Records and the meaning of their channels.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DataSettings {
+    /// Sample time in seconds; this or `time_column` must be given.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sample_time: Option<f64>,
+    /// Column with the time in seconds; with `sample_time` both must agree.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub time_column: Option<ChannelRef>,
+    /// Greatest deviation of a time step, as a part of the sample time.
+    #[serde(default = "default_tolerance")]
+    pub time_tolerance: f64,
+    /// What to do with a file whose time column has gaps.
+    #[serde(default)]
+    pub gaps: Gaps,
+    /// Plant inputs u as applied, after saturation.
+    pub inputs: Vec<ChannelSpec>,
+    /// Measured plant outputs y.
+    pub outputs: Vec<ChannelSpec>,
+    /// Known excitation added at the plant input, one channel per input.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub input_excitation: Vec<ChannelSpec>,
+    /// Known reference r, one channel per output.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub reference: Vec<ChannelSpec>,
+    /// Known excitation alpha of Fig. 3, one channel per input; not together with `input_excitation`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub alpha: Vec<ChannelSpec>,
+    /// How text files are read.
+    #[serde(default)]
+    pub csv: CsvOptions,
+    /// What is removed from every channel before identification and verification.
+    #[serde(default)]
+    pub detrend: Detrend,
+    /// Lines of known frequency in the outputs, as of unbalance; none when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub disturbance: Option<DisturbanceSettings>,
+    /// Records to identify from; several files are several experiments.
+    pub estimation: Vec<DataFile>,
+    /// Records to verify on; never used for identification.
+    #[serde(default)]
+    pub verification: Vec<DataFile>,
+}
+
+fn default_tolerance() -> f64 {
+    1e-3
+}
+
+/// One file, or a part of it.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct DataFile {
+    /// Path, relative to run.toml.
+    pub file: PathBuf,
+    /// Samples skipped at the start.
+    #[serde(default)]
+    pub skip: usize,
+    /// Samples used after that; all when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub take: Option<usize>,
+    /// First and last row (counted from 1) of each stretch to use, as records of their own; instead of `skip` and `take`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub segments: Vec<[usize; 2]>,
+    /// Name in reports; the file's name when absent. Several records of one file are numbered: `name-1`, `name-2`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub name: Option<String>,
+}
+
+impl DataFile {
+    /// The first contradiction in its segments, in words.
+    fn problem(&self) -> Option<String> {
+        let name = self.file.display();
+        if !self.segments.is_empty() && (self.skip > 0 || self.take.is_some()) {
+            return Some(format!("{name} has both segments and skip or take; give one of them"));
+        }
+        let mut last = 0;
+        for [from, to] in &self.segments {
+            if *from <= last || to < from {
+                return Some(format!(
+                    "{name}: segments must be pairs [first, last] of rows counted from 1, in order and without overlap, but \
+                     [{from}, {to}] is not"
+                ));
+            }
+            last = *to;
+        }
+        None
+    }
+
+    /// Name in reports and in summary.json.
+    pub fn label(&self) -> String {
+        let stem = || {
+            let name = self.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+            name.split('.').next().unwrap_or_default().to_owned()
+        };
+        self.name.clone().unwrap_or_else(stem)
+    }
+}
+
+impl DataSettings {
+    /// Whether an excitation or a reference is known.
+    pub fn excitation_is_known(&self) -> bool {
+        !(self.alpha.is_empty() && self.input_excitation.is_empty() && self.reference.is_empty())
+    }
+
+    /// Checks what the types do not: that there are records with names of their own, a clock, and channels of matching numbers.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`].
+    pub fn check(&self) -> Result<()> {
+        super::refuse(self.problem(), Path::new("run.toml"))
+    }
+
+    pub(super) fn problem(&self) -> Option<String> {
+        self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.clock_problem())
+    }
+
+    fn clock_problem(&self) -> Option<String> {
+        let ts = self.sample_time.unwrap_or(1.0);
+        if !(ts > 0.0 && ts.is_finite()) {
+            return Some(format!("[data] sample_time is {ts}, but must be a positive number of seconds"));
+        }
+        let tolerance = self.time_tolerance;
+        let within = (0.0..1.0).contains(&tolerance);
+        (!within).then(|| format!("[data] time_tolerance is {tolerance}, but must be at least 0 and below 1"))
+    }
+
+    fn record_problem(&self) -> Option<String> {
+        let d = self;
+        if d.sample_time.is_none() && d.time_column.is_none() {
+            return Some("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
+        }
+        if d.estimation.is_empty() {
+            return Some("[data] names no estimation record; add [[data.estimation]] with a file".into());
+        }
+        if d.gaps == Gaps::Split && d.time_column.is_none() {
+            return Some("[data] gaps = \"split\" needs a time_column, which shows the gaps".into());
+        }
+        if let Some(problem) = d.estimation.iter().chain(&d.verification).find_map(DataFile::problem) {
+            return Some(problem);
+        }
+        let mut labels = HashSet::new();
+        for label in d.estimation.iter().chain(&d.verification).map(DataFile::label) {
+            if label.is_empty() || label.contains(['/', '\\']) || label.contains(char::is_control) {
+                return Some(format!("the record name {label:?} cannot be a file name; give another `name`"));
+            }
+            if !labels.insert(label.clone()) {
+                return Some(format!("two records are named {label:?}; give one of them another `name`"));
+            }
+        }
+        None
+    }
+
+    fn channel_problem(&self) -> Option<String> {
+        let d = self;
+        let mut names = HashSet::new();
+        let groups = [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha];
+        if let Some(twice) = groups.into_iter().flatten().find(|c| !names.insert(&c.name)) {
+            return Some(format!("[data] has more than one channel named {:?}", twice.name));
+        }
+        for (key, channels) in [("inputs", &d.inputs), ("outputs", &d.outputs)] {
+            if channels.is_empty() {
+                return Some(format!("[data] {key} is empty, but must list at least one channel"));
+            }
+        }
+        if !d.alpha.is_empty() && !d.input_excitation.is_empty() {
+            return Some("[data] has both alpha and input_excitation; give the one that was injected".into());
+        }
+        for (key, channels, of, wanted) in [
+            ("input_excitation", &d.input_excitation, "inputs", d.inputs.len()),
+            ("alpha", &d.alpha, "inputs", d.inputs.len()),
+            ("reference", &d.reference, "outputs", d.outputs.len()),
+        ] {
+            if !channels.is_empty() && channels.len() != wanted {
+                let found = channels.len();
+                return Some(format!("[data] {key} must list as many channels as {of} ({wanted}), but lists {found}"));
+            }
+        }
+        if let Some(problem) = d.disturbance.as_ref().and_then(DisturbanceSettings::problem) {
+            return Some(problem.into());
+        }
+        None
+    }
+}

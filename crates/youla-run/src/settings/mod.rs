@@ -1,0 +1,193 @@
+//! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
+
+mod certificate;
+mod data;
+mod disturbance;
+mod explain;
+mod grey_box;
+mod models;
+mod options;
+
+pub use certificate::CertificateSettings;
+pub use data::{DataFile, DataSettings};
+pub(crate) use disturbance::TACHO;
+pub use disturbance::{DisturbanceSettings, TachoUnit};
+pub use grey_box::{AlternativeStructure, GreyBoxSettings};
+pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
+pub use options::{
+    Construction, DeviationSettings, FactorSettings, FrequencySettings, Prediction, StabilisationSettings,
+    VerificationSettings,
+};
+
+use crate::{Error, Result};
+use explain::{explain, problem_at};
+use serde::{Deserialize, Serialize};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use youla::identify::subspace::SubspaceOptions;
+use youla::reduce::ReductionOptions;
+use youla_io::open;
+use youla_loop::check::CheckOptions;
+use youla_loop::redesign::RedesignOptions;
+
+/// The whole of run.toml.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RunSettings {
+    /// Name of the machine or of the experiment; titles and file names use it.
+    pub name: String,
+    /// Where the records are and what their channels mean.
+    pub data: DataSettings,
+    /// The nominal model G(0).
+    pub nominal: NominalModel,
+    /// The controller that ran while the data were logged.
+    pub controller: ControllerSettings,
+    /// How the coprime factors are built.
+    #[serde(default)]
+    pub factors: FactorSettings,
+    /// Identification of S from (alpha, beta).
+    #[serde(default)]
+    pub hansen: SubspaceOptions,
+    /// What is known of S beforehand.
+    #[serde(default)]
+    pub deviation: DeviationSettings,
+    /// Direct identification from (u, y), for comparison; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub direct: Option<SubspaceOptions>,
+    /// Reduction of G(S); left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduction: Option<ReductionOptions>,
+    /// A physical structure, estimated from the result of the scheme on; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grey_box: Option<GreyBoxSettings>,
+    /// What is stated about the loop; its cheap parts also without this table.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub certificate: Option<CertificateSettings>,
+    /// A new controller on the identified model; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub redesign: Option<RedesignOptions>,
+    /// The stabilisation diagrams of S and of the direct model.
+    #[serde(default)]
+    pub stabilisation: StabilisationSettings,
+    /// How models are held against the verification records.
+    #[serde(default)]
+    pub verification: VerificationSettings,
+    /// Thresholds of the check of the data.
+    #[serde(default)]
+    pub check: CheckOptions,
+    /// Frequency responses in the report.
+    #[serde(default)]
+    pub frequency_response: FrequencySettings,
+    /// Seed of a simulated record; absent for measured data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub seed: Option<u64>,
+}
+
+impl RunSettings {
+    /// Reads run.toml.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] with line and column, and the nearest known key for a misspelt one; [`youla_io::Error::Io`].
+    pub fn read(path: &Path) -> Result<Self> {
+        let mut bytes = Vec::new();
+        open(path)?
+            .read_to_end(&mut bytes)
+            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = std::str::from_utf8(&bytes).map_err(|e| {
+            let good = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
+            problem_at(path, &good, good.len(), "this is not text in UTF-8".into())
+        })?;
+        Self::parse(text, path)
+    }
+
+    /// Parses the text of run.toml; `path` is named in errors.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let settings: Self = toml::from_str(text).map_err(|e| explain(&e, text, path))?;
+        refuse(settings.problem(), path)?;
+        Ok(settings)
+    }
+
+    /// Settings built in code, if they are valid: the checks that [`RunSettings::parse`] makes of a file.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] with the key and what it must be, under the name run.toml.
+    pub fn checked(self) -> Result<Self> {
+        self.check()?;
+        Ok(self)
+    }
+
+    /// Checks values that the types allow and the method does not; every function that takes settings calls it.
+    ///
+    /// # Errors
+    /// As [`RunSettings::checked`].
+    pub fn check(&self) -> Result<()> {
+        refuse(self.problem(), Path::new("run.toml"))
+    }
+
+    /// The same settings as TOML.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] for values that TOML cannot hold.
+    pub fn to_toml(&self) -> Result<String> {
+        toml::to_string_pretty(self).map_err(|e| {
+            Error::File(youla_io::Error::Settings { path: PathBuf::from("run.toml"), at: None, problem: e.to_string() })
+        })
+    }
+
+    fn problem(&self) -> Option<String> {
+        let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
+        let problem = self.data.problem().or_else(|| self.loop_problem()).or_else(|| self.number_problem());
+        problem.or_else(structure).or_else(|| self.certificate.as_ref()?.problem())
+    }
+
+    fn loop_problem(&self) -> Option<String> {
+        let known = self.data.excitation_is_known();
+        if self.verification.prediction == Prediction::ClosedLoop && !known {
+            return Some(
+                "[verification] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha"
+                    .into(),
+            );
+        }
+        let of_structure = self.grey_box.as_ref().is_some_and(|g| g.prediction == Prediction::ClosedLoop);
+        if of_structure && !known {
+            return Some(
+                "[grey_box] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha".into(),
+            );
+        }
+        None
+    }
+
+    /// The first number outside of its range.
+    fn number_problem(&self) -> Option<String> {
+        let (factors, response) = (&self.factors, &self.frequency_response);
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        let part = |x: f64| (0.0..1.0).contains(&x);
+        let given = |x: Option<f64>| x.unwrap_or(1.0);
+        let (points, window) = (response.points, response.window);
+        [
+            ("[factors] input_weight", factors.input_weight, "positive", positive as fn(f64) -> bool),
+            ("[factors] output_noise", factors.output_noise, "positive", positive),
+            ("[stabilisation] max_order", given(self.stabilisation.max_order.map(|n| n as f64)), "at least 1", |x| {
+                x >= 1.0
+            }),
+            ("[frequency_response] overlap", response.overlap, "at least 0 and below 1", part),
+            ("[frequency_response] from_hz", given(response.from_hz), "a positive frequency", positive),
+            ("[frequency_response] window", window as f64, "at least 4 samples", |x| x >= 4.0),
+            ("[frequency_response] points", points as f64, "from 2 to 100000", |x| (2.0..=1e5).contains(&x)),
+        ]
+        .into_iter()
+        .find(|(_, value, _, good)| !good(*value))
+        .map(|(key, value, must, _)| format!("{key} is {value}, but must be {must}"))
+    }
+}
+
+/// The first problem of settings as an error.
+fn refuse(problem: Option<String>, path: &Path) -> Result<()> {
+    match problem {
+        None => Ok(()),
+        Some(problem) => Err(Error::File(youla_io::Error::Settings { path: path.to_owned(), at: None, problem })),
+    }
+}

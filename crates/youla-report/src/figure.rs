@@ -15,13 +15,17 @@ pub struct Figure {
     pub title: String,
     /// What is shown, in one sentence.
     pub caption: String,
-    /// How the panels stand.
+    /// Arrangement of the panels.
     pub layout: Layout,
     /// The panels.
     pub panels: Vec<Panel>,
+    /// Where a page shows one of several figures at a time: names and values of the choices that lead to this one, for
+    /// example `("Output", "y_1")`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub choice: Vec<(String, String)>,
 }
 
-/// How the panels of a figure stand.
+/// Arrangement of the panels of a figure.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Layout {
@@ -56,6 +60,9 @@ pub struct Panel {
     /// Whether a unit is as long on one axis as on the other; one range is then widened.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub equal: bool,
+    /// Quantity of [`Curve::along`]; without a label where there is none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub along: Option<Axis>,
     /// Height over that of a usual panel of the figure; 1 where it is absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub height: Option<f64>,
@@ -91,7 +98,7 @@ pub struct Guide {
     pub y: Vec<f64>,
     /// What it says; may be empty. It is left out where there is no room.
     pub label: String,
-    /// Middle of the label, in the values of both axes.
+    /// Middle of the label, in the values of both axes; the place of a point.
     pub at: [f64; 2],
 }
 
@@ -106,6 +113,8 @@ pub enum GuideKind {
     Boundary,
     /// A level or place, dashed.
     Level,
+    /// A dot with its label beside it; it has no line.
+    Point,
 }
 
 /// One axis.
@@ -159,6 +168,9 @@ pub struct Curve {
     /// What else belongs to each point and is written beside it, for example the frequency along a locus; mostly empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub along: Vec<f64>,
+    /// What the page says of each point in place of its values; mostly empty. Lines of text are separated by `\n`.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub details: Vec<String>,
 }
 
 /// How a curve is drawn.

@@ -1,8 +1,8 @@
 //! A run as one self-contained HTML file.
 //!
 //! Results come in as plain data, [`ReportData`], which holds what is drawn and nothing else, and go out as one file that
-//! opens without a network: tables are written by a template, figures are drawn by the embedded plotting library from
-//! the same data as JSON. Long records are reduced to their minimum and maximum per bucket ([`Trace`]) before they enter.
+//! opens without a network: tables are written by a template. A figure is described once, as a [`Figure`]: print draws it as SVG ([`svg()`]), the page embeds it as JSON and
+//! draws it by one script for all figures, on uPlot. Long records are reduced to their minimum and maximum per bucket ([`Trace`]) before they enter.
 //!
 //! | file | holds |
 //! |---|---|
@@ -12,11 +12,10 @@
 //! | `phase` | the branch on which a phase is drawn |
 //! | `figure` | a figure as data |
 //! | `run_figures` | the figures of a run for print |
+//! | `drawings` | figures, their places and styles, for the script of the page |
 //! | `svg` | a figure for print |
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
-//! | `paper` | the results of the whole paper as such a page |
-//! | `starts` | the study of starts as such a page |
 //! | `tables` | fits by record and output, modes by frequency |
 //! | `page` | template, style, code, data and library put into one file |
 //! | `html` | a run as a page |
@@ -26,6 +25,7 @@
 mod csv;
 pub mod data;
 mod decimate;
+mod drawings;
 mod error;
 pub mod figure;
 mod html;

@@ -1,36 +1,44 @@
-//! What all pages share: one file with template, style, figures' code, plotting library and data.
+//! What all pages share: one file with template, style, script, plotting library and data.
 //!
 //! The file makes no request (its content security policy forbids it). Data stands in the file as JSON in which every `<`
 //! is written `\u003c`, so that no text of the user can end the script element or open a comment in it.
 
 use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
-use serde::Serialize;
 
+use super::drawings::Drawings;
+use super::svg::pretty_unit;
 use crate::{Error, Result};
 
 /// The frame that each page fills.
 const FRAME: &str = include_str!("../assets/page.html");
 const STYLE: &str = include_str!("../assets/report.css");
-const THEME: &str = include_str!("../assets/figures/theme.js");
-const PLOT: &str = include_str!("../assets/figures/plot.js");
-const PAGE: &str = include_str!("../assets/figures/page.js");
+/// Draws any figure, the same on every page.
+const SCRIPT: [&str; 7] = [
+    include_str!("../assets/figures/base.js"),
+    include_str!("../assets/figures/marks.js"),
+    include_str!("../assets/figures/boxes.js"),
+    include_str!("../assets/figures/cells.js"),
+    include_str!("../assets/figures/panel.js"),
+    include_str!("../assets/figures/figure.js"),
+    include_str!("../assets/figures/page.js"),
+];
 const UPLOT: &str = include_str!("../assets/uplot/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../assets/uplot/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../assets/uplot/LICENSE");
 
-/// Most points of all lines of a page together; about 14 bytes each keep the file below 5 MB.
-pub(super) const ALL_POINTS: usize = 260_000;
+/// Most points of all lines of a page together; about 16 bytes each keep the file below 5 MB.
+pub(super) const ALL_POINTS: usize = 230_000;
 
 /// Renders a page.
 ///
-/// `template` extends the frame and reads `content`; `figures` is code that draws `data`, which it finds as `report`.
-pub(super) fn render(template: &str, content: Value, figures: &[&str], data: &impl Serialize) -> Result<String> {
+/// `template` extends the frame and reads `content`; the script draws `data`.
+pub(super) fn render(template: &str, content: Value, data: &Drawings) -> Result<String> {
     let json = serde_json::to_string(data).map_err(|source| Error::ReportData { source })?;
     let page = context! {
         style => safe(format!("{UPLOT_STYLE}\n{STYLE}")),
         library => safe(format!("/*!\nuPlot\n{UPLOT_LICENCE}*/\n{UPLOT}")),
-        figures => safe([&[THEME, PLOT], figures, &[PAGE]].concat().concat()),
+        script => safe(SCRIPT.concat()),
         json => safe(json.replace('<', "\\u003c")),
         ..content
     };
@@ -44,6 +52,8 @@ fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
     environment.add_filter("significant", |value: f64| with_minus(significant(value)));
     environment.add_filter("printed", with_minus);
+    environment.add_filter("unit", |unit: String| pretty_unit(&unit));
+    environment.add_filter("magnitude", |pole: Vec<f64>| pole.iter().fold(0.0_f64, |size, part| size.hypot(*part)));
     environment.add_template("page.html", FRAME)?;
     environment.add_template("content.html", template)?;
     environment.get_template("content.html")?.render(page)

@@ -4,7 +4,7 @@ use minijinja::context;
 use minijinja::value::Serde;
 use serde::Serialize;
 
-use super::data::Method;
+use super::drawings::drawings;
 use super::figure::Figure;
 use super::page::{self, ALL_POINTS};
 use super::story::{Block, Section, Story, Table};
@@ -12,12 +12,6 @@ use super::thin;
 use crate::Result;
 
 const TEMPLATE: &str = include_str!("../assets/story.html");
-const FIGURES: [&str; 4] = [
-    include_str!("../assets/figures/cloud.js"),
-    include_str!("../assets/figures/boxes.js"),
-    include_str!("../assets/figures/cells.js"),
-    include_str!("../assets/figures/story.js"),
-];
 
 /// Renders a story as one HTML file.
 ///
@@ -30,13 +24,13 @@ const FIGURES: [&str; 4] = [
 /// figure says so. Where the lines of a page together hold more points than a file of 5 MB takes, they are thinned further.
 ///
 /// # Errors
-/// [`youla::Error::ReportData`] and [`youla::Error::ReportTemplate`] where data or template cannot be written as text.
+/// [`crate::Error::ReportData`] and [`crate::Error::ReportTemplate`] where data or template cannot be written as text.
 ///
 /// ```
 /// use youla_report::{Story, story_html};
 /// let page = story_html(&Story { title: "Gas bearing".into(), ..Story::default() })?;
 /// assert!(page.starts_with("<!doctype html>"));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_report::Error>(())
 /// ```
 pub fn story_html(story: &Story) -> Result<String> {
     let most = thin::most_points(figures(story), ALL_POINTS);
@@ -47,15 +41,8 @@ pub fn story_html(story: &Story) -> Result<String> {
         methods => Serde(&story.methods),
         sections => Serde(story.sections.iter().map(|section| shown(section, most)).collect::<Vec<_>>()),
     };
-    let figures = figures(story).map(|figure| thin::for_drawing(figure, most)).collect();
-    page::render(TEMPLATE, content, &FIGURES, &Drawings { methods: &story.methods, figures })
-}
-
-/// What the code of the figures reads.
-#[derive(Serialize)]
-struct Drawings<'a> {
-    methods: &'a [Method],
-    figures: Vec<Figure>,
+    let placed: Vec<(String, Figure)> = figures(story).map(|figure| (figure.key.clone(), figure.clone())).collect();
+    page::render(TEMPLATE, content, &drawings(&story.methods, &placed))
 }
 
 /// What the template reads of a section.

@@ -11,7 +11,7 @@ use super::{decimate, numbers};
 
 /// Significant digits of positions: they only lose the noise of their last bits.
 const DIGITS_OF_POSITIONS: i32 = 9;
-const DIGITS_OF_VALUES: i32 = 6;
+const DIGITS_OF_VALUES: i32 = 5;
 
 /// Most points per line such that all lines together have at most `together`.
 pub(super) fn most_points<'a>(figures: impl Iterator<Item = &'a Figure>, together: usize) -> usize {
@@ -37,6 +37,7 @@ fn without_panels(figure: &Figure) -> Figure {
         title: figure.title.clone(),
         caption: figure.caption.clone(),
         layout: figure.layout,
+        choice: figure.choice.clone(),
         panels: Vec::new(),
     }
 }
@@ -51,6 +52,7 @@ fn without_content(panel: &Panel) -> Panel {
         guides: panel.guides.clone(),
         shades: panel.shades.clone(),
         equal: panel.equal,
+        along: panel.along.clone(),
         height: panel.height,
     }
 }
@@ -65,7 +67,7 @@ fn lines(figure: &Figure) -> impl Iterator<Item = &Curve> {
 
 fn content(panel: &Panel, most: usize) -> Content {
     match &panel.content {
-        Content::Curves(curves) => Content::Curves(curves.iter().map(|curve| thinned(curve, &panel.x, most)).collect()),
+        Content::Curves(curves) => Content::Curves(curves.iter().map(|curve| thinned(curve, panel, most)).collect()),
         Content::Boxes(samples) => Content::Boxes(samples.iter().map(rounded).collect()),
         Content::Cells(cells) => Content::Cells(cells.clone()),
     }
@@ -75,22 +77,25 @@ fn rounded(sample: &Sample) -> Sample {
     Sample { values: numbers::for_drawing(sample.values.iter().copied(), DIGITS_OF_VALUES), ..sample.clone() }
 }
 
-fn thinned(curve: &Curve, axis: &Axis, most: usize) -> Curve {
+fn thinned(curve: &Curve, panel: &Panel, most: usize) -> Curve {
     let samples = curve.x.len().min(curve.y.len());
     let points = curve.y[..samples].iter().copied().enumerate();
     let kept = if curve.drawn == Drawn::Line && samples > most {
-        let detail = first_view(&curve.x[..samples], axis, most);
+        let detail = first_view(&curve.x[..samples], &panel.x, most);
         decimate::min_max(points, samples, &detail, decimate::width_for(samples, detail.len(), most))
     } else {
         points.collect()
     };
+    // In a plane both axes are values.
+    let digits_of_positions = if panel.equal { DIGITS_OF_VALUES } else { DIGITS_OF_POSITIONS };
     Curve {
         method: curve.method.clone(),
         note: curve.note.clone(),
         drawn: curve.drawn,
-        x: numbers::for_drawing(kept.iter().map(|point| curve.x[point.0]), DIGITS_OF_POSITIONS),
+        x: numbers::for_drawing(kept.iter().map(|point| curve.x[point.0]), digits_of_positions),
         y: numbers::for_drawing(kept.iter().map(|point| point.1), DIGITS_OF_VALUES),
-        along: kept.iter().filter_map(|point| curve.along.get(point.0).copied()).collect(),
+        along: numbers::for_drawing(kept.iter().filter_map(|point| curve.along.get(point.0).copied()), DIGITS_OF_VALUES),
+        details: kept.iter().filter_map(|point| curve.details.get(point.0).cloned()).collect(),
     }
 }
 
@@ -138,7 +143,7 @@ mod tests {
         assert_eq!(cloud.y.len(), 50_000);
         assert!(is_thinned(&whole, MAX_POINTS) && !is_thinned(&drawn, MAX_POINTS));
         for (x, y) in line.x.iter().zip(&line.y) {
-            assert!((y - (x * 7000.0).sin() / 3.0).abs() < 2e-6);
+            assert!((y - (x * 7000.0).sin() / 3.0).abs() < 1e-5);
         }
     }
 

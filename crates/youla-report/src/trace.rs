@@ -54,7 +54,7 @@ impl Timeline {
     }
 
     /// Chooses window and buckets such that a curve has at most `points` points.
-    pub(super) fn fit_into(&mut self, points: usize) {
+    fn fit_into(&mut self, points: usize) {
         let length = if self.samples <= points { 0 } else { MAX_DETAIL.min(points * 2 / 5) };
         let centre = self.detail.start + self.detail.len() / 2;
         let start = centre.saturating_sub(length / 2).min(self.samples - length);
@@ -103,7 +103,7 @@ impl TryFrom<TimelineNumbers> for Timeline {
 /// let clock = Timeline::new(1e-3, samples.len());
 /// let trace = Trace::new("u", &samples, &clock)?;
 /// assert!(trace.values.len() <= 4000);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_report::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "TraceNumbers")]
@@ -155,11 +155,6 @@ impl Trace {
         Ok(Self::reduced(samples.iter().copied().enumerate(), clock))
     }
 
-    /// The same curve on a clock with fewer points.
-    pub(super) fn thinned(&self, clock: &Timeline) -> Self {
-        Self::reduced(self.points(), clock)
-    }
-
     /// Row and value of each point.
     pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
         let rows = self.steps.iter().scan(0, |row, step| {
@@ -190,19 +185,6 @@ mod tests {
         for (row, value) in trace.points() {
             assert!((samples[row] - value).abs() <= 2e-5);
         }
-    }
-
-    #[test]
-    fn thinning_keeps_the_outline() {
-        let mut samples = vec![0.0; 100_000];
-        samples[77_777] = 5.0;
-        let mut clock = Timeline::new(1e-3, samples.len());
-        let trace = Trace::new("y", &samples, &clock).unwrap();
-        clock.fit_into(600);
-        let thin = trace.thinned(&clock);
-        assert!(thin.values.len() <= 600);
-        assert!(thin.points().any(|point| point == (77_777, 5.0)));
-        assert_eq!(thin.points().last(), Some((99_999, 0.0)));
     }
 
     /// What a report.json that was changed by hand may hold.

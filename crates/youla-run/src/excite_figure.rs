@@ -3,7 +3,7 @@
 use super::excite::RunExcitation;
 use youla::signal::Channel;
 use youla_report::data::{Method, Role};
-use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
+use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Panel};
 
 /// Range of the energy density, dB.
 const DECIBELS: [f64; 2] = [-60.0, 20.0];
@@ -25,8 +25,8 @@ pub(super) fn figure(found: &RunExcitation) -> (Figure, Vec<Method>) {
         title: format!("Excitation of {}", found.name),
         caption: "The sequence, its energy density over its mean in the band, and what the nominal loop does under it."
             .into(),
-        layout: Layout::Stacked,
         panels,
+        ..Figure::default()
     };
     (figure, curves(found))
 }

@@ -14,7 +14,7 @@ use youla::validate::ExactCertificate;
 use youla_io::export::{ExportedController, FilterData, ObserverData};
 use youla_loop::redesign::{Candidate, LoopFigures, Redesign, RedesignMethod, RedesignProblem, redesign};
 use youla_report::data as draw;
-use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel};
+use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 
 /// Designs on the reduced model where there is one, else on G(S).
 ///
@@ -229,8 +229,8 @@ pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
         key: "response".into(),
         title: "The loop, present and predicted".into(),
         caption: "Largest gain from a disturbance at the plant input to y, channels in their rms.".into(),
-        layout: Layout::Stacked,
         panels: vec![panel],
+        ..Figure::default()
     })
 }
 

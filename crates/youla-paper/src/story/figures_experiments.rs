@@ -6,7 +6,7 @@ use crate::study::ExcitedChannel;
 use crate::study::{Experiment, ExperimentModel, Method, Paper, Start};
 use std::f64::consts::TAU;
 use youla::{Mat, MatRef};
-use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Layout, MEASURED, Panel};
+use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, MEASURED, Panel};
 use youla_report::numbers::{decimals, rounded};
 
 /// First view of a record, s.
@@ -40,8 +40,8 @@ pub(super) fn verification(experiment: &Experiment) -> Figure {
             experiment.case.title,
             fits(experiment)
         ),
-        layout: Layout::Stacked,
         panels: displacement(experiment, rows, first_view(experiment)),
+        ..Figure::default()
     }
 }
 
@@ -59,12 +59,12 @@ pub(super) fn zoom(experiment: &Experiment) -> Figure {
             "Part of Figure {} around a switch of the excitation: measured displacement and what the models predict.",
             experiment.case.figure
         ),
-        layout: Layout::Stacked,
         panels: displacement(
             experiment,
             switch.saturating_sub(half)..(switch + half).min(samples),
             [start, rounded(start + ZOOM, 6)],
         ),
+        ..Figure::default()
     }
 }
 
@@ -86,8 +86,8 @@ pub(super) fn beta(experiment: &Experiment, [measured, predicted]: &[Mat<f64>; 2
             "Innovation beta of the verification record of {} as measured, and what S makes of alpha alone.",
             experiment.case.title
         ),
-        layout: Layout::Stacked,
         panels: (0..2).map(panel).collect(),
+        ..Figure::default()
     }
 }
 
@@ -123,8 +123,8 @@ pub(super) fn starts(experiment: &Experiment) -> Figure {
              the Hansen scheme.",
             experiment.case.title
         ),
-        layout: Layout::Stacked,
         panels: (0..2).map(fit_panel).chain([criterion]).collect(),
+        ..Figure::default()
     }
 }
 
@@ -249,7 +249,6 @@ pub(super) fn excitation(paper: &Paper) -> Figure {
         caption: "Power spectral density of alpha in the estimation record of the first experiment; the others are \
                   drawn from the same distribution."
             .into(),
-        layout: Layout::Stacked,
         panels: vec![Panel {
             title: String::new(),
             x: logarithmic("frequency", "Hz"),
@@ -257,5 +256,6 @@ pub(super) fn excitation(paper: &Paper) -> Figure {
             content: Content::Curves(channels.iter().zip(&AXES).map(curve).collect()),
             ..Panel::default()
         }],
+        ..Figure::default()
     }
 }

@@ -26,12 +26,12 @@ pub(super) fn controllers(paper: &Paper) -> Figure {
              the output sensitivity that its controller reaches with the nominal model and with the true plant; the \
              line is the limit of {limit}."
         ),
-        layout: Layout::Stacked,
         panels: vec![
             panel(paper, "weight of the command", logarithmic("weight", "1/V^2"), vec![cloud(&|r| r.command_weight)]),
             peak("peak sensitivity with the nominal model", &|r| r.peak_nominal),
             peak("peak sensitivity with the true plant", &|r| r.peak_plant),
         ],
+        ..Figure::default()
     }
 }
 
@@ -51,8 +51,8 @@ pub(super) fn figure_4(paper: &Paper) -> Figure {
                   one point per nominal model, with the medians of the tenths of theta as lines; points at the lower edge lie below it, and \
                   those of their own shape have no model."
                 .into(),
-        layout: Layout::Stacked,
         panels: panels.collect(),
+        ..Figure::default()
     }
 }
 
@@ -81,6 +81,7 @@ pub(super) fn figure_5(paper: &Paper) -> Figure {
             .into(),
         layout: Layout::Beside,
         panels: panels.collect(),
+        ..Figure::default()
     }
 }
 

@@ -110,6 +110,7 @@ fn drawn(paper: &Paper, cells: &[MapCell], key: &str, title: &str, caption: Stri
         caption,
         layout: Layout::Beside,
         panels: (0..grid.command_weights.len()).map(panel).collect(),
+        ..Figure::default()
     }
 }
 

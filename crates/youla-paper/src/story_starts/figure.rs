@@ -1,7 +1,7 @@
 //! The share that arrived, as a map.
 
 use crate::study::{Search, StartCase, StartCount};
-use youla_report::figure::{Axis, Cell, Cells, Content, Figure, Layout, Panel};
+use youla_report::figure::{Axis, Cell, Cells, Content, Figure, Panel};
 
 /// One cell per case and search; the searches without a start share a column.
 pub(super) fn arrived(counts: &[StartCount]) -> Figure {
@@ -23,7 +23,6 @@ pub(super) fn arrived(counts: &[StartCount]) -> Figure {
         title: "Searches that arrive".into(),
         caption: "Items that arrived at the estimate of the search from the true parameters, of all items of the case."
             .into(),
-        layout: Layout::Stacked,
         panels: vec![Panel {
             title: String::new(),
             x: Axis { label: "start".into(), ..Axis::default() },
@@ -35,6 +34,7 @@ pub(super) fn arrived(counts: &[StartCount]) -> Figure {
             }),
             ..Panel::default()
         }],
+        ..Figure::default()
     }
 }
 

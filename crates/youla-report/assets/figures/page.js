@@ -1,29 +1,37 @@
-// What every page does once its figures are drawn.
+// The whole page: figures in their places, colours of methods in tables, theme, paper, the part in view.
 
-for (const node of document.querySelectorAll("[data-method]")) node.style.setProperty("--c", `var(${methodOf(node.dataset.method).style.colour})`);
-for (const node of document.querySelectorAll("[data-swatch]")) node.innerHTML = (node.closest(".key") ? keySwatch : swatch)(methodOf(node.dataset.swatch).style);
+for (const host of document.querySelectorAll("[data-figure]")) {
+  const figures = page.figures.filter((_, k) => page.hosts[k] === host.dataset.figure);
+  if (figures.length) show(host, figures);
+}
+for (const node of document.querySelectorAll("[data-method]")) node.style.setProperty("--c", `var(${styleOf(node.dataset.method).colour})`);
+for (const node of document.querySelectorAll("[data-swatch]")) node.innerHTML = swatch(node.dataset.swatch, node.closest(".key") ? { line: true, dots: true } : { line: true });
+// A line of the verdict leads nowhere where the run has no such part.
+for (const link of document.querySelectorAll(".evidence")) if (!document.querySelector(link.hash)) link.remove();
 
-const redrawAll = () => figures.forEach(figure => figure.draw());
+const redrawAll = () => mounted.forEach(drawing => drawing.draw());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
 
 // On paper all is unfolded, and figures are drawn for its width.
 const folded = [...document.querySelectorAll("details")];
-let opened = [];
+let opened = [], away = [];
 addEventListener("beforeprint", () => {
   opened = folded.filter(part => !part.open);
-  opened.forEach(part => { part.open = true; });
+  away = [...document.querySelectorAll("[data-with][hidden]")];
+  for (const part of opened) part.open = true;
+  for (const part of away) part.hidden = false;
   document.documentElement.classList.add("printing");
   redrawAll();
 });
 addEventListener("afterprint", () => {
-  opened.forEach(part => { part.open = false; });
+  for (const part of opened) part.open = false;
+  for (const part of away) part.hidden = true;
   document.documentElement.classList.remove("printing");
   redrawAll();
 });
 
 // The part in view is marked in the list of parts.
-const entries = new Map([...document.querySelectorAll("nav a")].map(link => [link.getAttribute("href").slice(1), link]));
-const visible = new Set();
+const entries = new Map([...document.querySelectorAll("nav a")].map(link => [link.getAttribute("href").slice(1), link])), visible = new Set();
 const watcher = new IntersectionObserver(changes => {
   for (const { target, isIntersecting } of changes) isIntersecting ? visible.add(target.id) : visible.delete(target.id);
   const first = [...entries.keys()].find(id => visible.has(id));

@@ -2,9 +2,9 @@
 
 use super::choice::Chosen;
 use super::verification::channel;
-use super::{RunFigure, axis, key, logarithmic, span};
+use super::{RunFigure, axis, choice, key, logarithmic, span};
 use crate::data::{Band, FrequencyResponse, Indirect, ModelResponse};
-use crate::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel, Region};
+use crate::figure::{Axis, Content, Curve, Drawn, Figure, Panel, Region};
 use crate::pretty_unit;
 
 /// Coherence below which a point of the indirect response is said to carry little.
@@ -81,8 +81,9 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         key: pair.key.clone(),
         title: format!("Frequency response, {}", pair.title),
         caption: caption(chosen, pair),
-        layout: Layout::Stacked,
+        choice: choice(&[("View", "Bode"), ("Response of", &pair.title)]),
         panels,
+        ..Figure::default()
     }
 }
 

@@ -149,7 +149,7 @@ pub struct RunDrawing {
 /// ```
 /// use youla_report::{ReportData, run_figures};
 /// assert!(run_figures(&ReportData::default())?.is_empty());
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_report::Error>(())
 /// ```
 ///
 /// # Errors
@@ -215,6 +215,11 @@ fn key(figure: RunFigure, parts: &[(&str, bool)]) -> String {
     let parts =
         parts.iter().filter(|(_, several)| *several).map(|(name, _)| name.chars().map(safe).collect::<String>());
     std::iter::once(figure.key().to_owned()).chain(parts).collect::<Vec<_>>().join("-")
+}
+
+/// The choices that lead to a figure.
+fn choice(parts: &[(&str, &str)]) -> Vec<(String, String)> {
+    parts.iter().map(|(name, value)| ((*name).to_owned(), (*value).to_owned())).collect()
 }
 
 fn axis(label: impl Into<String>, unit: impl Into<String>) -> Axis {

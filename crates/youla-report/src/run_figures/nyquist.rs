@@ -4,14 +4,14 @@
 
 use super::bode::{FADED, Pair, is_clear, pairs, percent};
 use super::choice::Chosen;
-use super::{RunFigure, axis};
+use super::{RunFigure, axis, choice};
 use crate::data::{Band, Indirect, ModelResponse};
-use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
+use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 use std::f64::consts::TAU;
 
 /// Most regions of a curve, and points of each.
-const ELLIPSES: usize = 60;
-const AROUND: usize = 32;
+const ELLIPSES: usize = 48;
+const AROUND: usize = 24;
 
 /// One figure per pair of output and input.
 pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
@@ -36,25 +36,48 @@ fn figure(pair: &Pair) -> Figure {
     let line =
         |x: [f64; 2], y: [f64; 2]| Guide { kind: GuideKind::Level, x: x.into(), y: y.into(), ..Guide::default() };
     const FAR: f64 = 1e12;
+    let axes = [line([-FAR, FAR], [0.0, 0.0]), line([0.0, 0.0], [-FAR, FAR])];
+    let marked = pair.models.iter().find(|model| model.method == "hansen").or(pair.models.first());
+    let frequencies = marked.map_or_else(Vec::new, |model| frequencies(pair.hz, model));
     Figure {
         key: pair.key.clone(),
         title: format!("Locus, {}", pair.title),
         caption: format!("Frequency response, {}, over positive frequencies.{said}{ellipses}", pair.title),
-        layout: Layout::Stacked,
+        choice: choice(&[("View", "Nyquist"), ("Response of", &pair.title)]),
         panels: vec![Panel {
             x: axis("Real part", &pair.unit),
             y: axis("Imaginary part", &pair.unit),
             content: Content::Curves(curves),
-            guides: vec![line([-FAR, FAR], [0.0, 0.0]), line([0.0, 0.0], [-FAR, FAR])],
+            guides: axes.into_iter().chain(frequencies).collect(),
             equal: true,
+            along: Some(axis("Frequency", "Hz")),
             ..Panel::default()
         }],
+        ..Figure::default()
     }
 }
 
 fn locus(hz: &[f64], model: &ModelResponse) -> Curve {
     let (x, y) = model.magnitude_db.iter().zip(&model.phase_deg).map(|(db, deg)| place(*db, *deg)).unzip();
     Curve { method: model.method.clone(), x, y, along: hz.to_vec(), ..Curve::default() }
+}
+
+/// Points at 1, 2 and 5 times powers of ten, with their frequencies; between grid points on the chord.
+fn frequencies(hz: &[f64], model: &ModelResponse) -> Vec<Guide> {
+    let decades = (-3..6).map(|decade| 10f64.powi(decade));
+    let wanted = [1.0, 2.0, 5.0].iter().flat_map(|digit| decades.clone().map(move |decade| digit * decade));
+    let point = |wanted: f64| {
+        let next = hz.partition_point(|f| *f <= wanted);
+        let [from, to] = [next.checked_sub(1)?, next].map(|k| {
+            Some((*hz.get(k)?, place(*model.magnitude_db.get(k)?, *model.phase_deg.get(k)?)))
+        });
+        let ((low, a), (high, b)) = (from?, to?);
+        let share = (wanted - low) / (high - low);
+        let at = [a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)];
+        let label = format!("{} Hz", (wanted * 1e6).round() / 1e6);
+        at.iter().all(|v| v.is_finite()).then(|| Guide { kind: GuideKind::Point, label, at, ..Guide::default() })
+    };
+    wanted.filter_map(point).collect()
 }
 
 /// The regions at some frequencies as one line with gaps.

@@ -3,7 +3,7 @@
 use super::choice::Chosen;
 use super::{RunFigure, axis, key, logarithmic};
 use crate::data::OrderChoice;
-use crate::figure::{Content, Curve, Drawn, Figure, Layout, Panel};
+use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
 
 /// Values below this share of the largest one are rounding.
 const ROUNDING: f64 = 1e-18;
@@ -25,6 +25,7 @@ pub(super) fn singular_values(chosen: &Chosen) -> Vec<Figure> {
         caption: format!("Singular values, filled where they are kept. {}", sentences.join(" ")),
         layout: Layout::Beside,
         panels: orders.iter().map(panel).collect(),
+        ..Figure::default()
     };
     if orders.is_empty() { Vec::new() } else { vec![figure()] }
 }
@@ -49,8 +50,8 @@ pub(super) fn hankel(chosen: &Chosen) -> Vec<Figure> {
             "Hankel singular values ({}). {kept} of {all} states are kept{apart}.{bound}",
             reduction.label
         ),
-        layout: Layout::Stacked,
         panels: vec![stems("hansen_reduced", &reduction.hankel, kept, "Hankel singular value")],
+        ..Figure::default()
     }]
 }
 
@@ -66,6 +67,12 @@ fn stems(method: &str, values: &[f64], kept: usize, label: &str) -> Panel {
         x: axis("Number", ""),
         y: logarithmic(label, ""),
         content: Content::Curves(curves.into_iter().filter(|curve| !curve.x.is_empty()).collect()),
+        guides: vec![Guide {
+            kind: GuideKind::Level,
+            x: vec![kept as f64 + 0.5; 2],
+            y: vec![1e-300, 1e300],
+            ..Guide::default()
+        }],
         ..Panel::default()
     }
 }

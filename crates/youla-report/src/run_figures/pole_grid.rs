@@ -1,6 +1,7 @@
 //! Lines of constant natural frequency and of constant damping ratio: `s = omega (-zeta + i sqrt(1 - zeta^2))`, `z = exp(s ts)`.
 
 use crate::figure::{Guide, GuideKind};
+use crate::with_minus;
 use std::f64::consts::{PI, TAU};
 
 const DAMPINGS: [f64; 15] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9];
@@ -22,6 +23,28 @@ impl Plane {
             Some(ts) => [(re * ts).exp() * (im * ts).cos(), (re * ts).exp() * (im * ts).sin()],
             None => [re, im],
         }
+    }
+
+    /// A place in words: its value, natural frequency and damping ratio.
+    pub(super) fn details(&self, [x, y]: [f64; 2]) -> String {
+        let [re, im] = match self.sample_time {
+            Some(ts) => [x.hypot(y).ln() / ts, y.atan2(x) / ts],
+            None => [x, y],
+        };
+        let places = |value: f64| if value.abs() < 100.0 { 5 } else { 1 };
+        let imaginary = match y {
+            0.0 => String::new(),
+            y => format!(" {} {:.*}i", if y < 0.0 { "-" } else { "+" }, places(y), y.abs()),
+        };
+        let (letter, size) = match self.sample_time {
+            Some(_) => ("z", format!("|z| = {:.5}\n", x.hypot(y))),
+            None => ("s", String::new()),
+        };
+        let omega = re.hypot(im);
+        let hz = omega / TAU;
+        let digits = crate::numbers::decimals(hz, 4).clamp(0, 6) as usize;
+        let zeta = if omega == 0.0 { 1.0 } else { -re / omega };
+        with_minus(format!("{letter} = {x:.*}{imaginary}\n{size}{hz:.digits$} Hz, ζ = {zeta:.4}", places(x)))
     }
 
     /// Frequency of a place on the boundary of stability in its direction.

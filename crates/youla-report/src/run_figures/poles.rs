@@ -30,6 +30,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
         caption: format!("{caption}{}", if sets.iter().any(|set| !set.zeros.is_empty()) { ZEROS } else { "" }),
         layout: Layout::Beside,
         panels: views(&plane, &all).into_iter().map(|(title, view)| panel(&plane, sets, title, view)).collect(),
+        ..Figure::default()
     }]
 }
 
@@ -39,6 +40,7 @@ fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> P
         drawn: Drawn::Marks,
         x: set.poles.iter().map(|pole| pole[0]).collect(),
         y: set.poles.iter().map(|pole| pole[1]).collect(),
+        details: set.poles.iter().map(|pole| plane.details(*pole)).collect(),
         ..Curve::default()
     };
     let zeros = |set: &Poles| Curve {
@@ -47,6 +49,7 @@ fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> P
         drawn: Drawn::Dots,
         x: set.zeros.iter().map(|zero| zero[0]).collect(),
         y: set.zeros.iter().map(|zero| zero[1]).collect(),
+        details: set.zeros.iter().map(|zero| plane.details(*zero)).collect(),
         ..Curve::default()
     };
     let letter = if plane.sample_time.is_some() { "z" } else { "s" };

@@ -3,7 +3,7 @@
 use super::choice::Chosen;
 use super::{RunFigure, axis, key, logarithmic};
 use crate::data::{Reduction, ReductionOrder};
-use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
+use crate::figure::{Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 
 /// Relative errors below this are rounding, as of a model that is not reduced.
 const ROUNDING: f64 = 1e-9;
@@ -32,7 +32,6 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
             "Relative errors over the order (H∞ norm, {}); order {} is taken (dashed).{shaded}",
             reduction.label, reduction.chosen
         ),
-        layout: Layout::Stacked,
         panels: vec![Panel {
             x: axis("Order", ""),
             y: logarithmic("Relative error", ""),
@@ -41,6 +40,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
             shades,
             ..Panel::default()
         }],
+        ..Figure::default()
     }]
 }
 

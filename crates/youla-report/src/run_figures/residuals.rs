@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::verification::channel;
-use super::{RunFigure, axis, key};
+use super::{RunFigure, axis, choice, key};
 use crate::data::{Correlation, ResidualTest};
 use crate::figure::{Content, Curve, Figure, Layout, Panel, Region};
 
@@ -48,7 +48,9 @@ fn figure(
              band of 99 % of all models for residuals that are noise. {judged}"
         ),
         layout: Layout::Beside,
+        choice: choice(&[("Record", record), ("Output", &name)]),
         panels: cross.chain([auto]).filter(has_curves).collect(),
+        ..Figure::default()
     }
 }
 

@@ -2,9 +2,9 @@
 
 use super::bode::percent;
 use super::choice::Chosen;
-use super::{RunFigure, axis, key, logarithmic, span};
+use super::{RunFigure, axis, choice, key, logarithmic, span};
 use crate::data::SingularValue;
-use crate::figure::{Axis, Content, Curve, Figure, Layout, Panel, Region};
+use crate::figure::{Axis, Content, Curve, Figure, Panel, Region};
 
 /// One figure where the run has several inputs and outputs.
 pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
@@ -44,7 +44,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
         caption: format!(
             "Singular values of the response of all outputs from all inputs, in the units of the channels.{said}"
         ),
-        layout: Layout::Stacked,
+        choice: choice(&[("View", "Singular values")]),
         panels: vec![Panel {
             x: logarithmic("Frequency", "Hz"),
             y: Axis { range, ..axis("Singular values", "dB") },
@@ -52,5 +52,6 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
             regions,
             ..Panel::default()
         }],
+        ..Figure::default()
     }]
 }

@@ -1,9 +1,10 @@
 //! Poles of the models of all orders over frequency, and beneath them their damping ratios.
 
 use super::choice::Chosen;
-use super::{RunFigure, axis, key, logarithmic};
+use super::{RunFigure, axis, choice, key, logarithmic};
 use crate::data::{PoleStability, Stabilisation, StabilisationPole};
-use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Layout, Panel};
+use crate::with_minus;
+use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 
 /// Room above the largest order for the frequencies of the clusters, as a share of all orders.
 const ROOM_FOR_LABELS: f64 = 0.22;
@@ -44,18 +45,20 @@ fn figure(diagram: &Stabilisation, nyquist: Option<f64>) -> Figure {
         key: key(RunFigure::Stabilisation, &[(&diagram.method, true)]),
         title: format!("Stabilisation diagram of {}", diagram.label),
         caption: format!(
-            "Poles of the models of all orders ({}). Settled: the next lower order has a pole of the same frequency, damping \
-             ratio and mode shape. Dashed: clusters that are settled at enough orders, and the order of the model, {}.{}",
+            "Poles of the models of all orders ({}). Stable: the next lower order has a pole of the same frequency, damping \
+             ratio and mode shape. Frequency stable: of the same frequency only. Dashed: clusters that are stable at enough \
+             orders, and the order of the model, {}.{}",
             diagram.label,
             diagram.chosen,
             if diagram.poles.iter().any(|p| p.hz_deviation.is_some()) {
-                " Lines through settled poles: two standard deviations to either side."
+                " Lines through stable poles: two standard deviations to either side."
             } else {
                 ""
             }
         ),
-        layout: Layout::Stacked,
         panels,
+        choice: choice(&[("Poles of", &diagram.label)]),
+        ..Figure::default()
     }
 }
 
@@ -72,10 +75,10 @@ fn curves(diagram: &Stabilisation, value: Value) -> Vec<Curve> {
     };
     let own = diagram.method.as_str();
     let mut list: Vec<Curve> = [
-        ("unstable", "", None, Drawn::Marks),
-        ("new", "", Some(PoleStability::New), Drawn::Marks),
-        (own, "frequency repeats", Some(PoleStability::Frequency), Drawn::Marks),
-        (own, "settled", Some(PoleStability::Stable), Drawn::Dots),
+        ("unstable pole", "", None, Drawn::Marks),
+        ("new pole", "", Some(PoleStability::New), Drawn::Marks),
+        (own, "frequency stable", Some(PoleStability::Frequency), Drawn::Marks),
+        (own, "stable", Some(PoleStability::Stable), Drawn::Dots),
     ]
     .into_iter()
     .map(|(method, note, wanted, drawn)| {
@@ -83,7 +86,8 @@ fn curves(diagram: &Stabilisation, value: Value) -> Vec<Curve> {
         let y = poles.iter().map(|pole| if value == Value::Order { pole.order as f64 } else { pole.zeta }).collect();
         let along = poles.iter().map(|pole| pole.order as f64).filter(|_| value == Value::Damping).collect();
         let x = poles.iter().map(|pole| pole.hz).collect();
-        Curve { method: method.into(), note: note.into(), drawn, x, y, along }
+        let details = poles.iter().map(|pole| details(diagram, pole)).collect();
+        Curve { method: method.into(), note: note.into(), drawn, x, y, along, details }
     })
     .filter(|curve| !curve.x.is_empty())
     .collect();
@@ -91,10 +95,25 @@ fn curves(diagram: &Stabilisation, value: Value) -> Vec<Curve> {
     list
 }
 
-/// Two standard deviations to either side of settled poles, one line with gaps.
+/// Order, frequency and damping ratio with their deviations, and the cluster.
+fn details(diagram: &Stabilisation, pole: &StabilisationPole) -> String {
+    let deviation = |value: Option<f64>, places: usize| value.map_or(String::new(), |v| format!(" ± {v:.places$}"));
+    let cluster = pole.cluster.and_then(|k| Some((k, diagram.clusters.get(k)?)));
+    let cluster = cluster.map_or(String::new(), |(k, c)| format!("\ncluster {} at {} Hz", k + 1, short(c.hz)));
+    with_minus(format!(
+        "Order {}\n{}{} Hz\nζ = {:.4}{}{cluster}",
+        pole.order,
+        short(pole.hz),
+        deviation(pole.hz_deviation, 3),
+        pole.zeta,
+        deviation(pole.zeta_deviation, 4)
+    ))
+}
+
+/// Two standard deviations to either side of stable poles, one line with gaps.
 fn whiskers(diagram: &Stabilisation, value: Value) -> Option<Curve> {
-    let settled = diagram.poles.iter().filter(|pole| pole.stable && pole.standing == PoleStability::Stable);
-    let (x, y): (Vec<f64>, Vec<f64>) = settled
+    let stable = diagram.poles.iter().filter(|pole| pole.stable && pole.standing == PoleStability::Stable);
+    let (x, y): (Vec<f64>, Vec<f64>) = stable
         .filter_map(|pole| match value {
             Value::Order => pole.hz_deviation.map(|d| {
                 let order = pole.order as f64;

@@ -10,7 +10,7 @@ use crate::figure::{Content, Curve, Drawn, MEASURED};
 use crate::trace::{Timeline, Trace};
 use crate::{Error, Result};
 use youla::signal::Channel;
-use youla::{Print, figure_csv, svg_for};
+use crate::{Print, figure_csv, svg_for};
 
 const TS: f64 = 0.01;
 
@@ -287,7 +287,7 @@ fn orders_poles_and_errors_are_those_of_the_report() {
     assert_eq!((zeros.note.as_str(), &zeros.x[..]), ("zeros", &[0.2][..]));
     let diagram = &drawn(RunFigure::Stabilisation, &FigureChoice::default())[0].figure;
     assert_eq!(
-        (&of(curves(diagram, 1), "hansen").along[..], &of(curves(diagram, 1), "new").along[..]),
+        (&of(curves(diagram, 1), "hansen").along[..], &of(curves(diagram, 1), "new pole").along[..]),
         (&[3.0][..], &[2.0][..])
     );
     assert_eq!(of(curves(diagram, 0), "two standard deviations").x[..2], [12.1 - 0.2, 12.1 + 0.2]);

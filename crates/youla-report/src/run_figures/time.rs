@@ -1,9 +1,9 @@
 //! Signals over time.
 
 use super::choice::Chosen;
-use super::{RunFigure, axis, key};
+use super::{RunFigure, axis, choice, key};
 use crate::data::{Experiment, Signal, SignalKind};
-use crate::figure::{Content, Curve, Figure, Layout, Panel};
+use crate::figure::{Axis, Content, Curve, Figure, Panel};
 use crate::trace::{Timeline, Trace};
 
 /// Height of all panels together, in panels of the usual height.
@@ -26,8 +26,8 @@ fn figures(chosen: &Chosen, figure: RunFigure, kinds: &[SignalKind], sentence: &
     let drawn = |(experiment, signals): (&Experiment, Vec<Signal>)| {
         let height = Some((TALLEST / signals.len() as f64).min(1.0)).filter(|height| *height < 1.0);
         let panel = |signal: &Signal| Panel {
-            x: axis("Time", "s"),
-            y: axis(&signal.channel.name, &signal.channel.unit),
+            x: Axis { range: detail(&experiment.clock), ..axis("Time", "s") },
+            y: axis(greek(&signal.channel.name), &signal.channel.unit),
             content: Content::Curves(vec![curve(signal, &experiment.clock)]),
             height,
             ..Panel::default()
@@ -36,12 +36,22 @@ fn figures(chosen: &Chosen, figure: RunFigure, kinds: &[SignalKind], sentence: &
             key: key(figure, &[(&experiment.name, chosen.several_experiments)]),
             title: format!("Signals of {}", experiment.name),
             caption: format!("{sentence} {}", statement(&experiment.clock)),
-            layout: Layout::Stacked,
             panels: signals.iter().map(panel).collect(),
+            choice: choice(&[("Record", &experiment.name)]),
+            ..Figure::default()
         }
     };
     let experiments = chosen.data.experiments.iter().map(|experiment| (experiment, shown(experiment)));
     experiments.filter(|(_, signals)| !signals.is_empty()).map(drawn).collect()
+}
+
+/// Names of the signals of the scheme with their letters.
+fn greek(name: &str) -> String {
+    match name.split_once(' ') {
+        Some(("alpha", channel)) => format!("α {channel}"),
+        Some(("beta", channel)) => format!("β {channel}"),
+        _ => name.to_owned(),
+    }
 }
 
 fn curve(signal: &Signal, clock: &Timeline) -> Curve {

@@ -2,9 +2,9 @@
 
 use super::choice::Chosen;
 use super::time::{detail, over_time, statement};
-use super::{RunFigure, axis, key, span};
+use super::{RunFigure, axis, choice, key, span};
 use crate::data::{Prediction, Verification, VerifiedOutput};
-use crate::figure::{Axis, Content, Curve, Figure, Layout, MEASURED, Panel};
+use crate::figure::{Axis, Content, Curve, Figure, MEASURED, Panel};
 use crate::with_minus;
 use youla::signal::Channel;
 
@@ -28,8 +28,9 @@ fn figure(chosen: &Chosen, record: &Verification, output: &VerifiedOutput) -> Fi
             record.prediction,
             statement(&record.clock)
         ),
-        layout: Layout::Stacked,
+        choice: choice(&[("Record", &record.record), ("Output", &channel.name)]),
         panels: vec![measured(chosen, record, output, &channel, &x), residuals(chosen, record, output, &channel, &x)],
+        ..Figure::default()
     }
 }
 

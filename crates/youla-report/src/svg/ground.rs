@@ -10,6 +10,8 @@ use crate::figure::{Guide, GuideKind, Panel, Region};
 
 /// Opacity of an area.
 pub(super) const REGION: f64 = 0.22;
+/// Half-width of the dot of a point.
+const DOT: f64 = 1.3;
 const SHADE: &str = "#eef2f6";
 
 /// All values of the areas, for the scale of the vertical axis.
@@ -45,7 +47,7 @@ fn paint(kind: GuideKind) -> Paint<'static> {
     let (stroke, width, dash): (_, _, &[f64]) = match kind {
         GuideKind::Grid => (GRID, 0.5, &[]),
         GuideKind::Boundary => (INK, 0.7, &[]),
-        GuideKind::Level => (SOFT, 0.6, &[3.0, 2.0]),
+        GuideKind::Level | GuideKind::Point => (SOFT, 0.6, &[3.0, 2.0]),
     };
     Paint { stroke, width, dash, ..Paint::default() }
 }
@@ -56,6 +58,10 @@ pub(super) fn draw_labels(canvas: &mut Canvas, guides: &[Guide], (x, y): (&Scale
     for guide in guides.iter().filter(|guide| !guide.label.is_empty()) {
         let (Place::Inside(across), Place::Inside(up)) = (x.place(guide.at[0]), y.place(guide.at[1])) else { continue };
         let (width, height) = (text::width(&guide.label, REMARK) + 3.0, REMARK + 1.0);
+        // Beside its dot.
+        let dot = (across, up);
+        let is_point = guide.kind == GuideKind::Point;
+        let (across, up) = if is_point { (across + width / 2.0 + 2.0, up - height / 2.0) } else { dot };
         // Beside an edge it moves inwards.
         let across = across.min(frame.right() - width / 2.0).max(frame.left + width / 2.0);
         let place = Frame { left: across - width / 2.0, top: up - height / 2.0, width, height };
@@ -70,6 +76,11 @@ pub(super) fn draw_labels(canvas: &mut Canvas, guides: &[Guide], (x, y): (&Scale
                 || place.top >= other.bottom()
         };
         if within && taken.iter().all(clear) {
+            if is_point {
+                let mut path = Path::default();
+                path.circle(dot, DOT);
+                canvas.path(path, &Paint { fill: INK, ..Paint::default() });
+            }
             canvas.text_on_lines(&guide.label, across, up + 0.33 * REMARK, REMARK);
             taken.push(place);
         }

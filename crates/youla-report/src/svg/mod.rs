@@ -33,6 +33,7 @@ mod text;
 mod ticks;
 
 pub use font::FIGURE_FONT;
+pub(crate) use style::{Marker, Styles};
 pub use text::pretty_unit;
 
 use super::data::Method;
@@ -92,7 +93,7 @@ impl Default for Print {
 /// let figure = Figure { panels: vec![panel], ..Figure::default() };
 /// let file = youla_report::svg(&figure, &[Method::hansen()])?;
 /// assert!(file.starts_with("<svg") && file.contains("Hansen G(S)"));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_report::Error>(())
 /// ```
 pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
     svg_for(figure, methods, &Print::default())
@@ -108,7 +109,7 @@ pub fn svg(figure: &Figure, methods: &[Method]) -> Result<String> {
 /// let figure = Figure { panels: vec![Panel::default()], ..Figure::default() };
 /// let print = Print { width_cm: 8.5, height_cm: Some(6.0), ..Print::default() };
 /// assert!(svg_for(&figure, &[], &print)?.contains("height=\"60mm\""));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_report::Error>(())
 /// ```
 pub fn svg_for(figure: &Figure, methods: &[Method], print: &Print) -> Result<String> {
     let size = |side: &str, value: f64, range: std::ops::RangeInclusive<f64>, must| match range.contains(&value) {

@@ -4,30 +4,31 @@ use super::canvas::Paint;
 use super::path::Path;
 use crate::data::{Method, Role};
 use crate::figure::MEASURED;
+use serde::Serialize;
 
 /// Colour of the measured signal, which no method has.
-const MEASURED_STYLE: Style = style("#16191d", 0.5, &[], Marker::Circle);
+const MEASURED_STYLE: Style = style("--measured", "#16191d", 0.5, &[], Marker::Circle);
 const OTHER_STYLES: [Style; 4] = [
-    style("#cc79a7", 0.8, &[6.0, 1.5], Marker::Plus),
-    style("#56b4e9", 0.8, &[2.5, 1.0], Marker::Circle),
-    style("#8c564b", 0.8, &[1.0, 1.0], Marker::Square),
-    style("#6a51a3", 0.8, &[5.0, 1.5, 1.0, 1.5, 1.0, 1.5], Marker::Diamond),
+    style("--other-1", "#cc79a7", 0.8, &[6.0, 1.5], Marker::Plus),
+    style("--other-2", "#56b4e9", 0.8, &[2.5, 1.0], Marker::Circle),
+    style("--other-3", "#8c564b", 0.8, &[1.0, 1.0], Marker::Square),
+    style("--other-4", "#6a51a3", 0.8, &[5.0, 1.5, 1.0, 1.5, 1.0, 1.5], Marker::Diamond),
 ];
 /// What is no method and stands before all of them in the legend, and after them.
 const BEFORE: [(&str, Style); 6] = [
     (MEASURED, MEASURED_STYLE),
     ("output", MEASURED_STYLE),
-    ("input", style("#59616b", 0.5, &[], Marker::Square)),
-    ("excitation", style("#c77f00", 0.5, &[], Marker::Diamond)),
-    ("indirect", style("#e69f00", 0.7, &[], Marker::Circle)),
-    ("band of noise", style("#59616b", 0.6, &[2.0, 1.5], Marker::Square)),
+    ("input", style("--soft", "#59616b", 0.5, &[], Marker::Square)),
+    ("excitation", style("--excitation", "#c77f00", 0.5, &[], Marker::Diamond)),
+    ("indirect", style("--indirect", "#e69f00", 0.7, &[], Marker::Circle)),
+    ("band of noise", style("--soft", "#59616b", 0.6, &[2.0, 1.5], Marker::Square)),
 ];
 const AFTER: [(&str, Style); 5] = [
-    ("new", style("#59616b", 0.7, &[], Marker::Plus)),
-    ("unstable", style("#b3261e", 0.7, &[], Marker::Cross)),
-    ("two standard deviations", style("#7f868e", 0.5, &[], Marker::Plus)),
-    ("open loop", style("#59616b", 0.8, &[4.0, 1.5], Marker::Square)),
-    ("bound", style("#16191d", 0.7, &[1.2, 1.5], Marker::Down)),
+    ("new pole", style("--soft", "#59616b", 0.7, &[], Marker::Plus)),
+    ("unstable pole", style("--bad", "#b3261e", 0.7, &[], Marker::Cross)),
+    ("two standard deviations", style("--nominal", "#7f868e", 0.5, &[], Marker::Plus)),
+    ("open loop", style("--soft", "#59616b", 0.8, &[4.0, 1.5], Marker::Square)),
+    ("bound", style("--ink", "#16191d", 0.7, &[1.2, 1.5], Marker::Down)),
 ];
 /// Dashes of further curves of one method, told apart by their notes.
 const FURTHER_DASHES: [&[f64]; 3] = [&[1.2, 1.2], &[4.0, 1.0, 1.0, 1.0], &[7.0, 2.0]];
@@ -37,16 +38,20 @@ const STRONGEST: f64 = 0.7;
 
 /// How one method is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Style {
+pub(crate) struct Style {
+    /// Custom property of the style sheet of the page, which has a value for light and one for dark paper.
+    pub(crate) property: &'static str,
+    /// Its value on white paper.
     pub(super) colour: &'static str,
-    pub(super) width: f64,
-    pub(super) dash: &'static [f64],
-    pub(super) marker: Marker,
+    pub(crate) width: f64,
+    pub(crate) dash: &'static [f64],
+    pub(crate) marker: Marker,
 }
 
 /// Shape of a point.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Marker {
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub(crate) enum Marker {
     Circle,
     Square,
     Diamond,
@@ -56,22 +61,28 @@ pub(super) enum Marker {
     Cross,
 }
 
-const fn style(colour: &'static str, width: f64, dash: &'static [f64], marker: Marker) -> Style {
-    Style { colour, width, dash, marker }
+const fn style(
+    property: &'static str,
+    colour: &'static str,
+    width: f64,
+    dash: &'static [f64],
+    marker: Marker,
+) -> Style {
+    Style { property, colour, width, dash, marker }
 }
 
 /// The methods of a page and their styles.
-pub(super) struct Styles<'a> {
+pub(crate) struct Styles<'a> {
     methods: &'a [Method],
 }
 
 impl<'a> Styles<'a> {
-    pub(super) fn new(methods: &'a [Method]) -> Self {
+    pub(crate) fn new(methods: &'a [Method]) -> Self {
         Styles { methods }
     }
 
     /// The style of a method; an unknown one is drawn as the first without a role.
-    pub(super) fn of(&self, key: &str) -> Style {
+    pub(crate) fn of(&self, key: &str) -> Style {
         if key == MEASURED {
             return MEASURED_STYLE;
         }
@@ -81,13 +92,13 @@ impl<'a> Styles<'a> {
         };
         let others = self.methods[..place].iter().filter(|method| method.role == Role::Other).count();
         match self.methods[place].role {
-            Role::Nominal => style("#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
-            Role::Pem => style("#b0457b", 0.85, &[5.5, 1.5], Marker::Up),
-            Role::PemMultiStart => style("#8a7a00", 0.85, &[2.5, 1.2], Marker::Down),
-            Role::Direct => style("#d55e00", 0.85, &[4.5, 1.5, 1.0, 1.5], Marker::Square),
-            Role::Hansen => style("#0072b2", 0.95, &[], Marker::Circle),
-            Role::HansenReduced => style("#009e73", 0.85, &[3.5, 2.0], Marker::Diamond),
-            Role::HansenPem => style("#5b2ca0", 0.9, &[8.0, 1.2, 1.2, 1.2], Marker::Cross),
+            Role::Nominal => style("--nominal", "#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
+            Role::Pem => style("--pem", "#b0457b", 0.85, &[5.5, 1.5], Marker::Up),
+            Role::PemMultiStart => style("--pem-multi-start", "#8a7a00", 0.85, &[2.5, 1.2], Marker::Down),
+            Role::Direct => style("--direct", "#d55e00", 0.85, &[4.5, 1.5, 1.0, 1.5], Marker::Square),
+            Role::Hansen => style("--hansen", "#0072b2", 0.95, &[], Marker::Circle),
+            Role::HansenReduced => style("--hansen-reduced", "#009e73", 0.85, &[3.5, 2.0], Marker::Diamond),
+            Role::HansenPem => style("--hansen-pem", "#5b2ca0", 0.9, &[8.0, 1.2, 1.2, 1.2], Marker::Cross),
             Role::Other => OTHER_STYLES[others % OTHER_STYLES.len()],
         }
     }
@@ -101,13 +112,13 @@ impl<'a> Styles<'a> {
     }
 
     /// Name of a method and, behind a comma, its note.
-    pub(super) fn name(&self, key: &str, note: &str) -> String {
+    pub(crate) fn name(&self, key: &str, note: &str) -> String {
         let label = self.place(key).map_or(key, |place| &self.methods[place].label);
         if note.is_empty() { label.to_owned() } else { format!("{label}, {note}") }
     }
 
     /// Place in the order in which methods are listed: the measured signal first, unknown ones last.
-    pub(super) fn order(&self, key: &str) -> usize {
+    pub(crate) fn order(&self, key: &str) -> usize {
         let before = BEFORE.iter().any(|(name, _)| *name == key);
         match self.place(key) {
             _ if key == MEASURED => 0,

@@ -40,10 +40,11 @@ export async function readingAt(page, stack, share) {
   return Number(text.replace("\u2212", "-").match(/-?\d+(\.\d+)?/)?.[0]);
 }
 
-export async function drag(page, stack, from, to) {
-  const box = await stack.locator(".u-over").first().boundingBox(), y = box.y + box.height / 2;
+// From one share of the width to another and, for a plane, as far down.
+export async function drag(page, stack, from, to, down = 0) {
+  const box = await stack.locator(".u-over").first().boundingBox(), y = box.y + (0.5 - down / 2) * box.height;
   await page.mouse.move(box.x + from * box.width, y);
   await page.mouse.down();
-  await page.mouse.move(box.x + to * box.width, y, { steps: 5 });
+  await page.mouse.move(box.x + to * box.width, y + down * box.height, { steps: 5 });
   await page.mouse.up();
 }

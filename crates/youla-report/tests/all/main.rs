@@ -5,7 +5,8 @@
 mod sample;
 mod story;
 
-use youla_report::data::{FrequencyResponse, Method, ReportData};
+use youla_report::data::{FrequencyResponse, Method, ReportData, SignalKind};
+use youla_report::figure::{Content, Curve, Drawn, Figure, MEASURED};
 use youla_report::html;
 
 const FIVE_MEGABYTES: usize = 5_000_000;
@@ -16,10 +17,27 @@ fn written(name: &str, data: &ReportData) -> String {
     page
 }
 
-fn embedded(page: &str) -> ReportData {
+fn embedded(page: &str) -> Vec<Figure> {
     let start = "<script type=\"application/json\" id=\"report-data\">";
     let json = page.split_once(start).unwrap().1.split_once("</script>").unwrap().0;
-    serde_json::from_str(json).unwrap()
+    let mut data: serde_json::Value = serde_json::from_str(json).unwrap();
+    serde_json::from_value(data["figures"].take()).unwrap()
+}
+
+/// The curve of a method in a panel of an embedded figure.
+fn curve<'a>(figures: &'a [Figure], key: &str, panel: usize, method: &str) -> &'a Curve {
+    let figure = figures.iter().find(|figure| figure.key == key).unwrap();
+    let Content::Curves(curves) = &figure.panels[panel].content else { panic!("{key}") };
+    curves.iter().find(|curve| curve.method == method).unwrap()
+}
+
+fn extremes(values: &[f64]) -> (f64, f64) {
+    (values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(f64::MIN, f64::max))
+}
+
+fn close(a: (f64, f64), b: (f64, f64)) -> bool {
+    let size = b.0.abs().max(b.1.abs());
+    (a.0 - b.0).abs() <= 1e-5 * size && (a.1 - b.1).abs() <= 1e-5 * size
 }
 
 #[test]
@@ -27,9 +45,15 @@ fn long_record_stays_small_and_keeps_its_outline() {
     let data = sample::flexible_drive();
     let page = written("report-flexible-drive", &data);
     assert!(page.len() < FIVE_MEGABYTES, "{} bytes", page.len());
+    let output = &data.verification[0].outputs[0];
     let drawn = embedded(&page);
-    assert_eq!(drawn.verification, data.verification);
-    assert_eq!(drawn.experiments, data.experiments);
+    let measured = drawn.iter().find(|figure| figure.key.starts_with("verification")).unwrap().key.clone();
+    let measured = curve(&drawn, &measured, 0, MEASURED);
+    assert_eq!(measured.y.len(), output.measured.values.len());
+    assert!(close(extremes(&measured.y), extremes(&output.measured.values)));
+    let signals = drawn.iter().find(|figure| figure.key == "data").unwrap();
+    let shown = data.experiments[0].signals.iter().filter(|s| !matches!(s.kind, SignalKind::Alpha | SignalKind::Beta));
+    assert_eq!(signals.panels.len(), shown.count());
 }
 
 #[test]
@@ -39,19 +63,26 @@ fn many_curves_are_thinned_to_keep_the_file_small() {
     data.verification = vec![record; 24];
     let page = html(&data).unwrap();
     assert!(page.len() < FIVE_MEGABYTES, "{} bytes", page.len());
-    let extremes = |data: &ReportData| {
-        let values = &data.verification[7].outputs[0].measured.values;
-        (values.iter().copied().fold(f64::MAX, f64::min), values.iter().copied().fold(f64::MIN, f64::max))
-    };
-    assert_eq!(extremes(&embedded(&page)), extremes(&data));
+    let drawn = embedded(&page);
+    let figures: Vec<&Figure> = drawn.iter().filter(|figure| figure.key.starts_with("verification")).collect();
+    assert_eq!(figures.len(), 24 * data.verification[0].outputs.len());
+    let measured = curve(&drawn, &figures[7].key, 0, MEASURED);
+    assert!(measured.y.len() < data.verification[7].outputs[0].measured.values.len());
+    assert!(close(extremes(&measured.y), extremes(&data.verification[7].outputs[0].measured.values)));
 }
 
 #[test]
 fn several_inputs_and_outputs_are_all_inside() {
     let data = sample::bearing();
     let page = written("report-bearing", &data);
-    let response = embedded(&page).frequency.unwrap();
-    assert_eq!((response.models.len(), response.indirect.len()), (16, 4));
+    let figures = embedded(&page);
+    let bodes: Vec<&Figure> = figures.iter().filter(|figure| figure.key.starts_with("bode")).collect();
+    assert_eq!(bodes.len(), 4);
+    for bode in bodes {
+        let Content::Curves(curves) = &bode.panels[0].content else { panic!("{}", bode.key) };
+        let lines = curves.iter().filter(|curve| curve.drawn == Drawn::Line).count();
+        assert_eq!((lines, bode.panels.len()), (4, 3));
+    }
     for text in [
         "Hansen reduced G_red(S)",
         "y_x",
@@ -91,7 +122,7 @@ fn text_of_the_user_cannot_leave_its_place() {
     let page = written("report-hostile", &data);
     assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
     assert_eq!(page.matches("</script>").count(), 3);
-    assert_eq!(embedded(&page).title, evil);
+    assert!(embedded(&page).iter().any(|figure| figure.caption.contains(evil)));
 }
 
 #[test]
@@ -118,5 +149,9 @@ fn diverged_predictions_are_said_and_leave_gaps() {
     values.iter_mut().skip(2000).for_each(|value| *value = f64::INFINITY);
     let page = written("report-diverged", &data);
     assert!(page.contains("diverged"));
-    assert!(embedded(&page).verification[0].outputs[0].predictions[1].predicted.values[3000].is_nan());
+    let figures = embedded(&page);
+    let figure = figures.iter().find(|figure| figure.key.starts_with("verification")).unwrap();
+    let method = &data.verification[0].outputs[0].predictions[1].method;
+    let drawn = curve(&figures, &figure.key, 0, method);
+    assert!(drawn.y[3000].is_nan() && drawn.y[1000].is_finite());
 }

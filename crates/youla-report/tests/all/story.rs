@@ -6,7 +6,7 @@ use youla_report::figure::*;
 use youla_report::story::*;
 use youla_report::{Story, story_html};
 
-use super::FIVE_MEGABYTES;
+use super::{FIVE_MEGABYTES, embedded};
 
 fn written(name: &str, story: &Story) -> String {
     let page = story_html(story).unwrap();
@@ -14,11 +14,9 @@ fn written(name: &str, story: &Story) -> String {
     page
 }
 
-fn embedded(page: &str) -> Vec<Figure> {
+fn page_data(page: &str) -> Value {
     let start = "<script type=\"application/json\" id=\"report-data\">";
-    let json = page.split_once(start).unwrap().1.split_once("</script>").unwrap().0;
-    let mut data: Value = serde_json::from_str(json).unwrap();
-    serde_json::from_value(data["figures"].take()).unwrap()
+    serde_json::from_str(page.split_once(start).unwrap().1.split_once("</script>").unwrap().0).unwrap()
 }
 
 fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
@@ -31,7 +29,7 @@ fn panel(title: &str, y: Axis, content: Content) -> Panel {
 
 fn figure(key: &str, layout: Layout, panels: Vec<Panel>) -> Block {
     let (title, caption) = (format!("Figure {key}"), format!("What {key} shows."));
-    Block::Figure(Figure { key: key.into(), title, caption, layout, panels })
+    Block::Figure(Figure { key: key.into(), title, caption, layout, panels, ..Figure::default() })
 }
 
 fn curve(method: &str, drawn: Drawn, samples: usize) -> Curve {
@@ -254,11 +252,12 @@ fn parts_without_a_key_have_no_files() {
 #[test]
 fn every_role_has_a_colour_on_light_and_dark_paper() {
     let page = story_html(&story()).unwrap();
+    let data = page_data(&page);
+    let styles = &data["styles"];
     for method in story().methods {
         let role = serde_json::to_value(method.role).unwrap();
-        let name = role.as_str().unwrap();
-        let colour = format!("--{}", name.replace('_', "-"));
-        assert!(page.contains(&format!("  {name}: {{ colour: \"{colour}\"")), "{name} has no style");
+        let colour = format!("--{}", role.as_str().unwrap().replace('_', "-"));
+        assert_eq!(styles[&method.key]["colour"], *colour);
         assert_eq!(page.matches(&format!(" {colour}: #")).count(), 2, "{colour}");
     }
 }

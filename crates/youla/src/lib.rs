@@ -1,38 +1,31 @@
 //! Closed-loop identification: finding out how a machine behaves while its controller keeps running.
 //!
 //! Feedback makes the input of a plant depend on its noise, which biases ordinary identification. With a doubly coprime
-//! factorisation of a nominal model and of the controller that ran, the same data tell of the *Youla deviation system* S,
-//! which is stable, driven by a signal that is free of noise, and stands for the true plant G(S). This library factorises,
+//! factorisation of a nominal model and of the controller that ran, the same data identify the *Youla deviation system* S,
+//! which is stable, has an input that is independent of the noise, and represents the true plant G(S). This library factorises,
 //! filters, identifies S, recombines it to G(S), reduces it and says what the result is worth.
 //!
 #![doc = include_str!("../assets/docs/flow.svg")]
 //!
 //! # Data flow
 //!
-//! Modules depend on each other in one direction only, in the order in which data flow:
+//! Each module uses only those before it; a test holds this order. Files, settings, charts and the grey-box methods are crates of
+//! their own, on top of this one.
 //!
 //! ```text
-//! error, units -> linalg -> lti -> record -> check -> control -> rig -> factor -> identify -> reduce -> validate -> redesign -> export -> excite -> study -> report -> run
+//! error -> linalg -> lti -> signal -> control -> factor -> identify -> reduce -> validate
 //! ```
 //!
 //! | module | holds |
 //! |---|---|
 //! | [`linalg`] | ordered real Schur form, Sylvester, Lyapunov and Riccati equations, exponential and logarithm, each with its residual |
 //! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, norms, simulation |
-//! | [`record`] | labelled, clocked data; CSV, MATLAB and NumPy files; spectra; excitation signals |
-//! | [`check`] | what is wrong with the data: clock, clipping, steps, drift, outliers, delays, excitation, lines, feedback, controller |
+//! | [`signal`] | labelled, clocked data; spectra; excitation signals and their persistency |
 //! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops, margins, nu-gap |
-//! | [`rig`] | the gas bearing of the paper, its digital twin with sensors, actuators and rotation, and experiments on it |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
-//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it; grey-box prediction error |
+//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it |
 //! | [`reduce`] | balanced truncation, singular perturbation, weighted by the loop, normalised coprime factors; every order judged in the loop |
 //! | [`validate`] | fit, variance accounted for, residual tests, certificates of the loop, prediction of fresh data |
-//! | [`redesign`] | a new controller on the identified model, with its prediction and its data for firmware |
-//! | [`export`] | models for other tools: JSON, MATLAB, NumPy, scripts, C99 headers of the model and of the controller |
-//! | [`excite`] | excitation for a machine under its controller: sequence, predicted displacement, accuracy of the modes |
-//! | [`study`] | the paper: its 500 models, its three experiments, the map of which method wins where |
-//! | [`report`] | results as data and as one offline page |
-//! | [`run`] | run.toml in, run folder out: the driver of the program |
 //!
 //! # The scheme in a few lines
 //!

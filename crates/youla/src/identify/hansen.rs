@@ -7,7 +7,7 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
-use super::innovation_form::{DeviationOptions, InnovationForm, hansen_structured};
+use super::innovation_form::{self, DeviationOptions, InnovationForm, Structure};
 use super::subspace::subspace_stream;
 use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
 use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
@@ -78,6 +78,32 @@ pub fn deviation_data<'a>(
 ) -> Result<SubspaceData<'a>> {
     let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
     SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)
+}
+
+/// Identifies S with the structure asked for from [`deviation_data`], and recombines it to G(S).
+///
+/// # Errors
+/// As [`hansen_disturbed`]; for the innovation form [`crate::Error::Unstable`] where `A - K_s C` is not stable, as for
+/// an unstable plant, and [`crate::Error::OutOfRange`] for delays, no refits or a tolerance below zero.
+pub fn hansen_structured(
+    factors: &CoprimeFactors<Discrete>,
+    data: &SubspaceData<'_>,
+    options: &SubspaceOptions,
+    deviation: &DeviationOptions,
+) -> Result<HansenModel> {
+    let (deviation, innovation_form) = match deviation.structure {
+        Structure::Free => (data.identify(options)?, None),
+        Structure::Innovation => {
+            innovation_form::check(options, deviation)?;
+            let (model, form) = innovation_form::refit(factors, data, options, deviation)?;
+            (model, Some(form))
+        }
+    };
+    let plant = factors.plant_of(&deviation.model)?;
+    let uncertainty = deviation.uncertainty.as_ref().map(|u| u.through(|s| factors.plant_of(s))).transpose()?;
+    let order = deviation.order.order;
+    let evidence = uncertainty.is_some().then(|| data.evidence(order, options));
+    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
 }
 
 /// The same as [`hansen`] from a stream of u and y that need not fit into memory; the first `settle` samples of each experiment

@@ -9,7 +9,6 @@
 //! whose errors are white where those of the simulation are not, and K_s is taken from the new S until it settles. Because
 //! the zeros of H are the poles of the plant and of `A + B F`, this is refused where `A - K_s C` is not stable.
 
-use super::hansen::HansenModel;
 use super::subspace::{
     NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty, UncertaintyMethod, UncertaintyOptions,
     check_uncertainty,
@@ -80,33 +79,7 @@ pub struct InnovationForm {
     pub from_kalman: Option<f64>,
 }
 
-/// Identifies S with the structure asked for from [`super::hansen::deviation_data`], and recombines it to G(S).
-///
-/// # Errors
-/// As [`super::hansen::hansen_disturbed`]; for the innovation form [`Error::Unstable`] where `A - K_s C` is not stable, as for
-/// an unstable plant, and [`Error::OutOfRange`] for delays, no refits or a tolerance below zero.
-pub fn hansen_structured(
-    factors: &CoprimeFactors<Discrete>,
-    data: &SubspaceData<'_>,
-    options: &SubspaceOptions,
-    deviation: &DeviationOptions,
-) -> Result<HansenModel> {
-    let (deviation, innovation_form) = match deviation.structure {
-        Structure::Free => (data.identify(options)?, None),
-        Structure::Innovation => {
-            check(options, deviation)?;
-            let (model, form) = refit(factors, data, options, deviation)?;
-            (model, Some(form))
-        }
-    };
-    let plant = factors.plant_of(&deviation.model)?;
-    let uncertainty = deviation.uncertainty.as_ref().map(|u| u.through(|s| factors.plant_of(s))).transpose()?;
-    let order = deviation.order.order;
-    let evidence = uncertainty.is_some().then(|| data.evidence(order, options));
-    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
-}
-
-fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
+pub(super) fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
     check_uncertainty(options)?;
     let refused = |what: &str, value: f64, must| Err(Error::OutOfRange { what: what.into(), value, must });
     if options.delays.iter().any(|delay| *delay > 0) {
@@ -121,7 +94,7 @@ fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> 
 }
 
 /// K_s from S, S from K_s, until K_s settles. The uncertainty is not computed, since it would be that of another fit.
-fn refit(
+pub(super) fn refit(
     factors: &CoprimeFactors<Discrete>,
     data: &SubspaceData<'_>,
     options: &SubspaceOptions,

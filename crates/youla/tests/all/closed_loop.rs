@@ -3,8 +3,8 @@
 
 use crate::common::feedback::{Loop, options};
 use youla::Mat;
-use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed};
-use youla::identify::innovation_form::{Convergence, DeviationOptions, Structure, hansen_structured};
+use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed, hansen_structured};
+use youla::identify::innovation_form::{Convergence, DeviationOptions, Structure};
 use youla::identify::subspace::{
     AutomaticHorizon, Experiment, Order, SubspaceMethod, SubspaceOptions, lines, subspace,
 };

@@ -1,6 +1,7 @@
 //! What the method promises: identities, published values, seeded statistics on simulated loops and on measured records.
 #![allow(missing_docs)]
 
+mod architecture;
 mod closed_loop;
 mod common;
 mod excitation;

@@ -3,7 +3,7 @@
 //!
 //! Where batches begin depends on the lengths of the experiments and the number of channels alone, never on the threads.
 
-use super::channels::View;
+use super::view::View;
 use crate::signal::SampleStream;
 use crate::{Error, Mat, Result};
 use std::ops::Range;

@@ -2,54 +2,16 @@
 //! them or is to be done.
 
 use super::delay::Delays;
-use super::realisation::OutputPair;
+use super::experiment::Experiment;
+use super::output_pair::OutputPair;
 use super::statistics::Statistics;
-use super::{ChannelScaling, Experiment, InitialState, SubspaceOptions};
+use super::view::{Signals, View};
+use super::{ChannelScaling, InitialState, SubspaceOptions};
 use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 use std::borrow::Cow;
-
-/// Views of the records of one experiment, or of a part of it.
-#[derive(Clone, Copy)]
-pub(super) struct View<'a> {
-    pub(super) u: MatRef<'a, f64>,
-    pub(super) y: MatRef<'a, f64>,
-    /// Known signals of a disturbance of the outputs; no columns where none is known.
-    pub(super) w: MatRef<'a, f64>,
-}
-
-impl<'a> View<'a> {
-    /// Without known disturbances.
-    pub(super) fn of(u: MatRef<'a, f64>, y: MatRef<'a, f64>) -> Self {
-        View { u, y, w: y.subcols(0, 0) }
-    }
-
-    pub(super) fn samples(&self) -> usize {
-        self.u.nrows()
-    }
-
-    pub(super) fn part(&self, start: usize, count: usize) -> View<'a> {
-        let part = |m: MatRef<'a, f64>| m.subrows(start, count);
-        View { u: part(self.u), y: part(self.y), w: part(self.w) }
-    }
-}
-
-/// The records of one experiment in scaled units, one contiguous column per channel.
-#[derive(Clone)]
-pub(super) struct Signals {
-    pub(super) u: Mat<f64>,
-    pub(super) y: Mat<f64>,
-    /// Of unit rms.
-    pub(super) w: Mat<f64>,
-}
-
-impl Signals {
-    pub(super) fn view(&self) -> View<'_> {
-        View { u: self.u.as_ref(), y: self.y.as_ref(), w: self.w.as_ref() }
-    }
-}
 
 /// Where the samples are.
 #[derive(Clone)]

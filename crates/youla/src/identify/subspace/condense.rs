@@ -5,11 +5,12 @@
 //! ([`super::modal_sums`]) or, where these would lose too many digits, by QR of the rows; else output by output
 //! ([`super::sensitivity`]).
 
-use super::channels::{Channels, View};
+use super::channels::Channels;
 use super::disturbance::{KnownColumns, Regressors};
 use super::modal::{Modes, Rows};
 use super::modal_sums::Sums;
 use super::sensitivity::{KnownShare, Predictor, Sensitivity, Unknowns};
+use super::view::View;
 use crate::linalg::{SequentialQr, block};
 use faer::{Mat, MatRef};
 use rayon::prelude::*;

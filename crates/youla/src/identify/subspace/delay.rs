@@ -5,7 +5,7 @@
 //! ```
 //! No sample is invented: each experiment starts at the largest delay, and the delay states there are the inputs before.
 
-use super::{Experiment, Innovation};
+use super::experiment::Experiment;
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, MatRef, Result};
 
@@ -73,18 +73,5 @@ impl Delays {
             first = last + 1;
         }
         StateSpace::new(a, b, c, d, model.time())
-    }
-
-    /// The gain with rows for the delay states, which the innovations do not reach.
-    pub(super) fn put_below(&self, innovation: Innovation) -> Innovation {
-        match innovation {
-            Innovation::Found { gain, covariance, residual } => {
-                let n = gain.nrows();
-                let row = |i: usize, j: usize| if i < n { gain[(i, j)] } else { 0.0 };
-                let gain = Mat::from_fn(n + self.states(), gain.ncols(), row);
-                Innovation::Found { gain, covariance, residual }
-            }
-            none => none,
-        }
     }
 }

@@ -9,8 +9,8 @@
 //! (V. Sima, SLICOT working note 2000-4). The Cholesky factor squares the condition number k of the data: its relative error
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
-use super::channels::View;
 use super::disturbance;
+use super::view::View;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
 use faer::dyn_stack::{MemBuffer, MemStack};

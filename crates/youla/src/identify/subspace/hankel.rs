@@ -1,7 +1,8 @@
 //! `[U_f; U_p; Y_p; Y_f]' = Q R` for the open-loop methods.
 
 use super::DataFactor;
-use super::factorisation::{HankelLayout, HankelLq};
+use super::factorisation::HankelLq;
+use super::hankel_layout::HankelLayout;
 use crate::linalg::{leading_rank, triangular_condition};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};

@@ -10,27 +10,12 @@
 //! that it is at least as long as the past and holds the largest order n asked for.
 
 use super::channels::Channels;
-use super::factorisation::{HankelLayout, HankelLq};
-use super::{Feedthrough, Order, SubspaceData, SubspaceModel, SubspaceOptions};
+use super::factorisation::HankelLq;
+use super::hankel_layout::HankelLayout;
+use super::{AutomaticHorizon, Feedthrough, Order, SubspaceData, SubspaceModel, SubspaceOptions};
 use crate::Result;
 use crate::linalg::leading_rank;
 use faer::MatRef;
-
-/// Choice of past and future by the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct AutomaticHorizon {
-    /// Largest past to consider, block rows.
-    pub max: usize,
-}
-
-impl Default for AutomaticHorizon {
-    fn default() -> Self {
-        AutomaticHorizon { max: 60 }
-    }
-}
 
 /// Past and future as the data propose them.
 #[derive(Debug, Clone, PartialEq)]

@@ -7,7 +7,7 @@
 //! (Van Overschee and De Moor, section 3.4). The residuals are those of a filter that has seen s samples: the gain is biased
 //! where `(A - K C)^s` is not small. Where no stabilising solution exists this is said, and no gain is returned.
 
-use super::realisation::OutputPair;
+use super::output_pair::OutputPair;
 use crate::linalg::{RiccatiProblem, dare};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, Side};
@@ -59,6 +59,19 @@ impl Innovation {
         match self {
             Innovation::Found { covariance, .. } => Some(covariance.as_ref()),
             Innovation::None { .. } => None,
+        }
+    }
+
+    /// The gain with rows for so many states of delays, which the innovations do not reach.
+    pub(super) fn beside_delays(self, states: usize) -> Innovation {
+        match self {
+            Innovation::Found { gain, covariance, residual } => {
+                let n = gain.nrows();
+                let row = |i: usize, j: usize| if i < n { gain[(i, j)] } else { 0.0 };
+                let gain = Mat::from_fn(n + states, gain.ncols(), row);
+                Innovation::Found { gain, covariance, residual }
+            }
+            none => none,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Records in memory as a stream.
 
-use super::Experiment;
+use super::experiment::Experiment;
 use crate::signal::SampleStream;
 use crate::{MatRef, Result};
 use faer::MatMut;

@@ -16,9 +16,11 @@ mod channels;
 mod condense;
 pub mod delay;
 mod disturbance;
+mod experiment;
 mod factorisation;
 mod gram;
 mod hankel;
+mod hankel_layout;
 mod horizons;
 mod innovation;
 mod memory;
@@ -29,12 +31,14 @@ mod options;
 mod order;
 mod order_models;
 mod output_error;
+mod output_pair;
 mod parsim;
 mod pbsid;
 mod predictor_form;
 mod projected;
 mod projection;
 mod realisation;
+mod row_map;
 mod sensitivity;
 mod ssarx;
 pub mod stabilisation;
@@ -45,14 +49,16 @@ mod stream;
 mod tests;
 pub mod uncertainty;
 mod varx;
+mod view;
 
 pub use disturbance::{Line, amplitudes, harmonics, lines};
-pub use horizons::{AutomaticHorizon, HorizonReport, ScannedModel};
+pub use experiment::Experiment;
+pub use horizons::{HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
 pub use memory::ExperimentStream;
 pub use options::{
-    AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
-    SubspaceMethod, SubspaceOptions,
+    AutoOrder, AutomaticHorizon, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order,
+    OrderRule, Stability, SubspaceMethod, SubspaceOptions,
 };
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
@@ -67,19 +73,11 @@ pub use uncertainty::{
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use channels::{Channels, check_blocks};
-use factorisation::{HankelLayout, HankelLq};
+use factorisation::HankelLq;
 use faer::{Mat, MatRef, c64};
+use hankel_layout::HankelLayout;
 use output_error::{Base, Condense, Fitted};
 use projected::{Estimate, Projected};
-
-/// Records of one experiment: row k is time k.
-#[derive(Debug, Clone, Copy)]
-pub struct Experiment<'a> {
-    /// Inputs, N x m.
-    pub u: MatRef<'a, f64>,
-    /// Outputs, N x p.
-    pub y: MatRef<'a, f64>,
-}
 
 /// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon
 /// has orthonormal columns (with output scaling: of the scaled outputs); those of PBSIDopt and PARSIM-S those in which the
@@ -332,7 +330,7 @@ impl<'a> SubspaceData<'a> {
         Ok(SubspaceModel {
             model: delays.put_before(model)?,
             uncertainty,
-            innovation: delays.put_below(estimate.innovation.unscale(self.channels.y_scale())),
+            innovation: estimate.innovation.unscale(self.channels.y_scale()).beside_delays(delays.states()),
             initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
             singular_values: projected.singular_values().to_vec(),

@@ -1,6 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
-use super::{AutomaticHorizon, UncertaintyOptions};
+use super::UncertaintyOptions;
 use crate::{Error, Result};
 
 /// Choices of [`super::subspace`].
@@ -80,6 +80,22 @@ impl SubspaceOptions {
             Order::Fixed(order) => order,
             Order::Auto(auto) => auto.max,
         }
+    }
+}
+
+/// Choice of past and future by the data.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
+pub struct AutomaticHorizon {
+    /// Largest past to consider, block rows.
+    pub max: usize,
+}
+
+impl Default for AutomaticHorizon {
+    fn default() -> Self {
+        AutomaticHorizon { max: 60 }
     }
 }
 

@@ -12,7 +12,7 @@ use super::order::{ByModels, OrderValue, least, parameters};
 use super::output_error::prediction_errors;
 use super::projected::Projected;
 use super::{AutoOrder, Experiment, Innovation, NoInnovation, Order, OrderRule, SubspaceData, SubspaceModel};
-use super::{SubspaceOptions, UncertaintyOptions, channels::Signals};
+use super::{SubspaceOptions, UncertaintyOptions, view::Signals};
 use crate::identify::fit::reproduction;
 use crate::lti::simulate_best;
 use crate::{Error, Result};

@@ -5,12 +5,13 @@
 //! all that an experiment says about B and D, so that any number of experiments costs no more than one
 //! (SLICOT working note 2000-4, section 2.3, for one experiment). The coefficients of known disturbances stand beside x0.
 
-use super::channels::{Channels, Signals};
+use super::channels::Channels;
 use super::condense::Factors;
 use super::innovation::observer_gain;
-use super::realisation::OutputPair;
+use super::output_pair::OutputPair;
 use super::sensitivity::{Predictor, Unknowns, simulate};
 use super::stability::StabilityReport;
+use super::view::Signals;
 use super::{InitialState, SubspaceOptions};
 use crate::Result;
 use crate::linalg::{SequentialQr, block, leading_rank, least_squares};

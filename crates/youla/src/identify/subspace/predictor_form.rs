@@ -10,7 +10,7 @@
 use super::factorisation::HankelLq;
 use super::innovation::{self, Innovation};
 use super::order::Evidence;
-use super::realisation::OutputPair;
+use super::output_pair::OutputPair;
 use super::varx::{StateMap, Varx};
 use super::{SubspaceMethod, SubspaceOptions, parsim, pbsid, ssarx};
 use crate::error::OrderLimit;

@@ -4,18 +4,10 @@
 
 use super::SubspaceMethod;
 use super::hankel::HankelFactor;
+use super::output_pair::OutputPair;
 use crate::Result;
 use crate::linalg::{block, regress};
 use faer::{Mat, MatRef};
-
-/// The matrices through which the states are seen.
-#[derive(Clone)]
-pub(super) struct OutputPair {
-    /// State matrix, n x n.
-    pub(super) a: Mat<f64>,
-    /// Output matrix, p x n.
-    pub(super) c: Mat<f64>,
-}
 
 /// Sequences of the state equation `[x+; y] = [A; C] x + (..) U_f + [w; v]`, transposed: rows are directions.
 pub(super) struct StateSequences<'a> {

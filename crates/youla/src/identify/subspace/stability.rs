@@ -4,7 +4,7 @@
 //! modes change: with right and left eigenvectors v, w of A, `A+ = A + sum (z+ - z) v w' / (w' v)`.
 
 use super::Stability;
-use super::realisation::OutputPair;
+use super::output_pair::OutputPair;
 use crate::linalg::{check_finite, eigenvalues};
 use crate::lti::{Discrete, TimeDomain};
 use crate::{Error, Result};

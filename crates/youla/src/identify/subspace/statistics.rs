@@ -1,7 +1,7 @@
 //! What one pass over the records tells of each channel: that it is finite and moves, its mean, spread and scale.
 
 use super::ChannelScaling;
-use super::channels::View;
+use super::view::View;
 use crate::{Error, Result};
 use faer::ColRef;
 use rayon::prelude::*;

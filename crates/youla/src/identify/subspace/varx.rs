@@ -10,8 +10,9 @@
 //! regressed on the past needs the leading part of it, and a state `x(k) = T [z(k-p); ...; z(k-1)]` is known one sample
 //! later from the columns one block further on.
 
-use super::factorisation::{HankelLayout, HankelLq};
+use super::factorisation::HankelLq;
 use super::hankel::require_excitation;
+use super::hankel_layout::HankelLayout;
 use super::{DataFactor, Factorisation, SubspaceOptions};
 use crate::linalg::{leading_rank, least_squares};
 use crate::{Error, Result};

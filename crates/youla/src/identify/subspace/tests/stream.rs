@@ -113,7 +113,7 @@ fn batches_leave_no_seam() {
             })
             .collect();
         let gram = hankel.iter().fold(Mat::zeros(24, 24), |sum, h| sum + h.transpose() * h);
-        let r = triangle.arranged(super::super::factorisation::HankelLayout::InputsFirst, 3, 3).unwrap();
+        let r = triangle.arranged(super::super::hankel_layout::HankelLayout::InputsFirst, 3, 3).unwrap();
         let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
         assert!(error < 1e-12, "{factorisation:?}: {error:.1e}");
     }

@@ -7,9 +7,9 @@
 //! Intervals are percentiles over the records so simulated (Efron, Tibshirani, An introduction to the bootstrap, 1993,
 //! chapters 8 and 13). Each record has a random stream of its own, so that the result does not depend on the threads.
 
-use super::super::channels::Signals;
 use super::super::output_error::{Base, without_disturbances};
 use super::super::sensitivity::simulate;
+use super::super::view::Signals;
 use super::super::{Order, Stability, SubspaceData, SubspaceOptions};
 use super::band::{ModeBand, ResponseBand};
 use super::student::ellipse;

@@ -13,7 +13,7 @@
 //!
 //! This is a two-fold cross-validation (Stone, J. R. Stat. Soc. B 36, 111 (1974)) with a test of its outcome.
 
-use super::super::channels::Signals;
+use super::super::view::Signals;
 use super::super::{Experiment, InitialState, Order, Stability, SubspaceData, SubspaceOptions};
 use super::student::student;
 use super::{NoUncertainty, UncertaintyOptions};

@@ -11,8 +11,8 @@
 use super::super::channels::Channels;
 use super::super::factorisation::{BlockWeights, HankelLq};
 use super::super::output_error::Base;
+use super::super::output_pair::OutputPair;
 use super::super::projected::Projected;
-use super::super::realisation::OutputPair;
 use super::super::{Stability, SubspaceOptions, output_error, stability};
 use super::blocks::TimeBlock;
 use crate::linalg::{least_squares, observability, solve};

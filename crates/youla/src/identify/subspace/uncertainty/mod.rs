@@ -29,9 +29,9 @@ pub use response::{mode_change, response_changes};
 pub use student::{ellipse, student, two_sided_student};
 pub use zeros::zero_changes;
 
-use super::channels::View;
 use super::innovation::{Innovation, NoInnovation};
 use super::output_error::Base;
+use super::view::View;
 use super::{SubspaceData, SubspaceOptions};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, Result};

@@ -2,9 +2,9 @@
 //! of time, from one raised factor per block for all orders.
 
 use super::super::SubspaceData;
-use super::super::channels::View;
 use super::super::factorisation::BlockWeights;
 use super::super::projected::Projected;
+use super::super::view::View;
 use super::delta::covariance;
 use super::influence::STEP;
 use super::response::mode_change;

@@ -1,0 +1,12 @@
+//! A and C, which every estimate of B, D and the noise starts from.
+
+use faer::Mat;
+
+/// The matrices through which the states are seen.
+#[derive(Clone)]
+pub(super) struct OutputPair {
+    /// State matrix, n x n.
+    pub(super) a: Mat<f64>,
+    /// Output matrix, p x n.
+    pub(super) c: Mat<f64>,
+}

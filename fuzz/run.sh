@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Coverage-guided fuzzing of one reader on the stable toolchain: fuzz/run.sh NAME [RUNS], for example fuzz/run.sh mat 1000000.
-# The names are those of the folders of seeds, crates/youla/tests/readers/seeds. Needs a C++ compiler for libFuzzer.
+# The names are those of the folders of seeds, crates/youla-io/tests/seeds. Needs a C++ compiler for libFuzzer.
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")"
 name=${1:?which reader}
@@ -16,5 +16,5 @@ folder=${CARGO_TARGET_DIR:-target}
 found=$folder/corpus/$name
 mkdir -p "$found"
 # A megabyte per input of at most 4 kB is let through, a gigabyte is not.
-YOULA_READER=$name exec "$folder/$target/release/readers" "$found" "../crates/youla/tests/readers/seeds/$name" \
+YOULA_READER=$name exec "$folder/$target/release/readers" "$found" "../crates/youla-io/tests/seeds/$name" \
     -runs="$runs" -max_len=4096 -rss_limit_mb=1024 -malloc_limit_mb=512 -timeout=10 -print_final_stats=1

@@ -1,4 +1,4 @@
-"""Writes the seeds of the fuzz targets to crates/youla/tests/readers/seeds: synthetic, a few hundred bytes each.
+"""Writes the seeds of the fuzz targets to crates/youla-io/tests/seeds: synthetic, a few hundred bytes each.
 Needs numpy, scipy, h5py, pyarrow and polars; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
 import gzip, hashlib, io, json, pathlib
 import h5py
@@ -9,7 +9,7 @@ import pyarrow.parquet as pq
 from scipy.io import savemat
 
 root = pathlib.Path(__file__).resolve().parent.parent
-seeds = root / 'crates/youla/tests/readers/seeds'
+seeds = root / 'crates/youla-io/tests/seeds'
 
 
 def put(reader, name, data):
@@ -121,17 +121,17 @@ out = io.BytesIO()
 polars.from_arrow(log).write_parquet(out, compression='zstd')
 put('parquet', 'zstd.parquet', out.getvalue())
 put('run_toml', 'drive.toml', (root / 'examples/flexible-drive/run.toml').read_bytes())
-put('subspace_toml', 'options.toml', 'horizon = 20\nweight = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
+put('subspace_toml', 'options.toml', 'horizon = 20\nmethod = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
 put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = { fixed = 4 }\nstability = "allow"\n')
-for template in sorted((root / 'crates/youla/src/identify/greybox/declared/templates').glob('*.toml')):
+for template in sorted((root / 'crates/youla-greybox/src/declared/templates').glob('*.toml')):
     put('structure', template.name, template.read_bytes())
 put('structure', 'small.toml', 'sample_time = 0.1\na = [["sqrt(k) ^ -2 * pi", "exp(-m)"], [0, "atan(k / m)"]]\nb = [["1 / m"], [1]]\n'
     'c = [["(k - 2) * ratio", 0]]\n[parameters]\nk = { initial = 2.0, min = 0.0, unit = "N/m" }\nm = { initial = 1.0, fixed = true }\n'
     '[derived]\nratio = "k / m"\n')
 row = '3,0.5,0.1,100,1.5,1.6,hansen,ok,97.1,96.2,12,note'
 put('row', 'row.csv', f'{row},{hashlib.sha256(row.encode()).hexdigest()[:8]}')
-put('paper_toml', 'paper.toml', (root / 'crates/youla/assets/paper.toml').read_bytes())
-put('rig_toml', 'bearing.toml', (root / 'crates/youla/assets/bearing.toml').read_bytes())
+put('paper_toml', 'paper.toml', (root / 'crates/youla-paper/assets/paper.toml').read_bytes())
+put('rig_toml', 'bearing.toml', (root / 'crates/youla-paper/assets/bearing.toml').read_bytes())
 put('check_toml', 'check.toml', 'clipped_samples = 3\nlags = 20\nexcitation_order = 40\ncrest = 4.5\nsignificance = 1e-3\n[limits]\ny = [-1.0, 2.5]\n')
 channel = {'name': 'y', 'unit': 'um'}
 system = {'a': [[0.5, 0.1], [0, 0.25]], 'b': [[1.0], [0]], 'c': [[1, -1e-3]], 'd': [[0]]}

@@ -6,7 +6,7 @@ use super::signals::DeviationSignals;
 use super::stabilisation::diagram;
 use crate::{Error, Result};
 use youla::identify::hansen::{HansenModel, deviation_data};
-use youla::identify::innovation_form::hansen_structured;
+use youla::identify::hansen::hansen_structured;
 use youla::identify::subspace::SubspaceOptions;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla_greybox::hansen_refine::{RefinedHansen, Refinement, refine_hansen};

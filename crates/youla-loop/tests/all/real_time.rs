@@ -1,11 +1,8 @@
 //! The controller of `youla-rt` against the library: `J_K` (22) in closed loop, `beta = Mt y - Nt u` (28) under saturation.
 //!
 //! Distances are the largest difference relative to the largest value of a signal: 1e-12 in `f64`, 1e-5 in `f32`.
-#![allow(missing_docs)]
 
-mod common;
-
-use common::{TS, gains, normal, random_system, rng};
+use crate::common::{TS, gains, normal, random_system, rng};
 use faer::Scale;
 use youla::control::real_time_controller;
 use youla::factor::CoprimeFactors;

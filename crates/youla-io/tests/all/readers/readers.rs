@@ -6,11 +6,11 @@ use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
 use youla::signal::SampleStream;
 use youla_greybox::{Declaration, DeclaredStructure};
+use youla_io::export::ExportedController;
 use youla_io::{
     ChannelRef, CsvOptions, DecimalSign, NpyStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
     npz_from_bytes, parquet_from_bytes,
 };
-use youla_loop::redesign::ExportedController;
 use youla_paper::rig::RigParameters;
 use youla_paper::study::{PaperSettings, Row};
 use youla_report::{ReportData, html};

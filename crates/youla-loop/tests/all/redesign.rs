@@ -1,9 +1,6 @@
 //! A controller that is designed on an identified model meets the simulated rig: damping is measured before and after.
-#![allow(missing_docs)]
 
-mod common;
-
-use common::rng;
+use crate::common::{self, rng};
 use faer::Scale;
 use std::cell::Cell;
 use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, real_time_controller};
@@ -18,7 +15,9 @@ use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
 use youla::signal::Channel;
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, MatRef};
-use youla_loop::redesign::{ExportedController, Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
+use youla_io::SystemMatrices;
+use youla_io::export::{ExportedController, ObserverData};
+use youla_loop::redesign::{Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
 use youla_paper::rig::{
     Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, Rig, RigParameters,
     bearing_at_speed, degraded, run_experiment,
@@ -227,7 +226,16 @@ fn exported_data_are_the_controller() {
     for method in [RedesignMethod::Lqg, RedesignMethod::Youla] {
         let new = redesign(&problem, &RedesignOptions { method, ..Default::default() }).unwrap();
         assert!(new.band.is_none() && new.gains_damping(), "{method:?}");
-        let data = ExportedController::new(&new.controller, method, channels("u", "V"), channels("y", "um"));
+        let gains = new.controller.gains.as_ref();
+        let data = ExportedController {
+            method: method.key().into(),
+            ts: time.ts(),
+            measured: channels("y", "um"),
+            commanded: channels("u", "V"),
+            controller: SystemMatrices::new(&new.controller.system),
+            observer: gains.map(|g| ObserverData::new(&g.model, g.f.as_ref(), g.l.as_ref())),
+            q: new.controller.q.as_ref().map(SystemMatrices::new),
+        };
         let text = serde_json::to_string(&data).unwrap();
         let read: ExportedController = serde_json::from_str(&text).unwrap();
         assert_eq!(read, data);

@@ -1,6 +1,6 @@
 //! How a channel is chosen: by name or by column number, never by guessing.
 
-use crate::Result;
+use crate::error::Result;
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::fmt;
@@ -26,13 +26,13 @@ pub enum ChannelRef {
     Column(usize),
 }
 
-/// A channel of the record and where it comes from.
+/// A channel of the record and its column in the file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
     /// Name in the record.
     pub name: String,
-    /// Where it stands in the file; the column of the same name where nothing is stated.
+    /// Its column in the file; by default the column of the same name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub from: Option<ChannelRef>,
     /// Unit label such as `um` or `V`.
@@ -51,7 +51,7 @@ impl ChannelSpec {
         ChannelSpec { name: name.into(), from: Some(from), unit: unit.into() }
     }
 
-    /// Where the channel stands in the file.
+    /// The column of the channel in the file.
     pub fn source(&self) -> ChannelRef {
         self.from.clone().unwrap_or_else(|| ChannelRef::Name(self.name.clone()))
     }

@@ -1,4 +1,4 @@
-//! Everything that can go wrong with files of records and models, with the evidence.
+//! The errors of reading and writing files.
 
 use std::path::PathBuf;
 use youla::ErrorKind;
@@ -7,14 +7,14 @@ use youla::error::Seconds;
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Everything that can go wrong, with the evidence.
+/// An error of reading or writing a file, with its evidence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The method refused its input or its computation.
+    /// The method rejected its input, or a computation failed.
     #[error(transparent)]
     Method(#[from] youla::Error),
-    /// Something failed in a part of a larger task.
+    /// A part of a larger task failed.
     #[error("{part}: {source}")]
     Within {
         /// The part, in the words of the user, for example `[controller]`.
@@ -22,23 +22,23 @@ pub enum Error {
         /// What failed.
         source: Box<Error>,
     },
-    /// run.toml cannot be used.
+    /// A settings file cannot be used.
     #[error("{}{}: {problem}", path.display(), position(*at))]
     Settings {
-        /// Path of run.toml.
+        /// The settings file.
         path: PathBuf,
-        /// Where, `None` where the file as a whole is meant.
+        /// Position in the text; `None` for the file as a whole.
         at: Option<TextPosition>,
         /// What is wrong, and the nearest known key for a misspelt one.
         problem: String,
     },
-    /// The output folder holds something already.
+    /// The output folder exists and is not empty.
     #[error("{} exists already and is not empty; choose another output folder or remove it", path.display())]
     OutputExists {
         /// The folder.
         path: PathBuf,
     },
-    /// A file is there already.
+    /// The output file exists.
     #[error("{} exists already; choose another file, or replace it with --force", path.display())]
     FileExists {
         /// The file.
@@ -50,7 +50,7 @@ pub enum Error {
         /// The reason.
         source: serde_json::Error,
     },
-    /// A file or folder holds no model that could be read or exported.
+    /// A file or folder contains no model that can be read or exported.
     #[error("{}: {problem}", path.display())]
     NotAModel {
         /// The file or folder.
@@ -58,21 +58,21 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
-    /// The operating system refused to read or write a file.
+    /// The operating system failed to read or write a file.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// What the operating system says.
+        /// The error of the operating system.
         source: std::io::Error,
     },
-    /// There is no such file.
+    /// The file does not exist.
     #[error("{}: no such file", path.display())]
     MissingFile {
         /// The file.
         path: PathBuf,
     },
-    /// A file holds no samples.
+    /// A file contains no samples.
     #[error("{}: {problem}", path.display())]
     NoData {
         /// The file.
@@ -81,7 +81,7 @@ pub enum Error {
         problem: &'static str,
     },
     /// A cell of a text file is not a finite number.
-    #[error("{}, line {line}, column {column}: {text:?} is not a finite number", path.display())]
+    #[error("{}, line {line}, column {column}: {text:?} is not a finite number{}", path.display(), decimal_remedy(*decimal))]
     Cell {
         /// The file.
         path: PathBuf,
@@ -89,38 +89,14 @@ pub enum Error {
         line: usize,
         /// Name of the column, or `#` and its number.
         column: String,
-        /// What stands there.
+        /// Content of the cell, at most 40 characters.
         text: String,
-    },
-    /// A number of a text file is written with another decimal sign than the one that was declared.
-    #[error(
-        "{}, line {line}, column {column}: {text:?} has a decimal {found}, but the decimal sign is a {declared}; declare \
-         decimal = \"{found}\" if all numbers of the file are written so",
-        path.display()
-    )]
-    DecimalSign {
-        /// The file.
-        path: PathBuf,
-        /// Line, counted from 1 with comments and blank lines.
-        line: usize,
-        /// Name of the column, or `#` and its number.
-        column: String,
-        /// What stands there.
-        text: String,
-        /// The decimal sign that was declared, or the point by default.
-        declared: &'static str,
-        /// The decimal sign that the number has.
-        found: &'static str,
-    },
-    /// The comma is declared both as delimiter and as decimal sign.
-    #[error("{}: the comma cannot be both the delimiter and the decimal sign; declare another delimiter", path.display())]
-    CommaTwice {
-        /// The file.
-        path: PathBuf,
+        /// The decimal sign, `point` or `comma`, with which the cell is a number although the other sign is declared.
+        decimal: Option<&'static str>,
     },
     /// A line of a text file has more or fewer fields than the first one.
     #[error("{}, line {line}: {found} fields, but the first line has {expected}", path.display())]
-    RaggedRow {
+    FieldCount {
         /// The file.
         path: PathBuf,
         /// Line, counted from 1 with comments and blank lines.
@@ -130,38 +106,26 @@ pub enum Error {
         /// Fields on the first line.
         expected: usize,
     },
-    /// The delimiter of a text file does not follow from its first line.
-    #[error("{}, line {line}: the delimiter is not clear, the line holds {found}; state the delimiter", path.display())]
+    /// The delimiter of a text file is ambiguous.
+    #[error("{}: the delimiter is ambiguous: {problem}", path.display())]
     Delimiter {
         /// The file.
         path: PathBuf,
-        /// Line, counted from 1 with comments and blank lines.
-        line: usize,
-        /// The candidates that were found, in words.
-        found: String,
+        /// The conflict, with the line where there is one, and the setting that resolves it.
+        problem: String,
     },
-    /// A file is damaged, cut off or not of the format it claims.
-    #[error("{}, byte {offset}: expected {expected}", path.display())]
+    /// A file is damaged, truncated or not of the format that its first bytes state.
+    #[error("{}, {at}: expected {expected}", path.display())]
     Corrupt {
         /// The file.
         path: PathBuf,
-        /// Position in the file, counted from 0.
-        offset: u64,
-        /// What should stand there.
+        /// Where the damage was found.
+        at: CorruptAt,
+        /// What an undamaged file has there.
         expected: String,
     },
-    /// A gzip file is damaged or cut off.
-    #[error("{}: the gzip file is damaged or cut off after line {line}: {source}", path.display())]
-    CorruptGzip {
-        /// The file.
-        path: PathBuf,
-        /// Last line, counted from 1, that could be unpacked.
-        line: usize,
-        /// What the decoder says.
-        source: std::io::Error,
-    },
-    /// A file is of a format that this library does not read.
-    #[error("{}: {found}, which is not read; {remedy}", path.display())]
+    /// A file has a format that is not supported, or whose feature is off.
+    #[error("{}: {found} cannot be read; {remedy}", path.display())]
     FormatNotRead {
         /// The file.
         path: PathBuf,
@@ -182,19 +146,19 @@ pub enum Error {
         /// Samples of the other channels.
         expected: usize,
     },
-    /// A variable of a file is not of the kind that is needed, or cannot be written.
+    /// A variable of a file has the wrong type or size, or cannot be written.
     #[error("{}: {name} is {found}, but must be {must}", path.display())]
     WrongVariable {
         /// The file.
         path: PathBuf,
-        /// The variable as it was asked for.
+        /// The variable as it was requested.
         name: String,
         /// What it is.
         found: String,
         /// What it must be.
         must: &'static str,
     },
-    /// The time column is not uniform.
+    /// The steps of the time column are not uniform.
     #[error(
         "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s",
         Seconds(*dt), Seconds(*ts)
@@ -202,14 +166,14 @@ pub enum Error {
     NonUniformTime {
         /// The record or file.
         what: String,
-        /// First row, counted from 1, whose distance from the row before is wrong.
+        /// First row, counted from 1, whose distance from the row before differs from the sample time.
         row: usize,
         /// That distance in seconds.
         dt: f64,
         /// The sample time in seconds.
         ts: f64,
     },
-    /// Neither a sample time nor a time column was given.
+    /// Neither a sample time nor a time column is declared.
     #[error("{what}: the sample time is not known; state it in seconds or name the time column")]
     SampleTimeMissing {
         /// The record or file.
@@ -217,7 +181,7 @@ pub enum Error {
     },
 }
 
-/// A stream of samples from a file gives the errors of the method.
+/// A stream of samples reports its errors as errors of the method.
 impl From<Error> for youla::Error {
     fn from(error: Error) -> Self {
         match error {
@@ -228,12 +192,12 @@ impl From<Error> for youla::Error {
 }
 
 impl Error {
-    /// The same error, said of a part of a larger task.
+    /// The same error with the part of a larger task in which it occurred.
     pub fn within(self, part: impl Into<String>) -> Self {
         Error::Within { part: part.into(), source: Box::new(self) }
     }
 
-    /// Whether the input is at fault or the computation is impossible on it.
+    /// Whether the input is invalid or a computation failed.
     pub fn kind(&self) -> ErrorKind {
         match self {
             Error::Method(source) => source.kind(),
@@ -246,12 +210,9 @@ impl Error {
             | Error::MissingFile { .. }
             | Error::NoData { .. }
             | Error::Cell { .. }
-            | Error::DecimalSign { .. }
-            | Error::CommaTwice { .. }
-            | Error::RaggedRow { .. }
+            | Error::FieldCount { .. }
             | Error::Delimiter { .. }
             | Error::Corrupt { .. }
-            | Error::CorruptGzip { .. }
             | Error::FormatNotRead { .. }
             | Error::UnequalLength { .. }
             | Error::WrongVariable { .. }
@@ -262,7 +223,25 @@ impl Error {
     }
 }
 
-/// A place in a text file.
+/// Where a damaged file was found to be damaged.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CorruptAt {
+    /// Byte, counted from 0.
+    Byte(u64),
+    /// After this line, counted from 1, the last one that could be decompressed.
+    Line(usize),
+}
+
+impl std::fmt::Display for CorruptAt {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            CorruptAt::Byte(offset) => write!(f, "byte {offset}"),
+            CorruptAt::Line(line) => write!(f, "after line {line}"),
+        }
+    }
+}
+
+/// A position in a text file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TextPosition {
     /// Line, counted from 1.
@@ -272,8 +251,8 @@ pub struct TextPosition {
 }
 
 impl TextPosition {
-    /// The place of byte `offset` of a text; columns count characters. An offset that is no place of the text is its
-    /// end.
+    /// The position of byte `offset` of a text; columns count characters. An offset outside of the text, or inside of a
+    /// character, gives the end.
     pub fn of(text: &str, offset: usize) -> Self {
         let before = text.get(..offset).unwrap_or(text);
         let line = before.matches('\n').count() + 1;
@@ -284,4 +263,11 @@ impl TextPosition {
 /// `:line:column` where they are known.
 fn position(at: Option<TextPosition>) -> String {
     at.map_or(String::new(), |p| format!(":{}:{}", p.line, p.column))
+}
+
+/// The setting that makes a cell with the other decimal sign a number.
+fn decimal_remedy(decimal: Option<&str>) -> String {
+    let remedy =
+        |sign| format!(" with the declared decimal sign; set decimal = \"{sign}\" if the whole file uses the {sign}");
+    decimal.map_or(String::new(), remedy)
 }

@@ -1,6 +1,6 @@
 //! The run folder: written beside its final place and renamed when whole, so that nothing half-written looks finished.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use serde::Serialize;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub struct RunFolder {
 
 impl RunFolder {
     /// Whether `target` can become a run folder: it does not exist, is empty, or is to be replaced and is a run folder
-    /// (holds a summary.json). Nothing is written; ask before a long computation.
+    /// (contains a summary.json). Nothing is written; call it before a long computation.
     ///
     /// # Errors
     /// [`Error::OutputExists`]; [`Error::Io`] where it cannot be read or is a file.
@@ -50,7 +50,7 @@ impl RunFolder {
         Ok(folder)
     }
 
-    /// Writes a file by `write`, which is told where; its folder is made. Errors name the file by its final place.
+    /// Writes a file by `write`, which is called with its temporary path; creates its folder. Errors state the final path.
     ///
     /// # Errors
     /// [`Error::Io`], and those of `write`.
@@ -101,7 +101,7 @@ impl RunFolder {
     /// [`Error::Io`].
     pub fn finish(mut self) -> Result<PathBuf> {
         let io = |source| Error::Io { path: self.target.clone(), source };
-        // The old run goes only when the new one is in its place.
+        // The old run is removed after the new one is in its place.
         let old = self.partial.with_extension("old");
         if self.replace {
             fs::rename(&self.target, &old).map_err(io)?;
@@ -141,7 +141,7 @@ pub fn replace_file(path: &Path, text: &str) -> Result<()> {
     })
 }
 
-/// Refuses names that a folder holds already.
+/// Rejects names of files that exist in a folder.
 ///
 /// # Errors
 /// [`Error::FileExists`] with the first.

@@ -1,36 +1,31 @@
 //! MATLAB files of version 7.3 (`save -v7.3`), which are HDF5 files: real arrays of any class, text, and structs of them.
 //!
-//! Source: The MathWorks, "MAT-File Versions"; the attribute `MATLAB_class` of each array names its class, and its sizes stand in
-//! reverse, so that the numbers are by column. An array without that attribute, from another program, is by row. Sizes are believed
-//! only as far as the file could fill them: deflate packs at most 1032 bytes into one.
+//! Source: The MathWorks, "MAT-File Versions"; the attribute `MATLAB_class` of each array names its class, and its sizes are in
+//! reverse order, so the numbers are by column. An array without that attribute, from another program, is by row. Declared sizes
+//! above 32 MB + 1032 x file size are rejected.
 
-use super::{Value, Variable, Variables, believable};
-use crate::{Error, Result};
+use crate::error::{CorruptAt, Error, Result};
+use crate::limits::declared_limit;
+use crate::values::{Value, Variable, Variables};
 use hdf5_pure::{AttrValue, DType, Dataset, File, Group};
 use std::collections::HashMap;
 use std::path::Path;
 
-/// Structs inside of each other; a file deeper than this is refused.
+/// Largest nesting of structs.
 const MAX_DEPTH: usize = 32;
-/// Arrays and structs of a file; links may lead to one many times.
+/// Largest number of arrays and structs of a file; links may lead to one many times.
 const MOST_VALUES: usize = 10_000;
 /// Longest name of a variable or field, in bytes.
 const LONGEST_NAME: usize = 1024;
-/// Bytes of numbers that any file may hold.
-const SPARE: u64 = 1 << 25;
-
-/// Whether the bytes begin as those of an HDF5 file, perhaps behind the header of MATLAB.
-pub(super) fn is_hdf(bytes: &[u8]) -> bool {
-    const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
-    bytes.starts_with(MAGIC) || bytes.get(512..).is_some_and(|rest| rest.starts_with(MAGIC))
-}
+/// Bytes of numbers that any file may declare.
+const BASE: u64 = 1 << 25;
 
 /// The variables of a file that is in memory; `path` is named in errors.
 ///
 /// # Errors
-/// [`Error::Corrupt`] for a damaged file and for one that announces more than it can hold.
+/// [`Error::Corrupt`] for a damaged file and for one that declares more numbers than it can contain.
 pub(super) fn hdf_from_bytes(bytes: &[u8], path: &Path) -> Result<Variables> {
-    let numbers = believable(SPARE, bytes.len() as u64);
+    let numbers = declared_limit(BASE, bytes.len() as u64);
     let mut budget = Budget { values: MOST_VALUES, numbers };
     let mut read = || {
         let file = File::from_bytes(bytes.to_vec()).map_err(damaged)?;
@@ -41,7 +36,7 @@ pub(super) fn hdf_from_bytes(bytes: &[u8], path: &Path) -> Result<Variables> {
             let variables = members.into_iter().map(|(name, value)| Variable { name, value });
             Ok(Variables::new(path, variables.collect()))
         }
-        Err(expected) => Err(Error::Corrupt { path: path.to_owned(), offset: 0, expected }),
+        Err(expected) => Err(Error::Corrupt { path: path.to_owned(), at: CorruptAt::Byte(0), expected }),
     }
 }
 
@@ -52,7 +47,7 @@ fn damaged(error: hdf5_pure::Error) -> Fault {
     format!("a readable HDF5 file ({error})")
 }
 
-/// What may still be read.
+/// The remaining number of values and bytes.
 struct Budget {
     values: usize,
     /// Bytes of numbers.
@@ -106,13 +101,13 @@ impl Budget {
         let mut dims = self.sizes(dataset)?;
         let data = dataset.read_f64().map_err(damaged)?;
         if set("MATLAB_empty") {
-            // The numbers are the sizes of an array that holds none.
+            // The numbers are the sizes of an empty array.
             dims = data.iter().map(|x| *x as usize).collect();
             let empty = dims.len() >= 2 && dims.contains(&0);
             return if empty { Ok(Value::Real { dims, data: Vec::new() }) } else { Err("an empty array".into()) };
         }
         if data.len() != dims.iter().product::<usize>() {
-            return Err(format!("an array with as many numbers as its sizes say, not {}", data.len()));
+            return Err(format!("as many numbers as the sizes of the array state, not {}", data.len()));
         }
         match class {
             Some("char") => Ok(text(&reversed(dims), &data)),
@@ -121,14 +116,13 @@ impl Budget {
         }
     }
 
-    /// Sizes as they stand in the file; the numbers are counted.
+    /// Sizes in the order of the file; their product is charged to the budget.
     fn sizes(&mut self, dataset: &Dataset) -> Result<Vec<usize>, Fault> {
         let shape = dataset.shape().map_err(damaged)?;
         let size = dataset.element_size().map_err(damaged)?.max(8);
         let bytes = shape.iter().try_fold(size, |product, &n| product.checked_mul(n));
         let left = bytes.and_then(|bytes| self.numbers.checked_sub(bytes));
-        self.numbers =
-            left.ok_or_else(|| format!("arrays that a file of this size can hold, not one of sizes {shape:?}"))?;
+        self.numbers = left.ok_or_else(|| format!("array sizes that fit a file of this size, not {shape:?}"))?;
         shape.into_iter().map(|n| usize::try_from(n).map_err(|_| "sizes that fit into memory".to_owned())).collect()
     }
 }
@@ -237,7 +231,7 @@ mod tests {
     #[test]
     fn files_of_another_writer_are_read() {
         let seed = |bytes: &[u8]| mat_from_bytes(bytes, "log.mat");
-        let file = seed(include_bytes!("../../tests/readers/seeds/mat73/structs.mat")).unwrap();
+        let file = seed(include_bytes!("../tests/seeds/mat73/structs.mat")).unwrap();
         assert_eq!((file.column("x(:,2)").unwrap(), file.scalar("ts").unwrap()), (vec![3.0, 4.0, 5.0], 5e-4));
         assert_eq!(file.get("name").unwrap(), &Value::text("rig"));
         assert_eq!(file.get("none").unwrap(), &Value::Real { dims: vec![0, 0], data: Vec::new() });
@@ -245,11 +239,11 @@ mod tests {
             (file.column("Data.u").unwrap(), file.column("Data.y").unwrap()),
             (vec![0.0, 1.0, 2.0, 3.0], vec![0.0, 1.0, 2.0, 3.0])
         );
-        let packed = seed(include_bytes!("../../tests/readers/seeds/mat73/chunks.mat")).unwrap();
+        let packed = seed(include_bytes!("../tests/seeds/mat73/chunks.mat")).unwrap();
         assert_eq!(packed.column("x").unwrap(), (0..1011).map(f64::from).collect::<Vec<_>>());
         // Cut out of a larger file: the addresses in it lead elsewhere.
-        assert!(seed(include_bytes!("../../tests/readers/seeds/mat73/rows.h5")).is_err());
-        let cycle = seed(include_bytes!("../../tests/readers/seeds/mat73/cycle.mat")).unwrap_err().to_string();
+        assert!(seed(include_bytes!("../tests/seeds/mat73/rows.h5")).is_err());
+        let cycle = seed(include_bytes!("../tests/seeds/mat73/cycle.mat")).unwrap_err().to_string();
         assert!(cycle.contains("structs of at most 32 levels"), "{cycle}");
     }
 

@@ -1,17 +1,54 @@
-//! Records and models to and from files: CSV, MATLAB, NumPy, HDF5 and Parquet in; C, Python, MATLAB and JSON out.
+//! Files of measured records and of models.
 //!
-//! A file is read once, checked once and trusted afterwards. Nothing is repaired on the way: a gap, a NaN or an unequal
-//! length is an error that says where it is.
+//! A reader turns a file into a [`youla::signal::Record`] or refuses it: a gap in time, a cell that is not a finite number, or
+//! channels of unequal length is an error that states the file, the line or byte, and the setting to change. Nothing is
+//! repaired, resampled or guessed; channels are chosen by name or column number.
+//!
+//! | module or item | content |
+//! |---|---|
+//! | [`Source`], [`read`] | one description of a recorded file: path, format, time, channels |
+//! | [`read_csv`], [`CsvStream`], [`write_csv`] | text: comma, semicolon, tab or blanks, plain or gzip |
+//! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
+//! | [`read_npz`], [`NpyStream`] | NumPy archives and arrays |
+//! | [`read_parquet`] | Parquet, with the feature `parquet` |
+//! | [`Variables`] | the contents of a MATLAB, NumPy or Parquet file, by path |
+//! | [`survey`] | the columns of a file before any is chosen |
+//! | [`ModelFile`] | the JSON form of a discrete-time model |
+//! | [`export`] | models, controllers and sequences for C, Python, MATLAB; import of models |
+//! | [`folder`] | a folder of results that appears only when it is complete |
+//! | [`toml_file`] | settings in TOML, with errors that state line, column and key |
+//!
+//! The features `mat73` and `parquet` are off by default; a file of a disabled format is refused with the name of its feature.
+//!
+//! ```
+//! use youla_io::{ChannelSpec, CsvOptions, TimeSource, csv_from_bytes};
+//! let text = b"t,u,y\n0.0,1,0.2\n0.1,-1,0.4\n0.2,1,0.3\n";
+//! let channels = ["u", "y"].map(ChannelSpec::named);
+//! let time = TimeSource::column("t".parse()?);
+//! let record = csv_from_bytes(text, "log.csv", &channels, &time, &CsvOptions::default())?;
+//! assert_eq!((record.samples(), record.time().ts()), (3, 0.1));
+//! assert_eq!(record.column("y")?, [0.2, 0.4, 0.3]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 
+mod assemble;
 mod choose;
 mod csv;
+#[cfg(not(all(feature = "mat73", feature = "parquet")))]
+mod disabled;
 mod error;
 pub mod export;
 pub mod folder;
+#[cfg(feature = "mat73")]
 mod hdf;
+mod limits;
 mod matfile;
+mod matrices;
+mod model_file;
 mod npy;
 mod npz;
+mod open;
+#[cfg(feature = "parquet")]
 mod parquet;
 #[cfg(test)]
 pub(crate) mod scratch;
@@ -22,33 +59,20 @@ pub mod toml_file;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
-pub(crate) use csv::csv_to_bytes;
 pub use csv::{CsvOptions, CsvStream, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
-pub use error::{Error, Result, TextPosition};
-pub(crate) use matfile::mat_to_bytes;
+#[cfg(not(feature = "mat73"))]
+use disabled::hdf;
+#[cfg(not(feature = "parquet"))]
+use disabled::parquet;
+pub use error::{CorruptAt, Error, Result, TextPosition};
 pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
-pub use npy::NpyStream;
-pub use npy::is_npy;
+pub use matrices::{Rows, SystemMatrices};
+pub use model_file::ModelFile;
+pub use npy::{NpyStream, is_npy};
 pub use npz::{npz_from_bytes, read_npz};
+pub use open::open;
 pub use parquet::{parquet_from_bytes, read_parquet};
 pub use source::{Format, Source, read, read_parts, sha256};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource};
 pub use values::{Value, Variable, Variables};
-
-use std::{fs::File, io::ErrorKind, path::Path};
-
-/// Opens a file to read; a missing file has an error of its own.
-pub fn open(path: &Path) -> Result<File> {
-    File::open(path).map_err(|source| match source.kind() {
-        ErrorKind::NotFound => Error::MissingFile { path: path.to_owned() },
-        _ => Error::Io { path: path.to_owned(), source },
-    })
-}
-
-/// The bytes of numbers that a file or a part of one may announce: `spare`, and for each of its own what deflate packs into one at
-/// most. Other packings put more into a byte where numbers repeat, hence what is spare.
-fn believable(spare: u64, bytes: u64) -> u64 {
-    const UNPACKED: u64 = 1032;
-    spare.saturating_add(UNPACKED.saturating_mul(bytes))
-}

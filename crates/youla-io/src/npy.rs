@@ -2,9 +2,10 @@
 //!
 //! Source: NumPy, "NEP 1, A simple file format for NumPy arrays", versions 1 to 3.
 
-use crate::ChannelRef;
+use crate::choose::ChannelRef;
+use crate::error::{CorruptAt, Error, Result};
 use crate::npz::{Header, MAGIC, decode, element_size, header};
-use crate::{Error, Result};
+use crate::open::open;
 use faer::MatMut;
 use std::fs::File;
 use std::io::{ErrorKind, Read, Seek, SeekFrom};
@@ -44,8 +45,8 @@ impl NpyStream {
     /// [`youla::Error::UnknownChannel`], [`youla::Error::DuplicateChannel`].
     pub fn open(path: impl AsRef<Path>, inputs: &[ChannelRef], outputs: &[ChannelRef]) -> Result<Self> {
         let path = path.as_ref().to_owned();
-        let mut file = crate::open(&path)?;
-        let corrupt = |offset, expected| Error::Corrupt { path: path.clone(), offset, expected };
+        let mut file = open(&path)?;
+        let corrupt = |offset, expected| Error::Corrupt { path: path.clone(), at: CorruptAt::Byte(offset), expected };
         let io = |source| Error::Io { path: path.clone(), source };
         let Header { descr, fortran_order, shape } = header(&mut file).map_err(|expected| corrupt(0, expected))?;
         let start = file.stream_position().map_err(io)?;
@@ -147,7 +148,7 @@ impl NpyStream {
 /// Whether a file begins as NumPy arrays do.
 pub fn is_npy(path: &Path) -> Result<bool> {
     let mut start = Vec::new();
-    let read = crate::open(path)?.take(MAGIC.len() as u64).read_to_end(&mut start);
+    let read = open(path)?.take(MAGIC.len() as u64).read_to_end(&mut start);
     read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
     Ok(start == MAGIC)
 }
@@ -275,7 +276,9 @@ mod tests {
             "{error}"
         );
         let cut = npy(1, "<f8", false, "(1000, 3)", &good[..good.len() - 8]);
-        assert!(matches!(run(&cut, 2), Error::Corrupt { offset, .. } if offset == cut.len() as u64));
+        assert!(
+            matches!(run(&cut, 2), Error::Corrupt { at: CorruptAt::Byte(offset), .. } if offset == cut.len() as u64)
+        );
         assert!(matches!(run(&npy(1, "<f8", false, "(1000, 2)", &good), 2), Error::Corrupt { .. }));
         assert!(matches!(
             run(&npy(1, "<f8", false, "(1000, 3)", &good), 4),
@@ -289,6 +292,6 @@ mod tests {
         assert!(matches!(run(&npy(1, "<c16", false, "(500, 3)", &good), 2), Error::WrongVariable { .. }));
         assert!(matches!(run(&npy(4, "<f8", false, "(1000, 3)", &good), 2), Error::Corrupt { .. }));
         assert!(matches!(run(&npy(1, "<f8", false, "(0, 3)", &[]), 2), Error::NoData { .. }));
-        assert!(matches!(run(b"t,u,y\n1,2,3\n", 2), Error::Corrupt { offset: 0, .. }));
+        assert!(matches!(run(b"t,u,y\n1,2,3\n", 2), Error::Corrupt { at: CorruptAt::Byte(0), .. }));
     }
 }

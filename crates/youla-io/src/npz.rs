@@ -3,8 +3,9 @@
 //! Source: NumPy, "NEP 1, A simple file format for NumPy arrays", versions 1 to 3. An archive is a zip file of `.npy`
 //! entries, each a magic string, a Python dictionary of type, order and shape, and the numbers.
 
-use super::{Value, Variable, Variables};
-use crate::{Error, Result};
+use crate::error::{CorruptAt, Error, Result};
+use crate::open::open;
+use crate::values::{Value, Variable, Variables};
 use std::io::{BufReader, Cursor, Read, Seek};
 use std::ops::Range;
 use std::path::Path;
@@ -25,11 +26,11 @@ const LONGEST_HEADER: usize = 1 << 16;
 /// ```no_run
 /// use youla_io::{ChannelSpec, TimeSource, read_npz};
 /// let record = read_npz("run.npz")?.record(&["u", "y"].map(ChannelSpec::named), &TimeSource::ts(1e-3))?;
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn read_npz(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    variables(BufReader::new(super::open(path)?), path)
+    variables(BufReader::new(open(path)?), path)
 }
 
 /// The arrays of a NumPy archive that is in memory; `path` is named in errors.
@@ -41,7 +42,7 @@ pub fn npz_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables>
 }
 
 fn variables(file: impl Read + Seek, path: &Path) -> Result<Variables> {
-    let corrupt = |offset, expected| Error::Corrupt { path: path.to_owned(), offset, expected };
+    let corrupt = |offset, expected| Error::Corrupt { path: path.to_owned(), at: CorruptAt::Byte(offset), expected };
     let mut archive = ZipArchive::new(file).map_err(|e| corrupt(0, format!("a NumPy archive: {e}")))?;
     let mut variables = Vec::new();
     let mut taken: Vec<Range<u64>> = Vec::new();
@@ -96,7 +97,7 @@ fn array(reader: &mut impl Read) -> Result<Value, String> {
     Ok(Value::Real { dims: vec![rows, columns], data })
 }
 
-/// Reads what stands before the numbers; the error says what was expected.
+/// Reads the header before the numbers; the error states what was expected.
 pub(super) fn header(reader: &mut impl Read) -> Result<Header, String> {
     let magic = body_part(reader, MAGIC.len() + 2)?;
     if !magic.starts_with(MAGIC) {
@@ -234,7 +235,7 @@ mod tests {
             let bytes = archive(&[("x.npy", npy("<f8", "False", shape, &[0; 8]))], zip::CompressionMethod::Stored);
             assert!(matches!(read_bytes(&bytes), Err(Error::Corrupt { .. })), "{shape}");
         }
-        assert!(matches!(read_bytes(b"no archive"), Err(Error::Corrupt { offset: 0, .. })));
+        assert!(matches!(read_bytes(b"no archive"), Err(Error::Corrupt { at: CorruptAt::Byte(0), .. })));
     }
 
     static SAMPLE: LazyLock<Vec<u8>> = LazyLock::new(sample);

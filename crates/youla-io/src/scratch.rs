@@ -24,12 +24,10 @@ pub(crate) fn scratch(extension: &str) -> Scratch {
     Scratch(std::env::temp_dir().join(format!("youla-{}-{number}.{extension}", std::process::id())))
 }
 
-/// The folder of measured data beside the workspace, if it is there.
-pub(crate) fn data_folder() -> Option<PathBuf> {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    if folder.is_dir() {
-        return Some(folder);
-    }
-    println!("skipped: the folder of measured data ../shared/data is absent");
-    None
+/// The folder of measured data: `YOULA_DATA`, or `../shared/data` beside the workspace.
+pub(crate) fn data_folder() -> PathBuf {
+    let beside = || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
+    let folder = std::env::var_os("YOULA_DATA").map_or_else(beside, PathBuf::from);
+    assert!(folder.is_dir(), "the measured data are not at {}", folder.display());
+    folder
 }

@@ -1,9 +1,14 @@
 //! One description of a recorded file for the library, configuration files and the program.
 
-use super::csv::{only, read_csv_parts};
-use super::parquet;
-use super::{ChannelSpec, CsvOptions, TimeSource, read_mat, read_npz};
-use crate::{Error, Result};
+use crate::assemble::only;
+use crate::choose::ChannelSpec;
+use crate::csv::{CsvOptions, read_csv_parts};
+use crate::error::{Error, Result};
+use crate::matfile::read_mat;
+use crate::npz::read_npz;
+use crate::open::open;
+use crate::parquet;
+use crate::time::TimeSource;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 use std::io::Read;
@@ -17,13 +22,13 @@ pub enum Format {
     /// By the first bytes of the file (MATLAB, HDF5, zip, Parquet), else text.
     #[default]
     Detect,
-    /// Text, see [`super::read_csv`].
+    /// Text, see [`crate::read_csv`].
     Csv,
     /// MATLAB version 5, see [`read_mat`].
     Mat,
     /// NumPy archive, see [`read_npz`].
     Npz,
-    /// Parquet, see [`super::read_parquet`].
+    /// Parquet, see [`crate::read_parquet`].
     Parquet,
 }
 
@@ -65,12 +70,12 @@ pub struct Source {
 /// Reads a record as described.
 ///
 /// # Errors
-/// Those of [`super::read_csv`], [`read_mat`], [`read_npz`] and [`super::Variables::record`].
+/// Those of [`crate::read_csv`], [`read_mat`], [`read_npz`] and [`crate::Variables::record`].
 pub fn read(source: &Source) -> Result<Record> {
     only(read_parts(source)?)
 }
 
-/// Reads a record as described, cut where its time column has gaps if [`super::Gaps::Split`] says so: together the records
+/// Reads a record as described, cut where its time column has gaps if [`crate::Gaps::Split`] says so: together the records
 /// hold all rows of the file in order.
 ///
 /// # Errors
@@ -97,7 +102,7 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
 /// [`Error::MissingFile`], [`Error::Io`].
 pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
     let path = path.as_ref();
-    let mut file = super::open(path)?;
+    let mut file = open(path)?;
     let mut hash = Sha256::new();
     let mut buffer = vec![0; 1 << 16];
     loop {
@@ -115,11 +120,11 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
         return Ok(source.format);
     }
     let mut start = Vec::new();
-    let read = super::open(&source.path)?.take(8).read_to_end(&mut start);
+    let read = open(&source.path)?.take(8).read_to_end(&mut start);
     read.map_err(|e| Error::Io { path: source.path.clone(), source: e })?;
     Ok(match &start[..] {
         [b'P', b'K', 3, 4, ..] => Format::Npz,
-        start if start.starts_with(parquet::MAGIC) => Format::Parquet,
+        start if start.starts_with(b"PAR1") => Format::Parquet,
         start if start.starts_with(b"MATLAB") || start.starts_with(b"\x89HDF") => Format::Mat,
         _ if source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) => Format::Mat,
         _ => Format::Csv,

@@ -1,11 +1,14 @@
-//! What a file offers before anything is chosen from it: its columns, their range and which of them could be a clock.
+//! The columns of a file before any is chosen: their range, and which of them can be a time column.
 
-use super::csv::{column_names, read_csv};
-use super::source::{Format, resolve};
-use super::{
-    ChannelRef, ChannelSpec, CsvOptions, Source, TimeSource, Value, Variables, read_mat, read_npz, read_parquet,
-};
-use crate::Result;
+use crate::choose::{ChannelRef, ChannelSpec};
+use crate::csv::{CsvOptions, column_names, read_csv};
+use crate::error::Result;
+use crate::matfile::read_mat;
+use crate::npz::read_npz;
+use crate::parquet::read_parquet;
+use crate::source::{Format, Source, resolve};
+use crate::time::TimeSource;
+use crate::values::{Value, Variables};
 use std::path::Path;
 
 /// Most columns of a matrix in a file that are listed one by one.
@@ -19,7 +22,7 @@ const UNIFORM: f64 = 1e-3;
 pub struct SurveyedColumn {
     /// How it is chosen: a name, `#3`, or a path such as `Data.signals.u`.
     pub from: String,
-    /// What it holds, or why it cannot be a channel.
+    /// Its content, or the reason why it cannot be a channel.
     pub content: std::result::Result<ColumnContent, String>,
 }
 
@@ -39,7 +42,7 @@ pub struct ColumnContent {
 /// Lists the columns of a file; `csv` says how a text file is to be read.
 ///
 /// # Errors
-/// As [`super::read`], but for columns that hold something else than finite numbers: these say so themselves.
+/// As [`crate::read`], except for columns with cells that are not finite numbers: [`SurveyedColumn::content`] states those.
 ///
 /// ```
 /// let file = std::env::temp_dir().join("youla-survey-example.csv");

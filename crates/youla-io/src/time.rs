@@ -1,7 +1,7 @@
 //! The sample time of a file: declared, taken from a time column, or both, in which case they must agree.
 
-use super::ChannelRef;
-use crate::{Error, Result};
+use crate::choose::ChannelRef;
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use youla::lti::Discrete;
 
@@ -25,10 +25,10 @@ pub struct TimeSource {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Gaps {
-    /// Refuse the file and name the row.
+    /// Reject the file with the row of the gap.
     #[default]
     Refuse,
-    /// Cut it there into records of their own. Steps that are too short, or go back, are refused as before.
+    /// Split the file there into separate records. Steps that are too short or negative are rejected.
     Split,
 }
 
@@ -72,7 +72,7 @@ impl TimeSource {
         }
     }
 
-    /// The same from a time column of any length, value by value; the steps are held against the median of the first 65536.
+    /// The same from a time column of any length, value by value; the steps are compared with the median of the first 65536.
     ///
     /// # Errors
     /// As [`TimeSource::resolve`].
@@ -112,7 +112,7 @@ impl TimeSource {
         let parts = self.parts(what, times, middle)?;
         let ends = parts.iter().skip(1).map(|part| part.0).chain([times.len()]);
         let ranges = parts.iter().map(|part| part.0).zip(ends);
-        // The longest part knows the sample time best.
+        // The longest part gives the most accurate sample time.
         let (from, to) = ranges.fold((0, 0), |best, r| if r.1 - r.0 > best.1 - best.0 { r } else { best });
         let ts = if to - from > 1 { mean_step(times[from], times[to - 1], to - from) } else { middle };
         Ok(Clock { time: Discrete::new(ts)?, parts })

@@ -1,7 +1,7 @@
 //! A file of settings as text: errors with line, column and key, and the nearest known name for a misspelt one.
 
 use crate::error::TextPosition;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
@@ -36,7 +36,7 @@ fn nearest_name(message: &str) -> Option<String> {
     Some(format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})"))
 }
 
-/// The dotted key whose value stands at this place of the text.
+/// The dotted key of the value at this position of the text.
 fn key_at(text: &str, offset: usize) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
     let keys = path_to(document.get_ref(), offset)?;

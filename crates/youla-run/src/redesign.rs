@@ -11,7 +11,8 @@ use std::f64::consts::TAU;
 use youla::identify::hansen::HansenModel;
 use youla::lti::{SharedMode, frequency_response};
 use youla::validate::ExactCertificate;
-use youla_io::export::{ExportedController, FilterData, ObserverData};
+use youla_io::SystemMatrices;
+use youla_io::export::{ExportedController, ObserverData};
 use youla_loop::redesign::{Candidate, LoopFigures, Redesign, RedesignMethod, RedesignProblem, redesign};
 use youla_report::data as draw;
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
@@ -47,9 +48,9 @@ pub(super) fn exported(records: &RunRecords, redesign: &Redesign) -> ExportedCon
         ts: new.system.time().ts(),
         measured: y,
         commanded: u,
-        controller: FilterData::new(&new.system),
+        controller: SystemMatrices::new(&new.system),
         observer: new.gains.as_ref().map(|g| ObserverData::new(&g.model, g.f.as_ref(), g.l.as_ref())),
-        q: new.q.as_ref().map(FilterData::new),
+        q: new.q.as_ref().map(SystemMatrices::new),
     }
 }
 

@@ -99,7 +99,7 @@ pub fn long_model_file(
     let subspace = SubspaceDetails::from(&model.found);
     let details = to_value(&LongDetails { subspace, fit: &model.found.fit, samples: model.samples })?;
     let ports = (model.inputs.clone(), model.outputs.clone());
-    ModelFile::new("subspace", &model.found.model, ports, details, provenance)
+    Ok(ModelFile::new("subspace", &model.found.model, ports, details, provenance)?)
 }
 
 /// Reads options for the identification from a TOML file.

@@ -160,9 +160,9 @@ fn the_new_controller_is_exported_with_its_promise() {
     let model: ModelFile =
         serde_json::from_str(&fs::read_to_string(demo().join("8-redesign/new_controller.json")).expect("readable"))
             .expect("a model");
-    assert_eq!((&data.controller.a, &data.controller.c), (&model.a, &model.c));
+    assert_eq!((&data.controller.a, &data.controller.c), (&model.matrices.a, &model.matrices.c));
     let observer = data.observer.expect("LQG has an observer form");
-    assert_eq!((observer.a.len(), observer.f.len(), observer.l[0].len()), (6, 2, 2));
+    assert_eq!((observer.model.a.len(), observer.f.len(), observer.l[0].len()), (6, 2, 2));
     let source = fs::read_to_string(demo().join("8-redesign/controller.rs")).expect("readable");
     assert!(source.contains("pub const OBSERVER: Matrices<f64, 6, 2, 2> = Matrices {"), "{source}");
     assert!(source.contains(&format!("{:?}", observer.f[0][0])), "{source}");

@@ -1,6 +1,7 @@
-//! The lines of a text file that hold data, with their numbers, through gzip where the file is compressed.
+//! The data lines of a text file with their line numbers, through gzip for a compressed file.
 
-use crate::{Error, Result};
+use crate::error::{CorruptAt, Error, Result};
+use crate::open::open;
 use flate2::bufread::MultiGzDecoder;
 use std::io::{BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
@@ -15,16 +16,16 @@ pub(super) struct Lines {
     gzip: bool,
     line: Vec<u8>,
     number: usize,
-    /// The current line is to be handed out again.
+    /// The next call of [`Lines::advance`] returns the current line again.
     held: bool,
 }
 
 impl Lines {
     pub(super) fn open(path: &Path) -> Result<Lines> {
-        Self::over(path, BufReader::with_capacity(BUFFER, crate::open(path)?))
+        Self::over(path, BufReader::with_capacity(BUFFER, open(path)?))
     }
 
-    /// The lines of what stands in a file or in memory; `path` is named in errors.
+    /// The lines of a file or of bytes in memory; `path` is named in errors.
     pub(super) fn over(path: &Path, mut file: impl BufRead + Send + 'static) -> Result<Lines> {
         let start = file.fill_buf().map_err(|source| Error::Io { path: path.to_owned(), source })?;
         if start.is_empty() {
@@ -97,7 +98,8 @@ fn unpacked(file: impl BufRead + Send + 'static, gzip: bool) -> Box<dyn BufRead 
 fn read_error(path: &Path, gzip: bool, line: usize, source: std::io::Error) -> Error {
     let damaged = matches!(source.kind(), ErrorKind::InvalidInput | ErrorKind::InvalidData | ErrorKind::UnexpectedEof);
     if gzip && damaged {
-        Error::CorruptGzip { path: path.to_owned(), line, source }
+        let expected = format!("an undamaged gzip file up to its end ({source})");
+        Error::Corrupt { path: path.to_owned(), at: CorruptAt::Line(line), expected }
     } else {
         Error::Io { path: path.to_owned(), source }
     }

@@ -1,14 +1,14 @@
 //! From lines to cells, and from the chosen cells to numbers.
 
 use super::lines::Lines;
-use super::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
-use crate::{Error, Result};
+use super::options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
+use crate::error::{Error, Result};
 use std::collections::HashSet;
 
-/// Most columns of a table. Rows are samples; a packed file of some kilobytes may hold millions of cells on one line.
+/// Most columns of a table. Rows are samples; a compressed file of some kilobytes may contain millions of cells on one line.
 const MOST_COLUMNS: usize = 1 << 16;
 
-/// The form of a text file: its columns and what stands between them.
+/// The dialect of a text file and its columns.
 pub(super) struct Fields {
     delimiter: Option<u8>,
     decimal: DecimalSign,
@@ -16,17 +16,19 @@ pub(super) struct Fields {
 }
 
 impl Fields {
-    /// Reads the first line that is not a comment; leaves it to be read again where it holds numbers.
+    /// Reads the first line that is not a comment; keeps it for the data if it contains numbers.
     pub(super) fn detect(lines: &mut Lines, options: &CsvOptions) -> Result<Fields> {
         let decimal = options.decimal;
         if decimal == DecimalSign::Comma && options.delimiter == Delimiter::Comma {
-            return Err(Error::CommaTwice { path: lines.path().to_owned() });
+            let problem =
+                "the comma cannot be both the delimiter and the decimal sign; declare another delimiter".into();
+            return Err(Error::Delimiter { path: lines.path().to_owned(), problem });
         }
         if !lines.advance()? {
             return Err(no_rows(lines));
         }
         if lines.current().contains(&0) {
-            let (found, remedy) = ("binary and not text (zero bytes)", "save it as text in UTF-8");
+            let (found, remedy) = ("a binary file (zero bytes in its first line)", "save it as text in UTF-8");
             return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
         }
         let delimiter = match options.delimiter {
@@ -104,7 +106,7 @@ impl Selection {
         };
         if found != self.targets.len() {
             let (path, line) = (lines.path().to_owned(), lines.number());
-            return Err(Error::RaggedRow { path, line, found, expected: self.targets.len() });
+            return Err(Error::FieldCount { path, line, found, expected: self.targets.len() });
         }
         Ok(true)
     }
@@ -134,24 +136,20 @@ impl Selection {
     fn bad_cell(&self, fields: &Fields, lines: &Lines, found: usize, column: usize, cell: &[u8]) -> Error {
         let (path, line, expected) = (lines.path().to_owned(), lines.number(), self.targets.len());
         if found != expected {
-            return Error::RaggedRow { path, line, found, expected };
+            return Error::FieldCount { path, line, found, expected };
         }
         let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
         let column = fields.names[column].clone();
         let other = fields.decimal.other();
-        match number(cell, other) {
-            Some(_) => {
-                Error::DecimalSign { path, line, column, text, declared: fields.decimal.key(), found: other.key() }
-            }
-            None => Error::Cell { path, line, column, text },
-        }
+        let decimal = number(cell, other).map(|_| other.key());
+        Error::Cell { path, line, column, text, decimal }
     }
 }
 
 /// The only one of comma, semicolon and tab on the line; `None` means blanks. A decimal comma is no delimiter.
 ///
 /// A line of numbers with tabs and blanks is read as blank separated where the count of cells is the same, because a
-/// tab may stand at the end of the line.
+/// tab may be at the end of the line.
 fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
     const CANDIDATES: [(u8, &str); 3] = [(b',', "a comma"), (b';', "a semicolon"), (b'\t', "a tab")];
     let line = lines.current().trim_ascii();
@@ -167,12 +165,14 @@ fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
         [(delimiter, _)] => Ok(Some(*delimiter)),
         _ => {
             let names: Vec<_> = found.iter().map(|(_, name)| *name).collect();
-            Err(Error::Delimiter { path: lines.path().to_owned(), line: lines.number(), found: names.join(" and ") })
+            let (line, names) = (lines.number(), names.join(" and "));
+            let problem = format!("line {line} contains {names}; declare the delimiter");
+            Err(Error::Delimiter { path: lines.path().to_owned(), problem })
         }
     }
 }
 
-/// The cells of the first line; names may stand in quotes.
+/// The cells of the first line; names may be quoted.
 fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
     let text = |cell: &[u8]| String::from_utf8_lossy(cell).trim().to_owned();
     let Some(delimiter) = delimiter else {

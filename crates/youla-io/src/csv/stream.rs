@@ -1,10 +1,12 @@
 //! A text file of any length, line by line.
 
 use super::lines::Lines;
+use super::options::CsvOptions;
 use super::parse::{Fields, Selection, no_rows};
-use super::{CsvOptions, Plan};
-use crate::{ChannelSpec, TimeSource};
-use crate::{Error, Result};
+use super::plan::Plan;
+use crate::choose::ChannelSpec;
+use crate::error::{Error, Result};
+use crate::time::{Clock, TimeSource};
 use faer::MatMut;
 use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
@@ -12,10 +14,10 @@ use youla::signal::Channel;
 use youla::signal::SampleStream;
 
 /// One experiment in a text file, plain or gzip, that need not fit into memory; form, choice of columns, checks and errors are
-/// those of [`super::read_csv`].
+/// those of [`crate::read_csv`].
 ///
-/// Where the sample time comes from a column, the file is read once when it is opened to check that column; each step is held
-/// against the median of the first 65536.
+/// Where the sample time comes from a column, the file is read once when it is opened to check that column; each step is compared
+/// with the median of the first 65536.
 pub struct CsvStream {
     path: PathBuf,
     options: CsvOptions,
@@ -32,13 +34,13 @@ impl CsvStream {
     /// Opens a file and chooses its columns.
     ///
     /// # Errors
-    /// As [`super::read_csv`]; those of lines further on come when they are read.
+    /// As [`crate::read_csv`]; those of lines further on come when they are read.
     ///
     /// ```no_run
     /// use youla_io::{ChannelSpec, CsvOptions, CsvStream, TimeSource};
     /// let [u, y] = ["u", "y"].map(ChannelSpec::named);
     /// let stream = CsvStream::open("long.csv.gz", &[u], &[y], &TimeSource::ts(1e-4), &CsvOptions::default())?;
-    /// # Ok::<(), youla::Error>(())
+    /// # Ok::<(), youla_io::Error>(())
     /// ```
     pub fn open(
         path: impl AsRef<Path>,
@@ -98,7 +100,7 @@ fn begin(lines: &mut Lines, specs: &[ChannelSpec], time: &TimeSource, options: &
 }
 
 /// The clock of the time column, by a pass over the file.
-fn clock(lines: &mut Lines, fields: &Fields, plan: &Plan, time: &TimeSource) -> Result<super::Clock> {
+fn clock(lines: &mut Lines, fields: &Fields, plan: &Plan, time: &TimeSource) -> Result<Clock> {
     let what = lines.path().display().to_string();
     let column = Selection::new(fields, &plan.columns[plan.columns.len() - 1..]);
     let mut rows = 0;
@@ -129,7 +131,7 @@ impl SampleStream for CsvStream {
     fn read(&mut self, mut rows: MatMut<'_, f64>) -> youla::Result<usize> {
         for k in 0..rows.nrows() {
             let put = |position, value| rows[(k, position)] = value;
-            // What damage in a gzip file makes of its text is not the user's mistake.
+            // A damaged gzip stream gives damaged text; report the damage, not the text.
             let next = self.selection.next(&self.fields, &mut self.lines, put);
             if !next.map_err(|error| self.lines.damage().unwrap_or(error))? {
                 return if self.rows == 0 { Err(no_rows(&self.lines).into()) } else { Ok(k) };

@@ -3,7 +3,7 @@
 use super::NamedModel;
 use super::precision::{DOUBLE, Round, SINGLE, SingleError, add, noise, samples_for};
 use super::text::{heading, identifier, rows};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
 
@@ -63,7 +63,7 @@ pub(super) fn products(name: &str, letter: &str, x: &str, count: usize) -> Strin
     )
 }
 
-/// The state from the sum of products; without states what tells the compiler that the arguments are not used.
+/// The state from the sum of products; without states, statements that mark the arguments as unused.
 pub(super) fn update(name: &str, n: usize, terms: &[(&str, &str, usize)], unused: &str) -> String {
     if n == 0 {
         return format!("    (void)s;\n{unused}");

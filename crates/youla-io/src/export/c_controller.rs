@@ -12,7 +12,7 @@
 use super::c::{check_ports, comment, constant, finished, products, update};
 use super::precision::{DOUBLE, Round, SAMPLES, SINGLE, SingleError, add, noise};
 use super::text::{PROGRAM, identifier, labels, number, plain};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use faer::Scale;
 use faer::linalg::solvers::Solve;
 use youla::control::closed_loop;
@@ -56,7 +56,7 @@ pub struct CController {
 
 /// Writes the header: positive feedback, `u = K(Q) y` with alpha added at the port of Fig. 3.
 ///
-/// Agrees with the library's simulation of `J_K(Q)` to 1e-12 in double precision (`tests/exports.rs`).
+/// Agrees with the library's simulation of `J_K(Q)` to 1e-12 in double precision (`tests/all/exports/c.rs`).
 ///
 /// # Errors
 /// [`youla::Error::Ports`] and [`youla::Error::SampleTimeMismatch`] where nominal model, factors and Q do not fit; [`youla::Error::Unstable`] for an
@@ -64,8 +64,8 @@ pub struct CController {
 /// [`youla::Error::AlgebraicLoop`] where a loop with the nominal model is not well posed.
 ///
 /// ```
-/// use crate::export::{ControllerExport, c_controller};
-/// use youla::{Mat, factor::CoprimeFactors, linalg::eye, lti::{Discrete, StateSpace}, units::Channel};
+/// use youla_io::export::{ControllerExport, c_controller};
+/// use youla::{Mat, factor::CoprimeFactors, linalg::eye, lti::{Discrete, StateSpace}, signal::Channel};
 /// let nominal = StateSpace::new(eye(1), eye(1), eye(1), Mat::zeros(1, 1), Discrete::new(1e-3)?)?;
 /// let gain = Mat::from_fn(1, 1, |_, _| -0.5);
 /// let left = CoprimeFactors::observer(&nominal, gain.as_ref(), gain.as_ref())?.left().system().clone();
@@ -73,7 +73,7 @@ pub struct CController {
 /// let (measured, commanded) = (channel("y"), channel("u"));
 /// let export = ControllerExport { name: "controller".into(), measured, commanded, nominal, left, q: None, origin: String::new() };
 /// assert!(c_controller(&export)?.header.contains("controller_command"));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn c_controller(export: &ControllerExport) -> Result<CController> {
     let (m, p) = (export.nominal.inputs(), export.nominal.outputs());

@@ -1,18 +1,12 @@
-//! A model as JSON, in the form of `run::ModelFile`.
+//! A model as JSON, in the form of [`ModelFile`].
 
 use super::NamedModel;
-use super::controller::FilterData;
-use crate::{Error, Result};
-use serde_json::json;
+use crate::error::{Error, Result};
+use crate::model_file::ModelFile;
 
 pub(super) fn json(model: &NamedModel) -> Result<String> {
-    let FilterData { a, b, c, d } = FilterData::new(&model.system);
-    let poles: Vec<[f64; 2]> = model.system.poles()?.iter().map(|p| [p.re, p.im]).collect();
-    let file = json!({
-        "name": model.name, "inputs": model.inputs, "outputs": model.outputs, "ts": model.system.time().ts(),
-        "a": a, "b": b, "c": c, "d": d, "poles": poles,
-        "details": model.details, "provenance": model.provenance,
-    });
+    let channels = (model.inputs.clone(), model.outputs.clone());
+    let file = ModelFile::new(&model.name, &model.system, channels, model.details.clone(), &model.provenance)?;
     let text = serde_json::to_string_pretty(&file).map_err(|source| Error::Json { source })?;
     Ok(text + "\n")
 }

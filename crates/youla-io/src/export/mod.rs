@@ -1,7 +1,7 @@
 //! Models for other tools: as data (JSON, MATLAB, NumPy), as scripts (python-control, MATLAB) and as C99 headers of the model
 //! and of the controller `J_K(Q)` of (21), (22), so that firmware runs the experiment itself.
 //!
-//! Sequences for an experiment go out as text, MATLAB file and C99 header.
+//! Sequences for an experiment are exported as text, MATLAB file and C99 header.
 //!
 //! Every number is written with as many digits as it takes to read back the same bits.
 
@@ -18,13 +18,14 @@ mod sequence;
 mod text;
 
 pub use c_controller::{CController, ControllerExport, c_controller};
-pub use controller::{ExportedController, FilterData, ObserverData, Rows};
+pub use controller::{ExportedController, ObserverData};
 pub use precision::SingleError;
 pub use read::{model_from_bytes, read_model};
 pub use sequence::{SequenceFormat, export_sequence};
 
-use crate::{Error, Result};
-use crate::{Value, Variable, mat_to_bytes};
+use crate::error::{Error, Result};
+use crate::matfile::mat_to_bytes;
+use crate::values::{Value, Variable};
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
@@ -133,13 +134,13 @@ impl ModelFormat {
 /// [`Error::WrongVariable`] for a matrix that is too large for a MATLAB file.
 ///
 /// ```
-/// use crate::export::{ModelFormat, NamedModel, export_model, model_from_bytes};
-/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, units::Channel};
+/// use youla_io::export::{ModelFormat, NamedModel, export_model, model_from_bytes};
+/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, signal::Channel};
 /// let system = StateSpace::new(Mat::zeros(1, 1), eye(1), eye(1), eye(1), Discrete::new(0.1)?)?;
 /// let model = NamedModel::new("hansen", system, (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]))?;
 /// let bytes = export_model(&model, ModelFormat::Npz)?;
 /// assert_eq!(model_from_bytes(&bytes, "hansen.npz")?.system, model.system);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn export_model(model: &NamedModel, format: ModelFormat) -> Result<Vec<u8>> {
     match format {

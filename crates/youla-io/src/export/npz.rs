@@ -3,7 +3,7 @@
 //! Source: NumPy, "NEP 1, A simple file format for NumPy arrays", version 1.
 
 use super::NamedModel;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use std::io::{Cursor, Write};
 use youla::MatRef;
 use zip::write::SimpleFileOptions;

@@ -1,11 +1,12 @@
 //! A model from a file: JSON as in a run folder, MATLAB version 5 or 7.3, NumPy archive.
 
 use super::NamedModel;
-use super::controller::{FilterData, Rows};
-use crate::{Error, Result};
-use crate::{Value, Variables, mat_from_bytes, npz_from_bytes};
+use crate::error::{Error, Result};
+use crate::matfile::mat_from_bytes;
+use crate::model_file::ModelFile;
+use crate::npz::npz_from_bytes;
+use crate::values::{Value, Variables};
 use serde::Deserialize;
-use std::io::Read;
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
@@ -21,16 +22,13 @@ use youla::signal::Channel;
 /// [`youla::Error::Shape`], [`youla::Error::NotFinite`], [`youla::Error::Ports`] for matrices that do not fit.
 ///
 /// ```no_run
-/// let hansen = crate::export::read_model("runs/my-machine-001/5-recombine/hansen.json")?;
+/// let hansen = youla_io::export::read_model("runs/my-machine-001/5-recombine/hansen.json")?;
 /// println!("{} states", hansen.system.order());
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn read_model(path: impl AsRef<Path>) -> Result<NamedModel> {
     let path = path.as_ref();
-    let mut bytes = Vec::new();
-    let read = crate::open(path)?.read_to_end(&mut bytes);
-    read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    model_from_bytes(&bytes, path)
+    model_from_bytes(&crate::open::bytes(path)?, path)
 }
 
 /// The same of a file that is in memory; `path` is named in errors.
@@ -48,24 +46,7 @@ pub fn model_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<NamedMod
     Ok(model)
 }
 
-/// What a model needs of the fields of `run::ModelFile`.
-#[derive(Deserialize)]
-struct Fields {
-    name: Option<String>,
-    inputs: Option<Vec<Channel>>,
-    outputs: Option<Vec<Channel>>,
-    ts: f64,
-    a: Rows,
-    b: Rows,
-    c: Rows,
-    d: Rows,
-    #[serde(default)]
-    details: serde_json::Value,
-    #[serde(default)]
-    provenance: serde_json::Value,
-}
-
-/// What stands in place of a model that is impossible.
+/// A run folder holds this in place of a model that could not be computed.
 #[derive(Deserialize)]
 struct Refused {
     refused: String,
@@ -76,12 +57,12 @@ fn of_json(bytes: &[u8], path: &Path) -> Result<NamedModel> {
     if let Ok(Refused { refused }) = serde_json::from_slice(bytes) {
         return Err(not(format!("there is no model; it was refused: {refused}")));
     }
-    let found: Fields = serde_json::from_slice(bytes).map_err(|e| not(format!("this is not a model as JSON: {e}")))?;
-    let Fields { a, b, c, d, .. } = found;
-    let system = FilterData { a, b, c, d }.system(Discrete::new(found.ts)?).map_err(|e| e.within(shown(path)))?;
-    let channels = channels(&system, found.inputs, found.outputs);
-    let model = NamedModel::new(&found.name.unwrap_or_else(|| stem(path)), system, channels)?;
-    Ok(NamedModel { details: found.details, provenance: found.provenance, ..model })
+    let file: ModelFile =
+        serde_json::from_slice(bytes).map_err(|e| not(format!("this is not a model as JSON: {e}")))?;
+    let system = file.system().map_err(|e| e.within(shown(path)))?;
+    let channels = channels(&system, file.inputs, file.outputs);
+    let model = NamedModel::new(&file.name.unwrap_or_else(|| stem(path)), system, channels)?;
+    Ok(NamedModel { details: file.details, provenance: file.provenance.unwrap_or_default(), ..model })
 }
 
 fn of_variables(file: &Variables, path: &Path) -> Result<NamedModel> {

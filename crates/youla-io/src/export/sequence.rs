@@ -2,8 +2,10 @@
 
 use super::c::{comment, finished};
 use super::text::{PROGRAM, identifier, labels, number, plain, rows};
-use crate::{Error, Result};
-use crate::{Value, Variable, csv_to_bytes, mat_to_bytes};
+use crate::csv::csv_to_bytes;
+use crate::error::{Error, Result};
+use crate::matfile::mat_to_bytes;
+use crate::values::{Value, Variable};
 use youla::signal::Channel;
 use youla::signal::Record;
 
@@ -42,7 +44,7 @@ impl SequenceFormat {
     }
 }
 
-/// A sequence as the bytes of a file; `about` is what the comments say of it, one sentence a line.
+/// A sequence as the bytes of a file; `about` is the text of the comments, one sentence per line.
 ///
 /// The files read back to the same values, bit by bit.
 ///
@@ -51,15 +53,16 @@ impl SequenceFormat {
 /// file; [`youla::Error::OutOfRange`] for one that is too long for a C array.
 ///
 /// ```
-/// use crate::export::{SequenceFormat, export_sequence};
-/// use youla::{Mat, lti::Discrete, record::{ChannelSpec, CsvOptions, Record, TimeSource, csv_from_bytes}, units::Channel};
+/// use youla_io::export::{SequenceFormat, export_sequence};
+/// use youla::{Mat, lti::Discrete, signal::{Channel, Record}};
+/// use youla_io::{ChannelSpec, CsvOptions, TimeSource, csv_from_bytes};
 /// let values = Mat::from_fn(3, 1, |k, _| k as f64 / 3.0);
 /// let record = Record::new("alpha", vec![Channel::new("alpha_u", "V")], values, Discrete::new(1e-3)?)?;
 /// let bytes = export_sequence(&record, SequenceFormat::Csv, &["An example.".into()])?;
 /// let time = TimeSource::column("t".parse().unwrap());
 /// let back = csv_from_bytes(&bytes, "alpha.csv", &[ChannelSpec::named("alpha_u")], &time, &CsvOptions::default())?;
 /// assert_eq!(back.data(), record.data());
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn export_sequence(record: &Record, format: SequenceFormat, about: &[String]) -> Result<Vec<u8>> {
     let mut lines: Vec<String> = about.iter().map(|line| plain(line)).collect();

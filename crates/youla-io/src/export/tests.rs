@@ -1,10 +1,10 @@
 //! Round trips of models, and what their files must not do.
 
 use super::*;
+use crate::ModelFile;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use youla::Mat;
-use youla_run::ModelFile;
 
 /// A random model, with entries over many decades.
 pub(super) fn random(n: usize, m: usize, p: usize, seed: u64) -> NamedModel {
@@ -58,7 +58,7 @@ fn json_keeps_what_came_with_the_model() {
     model.provenance = provenance.clone();
     let text = export_model(&model, ModelFormat::Json).unwrap();
     let file: ModelFile<serde_json::Value> = serde_json::from_slice(&text).unwrap();
-    assert_eq!((file.poles.len(), &file.provenance.options["horizon"]), (2, &serde_json::json!(3)));
+    assert_eq!((file.poles.len(), &file.provenance["options"]["horizon"]), (2, &serde_json::json!(3)));
     assert_eq!(model_from_bytes(&text, "x.json").unwrap().provenance, provenance);
 }
 

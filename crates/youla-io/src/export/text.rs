@@ -48,7 +48,7 @@ pub(super) fn labels(channels: &[Channel]) -> String {
     plain(&channels.iter().map(Channel::label).collect::<Vec<_>>().join(", "))
 }
 
-/// What stands at the top of every script and header, one sentence a line.
+/// The heading of every script and header, one sentence per line.
 pub(super) fn heading(model: &NamedModel) -> Vec<String> {
     let g = &model.system;
     let mut lines = vec![

@@ -1,8 +1,8 @@
-//! A window on the bytes of a file that knows where it stands, and the data elements in it.
+//! Bytes of a file with their position, and the data elements in them.
 
 use super::kind;
 
-/// Where a file stops making sense, and what should stand there.
+/// Position and content of an expected part that is missing.
 #[derive(Debug)]
 pub(super) struct Fault {
     /// Position in the file, counted from 0.

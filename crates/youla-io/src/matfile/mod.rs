@@ -2,7 +2,7 @@
 //!
 //! Source: The MathWorks, "MAT-File Format", the chapter on level 5. A file is a header of 128 bytes and a sequence of
 //! data elements, each a tag (type, size) and its bytes; a variable is an element of elements; with `-v7` each variable
-//! is packed by zlib. Sizes are believed only as far as there are bytes to fill them.
+//! is packed by zlib. Sizes are accepted only if the remaining bytes can fill them.
 
 mod bytes;
 mod read;

@@ -2,14 +2,14 @@
 
 use super::bytes::{Bytes, Element, Fault};
 use super::{HEADER, class, kind};
-use crate::hdf::{hdf_from_bytes, is_hdf};
-use crate::{Error, Result};
-use crate::{Value, Variable, Variables};
+use crate::error::{CorruptAt, Error, Result};
+use crate::hdf::hdf_from_bytes;
+use crate::values::{Value, Variable, Variables};
 use flate2::read::ZlibDecoder;
 use std::io::Read;
 use std::path::Path;
 
-/// Structs and cells inside of each other; a file deeper than this is refused.
+/// Largest nesting of structs and cells.
 const MAX_DEPTH: usize = 32;
 /// Longest name of a variable or field, in bytes; MATLAB has 63. Paths repeat them.
 const LONGEST_NAME: usize = 1024;
@@ -27,10 +27,7 @@ const LONGEST_NAME: usize = 1024;
 /// [`Error::Corrupt`] with the position (0 in version 7.3) for a damaged or cut file.
 pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    let mut bytes = Vec::new();
-    let read = crate::open(path)?.read_to_end(&mut bytes);
-    read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
-    mat_from_bytes(&bytes, path)
+    mat_from_bytes(&crate::open::bytes(path)?, path)
 }
 
 /// The variables of a MATLAB file of version 5 or 7.3 that is in memory; `path` is named in errors.
@@ -50,8 +47,14 @@ pub fn mat_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables>
     }
 }
 
+/// Whether the bytes begin as those of an HDF5 file, with or without the 512 bytes of MATLAB before them.
+fn is_hdf(bytes: &[u8]) -> bool {
+    const MAGIC: &[u8] = b"\x89HDF\r\n\x1a\n";
+    bytes.starts_with(MAGIC) || bytes.get(512..).is_some_and(|rest| rest.starts_with(MAGIC))
+}
+
 fn corrupt(path: &Path, fault: Fault) -> Error {
-    Error::Corrupt { path: path.to_owned(), offset: fault.offset as u64, expected: fault.expected }
+    Error::Corrupt { path: path.to_owned(), at: CorruptAt::Byte(fault.offset as u64), expected: fault.expected }
 }
 
 /// Whether the file is big endian, if it is of version 5 at all.
@@ -64,7 +67,7 @@ fn check_format(path: &Path, bytes: &[u8]) -> Result<bool> {
         Some([0, 1, b'I', b'M']) => Ok(false),
         Some([1, 0, b'M', b'I']) => Ok(true),
         _ if bytes.len() >= 20 && bytes[..4].contains(&0) => {
-            not_read("a MATLAB file of version 4, or none at all", "save it with the option -v7")
+            not_read("a MATLAB file of version 4, or another binary file,", "save it with the option -v7")
         }
         _ => Err(corrupt(
             path,
@@ -90,17 +93,17 @@ fn variables(mut rest: Bytes) -> Result<Vec<Variable>, Fault> {
     Ok(out)
 }
 
-/// A variable packed by zlib. Positions inside of it are told apart from those in the file.
+/// A variable compressed by zlib. Errors state the position in the file and in the decompressed variable.
 fn compressed(body: Bytes) -> Result<Variable, Fault> {
     let data = inflate(body)?;
     let inner = Bytes { data: &data, offset: 0, ..body };
     array(inner, 0).map_err(|fault| Fault {
         offset: body.offset,
-        expected: format!("{} (byte {} of the variable that is packed here)", fault.expected, fault.offset),
+        expected: format!("{} (byte {} of the compressed variable)", fault.expected, fault.offset),
     })
 }
 
-/// Unpacks what the tag inside announces; memory grows only with the bytes that really come out.
+/// Decompresses the size that the inner tag declares; memory grows with the decompressed bytes only.
 fn inflate(body: Bytes) -> Result<Vec<u8>, Fault> {
     let mut decoder = ZlibDecoder::new(body.data);
     let mut tag = [0; 8];
@@ -114,7 +117,7 @@ fn inflate(body: Bytes) -> Result<Vec<u8>, Fault> {
     match decoder.by_ref().take(u64::from(size)).read_to_end(&mut data) {
         Err(e) => body.fault(format!("{size} bytes packed by zlib, but after {} of them: {e}", data.len())),
         Ok(unpacked) if unpacked != size as usize => {
-            body.fault(format!("{size} bytes packed by zlib, but only {unpacked} came out"))
+            body.fault(format!("{size} bytes packed by zlib, but only {unpacked} were decompressed"))
         }
         Ok(_) => match decoder.read(&mut [0]) {
             Ok(0) => Ok(data),
@@ -130,7 +133,7 @@ fn array(mut rest: Bytes, depth: usize) -> Result<Variable, Fault> {
         return Ok(Variable { name: String::new(), value: Value::Real { dims: vec![0, 0], data: Vec::new() } });
     }
     if depth > MAX_DEPTH {
-        return rest.fault(format!("at most {MAX_DEPTH} structs and cells inside of each other"));
+        return rest.fault(format!("at most {MAX_DEPTH} levels of structs and cells"));
     }
     let flags = rest.element("array flags")?;
     if flags.kind != kind::UINT32 || flags.body.data.len() != 8 {
@@ -183,7 +186,7 @@ fn count(dims: &[usize], at: Bytes) -> Result<usize, Fault> {
     }
 }
 
-/// Arrays that follow each other; each takes the eight bytes of its tag at least.
+/// Consecutive arrays; each has at least the eight bytes of its tag.
 fn items(rest: &mut Bytes, count: usize, depth: usize) -> Result<Vec<Value>, Fault> {
     if count > rest.data.len() / 8 {
         return rest.fault(format!("{count} arrays, but only {} bytes are left", rest.data.len()));

@@ -1,18 +1,18 @@
 //! From variables to bytes, little endian.
 
 use super::{HEADER, class, kind};
-use crate::{Error, Result};
-use crate::{Value, Variable};
+use crate::error::{Error, Result};
+use crate::values::{Value, Variable};
 use flate2::{Compression, write::ZlibEncoder};
 use std::io::Write;
 use std::path::Path;
 
-/// Whether each variable is packed by zlib.
+/// Compression of the variables.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Packing {
-    /// Stored as it is, `save -v6`.
+    /// Uncompressed, `save -v6`.
     Plain,
-    /// Packed, `save -v7`.
+    /// Compressed, `save -v7`.
     #[default]
     Zlib,
 }
@@ -24,10 +24,11 @@ pub enum Packing {
 /// that is not written, and for an empty name; [`Error::Io`].
 ///
 /// ```no_run
-/// use youla::{linalg::eye, record::{Packing, Value, Variable, write_mat}};
+/// use youla::linalg::eye;
+/// use youla_io::{Packing, Value, Variable, write_mat};
 /// let model = Value::structure([("a", Value::matrix(eye(2).as_ref())), ("ts", Value::scalar(2e-4))]);
 /// write_mat("model.mat", &[Variable { name: "model".into(), value: model }], Packing::Zlib)?;
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn write_mat(path: impl AsRef<Path>, variables: &[Variable], packing: Packing) -> Result<()> {
     let path = path.as_ref();
@@ -124,7 +125,7 @@ fn array_parts(out: &mut Vec<u8>, name: &str, value: &Value) -> Result<(), Unwri
 }
 
 fn full(filled: bool) -> Result<(), Unwritable> {
-    if filled { Ok(()) } else { Err("as many values as its dimensions say") }
+    if filled { Ok(()) } else { Err("filled with as many values as its dimensions state") }
 }
 
 /// Flags, dimensions and name.

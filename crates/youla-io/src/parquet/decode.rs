@@ -9,7 +9,7 @@ use super::thrift::{natural, signed};
 const LARGEST_BLOCK: u64 = 1 << 16;
 
 impl Number {
-    /// Bytes that a number takes; truth values take a bit.
+    /// Bytes of a number; 0 for truth values, which have one bit.
     fn width(self) -> usize {
         match self {
             Number::Bool => 0,

@@ -19,7 +19,7 @@ pub(super) struct Column {
     pub(super) name: String,
     /// Cells may be empty.
     pub(super) optional: bool,
-    /// How its numbers are stored, or what it holds instead.
+    /// How its numbers are stored, or its type if it is not numeric.
     pub(super) content: Result<Number, &'static str>,
 }
 

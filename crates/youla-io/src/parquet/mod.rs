@@ -1,8 +1,8 @@
 //! Parquet files: flat columns of numbers, as pandas, polars and data loggers write them.
 //!
-//! Source: Apache Parquet format, version 2. A file holds groups of rows, each with a chunk of every column, each of pages; a footer
-//! says where. Numbers of any width become `f64`; a column of timestamps becomes seconds from its first row, because nanoseconds
-//! since 1970 do not fit into a `f64`; an empty cell becomes NaN, which no record takes. The reader is ours, see decision 0016.
+//! Source: Apache Parquet format, version 2. A file contains groups of rows, each with a chunk of every column, each of pages; the
+//! footer lists their positions. Numbers of any width become `f64`; a column of timestamps becomes seconds from its first row, because nanoseconds
+//! since 1970 do not fit into a `f64`; an empty cell becomes NaN, which a record rejects. For the choice of an own reader see decision 0016.
 
 mod decode;
 mod footer;
@@ -12,17 +12,20 @@ mod pages;
 mod tests;
 mod thrift;
 
-use super::{ChannelRef, Value, Variable, Variables, believable};
-use crate::{Error, Result};
+use crate::choose::ChannelRef;
+use crate::error::{CorruptAt, Error, Result};
+use crate::limits::declared_limit;
+use crate::open::open;
+use crate::values::{Value, Variable, Variables};
 use footer::Footer;
 use pages::Cells;
 use std::io::{Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
-/// The first and last bytes of a file.
-pub(super) const MAGIC: &[u8] = b"PAR1";
-/// Bytes of numbers that any file or page may hold: runs of equal values take next to nothing.
-const SPARE: u64 = 1 << 26;
+/// The last bytes of a file.
+const MAGIC: &[u8] = b"PAR1";
+/// Bytes of numbers that any file or page may declare: runs of equal values need almost no bytes.
+const BASE: u64 = 1 << 26;
 /// Bytes of the largest footer that is read.
 const LARGEST_FOOTER: u64 = 1 << 24;
 
@@ -31,17 +34,17 @@ const LARGEST_FOOTER: u64 = 1 << 24;
 /// Columns of text, dates, decimals and lists become [`Value::Unsupported`], empty cells NaN.
 ///
 /// # Errors
-/// [`Error::MissingFile`], [`Error::Io`], [`Error::Corrupt`] for a damaged file, one that announces more than it can hold, and one
-/// that is packed in a way that is not read.
+/// [`Error::MissingFile`], [`Error::Io`], [`Error::Corrupt`] for a damaged file, one that declares more than it can contain, and one
+/// with an unsupported compression.
 ///
 /// ```no_run
 /// use youla_io::{ChannelSpec, TimeSource, read_parquet};
 /// let record = read_parquet("run.parquet")?.record(&["u", "y"].map(ChannelSpec::named), &TimeSource::ts(1e-3))?;
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn read_parquet(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    variables(super::open(path)?, path, |_, _| true)
+    variables(open(path)?, path, |_, _| true)
 }
 
 /// The columns of a Parquet file that is in memory; `path` is named in errors.
@@ -57,7 +60,7 @@ pub(super) fn read_columns(path: &Path, references: &[ChannelRef]) -> Result<Var
     let wanted = |name: &str, number: usize| {
         references.iter().any(|r| matches!(r, ChannelRef::Column(n) if *n == number) || r.to_string() == name)
     };
-    variables(super::open(path)?, path, wanted)
+    variables(open(path)?, path, wanted)
 }
 
 /// What was expected instead.
@@ -66,7 +69,7 @@ type Fault = String;
 fn variables(file: impl Read + Seek, path: &Path, wanted: impl Fn(&str, usize) -> bool) -> Result<Variables> {
     match columns(file, wanted) {
         Ok(columns) => Ok(Variables::new(path, columns)),
-        Err(expected) => Err(Error::Corrupt { path: path.to_owned(), offset: 0, expected }),
+        Err(expected) => Err(Error::Corrupt { path: path.to_owned(), at: CorruptAt::Byte(0), expected }),
     }
 }
 
@@ -78,7 +81,7 @@ fn columns(mut file: impl Read + Seek, wanted: impl Fn(&str, usize) -> bool) -> 
     let column = |(k, about): (usize, &footer::Column)| {
         let value = match about.content {
             Err(class) => Value::Unsupported { class: class.into() },
-            Ok(_) if !chosen[k] => Value::Unsupported { class: "a column that was not asked for".into() },
+            Ok(_) if !chosen[k] => Value::Unsupported { class: "a column that was not requested".into() },
             Ok(number) => {
                 let mut cells = Cells::new(about, number, rows);
                 for group in &footer.groups {
@@ -122,9 +125,9 @@ fn footer(file: &mut (impl Read + Seek), size: u64) -> Result<Footer, Fault> {
     Footer::parse(&part(file, start, length, size)?)
 }
 
-/// The rows of a file of `size` bytes, believed as far as it could fill `columns` with them.
+/// The rows of a file of `size` bytes; more than could fill `columns` within the limit are rejected.
 fn rows(footer: &Footer, size: u64, columns: usize) -> Result<usize, Fault> {
-    let most = believable(SPARE, size) / (8 * columns.max(1) as u64);
+    let most = declared_limit(BASE, size) / (8 * columns.max(1) as u64);
     let rows = footer.groups.iter().fold(0_u64, |rows, group| rows.saturating_add(group.rows));
     if rows > most {
         return Err(format!("fewer than {rows} rows in {size} bytes"));

@@ -1,12 +1,13 @@
-//! A chunk of a column: pages, each with a header, perhaps levels that tell which cells are empty, and numbers.
+//! A chunk of a column: pages, each with a header, levels that mark empty cells if the column is optional, and numbers.
 //!
-//! Source: Apache Parquet format 2, `PageHeader` in `parquet.thrift` and "Data Pages". Sizes are believed only as far as a page could
-//! fill them.
+//! Source: Apache Parquet format 2, `PageHeader` in `parquet.thrift` and "Data Pages". Declared page sizes
+//! above 64 MB + 1032 x compressed size are rejected.
 
 use super::footer::{Column, Number};
 use super::packing::unpack;
 use super::thrift::Fields;
-use super::{Fault, SPARE, believable, decode};
+use super::{BASE, Fault, decode};
+use crate::limits::declared_limit;
 
 /// How the numbers of a page are stored.
 struct Page<'a> {
@@ -47,7 +48,7 @@ impl<'a> Cells<'a> {
             if header.integer(4).is_some_and(|sum| sum as u32 != check_sum(body)) {
                 return Err("a page that agrees with its check sum".into());
             }
-            if unpacked as u64 > believable(SPARE, packed as u64) {
+            if unpacked as u64 > declared_limit(BASE, packed as u64) {
                 return Err(format!("fewer than {unpacked} bytes packed in {packed}"));
             }
             match (header.integer(1), header.fields(5), header.fields(7), header.fields(8)) {
@@ -67,7 +68,7 @@ impl<'a> Cells<'a> {
     fn dictionary(&mut self, about: &Fields<'_>, page: &[u8]) -> Result<(), Fault> {
         let count = about.size(1).ok_or("a dictionary with its length")?;
         let mut words = Vec::new();
-        decode::plain(page, count, self.number, &mut words).ok_or("a dictionary that is as long as it says")?;
+        decode::plain(page, count, self.number, &mut words).ok_or("a dictionary of its declared length")?;
         self.dictionary = Some(words);
         Ok(())
     }
@@ -89,7 +90,7 @@ impl<'a> Cells<'a> {
         self.page(&Page { levels, numbers, cells, encoding: about.integer(2).ok_or("a page with its encoding")? })
     }
 
-    /// Levels stand before what is packed, and may be there for nothing.
+    /// Levels precede the compressed part, and may be present in a column without empty cells.
     fn second_kind(&mut self, about: &Fields<'_>, body: &[u8], unpacked: usize, packing: i64) -> Result<(), Fault> {
         let inside = |(definition, repetition): (usize, usize)| {
             let length = definition.checked_add(repetition)?;
@@ -224,7 +225,7 @@ mod tests {
         refused(double, false, &page(0, 16, &[0; 15], 2, &[2, 0, 3, 3]), "unpacks to 16");
         refused(double, false, &page(0, 16, &[0; 16], 2, &[2, 8, 3, 3]), "dictionary before");
         refused(double, false, &page(0, 16, &[0; 16], 2, &[2, 77, 3, 3]), "number 77");
-        refused(double, false, &page(2, 16, &[0; 16], 4, &[1 << 31, 0]), "dictionary that is as long");
+        refused(double, false, &page(2, 16, &[0; 16], 4, &[1 << 31, 0]), "dictionary of its declared length");
         refused(double, false, &page(3, 16, &[0; 16], 5, &[2, 0, 2, 0, 17, 0]), "part of their page");
         refused(double, true, &page(0, 16, &[0xff; 16], 2, &[2, 0, 3, 3]), "part of their page");
         refused(double, true, &page(0, 16, &[0; 16], 2, &[2, 0, 4, 3]), "in runs");

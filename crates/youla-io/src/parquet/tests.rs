@@ -8,7 +8,7 @@ use std::path::PathBuf;
 const FILES: [&str; 5] = ["snappy", "plain", "lz4", "gzip", "zstd"];
 
 fn file(name: &str) -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/readers/seeds/parquet/{name}.parquet"))
+    Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("tests/seeds/parquet/{name}.parquet"))
 }
 
 fn bytes(name: &str) -> Vec<u8> {

@@ -1,10 +1,11 @@
-//! What a MATLAB, NumPy or Parquet file holds, and records from it.
+//! The contents of a MATLAB, NumPy or Parquet file, and records from them.
 
 mod path;
 
-use super::csv::{assemble, only};
-use super::{ChannelRef, ChannelSpec, TimeSource};
-use crate::{Error, Result};
+use crate::assemble::{assemble, only};
+use crate::choose::{ChannelRef, ChannelSpec};
+use crate::error::{Error, Result};
+use crate::time::TimeSource;
 use std::path::{Path, PathBuf};
 use youla::signal::Channel;
 use youla::signal::Record;
@@ -96,7 +97,7 @@ impl Variables {
     /// use youla_io::{ChannelRef, ChannelSpec, TimeSource, read_mat};
     /// let channels = ["u", "y"].map(|n| ChannelSpec::from(n, ChannelRef::Name(format!("Data.signals.{n}")), ""));
     /// let record = read_mat("cycle1.mat")?.record(&channels, &TimeSource::ts(5e-4))?;
-    /// # Ok::<(), youla::Error>(())
+    /// # Ok::<(), youla_io::Error>(())
     /// ```
     pub fn record(&self, channels: &[ChannelSpec], time: &TimeSource) -> Result<Record> {
         only(self.record_parts(channels, time)?)

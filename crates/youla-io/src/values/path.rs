@@ -1,7 +1,7 @@
 //! Values by their path, written as in MATLAB: `Data.signals.u`, `runs(2).y`, `names{3}`, `x(:,2)`; `#3` is the third variable.
 
 use super::{Value, Variables};
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use youla::signal::unknown;
 
 /// Rows and columns of an array without numbers, which may state any.

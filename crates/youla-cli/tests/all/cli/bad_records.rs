@@ -52,11 +52,11 @@ fn damaged_gzip() {
     let text = csv(&log()[..1400]);
     let text = &text.as_bytes()[..60_000.min(text.len())];
     let whole = gzip(text);
-    log_refused("cut-gzip", &whole[..30_000], &["log.csv: the gzip file is damaged or cut off after line"]);
+    log_refused("cut-gzip", &whole[..30_000], &["log.csv, after line"]);
     // A changed cell shows as a bad number first, but the checksum is what is wrong.
     let mut changed = whole;
     changed[20_000] = b'x';
-    log_refused("changed-gzip", &changed, &["log.csv: the gzip file is damaged or cut off after line", "checksum"]);
+    log_refused("changed-gzip", &changed, &["log.csv, after line", "checksum"]);
 }
 
 /// A gzip file of one stored block, RFC 1951 and 1952; its checksum is left at zero.

@@ -1,0 +1,92 @@
+//! A text file as records.
+
+use super::lines::Lines;
+use super::options::CsvOptions;
+use super::parse::{Fields, Selection};
+use super::plan::Plan;
+use crate::assemble::only;
+use crate::choose::ChannelSpec;
+use crate::error::Result;
+use crate::time::TimeSource;
+use std::io::Cursor;
+use std::path::Path;
+use youla::signal::Record;
+
+/// Reads `channels`, or all columns but the time where `channels` is empty.
+///
+/// # Errors
+/// [`crate::Error::MissingFile`], [`crate::Error::Io`], [`crate::Error::Corrupt`] for a damaged gzip file, [`crate::Error::NoData`],
+/// [`crate::Error::FormatNotRead`] for zero bytes and for more than 65536 columns,
+/// [`crate::Error::Delimiter`], [`crate::Error::FieldCount`], [`crate::Error::Cell`], [`youla::Error::DuplicateChannel`], [`youla::Error::UnknownChannel`],
+/// and those of the sample time: [`crate::Error::SampleTimeMissing`], [`crate::Error::NonUniformTime`],
+/// [`youla::Error::SampleTimeMismatch`].
+///
+/// ```no_run
+/// use youla_io::{ChannelSpec, CsvOptions, TimeSource, read_csv};
+/// let channels = [ChannelSpec::named("u"), ChannelSpec::named("y")];
+/// let record = read_csv("run.csv.gz", &channels, &TimeSource::column("t".parse().unwrap()), &CsvOptions::default())?;
+/// # Ok::<(), youla_io::Error>(())
+/// ```
+pub fn read_csv(
+    path: impl AsRef<Path>,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Record> {
+    only(read_csv_parts(path.as_ref(), channels, time, options)?)
+}
+
+/// The same for text, plain or gzip, that is in memory; `path` is named in errors.
+///
+/// # Errors
+/// Those of [`read_csv`] but for the operating system's.
+pub fn csv_from_bytes(
+    bytes: &[u8],
+    path: impl AsRef<Path>,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Record> {
+    let path = path.as_ref();
+    only(read_parts(Lines::over(path, Cursor::new(bytes.to_vec()))?, path, channels, time, options)?)
+}
+
+/// The record of a file for each part without gaps.
+pub(crate) fn read_csv_parts(
+    path: &Path,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Vec<Record>> {
+    read_parts(Lines::open(path)?, path, channels, time, options)
+}
+
+fn read_parts(
+    mut lines: Lines,
+    path: &Path,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<Vec<Record>> {
+    // A damaged gzip stream gives damaged text; report the damage, not the text.
+    let (plan, columns) =
+        read_columns(&mut lines, channels, time, options).map_err(|error| lines.damage().unwrap_or(error))?;
+    plan.assemble(path, time, columns)
+}
+
+fn read_columns(
+    lines: &mut Lines,
+    channels: &[ChannelSpec],
+    time: &TimeSource,
+    options: &CsvOptions,
+) -> Result<(Plan, Vec<Vec<f64>>)> {
+    let fields = Fields::detect(lines, options)?;
+    let plan = Plan::new(lines.path(), fields.names(), channels, time)?;
+    let columns = Selection::new(&fields, &plan.columns).read(&fields, lines)?;
+    Ok((plan, columns))
+}
+
+/// Names of all columns, `#1`, `#2` and so on where the file has none.
+pub(crate) fn column_names(path: &Path, options: &CsvOptions) -> Result<Vec<String>> {
+    Ok(Fields::detect(&mut Lines::open(path)?, options)?.names().to_vec())
+}

@@ -1,0 +1,61 @@
+//! Matrices of a linear system by rows, as they are written to JSON.
+
+use crate::error::{Error, Result};
+use serde::{Deserialize, Serialize};
+use youla::lti::{Discrete, StateSpace};
+use youla::{Mat, MatRef};
+
+/// A matrix by rows.
+pub type Rows = Vec<Vec<f64>>;
+
+/// Matrices of one linear system `x+ = A x + B v, w = C x + D v`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct SystemMatrices {
+    /// A, n x n.
+    pub a: Rows,
+    /// B, n x m.
+    pub b: Rows,
+    /// C, p x n.
+    pub c: Rows,
+    /// D, p x m.
+    pub d: Rows,
+}
+
+impl SystemMatrices {
+    /// The matrices of a system.
+    pub fn new(system: &StateSpace<Discrete>) -> Self {
+        SystemMatrices { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
+    }
+
+    /// Number of inputs m, also where B has no rows.
+    pub(crate) fn inputs(&self) -> usize {
+        self.d.first().map_or(0, Vec::len)
+    }
+
+    /// The system with these matrices.
+    ///
+    /// # Errors
+    /// [`youla::Error::Shape`] and [`youla::Error::NotFinite`] for matrices that do not fit together.
+    pub fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
+        let (n, m) = (self.a.len(), self.inputs());
+        let (a, b) = (matrix("A", &self.a, n)?, matrix("B", &self.b, m)?);
+        let (c, d) = (matrix("C", &self.c, n)?, matrix("D", &self.d, m)?);
+        Ok(StateSpace::new(a, b, c, d, time)?)
+    }
+}
+
+/// A matrix by rows.
+pub(crate) fn rows(m: MatRef<'_, f64>) -> Rows {
+    (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect()
+}
+
+fn matrix(what: &str, rows: &Rows, columns: usize) -> Result<Mat<f64>> {
+    match rows.iter().position(|row| row.len() != columns) {
+        Some(bad) => Err(Error::Method(youla::Error::Shape {
+            what: format!("row {} of {what}", bad + 1),
+            expected: (1, columns),
+            found: (1, rows[bad].len()),
+        })),
+        None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
+    }
+}

@@ -1,18 +1,18 @@
-//! Everything that can go wrong with the running loop, with the evidence.
+//! The errors of check, excitation and redesign.
 
 use youla::ErrorKind;
 
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// Everything that can go wrong, with the evidence.
+/// An error of check, excitation or redesign, with its evidence.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The method refused its input or its computation.
+    /// The method rejected its input, or a computation failed.
     #[error(transparent)]
     Method(#[from] youla::Error),
-    /// Something failed in a part of a larger task.
+    /// A part of a larger task failed.
     #[error("{part}: {source}")]
     Within {
         /// The part, in the words of the user, for example `[controller]`.
@@ -21,37 +21,39 @@ pub enum Error {
         source: Box<Error>,
     },
     /// No controller could be designed on an identified model within the limits.
-    #[error("no weight gives a new controller within the limits ({reasons}); add weights or allow more in [redesign]")]
+    #[error(
+        "no weight gives a new controller within the limits ({reasons}); add input_weights or relax the limits in [redesign]"
+    )]
     NoRedesign {
-        /// For each weight why not.
+        /// The reason for each weight.
         reasons: String,
     },
-    /// An excitation would drive the nominal loop beyond a limit.
+    /// The predicted response to an excitation exceeds a limit.
     #[error(
-        "the predicted magnitude of {channel} is {predicted:.4}{unit}, beyond its limit of {limit}{unit}; {} would just keep all limits",
-        Amplitudes(holding)
+        "the predicted magnitude of {channel} is {predicted:.4}{unit}, above its limit of {limit}{unit}; the largest permitted {}",
+        Amplitudes(permitted)
     )]
     BeyondLimit {
-        /// The input or output that passes its limit by most.
+        /// The input or output that exceeds its limit by the largest factor.
         channel: String,
         /// Largest magnitude that the nominal loop predicts.
         predicted: f64,
-        /// Largest magnitude that is allowed.
+        /// Its limit.
         limit: f64,
         /// The unit, behind a blank; empty where there is none.
         unit: String,
-        /// Amplitude of each input that would just keep all limits.
-        holding: Vec<f64>,
+        /// Largest amplitude of each input that keeps all limits.
+        permitted: Vec<f64>,
     },
 }
 
 impl Error {
-    /// The same error, said of a part of a larger task.
+    /// The same error with the part of a larger task in which it occurred.
     pub fn within(self, part: impl Into<String>) -> Self {
         Error::Within { part: part.into(), source: Box::new(self) }
     }
 
-    /// Whether the input is at fault or the computation is impossible on it.
+    /// Whether the input is invalid or a computation failed.
     pub fn kind(&self) -> ErrorKind {
         match self {
             Error::Method(source) => source.kind(),
@@ -67,7 +69,7 @@ struct Amplitudes<'a>(&'a [f64]);
 
 impl std::fmt::Display for Amplitudes<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        // Rounded down: what is typed must keep the limit.
+        // Rounded down, so that the printed amplitude keeps the limit.
         let down = |x: &f64| {
             let unit = 10f64.powf(x.abs().log10().floor() - 3.0);
             if unit > 0.0 {
@@ -77,6 +79,6 @@ impl std::fmt::Display for Amplitudes<'_> {
             }
         };
         let all: Vec<String> = self.0.iter().map(down).collect();
-        write!(f, "{} {}", if all.len() == 1 { "an amplitude of" } else { "amplitudes of" }, all.join(", "))
+        write!(f, "{} {}", if all.len() == 1 { "amplitude is" } else { "amplitudes are" }, all.join(", "))
     }
 }

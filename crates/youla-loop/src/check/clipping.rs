@@ -1,15 +1,15 @@
-//! Clipping and saturation: an extreme value that is held.
+//! Clipping and saturation: an extreme value that is reached too often.
 //!
 //! The density of a signal falls towards its extremes, so that the largest value of a channel with steps is rarer than its
 //! neighbours, and that of a channel without steps appears once. A limit makes it the most frequent of all. Of a channel
 //! of noise without a limit, the value with the largest count among the outermost six is the outermost one only by
 //! chance, and at least four times as frequent as the rest with a small probability from four samples on, two of them in a row.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, with_unit};
+use super::options::CheckOptions;
 use youla::signal::Channel;
 
-/// A limit at which a channel was held.
+/// A limit at which a channel is clipped.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limit {
     /// Its value.
@@ -34,7 +34,7 @@ pub struct Clipping {
 /// Neighbouring values with which the extreme one is compared.
 const NEIGHBOURS: usize = 5;
 
-/// Looks for limits; `declared` are known ones, at or beyond which every sample counts.
+/// Finds the limits; `declared` are known ones, at or beyond which every sample counts.
 ///
 /// ```
 /// use youla_loop::check::{CheckOptions, clipping};
@@ -106,17 +106,17 @@ impl Clipping {
         let one = |limit: &Limit, side: &str| {
             let share = 100.0 * limit.samples as f64 / n as f64;
             let what = format!(
-                "it is held at its {side} value, {}, for {} samples ({share:.2} %), {} in a row at most",
+                "it is clipped at its {side} value, {}, for {} samples ({share:.2} %), at most {} in a row",
                 with_unit(limit.value, &channel.unit),
                 limit.samples,
                 limit.longest
             );
             let (severity, advice) = if output {
-                let advice = "Leave these stretches out by `segments`, or lower the excitation and log again";
+                let advice = "Exclude these stretches by `segments`, or log again with a lower excitation";
                 (Severity::Defect, advice)
             } else {
-                let advice = "The input must be logged as applied, after saturation; then the plant is not harmed, but the \
-                              controller is not linear there: leave long saturated stretches out by `skip` or `segments`";
+                let advice = "Log the input as applied, after saturation. The plant model is then not affected, but the controller is not \
+                              linear there: exclude long saturated stretches by `skip` or `segments`";
                 (Severity::Caution, advice)
             };
             Finding::new(Test::Clipping, severity, record, what)

@@ -2,18 +2,18 @@
 //!
 //! The output is regressed on its past, that of u and, ahead of time, on x(k+1) ... x(k+3), where x is the known excitation, or u
 //! itself where the record is open-loop. A cause does not come after its effect: if these future samples explain part of
-//! y(k), tested by F, y stands too early in the file or x too late. The regression holds the whole past, so that slow dynamics and
+//! y(k), tested by F, y is too early in the file or x too late. The regression contains the whole past, so that slow dynamics and
 //! periodic excitations do not leak into the test. The dead time is that of the first lag of u with a t value beyond
 //! `significance`. An excitation added at the plant input must be in u at the same sample; where another lag is the first with such a t
 //! value and a substantial coefficient, u is shifted.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few};
+use super::options::CheckOptions;
 use super::regression::{AHEAD, Fit, Lagged};
-use crate::Result;
+use crate::error::Result;
 use youla::signal::Channel;
 
-/// What lags say of the record.
+/// Delays and shifts of a record.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Delay {
     /// Per output: share of the innovation that future samples of the excitation explain, where that is more than chance.
@@ -21,11 +21,11 @@ pub struct Delay {
     /// Per output and input: first lag of u with an effect on y, 0 where y answers in the same sample; `None` where none
     /// of the lags has one.
     pub first: Vec<Vec<Option<usize>>>,
-    /// Per input: lag at which the excitation added there stands in u, 0 as it should be.
+    /// Per input: lag at which u contains the excitation added there; 0 without a shift.
     pub shift: Vec<Option<isize>>,
 }
 
-/// Which signals stand where in the regression.
+/// Positions of the signals in the regression.
 pub(super) struct Places {
     pub(super) inputs: usize,
     pub(super) outputs: usize,
@@ -73,7 +73,7 @@ pub(super) fn of_record(lagged: &Lagged, at: &Places, options: &CheckOptions) ->
 }
 
 /// Share of the next sample of the cause that must not follow from the past: a smooth trajectory is known ahead, and its future
-/// tells of nonlinearities that the regression lacks.
+/// reflects nonlinearities that the regression lacks.
 const NEW: f64 = 1e-3;
 /// Future samples must explain this many times the usual share: dynamics that the regression misses leak a little.
 const EARLY: f64 = 2.5;
@@ -89,7 +89,7 @@ fn t_value(lagged: &Lagged, fit: &Fit, column: usize, target: usize) -> f64 {
 /// Share of the largest coefficient of the excitation from which one of them counts.
 const SUBSTANTIAL: f64 = 0.2;
 
-/// The lag at which the excitation stands in the input beside everything that is fed back.
+/// The lag at which the input contains the excitation, next to the feedback.
 fn shift_of(
     lagged: &Lagged,
     at: &Places,
@@ -125,12 +125,13 @@ fn shift_of(
 /// [`youla::Error::NoConvergence`] of the regressions.
 ///
 /// ```
-/// use youla::{Mat, check::{CheckOptions, delay}};
+/// use youla::Mat;
+/// use youla_loop::check::{CheckOptions, delay};
 /// let u = Mat::from_fn(3000, 1, |k, _| (((k * k) % 8191) as f64 / 8191.0) - 0.5);
 /// let y = Mat::from_fn(3000, 1, |k, _| if k < 4 { 0.0 } else { 2.0 * u[(k - 4, 0)] + 0.1 * u[(3000 - k, 0)] });
 /// let found = delay(u.as_ref(), y.as_ref(), false, &CheckOptions::default())?.unwrap();
 /// assert_eq!((found.first[0][0], found.early[0]), (Some(4), None));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn delay(
     u: youla::MatRef<'_, f64>,
@@ -151,11 +152,11 @@ impl Delay {
         for (output, share) in outputs.iter().zip(&self.early) {
             let Some(share) = share else { continue };
             let what = format!(
-                "it moves before {cause} does: up to three future samples explain {} % of what its past leaves",
+                "it moves before {cause}: up to three future samples explain {} % of its innovation",
                 few(100.0 * share)
             );
-            let advice = "See whether the channels come from one clock: shift the input to earlier rows, or the output to later ones, \
-                          until this finding goes";
+            let advice = "Check that all channels were sampled with one clock; shift the input to earlier rows, or the output to later \
+                          ones, until this finding disappears";
             let finding = Finding::new(Test::Delay, Severity::Defect, record, what).channel(&output.name);
             all.push(finding.number("share", *share).advice(advice));
         }
@@ -163,8 +164,8 @@ impl Delay {
             let Some(lag) = shift.filter(|lag| *lag != 0) else { continue };
             let (side, rows) = if lag > 0 { ("later", lag) } else { ("earlier", -lag) };
             let plural = if rows == 1 { "" } else { "s" };
-            let what = format!("the excitation stands in it {rows} sample{plural} {side} than in its own channel");
-            let advice = "Shift the channels until the excitation and the input that contains it stand in the same row";
+            let what = format!("it contains the excitation {rows} sample{plural} {side} than the excitation channel");
+            let advice = "Shift the channels until the excitation and the input that contains it are in the same row";
             let finding = Finding::new(Test::Delay, Severity::Defect, record, what).channel(&input.name);
             all.push(finding.number("lag", lag as f64).advice(advice));
         }
@@ -181,7 +182,7 @@ impl Delay {
                 };
                 let advice = match first {
                     Some(0) => {
-                        "Take feedthrough = \"estimated\", or see whether the output is logged one sample late or the input early"
+                        "Use feedthrough = \"estimated\", or check whether the output is logged one sample late or the input early"
                     }
                     _ => "Declare `delays` if this is dead time; then the model needs no states for it",
                 };

@@ -4,17 +4,17 @@
 //! ```text
 //! y(k) = sum_i (A_i y(k-i) + B_i u(k-i)) + g0 + g1 P1(k) + g2 P2(k) + e(k),    trend = (I - sum_i A_i)^-1 (g1 P1 + g2 P2)
 //! ```
-//! so that an integrating plant, which wanders by its own, is not blamed. F of g1 and g2 is divided by what the means of 20 blocks
+//! so that the random walk of an integrating plant is not reported. F of g1 and g2 is divided by what the means of 20 blocks
 //! of the residual vary more than white residuals would, which leaves the test valid for slow residuals. The trend is at the output; where the plant
 //! integrates, `I - sum_i A_i` is singular and a trend of the sensor cannot be told from one of the machine. In a loop
 //! that holds such a plant at a constant reference the means of 20 blocks of `y - r` are regressed on time instead.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), section 14.1, for trends as parameters.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few, with_unit};
+use super::options::CheckOptions;
 use super::regression::{Lagged, paulson};
-use crate::Result;
+use crate::error::Result;
 use faer::prelude::*;
 use youla::Mat;
 use youla::signal::Channel;
@@ -117,12 +117,12 @@ impl Drift {
         }
         let severity = if self.relative < 4.0 * options.drift { Severity::Caution } else { Severity::Defect };
         let what = format!(
-            "it drifts by {} over the record, {} times its standard deviation, by what the input does not explain",
+            "it drifts by {} over the record, {} times its standard deviation, which the input does not explain",
             with_unit(self.size, &channel.unit),
             few(self.relative)
         );
-        let advice = "Take the trend out by detrend = \"linear\", use shorter records, or find its cause (temperature, a leak, \
-                      an amplifier that warms up)";
+        let advice = "Remove the trend by detrend = \"linear\", use shorter records, or remove the cause (temperature, a leak, \
+                      warm-up of an amplifier)";
         let numbers = Finding::new(Test::Drift, severity, record, what).number("size", self.size);
         Some(numbers.channel(&channel.name).number("relative", self.relative).advice(advice))
     }

@@ -1,19 +1,19 @@
-//! What the excitation offers: size, crest factor, rank of its Hankel matrix, and the band in which it has power.
+//! Properties of the excitation: size, crest factor, rank of its Hankel matrix, and the band in which it has power.
 //!
 //! Identification with past and future horizons p and f needs persistency of order p + f ([`youla::signal::persistency`]). Rank is
 //! a question of rounding; the condition number says how much weaker the weakest direction is. The band ends where the
 //! spectrum (Welch) stays 60 dB below its largest value.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few};
-use crate::Result;
+use super::options::CheckOptions;
+use crate::error::Result;
 use std::f64::consts::TAU;
 use youla::MatRef;
 use youla::lti::Discrete;
 use youla::signal::Channel;
 use youla::signal::{Welch, cross_spectrum, persistency, persistency_order};
 
-/// What an excitation offers.
+/// Properties of an excitation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excitation {
     /// Standard deviation of each channel.
@@ -34,7 +34,7 @@ pub struct Excitation {
 const EMPTY: f64 = 1e-6;
 /// Samples of a window of the spectrum, at most.
 const WINDOW: usize = 1024;
-/// Part of the band up to Nyquist that must be empty to be worth a word.
+/// Fraction of the band up to Nyquist above which an empty band is reported.
 const WORTH: f64 = 0.1;
 
 /// Describes an excitation, samples x channels; the mean does not count.
@@ -43,12 +43,13 @@ const WORTH: f64 = 0.1;
 /// [`youla::Error::NoConvergence`] of the singular values.
 ///
 /// ```
-/// use youla::{Mat, check::excitation, lti::Discrete};
+/// use youla::{Mat, lti::Discrete};
+/// use youla_loop::check::excitation;
 /// let turn = std::f64::consts::TAU / 100.0;
 /// let sines = Mat::from_fn(2000, 1, |k, _| (5.0 * turn * k as f64).sin() + (13.0 * turn * k as f64).sin());
 /// let found = excitation(sines.as_ref(), Discrete::new(0.01)?, 20)?;
 /// assert_eq!((found.order, found.reached), (20, 4));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Result<Excitation> {
     let n = signal.nrows();
@@ -106,11 +107,11 @@ impl Excitation {
         }
         for channel in &dead {
             let what = match declared {
-                true => "it is declared as an excitation, but does not move",
-                false => "the input does not move",
+                true => "it is declared as an excitation, but is constant",
+                false => "the input is constant",
             };
-            let advice = "Log the signal that was injected, or leave the channel out of run.toml; without excitation nothing can \
-                          be identified";
+            let advice = "Log the injected signal, or remove the channel from run.toml; without excitation nothing can be \
+                          identified";
             let finding = Finding::new(Test::Excitation, Severity::Defect, record, what.into());
             all.push(finding.channel(&channel.name).advice(advice));
         }
@@ -125,10 +126,10 @@ impl Excitation {
         };
         if self.reached < self.order {
             let what = format!(
-                "it excites persistently of order {}, but past and future horizon need {}",
+                "it is persistently exciting of order {}, but past and future horizon require {}",
                 self.reached, self.order
             );
-            let advice = "Excite with more lines, a longer shift register or noise; or take shorter horizons";
+            let advice = "Use more lines, a longer shift register or noise, or shorter horizons";
             all.push(
                 numbers(Finding::new(Test::Excitation, Severity::Defect, record, what).channel(&names)).advice(advice),
             );
@@ -138,26 +139,30 @@ impl Excitation {
                 self.order,
                 few(self.condition)
             );
-            let advice = "Expect little to be known where it has no power; keep the horizons short, or excite there";
+            let advice = "The model is inaccurate at frequencies without power; use short horizons, or excite there";
             all.push(
                 numbers(Finding::new(Test::Excitation, Severity::Note, record, what).channel(&names)).advice(advice),
             );
         }
         for ((channel, crest), end) in channels.iter().zip(&self.crest).zip(&self.band_end) {
             if *crest > options.crest {
-                let what = format!("the excitation has a crest factor of {}: few samples hold its energy", few(*crest));
+                let what = format!(
+                    "the excitation has a crest factor of {}: its energy is concentrated in few samples",
+                    few(*crest)
+                );
                 let finding = Finding::new(Test::Excitation, Severity::Note, record, what).channel(&channel.name);
-                let advice = "A signal of two levels has 1 and reaches the same energy with less amplitude";
+                let advice =
+                    "A two-level signal has a crest factor of 1 and gives the same energy with a lower amplitude";
                 all.push(finding.number("crest", *crest).advice(advice));
             }
             if let Some(hz) = end {
                 let what = format!(
-                    "from {} Hz to the Nyquist frequency of {} Hz it has hardly any power (60 dB below its largest)",
+                    "from {} Hz to the Nyquist frequency of {} Hz its power is more than 60 dB below its maximum",
                     few(*hz),
                     few(nyquist)
                 );
                 let finding = Finding::new(Test::Excitation, Severity::Note, record, what).channel(&channel.name);
-                let advice = "Nothing is known of the plant there; a slower sample time would do";
+                let advice = "The plant cannot be identified there; a longer sample time is sufficient";
                 all.push(finding.number("band_end_hz", *hz).advice(advice));
             }
         }
@@ -196,7 +201,7 @@ mod tests {
         let findings = found.findings("log", &channels, (true, false), 500.0, &options);
         assert_eq!(findings[0].severity, Severity::Defect);
         let zero = excitation(Mat::zeros(4000, 1).as_ref(), time, 40).unwrap();
-        assert!(zero.findings("log", &channels, (true, false), 500.0, &options)[0].what.contains("does not move"));
+        assert!(zero.findings("log", &channels, (true, false), 500.0, &options)[0].what.contains("is constant"));
         assert!(zero.findings("log", &channels, (true, true), 500.0, &options).is_empty());
     }
 }

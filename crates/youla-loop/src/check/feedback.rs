@@ -5,10 +5,10 @@
 //! C. W. J. Granger (Econometrica 37 (1969), 424). Without feedback the past of y adds nothing; a small share is not taken for
 //! feedback, because it appears with inputs that their own past predicts nearly exactly.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few};
+use super::options::CheckOptions;
 use super::regression::Lagged;
-use crate::Result;
+use crate::error::Result;
 
 /// Dependence of the inputs on past outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,7 +48,8 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize, optio
 /// [`youla::Error::NoConvergence`] of the regressions.
 ///
 /// ```
-/// use youla::{Mat, check::{CheckOptions, feedback}};
+/// use youla::Mat;
+/// use youla_loop::check::{CheckOptions, feedback};
 /// let noise = |k: usize| (((k * k) % 8191) as f64 / 8191.0 - 0.5) * 2.0;
 /// let mut y = vec![0.0; 4000];
 /// for k in 1..4000 {
@@ -57,7 +58,7 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize, optio
 /// let u = Mat::from_fn(4000, 1, |k, _| -0.5 * y[k.saturating_sub(1)] + noise(3 * k + 1));
 /// let y = Mat::from_fn(4000, 1, |k, _| y[k]);
 /// assert!(feedback(u.as_ref(), y.as_ref(), &CheckOptions::default())?.unwrap().detected);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn feedback(
     u: youla::MatRef<'_, f64>,
@@ -74,7 +75,7 @@ impl Feedback {
             (true, true) => (
                 Severity::Note,
                 format!(
-                    "the input depends on past outputs, as it does under a controller: they explain {} % of what is new in it",
+                    "the input depends on past outputs, as expected under a controller: they explain {} % of its innovation",
                     few(100.0 * self.share)
                 ),
                 "",
@@ -82,16 +83,16 @@ impl Feedback {
             (true, false) => (
                 Severity::Caution,
                 format!(
-                    "the input depends on past outputs: they explain {} % of what is new in it, {} standard deviations more \
-                     than chance; the record comes from a closed loop",
+                    "the input depends on past outputs: they explain {} % of its innovation ({} standard deviations); the \
+                     record is from a closed loop",
                     few(100.0 * self.share),
                     few(self.deviations)
                 ),
-                "Take a method for closed loops: weight = \"pbsid-opt\" or \"ssarx\", or the scheme with the declared controller",
+                "Use a method for closed loops: method = \"pbsid-opt\" or \"ssarx\", or the Hansen scheme with the declared controller",
             ),
             (false, true) => (
                 Severity::Note,
-                "no feedback from past outputs to the input is seen beside the excitation".to_owned(),
+                "no feedback from past outputs to the input is detected".to_owned(),
                 "If the loop was open, identify directly from u and y by `youla subspace`",
             ),
             (false, false) => return None,

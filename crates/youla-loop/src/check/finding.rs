@@ -1,17 +1,17 @@
-//! What a check says: which test, how serious, where, how bad, what to do.
+//! A finding: test, severity, location, numbers, advice.
 
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// How serious a finding is.
+/// Severity, ascending.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Severity {
-    /// A property of the data that is worth knowing; nothing is wrong.
+    /// A property of the data, for information.
     Note,
-    /// Identification works, but something is lost or must be chosen with care.
+    /// Identification is possible, with reduced accuracy or with options that suit the data.
     Caution,
-    /// Results would be wrong.
+    /// Identification would give wrong results.
     Defect,
 }
 
@@ -32,27 +32,27 @@ impl Severity {
 pub enum Test {
     /// Time steps: irregular, missing, repeated, of another size than declared ([`super::timing()`]).
     Timing,
-    /// Values held at a limit ([`super::clipping()`]).
+    /// Saturation at a limit ([`super::clipping()`]).
     Clipping,
-    /// A channel that stands still ([`super::flatline()`]).
+    /// A constant stretch of a channel ([`super::stuck()`]).
     Stuck,
     /// Resolution of a channel ([`super::quantisation()`]).
     Quantisation,
-    /// A slow trend that the input does not explain ([`super::drift()`]).
+    /// A slow trend not explained by the input ([`super::drift()`]).
     Drift,
-    /// Single wrong samples ([`super::outliers()`]).
+    /// Single-sample outliers ([`super::outliers()`]).
     Outliers,
     /// Dead time, and channels shifted against each other ([`super::delay()`]).
     Delay,
     /// Rank, crest and band of the excitation ([`super::excitation()`]).
     Excitation,
-    /// How much of the outputs the excitation explains ([`super::noise()`]).
+    /// Signal-to-noise ratio of the outputs ([`super::noise()`]).
     Noise,
     /// Narrow lines in the outputs ([`super::lines()`]).
     Lines,
     /// Whether the input depends on the output ([`super::feedback()`]).
     Feedback,
-    /// Whether the declared controller gives the logged input ([`super::controller()`]).
+    /// Whether the declared controller reproduces the logged input ([`super::controller()`]).
     Controller,
 }
 
@@ -79,21 +79,21 @@ impl Test {
 /// One result of a check.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct Finding {
-    /// Which test.
+    /// The test.
     pub test: Test,
-    /// How serious.
+    /// The severity.
     pub severity: Severity,
     /// Name of the record.
     pub record: String,
-    /// Channel, where one is meant.
+    /// The channel; absent for a finding on the whole record.
     pub channel: Option<String>,
-    /// First and last row in the file, counted from 1, where a place is known.
+    /// First and last row in the file, counted from 1; absent for a finding on the whole record.
     pub rows: Option<[usize; 2]>,
-    /// What was found, one sentence without its full stop.
+    /// The finding, one sentence without its full stop.
     pub what: String,
-    /// How bad, by name; documented for each test. A number that does not exist is left out.
+    /// Figures by name, documented for each test; only finite ones.
     pub numbers: BTreeMap<String, f64>,
-    /// What to do, one sentence without its full stop; empty where nothing is to be done.
+    /// The remedy, one sentence without its full stop; may be empty.
     pub advice: String,
 }
 
@@ -125,7 +125,7 @@ impl Finding {
         self
     }
 
-    /// The finding as plain text: record and place, what was found, what to do.
+    /// The finding as plain text: record, location, finding, remedy.
     pub fn sentence(&self) -> String {
         let rows = match self.rows {
             Some([first, last]) if first == last => format!(", row {first}"),
@@ -138,7 +138,7 @@ impl Finding {
     }
 }
 
-/// Puts the most serious findings first; among equals, the order of the tests and of the records stays.
+/// Sorts by severity, descending, then by test; the order of the records is kept.
 pub fn by_severity(findings: &mut [Finding]) {
     findings.sort_by(|a, b| b.severity.cmp(&a.severity).then(a.test.cmp(&b.test)));
 }
@@ -166,13 +166,13 @@ mod tests {
 
     #[test]
     fn a_finding_is_a_sentence() {
-        let finding = Finding::new(Test::Stuck, Severity::Defect, "log", "it stands still".into())
+        let finding = Finding::new(Test::Stuck, Severity::Defect, "log", "it is constant".into())
             .channel("y")
             .rows(3, 9)
             .number("samples", 7.0)
             .number("nothing", f64::NAN)
             .advice("Leave it out");
-        assert_eq!(finding.sentence(), "log, y, rows 3 to 9: it stands still. Leave it out.");
+        assert_eq!(finding.sentence(), "log, y, rows 3 to 9: it is constant. Leave it out.");
         assert_eq!(finding.numbers.len(), 1);
         assert_eq!([few(0.0), few(1234.56), few(0.012345), few(2.5e-7)], ["0", "1235", "0.0123", "2.50e-7"]);
     }

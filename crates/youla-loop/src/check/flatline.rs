@@ -1,11 +1,11 @@
-//! A channel that stands still: a sensor that is stuck, a cable that dropped out, a logger that repeats its last value.
+//! Constant stretches: a sensor that is stuck, a disconnected cable, a logger that repeats its last value.
 //!
 //! Of N samples of which the share q equals the one before, a constant stretch of L samples has a probability of about
 //! `N q^(L-1)`. Friction and coarse steps make longer ones, but many of them, so that the stretch must also be several times as
 //! long as every other one of the channel.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, with_unit};
+use super::options::CheckOptions;
 use youla::signal::Channel;
 
 /// A constant stretch.
@@ -23,7 +23,7 @@ pub struct Standstill {
 
 /// Probability of a stretch by chance in a record.
 const CHANCE: f64 = 1e-4;
-/// Shortest stretch that is looked at.
+/// Shortest stretch that is tested.
 const SHORTEST: usize = 4;
 
 /// Looks for the longest constant stretch that is out of proportion. `None` also for a channel that is switched between few
@@ -86,7 +86,7 @@ fn several(values: &[f64], levels: usize) -> bool {
 impl Standstill {
     pub(super) fn finding(&self, record: &str, first: usize, channel: &Channel) -> Finding {
         let what = format!(
-            "it stands still at {} for {} samples, while no other constant stretch is longer than {}",
+            "it is constant at {} for {} samples; the next longest constant stretch has {}",
             with_unit(self.value, &channel.unit),
             self.samples,
             self.next
@@ -96,7 +96,7 @@ impl Standstill {
             .rows(first + self.first, first + self.first + self.samples - 1)
             .number("samples", self.samples as f64)
             .number("next", self.next as f64)
-            .advice("Leave these rows out by `segments`; see whether the sensor or the logger dropped out")
+            .advice("Exclude these rows by `segments`; check the sensor and the logger for dropouts")
     }
 }
 

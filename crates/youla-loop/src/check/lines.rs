@@ -1,6 +1,6 @@
 //! Narrow lines in the outputs: unbalance, run-out, gears, mains.
 //!
-//! A line of the Hann-windowed periodogram is held against the median of its neighbours, without the two on either side that it
+//! A line of the Hann-windowed periodogram is compared with the median of its neighbours, without the two on either side that it
 //! leaks into. Over noise the ratio to the mean of the neighbours has, with nu of them independent, the tail
 //! `(1 + x / nu)^-nu`, from which the threshold for the given probability in N / 2 lines follows. Resonances are wider than a line
 //! and lift their neighbours; a line must also stand out from the eight nearest of them and fall off by a factor five within two bins, as the window makes it. Lines that
@@ -8,8 +8,8 @@
 //!
 //! Source: for the window F. J. Harris, Proc. IEEE 66 (1978), 51; for the test R. A. Fisher, Proc. R. Soc. A 125 (1929), 54.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few, with_unit};
+use super::options::CheckOptions;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
@@ -48,13 +48,14 @@ const PERIODIC: f64 = 0.02;
 /// Finds the lines of `values` that none of the `known` signals has.
 ///
 /// ```
-/// use youla::{check::{CheckOptions, lines}, lti::Discrete};
+/// use youla::lti::Discrete;
+/// use youla_loop::check::{CheckOptions, lines};
 /// let noise = |k: usize| ((k * k * 31 + 7 * k) % 8191) as f64 / 8191.0 - 0.5;
 /// let y: Vec<f64> = (0..4000).map(|k| noise(k) + 0.2 * (k as f64 * 0.5).sin()).collect();
 /// let found = lines(&y, &[], Discrete::new(0.01)?, &CheckOptions::default());
 /// assert_eq!(found.len(), 1);
 /// assert!((found[0].hz - 7.958).abs() < 0.01 && (found[0].amplitude - 0.2).abs() < 0.02);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOptions) -> Vec<Line> {
     let n = values.len();
@@ -185,14 +186,14 @@ pub(super) fn finding(lines: &[Line], record: &str, channel: &Channel) -> Option
         .collect();
     let more = if lines.len() > LISTED { ", ..." } else { "" };
     let plural = if lines.len() == 1 { "a line" } else { "lines" };
-    let what = format!("it has {plural} that the excitation does not have: {}{more}", listed.join(", "));
-    let advice = "Name the frequencies, or a tacho, in [data.disturbance]; left alone each takes two states of a model";
+    let what = format!("it has {plural} that the excitation does not contain: {}{more}", listed.join(", "));
+    let advice = "Declare the frequencies, or a tachometer, in [data.disturbance]; an undeclared line takes two states of the model";
     Some(
         Finding::new(
             Test::Lines,
             Severity::Caution,
             record,
-            format!("{what} (power {} times the neighbourhood)", few(strongest.ratio)),
+            format!("{what} (power {} times that of the neighbouring frequencies)", few(strongest.ratio)),
         )
         .channel(&channel.name)
         .number("count", lines.len() as f64)

@@ -1,26 +1,26 @@
-//! What is wrong with the data before anything is identified from them.
+//! Tests of the data before identification.
 //!
 //! One file per test; each is a public function from samples to a typed result, with its equation and source. [`check_record`] runs
-//! all of them on one record and says what they found as [`Finding`]s: which test, how serious, where, how bad, what to do.
-//! Nothing is repaired. What the thresholds are and why stands in [`CheckOptions`].
+//! all tests on one record and returns [`Finding`]s: test, severity, location, numbers, advice. Nothing is repaired. The
+//! thresholds and their reasons are documented in [`CheckOptions`].
 //!
 //! | file | test |
 //! |---|---|
 //! | `timing` | steps of the time column: irregular, missing, repeated, of another unit |
-//! | `clipping` | values held at a limit |
-//! | `stuck` | a channel that stands still |
-//! | `quantisation` | steps of a channel against its innovation |
-//! | `drift` | a trend that the input does not explain |
-//! | `outliers` | single wrong samples |
+//! | `clipping` | saturation at a limit |
+//! | `flatline` | a constant stretch of a channel |
+//! | `quantisation` | resolution of a channel relative to its innovation |
+//! | `drift` | a trend not explained by the input |
+//! | `outliers` | single-sample outliers |
 //! | `delay` | dead time, channels shifted against each other |
 //! | `excitation` | rank, crest factor and band of the excitation |
 //! | `noise` | signal-to-noise ratio |
 //! | `lines` | narrow lines of unbalance or mains |
 //! | `feedback` | whether the input depends on the output |
-//! | `controller` | whether the declared controller gives the logged input |
-//! | `record` | [`check_record`]: all of them on one record |
-//! | `outside` | those of them that depend on what moves the record from outside |
-//! | `regression` | what several tests share: all regressions of a record from one triangular factor |
+//! | `controller` | whether the declared controller reproduces the logged input |
+//! | `record` | [`check_record`]: all tests on one record |
+//! | `outside` | the tests of excitation, noise, trends and lines |
+//! | `regression` | the regressions of all tests, from one triangular factor |
 
 mod clipping;
 mod controller;

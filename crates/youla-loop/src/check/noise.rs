@@ -1,4 +1,4 @@
-//! How much of each output the excitation explains.
+//! Signal-to-noise ratio of each output with respect to the excitation.
 //!
 //! With the coherence `gamma^2` between the excitation (the input, where the loop is open) and an output, estimated over K windows
 //! and freed of its bias m / K,
@@ -10,7 +10,7 @@
 //! Source: G. C. Carter, C. H. Knapp, A. H. Nuttall, IEEE Trans. Audio Electroacoust. 21 (1973), 337, for the bias.
 
 use super::finding::{Finding, Severity, Test, few};
-use crate::Result;
+use crate::error::Result;
 use std::f64::consts::TAU;
 use youla::MatRef;
 use youla::lti::Discrete;
@@ -40,13 +40,14 @@ const WINDOW: [usize; 2] = [32, 2048];
 /// Shapes; [`youla::Error::NotFinite`].
 ///
 /// ```
-/// use youla::{Mat, check::noise, lti::Discrete};
+/// use youla::{Mat, lti::Discrete};
+/// use youla_loop::check::noise;
 /// let hash = |k: usize| ((k * k * 31 + 7 * k) % 8191) as f64 / 8191.0 - 0.5;
 /// let u = Mat::from_fn(8000, 1, |k, _| hash(k));
 /// let y = Mat::from_fn(8000, 1, |k, _| hash(k) + 0.1 * hash(3 * k + 1));
 /// let found = noise(u.as_ref(), y.as_ref(), Discrete::new(0.01)?)?.unwrap();
 /// assert!((50.0..200.0).contains(&found[0].ratio));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn noise(excitation: MatRef<'_, f64>, y: MatRef<'_, f64>, time: Discrete) -> Result<Option<Vec<Noise>>> {
     let window = (y.nrows() / WINDOWS).min(WINDOW[1]);
@@ -85,20 +86,20 @@ pub fn noise(excitation: MatRef<'_, f64>, y: MatRef<'_, f64>, time: Discrete) ->
     Ok(Some(all))
 }
 
-/// Share of the frequencies, and signal-to-noise ratio, below which an excitation is not seen.
+/// Share of the frequencies, and signal-to-noise ratio, below which a caution is reported.
 const UNSEEN: [f64; 2] = [0.02, 0.05];
 
 impl Noise {
     pub(super) fn finding(&self, record: &str, channel: &Channel) -> Finding {
         let decibel = 10.0 * self.ratio.log10();
-        let band = self.band.map_or("nowhere".to_owned(), |[from, to]| {
+        let band = self.band.map_or("at no frequency".to_owned(), |[from, to]| {
             format!("at {} % of the frequencies, from {} Hz to {} Hz", few(100.0 * self.seen), few(from), few(to))
         });
         let what = format!(
-            "the excitation explains it with a signal-to-noise ratio of {decibel:.1} dB; it explains half of the power {band}"
+            "its signal-to-noise ratio is {decibel:.1} dB; the excitation explains at least half of its power {band}"
         );
         let (severity, advice) = if self.seen < UNSEEN[0] && self.ratio < UNSEEN[1] {
-            (Severity::Caution, "Excite more strongly or longer: what is hardly seen can hardly be identified")
+            (Severity::Caution, "Increase the amplitude or the length of the excitation")
         } else {
             (Severity::Note, "")
         };

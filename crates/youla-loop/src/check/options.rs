@@ -1,13 +1,13 @@
 //! Thresholds of all tests, with the reason for each.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// What counts as a finding: `[check]` of run.toml.
 ///
-/// Tests with a distribution hold at `significance` standard deviations; measured records have residuals that are not quite
-/// white and not quite normal, so that it is far out, and a share that must be exceeded stands beside it.
+/// Statistical tests use `significance` standard deviations. Residuals of measured records are neither exactly white nor exactly
+/// normal; the threshold is therefore high, and an effect must also exceed a share of the variance.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct CheckOptions {
@@ -15,13 +15,13 @@ pub struct CheckOptions {
     #[serde(skip_serializing_if = "BTreeMap::is_empty")]
     pub limits: BTreeMap<String, [f64; 2]>,
     /// Samples at the extreme value of a channel from which it counts as a limit. Values of a channel without steps do
-    /// not repeat; four are no accident.
+    /// not repeat by chance.
     pub clipped_samples: usize,
     /// By what factor the extreme value must be more frequent than each of the five values next to it. The density of a
     /// signal that is not clipped falls towards its extremes.
     pub clipped_pile_up: f64,
-    /// Channels with at most this many values are switched, not measured; they are not looked at for clipping, standstill
-    /// and steps.
+    /// Channels with at most this many values are treated as switched; they are not tested for clipping, constant stretches
+    /// and resolution.
     pub switched_levels: usize,
     /// How much longer than every other constant stretch of the channel one must be. A stretch must also be longer than
     /// chance allows (probability 1e-4 in a record, with the share of repeated samples of the channel); friction makes
@@ -41,7 +41,7 @@ pub struct CheckOptions {
     /// is a defect.
     pub drift: f64,
     /// Deviations of the test for a single wrong sample; 8 is a probability of 1e-15 for normal noise, and the tails of
-    /// measured residuals are held against their own quantiles besides.
+    /// measured residuals are compared with their own quantiles as well.
     pub outlier: f64,
     /// Share of the energy of the innovation that single wrong samples make, from which they are a caution; 2.5 times as
     /// much is a defect.
@@ -51,10 +51,10 @@ pub struct CheckOptions {
     /// Order of persistency that the excitation needs; past and future horizon of the identification when absent, else 40.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub excitation_order: Option<usize>,
-    /// Condition number of the Hankel matrix of the excitation from which it is worth a word: the weakest direction has this
+    /// Condition number of the Hankel matrix of the excitation above which a note is reported: the weakest direction has this
     /// much less amplitude than the strongest.
     pub excitation_condition: f64,
-    /// Crest factor from which an excitation spends its amplitude on few samples. White normal noise has 5.
+    /// Crest factor above which a note is reported. White normal noise has about 5.
     pub crest: f64,
     /// Part of the logged input that the controller does not explain, from which it is a caution.
     pub controller_caution: f64,

@@ -1,4 +1,4 @@
-//! Single wrong samples: bits that fell over, contacts that bounced, glitches of a converter.
+//! Single-sample outliers: bit errors, bouncing contacts, converter glitches.
 //!
 //! A wrong sample w at time k enters the innovation of a regression of y on its past as `w a(j)` at k + j, where
 //! `a = (1, -A_1, -A_2, ...)` are the coefficients of y itself. Its estimate and test are
@@ -11,10 +11,10 @@
 //! Source: I. Chang, G. C. Tiao, C. Chen, Estimation of time series parameters in the presence of outliers, Technometrics 30
 //! (1988), 193.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few, with_unit};
+use super::options::CheckOptions;
 use super::regression::Lagged;
-use crate::Result;
+use crate::error::Result;
 use youla::linalg::quantile;
 use youla::signal::Channel;
 
@@ -33,7 +33,7 @@ pub struct Outliers {
 const EXPLAINED: f64 = 0.8;
 /// Median of the magnitude of a normal variable.
 const MEDIAN: f64 = 0.674_489_75;
-/// Magnitudes in the tail of an innovation against which a candidate is held.
+/// Magnitudes in the tail of an innovation with which a candidate is compared.
 const TAIL: f64 = 0.995;
 
 /// Wrong samples of a channel by its own past alone; the check of a record uses the inputs too.
@@ -48,7 +48,7 @@ const TAIL: f64 = 0.995;
 /// let found = outliers(&wave, &CheckOptions::default())?;
 /// assert_eq!(found.samples, [400]);
 /// assert!((found.sizes[0] - 3.0).abs() < 0.3);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn outliers(values: &[f64], options: &CheckOptions) -> Result<Outliers> {
     let signal = youla::MatRef::from_column_major_slice(values, values.len(), 1);
@@ -128,14 +128,15 @@ impl Outliers {
             .map(|(k, w)| format!("row {} by {}", first + k, with_unit(*w, &channel.unit)))
             .collect();
         let more = if self.samples.len() > LISTED { ", ..." } else { "" };
-        let plural = if self.samples.len() == 1 { " is" } else { "s are" };
+        let plural = if self.samples.len() == 1 { "" } else { "s" };
         let what = format!(
-            "{} single sample{plural} wrong ({}{more}), {} % of the energy that the past does not predict",
+            "{} single-sample outlier{plural} ({}{more}) with {} % of the energy of the innovation",
             self.samples.len(),
             listed.join(", "),
             few(100.0 * self.share)
         );
-        let advice = "Cut them out by `segments`, or estimate with a robust loss (loss = \"huber\" in [grey_box.pem])";
+        let advice =
+            "Exclude the rows by `segments`, or estimate with a robust loss (loss = \"huber\" in [grey_box.pem])";
         Some(
             Finding::new(Test::Outliers, severity, record, what)
                 .channel(&channel.name)

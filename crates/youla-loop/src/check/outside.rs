@@ -1,12 +1,12 @@
-//! The tests of a record that depend on what moves it from outside: trends, excitation and noise, lines.
+//! The tests of a record that depend on its external signals: trends, excitation and noise, lines.
 
 use super::regression::Lagged;
 use super::{ChannelNames, CheckOptions, Finding, LoggedRecord, drift, excitation, lines, noise};
-use crate::Result;
+use crate::error::Result;
 use youla::MatRef;
 use youla::signal::Channel;
 
-/// Order of persistency that is asked for where nothing is said.
+/// Default of the required order of persistency.
 const ORDER: usize = 40;
 
 pub(super) fn constant(x: MatRef<'_, f64>) -> bool {

@@ -1,10 +1,10 @@
 //! The step of a channel, as of an encoder or a converter of few bits.
 //!
 //! The distinct values of a channel with steps are whole multiples of a step q apart. Its rounding adds noise of variance
-//! `q^2 / 12` (B. Widrow, I. Kollar, Quantization Noise, 2008, chapter 4), which is held against the innovation of the output.
+//! `q^2 / 12` (B. Widrow, I. Kollar, Quantization Noise, 2008, chapter 4), which is compared with the innovation of the output.
 
-use super::CheckOptions;
 use super::finding::{Finding, Severity, Test, few, with_unit};
+use super::options::CheckOptions;
 use youla::signal::Channel;
 
 /// The steps of a channel.
@@ -76,23 +76,23 @@ impl Quantisation {
         let severity = match share {
             _ if coarse => Severity::Defect,
             Some(share) if share > options.quantisation_share => Severity::Caution,
-            // Many fine steps, as of numbers with few digits, say nothing.
+            // Many fine steps come from numbers with few digits.
             _ if self.deviation_in_steps > FINE => return None,
             _ => Severity::Note,
         };
         let of_noise = share.map_or(String::new(), |share| match share {
-            s if s < 1.0 => format!(", which make {} % of the variance that the past does not predict", few(100.0 * s)),
-            _ => ", which make all of the variance that the past does not predict".to_owned(),
+            s if s < 1.0 => format!("; quantisation noise is {} % of the variance of the innovation", few(100.0 * s)),
+            _ => "; quantisation noise is all of the variance of the innovation".to_owned(),
         });
         let what = format!(
-            "it has steps of {}; its standard deviation is {} steps{of_noise}",
+            "its resolution is {}; its standard deviation is {} steps{of_noise}",
             with_unit(self.step, &channel.unit),
             few(self.deviation_in_steps)
         );
         let advice = match severity {
             Severity::Note => "",
             _ => {
-                "Excite more strongly or use a finer sensor; otherwise expect the noise of the steps to bound what can be seen \
+                "Increase the excitation or use a sensor of higher resolution; otherwise quantisation noise limits the accuracy \
                   where the response is small"
             }
         };
@@ -109,7 +109,7 @@ impl Quantisation {
     }
 }
 
-/// Steps in a standard deviation from which they are not worth a word.
+/// Steps per standard deviation above which no note is reported.
 const FINE: f64 = 100.0;
 
 #[cfg(test)]

@@ -6,7 +6,7 @@ use super::{
     CheckOptions, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay, feedback, outliers,
     quantisation, stuck,
 };
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use youla::MatRef;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
@@ -18,7 +18,7 @@ pub struct LoggedRecord<'a> {
     pub name: &'a str,
     /// Clock of the samples.
     pub time: Discrete,
-    /// Row of the file, counted from 1, in which the first sample stands.
+    /// Row of the file, counted from 1, of the first sample.
     pub first_row: usize,
     /// Plant input as applied, samples x m.
     pub u: MatRef<'a, f64>,
@@ -64,7 +64,7 @@ pub fn check_record(
     options.check()?;
     let declared = declared.filter(|k| !k.is_zero());
     if record.u.nrows() < SHORTEST {
-        let what = format!("it has {} samples; nothing can be tested below {SHORTEST}", record.u.nrows());
+        let what = format!("it has {} samples; the tests require at least {SHORTEST}", record.u.nrows());
         return Ok(vec![Finding::new(Test::Timing, Severity::Caution, record.name, what)]);
     }
     let mut all = Vec::new();
@@ -131,7 +131,7 @@ fn of_channels(
             let limits = options.limits.get(&channel.name).copied();
             let found = clipping(&values, limits, options);
             all.extend(found.findings(record.name, record.first_row, channel, output, values.len()));
-            // A channel at its limit stands still there; that has been said.
+            // A channel at its limit is constant; that is reported as clipping.
             let held = |value: f64| found.lower.iter().chain(&found.upper).any(|limit| limit.value == value);
             if let Some(standstill) = stuck(&values, options).filter(|s| !held(s.value)) {
                 all.push(standstill.finding(record.name, record.first_row, channel));

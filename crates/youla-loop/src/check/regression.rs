@@ -11,7 +11,7 @@
 //! Two nested regressions are compared by F, whose tail is put into standard deviations of a normal variable by the
 //! approximation of E. Paulson (Ann. Math. Statist. 13 (1942), 233).
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use rayon::prelude::*;
 use youla::linalg::block;
 use youla::{Mat, MatRef};

@@ -15,7 +15,7 @@ pub struct Gap {
     pub missing: usize,
 }
 
-/// What the time column says.
+/// Properties of a time column.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Timing {
     /// Median step, seconds as declared by the column.
@@ -41,7 +41,7 @@ const REPEATED: f64 = 0.05;
 /// From this part on a step is a gap.
 const GAP: f64 = 1.5;
 
-/// Holds a time column against its own median step and against a declared sample time. `None` for less than three rows or
+/// Compares a time column with its own median step and against a declared sample time. `None` for less than three rows or
 /// a median step that is not positive.
 ///
 /// ```
@@ -85,7 +85,7 @@ pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Ti
 }
 
 impl Timing {
-    /// In words; `first` is the row of the file, counted from 1, of the first time.
+    /// The findings; `first` is the row of the file, counted from 1, of the first time.
     pub fn findings(&self, record: &str, first: usize) -> Vec<Finding> {
         let mut all = Vec::new();
         let defect = |what: String| Finding::new(Test::Timing, Severity::Defect, record, what);
@@ -104,7 +104,7 @@ impl Timing {
                 defect(what)
                     .number("step", self.step)
                     .number("ratio", ratio)
-                    .advice("State time and sample time in seconds"),
+                    .advice("Give time and sample time in seconds"),
             );
         }
         if !self.gaps.is_empty() {
@@ -112,21 +112,21 @@ impl Timing {
             let rows: Vec<usize> = self.gaps.iter().map(|g| g.row).collect();
             let (from, to) = span(&rows);
             let what = format!("{} samples are missing in {} gaps", missing, self.gaps.len());
-            let advice =
-                "Cut the record there by gaps = \"split\", or log it again; nothing may be joined across a gap";
+            let advice = "Split the record there by gaps = \"split\", or log it again";
             let numbers = defect(what).number("missing", missing as f64).number("gaps", self.gaps.len() as f64);
             all.push(numbers.rows(from, to).advice(advice));
         }
         if !self.repeated.is_empty() {
             let (from, to) = span(&self.repeated);
             let what = format!("{} rows repeat the time of the row before", self.repeated.len());
-            let advice = "Remove the rows that were logged twice; if their values differ, the log lost its clock";
+            let advice =
+                "Remove the rows that were logged twice; if their values differ, check the clock of the logger";
             all.push(defect(what).rows(from, to).number("repeated", self.repeated.len() as f64).advice(advice));
         }
         if !self.back.is_empty() {
             let (from, to) = span(&self.back);
-            let what = format!("the time jumps back before {} rows", self.back.len());
-            let advice = "Put the rows in order, or use the parts as records of their own";
+            let what = format!("the time decreases at {} rows", self.back.len());
+            let advice = "Sort the rows, or use the parts as separate records";
             all.push(defect(what).rows(from, to).number("back", self.back.len() as f64).advice(advice));
         }
         if !self.irregular.is_empty() {
@@ -138,8 +138,8 @@ impl Timing {
                 few(100.0 * self.jitter),
                 few(100.0 * self.worst)
             );
-            let advice = "Where only the time stamps jitter, state sample_time and leave time_column out; where the sampling \
-                          does, resample to a regular clock before the identification";
+            let advice = "If only the time stamps are irregular, set sample_time and remove time_column; if the sampling is irregular, \
+                          resample to a uniform clock before the identification";
             let numbers = defect(what).number("irregular", self.irregular.len() as f64).number("jitter", self.jitter);
             all.push(numbers.rows(from, to).number("worst", self.worst).advice(advice));
         }

@@ -1,4 +1,4 @@
-//! Where the energy of a sequence lies: `E(f1, f2)`, the integral of `|alpha(f)|^2` of the whole finite sequence, its ends included.
+//! Energy of a sequence over frequency: `E(f1, f2)`, the integral of `|alpha(f)|^2` of the whole finite sequence, its ends included.
 
 use rustfft::FftPlanner;
 use youla::lti::Discrete;

@@ -1,14 +1,14 @@
-//! What the nominal loop does under an excitation: the predicted `u` and `y`, and how far they are off where the model is.
+//! The response of the nominal loop to an excitation, and its change under model errors.
 //!
 //! ```text
 //! [u; y] = T_0 alpha          T_0 the nominal model with the controller and its port
 //! ```
 //!
-//! The prediction is of the excitation alone: noise, unbalance and the point of operation come on top of it.
+//! The prediction contains the excitation alone. Noise, unbalance and the operating point add to it.
 
 use super::ExcitedLoop;
 use super::options::ExciteOptions;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use faer::Scale;
 use serde::Serialize;
 use youla::control::closed_loop;
@@ -16,7 +16,7 @@ use youla::linalg::block;
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
 
-/// Part to which the loop is to have decayed behind the end of the sequence.
+/// Fraction to which the response decays after the end of the sequence.
 const DECAYED: f64 = 1e-8;
 
 /// The prediction of the nominal loop, with what follows the end of the sequence.
@@ -27,12 +27,12 @@ pub(super) struct Response {
     pub(super) y: Mat<f64>,
 }
 
-/// What an error of the model makes of the prediction.
+/// Effect of a model error on the prediction.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ModelErrorEffect {
-    /// Relative error theta that was tried, as in (27), both ways.
+    /// Relative error theta of (27), applied with both signs.
     pub theta: f64,
-    /// Largest predicted magnitude of each input over the models that were tried.
+    /// Largest predicted magnitude of each input over the perturbed models.
     pub inputs: Vec<f64>,
     /// The same for each output.
     pub outputs: Vec<f64>,
@@ -83,7 +83,7 @@ impl Response {
     }
 }
 
-/// The prediction for models that are wrong by theta.
+/// The prediction for models with the relative error theta.
 pub(super) fn model_error(
     on: &ExcitedLoop,
     alpha: MatRef<'_, f64>,

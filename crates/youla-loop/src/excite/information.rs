@@ -1,4 +1,4 @@
-//! How well an excitation determines the modes of the plant: the Cramér-Rao bound of output error in closed loop with known alpha.
+//! Predicted accuracy of the modes of the plant: the Cramér-Rao bound of output error in closed loop with known alpha.
 //!
 //! ```text
 //! y = G_cl(theta) alpha + S_y n,   n white with covariance diag(sigma^2)
@@ -7,16 +7,16 @@
 //! ```
 //!
 //! Whitened by the sensitivity, the loop drops out of the derivative: what counts is the input that alpha makes. The noise colours y by
-//! S_y, which depends on theta too; what that adds is left out, so that the bound is on the safe side. Sums over frequencies hold for
+//! S_y, which depends on theta too; that information is neglected, so the bound is conservative. Sums over frequencies hold for
 //! unstable plants as well. The parameters are those of every simple pole: `G = sum of c b / (z - p)` with the pole p, its
 //! direction c at the outputs and b at the inputs, one entry of b held. Poles that repeat or lie at the origin (delays), with
 //! their residues, hidden ones and the feedthrough count as known.
 //!
-//! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.4 and 9.4; held against a Monte-Carlo study by
+//! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.4 and 9.4; compared with a Monte-Carlo study in
 //! `tests::the_bound_is_what_prediction_error_reaches`.
 
 use super::energy::transform;
-use crate::Result;
+use crate::error::Result;
 use faer::linalg::solvers::Solve;
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -28,7 +28,7 @@ use youla::{Mat, MatRef, c64};
 const DELAY: f64 = 0.05;
 /// Poles nearer to each other than this count as one that repeats.
 const APART: f64 = 1e-6;
-/// Part of the largest peak below which a pole does not show.
+/// Fraction of the largest peak below which a pole is treated as not controllable.
 const WEAKLY_CONTROLLABLE: f64 = 1e-10;
 /// Frequencies that are added up in one product.
 const CHUNK: usize = 1024;
@@ -36,7 +36,7 @@ const CHUNK: usize = 1024;
 /// The derivative of `c b / (z - p)` times u by one parameter, from p, c and b.
 type Derivative<'a> = dyn Fn(c64, &[c64], &[c64]) -> Vec<c64> + 'a;
 
-/// How well one mode will be known.
+/// Predicted accuracy of one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ModeAccuracy {
     /// Natural frequency in the nominal model, Hz.
@@ -48,7 +48,7 @@ pub struct ModeAccuracy {
     pub hz_deviation: Option<f64>,
     /// The same for the damping ratio.
     pub zeta_deviation: Option<f64>,
-    /// Length in seconds that the wanted standard deviation of the damping ratio needs: information grows in proportion to length.
+    /// Length in seconds at which the damping ratio has the required standard deviation: information is proportional to length.
     pub needed: Option<f64>,
 }
 

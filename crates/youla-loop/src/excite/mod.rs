@@ -1,15 +1,15 @@
-//! Excitation for a machine that runs under its controller: a sequence for the port alpha of Fig. 3 (or for the plant input), what the
-//! nominal loop will do under it, and how well it will determine the modes.
+//! Excitation for a machine that runs under its controller: a sequence for the port alpha of Fig. 3 (or for the plant input), the
+//! predicted response of the nominal loop, and the predicted accuracy of the modes.
 //!
 //! ```text
 //! u = F xh + alpha          the port alpha of J_K (22)
 //! u = K y + alpha           the plant input
 //! ```
 //!
-//! | file | holds |
+//! | file | content |
 //! |---|---|
-//! | `options` | what is asked |
-//! | `sequence` | shape, bands that stay free, ramps |
+//! | `options` | the options |
+//! | `sequence` | shape, notches, ramps |
 //! | `energy` | where the energy lies |
 //! | `guard` | the predicted u and y, against limits and for wrong models |
 //! | `information` | the Cramér-Rao bound of natural frequencies and damping ratios |
@@ -32,7 +32,7 @@ pub use noise::output_noise;
 pub use options::{ExciteOptions, InputOrder, Length, Notch, Shape};
 pub use summary::{ExcitedInput, ExcitedSpectrum, ExcitedSummary, NotchEnergy, PredictedPeak};
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use energy::Energy;
 use faer::Scale;
 use options::spread;
@@ -55,7 +55,7 @@ pub struct ExcitedLoop<'a> {
     pub outputs: &'a [Channel],
 }
 
-/// An excitation and what is known of it beforehand.
+/// An excitation and its predicted effect.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Excited {
     /// The sequence, samples x m.
@@ -72,16 +72,16 @@ pub struct Excited {
     pub summary: ExcitedSummary,
 }
 
-/// Makes an excitation, predicts what the nominal loop does under it, and how well it will determine the modes.
+/// Generates an excitation; predicts the response of the nominal loop and the accuracy of the modes.
 ///
 /// # Errors
-/// [`Error::BeyondLimit`] where a limit is passed, unless it is to be scaled; [`youla::Error::NotStabilising`] with the pole of a nominal loop
-/// that is not stable; [`youla::Error::OutOfRange`] and [`youla::Error::Ports`] for options without a meaning.
+/// [`Error::BeyondLimit`] where a limit is exceeded and `scale_to_limit` is off; [`youla::Error::NotStabilising`] with the pole of a nominal loop
+/// that is not stable; [`youla::Error::OutOfRange`] and [`youla::Error::Ports`] for options outside of their range.
 ///
 /// ```
 /// use youla::control::with_input_port;
 /// use youla_loop::excite::{ExcitedLoop, ExciteOptions, Length, excite};
-/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, units::Channel};
+/// use youla::{Mat, linalg::eye, lti::{Discrete, StateSpace}, signal::Channel};
 /// let time = Discrete::new(1e-3)?;
 /// let nominal = StateSpace::new(eye(1), eye(1), eye(1), Mat::zeros(1, 1), time)?;
 /// let controller = with_input_port(&StateSpace::gain(Mat::from_fn(1, 1, |_, _| -0.1), time)?)?;
@@ -97,7 +97,7 @@ pub struct Excited {
 /// };
 /// let found = excite(&on, &options)?;
 /// assert!((found.summary.predicted[1].peak - 3.0).abs() < 1e-9);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn excite(on: &ExcitedLoop, options: &ExciteOptions) -> Result<Excited> {
     let (time, m, p) = (on.nominal.time(), on.nominal.inputs(), on.nominal.outputs());
@@ -163,7 +163,7 @@ fn limits(options: &ExciteOptions, m: usize, p: usize) -> Result<[Option<Vec<f64
     Ok([one("limits of the inputs", &options.limit_input, m)?, one("limits of the outputs", &options.limit_output, p)?])
 }
 
-/// The factor that just keeps all limits, where one is passed.
+/// The largest factor that keeps all limits, if one is exceeded.
 fn keep(
     on: &ExcitedLoop,
     options: &ExciteOptions,
@@ -186,8 +186,8 @@ fn keep(
         Some((factor, channel, predicted, limit)) => {
             let unit = if channel.unit.is_empty() { String::new() } else { format!(" {}", channel.unit) };
             let amplitudes = spread("amplitudes", &options.amplitude, on.inputs.len(), 0.0)?;
-            let holding = amplitudes.iter().map(|a| factor * a).collect();
-            Err(Error::BeyondLimit { channel: channel.name.clone(), predicted, limit, unit, holding })
+            let permitted = amplitudes.iter().map(|a| factor * a).collect();
+            Err(Error::BeyondLimit { channel: channel.name.clone(), predicted, limit, unit, permitted })
         }
     }
 }

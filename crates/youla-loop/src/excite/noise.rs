@@ -6,15 +6,14 @@
 
 use super::ExcitedLoop;
 use super::guard::loop_of;
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use youla::linalg::solve;
 use youla::lti::h2_norm;
 use youla::{Mat, MatRef};
 
 /// Standard deviation of the noise of each output, from `y` (samples x p, without its mean) of the loop at rest.
 ///
-/// Everything in y counts as noise of the outputs: lines of unbalance make it larger, and the accuracies that rest on it worse than
-/// they are.
+/// Everything in y counts as noise of the outputs: unbalance increases it and makes the predicted accuracies pessimistic.
 ///
 /// # Errors
 /// [`youla::Error::Shape`]; [`youla::Error::NotStabilising`]; [`youla::Error::OutOfRange`] for an output whose variance the noise of the others would
@@ -38,7 +37,7 @@ pub fn output_noise(on: &ExcitedLoop, y: MatRef<'_, f64>) -> Result<Vec<f64>> {
                     on.outputs[i].name
                 ),
                 value: variance,
-                must: "positive; state the noise of each output instead",
+                must: "positive; set the noise of each output instead",
             })),
         })
         .collect()

@@ -1,6 +1,6 @@
-//! What is asked of an excitation.
+//! Options of an excitation.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 /// The shape of the sequence.
@@ -49,7 +49,7 @@ impl Default for Length {
     }
 }
 
-/// How several inputs are kept apart.
+/// How several inputs are excited.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum InputOrder {
@@ -61,7 +61,7 @@ pub enum InputOrder {
     OneAtATime,
 }
 
-/// Bands that are to stay free, around multiples of the speed of the shaft.
+/// Frequency bands without excitation, around multiples of the shaft speed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Notch {
@@ -96,13 +96,13 @@ impl Notch {
     }
 }
 
-/// Everything that is asked of an excitation; amplitude, band and length have no default that would be safe, and must be given.
+/// Options of an excitation. Amplitude, band and length have no safe default and must be set.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
 pub struct ExciteOptions {
     /// The shape.
     pub shape: Shape,
-    /// Greatest absolute value, in the unit of the input: one for each input, or one for all. 0 leaves an input in peace.
+    /// Greatest absolute value, in the unit of the input: one for each input, or one for all. 0 leaves an input unexcited.
     pub amplitude: Vec<f64>,
     /// Lowest and highest frequency, Hz.
     pub band: [f64; 2],
@@ -112,26 +112,26 @@ pub struct ExciteOptions {
     pub seed: u64,
     /// Time in seconds in which the amplitude grows linearly at the start, and falls at the end.
     pub ramp: f64,
-    /// Bands around the speed of the shaft that are to stay free; none when absent.
+    /// Bands around the shaft speed without excitation; none when absent.
     pub notch: Option<Notch>,
-    /// How several inputs are kept apart.
+    /// How several inputs are excited.
     pub inputs: InputOrder,
-    /// Periods of a multisine or PRBS within the length, or within the part of one input. One has the densest lines; several tell noise
-    /// from response. The period of a PRBS is the next longer one that a register has, at least that of the lowest frequency.
+    /// Periods of a multisine or PRBS within the length, or within the part of one input. One period has the densest lines; several periods
+    /// separate noise from response. The period of a PRBS is the next longer one that a register has, at least that of the lowest frequency.
     pub periods: usize,
     /// Largest predicted magnitude of each input u, in its unit: one for each, or one for all; none when empty.
     pub limit_input: Vec<f64>,
     /// The same for each output y.
     pub limit_output: Vec<f64>,
-    /// Scales an excitation that would pass a limit to one that just keeps it; else it is refused.
+    /// Reduces the amplitude of an excitation that exceeds a limit to the largest that keeps it; otherwise it is rejected.
     pub scale_to_limit: bool,
     /// Relative error theta of the nominal model for which the prediction is repeated: all entries of A, or of B, in continuous
     /// time, times `1 - theta` and `1 + theta`.
     pub model_error: f64,
-    /// Standard deviation of the white noise of each output, in its unit: one for each, or one for all. Empty where the accuracy of
-    /// the modes is not asked for.
+    /// Standard deviation of the white noise of each output, in its unit: one for each, or one for all. Empty: the accuracy of the
+    /// modes is not computed.
     pub noise: Vec<f64>,
-    /// Standard deviation of the damping ratios that is wanted; absent where the length it needs is not asked for.
+    /// Required standard deviation of the damping ratios, from which the required length follows; optional.
     pub damping_deviation: Option<f64>,
 }
 
@@ -177,7 +177,7 @@ impl ExciteOptions {
         Ok(samples as usize)
     }
 
-    /// Whatever does not depend on the machine.
+    /// Checks the options that do not depend on the plant.
     pub(super) fn check(&self, ts: f64) -> Result<()> {
         let [low, high] = self.band;
         check("the lowest frequency of the band in Hz", low, low > 0.0 && low.is_finite(), "positive")?;
@@ -197,7 +197,12 @@ impl ExciteOptions {
         )?;
         check("the number of periods", self.periods as f64, self.periods >= 1, "at least 1")?;
         if let Some(wanted) = self.damping_deviation {
-            check("the standard deviation of the damping that is wanted", wanted, positive(wanted), "positive")?;
+            check(
+                "the required standard deviation of the damping (damping_deviation)",
+                wanted,
+                positive(wanted),
+                "positive",
+            )?;
             if self.noise.is_empty() {
                 let what = "the number of noise levels, which the accuracy of the damping needs,".into();
                 return Err(Error::Method(youla::Error::Ports { what, expected: 1, found: 0 }));

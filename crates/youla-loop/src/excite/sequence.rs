@@ -1,4 +1,4 @@
-//! The sequence: shape, bands that stay free, ramps.
+//! The sequence: shape, notches, ramps.
 //!
 //! A multisine leaves out the lines in the bands and those nearer to them than two lines are wide. The other shapes pass a filter
 //! without phase, by the Fourier transform of the whole sequence: 0 within a band, 1 from half its width beyond its edges on, a
@@ -6,7 +6,7 @@
 //! longer binary behind it, and is scaled so that its greatest absolute value is the amplitude again.
 
 use super::options::{ExciteOptions, InputOrder, Notch, Shape, check, spread};
-use crate::Result;
+use crate::error::Result;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rustfft::FftPlanner;
@@ -18,13 +18,13 @@ use youla::{Mat, c64};
 /// Most bits of a register, [`Prbs::order`].
 const LONGEST_REGISTER: usize = 20;
 
-/// A sequence and how it came about.
+/// A sequence and its description.
 pub(super) struct Sequence {
     /// samples x m.
     pub(super) alpha: Mat<f64>,
-    /// What the shape became, for people.
+    /// The shape with its parameters, in words.
     pub(super) shape: String,
-    /// How the inputs are kept apart.
+    /// How the inputs are made independent.
     pub(super) independence: String,
     /// How the notches were made.
     pub(super) filter: Option<String>,

@@ -21,7 +21,7 @@ pub struct ExcitedSpectrum {
 pub struct ExcitedSummary {
     /// The shape and what it became.
     pub shape: String,
-    /// How the inputs are kept apart.
+    /// How the inputs are made independent.
     pub independence: String,
     /// Seed.
     pub seed: u64,
@@ -35,23 +35,23 @@ pub struct ExcitedSummary {
     pub band: [f64; 2],
     /// Each input.
     pub inputs: Vec<ExcitedInput>,
-    /// How the bands around the speed were freed; absent without any.
+    /// How the notches were made; absent without notches.
     pub filter: Option<String>,
     /// Each of these bands.
     pub notches: Vec<NotchEnergy>,
-    /// What the nominal loop does: inputs first, then outputs.
+    /// Predicted peaks of the nominal loop: inputs first, then outputs.
     pub predicted: Vec<PredictedPeak>,
-    /// The same for models that are wrong.
+    /// The same for perturbed models.
     pub model_error: ModelErrorEffect,
-    /// Factor by which the amplitude was reduced to keep the limits; absent where it was not.
+    /// Factor by which the amplitude was reduced to keep the limits; absent without reduction.
     pub scaled_by: Option<f64>,
-    /// Standard deviation of the noise of each output that the accuracies rest on; empty where it was not given.
+    /// Standard deviation of the noise of each output from which the accuracies are computed; empty if not given.
     pub noise: Vec<f64>,
-    /// How well the modes of the plant will be known; empty where no noise was given.
+    /// Predicted accuracy of the modes of the plant; empty if no noise was given.
     pub modes: Vec<ModeAccuracy>,
-    /// Standard deviation of the damping ratios that is wanted.
+    /// Required standard deviation of the damping ratios.
     pub damping_deviation: Option<f64>,
-    /// Length in seconds that the mode needs that needs most; absent where none was asked for or one is not determined.
+    /// Longest required length over all modes, seconds; absent if not requested or if a mode is not determined.
     pub needed: Option<f64>,
 }
 
@@ -64,13 +64,13 @@ pub struct ExcitedInput {
     pub peak: f64,
     /// Root mean square over the whole length.
     pub rms: f64,
-    /// Crest factor, peak over root mean square; absent for an input that is left in peace.
+    /// Crest factor, peak over root mean square; absent for an input without excitation.
     pub crest: Option<f64>,
     /// Part of the energy within the band.
     pub in_band: f64,
 }
 
-/// What is left in a band that is to stay free.
+/// The remaining energy in a notch.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct NotchEnergy {
     /// Lowest and highest frequency, Hz.

@@ -1,8 +1,7 @@
-//! What a loop is worth: the modes that a disturbance at the plant input excites, the peak of the response to it, and the peak
+//! Figures of a loop: the modes that a disturbance at the plant input excites, the peak of the response to it, and the peak
 //! of the sensitivity.
 
-use crate::Result;
-use serde::Serialize;
+use crate::error::Result;
 use youla::control::{closed_loop, peak_sensitivity, with_input_port};
 use youla::lti::{Discrete, PeakOptions, SharedMode, StateSpace, hinf_norm};
 

@@ -1,7 +1,7 @@
 //! F and L on the identified model.
 
 use super::{NewController, RedesignProblem, diagonal};
-use crate::Result;
+use crate::error::Result;
 use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, observer_controller};
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};

@@ -5,10 +5,10 @@
 //! max over omega of sigma_max(Q (I - S Q)^-1 (omega)) |dS(omega)|_F < 1
 //! ```
 //! alpha and beta in units in which the deviations of the entries of S are of one size (K. Zhou, J. C. Doyle, K. Glover, Robust
-//! and Optimal Control, 1996, theorem 9.1). The region of S gives `|dS|_F` at each frequency; between the grid's points nothing
-//! is said, which the test of drawn models makes up for.
+//! and Optimal Control, 1996, theorem 9.1). The region of S gives `|dS|_F` at each frequency; the product is not
+//! computed between the grid points; the test of drawn models covers those.
 
-use crate::{Error, Result};
+use crate::error::{Error, Result};
 use faer::prelude::*;
 use youla::identify::subspace::{ResponseBand, Uncertainty};
 use youla::linalg::eye;

@@ -6,7 +6,7 @@
 
 use super::lqg::observer_gain;
 use super::{NewController, RedesignProblem, diagonal};
-use crate::Result;
+use crate::error::Result;
 use youla::control::{LqrWeights, lqr, observer_controller};
 use youla::factor::CoprimeFactors;
 use youla::linalg::{block, eye};

@@ -1,7 +1,7 @@
-//! What the controller leaves of the logged input, as it is declared and with one thing changed.
+//! The part of the logged input that the controller does not explain, as declared and with one change.
 
 use super::{Change, ControllerRecord};
-use crate::Result;
+use crate::error::Result;
 use youla::Mat;
 use youla::linalg::least_squares;
 use youla::lti::{Discrete, StateSpace, simulate_best};

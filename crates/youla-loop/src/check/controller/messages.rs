@@ -1,9 +1,9 @@
-//! The finding on a controller, in words.
+//! The finding on a controller.
 
 use super::{Change, ControllerCheck};
-use crate::Error;
-use crate::check::CheckOptions;
 use crate::check::finding::{Finding, Severity, Test, few};
+use crate::check::options::CheckOptions;
+use crate::error::Error;
 use youla::signal::Channel;
 
 /// Factors that are known from units: degrees and radians, revolutions, thousands.
@@ -24,7 +24,7 @@ impl Change {
         };
         match self {
             Change::Sign => {
-                "the other sign: change `feedback` in [controller] to the other of \"negative\" and \"positive\"".into()
+                "the opposite sign: change `feedback` in [controller] between \"negative\" and \"positive\"".into()
             }
             Change::Shift(by) => format!("the outputs (and references) one sample {} against the input", rows(*by)),
             Change::InputShift(by) => {
@@ -34,8 +34,8 @@ impl Change {
             Change::ChannelGain(i, gain) => format!("{} times {}{}", few(*gain), name(*i), unit(*gain)),
             Change::Exchanged(i, j) => format!("{} and {} exchanged", name(*i), name(*j)),
             Change::Saturation([low, high]) => format!("the input limited to {} ... {}", few(*low), few(*high)),
-            Change::WithoutExcitation => "the excitation left out: the input was logged before it was added".into(),
-            Change::ExcitationSign => "the other sign of the excitation".into(),
+            Change::WithoutExcitation => "the excitation removed: the input was logged before it was added".into(),
+            Change::ExcitationSign => "the opposite sign of the excitation".into(),
         }
     }
 
@@ -70,26 +70,26 @@ impl ControllerCheck {
             (None, false) => (
                 Severity::Note,
                 format!(
-                    "the declared controller leaves {percent} % of the logged input: that is an excitation which is not \
-                     declared, or the controller is another one"
+                    "the declared controller does not explain {percent} % of the logged input: an excitation is not declared, \
+                     or the controller differs"
                 ),
             ),
             _ => {
                 let severe = self.residual > options.controller_defect;
                 let severity = if severe { Severity::Defect } else { Severity::Caution };
-                (severity, format!("the declared controller leaves {percent} % of the logged input"))
+                (severity, format!("the declared controller does not explain {percent} % of the logged input"))
             }
         };
         let advice = match &self.change {
             Some((change, left)) => {
-                format!("It would leave {} % with {}", few(100.0 * left), change.words(outputs))
+                format!("The unexplained part falls to {} % with {}", few(100.0 * left), change.words(outputs))
             }
             None if self.excited => {
-                "Look for saturation, a delay, another sample time or another controller; no single change of sign, gain, \
-                 shift or channels explains it"
+                "Check for saturation, a delay, a different sample time or a different controller; no single change of sign, \
+                 gain, shift or channel order explains it"
                     .into()
             }
-            None => "Log the excitation, or accept that the controller cannot be checked".into(),
+            None => "Log the excitation; without it the controller cannot be checked".into(),
         };
         let mut finding = Finding::new(Test::Controller, severity, record, what).number("residual", self.residual);
         if let Some((change, left)) = &self.change {
@@ -102,7 +102,7 @@ impl ControllerCheck {
 
 /// The finding for a controller that could not be simulated.
 pub(in crate::check) fn not_simulated(record: &str, error: &Error) -> Finding {
-    let what = format!("the declared controller cannot be held against the logged input: {error}");
+    let what = format!("the declared controller cannot be compared with the logged input: {error}");
     Finding::new(Test::Controller, Severity::Note, record, what)
         .advice("`youla identify` checks it through the coprime factors (controller_mismatch)")
 }

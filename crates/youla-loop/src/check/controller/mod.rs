@@ -1,7 +1,7 @@
-//! Whether the declared controller gives the logged input, and what would make it do so.
+//! Whether the declared controller reproduces the logged input, and which single change would make it do so.
 //!
 //! With positive feedback `u = K (y - r) + d` the declared K is simulated on the logged `e = y - r`, from the state that fits best,
-//! and held against `w = u - d`:
+//! and compared with `w = u - d`:
 //! ```text
 //! residual = |w - K e| / |w|     (about their means)
 //! ```
@@ -15,8 +15,8 @@ mod messages;
 
 pub(super) use messages::not_simulated;
 
-use super::CheckOptions;
-use crate::Result;
+use super::options::CheckOptions;
+use crate::error::Result;
 use log::Log;
 use youla::MatRef;
 use youla::lti::{Discrete, StateSpace};
@@ -26,9 +26,9 @@ use youla::lti::{Discrete, StateSpace};
 pub enum Change {
     /// The other sign of feedback.
     Sign,
-    /// y (and r) by so many rows later (positive) or earlier than they stand.
+    /// y (and r) shifted by so many rows, later if positive.
     Shift(isize),
-    /// u by so many rows earlier (positive) or later than it stands, against y, r and the excitation.
+    /// u shifted by so many rows relative to y, r and the excitation, earlier if positive.
     InputShift(isize),
     /// A factor on all channels of `y - r`: a gain of the controller.
     Gain(f64),
@@ -55,7 +55,7 @@ pub struct ControllerCheck {
     pub change: Option<(Change, f64)>,
 }
 
-/// What the controller is held against.
+/// The logged signals of the controller.
 #[derive(Debug, Clone, Copy)]
 pub struct ControllerRecord<'a> {
     /// Plant input as applied, samples x m.
@@ -73,7 +73,7 @@ const INTEGRATOR: f64 = 1.0 + 1e-6;
 /// A change must leave less than this share of the residual.
 const HELPS: f64 = 0.1;
 
-/// Holds a controller (positive feedback, `u = K y`) against a record.
+/// Compares a controller (positive feedback, `u = K y`) with a record.
 ///
 /// # Errors
 /// Shapes; [`youla::Error::Unstable`] for a controller that is unstable by itself, which cannot be simulated.
@@ -89,7 +89,7 @@ const HELPS: f64 = 0.1;
 /// let record = ControllerRecord { u: u.as_ref(), y: y.as_ref(), input_excitation: None, reference: None };
 /// let found = controller(&k, record, &CheckOptions::default())?;
 /// assert_eq!(found.change.unwrap().0, Change::Sign);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_loop::Error>(())
 /// ```
 pub fn controller(
     k: &StateSpace<Discrete>,

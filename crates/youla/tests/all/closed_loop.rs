@@ -169,8 +169,8 @@ fn a_refined_deviation_system_errs_less() {
         let found = hansen(&rig.factors, &signals, &subspace).unwrap();
         let refined = |noise| {
             let options = RefineOptions { noise, max_iterations: 12, ..RefineOptions::default() };
-            let refined = refine_hansen(found.clone(), &rig.factors, &signals, &options).unwrap();
-            let change = refined.refinement.as_ref().unwrap();
+            let refined = refine_hansen(found.clone(), &rig.factors, &signals, &[], &options).unwrap();
+            let (refined, change) = (refined.model, refined.refinement);
             assert!(change.stable && change.cost < 0.998 * change.cost_before, "{change:?}");
             assert_eq!(refined.deviation.stability.stable, refined.deviation.model.is_stable().unwrap());
             rig.error(&refined.plant)

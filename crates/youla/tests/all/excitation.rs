@@ -4,10 +4,15 @@ use crate::common::rng;
 use std::f64::consts::PI;
 use youla::lti::Discrete;
 use youla::signal::{Excitation, Multisine, Prbs, SquareWaves, Welch, persistency_order};
-use youla::{Error, Mat, Result};
+use youla::{Error, Mat};
 use youla_paper::study::{ExcitationReport, ExcitationReportOptions, PowerBand, describe_excitation};
 
-fn describe(signal: &Mat<f64>, wanted_order: usize, highest_order: usize, window: usize) -> Result<ExcitationReport> {
+fn describe(
+    signal: &Mat<f64>,
+    wanted_order: usize,
+    highest_order: usize,
+    window: usize,
+) -> youla_paper::Result<ExcitationReport> {
     let welch = Welch { window, remove_mean: false, ..Welch::default() };
     let options = ExcitationReportOptions { wanted_order, highest_order, welch };
     describe_excitation(signal.as_ref(), Discrete::new(0.01)?, &options)

@@ -21,7 +21,7 @@ fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
 
 /// Input and output columns of a file of the measured data.
 fn load(file: &str, inputs: usize) -> (Mat<f64>, Mat<f64>) {
-    let text = std::fs::read_to_string(youla_io::scratch::data_folder().join(file)).unwrap();
+    let text = std::fs::read_to_string(data_folder().join(file)).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect()).collect();
     let columns = rows[0].len();

@@ -44,7 +44,7 @@ fn a_refined_s_fits_no_worse() {
     let noise = RefineNoise::Innovation;
     demo.settings.deviation.refine = Some(RefineOptions { noise, max_iterations: 4, ..RefineOptions::default() });
     let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut |_| ())).unwrap();
-    let change = found.hansen.refinement.as_ref().unwrap();
+    let change = found.refinement.as_ref().unwrap();
     assert!(change.cost < change.cost_before && change.stable, "{change:?}");
     let after = &found.verdict.of(Method::Hansen).unwrap().records[0].fit;
     assert!(after[0] > 75.03 && after[1] > 66.43, "{after:?}");

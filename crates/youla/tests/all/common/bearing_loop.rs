@@ -18,7 +18,7 @@ pub(crate) struct Design {
     /// Factors on A and B of the nominal model.
     pub(crate) a_factor: f64,
     pub(crate) b_factor: f64,
-    /// SubspaceMethod of the commands per V^2, against 1 per um^2.
+    /// Weight of the commands per V^2, against 1 per um^2.
     pub(crate) input_weight: f64,
     /// Variance of the input noise, V^2, against 1 um^2 of output noise, for the observer.
     pub(crate) process_noise: f64,

@@ -15,7 +15,7 @@ use crate::{Error, Result};
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct SubspaceOptions {
-    /// SubspaceMethod of the singular value decomposition, and with it the name of the method.
+    /// The method: it sets the weights of the singular value decomposition.
     pub method: SubspaceMethod,
     /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the
     /// slowest mode.

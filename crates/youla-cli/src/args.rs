@@ -22,9 +22,9 @@ pub(crate) struct Args {
 const EXAMPLES: &str = "\
 Examples:
   youla paper                                  the whole paper: 500 models, three experiments, every figure
-  youla demo                                   simulate the gas bearing of the paper and identify it
+  youla demo                                   simulate a levitated mass under feedback and identify it
   youla init log.csv                           list the columns of a log, ask what they mean, write run.toml
-  youla check run.toml                         say what is wrong with the data, before anything is identified
+  youla check run.toml                         check the data before you identify from them
   youla identify run.toml                      identify a logged machine, write runs/<name>-001
   youla identify run.toml --out result --json  the same to a chosen folder, summary on standard output
   youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --limit-output 30
@@ -32,11 +32,11 @@ Examples:
   youla signals run.toml --out signals         alpha and beta as CSV, to go on in another tool
   youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
                                                a model straight from a file of any length
-  youla report runs/demo-gas-bearing-001       draw the report of a run again from its data
-  youla plot runs/demo-gas-bearing-001 bode --width 8.5
+  youla report runs/demo-levitated-mass-001       draw the report of a run again from its data
+  youla plot runs/demo-levitated-mass-001 bode --width 8.5
                                                figures for a paper, from the same data
   youla compare runs/before-001 runs/after-001 two runs side by side
-  youla export runs/demo-gas-bearing-001 --to python
+  youla export runs/demo-levitated-mass-001 --to python
                                                the model as a script for python-control; also npz, matlab, C99
 
 Exit codes: 0 done, 1 `check` found a defect, 2 the input cannot be used, 3 the computation is impossible on this input.";
@@ -46,11 +46,10 @@ Exit codes: 0 done, 1 `check` found a defect, 2 the input cannot be used, 3 the 
 pub(crate) enum Command {
     /// Reproduce the paper: the study of 500 models, the experiments of Table 1, every figure, one page.
     ///
-    /// Results stream to the folder as they are found. A run that was stopped, at whatever moment, goes on where it was when
-    /// the same command is given again.
+    /// Results are written to the folder as they are computed. The same command continues an interrupted run.
     #[command(after_help = paper::EXAMPLES)]
     Paper(Box<paper::PaperArgs>),
-    /// Count how often searches arrive, or put together a study of the paper that was computed in parts.
+    /// Count how often searches converge to the true plant, or merge the parts of a study of the paper.
     #[command(subcommand)]
     Study(study::StudyCommand),
     /// Simulate a machine under feedback and identify it: a loop in which direct identification fails.
@@ -80,11 +79,11 @@ pub(crate) enum Command {
     },
     /// Write a first run.toml for a log.
     ///
-    /// Lists the columns of the file, asks what the flags do not say (on a terminal), and writes a commented run.toml. Nothing is
-    /// guessed: what stays open is left out, and `identify` names the line.
+    /// Lists the columns of the file, asks for what the flags do not state (on a terminal), and writes a commented run.toml. Nothing is
+    /// guessed: what is not stated is left out, and `identify` names the missing line.
     #[command(after_help = init::EXAMPLES)]
     Init(init::InitArgs),
-    /// Say what is wrong with the data before anything is identified from them.
+    /// Check the data before you identify from them.
     ///
     /// With a run.toml all its records are checked, also against the declared controller; otherwise files with --input and
     /// --output. Nothing is changed, and nothing is written without --out.
@@ -102,7 +101,7 @@ pub(crate) enum Command {
     },
     /// Identify a model from u to y by subspace identification, straight from files of any length.
     ///
-    /// The files are read in two passes, three where the data ask for QR, in memory that does not depend on their length.
+    /// The files are read in two passes, three if ill-conditioned data need QR. Memory does not depend on their length.
     #[command(after_help = subspace::EXAMPLES)]
     Subspace(subspace::SubspaceArgs),
     /// Print the JSON schema of run.toml, for editors.
@@ -124,7 +123,7 @@ pub(crate) enum Command {
     #[command(after_help = "Example:\n  youla man > ~/.local/share/man/man1/youla.1")]
     Man,
     /// Draw report.html of a run again from its report.json.
-    #[command(after_help = "Example:\n  youla report runs/demo-gas-bearing-001")]
+    #[command(after_help = "Example:\n  youla report runs/demo-levitated-mass-001")]
     Report {
         /// A run folder.
         #[arg(value_name = "RUN")]
@@ -132,20 +131,20 @@ pub(crate) enum Command {
     },
     /// Draw figures of a run for papers: SVG, PNG, and the numbers as CSV.
     ///
-    /// Without a figure the figures that the run has are listed. Sizes are those on paper; text has 9 points in every size. SVG and PNG
-    /// hold the same font on every machine.
+    /// Without FIGURE, the figures of the run are listed. Sizes are those on paper; text is 9 points at every size. SVG and PNG
+    /// contain the same font on every machine.
     #[command(after_help = plot::EXAMPLES)]
     Plot(plot::PlotArgs),
-    /// Hold finished runs against each other: models, modes, distances, fits, settings, on one page.
+    /// Compare finished runs on one page: models, modes, distances, fits, settings.
     #[command(after_help = compare::EXAMPLES)]
     Compare(compare::CompareArgs),
     /// Write a model, or the controller with its ports alpha and beta, for another tool: MATLAB, NumPy, python-control, C99.
     #[command(after_help = export::EXAMPLES)]
     Export(export::ExportArgs),
-    /// Write an excitation for the machine under its controller, with what the nominal loop will do under it.
+    /// Design an excitation for the machine under its controller and predict the response of the nominal loop.
     ///
-    /// The sequence goes to the port alpha of the controller, or to the plant input. It is held against limits of inputs and outputs by
-    /// the nominal model, and says how well it will determine the modes.
+    /// The sequence goes to the port alpha of the controller, or to the plant input. The nominal loop predicts its effect: limits of
+    /// inputs and outputs are checked, and the accuracy of the modes is predicted.
     #[command(after_help = excite::EXAMPLES)]
     Excite(Box<excite::ExciteArgs>),
 }

@@ -15,13 +15,13 @@ Examples:
 /// Which runs.
 #[derive(Debug, Args)]
 pub(crate) struct CompareArgs {
-    /// Run folders, the first of which the others are held against.
+    /// Run folders; the others are compared with the first.
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
     /// Model of each run: hansen, or hansen_reduced, direct, grey_box, nominal.
     #[arg(long, value_name = "NAME", default_value = "hansen")]
     model: String,
-    /// Page to write; its data stand beside it as JSON.
+    /// Page to write; its data are written next to it as JSON.
     #[arg(long, value_name = "FILE", default_value = "comparison.html")]
     out: PathBuf,
     /// Replace the files if they are there.

@@ -6,7 +6,7 @@ use youla_io::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 /// How text files are written.
 #[derive(Debug, ClapArgs)]
 pub(crate) struct Dialect {
-    /// What stands between two cells of text files: comma, semicolon, tab or whitespace; read off the first line where it is clear.
+    /// Separator of the cells of text files: comma, semicolon, tab or whitespace; read from the first line where it is unambiguous.
     #[arg(long, value_name = "NAME", value_parser = delimiter)]
     delimiter: Option<Delimiter>,
     /// Decimal sign of text files: point (default) or comma. Never guessed.

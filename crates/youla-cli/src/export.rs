@@ -8,11 +8,11 @@ use youla_run::{controller_for_export, model_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  youla export runs/demo-gas-bearing-001 --to python     hansen.py, which makes a control.ss of python-control
-  youla export runs/demo-gas-bearing-001 --to npz --model hansen_reduced --out model.npz
+  youla export runs/demo-levitated-mass-001 --to python     hansen.py, which makes a control.ss of python-control
+  youla export runs/demo-levitated-mass-001 --to npz --model hansen_reduced --out model.npz
   youla export model.json --to matlab --out g.m
-  youla export runs/demo-gas-bearing-001 --to c-controller --out controller.h
-  youla export runs/demo-gas-bearing-001 --to c-controller --q runs/demo-gas-bearing-001/8-redesign/controller.json";
+  youla export runs/demo-levitated-mass-001 --to c-controller --out controller.h
+  youla export runs/demo-levitated-mass-001 --to c-controller --q runs/demo-levitated-mass-001/8-redesign/controller.json";
 
 /// What is exported as what.
 #[derive(Debug, Args)]

@@ -1,4 +1,4 @@
-//! `youla init`: a first run.toml from a log, args for or by flags.
+//! `youla init`: a first run.toml from a log, by questions or flags.
 
 use crate::dialect::Dialect;
 use crate::output::{Failure, Form, ask_line, say};
@@ -204,7 +204,7 @@ fn table(columns: &[SurveyedColumn]) -> String {
     text
 }
 
-/// What was chosen without being args for, and what is to be done now.
+/// What was chosen without being asked for, and what is to be done now.
 fn next(args: &InitArgs, draft: &Draft) -> String {
     let file = args.out.display();
     let split = match args.estimate {

@@ -18,7 +18,7 @@ Examples:
   youla paper --shard 1/2 --out part1  half of the loops, here; the other half elsewhere, then
   youla study merge part1 part2        exactly what one run gives";
 
-/// What is args of the paper.
+/// Arguments of `youla paper`.
 #[derive(Debug, Args)]
 pub(crate) struct PaperArgs {
     /// Settings instead of those that ship with the program.

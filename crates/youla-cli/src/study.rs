@@ -10,9 +10,9 @@ use youla_paper::study::{StartCase, StartsSettings};
 /// Studies beside the paper, and what is done with parts of its study.
 #[derive(Debug, Subcommand)]
 pub(crate) enum StudyCommand {
-    /// Count how often the prediction-error method arrives, from which start: single, several, continued, or none.
+    /// Count how often the prediction-error method converges to the true plant, by start: single, several, continued, or none.
     ///
-    /// Results stream to the folder as they are found, and a run that was stopped goes on where it was.
+    /// Results are written to the folder as they are computed. The same command continues an interrupted run.
     #[command(after_help = EXAMPLES)]
     Starts(StartsArgs),
     /// Join the results folders of all shards and finish the paper from them.
@@ -34,7 +34,7 @@ Examples:
 
 Cases: loop-0.2, loop-1.0, light-damping, periodic, far-start, slow-squares.";
 
-/// What is args of the study of starts.
+/// Arguments of `youla study starts`.
 #[derive(Debug, Args)]
 pub(crate) struct StartsArgs {
     /// Cases, separated by commas; all by default.

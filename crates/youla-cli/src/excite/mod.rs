@@ -17,7 +17,7 @@ Example:
   youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --noise 0.2 --damping-deviation 0.002
                                                how well the modes will be known, and how long it takes to know them so well";
 
-/// What is args of an excitation.
+/// Arguments of `youla excite`.
 #[derive(Debug, Args)]
 pub(crate) struct ExciteArgs {
     /// Settings, as for `identify`; the data files need not exist where [data] states the sample time.

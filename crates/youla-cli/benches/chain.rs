@@ -284,7 +284,7 @@ fn bearing_record(samples: usize) -> Result<(StateSpace<Discrete>, Mat<f64>, Mat
 /// A random discrete system with 2 inputs and 2 outputs whose poles lie in a disc of radius about 0.9.
 fn random_system(n: usize) -> Result<StateSpace<Discrete>> {
     let a = random(n, n, 5) * Scale(0.9 / (n as f64).sqrt());
-    StateSpace::new(a, random(n, 2, 6), random(2, n, 7), Mat::zeros(2, 2), Discrete::new(TS)?)
+    Ok(StateSpace::new(a, random(n, 2, 6), random(2, n, 7), Mat::zeros(2, 2), Discrete::new(TS)?)?)
 }
 
 fn random(rows: usize, columns: usize, seed: u64) -> Mat<f64> {

@@ -16,7 +16,7 @@ mod common;
 
 use std::path::Path;
 
-fn main() -> Result<(), Box<dyn std::error::Error>> {
+fn main() -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
     let asked: Vec<String> = std::env::args().skip(1).filter(|a| a != "--bench").collect();
     let wanted = |name: &str| asked.is_empty() || asked.iter().any(|a| a == name);
     let book = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/book");

@@ -56,11 +56,24 @@ fn run_chapters(set: &str, wanted: impl Fn(&str) -> bool, language: Option<Langu
         }
         let name = page.trim_start_matches("../").trim_end_matches(".md");
         let folder = folder_of(&format!("{set}/{name}"));
-        if name == "README" {
+        if name == "README" || name == "book/long-records" {
             readme::write_scene(&folder);
+        }
+        if name == "book/long-records" {
+            fs::write(folder.join("run.toml"), run_of_readme()).expect("written");
         }
         run_chapter(&folder, name, &steps, language);
     }
+}
+
+/// The run.toml that README.md shows.
+fn run_of_readme() -> String {
+    let text = fs::read_to_string(docs().join("../README.md")).expect("readable");
+    let shown = steps(&text).into_iter().find_map(|step| match step {
+        Step::Write { file, text } => (file == "run.toml").then_some(text),
+        _ => None,
+    });
+    shown.expect("a run.toml")
 }
 
 /// README.md runs on a log of its own.

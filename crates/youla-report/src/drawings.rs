@@ -36,7 +36,14 @@ pub(super) fn drawings<'a>(methods: &'a [Method], figures: &'a [(String, Figure)
     let style = |key: &'a str| {
         let style = styles.of(key);
         let (label, order) = (styles.name(key, ""), styles.order(key).min(methods.len() + 1));
-        let page = PageStyle { label, colour: style.property, width: style.width, dash: style.dash, marker: style.marker, order };
+        let page = PageStyle {
+            label,
+            colour: style.property,
+            width: style.width,
+            dash: style.dash,
+            marker: style.marker,
+            order,
+        };
         (key, page)
     };
     let keys = methods.iter().map(|method| method.key.as_str()).chain(figures.iter().flat_map(|(_, f)| named(f)));

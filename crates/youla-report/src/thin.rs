@@ -94,7 +94,10 @@ fn thinned(curve: &Curve, panel: &Panel, most: usize) -> Curve {
         drawn: curve.drawn,
         x: numbers::for_drawing(kept.iter().map(|point| curve.x[point.0]), digits_of_positions),
         y: numbers::for_drawing(kept.iter().map(|point| point.1), DIGITS_OF_VALUES),
-        along: numbers::for_drawing(kept.iter().filter_map(|point| curve.along.get(point.0).copied()), DIGITS_OF_VALUES),
+        along: numbers::for_drawing(
+            kept.iter().filter_map(|point| curve.along.get(point.0).copied()),
+            DIGITS_OF_VALUES,
+        ),
         details: kept.iter().filter_map(|point| curve.details.get(point.0).cloned()).collect(),
     }
 }

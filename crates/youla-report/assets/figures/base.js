@@ -36,8 +36,7 @@ function tooltip(host) {
 function chooser(label, options, changed, chosen = 0) {
   const name = element("span", {}, label);
   if (options.length > 9) {
-    const list = element("select", { "aria-label": label, onchange: () => changed(list.selectedIndex) }, ...options.map(option => element("option", {}, option)));
-    list.selectedIndex = chosen;
+    const list = element("select", { "aria-label": label, onchange: () => changed(list.selectedIndex) }, ...options.map((option, k) => element("option", { selected: k === chosen ? "" : null }, option)));
     return element("label", { class: "choice" }, name, list);
   }
   const buttons = options.map((option, k) => element("button", { type: "button", "aria-pressed": k === chosen,
@@ -68,8 +67,7 @@ const inProse = value => readOut(value).replace(/(\.\d*?)0+(?=$|×)/, "$1").repl
 
 // Labels of an axis: as many decimals as the increment needs, a power of ten where numbers are very small or large.
 function tickLabels(splits) {
-  const finite = splits.filter(v => v != null), largest = Math.max(...finite.map(Math.abs));
-  const step = finite.length > 1 ? Math.abs(finite[1] - finite[0]) : largest || 1;
+  const finite = splits.filter(v => v != null), largest = Math.max(...finite.map(Math.abs)), step = finite.length > 1 ? Math.abs(finite[1] - finite[0]) : largest || 1;
   const exponent = largest > 0 && (largest < 1e-3 || largest >= 1e6) ? Math.floor(Math.log10(largest)) : 0, unit = step / 10 ** exponent;
   let places = 0;
   while (places < 9 && Math.abs(unit * 10 ** places - Math.round(unit * 10 ** places)) > 1e-6 * unit * 10 ** places) places++;

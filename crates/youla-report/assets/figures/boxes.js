@@ -24,8 +24,8 @@ function drawBox(ctx, { spread, y }, { centre, half, at, place, ink, ratio, edge
     line([centre, at(quartile)], [centre, at(whisker)]);
     if (inside(whisker)) line([centre - half / 2, at(whisker)], [centre + half / 2, at(whisker)]);
   }
-  if (at(spread.q1) > at(spread.q3) || inside(spread.q1)) {
-    const box = [centre - half, at(spread.q3), 2 * half, at(spread.q1) - at(spread.q3)];
+  const box = [centre - half, at(spread.q3), 2 * half, at(spread.q1) - at(spread.q3)];
+  if (box[3] > 0 || inside(spread.q1)) {
     ctx.globalAlpha = 0.22;
     ctx.fillRect(...box);
     ctx.globalAlpha = 1;

@@ -5,9 +5,7 @@ function cells(host, panel) {
   const map = element("div", { class: "cells", role: "grid", "aria-label": panel.title || withUnit(panel.y) });
   map.style.setProperty("--columns", columns.length);
   if (panel.title) map.append(element("p", { class: "panel-title" }, panel.title));
-  const upright = element("div", { class: "axis-name upright", "aria-hidden": "true" }, withUnit(panel.y));
-  upright.style.gridRow = `${panel.title ? 2 : 1} / span ${rows.length}`;
-  map.append(upright);
+  map.append(element("div", { class: "axis-name upright", "aria-hidden": "true", style: `grid-row: ${panel.title ? 2 : 1} / span ${rows.length}` }, withUnit(panel.y)));
   const grid = rows.map((_, r) => columns.map((_, c) => cellOf(cells[r * columns.length + c] ?? { method: "", strength: 0, text: "", detail: "" }, r, c)));
   for (let r = rows.length - 1; r >= 0; r--) map.append(element("div", { class: "row", role: "row" }, element("div", { class: "label", role: "rowheader" }, rows[r]), ...grid[r]));
   map.append(element("div", { class: "row", role: "row" }, element("div", { class: "corner" }), ...columns.map(label => element("div", { class: "label below", role: "columnheader" }, label))));

@@ -12,13 +12,12 @@ function show(host, figures) {
   const own = host.closest("figure") ? null : element("p", { class: "caption" }), said = own ?? host.parentElement.querySelector("figcaption .counts");
   const choosers = [...options].filter(([, values]) => values.length > 1)
     .map(([name, values]) => ({ name, node: chooser(name, values, k => { wanted.set(name, values[k]); pick(name); }) }));
+  let now = figures[0];
   controls.append(...choosers.map(c => c.node), extra);
   host.append(controls, body, ...(own ? [own] : []));
-  let now = figures[0];
   const drawing = { draw() { drawing.parts?.forEach(part => part.destroy()); drawing.parts = parts(body, now, states.get(now)); } };
   mounted.push(drawing);
-  drawing.draw();
-  describe();
+  pick();
 
   // The figure with the choice just made and most of the others.
   function pick(name) {
@@ -142,7 +141,7 @@ function stack(host, panels, { figure, legend, state, beside, place }) {
   }
 
   function toggled() {
-    plots.forEach(({ u, plain }) => { plain.forEach((c, k) => u.setSeries(k + 1, { show: !legend.hidden.has(idOf(c)) }, false)); u.redraw(); });
+    for (const { u, plain } of plots) { plain.forEach((c, k) => u.setSeries(k + 1, { show: !legend.hidden.has(idOf(c)) }, false)); u.redraw(); }
     read();
   }
 

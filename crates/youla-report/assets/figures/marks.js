@@ -1,8 +1,7 @@
 // Marks of points, swatches, and the legend of a figure.
 
-const isFilled = marker => !["plus", "cross"].includes(marker);
 // A shape that can be filled, and so be told from its outline.
-const solid = marker => ({ plus: "up", cross: "down" })[marker] ?? marker;
+const isFilled = marker => !["plus", "cross"].includes(marker), solid = marker => ({ plus: "up", cross: "down" })[marker] ?? marker;
 
 // A path around (x, y) of half-width r.
 function markerPath(marker, x, y, r) {

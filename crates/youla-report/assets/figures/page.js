@@ -13,10 +13,9 @@ const redrawAll = () => mounted.forEach(drawing => drawing.draw());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
 
 // On paper all is unfolded, and figures are drawn for its width.
-const folded = [...document.querySelectorAll("details")];
 let opened = [], away = [];
 addEventListener("beforeprint", () => {
-  opened = folded.filter(part => !part.open);
+  opened = [...document.querySelectorAll("details:not([open])")];
   away = [...document.querySelectorAll("[data-with][hidden]")];
   for (const part of opened) part.open = true;
   for (const part of away) part.hidden = false;

@@ -30,8 +30,7 @@ function makePlot(root, panel, at) {
   const shown = list => list.filter(item => !legend.hidden.has(idOf(item)));
   const place = value => placeOf(value, now.limits, y.log), ink = item => colour(styleOf(item.method).colour);
   const now = { limits: [0, 1], below: [], above: [] };
-  const ratio = () => uPlot.pxRatio, X = v => bounded(u.valToPos(v, "x", true)), Y = v => bounded(u.valToPos(v, "y", true));
-  const bounded = v => Math.max(-1e5, Math.min(1e5, v));
+  const ratio = () => uPlot.pxRatio, bounded = v => Math.max(-1e5, Math.min(1e5, v)), X = v => bounded(u.valToPos(v, "x", true)), Y = v => bounded(u.valToPos(v, "y", true));
   const u = new uPlot(options(), uPlot.join([...plain.map(c => [c.x, c.y]), [at.extent, [null, null]]]), root), tip = tooltip(root);
   u.over.addEventListener("mousemove", hover);
   u.over.addEventListener("mouseleave", tip.hide);
@@ -70,12 +69,12 @@ function makePlot(root, panel, at) {
     const areas = shown(panel.regions ?? []).flatMap(r => [r.low, r.high]);
     now.limits = given ? y.range : padded([low, high, ...[...rest, ...areas].flat()], y.log);
     const rows = (...places) => shown(clouds).filter(c => c.y.some(v => places.includes(place(v))));
-    [now.below, now.above] = boxes ? [rows("below"), rows("above")] : [rows("below", "missing"), rows("above")];
+    [now.below, now.above] = [rows("below", boxes ? "below" : "missing"), rows("above")];
     const [to, from] = y.log ? [Math.log, Math.exp] : [v => v, v => v], [below, above] = [strip(now.below), strip(now.above)];
     const perPixel = (to(now.limits[1]) - to(now.limits[0])) / Math.max(40, height - below - above);
     return [from(to(now.limits[0]) - below * perPixel), from(to(now.limits[1]) + above * perPixel)];
   }
-  function strip(rows) { return rows.length ? (boxes ? 1 : rows.length) * STRIP + GAP : 0; }
+  function strip(rows) { return rows.length ? (boxes ? 1 : rows.length) * STRIP + GAP : clouds.length && y.range && !state.everything ? 5 : 0; }
 
   function clipped(draw) {
     const { left, top, width, height } = u.bbox, { ctx } = u;
@@ -138,12 +137,11 @@ function makePlot(root, panel, at) {
 
   function scatter(ctx, curve, hollow) {
     const { marker } = styleOf(curve.method), shapes = { inside: curve.drawn === "dots" ? solid(marker) : marker, below: "down", above: "up", missing: "cross" };
-    const paths = { inside: [], below: [], above: [], missing: [] }, size = MARKS[curve.drawn] * (curve.x.length > 1000 ? 0.8 : 1) * ratio();
+    const paths = { inside: [], below: [], above: [], missing: [] }, fine = curve.drawn === "points", size = MARKS[curve.drawn] * (curve.x.length > 1000 ? 0.8 : 1) * ratio();
     curve.x.forEach((x, k) => {
       const { where, x: px, y: py } = spot(curve, k);
       if (x != null && (where !== "inside" || curve.y[k] != null)) paths[where].push(markerPath(shapes[where], px, py, size));
     });
-    const fine = curve.drawn === "points";
     Object.assign(ctx, { strokeStyle: ink(curve), fillStyle: ink(curve), lineWidth: (fine ? 1.1 : 1.4) * ratio(), globalAlpha: fine ? 0.7 : 1 });
     ctx.setLineDash([]);
     for (const [where, list] of Object.entries(paths)) {
@@ -160,7 +158,7 @@ function makePlot(root, panel, at) {
     clipped(ctx => {
       Object.assign(ctx, { strokeStyle: colour("--grid"), lineWidth: ratio() });
       ctx.setLineDash([]);
-      for (const edge of [over && top + over, below && top + height - below]) if (edge) ctx.strokeRect(left - 9, edge, width + 18, 0);
+      for (const edge of [now.above.length && top + over, now.below.length && top + height - below]) if (edge) ctx.strokeRect(left - 9, edge, width + 18, 0);
       for (const curve of shown(marks)) scatter(ctx, curve, false);
       boxes?.forEach((sample, k) => drawBox(ctx, sample, { centre: X(k), half: Math.min(46 * ratio(), 0.56 * (X(1) - X(0))) / 2, at: v => Y(Math.min(Math.max(v, now.limits[0]), now.limits[1])),
         place, ink: ink(sample), ratio: ratio(), edges: { below: top + height - STRIP / 2 * ratio(), above: top + STRIP / 2 * ratio() } }));

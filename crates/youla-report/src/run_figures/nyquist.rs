@@ -68,9 +68,8 @@ fn frequencies(hz: &[f64], model: &ModelResponse) -> Vec<Guide> {
     let wanted = [1.0, 2.0, 5.0].iter().flat_map(|digit| decades.clone().map(move |decade| digit * decade));
     let point = |wanted: f64| {
         let next = hz.partition_point(|f| *f <= wanted);
-        let [from, to] = [next.checked_sub(1)?, next].map(|k| {
-            Some((*hz.get(k)?, place(*model.magnitude_db.get(k)?, *model.phase_deg.get(k)?)))
-        });
+        let [from, to] = [next.checked_sub(1)?, next]
+            .map(|k| Some((*hz.get(k)?, place(*model.magnitude_db.get(k)?, *model.phase_deg.get(k)?))));
         let ((low, a), (high, b)) = (from?, to?);
         let share = (wanted - low) / (high - low);
         let at = [a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)];

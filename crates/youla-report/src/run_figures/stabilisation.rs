@@ -3,8 +3,8 @@
 use super::choice::Chosen;
 use super::{RunFigure, axis, choice, key, logarithmic};
 use crate::data::{PoleStability, Stabilisation, StabilisationPole};
-use crate::with_minus;
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
+use crate::with_minus;
 
 /// Room above the largest order for the frequencies of the clusters, as a share of all orders.
 const ROOM_FOR_LABELS: f64 = 0.22;

@@ -9,8 +9,8 @@ use crate::data::*;
 use crate::figure::{Content, Curve, Drawn, MEASURED};
 use crate::trace::{Timeline, Trace};
 use crate::{Error, Result};
-use youla::signal::Channel;
 use crate::{Print, figure_csv, svg_for};
+use youla::signal::Channel;
 
 const TS: f64 = 0.01;
 

@@ -1,0 +1,105 @@
+//! Frequency responses of models, their confidence regions, and the non-parametric response.
+
+use serde::{Deserialize, Serialize};
+
+use crate::numbers;
+
+/// Frequency responses of all models on one grid, and the measured ones on theirs.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrequencyResponse {
+    /// Grid of the models, Hz, rising.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// One entry per method, output and input.
+    pub models: Vec<ModelResponse>,
+    /// Non-parametric responses where the external excitation is known, per output and input.
+    pub indirect: Vec<Indirect>,
+    /// Bounds of magnitudes on the grid of the models.
+    pub bands: Vec<Band>,
+    /// Singular values of models with several inputs and outputs, on the grid of the models.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub singular: Vec<SingularValue>,
+}
+
+/// One singular value of the response of one model.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct SingularValue {
+    /// Key of the method.
+    pub method: String,
+    /// Its place, 0 for the largest.
+    pub place: usize,
+    /// Its values, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub value_db: Vec<f64>,
+    /// Probability with which the bounds should hold the truth, at each frequency; absent without bounds.
+    pub level: Option<f64>,
+    /// Lower bound, dB; empty without bounds.
+    #[serde(with = "numbers::seven_digits")]
+    pub low_db: Vec<f64>,
+    /// Upper bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub high_db: Vec<f64>,
+}
+
+/// Bounds of the response of one model from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Band {
+    /// Key of the method.
+    pub method: String,
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Probability with which the bounds should hold the truth, at each frequency.
+    pub level: f64,
+    /// Lower bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub low_db: Vec<f64>,
+    /// Upper bound, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub high_db: Vec<f64>,
+    /// Region of the complex value: per frequency the entries rr, ri, ii of V in `d' V^-1 d <= 1`, d the real and imaginary
+    /// part of the distance from the response.
+    #[serde(default, with = "numbers::seven_digits", skip_serializing_if = "Vec::is_empty")]
+    pub region: Vec<f64>,
+}
+
+/// Response of one model from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ModelResponse {
+    /// Key of the method.
+    pub method: String,
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Magnitude in dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub magnitude_db: Vec<f64>,
+    /// Phase in degrees, on any branch.
+    #[serde(with = "numbers::seven_digits")]
+    pub phase_deg: Vec<f64>,
+}
+
+/// Indirect non-parametric response from one input to one output.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Indirect {
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Its own grid, Hz, rising.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// Magnitude in dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub magnitude_db: Vec<f64>,
+    /// Phase in degrees, on any branch.
+    #[serde(with = "numbers::seven_digits")]
+    pub phase_deg: Vec<f64>,
+    /// Coherence with the excitation, 0 to 1.
+    #[serde(with = "numbers::seven_digits")]
+    pub coherence: Vec<f64>,
+}

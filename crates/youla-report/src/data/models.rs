@@ -1,0 +1,168 @@
+//! Orders, poles, modes and the reduction of models.
+
+use serde::{Deserialize, Serialize};
+
+use crate::numbers;
+
+/// Singular values from which an order was chosen.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct OrderChoice {
+    /// Key of the method.
+    pub method: String,
+    /// What was identified, for example "S from alpha to beta".
+    pub label: String,
+    /// Singular values, falling.
+    #[serde(with = "numbers")]
+    pub values: Vec<f64>,
+    /// The order that was taken.
+    pub chosen: usize,
+}
+
+/// The stabilisation diagram of one method.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Stabilisation {
+    /// Key of the method.
+    pub method: String,
+    /// What was identified, for example "S from alpha to beta".
+    pub label: String,
+    /// The orders, rising.
+    pub orders: Vec<usize>,
+    /// The order of the model.
+    pub chosen: usize,
+    /// The poles by order.
+    pub poles: Vec<StabilisationPole>,
+    /// Clusters by frequency.
+    pub clusters: Vec<StabilisationCluster>,
+}
+
+/// One pole of a stabilisation diagram.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StabilisationPole {
+    /// Order of its model.
+    pub order: usize,
+    /// Natural frequency, Hz.
+    pub hz: f64,
+    /// Damping ratio.
+    pub zeta: f64,
+    /// Standard deviation of the frequency, Hz, where it is known.
+    pub hz_deviation: Option<f64>,
+    /// Standard deviation of the damping ratio, where it is known.
+    pub zeta_deviation: Option<f64>,
+    /// Whether the pole is stable.
+    pub stable: bool,
+    /// Comparison with the poles of the next lower order.
+    pub standing: PoleStability,
+    /// Its cluster, by its place.
+    pub cluster: Option<usize>,
+}
+
+/// Comparison of a pole with those of the next lower order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PoleStability {
+    /// No pole of this frequency there.
+    New,
+    /// Frequency stable: a pole of this frequency there, with another damping ratio or mode shape.
+    Frequency,
+    /// Stable: a pole of this frequency, damping ratio and mode shape there.
+    Stable,
+}
+
+/// Poles of many orders that are close to each other.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct StabilisationCluster {
+    /// Median of the natural frequencies, Hz.
+    pub hz: f64,
+    /// Median of the damping ratios.
+    pub zeta: f64,
+    /// Half the distance of the quartiles of the frequencies, Hz.
+    pub hz_spread: f64,
+    /// Half the distance of the quartiles of the damping ratios.
+    pub zeta_spread: f64,
+    /// Median of the standard deviations of the frequencies, Hz, where they are known.
+    pub hz_deviation: Option<f64>,
+    /// Median of the standard deviations of the damping ratios, where they are known.
+    pub zeta_deviation: Option<f64>,
+    /// Number of orders at which it appears.
+    pub orders: usize,
+    /// Number of orders at which it is stable: [`PoleStability::Stable`].
+    pub settled: usize,
+    /// Mode shape: magnitude and phase in degrees of each output.
+    pub shape: Vec<[f64; 2]>,
+}
+
+/// Poles and zeros of one model, in z or, without a sample time, in rad/s.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Poles {
+    /// Key of the method.
+    pub method: String,
+    /// Real and imaginary parts.
+    pub poles: Vec<[f64; 2]>,
+    /// Those of the finite invariant zeros, where the model has as many inputs as outputs.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zeros: Vec<[f64; 2]>,
+}
+
+/// A mode of one model.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Mode {
+    /// Key of the method.
+    pub method: String,
+    /// Natural frequency, Hz.
+    pub hz: f64,
+    /// Damping ratio; negative where the mode is unstable.
+    pub zeta: f64,
+    /// Standard deviations of both, where they are known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub deviation: Option<[f64; 2]>,
+}
+
+/// Hankel singular values of a model that was reduced, and the error at each order.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Reduction {
+    /// What was reduced and how, for example "G(S) by balanced truncation".
+    pub label: String,
+    /// Hankel singular values, falling.
+    #[serde(with = "numbers")]
+    pub hankel: Vec<f64>,
+    /// Order that was kept.
+    pub chosen: usize,
+    /// States among them whose poles were kept as they are; they have no Hankel singular value.
+    #[serde(default)]
+    pub kept: usize,
+    /// Bound of the error in the H-infinity norm, in the units of the model, or in the gap metric.
+    pub bound: Option<f64>,
+    /// Whether the bound is one of the gap.
+    #[serde(default)]
+    pub bound_is_gap: bool,
+    /// Largest gain of the model over frequency, where it is finite.
+    #[serde(default)]
+    pub plant_norm: Option<f64>,
+    /// Error at each order; empty where that was not computed.
+    #[serde(default)]
+    pub orders: Vec<ReductionOrder>,
+    /// The outcome, in a sentence.
+    #[serde(default)]
+    pub sentence: String,
+}
+
+/// One order of a reduction.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct ReductionOrder {
+    /// The order.
+    pub order: usize,
+    /// A-priori bound of the error.
+    pub bound: Option<f64>,
+    /// Largest gain of the error over frequency.
+    pub open_loop: Option<f64>,
+    /// The same over that of the model.
+    pub open_loop_relative: Option<f64>,
+    /// Error of the closed loop from alpha to y over the closed loop.
+    pub closed_loop_relative: Option<f64>,
+    /// Whether the controller stabilises the model of this order.
+    pub stabilised: bool,
+    /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
+    pub worst_pole: Option<[f64; 2]>,
+    /// Why there is no model of this order.
+    pub failure: Option<String>,
+}

@@ -120,15 +120,15 @@ impl RunCertificate {
         let band = self.band.as_ref()?;
         let level = 100.0 * band.level;
         let [low, high] = band.radius.bounds;
-        let interval = format!("{level:.0} % interval of it {low:.5} to {high:.5}");
+        let interval = format!("{level:.0} % interval {low:.5} to {high:.5}");
         Some(if band.holds() {
             format!(
-                "The controller stabilises every one of the {} models within the {level:.0} % region of S, at worst with {:.5} ({interval}).",
+                "The controller stabilises all {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5} ({interval}).",
                 band.within, band.worst_within
             )
         } else {
             format!(
-                "The controller does not stabilise {} of the {} models within the {level:.0} % region of S, at worst with {:.5} ({interval}).",
+                "The controller does not stabilise {} of the {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5} ({interval}).",
                 band.unstable_within, band.within, band.worst_within
             )
         })
@@ -158,11 +158,11 @@ impl RunCertificate {
                 std::iter::once(name.clone()).chain(cells.map(with_minus)).collect()
             };
             tables.push(draw::EvidenceTable {
-                title: "The loop of G(S) under the uncertainty of S".into(),
+                title: "Margins of the loop of G(S) with intervals".into(),
                 text: self.band_sentence().unwrap_or_default(),
                 columns: ["Figure", "Estimate", "Interval"].map(String::from).to_vec(),
                 rows: self.margins.iter().map(row).collect(),
-                caption: "Gain, phase and delay of one channel at a time, the worst one; the coprime margin in channels scaled by their rms."
+                caption: "Gain, phase and delay margins are those of the worst single channel. The coprime margin is computed with channels scaled by their rms."
                     .into(),
             });
         }

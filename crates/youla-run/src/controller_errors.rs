@@ -45,11 +45,11 @@ impl ControllerError {
     pub fn label(self) -> String {
         match self {
             ControllerError::None => "none".into(),
-            ControllerError::Delay => "one sample of delay left out".into(),
+            ControllerError::Delay => "one sample of delay omitted".into(),
             ControllerError::Gain(g) if g > 0.0 => format!("gain too large by {:.0} %", 100.0 * g),
             ControllerError::Gain(g) => format!("gain too small by {:.0} %", -100.0 * g),
             ControllerError::Saturation(part) => format!("u cut at {:.0} % of its largest value", 100.0 * part),
-            ControllerError::InitialState => "initial state of the observer unknown, nothing dropped".into(),
+            ControllerError::InitialState => "unknown initial state of the observer, no samples discarded".into(),
         }
     }
 
@@ -299,10 +299,10 @@ pub(super) fn table(effects: &[ControllerErrorEffect]) -> Option<draw::EvidenceT
     columns.extend((1..=first.modes.len()).map(|k| format!("Mode {k}")));
     columns.extend(["Fit of S, %", "Largest pole of S", "Fit of G(S), %", "K stabilises G(S)"].map(String::from));
     Some(draw::EvidenceTable {
-        title: "How wrong may the controller be described?".into(),
-        text: "S was identified again with alpha and beta from a description of the controller that is wrong in one point.".into(),
+        title: "Effect of errors in the description of the controller".into(),
+        text: "S was identified again with alpha and beta computed from a controller description that has one error.".into(),
         columns,
         rows: effects.iter().map(row).collect(),
-        caption: "Lightly damped modes of G(S), below the first row their change. Fit of S on alpha and beta, of G(S) on the verification records, means over channels.".into(),
+        caption: "First row: lightly damped modes of G(S); rows below: their change. Fits are means over channels: S on alpha and beta, G(S) on the verification records.".into(),
     })
 }

@@ -56,8 +56,8 @@ pub enum Error {
         /// The name.
         name: String,
     },
-    /// A file is not the summary of a run.
-    #[error("{}: this is not the summary.json of a run of this version: {source}", path.display())]
+    /// A file of a run folder has another layout than this version writes.
+    #[error("{}: this is not a file of a run of this version of youla ({source}); run `youla identify` again", path.display())]
     NotASummary {
         /// The file.
         path: PathBuf,

@@ -1,4 +1,4 @@
-//! What a run says in words: the answer to "can I trust it?" and the remarks besides.
+//! The sentences of a report: the answer to "Can it be trusted?" and remarks.
 
 mod extra;
 mod trust;
@@ -14,19 +14,17 @@ use youla_greybox::Stop;
 use youla_greybox::refine::RefineNoise;
 use youla_report::data::{Evidence, Note, Status};
 
-/// What speaks against the result or asks for a look, in sentences: for a terminal that shows no report.
-///
-/// What the check of the data says at least as a caution comes first.
+/// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.
 pub fn cautions(found: &Identification) -> Vec<String> {
     let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
-    // What the line on the data counts is said one by one.
+    // The line on the data counts its findings; here each has its own sentence.
     let trust = verdict_lines(found).into_iter().filter(|line| line.evidence != Evidence::Data);
     let lines = trust.chain(further_lines(found)).map(|v| weigh(v.status, v.text));
     let rest = lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten();
     found.data.sentences().into_iter().chain(rest).collect()
 }
 
-/// Remarks that a user should know: methods that could not be had, poles that were moved, predictions that diverged.
+/// Remarks: models that are impossible, poles that were moved, predictions that diverged.
 pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let mut all = Vec::new();
     let mut add = |status: Status, text: String| all.push(Note { status, text });
@@ -38,12 +36,12 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         add(Status::Caution, format!("There is no uncertainty of S and G(S): {reason}."));
     }
     if let Some(Err(reason)) = &found.hansen.evidence {
-        add(Status::Caution, format!("Nothing is said on S = 0: {reason}."));
+        add(Status::Caution, format!("S = 0 was not tested: {reason}."));
     }
     if let Some(Uncertainty::Bootstrap(bootstrap)) = &found.hansen.deviation.uncertainty {
         let (unstable, failed) = (bootstrap.unstable, bootstrap.failed);
         if unstable + failed > 0 {
-            let text = format!("Of the resampled records {unstable} gave an unstable S and {failed} none.");
+            let text = format!("Of the resampled records, {unstable} gave an unstable S and {failed} no S.");
             add(Status::Info, text);
         }
     }
@@ -74,15 +72,15 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     }
     if let Some(form) = &found.hansen.innovation_form {
         let (status, settled) = match form.stop {
-            Convergence::Converged => (Status::Info, "settled"),
-            Convergence::Iterations => (Status::Caution, "had not settled"),
+            Convergence::Converged => (Status::Info, "converged"),
+            Convergence::Iterations => (Status::Caution, "did not converge"),
         };
         let kalman = form.from_kalman.map_or(String::new(), |x| {
-            format!(" It differs from the Kalman gain of the subspace method by {:.0} % of its size.", 100.0 * x)
+            format!(" The Kalman gain of the subspace method differs from K_s by {:.0} %.", 100.0 * x)
         });
         let text = format!(
-            "S is in innovation form: its gain K_s {settled} after {} refits (last change {:.1e}) and misses the response of \
-             beta to output noise by {:.1} %.{kalman}",
+            "S is in innovation form: its gain K_s {settled} within {} refits (last relative change {:.1e}); it differs from the \
+             response of beta to output noise by {:.1} %.{kalman}",
             form.iterations,
             form.change,
             100.0 * form.misfit
@@ -91,7 +89,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     }
     if let Some(refined) = &found.refinement {
         let (status, ended) = match refined.stop {
-            Stop::Iterations => (Status::Caution, " and stopped at the limit"),
+            Stop::Iterations => (Status::Caution, " (the limit `max_iterations`)"),
             _ => (Status::Info, ""),
         };
         let noise = match refined.noise {
@@ -100,8 +98,8 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         };
         let fits = |fit: &[f64]| fit.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" and ");
         let text = format!(
-            "S was refined on {noise}: {} steps{ended} took the criterion from {:.5e} to {:.5e}, and the fit of the simulated \
-             beta from {} % to {} %. S is {}.",
+            "S was refined on {noise}: {} iterations{ended} reduced the criterion from {:.5e} to {:.5e}; the fit of the simulated \
+             beta changed from {} % to {} %. S is {}.",
             refined.iterations,
             refined.cost_before,
             refined.cost,
@@ -114,10 +112,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     if !found.records.segments.is_empty() {
         let part = |s: &RecordSegment| format!("{} is rows {} to {} of {}", s.record, s.rows[0], s.rows[1], s.file);
         let parts: Vec<String> = found.records.segments.iter().map(part).collect();
-        add(
-            Status::Info,
-            format!("Records that are parts of a file, each an experiment by itself: {}.", parts.join("; ")),
-        );
+        add(Status::Info, format!("Parts of files, each identified as a separate experiment: {}.", parts.join("; ")));
     }
     if let Some(text) = disturbance_note(found) {
         add(Status::Info, text);
@@ -125,14 +120,14 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     let settle = found.signals.settle;
     if settle > 0 {
         let text = format!(
-            "The first {settle} samples of alpha and beta of each record were dropped (settling of the filter)."
+            "The first {settle} samples of alpha and beta of each record were discarded (transient of the signal filter)."
         );
         add(Status::Info, text);
     }
     all
 }
 
-/// The known lines that were taken out of beta, with their amplitudes in each output, largest over the records.
+/// The known lines that were removed from beta, with their amplitudes in each output, largest over the records.
 fn disturbance_note(found: &Identification) -> Option<String> {
     let labels = found.settings.data.disturbance.as_ref()?.labels();
     let all: Vec<_> = found.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
@@ -144,8 +139,8 @@ fn disturbance_note(found: &Identification) -> Option<String> {
     };
     let lines: Vec<String> = labels.iter().enumerate().map(of_line).collect();
     Some(format!(
-        "Known lines were taken out before identification, and out of measured and predicted outputs alike before each fit; \
-         their amplitudes in beta, largest over the records: {}.",
+        "Sinusoids of known frequency were removed before identification, and from measured and predicted outputs before each fit. \
+         Their largest amplitudes in beta over the records: {}.",
         lines.join("; ")
     ))
 }

@@ -86,11 +86,6 @@ impl Identification {
         .collect()
     }
 
-    /// The direct model, where there is one.
-    pub(crate) fn direct_model(&self) -> Option<&SubspaceModel> {
-        found(self.direct.as_ref())
-    }
-
     /// The reduced model, where there is one.
     pub(crate) fn reduced(&self) -> Option<&RunReduction> {
         found(self.reduction.as_ref())

@@ -51,7 +51,9 @@ mod write;
 
 pub use artefacts::{ModelFile, Provenance, SCHEMA};
 pub use certificate::{CertificateEntry, RunCertificate};
-pub use check::{CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, check_files, check_run, further, read_check_options};
+pub use check::{
+    CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, check_files, check_run, further, read_check_options,
+};
 pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use controller_errors::{
     Changed, ChangedMode, ControllerError, ControllerErrorEffect, ControllerErrorEntry, EffectEntry, ModePoint,
@@ -71,8 +73,8 @@ pub use page::page;
 pub use pipeline::identify;
 pub use plot::{Plot, plot, plottable, write_plots};
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
-pub use redraw::redraw;
 pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry};
+pub use redraw::redraw;
 pub use reduction::{ReductionEntry, RunReduction};
 pub use reference::settings_reference;
 pub use residual_tests::{LargestEntry, Predictor, RecordResiduals, ResidualEntry};
@@ -91,9 +93,7 @@ pub use streaming::{
     LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
     read_subspace_options,
 };
-pub use summary::{
-    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary,
-};
+pub use summary::{MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary};
 pub use uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
 pub use verdict::{ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

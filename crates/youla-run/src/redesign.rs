@@ -143,12 +143,17 @@ impl From<&LoopFigures> for LoopEntry {
 pub(super) fn sentence(redesign: &Redesign) -> String {
     let Redesign { present, predicted, .. } = redesign;
     let band = redesign.band.map_or_else(String::new, |b| {
-        format!(", and stabilises every one of the {} models within the {:.0} % region of S", b.within, 100.0 * b.level)
+        format!(
+            "; it stabilises all {} models drawn from the {:.0} % confidence region of S",
+            b.within,
+            100.0 * b.level
+        )
     });
-    let verb = if redesign.gains_damping() { "raises" } else { "takes" };
+    let verb = if redesign.gains_damping() { "raises" } else { "lowers" };
     format!(
-        "The new controller {verb} the least damping of the loop from {:.3} to {:.3}, with a peak of the response to a disturbance at \
-         the input of {:.2} (now {:.2}) and a peak sensitivity of {:.2} (now {:.2}){band}. It has not run yet.",
+        "The new controller {verb} the minimum damping of the loop from {:.3} to {:.3}. The peak response to a disturbance at the \
+         plant input is {:.2} (present controller: {:.2}) and the peak sensitivity {:.2} (present: {:.2}){band}. These are \
+         predictions: the controller has not run yet.",
         present.least_damping,
         predicted.least_damping,
         predicted.peak_response,
@@ -169,7 +174,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
     };
     let number = |v: Option<f64>| v.map_or("–".to_owned(), |v| format!("{v:.3}"));
     let candidate = |c: &Candidate| {
-        let taken = if c.input_weight == redesign.input_weight { "taken" } else { "" };
+        let taken = if c.input_weight == redesign.input_weight { "selected" } else { "" };
         let remark = c.refused.clone().unwrap_or_else(|| taken.into());
         vec![
             c.input_weight.to_string(),
@@ -185,15 +190,15 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
             text: sentence(redesign),
             columns: ["Loop", "Hz", "ζ", "Share"].map(String::from).to_vec(),
             rows: [modes(&redesign.present, "present"), modes(&redesign.predicted, "new")].concat(),
-            caption: "Modes with at least 5 % of the response of y to a disturbance at the plant input, on the model of the design; channels in their rms."
+            caption: "Modes that contribute at least 5 % to the response of y to a disturbance at the plant input, on the design model; channels scaled by their rms."
                 .into(),
         },
         draw::EvidenceTable {
-            title: "Weights that were tried".into(),
+            title: "Candidate weights".into(),
             text: String::new(),
-            columns: ["Weight of u", "Least damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
+            columns: ["Weight of u", "Minimum damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
             rows: redesign.candidates.iter().map(candidate).collect(),
-            caption: "Of those within the limits the one with the most damping is taken that stabilises every model within the region of S."
+            caption: "Among the candidates within the limits that stabilise all drawn models, the one with the largest minimum damping is selected."
                 .into(),
         },
     ]

@@ -9,9 +9,9 @@ const HEAD: &str = "\
 
 <!-- Written by `youla schema --markdown`; do not edit. The texts are the doc comments of the settings. -->
 
-Every key with its type, its default and its meaning. What belongs together and why is explained in [run.toml](../run-toml.md). Lists of
-alternatives are separated by commas; a table that is written within braces may also stand under a heading of its own. `youla schema` prints
-the same as a JSON schema, with which editors complete and check a run.toml:
+Every key with its type, its default and its meaning; [run.toml](../run-toml.md) explains which keys belong together. Alternatives are
+separated by commas. A table written in braces may also have a heading of its own. `youla schema` prints the same as a JSON schema, with
+which editors complete and check a run.toml:
 
     youla schema > run.schema.json
 
@@ -27,14 +27,46 @@ pub fn settings_reference() -> String {
     let schema = settings_schema();
     let none = Map::new();
     let defs = schema["$defs"].as_object().unwrap_or(&none);
-    let mut page = Page { defs, text: HEAD.to_owned(), written: HashMap::new() };
+    let mut page = Page { defs, parts: Default::default(), at: 0, written: HashMap::new() };
     page.section("", "", &schema);
-    page.text
+    let [common, further, check] = page.parts;
+    format!(
+        "{HEAD}\n# Common keys\n{common}\n# Further keys\n{further}\n# Thresholds of the check of the data\n{check}"
+    )
+}
+
+/// Tables that most run files need; all others but `[check]` are further ones.
+const COMMON: [&str; 13] = [
+    "",
+    "[data]",
+    "[[data.inputs]]",
+    "[[data.estimation]]",
+    "[nominal]",
+    "[nominal.transfer_function]",
+    "[nominal.state_space]",
+    "[controller]",
+    "[controller.difference_equation]",
+    "[controller.state_space]",
+    "[direct]",
+    "[hansen]",
+    "[verification]",
+];
+
+/// The part of the page in which a table is described.
+fn part_of(path: &str) -> usize {
+    match path {
+        path if COMMON.contains(&path) => 0,
+        "[check]" => 2,
+        _ => 1,
+    }
 }
 
 struct Page<'a> {
     defs: &'a Map<String, Value>,
-    text: String,
+    /// Common tables, further ones, `[check]`.
+    parts: [String; 3],
+    /// The part that is written to.
+    at: usize,
     /// Heading under which a definition was written.
     written: HashMap<String, String>,
 }
@@ -49,20 +81,25 @@ fn text_of(schema: &Value) -> &str {
 }
 
 impl<'a> Page<'a> {
+    fn part(&mut self) -> &mut String {
+        &mut self.parts[self.at]
+    }
+
     fn resolve(&self, schema: &'a Value) -> &'a Value {
         name_of(schema).and_then(|name| self.defs.get(name)).unwrap_or(schema)
     }
 
     /// A table with its keys, or a choice of forms; then what stands below it.
     fn section(&mut self, path: &str, about: &str, schema: &'a Value) {
+        self.at = part_of(path);
         let heading = if path.is_empty() { "The top level".to_owned() } else { format!("`{path}`") };
-        self.text += &format!("\n## {heading}\n");
+        *self.part() += &format!("\n## {heading}\n");
         if !about.is_empty() {
-            self.text += &format!("\n{about}\n");
+            *self.part() += &format!("\n{about}\n");
         }
         if let Some(name) = name_of(schema) {
-            if let Some(first) = self.written.get(name) {
-                self.text += &format!("\nThe keys are those of `{first}`.\n");
+            if let Some(first) = self.written.get(name).cloned() {
+                *self.part() += &format!("\nThe keys are those of `{first}`.\n");
                 return;
             }
             self.written.insert(name.to_owned(), path.to_owned());
@@ -78,7 +115,7 @@ impl<'a> Page<'a> {
                     && !p.starts_with("Options of ")
             };
             for paragraph in text_of(own).split("\n\n").filter(new) {
-                self.text += &format!("\n{paragraph}\n");
+                *self.part() += &format!("\n{paragraph}\n");
             }
         }
         let below = match own["properties"].as_object() {
@@ -93,7 +130,7 @@ impl<'a> Page<'a> {
     fn keys(&mut self, path: &str, keys: &'a Map<String, Value>, required: &Value) -> Vec<(String, String, &'a Value)> {
         let needed = |key: &str| required.as_array().is_some_and(|all| all.iter().any(|name| name == key));
         let mut below = Vec::new();
-        self.text += "\n| key | type | default | meaning |\n|---|---|---|---|\n";
+        *self.part() += "\n| key | type | default | meaning |\n|---|---|---|---|\n";
         let (first, rest): (Vec<_>, Vec<_>) = keys.iter().partition(|(key, _)| needed(key));
         for (key, schema) in first.into_iter().chain(rest) {
             let default = match &schema["default"] {
@@ -109,7 +146,7 @@ impl<'a> Page<'a> {
             };
             let cells = [format!("`{key}`"), kind, default, text_of(schema).to_owned() + &choices];
             let cells = cells.map(|cell| cell.replace('|', "\\|").replace("\n\n", "<br>"));
-            self.text += &format!("| {} |\n", cells.join(" | "));
+            *self.part() += &format!("| {} |\n", cells.join(" | "));
             let bare = path.trim_matches(['[', ']']);
             let place = if bare.is_empty() { key.clone() } else { format!("{bare}.{key}") };
             if let Some((brackets, table)) = self.table(schema) {
@@ -137,7 +174,7 @@ impl<'a> Page<'a> {
         }
         if !below.is_empty() {
             let names: Vec<String> = below.iter().map(|(heading, ..)| format!("`{heading}`")).collect();
-            self.text += &format!("\nWhat has keys of its own: {}.\n", names.join(", "));
+            *self.part() += &format!("\nWhat has keys of its own: {}.\n", names.join(", "));
         }
         below
     }
@@ -249,5 +286,20 @@ fn toml_of(value: &Value) -> String {
         }
         Value::Array(values) => format!("[{}]", values.iter().map(toml_of).collect::<Vec<_>>().join(", ")),
         other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What a user reads first fits on one page.
+    #[test]
+    fn common_keys_are_few() {
+        let page = settings_reference();
+        let common = page.split("\n# Further keys\n").next().unwrap();
+        let keys = common.lines().filter(|line| line.starts_with("| `")).count();
+        assert!((40..=80).contains(&keys), "{keys}");
+        assert!(!common.contains("## `[check]`") && page.contains("## `[check]`"));
     }
 }

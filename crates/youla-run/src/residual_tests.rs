@@ -8,7 +8,10 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
-use youla::validate::{LargestCorrelation, PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations};
+use youla::validate::{
+    LargestCorrelation, PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise,
+    residual_correlations,
+};
 use youla::{Mat, MatRef};
 
 /// The residual of one model on one record.

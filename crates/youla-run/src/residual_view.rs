@@ -2,7 +2,7 @@
 
 use super::identification::Identification;
 use super::settings::Prediction;
-use youla::validate::PREDICTION_STEPS;
+use youla::validate::{PREDICTION_STEPS, ResidualCorrelations};
 use youla_report::data as draw;
 
 /// What the report draws.
@@ -10,7 +10,8 @@ pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
     let mut tests = Vec::new();
     for v in &found.verdict.models {
         for record in &v.records {
-            let Some(r) = &record.residuals else { continue };
+            // A residual or an excitation that is zero throughout has no correlations; `residuals.json` says so by null.
+            let Some(r) = record.residuals.as_ref().filter(|r| exist(&r.correlations)) else { continue };
             tests.push(draw::ResidualTest {
                 record: record.record.clone(),
                 method: v.method.key().into(),
@@ -48,4 +49,10 @@ pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
         steps: PREDICTION_STEPS.to_vec(),
         tests,
     })
+}
+
+/// Whether all correlations are numbers.
+fn exist(found: &ResidualCorrelations) -> bool {
+    let cross = found.cross.iter().flat_map(|c| &c.values);
+    found.auto.iter().flatten().chain(cross).all(|value| value.is_finite())
 }

@@ -42,8 +42,8 @@ pub(super) fn caption(found: &Identification) -> String {
                 .zip(sizes)
                 .map(|(c, s)| format!("{} {s:.3} {}", c.name, pretty_unit(&c.unit)).trim_end().into())
                 .collect();
-            format!("Channels are scaled for b(G, K) and the nu-gap by their {BASIS}: {}.", each.join(", "))
+            format!("For b(G, K) and the nu-gap, channels are scaled by their {BASIS}: {}.", each.join(", "))
         }
-        Err(reason) => format!("There is no b(G, K) and no nu-gap, which need scaled channels: {reason}."),
+        Err(reason) => format!("b(G, K) and the nu-gap need scaled channels and are not available: {reason}."),
     }
 }

@@ -30,8 +30,7 @@ pub fn settings_schema() -> Value {
 /// assert!(schema["required"].as_array().is_some_and(|keys| keys.contains(&"methods".into())));
 /// ```
 pub fn summary_schema() -> Value {
-    let mut schema =
-        Value::from(SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<Summary>());
+    let mut schema = Value::from(SchemaSettings::draft2020_12().into_generator().into_root_schema_for::<Summary>());
     plain(&mut schema);
     schema["title"] = "summary.json of youla".into();
     schema

@@ -86,11 +86,11 @@ fn wanted(file: &DataFile, samples: usize) -> Result<Vec<[usize; 2]>> {
 
 #[cfg(test)]
 mod tests {
+    use crate::{RunRecords, RunSettings, read_records};
     use std::fmt::Write;
     use std::path::{Path, PathBuf};
     use youla::identify::direct::direct;
     use youla::identify::subspace::{Order, SubspaceOptions};
-    use youla::{RunRecords, RunSettings, read_records};
 
     /// A folder of its own with files, removed in the end.
     struct Folder(PathBuf);

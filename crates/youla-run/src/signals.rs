@@ -82,9 +82,9 @@ pub fn deviation_signals(
 
 /// The signals of every estimation record as records of their own, over all samples:
 ///
-/// - `eta_<input> = Vt u - Ut y` and `epsilon_<output> = Mt y - Nt u`, computed from the measured signals;
+/// - `eta_<input> = Vt u - Ut y`, computed from the measured signals;
 /// - `alpha_<input>`, the part of eta that the known excitations cause (eta itself where none is known);
-/// - `beta_<output>`, the innovation (28), which is epsilon plus noise and computed by the same filter.
+/// - `beta_<output> = Mt y - Nt u`, the innovation (28); epsilon of the same filter has the same values.
 ///
 /// # Errors
 /// Shapes.
@@ -93,11 +93,11 @@ pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) 
         channels.iter().map(|c| Channel::new(format!("{prefix}_{}", c.name), &c.unit)).collect()
     };
     let (u, y) = (&records.inputs, &records.outputs);
-    let channels = [named("alpha", u), named("beta", y), named("eta", u), named("epsilon", y)].concat();
+    let channels = [named("alpha", u), named("beta", y), named("eta", u)].concat();
     let one = |record: &LoopRecord| {
         let YoulaSignals { alpha: eta, beta } = factors.signals(record.u.as_ref(), record.y.as_ref())?;
         let alpha = expected(factors, record)?.unwrap_or_else(|| eta.clone());
-        let data = block(&[&[alpha.as_ref(), beta.as_ref(), eta.as_ref(), beta.as_ref()]]);
+        let data = block(&[&[alpha.as_ref(), beta.as_ref(), eta.as_ref()]]);
         Ok(Record::new(&record.name, channels.clone(), data, record.time)?)
     };
     records.estimation.iter().map(one).collect()

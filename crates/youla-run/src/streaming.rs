@@ -120,7 +120,12 @@ pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<Subspa
 /// # Errors
 /// [`youla_io::Error::Settings`] with line, column and key.
 pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<SubspaceOptions> {
-    Ok(youla_io::toml_file::parse(text, path)?)
+    youla_io::toml_file::parse(text, path).map_err(|error| match error {
+        youla_io::Error::Settings { path, at, problem } if problem.starts_with("`weight` is not known") => {
+            Error::File(youla_io::Error::Settings { path, at, problem: "`weight` is now `method`".into() })
+        }
+        other => Error::File(other),
+    })
 }
 
 fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {

@@ -1,13 +1,14 @@
 //! What programs may rely on: summary.json, artefacts, signals, and the same result for the same seed.
 
 use crate::common::{demo, empty_folder, outcome, youla};
+use crate::schema::problem;
 use serde_json::{Map, Value};
 use std::fs;
 use std::path::Path;
 use std::process::Command;
 use youla_io::export::ExportedController;
 use youla_io::{ChannelSpec, CsvOptions, TimeSource, read_csv, read_mat};
-use youla_run::ModelFile;
+use youla_run::{ModelFile, Summary, summary_schema};
 
 fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).expect("readable")).expect("JSON")
@@ -39,7 +40,7 @@ fn summary_has_the_documented_structure() {
     ]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
-    assert_eq!(summary["schema"], 1);
+    assert_eq!(summary["schema"], 2);
     assert_eq!(summary["refused"], Value::Object(Map::new()));
     for fit in [&summary["nominal"]["fit"], &summary["true_plant"]["fit"]] {
         assert_eq!(keys(fit), ["verification"]);
@@ -53,6 +54,19 @@ fn summary_has_the_documented_structure() {
         ["certify", "factor", "identify", "record", "redesign", "reduce", "report", "signals", "validate", "write"];
     assert_eq!(keys(&summary["seconds"]), stages);
     assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
+}
+
+/// The file fits the schema that `summary_schema` states, and the type reads it back.
+#[test]
+fn summary_fits_its_schema() {
+    let summary = json(&demo().join("summary.json"));
+    let schema = summary_schema();
+    assert_eq!(problem(&schema, &schema, &summary, "summary.json"), None);
+    let mut wrong = summary.clone();
+    wrong["methods"]["hansen"]["order"] = "sixteen".into();
+    assert!(problem(&schema, &schema, &wrong, "summary.json").is_some());
+    let read = Summary::read(demo()).expect("a summary");
+    assert_eq!(serde_json::to_value(&read).expect("JSON"), summary);
 }
 
 #[test]
@@ -238,8 +252,19 @@ fn frequency_responses_share_one_grid() {
     assert_eq!(keys(response), all);
     let hz = numbers(&response["hz"]);
     assert!(hz.len() > 100 && hz.windows(2).all(|w| w[0] < w[1]));
-    assert!(all.iter().all(|key| numbers(&response[key]).len() == hz.len()));
-    assert!(numbers(&response["coherence"]).iter().all(|c| (0.0..=1.0 + 1e-12).contains(c)));
+    // Two inputs and two outputs: [output][input][frequency], coherence [output][frequency].
+    let array = |value: &Value| value.as_array().expect("an array").clone();
+    for key in all.iter().filter(|key| key.ends_with("_db")) {
+        let outputs = array(&response[key]);
+        assert_eq!(outputs.len(), 2, "{key}");
+        for curves in outputs.iter().map(array) {
+            assert!(curves.len() == 2 && curves.iter().all(|curve| numbers(curve).len() == hz.len()), "{key}");
+        }
+    }
+    let coherence = array(&response["coherence"]);
+    assert_eq!(coherence.len(), 2);
+    assert!(coherence.iter().all(|c| numbers(c).len() == hz.len()));
+    assert!(coherence.iter().flat_map(numbers).all(|c| (0.0..=1.0 + 1e-12).contains(&c)));
 }
 
 #[test]
@@ -350,7 +375,7 @@ fn signals_read_back() {
     assert!(found.stdout.contains("estimation.csv (20000 samples)"), "{}", found.stdout);
     let path = folder.join("deep/csv/estimation.csv");
     let header = fs::read_to_string(&path).expect("readable").lines().next().map(str::to_owned).expect("a header");
-    let names = ["alpha_u_h", "alpha_u_v", "beta_y_h", "beta_y_v", "eta_u_h", "eta_u_v", "epsilon_y_h", "epsilon_y_v"];
+    let names = ["alpha_u_h", "alpha_u_v", "beta_y_h", "beta_y_v", "eta_u_h", "eta_u_v"];
     assert_eq!(header, format!("t,{}", names.join(",")));
     let time = TimeSource::column("t".parse().expect("a name"));
     let record = read_csv(&path, &names.map(ChannelSpec::named), &time, &CsvOptions::default()).expect("a record");

@@ -16,7 +16,7 @@ fn schema() -> Value {
 }
 
 /// What keeps a value from a schema, for the keywords that ours has; any other keyword ends the test.
-fn problem(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String> {
+pub(crate) fn problem(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<String> {
     let keys = match schema {
         Value::Object(keys) => keys,
         Value::Bool(true) => return None,
@@ -33,13 +33,15 @@ fn problem(root: &Value, schema: &Value, value: &Value, at: &str) -> Option<Stri
                 problem(root, root.pointer(pointer).expect("a definition"), value, at)
             }
             "type" => {
-                (!has_type(rule.as_str().expect("one type"), value)).then(|| format!("{at}: {value} is not {rule}"))
+                let names = rule.as_str().into_iter().chain(list.iter().filter_map(Value::as_str));
+                (!names.into_iter().any(|name| has_type(name, value))).then(|| format!("{at}: {value} is not {rule}"))
             }
             "const" => (value != rule).then(|| format!("{at}: {value} is not {rule}")),
             "enum" => (!list.contains(value)).then(|| format!("{at}: {value} is none of {rule}")),
             "oneOf" if list.iter().filter(|one| fits(one)).count() != 1 => {
                 said(format!("{value} fits not one of {rule}"))
             }
+            "allOf" => list.iter().find_map(|one| problem(root, one, value, at)),
             "anyOf" if !list.iter().any(fits) => said(format!("{value} fits none of {rule}")),
             "oneOf" | "anyOf" => None,
             "minimum" => value
@@ -79,6 +81,7 @@ fn has_type(name: &str, value: &Value) -> bool {
         "array" => value.is_array(),
         "string" => value.is_string(),
         "boolean" => value.is_boolean(),
+        "null" => value.is_null(),
         "integer" => value.is_i64() || value.is_u64(),
         "number" => value.is_number(),
         other => panic!("the type {other} is not checked"),

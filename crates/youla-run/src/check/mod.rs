@@ -1,4 +1,4 @@
-//! `youla check`: what is wrong with the records of a run, or of files alone, before anything is identified.
+//! `youla check`: problems in the records of a run, or of files alone, before identification.
 //!
 //! Records are read as they stand, without taking means out and without refusing time columns that are not uniform: what the reader
 //! would refuse is what the check is to describe. Where the time column has gaps or repetitions, the other tests look at the longest
@@ -123,7 +123,7 @@ pub(super) fn check_records(
         // A test that cannot be computed does not end a run.
         let findings = match check_record(&logged, &names, Some(controller), &options) {
             Err(error) if error.kind() == ErrorKind::Numerical => {
-                vec![finding(Severity::Note, &record.name, format!("it could not be checked: {error}"), "")]
+                vec![finding(Severity::Note, &record.name, format!("the record could not be checked: {error}"), "")]
             }
             found => found?,
         };
@@ -169,9 +169,10 @@ fn method_finding(settings: &RunSettings) -> Option<Finding> {
     let method =
         serde_json::to_value(direct.method).ok().and_then(|v| v.as_str().map(str::to_owned)).unwrap_or_default();
     let what = format!(
-        "[direct] method = \"{method}\" is for inputs that do not depend on the noise, but the records are of a closed loop"
+        "[direct] method = \"{method}\" assumes inputs that do not depend on the noise, but the records are from a closed loop"
     );
-    let advice = "Take method = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct]; as a comparison with the scheme it may stay";
+    let advice =
+        "Use method = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct], or keep this one only for comparison";
     Some(finding(Severity::Caution, OF_SETTINGS, what, advice))
 }
 

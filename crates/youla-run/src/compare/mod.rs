@@ -1,7 +1,7 @@
 //! Several finished runs beside each other: fits, modes, responses and settings, and the distance of the models.
 //!
 //! A comparison is a report whose methods are the runs, so that one page draws both. Everything comes from the run folders
-//! (`report.json`, `summary.json`, the models); nothing is identified again.
+//! (numbers from `summary.json`, `7-validate/verdict.json` and the models, curves from `report.json`); nothing is identified again.
 
 mod distances;
 mod figures;
@@ -42,7 +42,7 @@ pub struct Comparison {
 /// inputs and outputs; differing names, units, records and sample times are said on the page.
 ///
 /// # Errors
-/// [`youla::Error::OutOfRange`] for fewer than two runs, [`Error::NotAReport`], [`youla_io::Error::MissingFile`], [`youla_io::Error::NotAModel`] for
+/// [`youla::Error::OutOfRange`] for fewer than two runs, [`Error::NotAReport`], [`Error::NotASummary`], [`youla_io::Error::MissingFile`], [`youla_io::Error::NotAModel`] for
 /// folders that are no finished runs, [`youla::Error::UnknownChannel`] for a model that a run does not hold, [`youla::Error::Ports`] where the
 /// runs have different numbers of channels; those of the frequency responses.
 ///
@@ -99,19 +99,19 @@ fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<Rep
         sample_time: first.sample_time.filter(|_| same_time),
         methods: runs.iter().enumerate().map(|(k, r)| method(k, r)).collect(),
         overview: vec![
-            tables::overview(runs, model),
+            tables::overview(runs),
             tables::modes(runs, model),
             distances::table(runs, distances),
             settings::differences(runs)?,
         ],
         notes: tables::notes(runs),
-        fits: runs.iter().flat_map(|r| r.fits(model)).collect(),
+        fits: runs.iter().flat_map(FinishedRun::fits).collect(),
         verification: figures::verification(runs, model),
         frequency: Some(figures::frequency(runs, model)?),
         poles: runs.iter().map(|r| figures::poles(r, same_time)).collect::<Result<_>>()?,
         modes: runs.iter().flat_map(|r| r.modes(model)).collect(),
-        certificates: runs.iter().flat_map(|r| r.certificates(model)).collect(),
-        margins: runs.iter().flat_map(|r| r.margins(model)).collect(),
+        certificates: runs.iter().filter_map(|r| r.certificate(model)).collect(),
+        margins: runs.iter().filter_map(|r| r.margins(model)).collect(),
         margins_caption: "The gaps are those of each run to its own nominal model and G(S), in its own scales.".into(),
         ..ReportData::default()
     })

@@ -1,9 +1,14 @@
 //! What a comparison needs of a finished run.
 
+use crate::entries::ModeEntry;
 use crate::export::model_for_export;
+use crate::folder::ModelFacts;
 use crate::redraw::read_report;
+use crate::robustness::{DiskEntry, RobustnessEntry};
+use crate::summary::Summary;
 use crate::{Error, Result};
-use serde_json::Value;
+use serde::Deserialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::control::ChannelScales;
 use youla_io::export::NamedModel;
@@ -15,7 +20,11 @@ pub(super) struct FinishedRun {
     pub(super) key: String,
     /// Name of its folder, or its path where two folders have the same name.
     pub(super) name: String,
+    /// What its report draws: curves and predictions.
     pub(super) report: ReportData,
+    pub(super) summary: Summary,
+    /// What the verification found of the model; `None` for a system that is not verified, as S.
+    facts: Option<ModelFacts>,
     pub(super) model: NamedModel,
     /// Sizes of the channels of its estimation records, where there are any.
     pub(super) scales: Option<ChannelScales>,
@@ -23,31 +32,101 @@ pub(super) struct FinishedRun {
 
 impl FinishedRun {
     fn read(folder: &Path, place: usize, name: String, model: &str) -> Result<Self> {
-        let model = model_for_export(folder, Some(model))?;
-        let report = read_report(folder)?;
-        Ok(FinishedRun { key: format!("run{}", place + 1), name, report, model, scales: scales(folder)? })
+        let system = model_for_export(folder, Some(model))?;
+        let (report, summary) = (read_report(folder)?, Summary::read(folder)?);
+        let scales = summary.channel_scales.value().map(|s| ChannelScales::new(s.inputs.clone(), s.outputs.clone()));
+        let scales = scales.transpose()?;
+        let facts = facts(folder, model)?;
+        Ok(FinishedRun { key: format!("run{}", place + 1), name, report, summary, facts, model: system, scales })
     }
 
-    /// What the run says of the model, under its own key.
-    pub(super) fn fits(&self, model: &str) -> Vec<Fit> {
-        let of = |f: &Fit| Fit { method: self.key.clone(), ..f.clone() };
-        self.report.fits.iter().filter(|f| f.method == model).map(of).collect()
+    /// Fits of the model under the key of the run.
+    pub(super) fn fits(&self) -> Vec<Fit> {
+        let mut all = Vec::new();
+        for r in self.facts.iter().flat_map(|facts| &facts.records) {
+            let (method, record) = (&self.key, &r.record);
+            let of = |(output, fit): (usize, &Option<f64>)| Fit {
+                record: record.clone(),
+                output,
+                method: method.clone(),
+                fit: *fit,
+            };
+            all.extend(r.fit.iter().enumerate().map(of));
+        }
+        all
     }
 
+    /// Modes of the model, with deviations where they are known.
     pub(super) fn modes(&self, model: &str) -> Vec<Mode> {
-        let of = |m: &Mode| Mode { method: self.key.clone(), ..m.clone() };
-        self.report.modes.iter().filter(|m| m.method == model).map(of).collect()
+        let of = |m: &ModeEntry| {
+            Some(Mode {
+                method: self.key.clone(),
+                hz: m.hz?,
+                zeta: m.zeta?,
+                deviation: m.hz_deviation.zip(m.zeta_deviation).map(|(hz, zeta)| [hz, zeta]),
+            })
+        };
+        let identified = self.summary.methods.get(model).map(|m| &m.modes);
+        let modes = identified.or(self.facts.as_ref().map(|facts| &facts.modes));
+        modes.into_iter().flatten().filter_map(of).collect()
     }
 
-    pub(super) fn certificates(&self, model: &str) -> Vec<Certificate> {
-        let of = |c: &Certificate| Certificate { method: self.key.clone(), ..c.clone() };
-        self.report.certificates.iter().filter(|c| c.method == model).map(of).collect()
+    /// The loop of the model with the controller that ran.
+    pub(super) fn certificate(&self, model: &str) -> Option<Certificate> {
+        let (facts, entry) = (self.facts.as_ref()?, self.summary.methods.get(model));
+        let radius = |p: &[f64; 2]| p[0].hypot(p[1]);
+        let worst = facts.closed_loop_poles.iter().copied().max_by(|a, b| radius(a).total_cmp(&radius(b)));
+        Some(Certificate {
+            method: self.key.clone(),
+            order: facts.order,
+            s_order: entry.and_then(|m| m.s_order),
+            s_stable: entry.and_then(|m| m.s_stable),
+            stabilised_by_controller: Some(facts.stabilised_by_controller),
+            worst_closed_loop_pole: worst,
+        })
     }
 
-    pub(super) fn margins(&self, model: &str) -> Vec<LoopMargins> {
-        let of = |m: &LoopMargins| LoopMargins { method: self.key.clone(), ..m.clone() };
-        self.report.margins.iter().filter(|m| m.method == model).map(of).collect()
+    /// Margins of that loop.
+    pub(super) fn margins(&self, model: &str) -> Option<LoopMargins> {
+        let given = self.summary.nominal.as_ref().filter(|_| model == "nominal").map(|n| &n.robustness);
+        let known = self.summary.methods.get(model).map(|m| &m.robustness).or(given)?;
+        Some(margins(&self.key, known))
     }
+}
+
+fn margins(key: &str, known: &RobustnessEntry) -> LoopMargins {
+    let disks = [&known.input_disk_margin, &known.output_disk_margin].into_iter().flatten();
+    let size = |d: &&DiskEntry| d.alpha.unwrap_or(f64::INFINITY);
+    let disk = disks.min_by(|a, b| size(a).total_cmp(&size(b)));
+    LoopMargins {
+        method: key.to_owned(),
+        refusal: known.refused.clone(),
+        peak_sensitivity: known.peak_sensitivity,
+        zone: known.iso_14839_zone.map(|zone| zone.to_string()),
+        lowest_gain: known.lowest_gain,
+        highest_gain: known.highest_gain,
+        phase_deg: known.phase_margin_deg,
+        delay_ms: known.delay_margin_s.map(|seconds| 1e3 * seconds),
+        disk: disk.and_then(|d| d.alpha),
+        disk_phase_deg: disk.and_then(|d| d.phase_deg),
+        coprime: known.coprime_margin,
+        gap_to_nominal: known.nu_gap_to_nominal,
+        gap_to_hansen: known.nu_gap_to_hansen,
+    }
+}
+
+/// The model in `7-validate/verdict.json`.
+fn facts(folder: &Path, model: &str) -> Result<Option<ModelFacts>> {
+    #[derive(Deserialize)]
+    struct Verified {
+        models: BTreeMap<String, ModelFacts>,
+    }
+    let path = folder.join("7-validate/verdict.json");
+    let text = std::fs::read_to_string(&path)
+        .map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
+    let mut verified: Verified =
+        serde_json::from_str(&text).map_err(|source| Error::NotASummary { path: path.clone(), source })?;
+    Ok(verified.models.remove(model))
 }
 
 /// Reads the runs.
@@ -78,17 +157,4 @@ fn name(folders: &[PathBuf], folder: &Path) -> String {
     let short = |f: &Path| f.file_name().map(|n| n.to_string_lossy().into_owned());
     let alone = folders.iter().filter(|f| short(f) == short(folder)).count() == 1;
     short(folder).filter(|_| alone).unwrap_or_else(|| folder.display().to_string())
-}
-
-/// The sizes of the channels from `summary.json`.
-fn scales(folder: &Path) -> Result<Option<ChannelScales>> {
-    let path = folder.join("summary.json");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
-    let summary: Value =
-        serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: path.clone(), source })?;
-    let sizes = |of: &str| -> Option<Vec<f64>> {
-        summary["channel_scales"][of].as_array()?.iter().map(Value::as_f64).collect()
-    };
-    Ok(sizes("inputs").zip(sizes("outputs")).map(|(u, y)| ChannelScales::new(u, y)).transpose()?)
 }

@@ -5,12 +5,12 @@ use youla_report::SAME_MODE;
 use youla_report::data::{EvidenceTable, Fit, Mode, Note, ReportData, Status, Verdict};
 
 /// One row per run: verdict, order, fit.
-pub(super) fn overview(runs: &[FinishedRun], model: &str) -> EvidenceTable {
+pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
     let row = |run: &FinishedRun| {
-        let fits = run.fits(model);
+        let fits = run.fits();
         vec![
             run.name.clone(),
-            run.report.title.clone(),
+            run.summary.name.clone(),
             verdict(&run.report),
             run.model.system.order().to_string(),
             format!("{} s", run.model.system.time().ts()),
@@ -32,8 +32,8 @@ fn verdict(report: &ReportData) -> String {
     match (bad.first(), caution.len()) {
         (Some(line), _) => line.text.clone(),
         (None, 0) if report.verdict.is_empty() => "no verdict".into(),
-        (None, 0) => "all in order".into(),
-        (None, n) => format!("{n} of {} lines ask for care: {}", report.verdict.len(), caution[0].text),
+        (None, 0) => "no warning".into(),
+        (None, n) => format!("{n} of {} lines are warnings: {}", report.verdict.len(), caution[0].text),
     }
 }
 
@@ -97,7 +97,7 @@ pub(super) fn notes(runs: &[FinishedRun]) -> Vec<Note> {
         let (a, b) = (&first.report, &run.report);
         if (&a.inputs, &a.outputs) != (&b.inputs, &b.outputs) {
             add(format!(
-                "{} has channels of other names or units than {}: they are compared by their place.",
+                "{} has channels of other names or units than {}: they are compared by their position.",
                 run.name, first.name
             ));
         }
@@ -112,7 +112,7 @@ pub(super) fn notes(runs: &[FinishedRun]) -> Vec<Note> {
         };
         if files(a) != files(b) {
             add(format!(
-                "{} was verified on other files than {}: fits tell less about the models than about the records.",
+                "{} was verified on other files than {}: the fits differ by the records as well as by the models.",
                 run.name, first.name
             ));
         }

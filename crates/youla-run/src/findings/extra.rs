@@ -1,4 +1,4 @@
-//! What else a run says besides the answer to "can I trust it?": what the loop can bear, reduction, physics, redesign.
+//! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
 
 use crate::identification::Identification;
 use crate::method::Method;
@@ -14,7 +14,7 @@ pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
         .collect()
 }
 
-/// What the loop of G(S) can bear; nothing where it is unstable, which the answer says, and where no controller ran.
+/// Margins of the loop of G(S); none where it is unstable, which the answer states, and where no controller ran.
 fn margin_line(found: &Identification) -> Option<Verdict> {
     if found.factorisation.controller.is_zero() {
         return None;
@@ -24,11 +24,11 @@ fn margin_line(found: &Identification) -> Option<Verdict> {
     let zone = margins.zone()?;
     let worst = margins.outputs.iter().map(|c| c.sensitivity.value).fold(0.0, f64::max);
     let disk = margins.output_disks.balanced;
-    let highest = disk.highest_gain.map_or("any higher factor".into(), |g| format!("{g:.2}"));
+    let highest = disk.highest_gain.map_or("any higher value".into(), |g| format!("{g:.2}"));
     let text = format!(
-        "With G(S) the peak sensitivity of the loop is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
-         all outputs at once; the gains of all outputs may change by factors from {:.2} to {highest}, or their phases by {:.0} \
-         degrees.",
+        "The peak sensitivity of the loop with G(S) is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
+         all outputs together. The loop stays stable when the gains of all outputs change by factors between {:.2} and \
+         {highest}, or their phases by up to {:.0} degrees.",
         margins.output_sensitivity.value, disk.lowest_gain, disk.phase_degrees
     );
     let status = match zone {
@@ -45,12 +45,12 @@ fn redesign_line(found: &Identification) -> Option<Verdict> {
     Some(Verdict { status, text: crate::redesign::sentence(new), evidence: Evidence::Redesign })
 }
 
-/// Whether the controller stabilises the reduced model, and what the reduction costs in the loop.
+/// Whether the controller stabilises the reduced model, and the error of the reduction in the loop.
 fn reduction_line(found: &Identification) -> Option<Verdict> {
     Some(found.reduction.as_ref()?.as_ref().ok()?.verdict())
 }
 
-/// Whether the physical structure explains what G(S) explains.
+/// The fit of the physical structure against that of G(S).
 fn grey_box_line(found: &Identification) -> Option<Verdict> {
     let run = found.grey_box.as_ref()?.as_ref().ok()?;
     let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
@@ -61,12 +61,12 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
         PemStart::Direct => "the projection of a model of u and y by PBSIDopt",
     };
     let text = format!(
-        "The physical structure explains the estimation records with a fit of {model} per output, G(S) {plant} (found from {start})."
+        "The physical structure fits the estimation records to {model} per output, G(S) to {plant} (search started from {start})."
     );
     let (status, text) = match run.found.lost() {
         true => (
             Status::Caution,
-            text + " It stays behind: the search is lost, or the structure does not describe the plant.",
+            text + " The fit is more than 1 percentage point below that of G(S): the search ended in a local minimum, or the structure does not describe the plant.",
         ),
         false => (Status::Good, text),
     };

@@ -1,4 +1,4 @@
-//! The answer to "can I trust it?" in five lines: fresh data, what is left of them, data and controller, S, the loop.
+//! The answer to "Can it be trusted?" in five lines: fit on fresh data, residuals, data and controller, S, the loop.
 
 use crate::check::OF_SETTINGS;
 use crate::identification::Identification;
@@ -23,7 +23,7 @@ fn mean_fit(v: &ModelVerdict) -> f64 {
 
 fn fit_line(found: &Identification) -> Option<Verdict> {
     if found.records.verification.is_empty() {
-        let text = "No verification record was given: nothing shows how the model does on fresh data.".into();
+        let text = "No verification record was given, so the fit on fresh data is unknown.".into();
         return Some(Verdict { status: Status::Caution, text, evidence: Evidence::Fits });
     }
     let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
@@ -45,19 +45,21 @@ fn residual_line(found: &Identification) -> Option<Verdict> {
     let tested: Vec<_> = records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect();
     let (status, text) = match tested.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))? {
         (_, worst) if !worst.external => {
-            let text = "No excitation from outside is known, so that the residuals of G(S) cannot show what it lacks.";
+            let text =
+                "No external excitation is known, so the residuals of G(S) were not tested for dependence on it.";
             (Status::Caution, text.to_owned())
         }
         _ if tested.iter().all(|(_, r)| r.correlations.independent) => (
             Status::Good,
-            "What G(S) leaves of fresh data does not depend on past excitation: these data do not show that anything is missing.".into(),
+            "The residual of G(S) on fresh data does not depend on past excitation: no missing dynamics detected."
+                .into(),
         ),
         (record, worst) => {
             let at = worst.correlations.largest?;
             let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
             let text = format!(
-                "What G(S) leaves of fresh data still depends on past excitation: the residual of {output} in {record} has a \
-                 correlation of {:.3} with {input} {} samples before, {:.0} standard deviations.",
+                "The residual of G(S) on fresh data depends on past excitation: the residual of {output} in {record} has a \
+                 correlation of {:.3} with {input} at a lag of {} samples ({:.0} standard deviations).",
                 size(worst),
                 at.lag,
                 at.deviations.abs()
@@ -76,18 +78,18 @@ fn size(residuals: &RecordResiduals) -> f64 {
     with.map_or(0.0, |c| c.values[c.values.len() / 2 + at.lag].abs())
 }
 
-/// What the check of the data says, and whether the declared controller is the one that ran.
+/// The result of the check of the data, and whether the declared controller explains the logged input.
 fn data_line(found: &Identification) -> Option<Verdict> {
     let (controller, of_controller) = controller_sentence(found);
     let of_data = |f: &Finding, severity: Severity| f.severity == severity && f.record != OF_SETTINGS;
     let count = |severity: Severity| found.data.grouped().iter().filter(|(f, _)| of_data(f, severity)).count();
     let (defects, cautions) = (count(Severity::Defect), count(Severity::Caution));
     let (checked, of_check) = match (defects, cautions) {
-        (0, 0) => ("finds nothing to mend".to_owned(), Status::Good),
-        (0, n) => (format!("asks for care at {n} point{}", if n == 1 { "" } else { "s" }), Status::Caution),
-        (n, _) => (format!("finds {n} defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
+        (0, 0) => ("No data problems found".to_owned(), Status::Good),
+        (0, n) => (format!("{n} data warning{}", if n == 1 { "" } else { "s" }), Status::Caution),
+        (n, _) => (format!("{n} data defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
     };
-    let text = format!("{controller} The check of the data {checked}.");
+    let text = format!("{controller} {checked}.");
     let evidence = if of_controller > of_check { Evidence::Signals } else { Evidence::Data };
     Some(Verdict { status: of_controller.max(of_check), text, evidence })
 }
@@ -97,27 +99,30 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
     match found.signals.controller_mismatch {
         _ if controller.order() == 0 && controller.d().norm_max() == 0.0 => ("No controller ran.".into(), Status::Good),
         None => {
-            let text = "No excitation is known that could show whether the declared controller is the one that ran.";
+            let text = "No excitation is declared, so the declared controller could not be verified against the log.";
             (text.into(), Status::Info)
         }
         Some(m) => {
             let (status, words) = match m {
-                m if m < 0.01 => (Status::Good, "is the one that ran"),
-                m if m < 0.1 => (Status::Caution, "nearly explains the logged input"),
-                _ => (Status::Bad, "does not explain the logged input; check sign, delay and saturation"),
+                m if m < 0.01 => (Status::Good, "explains the logged input"),
+                m if m < 0.1 => (Status::Caution, "explains the logged input only roughly"),
+                _ => (Status::Bad, "does not explain the logged input; check its sign, delay and saturation"),
             };
-            (format!("The declared controller {words} (alpha from known excitations to {m:.1e})."), status)
+            let figure = match m.is_finite() {
+                true => format!("relative error of alpha {m:.1e}"),
+                false => "the declared excitation is zero".into(),
+            };
+            (format!("The declared controller {words} ({figure})."), status)
         }
     }
 }
 
-/// Order and fit of S, and, where its uncertainty was asked for, whether it is more than noise.
+/// Order and fit of S and, where its uncertainty is computed, whether it differs from noise.
 fn deviation_line(found: &Identification) -> Option<Verdict> {
     let s = &found.hansen.deviation;
     let stable = if s.stability.stable { "stable" } else { "unstable" };
     let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
-    let text =
-        format!("S has order {}, is {stable} and reproduces beta with a fit of {}", s.model.order(), fit.join(", "));
+    let text = format!("S has order {}, is {stable} and fits beta to {}", s.model.order(), fit.join(", "));
     let of_stability = if s.stability.stable { Status::Good } else { Status::Bad };
     let (more, of_evidence) = match found.hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
         Some(evidence) => information(evidence),
@@ -127,13 +132,20 @@ fn deviation_line(found: &Identification) -> Option<Verdict> {
 }
 
 fn information(evidence: &Information) -> (String, Status) {
-    let figures =
-        format!("t = {:.1}, {:.1} at {:.0} %", evidence.statistic, evidence.threshold, 100.0 * evidence.level);
+    let figures = format!(
+        "t = {:.1}, threshold {:.1} at {:.0} %",
+        evidence.statistic,
+        evidence.threshold,
+        100.0 * evidence.level
+    );
     if evidence.against_nominal() {
-        (format!("; each half of the data predicts the other: the nominal model is refuted ({figures})."), Status::Good)
+        (
+            format!("; models from each half of the data agree: the data contradict the nominal model ({figures})."),
+            Status::Good,
+        )
     } else {
         let text = format!(
-            "; no half of the data predicts the other: S may be noise, and there is no evidence against the nominal model ({figures})."
+            "; models from each half of the data do not agree: S may be noise, there is no evidence against the nominal model ({figures})."
         );
         (text, Status::Caution)
     }

@@ -141,6 +141,9 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
 
 /// A key or a choice that does not exist, with those that do.
 fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
+    if let Some(sentence) = renamed(word, known) {
+        return sentence;
+    }
     let (is, are) = if place.found.starts_with(['"', '\'']) { ("choice", "choices") } else { ("key", "keys") };
     let of = if is == "choice" { place.subject() } else { place.holder() };
     let similarity = |k: &str| strsim::jaro_winkler(word, k);
@@ -150,6 +153,18 @@ fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
         None => "the".into(),
     };
     format!("`{word}` is not a {is} of {of}; {hint} {are} are {}", known.join(", "))
+}
+
+/// Keys of version 0.1 that have another name.
+fn renamed(word: &str, known: &[&str]) -> Option<String> {
+    match word {
+        "weight" if known.contains(&"method") => Some("`weight` is now `method`".into()),
+        "bearing" if known.contains(&"state_space") => Some(
+            "`bearing` is no longer a form of [nominal]; give the matrices of the model in [nominal.state_space]"
+                .into(),
+        ),
+        _ => None,
+    }
 }
 
 /// The forms among which the user chooses one, asked of the types themselves.

@@ -281,33 +281,3 @@ fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
         None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
     }
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use youla::signal::Channel;
-    use youla_io::export::{ModelFormat, NamedModel, export_model};
-    use youla_io::scratch::scratch;
-
-    /// One file in three formats is the model that was written; another sample time is refused, the sign is stated.
-    #[test]
-    fn a_model_that_was_written_is_read_again() {
-        let time = Discrete::new(1e-3).unwrap();
-        let entry = |x: f64| Mat::from_fn(1, 1, |_, _| x);
-        let system = StateSpace::new(entry(0.9), entry(1.0 / 3.0), entry(2.0), entry(0.1), time).unwrap();
-        let ports = (vec![Channel::new("u", "V")], vec![Channel::new("y", "um")]);
-        let model = NamedModel::new("g", system.clone(), ports).unwrap();
-        for format in [ModelFormat::Json, ModelFormat::Mat, ModelFormat::Npz] {
-            let file = scratch(format.extension());
-            std::fs::write(file.path(), export_model(&model, format).unwrap()).unwrap();
-            let nominal = NominalModel::ModelFile { file: file.path().to_owned() };
-            assert_eq!(nominal.realise(Path::new("/"), time).unwrap(), system);
-            let error = nominal.realise(Path::new("/"), Discrete::new(2e-3).unwrap()).unwrap_err();
-            assert!(error.to_string().contains("sample times differ"), "{error}");
-            let text = format!("model_file = {{ feedback = \"negative\", file = {:?} }}", file.path());
-            let settings: ControllerSettings = toml::from_str(&text).unwrap();
-            let Controller::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
-            assert_eq!(k, system.negated());
-        }
-    }
-}

@@ -1,0 +1,92 @@
+//! Settings built in code are checked as those of a file, keys of version 0.1 are refused by their new name, and the shortest
+//! run.toml is enough for a run.
+
+use crate::common::Folder;
+use std::fmt::Write;
+use std::path::Path;
+use youla_run::{
+    Method, RunSettings, StageClock, Summary, check_run, identify, parse_subspace_options, read_records, write_run,
+};
+
+const MINIMAL: &str = r#"name = "drive"
+
+[data]
+sample_time = 1e-2
+inputs = [{ name = "u" }]
+outputs = [{ name = "y" }]
+estimation = [{ file = "log.csv" }]
+
+[nominal.transfer_function]
+domain = "discrete"
+numerator = [0.1]
+denominator = [1.0, -0.8]
+
+[controller.difference_equation]
+feedback = "negative"
+numerator = [1.0]
+denominator = [1.0]
+"#;
+
+fn parse(text: &str) -> youla_run::Result<RunSettings> {
+    RunSettings::parse(text, Path::new("run.toml"))
+}
+
+#[test]
+fn settings_without_a_record_are_refused_not_run() {
+    let mut settings = parse(MINIMAL).unwrap();
+    let whole = settings.clone();
+    settings.data.estimation.clear();
+    let message = "[data] names no estimation record";
+    let refused = |outcome: Result<(), youla_run::Error>| assert!(outcome.unwrap_err().to_string().contains(message));
+    refused(settings.clone().checked().map(|_| ()));
+    refused(read_records(&settings.data, Path::new(".")).map(|_| ()));
+    refused(check_run(&settings, Path::new(".")).map(|_| ()));
+    assert_eq!(whole.clone().checked().unwrap(), whole);
+    let mut points = whole;
+    points.frequency_response.points = 1;
+    assert!(points.checked().unwrap_err().to_string().contains("[frequency_response] points is 1"));
+}
+
+#[test]
+fn keys_of_version_0_1_name_their_successors() {
+    for table in ["hansen", "direct"] {
+        let error = parse(&format!("{MINIMAL}\n[{table}]\nweight = \"moesp\"\n")).unwrap_err().to_string();
+        assert!(error.contains("`weight` is now `method`"), "{error}");
+    }
+    let options = parse_subspace_options("weight = \"moesp\"", Path::new("options.toml")).unwrap_err().to_string();
+    assert!(options.contains("`weight` is now `method`"), "{options}");
+    let bearing = MINIMAL.replace("[nominal.transfer_function]", "[nominal.bearing]");
+    let error = parse(&bearing).unwrap_err().to_string();
+    assert!(error.contains("[nominal.state_space]"), "{error}");
+}
+
+/// A first-order plant with a pole at 0.9 under u = -y + noise.
+fn log() -> String {
+    let mut text = String::from("u,y\n");
+    let (mut seed, mut y) = (1u64, 0.0);
+    for _ in 0..3000 {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        let noise = (seed >> 33) as f64 / (1u64 << 31) as f64 - 0.5;
+        let u = noise - y;
+        writeln!(text, "{u},{y}").unwrap();
+        y = 0.9 * y + 0.1 * u;
+    }
+    text
+}
+
+#[test]
+fn the_shortest_run_toml_runs_to_its_end() {
+    let folder = Folder::new("minimal");
+    std::fs::write(folder.path().join("log.csv"), log()).unwrap();
+    let settings = parse(MINIMAL).unwrap();
+    let records = read_records(&settings.data, folder.path()).unwrap();
+    let mut silent = |_| ();
+    let mut clock = StageClock::new(&mut silent);
+    let run = identify(settings, records, folder.path(), &mut clock).unwrap();
+    let plant = &run.verdict.of(Method::Hansen).unwrap().model;
+    assert!(plant.poles().unwrap().iter().any(|p| (p.re - 0.9).abs() < 0.01), "{:?}", plant.poles());
+    let written = write_run(&run, &folder.path().join("out"), false, &mut clock).unwrap();
+    let read = Summary::read(&written.folder).unwrap();
+    assert_eq!(read, written.summary);
+    assert_eq!((read.schema, read.frequency_response.models["hansen_db"].len()), (2, 1));
+}

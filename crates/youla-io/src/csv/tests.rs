@@ -4,7 +4,6 @@ use crate::scratch::{data_folder, scratch};
 use crate::{ChannelRef, ChannelSpec, TimeSource};
 use proptest::prelude::*;
 use std::io::Write;
-use std::path::Path;
 use youla::Mat;
 use youla::lti::Discrete;
 use youla::signal::{Channel, Record};

@@ -57,7 +57,7 @@ fn flexible_drive() {
     assert!((53.0..=56.5).contains(&resonance), "resonance at {resonance} Hz");
     assert!((39.0..=43.0).contains(&anti), "anti-resonance at {anti} Hz");
     // The first resonance, in the loop with the controller for S, settles in both diagrams.
-    let settled = |diagram: &Option<youla::Result<StabilisationDiagram>>, from, to| {
+    let settled = |diagram: &Option<youla_run::Result<StabilisationDiagram>>, from, to| {
         let clusters = &diagram.as_ref().unwrap().as_ref().unwrap().clusters;
         clusters.iter().filter(|c| (from..to).contains(&c.hz) && (0.004..0.04).contains(&c.zeta)).count()
     };
@@ -90,7 +90,7 @@ fn rotary_pendulum() {
         }
     }
     let refusal = found.reduction.unwrap().unwrap_err();
-    assert!(matches!(refusal, youla::Error::Unstable { .. }), "{refusal}");
+    assert!(matches!(refusal, youla_run::Error::Method(youla::Error::Unstable { .. })), "{refusal}");
 }
 
 /// `youla signals`: alpha and beta of every episode; alpha of the known excitations is that of the measured signals.

@@ -134,10 +134,10 @@ fn a_limit_is_kept() {
     let limited = ExciteOptions { limit_output: vec![0.5 * peak], limit_input: vec![10.0], ..usual(Shape::Prbs) };
     let error = excite(&plant.on(), &limited).unwrap_err();
     assert_eq!(error.kind(), youla::ErrorKind::BadInput);
-    let Error::BeyondLimit { channel, holding, .. } = &error else { panic!("{error}") };
-    assert!(channel == "y" && (holding[0] - 0.25).abs() < 1e-12, "{error}");
+    let Error::BeyondLimit { channel, permitted, .. } = &error else { panic!("{error}") };
+    assert!(channel == "y" && (permitted[0] - 0.25).abs() < 1e-12, "{error}");
     let typed: f64 =
-        error.to_string().split("an amplitude of ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+        error.to_string().split("amplitude is ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     excite(&plant.on(), &ExciteOptions { amplitude: vec![typed], ..limited.clone() }).unwrap();
     let scaled = excite(&plant.on(), &ExciteOptions { scale_to_limit: true, ..limited }).unwrap();
     assert!((scaled.summary.scaled_by.unwrap() - 0.5).abs() < 1e-12);

@@ -10,9 +10,10 @@ use youla::linalg::eye;
 use youla::lti::{Discrete, Simulator, StateSpace};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Error, Mat, MatRef};
+use youla_paper::demo;
 use youla_paper::rig::{Bearing, degraded};
 use youla_rt::{Controller, Real, State};
-use youla_run::{ControllerSettings, demo};
+use youla_run::ControllerSettings;
 
 const SAMPLES: usize = 1_000_000;
 const EXACT: f64 = 1e-12;

@@ -76,7 +76,7 @@ fn a_limit_refuses_or_scales() {
     assert!(found.code == Some(2) && found.stdout.is_empty(), "{:?}", found.code);
     assert!(
         found.stderr.contains("the predicted magnitude of y is ")
-            && found.stderr.contains("beyond its limit of 0.05 um; an amplitude of "),
+            && found.stderr.contains("above its limit of 0.05 um; the largest permitted amplitude is "),
         "{}",
         found.stderr
     );

@@ -5,13 +5,14 @@
 mod bombs;
 mod memory;
 mod mutations;
-#[allow(dead_code)]
-mod readers;
 mod seeds;
+#[allow(dead_code)]
+mod targets;
 
 use mutations::Mutations;
-use readers::READERS;
 use std::panic::catch_unwind;
+use std::process::Command;
+use targets::READERS;
 
 /// Most bytes that an input of at most 4 kB may make the process grow by. Deflate packs up to 1032 bytes into one, 4 MB in
 /// all, and a table of 4 million empty cells takes 24 bytes of each.
@@ -19,9 +20,20 @@ const MOST: usize = 512 << 20;
 
 const MUTATION: &str = "a mutation";
 
-/// One test, so that no other allocates while memory is counted.
+/// Memory is counted per process, so the readers run in a process of their own.
 #[test]
 fn seeds_mutations_and_bombs_neither_panic_nor_exhaust_memory() {
+    const ALONE: &str = "YOULA_READERS_ALONE";
+    if std::env::var_os(ALONE).is_some() {
+        return read_all();
+    }
+    let test = "readers::seeds_mutations_and_bombs_neither_panic_nor_exhaust_memory";
+    let program = std::env::current_exe().unwrap();
+    let outcome = Command::new(program).args(["--exact", test]).env(ALONE, "1").output().unwrap();
+    assert!(outcome.status.success(), "{}", String::from_utf8_lossy(&outcome.stdout));
+}
+
+fn read_all() {
     let count = std::env::var("YOULA_MUTATIONS").map_or(10_000, |text| text.parse().expect("a number"));
     let chosen = std::env::var("YOULA_READER").ok();
     std::panic::set_hook(Box::new(|_| ()));

@@ -156,5 +156,5 @@ pub(crate) fn model_json(bytes: &[u8]) {
 pub(crate) fn controller_json(bytes: &[u8]) {
     let Ok(controller) = serde_json::from_slice::<ExportedController>(bytes) else { return };
     let _ = controller.rust();
-    let _ = Discrete::new(controller.ts).and_then(|time| controller.controller.system(time));
+    let _ = Discrete::new(controller.ts).map(|time| controller.controller.system(time));
 }

@@ -18,7 +18,7 @@ use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
-use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Structure, greybox};
+use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Problem, Structure, greybox};
 use youla_paper::rig::Bearing;
 
 /// Errors of all crates.
@@ -145,7 +145,7 @@ fn one(folder: &Path, factor: f64) -> Result<()> {
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..GreyBoxOptions::default() };
     let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
     let begun = Instant::now();
-    let found = greybox(&structure, &start, &experiment, Discrete::new(TS)?, &options)?;
+    let found = greybox(&Problem::new(&structure, &experiment, Discrete::new(TS)?), &start, &options)?;
     let seconds = begun.elapsed().as_secs_f64();
     let predicted = simulate(&found.model, uv.as_ref(), &[0.0; 6])?;
     let fit = fit(yv.as_ref(), predicted.as_ref())?;

@@ -5,7 +5,7 @@
 mod machine;
 
 use youla::identify::subspace::Experiment;
-use youla_greybox::{GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop, greybox_intervals_in_loop};
+use youla_greybox::{GreyBoxOptions, IntervalOptions, LoopOutput, Problem, greybox, greybox_intervals};
 use youla_paper::BearingStructure;
 use youla_paper::rig::Bearing;
 
@@ -21,17 +21,8 @@ fn main() -> Result<()> {
     // Through the loop, from alpha: consistent whatever the noise, because alpha does not depend on it.
     let (controller, options) = (machine.factors.j_k()?, GreyBoxOptions::default());
     let data = [Experiment { u: log.alpha.as_ref(), y: log.y.as_ref() }];
-    let found = greybox_in_loop(&BearingStructure, &start, &controller, LoopOutput::Plant, &data, time, &options)?;
-    let known = greybox_intervals_in_loop(
-        &BearingStructure,
-        &found,
-        &controller,
-        LoopOutput::Plant,
-        &data,
-        time,
-        &options,
-        &IntervalOptions::default(),
-    )?;
+    let found = greybox(&Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant), &start, &options)?;
+    let known = greybox_intervals(&Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant), &found, &options, &IntervalOptions::default())?;
 
     println!("{} steps, {:?}; {:.0} % intervals", found.iterations, found.stop, 100.0 * known.level);
     for (parameter, truth) in known.parameters.iter().zip(&truth) {

@@ -29,6 +29,7 @@ pub enum LoopOutput {
 }
 
 /// The controller around the model.
+#[derive(Clone, Copy)]
 pub(super) struct Closure<'a> {
     controller: &'a Partitioned<Discrete>,
     output: LoopOutput,

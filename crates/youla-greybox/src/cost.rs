@@ -2,11 +2,9 @@
 
 use super::criterion::Criterion;
 use super::delays::Shifted;
-use super::estimate::{Setting, comparison};
-use super::{GreyBoxOptions, Structure};
+use super::estimate::comparison;
+use super::{GreyBoxOptions, Problem};
 use crate::Result;
-use youla::identify::subspace::Experiment;
-use youla::lti::Discrete;
 
 /// [`super::GreyBoxModel::cost`] of the structure at `theta`: half the sum of squares of the residuals, each divided by the
 /// deviation of its output, with the best initial states where they are estimated, and with the gain of the innovation form
@@ -16,27 +14,22 @@ use youla::lti::Discrete;
 /// As [`super::greybox`] with the start `theta`.
 ///
 /// ```
-/// use youla_greybox::{BearingStructure, GreyBoxOptions, greybox_cost};
+/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, Problem, Structure, Template, greybox_cost};
 /// use youla::identify::subspace::Experiment;
 /// use youla::lti::{Discrete, simulate};
-/// use youla::{Mat, rig::Bearing};
+/// use youla::Mat;
 /// let time = Discrete::new(2e-4)?;
 /// let u = Mat::from_fn(500, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
-/// let y = simulate(&Bearing::default().plant()?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
-/// let truth = BearingStructure::parameters(&Bearing::default());
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
+/// let truth = bearing.start();
 /// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
-/// assert!(greybox_cost(&BearingStructure, &truth, &records, time, &GreyBoxOptions::default())? < 1e-15);
-/// # Ok::<(), youla::Error>(())
+/// assert!(greybox_cost(&Problem::new(&bearing, &records, time), &truth, &GreyBoxOptions::default())? < 1e-15);
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
-pub fn greybox_cost(
-    structure: &dyn Structure,
-    theta: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &GreyBoxOptions,
-) -> Result<f64> {
-    let shifted = Shifted::new(experiments, &options.delays)?;
-    let setting = Setting { closure: None, confined: false };
-    let criterion = Criterion::new(structure, theta, &shifted.experiments(), time, comparison(setting, options))?;
+pub fn greybox_cost(problem: &Problem<'_>, theta: &[f64], options: &GreyBoxOptions) -> Result<f64> {
+    let shifted = Shifted::new(problem.experiments, &options.delays)?;
+    let compared = comparison(problem, options);
+    let criterion = Criterion::new(problem.structure, theta, &shifted.experiments(), problem.time, compared)?;
     Ok(criterion.evaluate(&criterion.start(theta))?.cost)
 }

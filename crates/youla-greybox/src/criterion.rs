@@ -3,7 +3,7 @@
 //! ```text
 //! V(theta) = 1/2 min_x0 sum_k |W (y(k) - yhat(k; theta, x0))|^2,     W = diag(1 / deviations)
 //! ```
-//! with yhat the simulation of the plant or of what stands around it (`simulated.rs`); theta holds the parameters of the
+//! with yhat the simulation of the plant or of the system around it (`simulated.rs`); theta holds the parameters of the
 //! structure, then those of the noise. Estimated initial states enter linearly and are solved for at every theta (variable
 //! projection). The rows over `[y_0 | y_theta | e]` of one experiment have the factor `[R11 R12 r1; 0 R22 r2]`; with `e`
 //! taken at the best x0, the gradient of V is exactly `-R22' r2`, and `R22` is the Jacobian in Kaufman's approximation (L.
@@ -15,7 +15,8 @@ use super::closure::Closure;
 use super::linearisation::Linearisation;
 use super::noise::NoiseModel;
 use super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
-use super::sensitivity::{InitialCondition, Samples, condense, residuals, sum_of_squares};
+use super::sensitivity::{Samples, condense, residuals, sum_of_squares};
+use super::sensitivity_bank::InitialCondition;
 use super::simulated::{Simulated, with_scaled_outputs, with_scaled_slopes};
 use super::steady::{steady_slopes, steady_state};
 use super::structure::Structure;

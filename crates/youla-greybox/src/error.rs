@@ -74,8 +74,8 @@ pub enum Error {
         /// What is wrong with it.
         problem: &'static str,
     },
-    /// Derived quantities that stand on each other in a circle.
-    #[error("these derived quantities need each other in a circle, or one that does: {}", Names(names))]
+    /// Derived quantities that are defined by each other in a circle.
+    #[error("circular definition among these derived quantities: {}", Names(names))]
     CircularDefinition {
         /// Their names.
         names: Vec<String>,
@@ -88,7 +88,7 @@ pub enum Error {
     },
     /// Bounds that leave no room.
     #[error(
-        "the parameter {name:?} has the bounds {min} and {max}, but the lower one must be below the upper one; a known parameter is fixed instead"
+        "the parameter {name:?} has the bounds {min} and {max}, but the lower one must be below the upper one; set fixed = true for a known parameter"
     )]
     EmptyBounds {
         /// The parameter.
@@ -135,6 +135,12 @@ pub enum Error {
         "the structure is not linear in its parameters and no start gives a model; give a parameter vector to start from"
     )]
     NoStart,
+    /// A method that needs the measured inputs was given a simulated loop.
+    #[error("{method} needs the measured inputs u; remove the simulated loop from the problem")]
+    MeasuredInputs {
+        /// The method.
+        method: &'static str,
+    },
     /// A structure of discrete time has no continuous-time model.
     #[error("the structure is one of discrete time, sampled every {} s: it has no continuous-time model", Seconds(*ts))]
     DiscreteStructure {
@@ -173,6 +179,7 @@ impl Error {
             | Error::UnusedParameter { .. }
             | Error::EntryNotFinite { .. }
             | Error::NoStart
+            | Error::MeasuredInputs { .. }
             | Error::DiscreteStructure { .. } => ErrorKind::BadInput,
         }
     }

@@ -1,13 +1,12 @@
 //! From records to an estimate with its diagnostics.
 
 use super::bounds::Bounds;
-use super::closure::Closure;
 use super::criterion::{Comparison, Criterion, Point};
 use super::delays::Shifted;
 use super::levenberg::{Outcome, minimise};
+use super::problem::Problem;
 use super::result::GreyBoxModel;
 use super::robust::{Loss, reweighted};
-use super::structure::Structure;
 use super::uncertainty::{Information, spread};
 use super::{GreyBoxOptions, RobustReport};
 use crate::{Error, Result};
@@ -16,13 +15,6 @@ use youla::Mat;
 use youla::identify::fit::reproduction;
 use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace, simulate};
-
-/// What is searched in beside the options.
-pub(super) struct Setting<'a> {
-    pub(super) closure: Option<Closure<'a>>,
-    /// Whether models that are not stable are refused.
-    pub(super) confined: bool,
-}
 
 /// A search that has ended.
 struct Searched {
@@ -35,26 +27,20 @@ struct Searched {
     sizes: Vec<f64>,
 }
 
-pub(super) fn estimate(
-    structure: &dyn Structure,
-    start: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    setting: Setting<'_>,
-    options: &GreyBoxOptions,
-) -> Result<GreyBoxModel> {
+pub(super) fn estimate(problem: &Problem<'_>, start: &[f64], options: &GreyBoxOptions) -> Result<GreyBoxModel> {
     options.check()?;
+    let (structure, time) = (problem.structure, problem.time);
     if structure.names().is_empty() {
         let (what, must) = ("the number of free parameters of the structure".into(), "at least 1");
         return Err(Error::Method(youla::Error::OutOfRange { what, value: 0.0, must }));
     }
-    if setting.closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
+    if problem.closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
         let (what, must) = ("the delay of an input inside of the loop".into(), "0: put it into the controller");
         return Err(Error::Method(youla::Error::OutOfRange { what, value: 1.0, must }));
     }
-    let shifted = Shifted::new(experiments, &options.delays)?;
+    let shifted = Shifted::new(problem.experiments, &options.delays)?;
     let experiments = &shifted.experiments();
-    let mut criterion = Criterion::new(structure, start, experiments, time, comparison(setting, options))?;
+    let mut criterion = Criterion::new(structure, start, experiments, time, comparison(problem, options))?;
     let names = criterion.names();
     let bounds = Bounds::new(structure, start)?.extended(&names);
     let begin = criterion.start(start);
@@ -97,13 +83,13 @@ pub(super) fn estimate(
 }
 
 /// What the criterion compares.
-pub(super) fn comparison<'a>(setting: Setting<'a>, options: &'a GreyBoxOptions) -> Comparison<'a> {
+pub(super) fn comparison<'a>(problem: &Problem<'a>, options: &'a GreyBoxOptions) -> Comparison<'a> {
     Comparison {
-        closure: setting.closure,
+        closure: problem.closure,
         noise: &options.noise,
         initial_state: options.initial_state,
         deviations: &options.output_deviations,
-        confined: setting.confined,
+        confined: problem.confined,
     }
 }
 

@@ -10,22 +10,19 @@
 //!
 //! The projection compares what alpha makes of y by S, `(N + V S) alpha`, with what the structure makes of the u that alpha
 //! causes, `(M + U S) alpha`: it is `|(G(S) - G_theta) u|^2` without a division by `M + U S`, whose zeros next to poles are the
-//! lightly damped ghosts of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
+//! spurious lightly damped modes of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
 //! S errs by `(Mt + S Ut) n / alpha`, the error has the same size at all frequencies.
 
-#[cfg(test)]
-mod tests;
+pub use super::projected_pem::{PemRun, PemStart, SUSPICION_POINTS};
 
-pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
-
-use super::projected_pem::{Grid, Projected, Task, falls_behind, fit_of, pem_from_targets, plant_target};
+use super::projected_pem::{Grid, Searches, Task, falls_behind, fit_of, pem_from_targets, plant_target};
 use crate::Result;
-use crate::{FrequencyTarget, GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure, decayed};
+use crate::{FrequencyTarget, GreyBoxModel, GreyBoxOptions, Problem, ProjectionOptions, StructureFit, decayed};
 use serde::{Deserialize, Serialize};
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::direct::direct;
 use youla::identify::hansen::{HansenModel, hansen};
-use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyOptions};
+use youla::identify::subspace::{Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyOptions};
 use youla::lti::{Discrete, StateSpace, frequency_response};
 
 /// Choices of [`hansen_pem`]. The initial states of `hansen` and `pem` are separate choices.
@@ -43,8 +40,8 @@ pub struct HansenPemOptions {
     pub frequencies: usize,
     /// Samples of a segment of the spectrum of alpha; at most a quarter of the shortest record is taken.
     pub window: usize,
-    /// Time constants that the shortest record is long, of the decay under which responses are compared: ghosts of S that
-    /// live longer than the record are flat then. The modes of the plant should decay faster.
+    /// Time constants that the shortest record is long, of the decay under which responses are compared: spurious poles of
+    /// S whose time constant exceeds the record are smoothed by it. The modes of the plant should decay faster.
     pub decay: f64,
     /// Whether the prediction-error method starts a second time, at the projection of a model that PBSIDopt finds from u and y with
     /// the horizons of `hansen`. It is consistent in closed loop and sees what noise that is fed back excites, which alpha does
@@ -76,7 +73,7 @@ pub struct HansenPem {
     /// S and G(S).
     pub hansen: HansenModel,
     /// Projections of G(S), that with the lowest criterion first.
-    pub projections: Vec<Projection>,
+    pub projections: Vec<StructureFit>,
     /// The searches.
     pub runs: Vec<PemRun>,
     /// Which of them won.
@@ -88,33 +85,41 @@ pub struct HansenPem {
 }
 
 impl HansenPem {
-    /// Whether the structure stays behind G(S), or behind a constant, by more than [`LOST_POINTS`] on an output: the search is
-    /// lost, or the structure does not describe the plant.
-    pub fn lost(&self) -> bool {
+    /// Whether the fit of the structure is more than [`SUSPICION_POINTS`] below that of G(S), or below that of a constant, on an
+    /// output: the search ended in a local minimum, or the structure does not describe the plant.
+    pub fn local_minimum_suspected(&self) -> bool {
         falls_behind(&self.model.simulation_fit, &self.fit_of_plant)
     }
+}
+
+/// The records of a loop as the scheme sees them.
+#[derive(Debug, Clone, Copy)]
+pub struct SchemeData<'a> {
+    /// Coprime factors of the nominal model and the controller.
+    pub factors: &'a CoprimeFactors<Discrete>,
+    /// alpha and beta of (28) for each experiment.
+    pub signals: &'a [YoulaSignals],
 }
 
 /// Identifies S, projects G(S) on the structure and starts the prediction-error method there; `nominal` parameters are a second
 /// start, where they are given, and a hint to the scale of parameters in the projection.
 ///
-/// `signals` are those of (28), `experiments` the measured u and y that they were made of.
+/// The experiments of the problem are the measured u and y from which the signals were computed.
 ///
 /// # Errors
-/// As [`hansen`], [`crate::project`] and [`crate::greybox`]; [`youla::Error::Diverged`] where no start leads to a model.
+/// As [`hansen`], [`crate::project`] and [`crate::greybox`]; [`youla::Error::Diverged`] where no start leads to a model;
+/// [`crate::Error::MeasuredInputs`] for a problem with a simulated loop.
 ///
 /// # Accuracy
-/// See `docs/hansen-pem.md` for how often the result is that of a search started at the true parameters.
+/// `docs/hansen-pem.md` gives the share of records for which the result is that of a search from the true parameters.
 pub fn hansen_pem(
-    factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    experiments: &[Experiment<'_>],
-    structure: &dyn Structure,
+    data: SchemeData<'_>,
+    problem: &Problem<'_>,
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
-    let found = hansen(factors, signals, &options.hansen)?;
-    pem_from_hansen(found, factors, signals, experiments, structure, nominal, options)
+    let found = hansen(data.factors, data.signals, &options.hansen)?;
+    pem_from_hansen(found, data, problem, nominal, options)
 }
 
 /// The same from a result of [`hansen`] or one of its siblings for the same factors and signals.
@@ -123,31 +128,27 @@ pub fn hansen_pem(
 /// As [`hansen_pem`].
 pub fn pem_from_hansen(
     found: HansenModel,
-    factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    experiments: &[Experiment<'_>],
-    structure: &dyn Structure,
+    data: SchemeData<'_>,
+    problem: &Problem<'_>,
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
-    let time = factors.nominal().time();
-    let target = projection_target(factors, &found.deviation.model, signals, options)?;
-    let fit_of_plant = fit_of(&found.plant, experiments, options.pem.initial_state)?;
-    let direct =
-        if options.direct_start { direct_target(structure, experiments, time, nominal, options).ok() } else { None };
-    let task = Task { structure, nominal, experiments, projection: &options.projection, pem: &options.pem };
-    let Projected { projections, runs, won, model } = pem_from_targets("G(S)", &target, direct, &task)?;
+    problem.require_measured_inputs("hansen_pem")?;
+    let target = projection_target(data.factors, &found.deviation.model, data.signals, options)?;
+    let fit_of_plant = fit_of(&found.plant, problem.experiments, options.pem.initial_state)?;
+    let direct = if options.direct_start { direct_target(problem, nominal, options).ok() } else { None };
+    let task = Task { problem, nominal, projection: &options.projection, pem: &options.pem };
+    let Searches { projections, runs, won, model } = pem_from_targets("G(S)", &target, direct, &task)?;
     Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
 }
 
 /// The response of a model of the order of the structure that PBSIDopt finds from u and y.
 fn direct_target(
-    structure: &dyn Structure,
-    experiments: &[Experiment<'_>],
-    time: Discrete,
+    problem: &Problem<'_>,
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<FrequencyTarget> {
+    let (structure, experiments) = (problem.structure, problem.experiments);
     // The order does not depend on the parameters.
     let probe = nominal.map_or_else(|| vec![1.0; structure.names().len()], <[f64]>::to_vec);
     let subspace = SubspaceOptions {
@@ -158,7 +159,7 @@ fn direct_target(
         delays: options.pem.delays.clone(),
         ..options.hansen.clone()
     };
-    let model = direct(experiments, time, &subspace)?.model;
+    let model = direct(experiments, problem.time, &subspace)?.model;
     plant_target(&model, experiments, [options.window, options.frequencies], options.decay, &options.pem)
 }
 

@@ -1,30 +1,51 @@
-//! Grey-box identification: the physical parameters of a structure by the prediction-error method.
+//! Physical parameters from measured records, by the prediction-error method.
 //!
-//! For white output noise, `y = G(theta) u + n`, the predictor is the simulation and the estimate
+//! A structure gives the matrices of a state-space model as functions of named parameters theta, in continuous time behind a
+//! zero-order hold or in discrete time. For white output noise, `y = G(theta) u + n`, the predictor is the simulation and the
+//! estimate is
 //! ```text
 //! theta = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2,
 //! x(k+1) = Ad(theta) x(k) + Bd(theta) u(k),   yhat(k) = C(theta) x(k) + D(theta) u(k)
 //! ```
-//! is the maximum-likelihood one: consistent and efficient, in closed loop too (L. Ljung, System Identification: Theory for
-//! the User, 2nd ed., 1999, sections 7.2, 8.4, 9.4 and 13.4). Its weakness is that it finds the minimum next to its start:
-//! lightly damped modes that are far off leave it in a local one, which [`Stop::Converged`] cannot tell from the global one;
-//! [`GreyBoxModel::fit`] can, next to the fit of another method.
+//! the maximum-likelihood estimate: consistent and efficient, in closed loop too (L. Ljung, System Identification: Theory for
+//! the User, 2nd ed., 1999, sections 7.2, 8.4, 9.4 and 13.4). The search finds the minimum next to its start. For lightly damped
+//! modes far from their true frequency this is often a local minimum, which [`Stop`] cannot distinguish from the global one;
+//! [`hansen_pem`] and [`subspace_pem`] start at the projection of a black-box model and compare the fits.
 //!
-//! Process noise or coloured output noise take another predictor, [`NoiseModel`]: the innovation form with a free gain
-//! (`predictor.rs`) or a known filter (`whitening.rs`).
+//! ```
+//! use youla::{Mat, identify::subspace::Experiment, lti::{Discrete, simulate}};
+//! use youla_greybox::{DeclaredStructure, GreyBoxOptions, Problem, Structure, Template, greybox};
+//! let structure = DeclaredStructure::new(&Template::MassSpringDamper.declaration()?)?;
+//! let (truth, time) = (structure.start(), Discrete::new(5e-3)?);
+//! let u = Mat::from_fn(600, 1, |k, _| if (k * k / 90) % 2 == 0 { 1.0 } else { -1.0 });
+//! let y = simulate(&structure.sampled(&truth, time)?, u.as_ref(), &[0.0; 2])?;
+//! let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+//! let start: Vec<f64> = truth.iter().map(|v| 1.1 * v).collect();
+//! let estimate = greybox(&Problem::new(&structure, &experiments, time), &start, &GreyBoxOptions::default())?;
+//! assert!((estimate.parameters[0] / truth[0] - 1.0).abs() < 1e-6);
+//! # Ok::<(), youla_greybox::Error>(())
+//! ```
 //!
-//! The steps: exact zero-order hold with derivatives (`sampled.rs`), one recursion for all sensitivities and its
-//! triangular factor (`sensitivity.rs`), the criterion with the initial states projected out (`criterion.rs`) or steady
-//! (`steady.rs`),
-//! Levenberg-Marquardt (`levenberg.rs`) within bounds (`bounds.rs`), the covariance (`uncertainty.rs`), parameters that the
-//! data do not determine (`identifiability.rs`). Beside them: delays of the inputs (`delays.rs`), outliers (`robust.rs`), and against
-//! a lost search several starts (`multi_start.rs`) and an observer that is taken away step by step (`continuation.rs`).
-//! Structures are programmed (`structure.rs`) or declared (`declared/`).
+//! Modules in the order of the data:
+//!
+//! | task | files |
+//! |---|---|
+//! | structures in code and as declarations | `structure`, `declared` |
+//! | structure, records, simulated loop | `problem`, `checks`, `delays`, `closure` |
+//! | sampled model with derivatives | `sampled` |
+//! | predictors of noise models | `noise`, `predictor`, `whitening`, `simulated` |
+//! | sensitivities and their triangular factor | `sensitivity`, `sensitivity_bank`, `small_qr` |
+//! | criterion, initial states | `criterion`, `steady`, `linearisation` |
+//! | search within bounds, robust loss | `levenberg`, `damped`, `bounds`, `robust`, `options` |
+//! | result, covariance, undetermined parameters | `estimate`, `result`, `uncertainty`, `identifiability` |
+//! | intervals, test of the residuals, comparison of structures | `intervals` |
+//! | projection of a frequency response on a structure | `projection` |
+//! | searches from a projection or from several starts | [`projected_pem`], [`hansen_pem`], [`subspace_pem`], `multi_start` |
+//! | refinement of black-box models | [`refine`], [`hansen_refine`] |
 
 mod bounds;
 mod checks;
 mod closure;
-mod continuation;
 mod cost;
 mod criterion;
 mod damped;
@@ -42,6 +63,7 @@ mod multi_start;
 mod noise;
 mod options;
 mod predictor;
+mod problem;
 pub mod projected_pem;
 mod projection;
 pub mod refine;
@@ -62,39 +84,36 @@ mod whitening;
 
 pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
-pub use continuation::{Continuation, ContinuationOptions, ContinuationStage, greybox_continued};
 pub use cost::greybox_cost;
-pub use declared::{
-    Declaration, DeclaredStructure, DerivedValue, Entry, Named, Parameter, ParameterDeclaration, Template,
-};
+pub use declared::{Declaration, DeclaredStructure, DerivedValue, Entry, Parameter, ParameterDeclaration, Template};
 pub use error::{Error, Result};
 pub use identifiability::{Combination, Part, Undetermined};
 pub use intervals::{
     ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ParameterInterval,
-    ResidualAssumption, ResidualTest, compare, greybox_intervals, greybox_intervals_in_loop, likelihood_ratio,
+    ResidualAssumption, ResidualTest, compare, greybox_intervals, likelihood_ratio,
 };
 pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
 pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
 pub use options::GreyBoxOptions;
+pub use problem::Problem;
 pub(crate) use projection::decayed;
-pub use projection::{FrequencyTarget, Origin, Projection, ProjectionOptions, logarithmic_grid, project, projections};
+pub use projection::{
+    FrequencyTarget, Origin, ProjectionOptions, StructureFit, logarithmic_grid, project, projections,
+};
 pub use result::{GreyBoxModel, Stop};
 pub use robust::{Loss, RobustReport};
 pub use structure::{Matrix, Slope, Structure};
 
-use closure::Closure;
-use estimate::{Setting, estimate};
-use youla::identify::subspace::Experiment;
-use youla::lti::{Discrete, Partitioned};
+use estimate::estimate;
 
-/// Estimates the parameters of a structure from one or more experiments by the prediction-error method.
+/// Estimates the parameters of a structure by the prediction-error method.
 ///
 /// The criterion is minimised by Levenberg-Marquardt from `start`, within the bounds of the structure where it has any. A
 /// trial point whose simulation is not finite is rejected and counted. An unstable result is returned and marked.
 ///
 /// # Errors
 /// [`youla::Error::Shape`], [`youla::Error::NotFinite`], [`youla::Error::Ports`], [`youla::Error::OutOfRange`] for data, start or options that do not
-/// fit; [`youla::Error::EmptyBounds`], [`youla::Error::OutsideBounds`]; [`youla::Error::TooFewSamples`]; [`youla::Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
+/// fit; [`crate::Error::EmptyBounds`], [`crate::Error::OutsideBounds`]; [`youla::Error::TooFewSamples`]; [`youla::Error::Diverged`] with the worst pole where the simulation from `start` is not finite;
 /// errors of the structure at `start`.
 ///
 /// # Accuracy
@@ -102,65 +121,21 @@ use youla::lti::{Discrete, Partitioned};
 /// scatter over noise is that of the covariance within 25 % (`tests::estimates`).
 ///
 /// ```
-/// use youla_greybox::{BearingStructure, GreyBoxOptions, greybox};
+/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, Problem, Structure, Template, greybox};
 /// use youla::identify::subspace::Experiment;
 /// use youla::lti::{Discrete, simulate};
-/// use youla::{Mat, rig::Bearing};
+/// use youla::Mat;
 /// let time = Discrete::new(2e-4)?;
 /// let u = Mat::from_fn(1000, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
-/// let y = simulate(&Bearing::default().plant()?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
-/// let truth = BearingStructure::parameters(&Bearing::default());
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
+/// let truth = bearing.start();
 /// let start: Vec<f64> = truth.iter().map(|v| 0.9 * v).collect();
 /// let experiment = Experiment { u: u.as_ref(), y: y.as_ref() };
-/// let found = greybox(&BearingStructure, &start, &[experiment], time, &GreyBoxOptions::default())?;
+/// let found = greybox(&Problem::new(&bearing, &[experiment], time), &start, &GreyBoxOptions::default())?;
 /// assert!((found.parameters[0] / truth[0] - 1.0).abs() < 1e-6);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
-pub fn greybox(
-    structure: &dyn Structure,
-    start: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &GreyBoxOptions,
-) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, Setting { closure: None, confined: false }, options)
-}
-
-/// The same through the loop: the model is simulated under the controller that ran, from the external signal w alone, and
-/// compared with y, or with beta. Needs no stable plant, only a loop that is stable with the start model and does not let the
-/// model's own instability into the residual; a trial point with an unstable loop that diverges is rejected.
-///
-/// `controller` is `J_K` from `(y, w)` to `(u, beta)`, for example [`youla::factor::CoprimeFactors::j_k`] with `w = alpha`, or a
-/// plain controller [`youla::control::with_input_port`]; the inputs of the experiments are w. Initial states are those of the
-/// plant, then those of the controller; [`GreyBoxModel::fit`] is that of the simulated loop.
-///
-/// White output noise passes the loop, so that the residuals are coloured: the estimate is consistent whatever the noise,
-/// because w does not depend on it, but the covariance is that of white residuals and too optimistic or pessimistic by their
-/// colour. For a stable plant [`greybox`] on (u, y) is efficient.
-///
-/// # Errors
-/// As [`greybox`]; [`youla::Error::Ports`] where the controller does not fit, [`youla::Error::OutOfRange`] for a structure with a direct path.
-pub fn greybox_in_loop(
-    structure: &dyn Structure,
-    start: &[f64],
-    controller: &Partitioned<Discrete>,
-    output: LoopOutput,
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &GreyBoxOptions,
-) -> Result<GreyBoxModel> {
-    let closure = Some(Closure::new(controller, output));
-    estimate(structure, start, experiments, time, Setting { closure, confined: false }, options)
-}
-
-/// The same as [`greybox`]; where `stable` says so, models that are not stable are rejected.
-pub(crate) fn greybox_confined(
-    structure: &dyn Structure,
-    start: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    stable: bool,
-    options: &GreyBoxOptions,
-) -> Result<GreyBoxModel> {
-    estimate(structure, start, experiments, time, Setting { closure: None, confined: stable }, options)
+pub fn greybox(problem: &Problem<'_>, start: &[f64], options: &GreyBoxOptions) -> Result<GreyBoxModel> {
+    estimate(problem, start, options)
 }

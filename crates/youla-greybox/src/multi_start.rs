@@ -7,14 +7,12 @@
 //! of them and the search begun at the best few only: an evaluation costs a fifth of a step, a search 10 to 50 steps.
 
 use super::projection::{Neighbourhood, spread};
-use super::{GreyBoxModel, GreyBoxOptions, Stop, Structure, greybox, greybox_cost};
+use super::{GreyBoxModel, GreyBoxOptions, Problem, Stop, Structure, greybox, greybox_cost};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use youla::MatRef;
-use youla::identify::subspace::Experiment;
 use youla::linalg::check_shape;
-use youla::lti::Discrete;
 
 /// Every how many-th of Halton's points is taken.
 const LEAP: usize = 409;
@@ -90,33 +88,30 @@ pub struct MultiStart {
 /// use youla_greybox::*;
 /// use youla::identify::subspace::Experiment;
 /// use youla::lti::{Discrete, simulate};
-/// use youla::{Mat, rig::Bearing};
+/// use youla::Mat;
 /// let time = Discrete::new(2e-4)?;
 /// let u = Mat::from_fn(400, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
-/// let y = simulate(&Bearing::default().plant()?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
-/// let truth = BearingStructure::parameters(&Bearing::default());
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
+/// let truth = bearing.start();
 /// let start: Vec<f64> = truth.iter().map(|v| 1.3 * v).collect();
 /// let options = MultiStartOptions { starts: 4, searched: Some(1), ..Default::default() };
+/// let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
 /// let found =
-///     greybox_multi_start(&BearingStructure, &start, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time, &options)?;
+///     greybox_multi_start(&Problem::new(&bearing, &experiments, time), &start, &options)?;
 /// assert_eq!((found.runs.len(), found.runs.iter().filter(|run| run.end.is_some()).count()), (4, 1));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
-pub fn greybox_multi_start(
-    structure: &dyn Structure,
-    start: &[f64],
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &MultiStartOptions,
-) -> Result<MultiStart> {
+pub fn greybox_multi_start(problem: &Problem<'_>, start: &[f64], options: &MultiStartOptions) -> Result<MultiStart> {
+    let structure = problem.structure;
     check(structure, start, options)?;
     let limits = structure.bounds();
     let around = Neighbourhood { factor: options.factor, points: options.starts, leap: LEAP, limits: &limits };
     let starts = spread(start, &around);
-    let cost = |theta: &Vec<f64>| greybox_cost(structure, theta, experiments, time, &options.pem);
+    let cost = |theta: &Vec<f64>| greybox_cost(problem, theta, &options.pem);
     let costs: Vec<f64> = starts.par_iter().map(|theta| cost(theta).unwrap_or(f64::INFINITY)).collect();
     let chosen = lowest(&costs, options.searched.unwrap_or(options.starts));
-    let search = |k: &usize| (*k, greybox(structure, &starts[*k], experiments, time, &options.pem));
+    let search = |k: &usize| (*k, greybox(problem, &starts[*k], &options.pem));
     let found: Vec<(usize, Result<GreyBoxModel>)> = chosen.par_iter().map(search).collect();
     let runs = starts.into_iter().zip(costs);
     let mut runs: Vec<StartRun> =

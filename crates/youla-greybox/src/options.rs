@@ -9,15 +9,16 @@ use youla::identify::subspace::InitialState;
 /// Choices of [`super::greybox`].
 ///
 /// ```
-/// use youla::identify::{greybox::GreyBoxOptions, subspace::InitialState};
+/// use youla::identify::subspace::InitialState;
+/// use youla_greybox::GreyBoxOptions;
 /// let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
 /// assert_eq!(options.max_iterations, 50);
 /// ```
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GreyBoxOptions {
-    /// Largest number of steps. From nominal models of the bearing that are up to 60 % wrong the search takes 5 to 20; one
-    /// that is lost creeps on to the limit.
+    /// Largest number of steps. From nominal models of the bearing that are up to 60 % wrong the search takes 5 to 20; a
+    /// search in a local minimum usually runs to the limit.
     pub max_iterations: usize,
     /// Converged where the distance to the minimum of the linearised criterion is below this share of the radius of the
     /// confidence region: the relative offset (D. M. Bates and D. G. Watts, Technometrics 23 (1981), 179).

@@ -5,14 +5,14 @@
 //! x_theta+ = Ad x_theta + [dAd dBd] v,    y_theta = C x_theta + [dC dD] v,      x_theta(0) = 0, or that of the steady state
 //! x_0+     = Ad x_0,                      y_0     = C x_0,                      x_0(0) = I
 //! ```
-//! so all sensitivities are columns of one matrix (n x columns) under one Ad and share one v (`bank.rs`). The rows
+//! so all sensitivities are columns of one matrix (n x columns) under one Ad and share one v (`sensitivity_bank.rs`). The rows
 //! `[y_0 y_theta e]` are folded into their triangular factor piece by piece, so that memory does not grow with the record.
 
 use super::sampled::SampledSlope;
-use super::sensitivity_bank::Bank;
+use super::sensitivity_bank::{Bank, InitialCondition};
 use super::small_qr::{SmallQr, dot};
 use crate::{Error, Result};
-use faer::{Mat, MatRef};
+use faer::Mat;
 use pulp::{Arch, Simd, WithSimd};
 use youla::lti::{Discrete, Simulator, StateSpace};
 
@@ -28,16 +28,6 @@ pub(super) struct Samples {
     pub(super) count: usize,
     /// Square root of the weight of each residual, in the order of `y`; empty where all are 1.
     pub(super) roots: Vec<f64>,
-}
-
-/// How a simulation begins.
-pub(super) struct InitialCondition<'a> {
-    /// The initial state.
-    pub(super) x0: &'a [f64],
-    /// x_theta(0), n x q; zero where `None`.
-    pub(super) slopes: Option<MatRef<'a, f64>>,
-    /// n where the sensitivity to the initial state is wanted, else 0.
-    pub(super) estimated: usize,
 }
 
 /// The triangular factor over `[y_0 | y_theta | e]` with the residual `e = y - yhat` of the simulated model.
@@ -56,19 +46,19 @@ pub(super) fn condense(
 }
 
 /// What is done with the rows `[y_0 | y_theta | e]`.
-pub(super) trait Take {
+pub(super) trait RowSink {
     /// Takes `count` rows of at most [`PIECE`] samples, given by columns, and may use them up.
     fn take(&mut self, piece: &mut [f64], count: usize);
 }
 
-impl Take for SmallQr {
+impl RowSink for SmallQr {
     #[inline(always)]
     fn take(&mut self, piece: &mut [f64], count: usize) {
         self.fold(piece, count);
     }
 }
 
-impl<F: FnMut(&mut [f64], usize)> Take for F {
+impl<F: FnMut(&mut [f64], usize)> RowSink for F {
     #[inline(always)]
     fn take(&mut self, piece: &mut [f64], count: usize) {
         self(piece, count);
@@ -84,7 +74,7 @@ pub(super) fn rows(
     system: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
     begin: &InitialCondition<'_>,
-    take: &mut impl Take,
+    take: &mut impl RowSink,
 ) -> Result<()> {
     Arch::new().dispatch(Rows { samples, system, slopes, begin, take })
 }
@@ -98,7 +88,7 @@ struct Rows<'a, T> {
     take: &'a mut T,
 }
 
-impl<T: Take> WithSimd for Rows<'_, T> {
+impl<T: RowSink> WithSimd for Rows<'_, T> {
     type Output = Result<()>;
 
     #[inline(always)]

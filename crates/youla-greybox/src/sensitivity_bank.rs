@@ -8,7 +8,6 @@
 //! The instructions are those of the widest registers of the processor.
 
 use super::sampled::SampledSlope;
-use super::sensitivity::InitialCondition;
 use faer::MatRef;
 use pulp::Simd;
 use youla::lti::{Discrete, StateSpace};
@@ -21,6 +20,16 @@ const ROWS: usize = 4;
 const VANISHED: f64 = 1e-150;
 
 type Lanes = [f64; LANES];
+
+/// How a simulation begins.
+pub(super) struct InitialCondition<'a> {
+    /// The initial state.
+    pub(super) x0: &'a [f64],
+    /// x_theta(0), n x q; zero where `None`.
+    pub(super) slopes: Option<MatRef<'a, f64>>,
+    /// n where the sensitivity to the initial state is wanted, else 0.
+    pub(super) estimated: usize,
+}
 
 /// All sensitivities, in groups of eight columns.
 pub(super) struct Bank {

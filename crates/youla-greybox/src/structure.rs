@@ -37,9 +37,9 @@ pub struct Slope {
 /// its slopes; a parameter may move any number of entries, each named once.
 ///
 /// ```
-/// use youla_greybox::{Matrix, Slope, Structure};
+/// use youla_greybox::{Matrix, Result, Slope, Structure};
 /// use youla::lti::{Continuous, StateSpace};
-/// use youla::{Mat, Result, linalg::eye};
+/// use youla::{Mat, linalg::eye};
 ///
 /// /// `x' = -rate x + rate u, y = x`.
 /// struct Lag;
@@ -50,7 +50,7 @@ pub struct Slope {
 ///     }
 ///     fn model(&self, theta: &[f64]) -> Result<StateSpace<Continuous>> {
 ///         let rate = Mat::from_fn(1, 1, |_, _| theta[0]);
-///         StateSpace::new(-&rate, rate, eye(1), Mat::zeros(1, 1), Continuous)
+///         Ok(StateSpace::new(-&rate, rate, eye(1), Mat::zeros(1, 1), Continuous)?)
 ///     }
 ///     fn slopes(&self, _: &[f64], _: usize) -> Vec<Slope> {
 ///         [(Matrix::A, -1.0), (Matrix::B, 1.0)].map(|(matrix, value)| Slope { matrix, row: 0, column: 0, value }).into()

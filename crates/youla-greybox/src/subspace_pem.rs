@@ -11,20 +11,20 @@
 #[cfg(test)]
 mod tests;
 
-pub use super::projected_pem::{LOST_POINTS, PemRun, PemStart};
+pub use super::projected_pem::{PemRun, PemStart, SUSPICION_POINTS};
 
-use super::projected_pem::{Projected, Task, falls_behind, fit_of, pem_from_targets, plant_target};
+use super::projected_pem::{Searches, Task, falls_behind, fit_of, pem_from_targets, plant_target};
 use crate::Result;
-use crate::{GreyBoxModel, GreyBoxOptions, Projection, ProjectionOptions, Structure};
+use crate::{GreyBoxModel, GreyBoxOptions, Problem, ProjectionOptions, StructureFit};
 use serde::{Deserialize, Serialize};
 use youla::identify::direct::direct;
-use youla::identify::subspace::{Experiment, SubspaceModel, SubspaceOptions};
-use youla::lti::Discrete;
+use youla::identify::subspace::{SubspaceModel, SubspaceOptions};
 
 /// Choices of [`subspace_pem`].
 ///
 /// ```
-/// use youla::identify::{subspace::Order, subspace_pem::SubspacePemOptions};
+/// use youla::identify::subspace::Order;
+/// use youla_greybox::subspace_pem::SubspacePemOptions;
 /// let mut options = SubspacePemOptions::default();
 /// options.subspace.order = Order::Fixed(6);
 /// assert_eq!(options.window, 1024);
@@ -65,7 +65,7 @@ pub struct SubspacePem {
     /// G.
     pub subspace: SubspaceModel,
     /// Projections of G, that with the lowest criterion first.
-    pub projections: Vec<Projection>,
+    pub projections: Vec<StructureFit>,
     /// The searches.
     pub runs: Vec<PemRun>,
     /// Which of them won.
@@ -77,9 +77,9 @@ pub struct SubspacePem {
 }
 
 impl SubspacePem {
-    /// Whether the structure stays behind G, or behind a constant, by more than [`LOST_POINTS`] on an output: the search is lost,
-    /// or the structure does not describe the plant.
-    pub fn lost(&self) -> bool {
+    /// Whether the fit of the structure is more than [`SUSPICION_POINTS`] below that of G, or below that of a constant, on an output:
+    /// the search ended in a local minimum, or the structure does not describe the plant.
+    pub fn local_minimum_suspected(&self) -> bool {
         falls_behind(&self.model.simulation_fit, &self.fit_of_plant)
     }
 }
@@ -96,32 +96,35 @@ impl SubspacePem {
 /// search started at the true parameters.
 ///
 /// ```
-/// use youla_greybox::BearingStructure;
-/// use youla::identify::{subspace::{Experiment, Order}, subspace_pem::*};
+/// use youla_greybox::{DeclaredStructure, Problem, Structure, Template};
+/// use youla::identify::subspace::{Experiment, Order};
+/// use youla_greybox::subspace_pem::*;
 /// use youla::lti::{Discrete, simulate};
-/// use youla::{Mat, rig::Bearing};
+/// use youla::Mat;
 /// let time = Discrete::new(2e-4)?;
 /// let u = Mat::from_fn(1000, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
-/// let y = simulate(&Bearing::default().plant()?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
 /// let mut options = SubspacePemOptions::default();
 /// options.subspace.order = Order::Fixed(6);
 /// let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
-/// let found = subspace_pem(&experiments, time, &BearingStructure, None, &options)?;
-/// assert!((found.model.parameters[4] / -1.869e6 - 1.0).abs() < 1e-6 && !found.lost());
-/// # Ok::<(), youla::Error>(())
+/// let problem = Problem::new(&bearing, &experiments, time);
+/// let found = subspace_pem(&problem, None, &options)?;
+/// assert!((found.model.parameters[4] / -1.869e6 - 1.0).abs() < 1e-6 && !found.local_minimum_suspected());
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 pub fn subspace_pem(
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    structure: &dyn Structure,
+    problem: &Problem<'_>,
     nominal: Option<&[f64]>,
     options: &SubspacePemOptions,
 ) -> Result<SubspacePem> {
-    let found = direct(experiments, time, &options.subspace)?;
+    problem.require_measured_inputs("subspace_pem")?;
+    let experiments = problem.experiments;
+    let found = direct(experiments, problem.time, &options.subspace)?;
     let sizes = [options.window, options.frequencies];
     let target = plant_target(&found.model, experiments, sizes, options.decay, &options.pem)?;
     let fit_of_plant = fit_of(&found.model, experiments, options.pem.initial_state)?;
-    let task = Task { structure, nominal, experiments, projection: &options.projection, pem: &options.pem };
-    let Projected { projections, runs, won, model } = pem_from_targets("the subspace model", &target, None, &task)?;
+    let task = Task { problem, nominal, projection: &options.projection, pem: &options.pem };
+    let Searches { projections, runs, won, model } = pem_from_targets("the subspace model", &target, None, &task)?;
     Ok(SubspacePem { subspace: found, projections, runs, won, model, fit_of_plant })
 }

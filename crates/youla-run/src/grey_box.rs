@@ -181,7 +181,7 @@ impl GreyBoxRun {
     /// What summary.json says of the structure.
     pub(super) fn entry(&self) -> Result<PhysicalEntry> {
         let PhysicalEstimate { level, verdict, correlations, structures, .. } = self.shown();
-        let (parameters, lost) = (self.rows()?, self.found.lost());
+        let (parameters, lost) = (self.rows()?, self.found.local_minimum_suspected());
         Ok(PhysicalEntry { parameters, level, correlations, verdict, structures, lost })
     }
 }

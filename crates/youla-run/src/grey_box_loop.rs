@@ -23,11 +23,13 @@ use youla::identify::subspace::Experiment;
 use youla::linalg::block;
 use youla::lti::{Discrete, Partitioned, StateSpace};
 use youla::validate::{LoopExcitation, fit, predict_closed_loop};
-use youla_greybox::hansen_pem::{HansenPem, HansenPemOptions, PemStart, pem_from_hansen, projection_target};
+use youla_greybox::hansen_pem::{
+    HansenPem, HansenPemOptions, PemStart, SchemeData, pem_from_hansen, projection_target,
+};
 use youla_greybox::projected_pem::{projected, searched};
 use youla_greybox::{
-    DeclaredStructure, GreyBoxIntervals, GreyBoxModel, GreyBoxOptions, IntervalOptions, LoopOutput, greybox_in_loop,
-    greybox_intervals, greybox_intervals_in_loop,
+    DeclaredStructure, GreyBoxIntervals, GreyBoxModel, GreyBoxOptions, IntervalOptions, LoopOutput, Problem, greybox,
+    greybox_intervals,
 };
 
 /// The measured outputs without known lines.
@@ -88,7 +90,9 @@ impl<'a> Criterion<'a> {
         let (signals, hansen) = (&self.signals.experiments, hansen.clone());
         let Some(closed) = &self.closed else {
             let experiments = &self.experiments();
-            return Ok(pem_from_hansen(hansen, self.factors, signals, experiments, structure, nominal, self.options)?);
+            let data = SchemeData { factors: self.factors, signals };
+            let problem = Problem::new(structure, experiments, self.records.time);
+            return Ok(pem_from_hansen(hansen, data, &problem, nominal, self.options)?);
         };
         let target = projection_target(self.factors, &hansen.deviation.model, signals, self.options)?;
         let cost = |theta: &[f64]| self.cost(closed, structure, theta);
@@ -117,13 +121,12 @@ impl<'a> Criterion<'a> {
         asked: &IntervalOptions,
     ) -> Result<GreyBoxIntervals> {
         let (experiments, time, options) = (&self.experiments(), self.records.time, &self.options.pem);
-        match &self.closed {
-            None => Ok(greybox_intervals(structure, found, experiments, time, options, asked)?),
-            Some(Closed { controller, .. }) => {
-                let output = LoopOutput::Plant;
-                Ok(greybox_intervals_in_loop(structure, found, controller, output, experiments, time, options, asked)?)
-            }
-        }
+        let open = Problem::new(structure, experiments, time);
+        let problem = match &self.closed {
+            None => open,
+            Some(Closed { controller, .. }) => open.in_loop(controller, LoopOutput::Plant),
+        };
+        Ok(greybox_intervals(&problem, found, options, asked)?)
     }
 
     fn search(
@@ -134,7 +137,8 @@ impl<'a> Criterion<'a> {
         options: &GreyBoxOptions,
     ) -> youla_greybox::Result<GreyBoxModel> {
         let (experiments, time) = (&self.experiments(), self.records.time);
-        greybox_in_loop(structure, start, &closed.controller, LoopOutput::Plant, experiments, time, options)
+        let problem = Problem::new(structure, experiments, time).in_loop(&closed.controller, LoopOutput::Plant);
+        greybox(&problem, start, options)
     }
 
     /// The criterion without a search, infinite where the loop diverges.

@@ -20,7 +20,7 @@ impl DeclaredStructure {
         let whole = declaration.whole()?;
         let names = Names::new(&whole)?;
         let derived = names.derived(&whole.derived)?;
-        let order = order_of_evaluation(&derived, whole.parameters.0.len())?;
+        let order = order_of_evaluation(&derived, whole.parameters.len())?;
         let (numbers, mut cells) = names.matrices(&whole)?;
         let time = time(declaration, &whole)?;
         let mut structure = DeclaredStructure {
@@ -32,11 +32,11 @@ impl DeclaredStructure {
             numbers,
             cells: Vec::new(),
         };
-        structure.spread_dependence(whole.parameters.0.len(), &mut cells);
+        structure.spread_dependence(whole.parameters.len(), &mut cells);
         structure.cells = cells;
         structure.check_use(declaration, &whole)?;
         structure.parameters =
-            whole.parameters.0.iter().map(|(name, declared)| parameter(name, declared)).collect::<Result<_>>()?;
+            whole.parameters.iter().map(|(name, declared)| parameter(name, declared)).collect::<Result<_>>()?;
         structure.free = (0..structure.parameters.len()).filter(|k| !structure.parameters[*k].fixed).collect();
         structure.check_at_start()?;
         Ok(structure)
@@ -52,18 +52,23 @@ impl DeclaredStructure {
         }
     }
 
-    /// Every parameter stands in an entry, but for known ones of a template.
+    /// Every parameter occurs in an entry; fixed parameters of a template are exempt.
     fn check_use(&self, given: &Declaration, whole: &Declaration) -> Result<()> {
         let used = |k: usize| self.cells.iter().any(|cell| cell.formula.moved_by[k]);
         let mut of_template = Vec::new();
         if let Some(template) = given.template {
-            of_template.extend(template.declaration()?.parameters.0.into_iter().map(|(name, _)| name));
+            of_template.extend(template.declaration()?.parameters.into_keys());
         }
         let excused = |name: &String, fixed: Option<bool>| fixed == Some(true) && of_template.contains(name);
-        for (k, (name, declared)) in whole.parameters.0.iter().enumerate() {
+        for (k, (name, declared)) in whole.parameters.iter().enumerate() {
             if !used(k) && !excused(name, declared.fixed) {
-                let others: Vec<&str> =
-                    whole.parameters.names().enumerate().filter(|(j, _)| used(*j)).map(|(_, name)| name).collect();
+                let others: Vec<&str> = whole
+                    .parameters
+                    .keys()
+                    .enumerate()
+                    .filter(|(j, _)| used(*j))
+                    .map(|(_, name)| name.as_str())
+                    .collect();
                 return Err(Error::UnusedParameter { name: name.clone(), nearest: nearest(name, &others) });
             }
         }

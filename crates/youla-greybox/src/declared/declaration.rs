@@ -1,9 +1,10 @@
 //! What is declared: the tables of a file, as they are written.
 
-use super::named::Named;
 use super::template::Template;
 use crate::{Error, Result};
+use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// Matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)` where a sample time is given, with entries that are numbers or expressions of named parameters.
 ///
@@ -29,7 +30,7 @@ use serde::{Deserialize, Serialize};
 /// let structure = DeclaredStructure::new(&Declaration::parse(text)?)?;
 /// assert_eq!(structure.names(), ["rate", "gain"]);
 /// assert_eq!(structure.model(&structure.start())?.b()[(0, 0)], 60.0);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -53,10 +54,12 @@ pub struct Declaration {
     #[serde(skip_serializing_if = "Option::is_none")]
     pub d: Option<Vec<Vec<Entry>>>,
     /// The parameters by name; their order is that of the parameter vector.
-    pub parameters: Named<ParameterDeclaration>,
+    #[schemars(with = "BTreeMap<String, ParameterDeclaration>")]
+    pub parameters: IndexMap<String, ParameterDeclaration>,
     /// Composite quantities by name, as expressions of parameters and of each other, for use in entries and for their
     /// values in the result.
-    pub derived: Named<String>,
+    #[schemars(with = "BTreeMap<String, String>")]
+    pub derived: IndexMap<String, String>,
 }
 
 /// An entry of a matrix.
@@ -111,21 +114,29 @@ impl Declaration {
         let Some(template) = self.template else { return Ok(self.clone()) };
         let Declaration { sample_time, a, b, c, d, mut parameters, mut derived, .. } = template.declaration()?;
         let amended = self.clone();
-        for (name, amendment) in amended.parameters.0 {
+        for (name, amendment) in amended.parameters {
             match parameters.get_mut(&name) {
                 Some(parameter) => *parameter = parameter.clone().amended(amendment),
-                None => parameters.0.push((name, amendment)),
+                None => {
+                    parameters.insert(name, amendment);
+                }
             }
         }
-        for (name, expression) in amended.derived.0 {
-            match derived.get_mut(&name) {
-                Some(old) => *old = expression,
-                None => derived.0.push((name, expression)),
-            }
-        }
+        // An amended quantity keeps its place.
+        derived.extend(amended.derived);
         let (a, b, c, d) = (amended.a.or(a), amended.b.or(b), amended.c.or(c), amended.d.or(d));
         let sample_time = amended.sample_time.or(sample_time);
         Ok(Declaration { template: None, sample_time, a, b, c, d, parameters, derived })
+    }
+}
+
+impl Template {
+    /// The declaration.
+    ///
+    /// # Errors
+    /// None; the tests read all of them.
+    pub fn declaration(self) -> Result<Declaration> {
+        Declaration::parse(self.text())
     }
 }
 

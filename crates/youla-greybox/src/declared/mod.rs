@@ -14,7 +14,6 @@ mod compile;
 mod declaration;
 mod dual;
 mod expression;
-mod named;
 mod names;
 mod parser;
 mod template;
@@ -22,7 +21,6 @@ mod template;
 mod tests;
 
 pub use declaration::{Declaration, Entry, ParameterDeclaration};
-pub use named::Named;
 pub use template::Template;
 
 use super::checks::check_time;
@@ -46,7 +44,7 @@ use youla::{Mat, MatRef};
 /// let values = drive.derived(&drive.start(), None)?;
 /// assert_eq!(values[1].name, "antiresonance");
 /// assert!((values[1].value - 100.0).abs() < 1e-9);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 pub struct DeclaredStructure {

@@ -2,12 +2,12 @@
 
 use super::declaration::{Declaration, Entry};
 use super::expression::{CONSTANTS, FUNCTIONS};
-use super::named::Named;
 use super::parser::{Problem, is_name, parse};
 use super::{Cell, Formula, Quantity};
 use crate::Matrix;
 use crate::{Error, Result};
 use faer::Mat;
+use indexmap::IndexMap;
 
 /// Similarity from which on a known name is proposed for an unknown one.
 const SIMILAR: f64 = 0.7;
@@ -19,7 +19,7 @@ pub(super) struct Names<'a> {
 
 impl<'a> Names<'a> {
     pub(super) fn new(whole: &'a Declaration) -> Result<Self> {
-        let known: Vec<&str> = whole.parameters.names().chain(whole.derived.names()).collect();
+        let known: Vec<&str> = whole.parameters.keys().chain(whole.derived.keys()).map(String::as_str).collect();
         for (k, name) in known.iter().enumerate() {
             let problem = if !is_name(name) {
                 "must consist of letters, digits and _ and not begin with a digit"
@@ -51,12 +51,12 @@ impl<'a> Names<'a> {
         }
     }
 
-    pub(super) fn derived(&self, declared: &Named<String>) -> Result<Vec<Quantity>> {
-        let quantity = |(name, text): &(String, String)| {
+    pub(super) fn derived(&self, declared: &IndexMap<String, String>) -> Result<Vec<Quantity>> {
+        let quantity = |(name, text): (&String, &String)| {
             let formula = self.formula(|| Quantity::place_of(name), text)?;
             Ok(Quantity { name: name.clone(), formula })
         };
-        declared.0.iter().map(quantity).collect()
+        declared.iter().map(quantity).collect()
     }
 
     /// The numbers of the four matrices, and their entries that are expressions.

@@ -20,7 +20,7 @@ const DEEPEST: usize = 64;
 pub(super) enum Problem {
     /// The character, counted from 1, and what is wrong there.
     Syntax { column: usize, problem: String },
-    /// A name that stands for nothing.
+    /// A name that is not declared.
     Unknown { name: String },
 }
 
@@ -30,7 +30,7 @@ pub(super) fn parse(text: &str, number_of: &dyn Fn(&str) -> Option<usize>) -> Re
     parser.sum()?;
     match parser.peek() {
         None => Ok(Expression::new(parser.program)),
-        Some(other) => Err(parser.problem(format!("{other:?} stands where an operator must stand"))),
+        Some(other) => Err(parser.problem(format!("{other:?} is in the place of an operator"))),
     }
 }
 
@@ -102,8 +102,8 @@ impl Parser<'_> {
             Some('(') => self.parentheses(),
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if begins_name(c) => self.name(),
-            Some(c) => Err(self.problem(format!("{c:?} stands where a number, a name or ( must stand"))),
-            None => Err(self.problem("it ends where a number, a name or ( must stand".into())),
+            Some(c) => Err(self.problem(format!("{c:?} is in the place of a number, a name or ("))),
+            None => Err(self.problem("it ends where a number, a name or ( is expected".into())),
         }
     }
 

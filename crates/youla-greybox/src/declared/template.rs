@@ -1,7 +1,5 @@
 //! Declarations that come with the library: the files in `templates/`, read as those of a user.
 
-use super::declaration::Declaration;
-use crate::Result;
 use serde::{Deserialize, Serialize};
 
 /// A declaration that comes with the library.
@@ -11,7 +9,7 @@ use serde::{Deserialize, Serialize};
 /// let text = "template = 'mass-spring-damper'\n[parameters.mass]\ninitial = 2.5\nfixed = true";
 /// let structure = DeclaredStructure::new(&Declaration::parse(text)?)?;
 /// assert_eq!(structure.names(), ["damping", "stiffness"]);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -39,13 +37,5 @@ impl Template {
             Template::RotorGyroscopic => include_str!("templates/rotor-gyroscopic.toml"),
             Template::TwoInertiaDrive => include_str!("templates/two-inertia-drive.toml"),
         }
-    }
-
-    /// The declaration.
-    ///
-    /// # Errors
-    /// None; the tests read all of them.
-    pub fn declaration(self) -> Result<Declaration> {
-        Declaration::parse(self.text())
     }
 }

@@ -46,7 +46,7 @@ pub struct ComparedStructure {
 /// [`youla::Error::OutOfRange`] for estimates from other numbers of residuals, or a larger structure without more unknowns.
 ///
 /// ```
-/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, Structure, Template, greybox, likelihood_ratio};
+/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, Problem, Structure, Template, greybox, likelihood_ratio};
 /// use youla::identify::subspace::Experiment;
 /// use youla::lti::{Discrete, simulate};
 /// use youla::Mat;
@@ -60,10 +60,10 @@ pub struct ComparedStructure {
 /// let noise = |k: usize| 1e-4 * (((k * 7919 + 13) * (k + 5)) % 1009) as f64 / 1009.0;
 /// let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + noise(k));
 /// let (records, options) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], GreyBoxOptions::default());
-/// let estimate = |s: &DeclaredStructure| greybox(s, &s.start(), &records, time, &options);
+/// let estimate = |s: &DeclaredStructure| greybox(&Problem::new(s, &records, time), &s.start(), &options);
 /// let test = likelihood_ratio(&estimate(&smaller)?, &estimate(&larger)?)?;
 /// assert!(test.degrees_of_freedom == 1 && test.p_value > 1e-4);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 pub fn likelihood_ratio(smaller: &GreyBoxModel, larger: &GreyBoxModel) -> Result<LikelihoodRatio> {
     same_residuals(smaller, larger)?;

@@ -52,7 +52,7 @@ impl GreyBoxIntervals {
         two_sided_student(self.level, self.degrees_of_freedom as f64)
     }
 
-    /// One sentence on whether the intervals can be believed.
+    /// One sentence on whether the assumption behind the intervals passes its test.
     pub fn verdict(&self) -> String {
         let test = &self.residuals;
         let (lag, largest) = test.largest_autocorrelation();

@@ -1,4 +1,4 @@
-//! What a grey-box estimate is worth: intervals of parameters, modes, zeros and responses, and whether they can be believed.
+//! Confidence intervals of parameters, modes, zeros and responses of a grey-box estimate, and the test of their assumption.
 //!
 //! Everything follows from the covariance of the parameters to first order,
 //! ```text
@@ -21,19 +21,18 @@ mod tests;
 pub use compare::{ComparedStructure, LikelihoodRatio, compare, likelihood_ratio};
 pub use residuals::{CrossCorrelation, ResidualTest};
 
-use super::closure::{Closure, LoopOutput};
 use super::criterion::Criterion;
 use super::delays::Shifted;
-use super::estimate::{Setting, comparison};
-use super::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseModel, Structure};
+use super::estimate::comparison;
+use super::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseModel, Problem};
 use crate::{Error, Result};
 use known::slopes_with_delays;
 use sandwich::{Counted, coloured, middle, residual_sums};
 use serde::{Deserialize, Serialize};
 use youla::Mat;
+use youla::identify::subspace::BlockInfluence;
 use youla::identify::subspace::uncertainty::two_sided_student;
-use youla::identify::subspace::{BlockInfluence, Experiment};
-use youla::lti::{Discrete, Partitioned, StateSpace};
+use youla::lti::{Discrete, StateSpace};
 
 /// Largest default number of lags of the correlation of the residuals.
 const MOST_LAGS: usize = 500;
@@ -114,7 +113,8 @@ pub struct GreyBoxIntervals {
     slopes: Vec<BlockInfluence>,
 }
 
-/// Intervals of an estimate of [`super::greybox`], which must come from the same structure, experiments and options.
+/// Intervals of an estimate of [`super::greybox`], which must come from the same problem and options. Residuals of a simulated loop
+/// ([`Problem::in_loop`]) are coloured by the loop.
 ///
 /// # Errors
 /// [`Error::Undetermined`] where the data do not determine all parameters; [`youla::Error::OutOfRange`] for a level or a number of
@@ -124,7 +124,7 @@ pub struct GreyBoxIntervals {
 /// Over 1000 seeded records 95 % intervals hold the truth in 93 to 97 %, in open and in closed loop (`tests::coverage`).
 ///
 /// ```
-/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, IntervalOptions, Structure, Template};
+/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, IntervalOptions, Problem, Structure, Template};
 /// use youla_greybox::{greybox, greybox_intervals};
 /// use youla::identify::subspace::Experiment;
 /// use youla::lti::{Discrete, simulate};
@@ -136,60 +136,28 @@ pub struct GreyBoxIntervals {
 /// let noise = |k: usize| 1e-4 * (((k * 7919 + 13) * (k + 5)) % 1009) as f64 / 1009.0;
 /// let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + noise(k));
 /// let (records, options) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], GreyBoxOptions::default());
-/// let found = greybox(&structure, &theta, &records, time, &options)?;
-/// let known = greybox_intervals(&structure, &found, &records, time, &options, &IntervalOptions::default())?;
+/// let problem = Problem::new(&structure, &records, time);
+/// let found = greybox(&problem, &theta, &options)?;
+/// let known = greybox_intervals(&problem, &found, &options, &IntervalOptions::default())?;
 /// assert!(known.parameters[0].interval[0] < found.parameters[0]);
 /// assert!(known.modes()?[0].hz_deviation > 0.0);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 pub fn greybox_intervals(
-    structure: &dyn Structure,
+    problem: &Problem<'_>,
     found: &GreyBoxModel,
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &GreyBoxOptions,
-    asked: &IntervalOptions,
-) -> Result<GreyBoxIntervals> {
-    intervals(structure, found, None, experiments, time, options, asked)
-}
-
-/// The same for an estimate of [`super::greybox_in_loop`], whose residuals are coloured by the loop.
-///
-/// # Errors
-/// As [`greybox_intervals`] and [`super::greybox_in_loop`].
-#[allow(clippy::too_many_arguments)]
-pub fn greybox_intervals_in_loop(
-    structure: &dyn Structure,
-    found: &GreyBoxModel,
-    controller: &Partitioned<Discrete>,
-    output: LoopOutput,
-    experiments: &[Experiment<'_>],
-    time: Discrete,
-    options: &GreyBoxOptions,
-    asked: &IntervalOptions,
-) -> Result<GreyBoxIntervals> {
-    let closure = Some(Closure::new(controller, output));
-    intervals(structure, found, closure, experiments, time, options, asked)
-}
-
-fn intervals(
-    structure: &dyn Structure,
-    found: &GreyBoxModel,
-    closure: Option<Closure<'_>>,
-    experiments: &[Experiment<'_>],
-    time: Discrete,
     options: &GreyBoxOptions,
     asked: &IntervalOptions,
 ) -> Result<GreyBoxIntervals> {
     let Some(white) = &found.covariance else {
         return Err(Error::Undetermined { sentences: found.undetermined.sentences() });
     };
-    let shifted = Shifted::new(experiments, &options.delays)?;
+    let shifted = Shifted::new(problem.experiments, &options.delays)?;
     let experiments = &shifted.experiments();
     let theta = &found.parameters;
     let noisy = with_gain(options, found);
-    let setting = Setting { closure, confined: false };
-    let criterion = Criterion::new(structure, theta, experiments, time, comparison(setting, &noisy))?;
+    let (structure, compared) = (problem.structure, comparison(problem, &noisy));
+    let criterion = Criterion::new(structure, theta, experiments, problem.time, compared)?;
     let point = criterion.evaluate(&criterion.start(theta))?;
     let samples: usize = experiments.iter().map(|e| e.y.nrows()).sum();
     let lags = checked_lags(asked, samples)?;

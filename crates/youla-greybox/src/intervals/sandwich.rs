@@ -11,7 +11,8 @@
 use super::super::GreyBoxModel;
 use super::super::criterion::{Criterion, Point, Slopes};
 use super::super::robust::LIMIT;
-use super::super::sensitivity::{InitialCondition, condense, rows};
+use super::super::sensitivity::{condense, rows};
+use super::super::sensitivity_bank::InitialCondition;
 use super::super::small_qr::dot;
 use super::super::uncertainty::{Information, spread};
 use super::lags::History;

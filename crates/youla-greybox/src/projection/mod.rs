@@ -87,7 +87,7 @@ pub enum Origin {
 
 /// Result of [`project`].
 #[derive(Debug, Clone)]
-pub struct Projection {
+pub struct StructureFit {
     /// Parameters, in the order of [`Structure::names`].
     pub parameters: Vec<f64>,
     /// The structure at these behind a zero-order hold.
@@ -106,7 +106,7 @@ pub struct Projection {
     pub starts: usize,
 }
 
-impl Projection {
+impl StructureFit {
     /// Where a search from here starts: the parameters, those beyond a bound of the structure at that bound. The projection knows no
     /// bounds; the search does not begin outside of them.
     pub fn start(&self, structure: &dyn Structure) -> Vec<f64> {
@@ -129,19 +129,20 @@ impl Projection {
 ///
 /// ```
 /// use youla_greybox::*;
-/// use youla::{lti::Discrete, rig::Bearing};
-/// let model = Bearing::default().plant()?.zoh(Discrete::new(2e-4)?)?;
+/// use youla::lti::Discrete;
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let model = bearing.model(&bearing.start())?.zoh(Discrete::new(2e-4)?)?;
 /// let target = FrequencyTarget::of_model(&model, &logarithmic_grid([60.0, 6000.0], 60)?)?;
-/// let found = project(&BearingStructure, &target, &[], &ProjectionOptions::default())?;
+/// let found = project(&bearing, &target, &[], &ProjectionOptions::default())?;
 /// assert!((found.parameters[4] / -1.869e6 - 1.0).abs() < 1e-8);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 pub fn project(
     structure: &dyn Structure,
     target: &FrequencyTarget,
     starts: &[Vec<f64>],
     options: &ProjectionOptions,
-) -> Result<Projection> {
+) -> Result<StructureFit> {
     let mut all = projections(structure, target, starts, options)?;
     Ok(all.swap_remove(0))
 }
@@ -155,7 +156,7 @@ pub fn projections(
     target: &FrequencyTarget,
     starts: &[Vec<f64>],
     options: &ProjectionOptions,
-) -> Result<Vec<Projection>> {
+) -> Result<Vec<StructureFit>> {
     check(structure, starts, options)?;
     check_time(structure, target.time())?;
     let misfit = Misfit::new(structure, target);
@@ -217,11 +218,11 @@ fn linear(misfit: &Misfit<'_>, starts: &[Vec<f64>], options: &ProjectionOptions)
     Ok(found.into_iter().map(|point| point.theta).collect())
 }
 
-fn describe(misfit: &Misfit<'_>, outcome: Outcome, origin: Origin, starts: usize) -> Result<Projection> {
+fn describe(misfit: &Misfit<'_>, outcome: Outcome, origin: Origin, starts: usize) -> Result<StructureFit> {
     let Outcome { point, stop, iterations } = outcome;
     let sums = misfit.entries(&point.response);
     let sizes = misfit.target.entries();
-    Ok(Projection {
+    Ok(StructureFit {
         model: misfit.structure.sampled(&point.theta, misfit.target.time())?,
         misfit: point.cost.sqrt() / misfit.size,
         entries: Mat::from_fn(sums.nrows(), sums.ncols(), |i, j| (sums[(i, j)] / sizes[(i, j)]).sqrt()),

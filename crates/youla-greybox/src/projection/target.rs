@@ -14,11 +14,12 @@ use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
 ///
 /// ```
 /// use youla_greybox::{FrequencyTarget, logarithmic_grid};
-/// use youla::{lti::Discrete, rig::Bearing};
-/// let model = Bearing::default().plant()?.zoh(Discrete::new(2e-4)?)?;
+/// use youla::lti::Discrete;
+/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
+/// let model = bearing.model(&bearing.start())?.zoh(Discrete::new(2e-4)?)?;
 /// let target = FrequencyTarget::of_model(&model, &logarithmic_grid([60.0, 12_000.0], 100)?)?;
 /// assert_eq!((target.omega().len(), target.outputs(), target.inputs()), (100, 2, 2));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct FrequencyTarget {

@@ -1,16 +1,16 @@
 //! Exact responses, other structures, input that does not fit.
 
-use super::super::{BearingStructure, Matrix, Slope, Stop, Structure};
+use super::super::tests::{bearing, truth};
+use super::super::{Matrix, Slope, Stop, Structure};
 use super::*;
 use youla::lti::Continuous;
-use youla_paper::rig::Bearing;
 
 fn time() -> Discrete {
     Discrete::new(2e-4).unwrap()
 }
 
 fn bearing_target(count: usize) -> FrequencyTarget {
-    let model = Bearing::default().plant().unwrap().zoh(time()).unwrap();
+    let model = bearing().model(&truth()).unwrap().zoh(time()).unwrap();
     FrequencyTarget::of_model(&model, &logarithmic_grid([30.0, 14_000.0], count).unwrap()).unwrap()
 }
 
@@ -20,8 +20,8 @@ fn error(found: &[f64], truth: &[f64]) -> f64 {
 
 #[test]
 fn exact_response() {
-    let truth = BearingStructure::parameters(&Bearing::default());
-    let found = project(&BearingStructure, &bearing_target(100), &[], &ProjectionOptions::default()).unwrap();
+    let truth = truth();
+    let found = project(bearing(), &bearing_target(100), &[], &ProjectionOptions::default()).unwrap();
     assert!(error(&found.parameters, &truth) < 1e-8, "{:.1e}", error(&found.parameters, &truth));
     assert!(found.misfit < 1e-11 && found.entries.norm_max() < 1e-10, "{:.1e}", found.misfit);
     assert_eq!((found.origin, found.starts), (Origin::Linear, 25));
@@ -32,12 +32,12 @@ fn exact_response() {
 /// actuators it is the solution itself.
 #[test]
 fn linear_least_squares_is_exact_at_the_true_poles() {
-    let truth = BearingStructure::parameters(&Bearing::default());
+    let truth = truth();
     let target = bearing_target(60);
-    let misfit = Misfit::new(&BearingStructure, &target);
+    let misfit = Misfit::new(bearing(), &target);
     let mut probe = vec![1.0; 14];
     probe[12..].copy_from_slice(&truth[12..]);
-    let separation = Separation::of(&BearingStructure, &probe, c64::new(0.0, 1000.0)).unwrap().unwrap();
+    let separation = Separation::of(bearing(), &probe, c64::new(0.0, 1000.0)).unwrap().unwrap();
     let found = separation.fit(&misfit, probe, 60, 1000.0).unwrap();
     assert!(error(&found.theta, &truth) < 1e-3, "{:.1e}", error(&found.theta, &truth));
     assert!(found.cost.sqrt() < 1e-4 * misfit.size, "{:.1e}", found.cost.sqrt() / misfit.size);
@@ -52,7 +52,7 @@ impl Structure for Bent {
     }
     fn model(&self, t: &[f64]) -> Result<StateSpace<Continuous>> {
         let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
-        StateSpace::new(number(-t[0] * t[0]), number(t[1].powi(3)), number(1.0), Mat::zeros(1, 1), Continuous)
+        Ok(StateSpace::new(number(-t[0] * t[0]), number(t[1].powi(3)), number(1.0), Mat::zeros(1, 1), Continuous)?)
     }
     fn slopes(&self, t: &[f64], parameter: usize) -> Vec<Slope> {
         let slope = |matrix, value| Slope { matrix, row: 0, column: 0, value };
@@ -75,8 +75,8 @@ fn a_structure_that_is_not_linear_starts_around_the_given_vector() {
 #[test]
 fn slopes_are_those_of_the_misfit() {
     let target = bearing_target(40);
-    let misfit = Misfit::new(&BearingStructure, &target);
-    let theta: Vec<f64> = BearingStructure::parameters(&Bearing::default()).iter().map(|v| 1.1 * v).collect();
+    let misfit = Misfit::new(bearing(), &target);
+    let theta: Vec<f64> = truth().iter().map(|v| 1.1 * v).collect();
     let cost = |j: usize, v: f64| {
         let mut moved = theta.clone();
         moved[j] = v;
@@ -105,8 +105,8 @@ fn values_without_weight_do_not_count() {
         weights[k][(0, 1)] = 0.0;
     }
     let target = FrequencyTarget::new(&omega, values, time()).unwrap().weighted(weights).unwrap();
-    let found = project(&BearingStructure, &target, &[], &ProjectionOptions::default()).unwrap();
-    let truth = BearingStructure::parameters(&Bearing::default());
+    let found = project(bearing(), &target, &[], &ProjectionOptions::default()).unwrap();
+    let truth = truth();
     assert!(error(&found.parameters, &truth) < 1e-8);
 }
 
@@ -125,7 +125,7 @@ fn input_that_does_not_fit_is_refused() {
     let weight = |w: f64| target(&[1.0], vec![value(2)]).unwrap().weighted(vec![Mat::from_fn(2, 2, |_, _| w)]);
     assert!(matches!(weight(-1.0), Err(Error::Method(youla::Error::OutOfRange { .. }))));
     let ready = ProjectionOptions::default();
-    let start = |theta: Vec<f64>| project(&BearingStructure, &bearing_target(30), &[theta], &ready).unwrap_err();
+    let start = |theta: Vec<f64>| project(bearing(), &bearing_target(30), &[theta], &ready).unwrap_err();
     assert!(matches!(start(vec![1.0; 13]), Error::Method(youla::Error::Shape { .. })));
     assert!(matches!(start(vec![f64::NAN; 14]), Error::Method(youla::Error::NotFinite { .. })));
     let none = project(&Bent, &FrequencyTarget::new(&[1.0], vec![value(1)], time()).unwrap(), &[], &ready);

@@ -18,7 +18,7 @@ use youla::lti::{Continuous, Discrete, StateSpace};
 /// A structure of discrete time around a model; `theta = 0` is the model itself.
 ///
 /// ```
-/// use youla::identify::{greybox::Structure, refine::LocalCoordinates};
+/// use youla_greybox::{Structure, refine::LocalCoordinates};
 /// use youla::lti::{Discrete, StateSpace};
 /// use youla::Mat;
 /// let time = Discrete::new(0.1)?;
@@ -27,7 +27,7 @@ use youla::lti::{Continuous, Discrete, StateSpace};
 /// let model = StateSpace::new(a, ones(2, 1), ones(1, 2), Mat::zeros(1, 1), time)?;
 /// let local = LocalCoordinates::new(model, false);
 /// assert_eq!(local.names().len(), 2 * (1 + 1));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct LocalCoordinates {

@@ -19,7 +19,7 @@ mod tests;
 pub use local::LocalCoordinates;
 
 use crate::Result;
-use crate::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseModel, Stop, greybox_confined, greybox_cost};
+use crate::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseModel, Problem, Stop, greybox, greybox_cost};
 use balance::Balanced;
 use serde::{Deserialize, Serialize};
 use youla::identify::subspace::{Experiment, InitialState};
@@ -147,7 +147,7 @@ pub struct RefinedModel {
 /// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
 /// let found = refine(&lag(0.6, 1.8)?, None, &records, &RefineOptions::default())?;
 /// assert!((found.model.a()[(0, 0)] - 0.7).abs() < 1e-8);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_greybox::Error>(())
 /// ```
 pub fn refine(
     start: &StateSpace<Discrete>,
@@ -165,12 +165,13 @@ pub fn refine(
     let mut here = Balanced::new(start, gain)?;
     let mut coordinates = LocalCoordinates::new(here.model.clone(), options.feedthrough);
     let search = |coordinates: &LocalCoordinates, choices: &GreyBoxOptions| {
-        greybox_confined(coordinates, &coordinates.origin(), experiments, time, options.stable, choices)
+        let problem = Problem::new(coordinates, experiments, time).confined(options.stable);
+        greybox(&problem, &coordinates.origin(), choices)
     };
     let mut choices = choices(options, &here, 0);
     let begun = search(&coordinates, &choices)?;
     choices.output_deviations = deviations(&begun, experiments);
-    let cost_before = greybox_cost(&coordinates, &coordinates.origin(), experiments, time, &choices)?;
+    let cost_before = greybox_cost(&Problem::new(&coordinates, experiments, time), &coordinates.origin(), &choices)?;
     let (mut iterations, mut charts, mut diverged) = (0, 0, 0);
     loop {
         choices.max_iterations = STEPS.min(options.max_iterations - iterations);

@@ -2,7 +2,8 @@
 
 use super::{LocalCoordinates, RefineNoise, RefineOptions, RefinedModel, refine};
 use crate::Error;
-use crate::{BearingStructure, GreyBoxOptions, Stop, Structure, greybox};
+use crate::tests::{bearing, truth};
+use crate::{GreyBoxOptions, Problem, Stop, Structure, greybox};
 use faer::Scale;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -12,14 +13,13 @@ use youla::identify::subspace::{Experiment, InitialState, Order, SubspaceOptions
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla::signal::{Excitation, SquareWaves};
-use youla_paper::rig::Bearing;
 
 fn time() -> Discrete {
     Discrete::new(2e-4).unwrap()
 }
 
 fn plant() -> StateSpace<Discrete> {
-    Bearing::default().plant().unwrap().zoh(time()).unwrap()
+    bearing().model(&truth()).unwrap().zoh(time()).unwrap()
 }
 
 /// Inputs and noise-free outputs.
@@ -94,7 +94,7 @@ fn error(model: &StateSpace<Discrete>) -> f64 {
 /// estimate errs more than both. Six runs leave some 25 % in the ratio.
 #[test]
 fn a_refined_estimate_comes_near_the_grey_box() {
-    let truth = BearingStructure::parameters(&Bearing::default());
+    let truth = truth();
     let mut sums = [0.0; 3];
     for seed in 0..6 {
         let [u, y] = noisy(3000, 0.3, 10 + seed);
@@ -105,7 +105,7 @@ fn a_refined_estimate_comes_near_the_grey_box() {
         assert!(refined.stable && refined.covariance.is_some() && refined.charts <= 8, "{}", refined.charts);
         assert!((0..2).all(|i| refined.fit[i] >= refined.fit_before[i] - 0.05), "{:?}", refined.fit);
         let options = GreyBoxOptions { initial_state: InitialState::Zero, ..GreyBoxOptions::default() };
-        let physical = greybox(&BearingStructure, &truth, &[experiment], time(), &options).unwrap();
+        let physical = greybox(&Problem::new(bearing(), &[experiment], time()), &truth, &options).unwrap();
         for (sum, model) in sums.iter_mut().zip([&start, &refined.model, &physical.model]) {
             *sum += error(model);
         }

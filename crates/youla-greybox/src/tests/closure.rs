@@ -2,9 +2,9 @@
 
 use super::super::closure::Closure;
 use super::super::criterion::{Comparison, Criterion};
-use super::super::{GreyBoxOptions, LoopOutput, Matrix, NoiseModel, Slope, Stop, Structure, greybox, greybox_in_loop};
+use super::super::{GreyBoxOptions, LoopOutput, Matrix, NoiseModel, Problem, Slope, Stop, Structure, greybox};
 use super::gradient::{comparison, gradient_error};
-use crate::Result;
+use crate::{Error, Result};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -26,7 +26,7 @@ impl Structure for Pendulum {
         let a = [[0.0, 1.0, 0.0], [t[0] * t[0], -t[1], t[2]], [0.0, 0.0, -t[3]]];
         let a = Mat::from_fn(3, 3, |i, j| a[i][j]);
         let b = Mat::from_fn(3, 1, |i, _| if i == 2 { t[3] } else { 0.0 });
-        StateSpace::new(a, b, Mat::from_fn(1, 3, |_, j| [1.0, 0.0, 0.0][j]), Mat::zeros(1, 1), Continuous)
+        Ok(StateSpace::new(a, b, Mat::from_fn(1, 3, |_, j| [1.0, 0.0, 0.0][j]), Mat::zeros(1, 1), Continuous)?)
     }
     fn slopes(&self, t: &[f64], parameter: usize) -> Vec<Slope> {
         let a = |row, column, value| Slope { matrix: Matrix::A, row, column, value };
@@ -93,7 +93,7 @@ fn an_unstable_plant_is_found_in_its_loop() {
     let find = |[w, _, y, beta]: &[Mat<f64>; 4], output| {
         let seen = if output == LoopOutput::Plant { y } else { beta };
         let experiment = [Experiment { u: w.as_ref(), y: seen.as_ref() }];
-        greybox_in_loop(&Pendulum, &start, &controller, output, &experiment, time(), &options).unwrap()
+        greybox(&Problem::new(&Pendulum, &experiment, time()).in_loop(&controller, output), &start, &options).unwrap()
     };
     for output in [LoopOutput::Plant, LoopOutput::Deviation] {
         let exact = find(&record(2000, 0.0, 2), output);
@@ -114,7 +114,8 @@ fn an_unstable_plant_is_found_in_its_loop() {
         }
     }
     let [_, u, y, _] = record(6000, 0.02, 3);
-    let alone = greybox(&Pendulum, &start, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time(), &options);
+    let alone =
+        greybox(&Problem::new(&Pendulum, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time()), &start, &options);
     assert!(
         matches!(alone, Err(Error::Method(youla::Error::Diverged { .. })))
             || alone.is_ok_and(|found| found.fit[0] < 0.0)
@@ -126,8 +127,11 @@ fn loops_that_do_not_fit_are_refused() {
     let [w, _, y, _] = record(300, 0.0, 4);
     let experiment = [Experiment { u: w.as_ref(), y: y.as_ref() }];
     let wide = Partitioned::new(controller().system().clone(), 2, 1).unwrap();
-    let refused =
-        greybox_in_loop(&Pendulum, &TRUTH, &wide, LoopOutput::Plant, &experiment, time(), &GreyBoxOptions::default());
+    let refused = greybox(
+        &Problem::new(&Pendulum, &experiment, time()).in_loop(&wide, LoopOutput::Plant),
+        &TRUTH,
+        &GreyBoxOptions::default(),
+    );
     let sentence = refused.unwrap_err().to_string();
     assert!(sentence.contains("the number of outputs of the controller"), "{sentence}");
 }

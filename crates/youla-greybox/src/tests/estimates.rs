@@ -1,7 +1,7 @@
 //! What the estimates are worth.
 
-use super::super::{BearingStructure, GreyBoxModel, GreyBoxOptions, Stop, greybox};
-use super::{off, open_loop, time, truth};
+use super::super::{GreyBoxModel, GreyBoxOptions, Problem, Stop, greybox};
+use super::{bearing, off, open_loop, time, truth};
 use rayon::prelude::*;
 use youla::identify::subspace::InitialState;
 
@@ -30,7 +30,7 @@ fn noise_free_records_give_the_parameters_back() {
     let second = open_loop(800, [0.0; 2], &REST, 4);
     let experiments = [first.experiment(), second.experiment()];
     let start = off(&truth(), 0.2, 5);
-    let found = greybox(&BearingStructure, &start, &experiments, time(), &GreyBoxOptions::default()).unwrap();
+    let found = greybox(&Problem::new(bearing(), &experiments, time()), &start, &GreyBoxOptions::default()).unwrap();
     for (found, truth) in found.parameters.iter().zip(truth()) {
         assert!((found / truth - 1.0).abs() < 1e-6, "{found} for {truth}");
     }
@@ -46,7 +46,7 @@ fn noise_free_records_give_the_parameters_back() {
 fn noisy_records_give_them_within_their_deviations() {
     let data = open_loop(5000, [0.3; 2], &REST, 6);
     let start = off(&truth(), 0.2, 7);
-    let found = greybox(&BearingStructure, &start, &[data.experiment()], time(), &from_rest()).unwrap();
+    let found = greybox(&Problem::new(bearing(), &[data.experiment()], time()), &start, &from_rest()).unwrap();
     let errors = scaled_errors(&found);
     assert!(errors.iter().all(|e| e.abs() < 4.0), "{errors:?}");
     assert_eq!(found.stop, Stop::Converged);
@@ -61,7 +61,7 @@ fn scatter_is_that_of_the_covariance() {
     const RUNS: u64 = 200;
     let run = |run: u64| {
         let data = open_loop(1500, [0.3; 2], &REST, 100 + run);
-        scaled_errors(&greybox(&BearingStructure, &truth(), &[data.experiment()], time(), &from_rest()).unwrap())
+        scaled_errors(&greybox(&Problem::new(bearing(), &[data.experiment()], time()), &truth(), &from_rest()).unwrap())
     };
     let errors: Vec<Vec<f64>> = (0..RUNS).into_par_iter().map(run).collect();
     let scatter = |j: usize| (errors.iter().map(|e| e[j] * e[j]).sum::<f64>() / RUNS as f64).sqrt();
@@ -77,7 +77,7 @@ fn deviations_of_the_outputs_weigh() {
     let data = open_loop(3000, [0.1, 1.0], &REST, 8);
     let fit = |output_deviations: Vec<f64>| {
         let options = GreyBoxOptions { output_deviations, ..from_rest() };
-        greybox(&BearingStructure, &truth(), &[data.experiment()], time(), &options).unwrap()
+        greybox(&Problem::new(bearing(), &[data.experiment()], time()), &truth(), &options).unwrap()
     };
     let weighted = fit(vec![1.0, 10.0]);
     let errors = scaled_errors(&weighted);

@@ -2,8 +2,8 @@
 
 use super::super::criterion::{Comparison, Criterion};
 use super::super::sampled::{Coordinates, sample, sampled_slopes};
-use super::super::{BearingStructure, Matrix, NoiseModel, Slope, Structure};
-use super::{off, open_loop, time, truth};
+use super::super::{Matrix, NoiseModel, Slope, Structure};
+use super::{bearing, off, open_loop, time, truth};
 use crate::Result;
 use faer::Mat;
 use youla::identify::subspace::InitialState;
@@ -49,7 +49,7 @@ fn gradient_is_that_of_the_criterion() {
     for initial in [InitialState::Zero, InitialState::Estimated] {
         let experiments = [data.experiment(), data.experiment()];
         let compared = comparison(&NoiseModel::OutputError, initial, &[0.5, 2.0]);
-        let criterion = Criterion::new(&BearingStructure, &theta, &experiments, time(), compared).unwrap();
+        let criterion = Criterion::new(bearing(), &theta, &experiments, time(), compared).unwrap();
         let point = criterion.evaluate(&theta).unwrap();
         let here = criterion.linearise(&point).unwrap();
         assert!((0.5 * here.residual().squared_norm_l2() / point.cost - 1.0).abs() < 1e-11);
@@ -69,7 +69,7 @@ impl Structure for Everything {
         let a = Mat::from_fn(2, 2, |i, j| [[-1.0, t[0]], [-t[0] * t[0], -0.3 * t[4]]][i][j]);
         let b = Mat::from_fn(2, 1, |i, _| [t[1], 0.2][i]);
         let c = Mat::from_fn(1, 2, |_, j| [t[2], t[4]][j]);
-        StateSpace::new(a, b, c, Mat::from_fn(1, 1, |_, _| t[3]), Continuous)
+        Ok(StateSpace::new(a, b, c, Mat::from_fn(1, 1, |_, _| t[3]), Continuous)?)
     }
     fn slopes(&self, t: &[f64], parameter: usize) -> Vec<Slope> {
         let slope = |matrix, row, column, value| Slope { matrix, row, column, value };
@@ -88,7 +88,7 @@ fn every_matrix_may_move() {
     let u = Mat::from_fn(60, 1, |k, _| ((k * k) as f64 * 0.37).sin());
     let y = Mat::from_fn(60, 1, |k, _| (k as f64 * 0.21).cos());
     let theta = [1.3, 0.7, -0.4, 0.2, 0.9];
-    let experiment = super::super::Experiment { u: u.as_ref(), y: y.as_ref() };
+    let experiment = youla::identify::subspace::Experiment { u: u.as_ref(), y: y.as_ref() };
     let time = youla::lti::Discrete::new(0.2).unwrap();
     let compared = comparison(&NoiseModel::OutputError, InitialState::Estimated, &[]);
     let criterion = Criterion::new(&Everything, &theta, &[experiment], time, compared).unwrap();
@@ -104,7 +104,7 @@ fn sampling_has_the_derivative_of_a_lag() {
             vec!["rate".into()]
         }
         fn model(&self, t: &[f64]) -> Result<StateSpace<Continuous>> {
-            StateSpace::new(-eye(1) * faer::Scale(t[0]), eye(1), eye(1), Mat::zeros(1, 1), Continuous)
+            Ok(StateSpace::new(-eye(1) * faer::Scale(t[0]), eye(1), eye(1), Mat::zeros(1, 1), Continuous)?)
         }
         fn slopes(&self, _: &[f64], _: usize) -> Vec<Slope> {
             vec![Slope { matrix: Matrix::A, row: 0, column: 0, value: -1.0 }]

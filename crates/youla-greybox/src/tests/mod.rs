@@ -7,14 +7,15 @@ mod starts;
 
 pub(super) use gradient::{comparison, gradient_error};
 
-use super::{BearingStructure, Structure};
+use super::{DeclaredStructure, Structure, Template};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use std::sync::LazyLock;
+use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, simulate};
 use youla::signal::{Excitation, SquareWaves};
-use youla_paper::rig::Bearing;
 
 /// An open-loop experiment on the bearing.
 struct OpenLoop {
@@ -23,8 +24,8 @@ struct OpenLoop {
 }
 
 impl OpenLoop {
-    fn experiment(&self) -> super::Experiment<'_> {
-        super::Experiment { u: self.u.as_ref(), y: self.y.as_ref() }
+    fn experiment(&self) -> Experiment<'_> {
+        Experiment { u: self.u.as_ref(), y: self.y.as_ref() }
     }
 }
 
@@ -32,8 +33,16 @@ fn time() -> Discrete {
     Discrete::new(2e-4).unwrap()
 }
 
-fn truth() -> Vec<f64> {
-    BearingStructure::parameters(&Bearing::default())
+/// The bearing of the paper as a declared structure.
+pub(super) fn bearing() -> &'static DeclaredStructure {
+    static BEARING: LazyLock<DeclaredStructure> =
+        LazyLock::new(|| DeclaredStructure::new(&Template::Bearing.declaration().unwrap()).unwrap());
+    &BEARING
+}
+
+/// Its parameters.
+pub(super) fn truth() -> Vec<f64> {
+    bearing().start()
 }
 
 /// Square waves of 0.5 V, white output noise of `deviation` um per output.
@@ -41,7 +50,7 @@ fn open_loop(samples: usize, deviation: [f64; 2], x0: &[f64; 6], seed: u64) -> O
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let waves = SquareWaves { amplitude: 0.5, hold_min: 5, hold_max: 40 };
     let u = Excitation::SquareWaves(waves).generate(samples, 2, time(), &mut rng).unwrap();
-    let plant = BearingStructure.model(&truth()).unwrap().zoh(time()).unwrap();
+    let plant = bearing().model(&truth()).unwrap().zoh(time()).unwrap();
     let clean = simulate(&plant, u.as_ref(), x0).unwrap();
     let y = Mat::from_fn(samples, 2, |k, i| clean[(k, i)] + deviation[i] * rng.sample::<f64, _>(StandardNormal));
     OpenLoop { u, y }

@@ -1,7 +1,9 @@
 //! Predictors of noise models and steady starts: derivatives against differences, and what the estimates are worth.
 
 use super::super::criterion::Criterion;
-use super::super::{GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseFilter, NoiseModel, Stop, Structure, greybox};
+use super::super::{
+    GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseFilter, NoiseModel, Problem, Stop, Structure, greybox,
+};
 use super::gradient::{Everything, comparison, gradient_error};
 use crate::Error;
 use faer::Mat;
@@ -64,7 +66,8 @@ fn find(noise: &NoiseModel, [u, y]: &[Mat<f64>; 2]) -> GreyBoxModel {
     let options =
         GreyBoxOptions { noise: noise.clone(), initial_state: InitialState::Zero, ..GreyBoxOptions::default() };
     let start = THETA.map(|v| 0.9 * v);
-    greybox(&Everything, &start, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time(), &options).unwrap()
+    greybox(&Problem::new(&Everything, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time()), &start, &options)
+        .unwrap()
 }
 
 /// Root mean square over runs and parameters of the error in deviations, and of the error itself.
@@ -144,11 +147,12 @@ fn a_steady_start_is_exact_and_an_integrator_has_none() {
     let y = y.as_ref().subrows(1000, 400);
     let options = GreyBoxOptions { initial_state: InitialState::SteadyState, ..GreyBoxOptions::default() };
     let experiment = [Experiment { u: u.as_ref(), y }];
-    let found = greybox(&Everything, &THETA.map(|v| 0.9 * v), &experiment, time(), &options).unwrap();
+    let found = greybox(&Problem::new(&Everything, &experiment, time()), &THETA.map(|v| 0.9 * v), &options).unwrap();
     let worst = found.parameters.iter().zip(THETA).map(|(p, t)| (p / t - 1.0).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-6, "{worst:e} {:?}", found.parameters);
     // A = [-1 0; 0 0]
-    let refused = greybox(&Everything, &[0.0, 0.7, -0.4, 0.2, 0.0], &experiment, time(), &options).unwrap_err();
+    let refused =
+        greybox(&Problem::new(&Everything, &experiment, time()), &[0.0, 0.7, -0.4, 0.2, 0.0], &options).unwrap_err();
     assert!(matches!(refused, Error::NoSteadyState { pole } if (pole - 1.0).norm() < 1e-7), "{refused}");
 }
 
@@ -158,7 +162,7 @@ fn noise_models_that_do_not_fit_are_refused() {
     let refused = |noise: NoiseModel| {
         let options = GreyBoxOptions { noise, ..GreyBoxOptions::default() };
         let experiment = [Experiment { u: u.as_ref(), y: u.as_ref() }];
-        greybox(&Everything, &THETA, &experiment, time(), &options).unwrap_err()
+        greybox(&Problem::new(&Everything, &experiment, time()), &THETA, &options).unwrap_err()
     };
     let one = |a: f64, b: f64, c: f64| {
         NoiseModel::Filter(NoiseFilter { a: vec![vec![a]], b: vec![vec![b]], c: vec![vec![c]] })

@@ -28,7 +28,7 @@ pub fn starts_methods() -> Vec<Method> {
         Search::Pem => Role::Pem,
         Search::PemMultiStart => Role::PemMultiStart,
         Search::HansenPem => Role::HansenPem,
-        Search::PemContinued | Search::SubspacePem => Role::Other,
+        Search::SubspacePem => Role::Other,
     };
     Search::ALL.into_iter().map(|search| Method::new(search.key(), search.label(), role(search))).collect()
 }
@@ -87,7 +87,7 @@ pub fn starts_story(starts: &Starts) -> Story {
 }
 
 fn searches(settings: &StartsSettings) -> Vec<String> {
-    let (several, continued) = (&settings.multi_start, &settings.continuation);
+    let several = &settings.multi_start;
     let searched = several.searched.unwrap_or(several.starts);
     vec![
         format!("{}: at most {} steps from the start.", Search::Pem.label(), settings.paper.pem.max_iterations),
@@ -96,13 +96,6 @@ fn searches(settings: &StartsSettings) -> Vec<String> {
             Search::PemMultiStart.label(),
             several.starts.saturating_sub(1),
             several.factor
-        ),
-        format!(
-            "{}: from the start, {} stages behind an observer with rho from {} to {}, then without.",
-            Search::PemContinued.label(),
-            continued.stages,
-            continued.first,
-            continued.last
         ),
         format!("{}: from the projection of G(S), without the nominal parameters.", Search::HansenPem.label()),
         format!("{}: from the projection of a subspace model of u and y.", Search::SubspacePem.label()),

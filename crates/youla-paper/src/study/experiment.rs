@@ -21,8 +21,8 @@ use youla::reduce::reduce;
 use youla::signal::Welch;
 use youla::validate::{certify, fit, predict_open_loop};
 use youla::{Mat, MatRef};
-use youla_greybox::hansen_pem::{HansenPemOptions, pem_from_hansen};
-use youla_greybox::{GreyBoxModel, GreyBoxOptions, Stop, greybox};
+use youla_greybox::hansen_pem::{HansenPemOptions, SchemeData, pem_from_hansen};
+use youla_greybox::{GreyBoxModel, GreyBoxOptions, Problem, Stop, greybox};
 
 /// How an experiment differs from the others.
 #[derive(Debug, Clone, PartialEq)]
@@ -251,8 +251,12 @@ impl Data<'_> {
         let start = self.start.degraded(factor, 1.0).map_err(text)?;
         let experiment = [subspace::Experiment { u: self.u.as_ref(), y: self.y.as_ref() }];
         let options = GreyBoxOptions { initial_state: self.initial_state, ..self.settings.pem.clone() };
-        greybox(&BearingStructure, &BearingStructure::parameters(&start), &experiment, self.time(), &options)
-            .map_err(text)
+        greybox(
+            &Problem::new(&BearingStructure, &experiment, self.time()),
+            &BearingStructure::parameters(&start),
+            &options,
+        )
+        .map_err(text)
     }
 
     /// From the projection of G(S), or that from the nominal model, `single`, where its criterion is lower.
@@ -262,7 +266,13 @@ impl Data<'_> {
         let pem = GreyBoxOptions { initial_state: self.initial_state, ..self.settings.pem.clone() };
         let options = HansenPemOptions { pem, ..Default::default() };
         let factors = &self.design.factors;
-        let projected = pem_from_hansen(found, factors, signals, &experiment, &BearingStructure, None, &options);
+        let projected = pem_from_hansen(
+            found,
+            SchemeData { factors, signals },
+            &Problem::new(&BearingStructure, &experiment, self.time()),
+            None,
+            &options,
+        );
         lower(projected.map(|found| found.model).map_err(text), single.clone())
     }
 

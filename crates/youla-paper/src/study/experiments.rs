@@ -9,7 +9,7 @@ use crate::{Error, Result};
 use rand::RngExt;
 use rayon::prelude::*;
 use youla::identify::subspace;
-use youla_greybox::{GreyBoxModel, greybox};
+use youla_greybox::{GreyBoxModel, Problem, greybox};
 
 /// First stream of the experiments; those of study and map lie elsewhere.
 const FIRST: u64 = 1 << 50;
@@ -65,7 +65,7 @@ fn open_loop(parameters: &RigParameters, settings: &PaperSettings) -> Result<Ope
     let record = run_experiment(&mut rig, &mut OpenLoop, alpha.as_ref(), &parameters.safety)?;
     let experiment = [subspace::Experiment { u: record.u_applied.as_ref(), y: record.y.as_ref() }];
     let start = BearingStructure::parameters(&e.start);
-    let found = greybox(&BearingStructure, &start, &experiment, rig.time(), &settings.pem)?;
+    let found = greybox(&Problem::new(&BearingStructure, &experiment, rig.time()), &start, &settings.pem)?;
     if !found.stable {
         let pole = found.model.worst_pole()?.unwrap_or_default();
         return Err(Error::Method(youla::Error::Unstable {

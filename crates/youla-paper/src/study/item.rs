@@ -23,8 +23,8 @@ use youla::lti::{Discrete, StateSpace, simulate};
 use youla::reduce::reduce;
 use youla::signal::RampedExcitation;
 use youla::validate::fit;
-use youla_greybox::hansen_pem::{HansenPemOptions, pem_from_hansen};
-use youla_greybox::{GreyBoxModel, greybox};
+use youla_greybox::hansen_pem::{HansenPemOptions, SchemeData, pem_from_hansen};
+use youla_greybox::{GreyBoxModel, Problem, greybox};
 
 /// What distinguishes one loop from another.
 #[derive(Debug, Clone, PartialEq)]
@@ -218,7 +218,7 @@ impl LoopData<'_> {
 
     fn pem(&self, start: &Bearing, settings: &PaperSettings) -> Result<GreyBoxModel, String> {
         let start = BearingStructure::parameters(start);
-        greybox(&BearingStructure, &start, &self.experiment(), self.time(), &settings.pem).map_err(text)
+        greybox(&Problem::new(&BearingStructure, &self.experiment(), self.time()), &start, &settings.pem).map_err(text)
     }
 
     fn single(&self, settings: &PaperSettings) -> Result<&GreyBoxModel, String> {
@@ -250,8 +250,13 @@ impl LoopData<'_> {
         let note = reflected(found);
         let options = HansenPemOptions { pem: settings.pem.clone(), ..Default::default() };
         let (factors, signals) = (&self.design.factors, [self.signals()?]);
-        let from_projection =
-            pem_from_hansen(found.clone(), factors, &signals, &self.experiment(), &BearingStructure, None, &options);
+        let from_projection = pem_from_hansen(
+            found.clone(),
+            SchemeData { factors, signals: &signals },
+            &Problem::new(&BearingStructure, &self.experiment(), self.time()),
+            None,
+            &options,
+        );
         let model = lower(from_projection.map(|found| found.model).map_err(text), self.single(settings).cloned())?;
         Ok(Found { note, ..grey_box(&model) })
     }

@@ -63,7 +63,7 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
     let text = format!(
         "The physical structure fits the estimation records to {model} per output, G(S) to {plant} (search started from {start})."
     );
-    let (status, text) = match run.found.lost() {
+    let (status, text) = match run.found.local_minimum_suspected() {
         true => (
             Status::Caution,
             text + " The fit is more than 1 percentage point below that of G(S): the search ended in a local minimum, or the structure does not describe the plant.",

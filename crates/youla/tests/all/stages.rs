@@ -125,7 +125,7 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     let mut silent = |_| ();
     let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap();
     let run = found.grey_box.as_ref().unwrap().as_ref().unwrap();
-    assert!(run.found.won == PemStart::Projection && !run.found.lost());
+    assert!(run.found.won == PemStart::Projection && !run.found.local_minimum_suspected());
     let fit = |method: Method| found.verdict.of(method).unwrap().records[0].fit.clone();
     for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
         assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");

@@ -3,7 +3,7 @@
 use super::super::super::criterion::Criterion;
 use super::super::super::tests::{comparison, gradient_error};
 use super::super::super::{
-    FrequencyTarget, GreyBoxOptions, InnovationStart, NoiseModel, ProjectionOptions, Structure, greybox,
+    FrequencyTarget, GreyBoxOptions, InnovationStart, NoiseModel, Problem, ProjectionOptions, Structure, greybox,
     logarithmic_grid, project,
 };
 use super::super::{Declaration, DeclaredStructure};
@@ -43,7 +43,8 @@ fn record() -> [Mat<f64>; 2] {
 fn exact_records_give_the_parameters_back() {
     let ([u, y], structure) = (record(), structure());
     let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
-    let found = greybox(&structure, &structure.start(), &experiment, time(), &GreyBoxOptions::default()).unwrap();
+    let found = greybox(&Problem::new(&structure, &experiment, time()), &structure.start(), &GreyBoxOptions::default())
+        .unwrap();
     assert!(found.parameters.iter().zip(TRUTH).all(|(p, t)| (p / t - 1.0).abs() < 1e-8), "{:?}", found.parameters);
     assert!(found.continuous.is_none() && found.model.time() == time());
 }
@@ -80,7 +81,9 @@ fn another_sample_time_is_refused_with_both() {
     let ([u, y], structure) = (record(), structure());
     let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
     let other = Discrete::new(2e-3).unwrap();
-    let refused = greybox(&structure, &structure.start(), &experiment, other, &GreyBoxOptions::default()).unwrap_err();
+    let refused =
+        greybox(&Problem::new(&structure, &experiment, other), &structure.start(), &GreyBoxOptions::default())
+            .unwrap_err();
     assert!(
         matches!(refused, Error::Method(youla::Error::SampleTimeMismatch { left: 1e-3, right: 2e-3, .. })),
         "{refused}"

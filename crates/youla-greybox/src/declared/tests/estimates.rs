@@ -1,14 +1,14 @@
 //! Parameters of declared structures from simulated records.
 
 use super::super::super::tests::off;
-use super::super::super::{Experiment, GreyBoxModel, GreyBoxOptions, Loss, Side, Stop, Structure, greybox};
+use super::super::super::{GreyBoxModel, GreyBoxOptions, Loss, Problem, Side, Stop, Structure, greybox};
 use super::super::DeclaredStructure;
 use super::declared;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use youla::Mat;
-use youla::identify::subspace::InitialState;
+use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, simulate};
 
 struct Records {
@@ -48,7 +48,7 @@ fn estimate_with(
 ) -> GreyBoxModel {
     let experiment = Experiment { u: data.u.as_ref(), y: data.y.as_ref() };
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..options };
-    greybox(structure, start, &[experiment], data.time, &options).unwrap()
+    greybox(&Problem::new(structure, &[experiment], data.time), start, &options).unwrap()
 }
 
 fn within_four_deviations(structure: &DeclaredStructure, found: &GreyBoxModel) {
@@ -227,7 +227,7 @@ fn known_delays_are_taken_out() {
     let data = Records { u: clean.u.as_ref().subrows(10, 3990).to_owned(), y: late, time: clean.time };
     let options = GreyBoxOptions { delays: vec![3], initial_state: InitialState::Estimated, ..Default::default() };
     let experiment = Experiment { u: data.u.as_ref(), y: data.y.as_ref() };
-    let found = greybox(&mass, &off(&mass.start(), 0.2, 4), &[experiment], data.time, &options).unwrap();
+    let found = greybox(&Problem::new(&mass, &[experiment], data.time), &off(&mass.start(), 0.2, 4), &options).unwrap();
     for (found, truth) in found.parameters.iter().zip(mass.start()) {
         assert!((found / truth - 1.0).abs() < 1e-6, "{found} for {truth}");
     }
@@ -237,7 +237,7 @@ fn known_delays_are_taken_out() {
     let refused = |delays: Vec<usize>, rows: usize| {
         let experiment = Experiment { u: data.u.as_ref().subrows(0, rows), y: data.y.as_ref().subrows(0, rows) };
         let options = GreyBoxOptions { delays, ..Default::default() };
-        greybox(&mass, &mass.start(), &[experiment], data.time, &options).unwrap_err().to_string()
+        greybox(&Problem::new(&mass, &[experiment], data.time), &mass.start(), &options).unwrap_err().to_string()
     };
     assert_eq!(refused(vec![1, 2], 100), "the number of delays is 2, but must be one per input, or none");
     assert_eq!(

@@ -82,19 +82,19 @@ fn what_is_no_expression_is_told_with_its_place() {
         other => panic!("{text}: {other:?}"),
     };
     for (text, told) in [
-        ("", "1: it ends where a number, a name or ( must stand"),
-        ("x +", "4: it ends where a number, a name or ( must stand"),
-        ("x ** y", "4: '*' stands where a number, a name or ( must stand"),
-        ("2x", "2: 'x' stands where an operator must stand"),
-        ("x y", "3: 'y' stands where an operator must stand"),
+        ("", "1: it ends where a number, a name or ( is expected"),
+        ("x +", "4: it ends where a number, a name or ( is expected"),
+        ("x ** y", "4: '*' is in the place of a number, a name or ("),
+        ("2x", "2: 'x' is in the place of an operator"),
+        ("x y", "3: 'y' is in the place of an operator"),
         ("(x", "3: a closing parenthesis is missing"),
-        ("x)", "2: ')' stands where an operator must stand"),
+        ("x)", "2: ')' is in the place of an operator"),
         ("1.2.3", "1: 1.2.3 is not a number"),
         ("1e999", "1: 1e999 is not a number"),
         ("y + sqrt x", "5: the function sqrt lacks its ("),
         ("log(x)", "1: log is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan"),
         ("x(y)", "1: x is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan"),
-        ("x = y", "3: '=' stands where an operator must stand"),
+        ("x = y", "3: '=' is in the place of an operator"),
     ] {
         assert_eq!(problem(text), told, "{text}");
     }

@@ -1,31 +1,14 @@
 //! What comes with the library, read as the files of a user.
 
 use super::super::super::tests::off;
-use super::super::super::{BearingStructure, Matrix, Structure};
+use super::super::super::{Matrix, Structure};
 use super::super::{Declaration, DeclaredStructure, Template};
 use super::declared;
 use faer::c64;
 use youla::lti::{Continuous, StateSpace, frequency_response};
-use youla_paper::rig::Bearing;
 
 fn template(template: Template) -> DeclaredStructure {
     DeclaredStructure::new(&template.declaration().unwrap()).unwrap()
-}
-
-#[test]
-fn the_bearing_is_that_of_the_rig() {
-    let bearing = template(Template::Bearing);
-    let truth = BearingStructure::parameters(&Bearing::default());
-    assert_eq!(bearing.names(), BearingStructure.names());
-    assert_eq!(bearing.start(), truth);
-    assert_eq!(bearing.bounds(), BearingStructure.bounds());
-    for seed in 0..5 {
-        let theta = off(&truth, 0.5, seed);
-        assert_eq!(bearing.model(&theta).unwrap(), BearingStructure.model(&theta).unwrap());
-        for parameter in 0..14 {
-            assert_eq!(bearing.slopes(&theta, parameter), BearingStructure.slopes(&theta, parameter), "{parameter}");
-        }
-    }
 }
 
 fn entry(model: &StateSpace<Continuous>, matrix: Matrix, row: usize, column: usize) -> f64 {

@@ -1,6 +1,6 @@
 //! The likelihood ratio has the distribution that its probability says.
 
-use super::super::super::{GreyBoxModel, GreyBoxOptions, greybox};
+use super::super::super::{GreyBoxModel, GreyBoxOptions, Problem, greybox};
 use super::super::{compare, likelihood_ratio};
 use super::*;
 use rayon::prelude::*;
@@ -19,7 +19,7 @@ fn with_known_damping(factor: f64) -> DeclaredStructure {
 
 fn estimate(structure: &DeclaredStructure, log: &Log) -> GreyBoxModel {
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
-    greybox(structure, &structure.start(), &[log.experiment()], time(), &options).unwrap()
+    greybox(&Problem::new(structure, &[log.experiment()], time()), &structure.start(), &options).unwrap()
 }
 
 /// Over 1000 records the probability is uniform where the smaller structure is true, and small where it is not.

@@ -1,9 +1,7 @@
 //! Over 1000 seeded records: 95 % intervals hold the truth in 93 to 97 %, and the scatter is that of the Cramer-Rao bound.
 
-use super::super::super::{GreyBoxModel, GreyBoxOptions, LoopOutput, greybox, greybox_in_loop};
-use super::super::{
-    GreyBoxIntervals, IntervalOptions, ResidualAssumption, greybox_intervals, greybox_intervals_in_loop,
-};
+use super::super::super::{GreyBoxModel, GreyBoxOptions, LoopOutput, Problem, greybox};
+use super::super::{GreyBoxIntervals, IntervalOptions, ResidualAssumption, greybox_intervals};
 use super::*;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -55,18 +53,27 @@ fn outcome(found: &GreyBoxModel, known: &GreyBoxIntervals) -> Outcome {
 
 fn direct(log: &Log) -> Outcome {
     let (structure, records) = (oscillator(), [log.experiment()]);
-    let found = greybox(&structure, &start(), &records, time(), &options()).unwrap();
+    let found = greybox(&Problem::new(&structure, &records, time()), &start(), &options()).unwrap();
     let asked = IntervalOptions { residuals: ResidualAssumption::White, ..Default::default() };
-    outcome(&found, &greybox_intervals(&structure, &found, &records, time(), &options(), &asked).unwrap())
+    outcome(
+        &found,
+        &greybox_intervals(&Problem::new(&structure, &records, time()), &found, &options(), &asked).unwrap(),
+    )
 }
 
 fn simulated_loop(log: &Log, slope: f64, residuals: ResidualAssumption) -> Outcome {
     let (structure, records, output) = (oscillator(), [log.experiment()], LoopOutput::Plant);
     let (controller, options) = (controller(slope), options());
-    let found = greybox_in_loop(&structure, &start(), &controller, output, &records, time(), &options).unwrap();
+    let found =
+        greybox(&Problem::new(&structure, &records, time()).in_loop(&controller, output), &start(), &options).unwrap();
     let asked = IntervalOptions { residuals, ..Default::default() };
-    let known =
-        greybox_intervals_in_loop(&structure, &found, &controller, output, &records, time(), &options, &asked).unwrap();
+    let known = greybox_intervals(
+        &Problem::new(&structure, &records, time()).in_loop(&controller, output),
+        &found,
+        &options,
+        &asked,
+    )
+    .unwrap();
     outcome(&found, &known)
 }
 

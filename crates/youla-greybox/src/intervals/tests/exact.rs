@@ -1,6 +1,7 @@
 //! Derivatives against difference quotients, and the sandwich against its definition in dense matrices.
 
-use super::super::super::{BearingStructure, GreyBoxOptions, Slope, Structure, greybox};
+use super::super::super::tests::{bearing, truth};
+use super::super::super::{GreyBoxOptions, Problem, Slope, Structure, greybox};
 use super::super::{IntervalOptions, ResidualAssumption, greybox_intervals};
 use super::*;
 use crate::Result;
@@ -8,7 +9,6 @@ use std::f64::consts::TAU;
 use youla::identify::subspace::InitialState;
 use youla::lti::{Continuous, frequency_response};
 use youla::signal::{Excitation, SquareWaves};
-use youla_paper::rig::Bearing;
 
 fn drive() -> DeclaredStructure {
     DeclaredStructure::new(&Template::TwoInertiaDrive.declaration().unwrap()).unwrap()
@@ -45,9 +45,9 @@ fn slopes_are_exact() {
     let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + n[k]);
     let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
     let options = GreyBoxOptions { delays: vec![2], ..Default::default() };
-    let found = greybox(&structure, &structure.start(), &records, time, &options).unwrap();
+    let found = greybox(&Problem::new(&structure, &records, time), &structure.start(), &options).unwrap();
     let asked = IntervalOptions { residuals: ResidualAssumption::White, ..Default::default() };
-    let known = greybox_intervals(&structure, &found, &records, time, &options, &asked).unwrap();
+    let known = greybox_intervals(&Problem::new(&structure, &records, time), &found, &options, &asked).unwrap();
     let theta = &found.parameters;
     let same = |deviation: f64, variance: f64| (deviation / variance.sqrt() - 1.0).abs() < 1e-6;
 
@@ -92,13 +92,12 @@ fn slopes_are_exact() {
 /// Two experiments of two outputs with estimated initial states.
 #[test]
 fn sandwich_is_its_definition() {
-    let (time, truth) = (Discrete::new(2e-4).unwrap(), BearingStructure::parameters(&Bearing::default()));
+    let (time, truth) = (Discrete::new(2e-4).unwrap(), truth());
     let log = |samples: usize, seed: u64| {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let waves = SquareWaves { amplitude: 0.5, hold_min: 5, hold_max: 40 };
         let u = Excitation::SquareWaves(waves).generate(samples, 2, time, &mut rng).unwrap();
-        let clean =
-            simulate(&BearingStructure.model(&truth).unwrap().zoh(time).unwrap(), u.as_ref(), &[0.0; 6]).unwrap();
+        let clean = simulate(&bearing().model(&truth).unwrap().zoh(time).unwrap(), u.as_ref(), &[0.0; 6]).unwrap();
         let n = [noise(samples, 0.1, 0.8, &mut rng), noise(samples, 0.2, 0.5, &mut rng)];
         let y = Mat::from_fn(samples, 2, |k, i| clean[(k, i)] + n[i][k] + 0.5 * n[0][k.saturating_sub(1)]);
         Log { u, y }
@@ -106,15 +105,15 @@ fn sandwich_is_its_definition() {
     let logs = [log(300, 1), log(200, 2)];
     let records = [logs[0].experiment(), logs[1].experiment()];
     let options = GreyBoxOptions { output_deviations: vec![0.5, 2.0], ..Default::default() };
-    let found = greybox(&BearingStructure, &truth, &records, time, &options).unwrap();
+    let found = greybox(&Problem::new(bearing(), &records, time), &truth, &options).unwrap();
     let lags = 40;
     let asked = IntervalOptions { lags: Some(lags), residuals: ResidualAssumption::Coloured, ..Default::default() };
-    let known = greybox_intervals(&BearingStructure, &found, &records, time, &options, &asked).unwrap();
+    let known = greybox_intervals(&Problem::new(bearing(), &records, time), &found, &options, &asked).unwrap();
 
     // Outputs sample after sample, over their deviations.
     let weighted = |y: Mat<f64>| Mat::from_fn(2 * y.nrows(), 1, |r, _| y[(r / 2, r % 2)] / [0.5, 2.0][r % 2]);
     let simulated = |theta: &[f64], k: usize, x0: &[f64]| {
-        let model = BearingStructure.model(theta).unwrap().zoh(time).unwrap();
+        let model = bearing().model(theta).unwrap().zoh(time).unwrap();
         weighted(simulate(&model, logs[k].u.as_ref(), x0).unwrap())
     };
     let theta = &found.parameters;
@@ -183,7 +182,7 @@ fn bounds_and_what_is_not_determined() {
         }
         fn model(&self, t: &[f64]) -> Result<StateSpace<Continuous>> {
             let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
-            StateSpace::new(number(-3.0), number(t[0] * t[1]), number(1.0), number(0.0), Continuous)
+            Ok(StateSpace::new(number(-3.0), number(t[0] * t[1]), number(1.0), number(0.0), Continuous)?)
         }
         fn slopes(&self, t: &[f64], j: usize) -> Vec<Slope> {
             vec![Slope { matrix: super::super::super::Matrix::B, row: 0, column: 0, value: t[1 - j] }]
@@ -191,8 +190,9 @@ fn bounds_and_what_is_not_determined() {
     }
     let log = open_loop(300, NOISE, 0.0, 1);
     let (records, options) = ([log.experiment()], GreyBoxOptions::default());
-    let found = greybox(&Product, &[1.0, 1.0], &records, time(), &options).unwrap();
-    let refused = greybox_intervals(&Product, &found, &records, time(), &options, &IntervalOptions::default());
+    let found = greybox(&Problem::new(&Product, &records, time()), &[1.0, 1.0], &options).unwrap();
+    let refused =
+        greybox_intervals(&Problem::new(&Product, &records, time()), &found, &options, &IntervalOptions::default());
     let sentence = refused.unwrap_err().to_string();
     assert!(sentence.contains("k and l cannot be told apart"), "{sentence}");
 
@@ -201,10 +201,10 @@ fn bounds_and_what_is_not_determined() {
     declared.parameters.get_mut("damping").unwrap().initial = Some(10.0);
     let held = DeclaredStructure::new(&declared).unwrap();
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
-    let found = greybox(&held, &held.start(), &records, time(), &options).unwrap();
+    let found = greybox(&Problem::new(&held, &records, time()), &held.start(), &options).unwrap();
     assert_eq!(found.at_bounds.len(), 1);
     let asked = IntervalOptions { residuals: ResidualAssumption::Coloured, ..Default::default() };
-    let known = greybox_intervals(&held, &found, &records, time(), &options, &asked).unwrap();
+    let known = greybox_intervals(&Problem::new(&held, &records, time()), &found, &options, &asked).unwrap();
     assert_eq!((known.parameters[1].deviation, known.colour[1], known.correlations[(0, 1)]), (0.0, 1.0, 0.0));
     assert!(known.parameters[0].deviation > 0.0 && known.correlations[(0, 0)] == 1.0);
     assert!(!known.residuals.white() && known.verdict().contains("the intervals count that"), "{}", known.verdict());
@@ -214,7 +214,9 @@ fn bounds_and_what_is_not_determined() {
         (IntervalOptions { lags: Some(0), ..Default::default() }, "lags"),
         (IntervalOptions { lags: Some(151), ..Default::default() }, "half"),
     ] {
-        let refused = greybox_intervals(&held, &found, &records, time(), &options, &asked).unwrap_err().to_string();
+        let refused = greybox_intervals(&Problem::new(&held, &records, time()), &found, &options, &asked)
+            .unwrap_err()
+            .to_string();
         assert!(refused.contains(word), "{refused}");
     }
 }

@@ -1,6 +1,6 @@
 //! What seeded searches take: iterations, values of the criterion, rejected points.
 
-use super::super::super::{GreyBoxOptions, LoopOutput, Loss, greybox, greybox_in_loop};
+use super::super::super::{GreyBoxOptions, LoopOutput, Loss, Problem, greybox};
 use super::*;
 
 /// Another number here means that the search does other work than before: to be looked at, and explained.
@@ -13,13 +13,17 @@ fn work_of_seeded_searches() {
     let [direct, from_outside] = in_loop(500, 2e-5, 0.0, 8000.0, 2);
     let (options, huber) = (GreyBoxOptions::default(), GreyBoxOptions { loss: Loss::Huber, ..Default::default() });
     let search = |theta: &[f64], log: &Log, options: &GreyBoxOptions| {
-        let found = greybox(&structure, theta, &[log.experiment()], time(), options).unwrap();
+        let found = greybox(&Problem::new(&structure, &[log.experiment()], time()), theta, options).unwrap();
         (found.iterations, found.evaluations, found.diverged)
     };
     let through_the_loop = {
         let (controller, records) = (controller(8000.0), [from_outside.experiment()]);
-        let found =
-            greybox_in_loop(&structure, &near, &controller, LoopOutput::Plant, &records, time(), &options).unwrap();
+        let found = greybox(
+            &Problem::new(&structure, &records, time()).in_loop(&controller, LoopOutput::Plant),
+            &near,
+            &options,
+        )
+        .unwrap();
         (found.iterations, found.evaluations, found.diverged)
     };
     let work = [

@@ -26,7 +26,7 @@ pub struct StartCount {
     pub refused: usize,
     /// Items with an unstable model.
     pub unstable: usize,
-    /// Searches without a start: items that did not arrive and of which the search itself says so, by `lost()` or by refusing.
+    /// Searches without a start: items that did not arrive and of which the search itself says so, by `local_minimum_suspected()` or by refusing.
     pub told: Option<usize>,
     /// Searches without a start: items that arrive where the search from the start is run too and the lower criterion wins.
     pub with_start: Option<usize>,
@@ -134,9 +134,9 @@ fn reason(row: &StartRow) -> String {
     let state = match row.status {
         Status::NoController => "no loop",
         Status::Refused => "no model",
-        Status::Unstable if row.lost => "unstable model, lost() says so",
+        Status::Unstable if row.lost => "unstable model, local minimum suspected",
         Status::Unstable => "unstable model",
-        Status::Stable if row.lost => "lost() says so",
+        Status::Stable if row.lost => "local minimum suspected",
         Status::Stable => "another minimum",
     };
     if row.note.is_empty() { state.into() } else { format!("{state}: {}", row.note) }
@@ -159,7 +159,6 @@ mod tests {
                 row(k, Search::Truth, 99.0, 1.0),
                 row(k, Search::Pem, start, 100.0 - start),
                 row(k, Search::PemMultiStart, 99.0, 1.0),
-                row(k, Search::PemContinued, 99.0, 1.0),
                 StartRow { lost: projected < 90.0, ..row(k, Search::HansenPem, projected, 100.0 - projected) },
             ]
         };
@@ -171,6 +170,9 @@ mod tests {
         assert_eq!((single.arrived, single.told), (1, None));
         let failures = start_failures(StartCase::Loop02, &rows);
         assert_eq!(failures.iter().map(|f| f.item).collect::<Vec<_>>(), [1, 2]);
-        assert_eq!((failures[0].reason.as_str(), failures[1].reason.as_str()), ("lost() says so", "another minimum"));
+        assert_eq!(
+            (failures[0].reason.as_str(), failures[1].reason.as_str()),
+            ("local minimum suspected", "another minimum")
+        );
     }
 }

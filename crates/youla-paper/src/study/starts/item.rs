@@ -10,10 +10,10 @@ use super::settings::StartsSettings;
 use crate::BearingStructure;
 use crate::{Error, Result};
 use youla::identify::subspace::Experiment;
-use youla_greybox::hansen_pem::{HansenPemOptions, hansen_pem};
+use youla_greybox::hansen_pem::{HansenPemOptions, SchemeData, hansen_pem};
 use youla_greybox::subspace_pem::{SubspacePemOptions, subspace_pem};
 use youla_greybox::{
-    ContinuationOptions, GreyBoxModel, MultiStartOptions, Projection, greybox, greybox_continued, greybox_multi_start,
+    GreyBoxModel, MultiStartOptions, Problem as GreyBoxProblem, StructureFit, greybox, greybox_multi_start,
 };
 
 /// Runs item number `index` of a case: one row per search of [`Search::of`]. A search that leads to no model, an unstable model,
@@ -82,24 +82,22 @@ fn find(problem: &Problem, search: Search, settings: &StartsSettings) -> Result<
     let record = [Experiment { u: problem.estimation.u.as_ref(), y: problem.estimation.y.as_ref() }];
     let plain = |model| Found { model, lost: false, note: String::new() };
     match search {
-        Search::Truth => Ok(greybox(&BearingStructure, &problem.truth, &record, time, pem).map(plain)?),
-        Search::Pem => Ok(greybox(&BearingStructure, start, &record, time, pem).map(plain)?),
+        Search::Truth => {
+            Ok(greybox(&GreyBoxProblem::new(&BearingStructure, &record, time), &problem.truth, pem).map(plain)?)
+        }
+        Search::Pem => Ok(greybox(&GreyBoxProblem::new(&BearingStructure, &record, time), start, pem).map(plain)?),
         Search::PemMultiStart => {
             let options = MultiStartOptions { pem: pem.clone(), ..settings.multi_start.clone() };
-            Ok(greybox_multi_start(&BearingStructure, start, &record, time, &options)
+            Ok(greybox_multi_start(&GreyBoxProblem::new(&BearingStructure, &record, time), start, &options)
                 .map(|found| plain(found.model))?)
-        }
-        Search::PemContinued => {
-            let options = ContinuationOptions { pem: pem.clone(), ..settings.continuation.clone() };
-            Ok(greybox_continued(&BearingStructure, start, &record, time, &options).map(|found| plain(found.model))?)
         }
         Search::HansenPem => from_hansen(problem, &record, settings),
         Search::SubspacePem => {
             let subspace = settings.subspace.clone();
             let options = SubspacePemOptions { subspace, pem: pem.clone(), ..Default::default() };
-            let found = subspace_pem(&record, time, &BearingStructure, None, &options)?;
+            let found = subspace_pem(&GreyBoxProblem::new(&BearingStructure, &record, time), None, &options)?;
             let note = projection_note(&found.projections)?.unwrap_or_default();
-            Ok(Found { lost: found.lost(), note, model: found.model })
+            Ok(Found { lost: found.local_minimum_suspected(), note, model: found.model })
         }
     }
 }
@@ -112,14 +110,15 @@ fn from_hansen(problem: &Problem, record: &[Experiment<'_>], settings: &StartsSe
     let signals = [design.factors.signals(record[0].u, record[0].y)?];
     let paper = &settings.paper;
     let options = HansenPemOptions { hansen: paper.hansen.clone(), pem: paper.pem.clone(), ..Default::default() };
-    let found = hansen_pem(&design.factors, &signals, record, &BearingStructure, None, &options)?;
+    let data = SchemeData { factors: &design.factors, signals: &signals };
+    let found = hansen_pem(data, &GreyBoxProblem::new(&BearingStructure, record, problem.time), None, &options)?;
     let notes = [Some(reflected(&found.hansen)).filter(|note| !note.is_empty()), projection_note(&found.projections)?];
     let note = notes.into_iter().flatten().collect::<Vec<_>>().join("; ");
-    Ok(Found { lost: found.lost(), note, model: found.model })
+    Ok(Found { lost: found.local_minimum_suspected(), note, model: found.model })
 }
 
 /// Whether the projection from which the search started is unstable.
-fn projection_note(projections: &[Projection]) -> Result<Option<String>> {
+fn projection_note(projections: &[StructureFit]) -> Result<Option<String>> {
     let stable = projections.first().map_or(Ok(true), |best| best.model.is_stable())?;
     Ok((!stable).then(|| "the best projection is unstable".into()))
 }

@@ -13,8 +13,6 @@ pub enum Search {
     Pem,
     /// The same from several starts around it.
     PemMultiStart,
-    /// The same behind an observer that is taken away step by step.
-    PemContinued,
     /// Prediction error from the projection of G(S), in closed loop. The start is not used.
     HansenPem,
     /// Prediction error from the projection of a subspace model, in open loop. The start is not used.
@@ -23,14 +21,8 @@ pub enum Search {
 
 impl Search {
     /// All searches in the order in which they are listed.
-    pub const ALL: [Search; 6] = [
-        Search::Truth,
-        Search::Pem,
-        Search::PemMultiStart,
-        Search::PemContinued,
-        Search::HansenPem,
-        Search::SubspacePem,
-    ];
+    pub const ALL: [Search; 5] =
+        [Search::Truth, Search::Pem, Search::PemMultiStart, Search::HansenPem, Search::SubspacePem];
 
     /// Those of a case, in order.
     pub fn of(case: StartCase) -> impl Iterator<Item = Search> {
@@ -44,7 +36,6 @@ impl Search {
             Search::Truth => "truth",
             Search::Pem => "pem",
             Search::PemMultiStart => "pem_multi_start",
-            Search::PemContinued => "pem_continued",
             Search::HansenPem => "hansen_pem",
             Search::SubspacePem => "subspace_pem",
         }
@@ -56,7 +47,6 @@ impl Search {
             Search::Truth => "PEM from the truth",
             Search::Pem => "PEM",
             Search::PemMultiStart => "PEM, several starts",
-            Search::PemContinued => "PEM, continued",
             Search::HansenPem => "PEM from Hansen",
             Search::SubspacePem => "PEM from subspace",
         }

@@ -6,7 +6,7 @@ use crate::rig::{Bearing, RigParameters};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use youla::identify::subspace::{InitialState, Order, Stability, SubspaceMethod, SubspaceOptions};
-use youla_greybox::{ContinuationOptions, MultiStartOptions};
+use youla_greybox::MultiStartOptions;
 
 /// The choices of [`super::evaluate_starts`].
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -25,8 +25,6 @@ pub struct StartsSettings {
     pub bearing: Bearing,
     /// Several starts; `pem` is that of `paper`.
     pub multi_start: MultiStartOptions,
-    /// Continuation; `pem` is that of `paper`.
-    pub continuation: ContinuationOptions,
     /// Identification of the plant in open loop.
     pub subspace: SubspaceOptions,
     /// Seed, loops, controllers, S and the prediction-error method as in the study of the paper.
@@ -39,15 +37,14 @@ impl StartsSettings {
         let mut paper = PaperSettings::shipped();
         paper.seed = seed;
         let rig = RigParameters::shipped();
-        let pem = || paper.pem.clone();
+        let pem = paper.pem.clone();
         StartsSettings {
             cases: cases.to_vec(),
             items,
             sample_time: rig.timing.sample_time.value,
             open_loop_noise: 0.1,
             bearing: rig.bearing.model(),
-            multi_start: MultiStartOptions { starts: 32, searched: Some(4), pem: pem(), ..Default::default() },
-            continuation: ContinuationOptions { pem: pem(), ..Default::default() },
+            multi_start: MultiStartOptions { starts: 32, searched: Some(4), pem, ..Default::default() },
             subspace: SubspaceOptions {
                 method: SubspaceMethod::Cva,
                 horizon: 20,

@@ -1,18 +1,20 @@
 //! The bearing in closed loop with nominal models that are 50 and 90 % wrong.
 
-use super::*;
-use crate::Error;
-use crate::{BearingStructure, Matrix, Slope, greybox, project};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use youla::Mat;
 use youla::control::closed_loop;
-use youla::identify::subspace::Order;
+use youla::factor::YoulaSignals;
+use youla::identify::hansen::hansen;
+use youla::identify::subspace::{Experiment, Order};
 use youla::linalg::{block, eye};
-use youla::lti::{Continuous, simulate};
+use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
+use youla_greybox::hansen_pem::{HansenPemOptions, PemStart, SchemeData, hansen_pem, projection_target};
+use youla_greybox::{Error, Matrix, Problem, Result, Slope, Structure, greybox, project};
+use youla_paper::BearingStructure;
 use youla_paper::rig::{Bearing, degraded};
 use youla_paper::study::{Design, PaperSettings, design};
 
@@ -56,6 +58,10 @@ impl Loop {
         Log { u: log.subcols(0, 2).to_owned(), y: log.subcols(2, 2).to_owned() }
     }
 
+    fn data<'a>(&'a self, signals: &'a [YoulaSignals]) -> SchemeData<'a> {
+        SchemeData { factors: &self.design.factors, signals }
+    }
+
     fn signals(&self, log: &Log) -> [YoulaSignals; 1] {
         [self.design.factors.signals(log.u.as_ref(), log.y.as_ref()).unwrap()]
     }
@@ -96,16 +102,26 @@ fn a_nominal_model_that_is_90_percent_wrong() {
     for seed in 1..=5 {
         let log = bearing.log(0.2, seed);
         let pem = |start: &[f64]| {
-            greybox(&BearingStructure, start, &[log.experiment()], bearing.plant.time(), &options().pem)
+            greybox(&Problem::new(&BearingStructure, &[log.experiment()], bearing.plant.time()), start, &options().pem)
                 .map_or(f64::NEG_INFINITY, |found| worse(&found.model))
         };
         let signals = bearing.signals(&log);
-        let factors = &bearing.design.factors;
-        let found = hansen_pem(factors, &signals, &[log.experiment()], &BearingStructure, None, &options()).unwrap();
+        let found = hansen_pem(
+            bearing.data(&signals),
+            &Problem::new(&BearingStructure, &[log.experiment()], bearing.plant.time()),
+            None,
+            &options(),
+        )
+        .unwrap();
         let (ours, oracle, single) = (worse(&found.model.model), pem(&truth), pem(&bearing.nominal));
         assert!(oracle - ours < 0.1, "seed {seed}: {ours} of {oracle}");
         assert!(single < oracle - 1.0, "seed {seed}: from the nominal model {single} of {oracle}");
-        assert!(!found.lost() && found.model.covariance.is_some(), "{:?} {:?}", found.model.fit, found.fit_of_plant);
+        assert!(
+            !found.local_minimum_suspected() && found.model.covariance.is_some(),
+            "{:?} {:?}",
+            found.model.fit,
+            found.fit_of_plant
+        );
         assert_eq!((found.won, found.runs.len()), (PemStart::Projection, 2));
     }
 }
@@ -116,8 +132,13 @@ fn the_nominal_model_is_a_second_start() {
     let log = bearing.log(0.2, 1);
     let (signals, nominal) = (bearing.signals(&log), Some(bearing.nominal.as_slice()));
     let experiments = [log.experiment()];
-    let found =
-        hansen_pem(&bearing.design.factors, &signals, &experiments, &BearingStructure, nominal, &options()).unwrap();
+    let found = hansen_pem(
+        bearing.data(&signals),
+        &Problem::new(&BearingStructure, &experiments, bearing.plant.time()),
+        nominal,
+        &options(),
+    )
+    .unwrap();
     let costs: Vec<f64> = found.runs.iter().map(|run| *run.cost.as_ref().unwrap()).collect();
     let starts: Vec<PemStart> = found.runs.iter().map(|run| run.start).collect();
     assert_eq!(starts, [PemStart::Projection, PemStart::Direct, PemStart::Nominal]);
@@ -135,7 +156,7 @@ impl Structure for Lags {
     }
     fn model(&self, t: &[f64]) -> Result<StateSpace<Continuous>> {
         let diagonal = |d: [f64; 2]| Mat::from_fn(2, 2, |i, j| if i == j { d[i] } else { 0.0 });
-        StateSpace::new(diagonal([-t[0], -t[1]]), diagonal([t[2], t[3]]), eye(2), Mat::zeros(2, 2), Continuous)
+        Ok(StateSpace::new(diagonal([-t[0], -t[1]]), diagonal([t[2], t[3]]), eye(2), Mat::zeros(2, 2), Continuous)?)
     }
     fn slopes(&self, _: &[f64], parameter: usize) -> Vec<Slope> {
         let (matrix, value) = if parameter < 2 { (Matrix::A, -1.0) } else { (Matrix::B, 1.0) };
@@ -148,8 +169,14 @@ fn a_structure_that_is_not_that_of_the_plant_is_seen() {
     let bearing = Loop::new(0.5);
     let log = bearing.log(0.2, 1);
     let signals = bearing.signals(&log);
-    let found = hansen_pem(&bearing.design.factors, &signals, &[log.experiment()], &Lags, None, &options()).unwrap();
-    assert!(found.lost(), "{:?} {:?}", found.model.fit, found.fit_of_plant);
+    let found = hansen_pem(
+        bearing.data(&signals),
+        &Problem::new(&Lags, &[log.experiment()], bearing.plant.time()),
+        None,
+        &options(),
+    )
+    .unwrap();
+    assert!(found.local_minimum_suspected(), "{:?} {:?}", found.model.fit, found.fit_of_plant);
     assert!(found.projections[0].misfit > 0.3, "{}", found.projections[0].misfit);
 }
 

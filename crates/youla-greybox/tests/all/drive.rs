@@ -1,21 +1,17 @@
 //! A physical structure of a measured machine: the flexible drive with two inertias, estimated in its loop, against the scheme that
-//! knows nothing of its physics. The data are not part of this project: without them the test prints that it is skipped.
-#![allow(missing_docs)]
+//! knows nothing of its physics. The data are not part of this project.
 
+use super::common::data;
 use std::path::Path;
 use youla::identify::subspace::{ModeBand, Uncertainty};
 use youla_run::{Identification, Method, RunSettings, StageClock, identify, read_records};
 
-fn run() -> Option<Identification> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
-    if !root.join("../shared/data/flexible_drive").is_dir() {
-        println!("skipped: ../shared/data/flexible_drive is not there");
-        return None;
-    }
-    let path = root.join("examples/flexible-drive/two-inertia.toml");
+fn run() -> Identification {
+    data("flexible_drive");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/flexible-drive/two-inertia.toml");
     let (settings, folder) = (RunSettings::read(&path).unwrap(), path.parent().unwrap());
     let records = read_records(&settings.data, folder).unwrap();
-    Some(identify(settings, records, folder, &mut StageClock::new(&mut |_| ())).unwrap())
+    identify(settings, records, folder, &mut StageClock::new(&mut |_| ())).unwrap()
 }
 
 /// The lightly damped one within a range of frequencies, Hz.
@@ -28,8 +24,9 @@ fn between(all: &[ModeBand], from: f64, to: f64) -> ModeBand {
 /// resonance within 1 % and its anti-resonance within 4 % of those of G(S). It is not the plant: it lies outside of the intervals of
 /// G(S), its residuals are coloured and depend on past inputs, and the run says so (stick-slip friction, docs/grey-box.md).
 #[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn two_inertias_of_the_flexible_drive() {
-    let Some(found) = run() else { return };
+    let found = run();
     let grey = found.grey_box.as_ref().unwrap().as_ref().unwrap();
     let known = grey.intervals.as_ref().unwrap();
     for p in &known.parameters {

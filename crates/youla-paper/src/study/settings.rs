@@ -201,7 +201,10 @@ impl PaperSettings {
             count(what, samples, 100, 100_000_000)?;
         }
         if self.reduction.method == ReductionMethod::Weighted {
-            return Err(Error::Method(youla::Error::Unsupported { what: "[reduction] method = \"weighted\"", instead: NEEDS_LOOP }));
+            return Err(Error::Method(youla::Error::Unsupported {
+                what: "[reduction] method = \"weighted\"",
+                instead: NEEDS_LOOP,
+            }));
         }
         if matches!(self.reduction.order, ReducedOrder::ClosedLoop(_)) {
             return Err(Error::Method(youla::Error::Unsupported {

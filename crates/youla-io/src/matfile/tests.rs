@@ -144,7 +144,7 @@ fn a_packed_variable_cannot_announce_more_than_it_holds() {
     bytes.extend(element(kind::COMPRESSED, &encoder.finish().unwrap(), false));
     let message = read_bytes(&bytes).unwrap_err().to_string();
     assert!(
-        message.contains("byte 136: expected 4294967295 bytes packed by zlib, but only 1000 came out"),
+        message.contains("byte 136: expected 4294967295 bytes packed by zlib, but only 1000 were decompressed"),
         "{message}"
     );
 }
@@ -158,7 +158,7 @@ fn nesting_is_bounded() {
     let file = scratch("mat");
     write_mat(file.path(), &[Variable { name: "deep".into(), value }], Packing::Zlib).unwrap();
     let message = read_mat(file.path()).unwrap_err().to_string();
-    assert!(message.contains("at most 32 structs and cells inside of each other"), "{message}");
+    assert!(message.contains("at most 32 levels of structs and cells"), "{message}");
 }
 
 #[test]

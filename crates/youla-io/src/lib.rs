@@ -41,6 +41,7 @@ pub mod export;
 pub mod folder;
 #[cfg(feature = "mat73")]
 mod hdf;
+#[cfg(any(feature = "mat73", feature = "parquet"))]
 mod limits;
 mod matfile;
 mod matrices;

@@ -124,7 +124,7 @@ pub struct RefinedModel {
     pub covariance: Option<Mat<f64>>,
 }
 
-/// Refines a model, for example of [`super::subspace::subspace`], on one or more experiments. `gain` is K at the start of an
+/// Refines a model, for example of [`youla::identify::subspace::subspace`], on one or more experiments. `gain` is K at the start of an
 /// innovation form (n x p), zero where `None`.
 ///
 /// # Errors

@@ -48,7 +48,7 @@ fn misspelt_keys_at_every_level() {
 
 #[test]
 fn misspelt_choices() {
-    let weight = settings("horizon = 10", "horizon = 10\nweight = \"moespp\"");
+    let weight = settings("horizon = 10", "horizon = 10\nmethod = \"moespp\"");
     settings_refused(
         "choice",
         &weight,

@@ -48,11 +48,11 @@ fn misspelt_keys_at_every_level() {
 
 #[test]
 fn misspelt_choices() {
-    let weight = settings("horizon = 10", "horizon = 10\nmethod = \"moespp\"");
+    let method = settings("horizon = 10", "horizon = 10\nmethod = \"moespp\"");
     settings_refused(
         "choice",
-        &weight,
-        &["run.toml:23:10:", "`moespp` is not a choice of `weight` in [hansen]", "`moesp`", "n4sid, cva"],
+        &method,
+        &["run.toml:23:10:", "`moespp` is not a choice of `method` in [hansen]", "`moesp`", "n4sid, cva"],
     );
     let sign = settings("feedback = \"negative\"", "feedback = \"minus\"");
     settings_refused("choice", &sign, &["run.toml:17:12:", "`minus`", "`feedback`", "negative, positive"]);

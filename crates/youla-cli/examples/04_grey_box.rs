@@ -21,8 +21,17 @@ fn main() -> Result<()> {
     // Through the loop, from alpha: consistent whatever the noise, because alpha does not depend on it.
     let (controller, options) = (machine.factors.j_k()?, GreyBoxOptions::default());
     let data = [Experiment { u: log.alpha.as_ref(), y: log.y.as_ref() }];
-    let found = greybox(&Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant), &start, &options)?;
-    let known = greybox_intervals(&Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant), &found, &options, &IntervalOptions::default())?;
+    let found = greybox(
+        &Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant),
+        &start,
+        &options,
+    )?;
+    let known = greybox_intervals(
+        &Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant),
+        &found,
+        &options,
+        &IntervalOptions::default(),
+    )?;
 
     println!("{} steps, {:?}; {:.0} % intervals", found.iterations, found.stop, 100.0 * known.level);
     for (parameter, truth) in known.parameters.iter().zip(&truth) {

@@ -2,7 +2,7 @@
 //! docs/closed-loop.md. `cargo run --release -p youla-cli --example closed_loop_bias` writes docs/images/closed-loop-bias.svg and
 //! .csv in a few seconds.
 
-#[path = "../../youla/tests/common/mod.rs"]
+#[path = "../../youla/tests/all/common/mod.rs"]
 mod common;
 
 use common::feedback::Loop;

@@ -5,9 +5,9 @@
 //! ```
 #![allow(missing_docs)]
 
-#[path = "../../youla/tests/common/bearing_loop.rs"]
+#[path = "../../youla/tests/all/common/bearing_loop.rs"]
 mod bearing_loop;
-#[path = "../../youla/tests/common/mod.rs"]
+#[path = "../../youla/tests/all/common/mod.rs"]
 mod common;
 
 use bearing_loop::{Coverage, Design, Loop};

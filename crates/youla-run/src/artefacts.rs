@@ -1,13 +1,8 @@
 //! Models as artefacts, and the provenance that every artefact states.
 
-use super::entries::pairs;
 use super::records::SourceFile;
 use super::settings::RunSettings;
-use crate::Result;
 use serde::{Deserialize, Serialize};
-use youla::lti::{Discrete, StateSpace};
-use youla::signal::Channel;
-use youla::MatRef;
 
 /// Version of the layout of all artefacts; that of summary.json is [`crate::SUMMARY_SCHEMA`].
 pub const SCHEMA: u32 = 1;

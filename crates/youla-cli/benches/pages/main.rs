@@ -9,9 +9,9 @@ mod speed;
 #[path = "../timing/mod.rs"]
 mod timing;
 
-#[path = "../../../youla/tests/common/bearing_loop.rs"]
+#[path = "../../../youla/tests/all/common/bearing_loop.rs"]
 mod bearing_loop;
-#[path = "../../../youla/tests/common/mod.rs"]
+#[path = "../../../youla/tests/all/common/mod.rs"]
 mod common;
 
 use std::path::Path;

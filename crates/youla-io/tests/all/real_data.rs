@@ -36,10 +36,10 @@ fn numbers(value: &serde_json::Value) -> Vec<f64> {
 fn flexible_drive() {
     let found = run(example("flexible-drive"));
     assert_eq!(found.settings.frequency_response.window, 8000);
-    let summary = summary(&found, &Vec::new()).unwrap();
+    let summary = serde_json::to_value(summary(&found, &Vec::new()).unwrap()).unwrap();
     let response = &summary["frequency_response"];
     let hz = numbers(&response["hz"]);
-    let curve = |name: &str| numbers(&response[name]);
+    let curve = |name: &str| numbers(&response[name][0][0]);
     let (indirect, hansen) = (curve("indirect_db"), curve("hansen_db"));
     let band = |from: f64, to: f64| (0..hz.len()).filter(|&k| (from..=to).contains(&hz[k])).collect::<Vec<_>>();
     let rms = |model: &[f64]| {

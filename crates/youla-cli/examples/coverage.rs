@@ -5,12 +5,10 @@
 //! ```
 #![allow(missing_docs)]
 
-#[path = "../../youla/tests/all/common/bearing_loop.rs"]
-mod bearing_loop;
 #[path = "../../youla/tests/all/common/mod.rs"]
 mod common;
 
-use bearing_loop::{Coverage, Design, Loop};
+use common::bearing_loop::{self, Coverage, Design, Loop};
 use youla::identify::subspace::{SubspaceMethod, UncertaintyMethod, UncertaintyOptions};
 
 fn main() {

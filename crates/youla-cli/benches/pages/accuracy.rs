@@ -1,6 +1,6 @@
 //! How exact results are: residuals of equations and factors, what noise-free and noisy records give back, coverage.
 
-use crate::bearing_loop::{self, Coverage, Design, Loop};
+use crate::common::bearing_loop::{self, Coverage, Design, Loop};
 use crate::equations::{Equation, KINDS};
 use crate::page::{head, table};
 use crate::timing::middle;

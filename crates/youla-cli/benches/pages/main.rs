@@ -9,8 +9,6 @@ mod speed;
 #[path = "../timing/mod.rs"]
 mod timing;
 
-#[path = "../../../youla/tests/all/common/bearing_loop.rs"]
-mod bearing_loop;
 #[path = "../../../youla/tests/all/common/mod.rs"]
 mod common;
 

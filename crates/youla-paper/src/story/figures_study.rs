@@ -22,7 +22,7 @@ pub(super) fn controllers(paper: &Paper) -> Figure {
         key: "controllers".into(),
         title: "Controllers of the study".into(),
         caption: format!(
-            "SubspaceMethod of the command that was chosen for each nominal model (small is strong feedback), and the peaks of \
+            "Weight of the command that was chosen for each nominal model (small is strong feedback), and the peaks of \
              the output sensitivity that its controller reaches with the nominal model and with the true plant; the \
              line is the limit of {limit}."
         ),

@@ -13,7 +13,7 @@ const FULL: f64 = 20.0;
 pub(super) struct MapCell {
     /// Places in the lists of the settings: weight of the command, noise, theta.
     place: [usize; 3],
-    /// SubspaceMethod of the command, noise and theta.
+    /// Weight of the command, noise and theta.
     pub(super) at: [f64; 3],
     /// `None` without a loop.
     pub(super) winner: Option<Winner>,

@@ -15,6 +15,7 @@
 mod claims;
 mod claims_experiments;
 mod claims_study;
+mod contents;
 mod figures;
 mod figures_experiments;
 mod figures_study;
@@ -27,7 +28,6 @@ mod section_rig;
 mod section_settings;
 mod section_study;
 mod section_timing;
-mod story;
 mod summary;
 mod tables;
 mod tables_experiments;
@@ -39,5 +39,5 @@ mod tests;
 mod words;
 
 pub use claims::{Claim, ClaimOutcome, paper_claims};
-pub use story::{paper_figures, paper_story, paper_tables, story_methods};
+pub use contents::{paper_figures, paper_story, paper_tables, story_methods};
 pub use summary::paper_summary;

@@ -1,8 +1,8 @@
 //! The experiments and the reduction.
 
+use super::contents::section;
 use super::order::{differences, lacking_in_words};
 use super::section_study::points;
-use super::story::section;
 use super::words::{both, count, excitation, short};
 use super::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
 use crate::Result;

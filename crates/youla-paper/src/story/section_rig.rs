@@ -1,7 +1,7 @@
 //! The rig, the controller and the nominal model.
 
+use super::contents::section;
 use super::order::lacking_in_words;
-use super::story::section;
 use super::words::{and, both, count, percent, short};
 use super::{figures_experiments, figures_study, tables_nominal, tables_rig};
 use crate::Result;

@@ -1,7 +1,7 @@
 //! Everything that was chosen.
 
+use super::contents::section;
 use super::open::choices;
-use super::story::section;
 use crate::study::Paper;
 use serde::Serialize;
 use youla_report::story::{Block, Section};

@@ -1,7 +1,7 @@
 //! The simulation study and the crossover map.
 
 use super::claims::Claim;
-use super::story::section;
+use super::contents::section;
 use super::words::{count, range, short};
 use super::{claims_study, figures_study, map as crossover, tables_study};
 use crate::study::{Method, Paper, Row};

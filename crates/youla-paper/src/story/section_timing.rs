@@ -1,6 +1,6 @@
 //! How long it took.
 
-use super::story::section;
+use super::contents::section;
 use super::tables::{method_row, plain, row};
 use super::tables_experiments::seconds;
 use super::words::{count, short};

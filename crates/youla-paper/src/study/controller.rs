@@ -18,7 +18,7 @@ pub struct Design {
     pub observer_gain: Mat<f64>,
     /// The factors (13)-(15).
     pub factors: CoprimeFactors<Discrete>,
-    /// SubspaceMethod of the command, per V^2.
+    /// Weight of the command, per V^2.
     pub command_weight: f64,
     /// Peak of the output sensitivity with the nominal model.
     pub peak_nominal: f64,

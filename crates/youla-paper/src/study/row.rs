@@ -58,7 +58,7 @@ pub struct Row {
     pub theta: f64,
     /// Output noise, um rms.
     pub noise: f64,
-    /// SubspaceMethod of the command in the design of the controller, per V^2.
+    /// Weight of the command in the design of the controller, per V^2.
     pub command_weight: f64,
     /// Peak of the output sensitivity with the nominal model.
     pub peak_nominal: f64,

@@ -47,9 +47,9 @@ pub struct PaperSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ControllerSettings {
-    /// SubspaceMethod of a displacement, per um^2.
+    /// Weight of a displacement, per um^2.
     pub displacement_weight: f64,
-    /// SubspaceMethod of a velocity, per (um/s)^2.
+    /// Weight of a velocity, per (um/s)^2.
     pub velocity_weight: f64,
     /// Intensity of the noise at the inputs that the observer assumes, V^2.
     pub input_noise: f64,
@@ -95,7 +95,7 @@ pub struct CrossoverSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ExperimentSettings {
-    /// SubspaceMethod of the command, per V^2.
+    /// Weight of the command, per V^2.
     pub command_weight: f64,
     /// Samples of the estimation record, and of the open-loop record for the nominal model.
     pub samples: usize,

@@ -50,7 +50,6 @@ fn figure(
         layout: Layout::Beside,
         choice: choice(&[("Record", record), ("Output", &name)]),
         panels: cross.chain([auto]).filter(has_curves).collect(),
-        ..Figure::default()
     }
 }
 

@@ -14,12 +14,12 @@ use crate::linalg::{
 use crate::lti::{StateSpace, TimeDomain};
 use faer::{Mat, MatRef, c64};
 
-/// SubspaceMethod `[Q S; S' R]` of states and inputs.
+/// Weight `[Q S; S' R]` of states and inputs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LqrWeights {
-    /// SubspaceMethod Q of the states, n x n, symmetric; `[Q S; S' R]` is positive semidefinite.
+    /// Weight Q of the states, n x n, symmetric; `[Q S; S' R]` is positive semidefinite.
     pub q: Mat<f64>,
-    /// SubspaceMethod R of the inputs, m x m, symmetric and positive definite.
+    /// Weight R of the inputs, m x m, symmetric and positive definite.
     pub r: Mat<f64>,
     /// Cross term S, n x m; none means zero.
     pub s: Option<Mat<f64>>,

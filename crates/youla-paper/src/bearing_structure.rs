@@ -14,7 +14,7 @@ use youla_greybox::{Matrix, Slope, Structure};
 /// let theta = BearingStructure::parameters(&Bearing::default());
 /// assert_eq!(BearingStructure.names()[13], "actuator_pole_v");
 /// assert_eq!(BearingStructure::bearing(&theta)?, Bearing::default());
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_paper::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BearingStructure;

@@ -293,7 +293,14 @@ fn same_seed_same_artefacts_on_any_number_of_threads() {
     for threads in ["1", "2"] {
         let folder = empty_folder(&format!("threads-{threads}"));
         let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
-        command.current_dir(&folder).env("RAYON_NUM_THREADS", threads).args(["demo", "--out", "run", "--quiet"]);
+        command.current_dir(&folder).env("RAYON_NUM_THREADS", threads).args([
+            "demo",
+            "--machine",
+            "bearing",
+            "--out",
+            "run",
+            "--quiet",
+        ]);
         assert_eq!(outcome(&mut command).code, Some(0));
         for name in [
             "run.toml",
@@ -322,7 +329,10 @@ fn same_seed_same_artefacts_on_any_number_of_threads() {
         assert_eq!(timeless(&folder.join("run")), timeless(demo()));
     }
     let folder = empty_folder("other-seed");
-    assert_eq!(youla(&folder, &["demo", "--seed", "2", "--out", "run", "--quiet"]).code, Some(0));
+    assert_eq!(
+        youla(&folder, &["demo", "--machine", "bearing", "--seed", "2", "--out", "run", "--quiet"]).code,
+        Some(0)
+    );
     let bytes = |run: &Path| fs::read(run.join("5-recombine/hansen.json")).expect("readable");
     assert!(bytes(&folder.join("run")) != bytes(demo()));
 }

@@ -101,7 +101,7 @@ fn run_files_validate() {
     let init = ["init", "log.csv", "--input", "u", "--output", "y", "--time", "t", "--open-loop"];
     assert_eq!(youla(&folder, &init).code, Some(0));
     let mut files = vec![folder.join("run.toml"), demo().join("run.toml")];
-    files.push(project().join("crates/youla/tests/readers/seeds/run_toml/drive.toml"));
+    files.push(project().join("crates/youla-io/tests/seeds/run_toml/drive.toml"));
     for example in fs::read_dir(project().join("examples")).expect("readable") {
         files.push(example.expect("readable").path().join("run.toml"));
     }

@@ -13,7 +13,7 @@ use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
 /// Values of a sampled p x m system at angular frequencies below the Nyquist frequency, with a weight for each value.
 ///
 /// ```
-/// use youla_greybox::{FrequencyTarget, logarithmic_grid};
+/// use youla_greybox::{DeclaredStructure, FrequencyTarget, Structure, Template, logarithmic_grid};
 /// use youla::lti::Discrete;
 /// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
 /// let model = bearing.model(&bearing.start())?.zoh(Discrete::new(2e-4)?)?;

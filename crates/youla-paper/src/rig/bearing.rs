@@ -50,7 +50,7 @@ impl Bearing {
     /// ```
     /// let modes = youla_paper::rig::Bearing::default().plant()?;
     /// assert_eq!((modes.order(), modes.inputs(), modes.outputs()), (6, 2, 2));
-    /// # Ok::<(), youla::Error>(())
+    /// # Ok::<(), youla_paper::Error>(())
     /// ```
     pub fn plant(&self) -> Result<StateSpace<Continuous>> {
         let square = |x: &[[f64; 2]; 2]| Mat::from_fn(2, 2, |i, j| x[i][j]);

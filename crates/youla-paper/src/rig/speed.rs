@@ -24,7 +24,7 @@ use std::f64::consts::PI;
 /// let parameters = RigParameters::shipped();
 /// assert_eq!(bearing_at_speed(&parameters, 0.0)?, parameters.bearing.model());
 /// assert!(bearing_at_speed(&parameters, 1e5).is_err());
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_paper::Error>(())
 /// ```
 pub fn bearing_at_speed(parameters: &RigParameters, rpm: f64) -> Result<Bearing> {
     let rotation = &parameters.rotation;

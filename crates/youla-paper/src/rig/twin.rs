@@ -51,7 +51,7 @@ pub trait Rig {
 /// let y = rig.measure();
 /// let step = rig.actuate([-0.1 * y[0], 7.0]);
 /// assert_eq!((step.applied[1], step.saturated), (5.0, [false, true]));
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_paper::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct BearingRig {

@@ -80,7 +80,8 @@ pub struct PowerBand {
 ///
 /// ```
 /// use rand::SeedableRng;
-/// use youla::{lti::Discrete, record::{Excitation, ExcitationReportOptions, Prbs, describe_excitation}};
+/// use youla::{lti::Discrete, signal::{Excitation, Prbs}};
+/// use youla_paper::study::{ExcitationReportOptions, describe_excitation};
 /// let time = Discrete::new(2e-4)?;
 /// let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
 /// let alpha = Excitation::Prbs(Prbs::default()).generate(8000, 2, time, &mut rng)?;
@@ -89,7 +90,7 @@ pub struct PowerBand {
 /// assert_eq!((report.order, report.channels[0].crest), (60, 1.0));
 /// // Bits of 4 samples have a clock of 1250 Hz; the lobes above it hold a tenth of the power.
 /// assert!(report.channels[0].band.omega_max > 2.0 * std::f64::consts::PI * 1250.0);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_paper::Error>(())
 /// ```
 pub fn describe_excitation(
     signal: MatRef<f64>,

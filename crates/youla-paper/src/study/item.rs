@@ -57,7 +57,7 @@ pub struct Evaluated<R = Row> {
 /// is an outcome.
 ///
 /// # Errors
-/// [`Error::NoController`]; [`youla::Error::OutOfRange`] for settings without meaning.
+/// [`crate::Error::NoController`]; [`youla::Error::OutOfRange`] for settings without meaning.
 pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSettings) -> Result<Evaluated> {
     let mut clock = Laps::start();
     // theta = 1 would leave nothing of A.

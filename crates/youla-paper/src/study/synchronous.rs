@@ -19,12 +19,13 @@ use youla::{Mat, MatRef};
 /// [`youla::Error::Shape`] and those of the least squares, for fewer samples than coefficients.
 ///
 /// ```
-/// use youla::{Mat, lti::Discrete, study::without_harmonics};
+/// use youla::{Mat, lti::Discrete};
+/// use youla_paper::study::without_harmonics;
 /// let time = Discrete::new(1e-3)?;
 /// let run_out = Mat::from_fn(500, 1, |k, _| 3.0 + (0.2 * k as f64).sin() - 2.0 * (0.4 * k as f64).cos());
 /// let rest = without_harmonics(run_out.as_ref(), 0.2 / (2.0 * std::f64::consts::PI * 1e-3), 2, time)?;
 /// assert!(rest.norm_max() < 1e-12);
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_paper::Error>(())
 /// ```
 pub fn without_harmonics(signal: MatRef<'_, f64>, hz: f64, harmonics: usize, time: Discrete) -> Result<Mat<f64>> {
     let step = TAU * hz * time.ts();

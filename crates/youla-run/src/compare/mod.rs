@@ -49,7 +49,7 @@ pub struct Comparison {
 /// ```no_run
 /// let found = youla_run::compare(&["runs/before-001".into(), "runs/after-001".into()], "hansen")?;
 /// youla_run::write_comparison(&found, "comparison.html".as_ref(), false)?;
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_run::Error>(())
 /// ```
 pub fn compare(folders: &[PathBuf], model: &str) -> Result<Comparison> {
     if folders.len() < 2 {

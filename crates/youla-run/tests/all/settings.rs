@@ -60,15 +60,18 @@ fn keys_of_version_0_1_name_their_successors() {
     assert!(error.contains("[nominal.state_space]"), "{error}");
 }
 
-/// A first-order plant with a pole at 0.9 under u = -y + noise.
+/// A first-order plant with a pole at 0.9 under u = d - y; d and the noise of the measured y are uniform.
 fn log() -> String {
     let mut text = String::from("u,y\n");
     let (mut seed, mut y) = (1u64, 0.0);
-    for _ in 0..3000 {
+    let mut uniform = || {
         seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        let noise = (seed >> 33) as f64 / (1u64 << 31) as f64 - 0.5;
-        let u = noise - y;
-        writeln!(text, "{u},{y}").unwrap();
+        (seed >> 33) as f64 / (1u64 << 31) as f64 - 0.5
+    };
+    for _ in 0..3000 {
+        let measured = y + 0.01 * uniform();
+        let u = uniform() - measured;
+        writeln!(text, "{u},{measured}").unwrap();
         y = 0.9 * y + 0.1 * u;
     }
     text

@@ -53,7 +53,7 @@ impl Persistency {
 /// [`Error::NoConvergence`] of the singular values.
 ///
 /// ```
-/// use youla::{Mat, record::persistency};
+/// use youla::{Mat, signal::persistency};
 /// let sine = Mat::from_fn(500, 1, |k, _| (k as f64 * 0.3).sin());
 /// let found = persistency(sine.as_ref(), 10)?;
 /// assert_eq!((found.rank, found.needed), (2, 10));
@@ -92,7 +92,7 @@ pub fn persistency(signal: MatRef<f64>, block_rows: usize) -> Result<Persistency
 /// [`Error::NotFinite`], [`Error::NoConvergence`] of the singular values.
 ///
 /// ```
-/// use youla::{Mat, record::persistency_order};
+/// use youla::{Mat, signal::persistency_order};
 /// let sine = Mat::from_fn(500, 1, |k, _| (k as f64 * 0.3).sin());
 /// assert_eq!(persistency_order(sine.as_ref(), 10)?, 2);
 /// # Ok::<(), youla::Error>(())

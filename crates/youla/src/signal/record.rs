@@ -46,7 +46,7 @@ impl Record {
     /// [`Error::DuplicateChannel`] for a repeated name, [`Error::NotFiniteSample`] with row and channel.
     ///
     /// ```
-    /// use youla::{Mat, lti::Discrete, record::Record, units::Channel};
+    /// use youla::{Mat, lti::Discrete, signal::{Channel, Record}};
     /// let channels = vec![Channel::new("u", "V"), Channel::new("y", "um")];
     /// let record = Record::new("test", channels, Mat::zeros(100, 2), Discrete::new(2e-4)?)?;
     /// assert_eq!(record.column("y")?.len(), 100);

@@ -82,7 +82,7 @@ pub struct IndirectResponse {
 /// than the record or a bad overlap.
 ///
 /// ```
-/// use youla::{Mat, lti::Discrete, record::{Welch, cross_spectrum}};
+/// use youla::{Mat, lti::Discrete, signal::{Welch, cross_spectrum}};
 /// let y = Mat::from_fn(512, 1, |k, _| (k as f64 * 0.3).sin());
 /// let welch = Welch { window: 128, ..Welch::default() };
 /// let spectrum = cross_spectrum(y.as_ref(), y.as_ref(), Discrete::new(1.0)?, &welch)?;
@@ -105,7 +105,7 @@ pub fn cross_spectrum(y: MatRef<f64>, x: MatRef<f64>, time: Discrete, welch: &We
 /// which `d` does not reach all inputs.
 ///
 /// ```
-/// use youla::{Mat, lti::Discrete, record::{ExcitedRecord, Welch, indirect_response}};
+/// use youla::{Mat, lti::Discrete, signal::{ExcitedRecord, Welch, indirect_response}};
 /// let d = Mat::from_fn(4096, 1, |k, _| ((k * k) as f64 * 0.7).sin());
 /// let y = Mat::from_fn(4096, 1, |k, _| 3.0 * d[(k, 0)]);
 /// let welch = Welch { window: 64, ..Welch::default() };

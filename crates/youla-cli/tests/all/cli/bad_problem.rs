@@ -66,11 +66,11 @@ fn too_few_samples() {
     let few = settings("take = 1200", "take = 45");
     settings_refused("few", &few, &["[hansen] S from alpha to beta", "samples are too few, at least", "horizon of 10"]);
     let fewer = settings("take = 1200", "take = 12");
-    settings_refused("few", &fewer, &["record log has 12 samples", "`settle` in [factors]"]);
+    settings_refused("few", &fewer, &["record log", "12 samples are too few, at least 21", "`settle` in [factors]"]);
     let order = settings("fixed = 3", "fixed = 30");
     settings_refused("few", &order, &["order 30 exceeds 9", "horizon of 10"]);
     let skip = settings("[hansen]", "[verification]\nskip = 100000\n\n[hansen]");
-    settings_refused("few", &skip, &["record rest has 800 samples", "`skip` in [verification]"]);
+    settings_refused("few", &skip, &["record rest", "800 samples are too few", "`skip` in [verification]"]);
 }
 
 #[test]
@@ -79,13 +79,13 @@ fn excitation_that_is_constant_or_poor() {
     let kept = settings("estimation =", "detrend = \"none\"\nestimation =");
     let files = [("log.csv", csv(&constant).into_bytes()), ("run.toml", kept.into_bytes())];
     let files = files.each_ref().map(|(name, bytes)| (*name, bytes.as_slice()));
-    refused(&loop_folder("constant", &files), 2, &["[hansen] S from alpha to beta", "rank ", "but 20 is needed"]);
+    refused(&loop_folder("constant", &files), 2, &["[hansen] S from alpha to beta", "rank ", "of 20;"]);
     refused(&loop_folder("constant", &files[..1]), 2, &["[hansen] S from alpha to beta", "channel 1 is constant"]);
     let sine = |k: usize| (0.3 * k as f64).sin();
     let lines: Vec<[f64; 4]> =
         log().iter().enumerate().map(|(k, row)| [row[0], sine(k), 0.0, 0.5 * sine(k + 3)]).collect();
     let folder = loop_folder("one-line", &[("log.csv", csv(&lines).as_bytes())]);
-    refused(&folder, 2, &["not exciting enough", "horizon of 10", "rank ", "but 20 is needed"]);
+    refused(&folder, 2, &["does not excite enough", "20 block rows", "rank ", "of 20;"]);
 }
 
 #[test]

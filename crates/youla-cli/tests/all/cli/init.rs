@@ -89,7 +89,7 @@ fn what_does_not_fit_the_log_is_refused() {
 #[test]
 fn a_parquet_log_is_listed_and_checked() {
     let folder = loop_folder("init-parquet", &[]);
-    let seed = concat!(env!("CARGO_MANIFEST_DIR"), "/../youla/tests/readers/seeds/parquet/zstd.parquet");
+    let seed = concat!(env!("CARGO_MANIFEST_DIR"), "/../youla-io/tests/seeds/parquet/zstd.parquet");
     fs::copy(seed, folder.join("log.parquet")).expect("the seeds are part of the project");
     let arguments = ["init", "log.parquet", "--input", "u [V]", "--output", "y.1", "--time", "t", "--open-loop"];
     let found = youla(&folder, &[&arguments[..], &["--out", "new.toml"]].concat());

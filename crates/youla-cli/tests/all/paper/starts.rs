@@ -23,12 +23,12 @@ fn a_small_study_is_written_continued_and_kept_apart() {
     let read = |name: &str| fs::read(folder.join("small").join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let before: Vec<Vec<u8>> = results.iter().map(|name| read(name)).collect();
     let rows = String::from_utf8(before[0].clone()).expect("text");
-    assert_eq!(rows.lines().count(), 1 + 2 * 5, "{rows}");
+    assert_eq!(rows.lines().count(), 1 + 2 * 4, "{rows}");
     assert!(rows.starts_with("item,setting,search,status,fit_horizontal"), "{rows}");
     assert!(String::from_utf8(read("report.html")).expect("text").contains("How often a search arrives"));
     let summary: serde_json::Value = serde_json::from_slice(&before[2]).expect("JSON");
     let counts = summary["counts"].as_array().expect("counts");
-    assert_eq!(counts.len(), 10);
+    assert_eq!(counts.len(), 8);
     assert!(counts.iter().filter(|c| c["search"] == "truth").all(|c| c["arrived"] == 2), "{summary}");
 
     // Cut off within the second item, and gone on with on another number of threads.

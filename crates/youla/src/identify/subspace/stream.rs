@@ -32,11 +32,12 @@ use crate::{Error, Mat, Result};
 ///
 /// ```no_run
 /// use youla::identify::subspace::{SubspaceOptions, subspace_stream};
-/// use youla::{lti::Discrete, record::{ChannelRef, NpyStream}};
+/// use youla::lti::Discrete;
+/// use youla_io::{ChannelRef, NpyStream};
 /// let [u, y] = [1, 2].map(ChannelRef::Column);
 /// let mut stream = NpyStream::open("long.npy", &[u], &[y])?;
 /// let found = subspace_stream(&mut stream, Discrete::new(1e-4)?, &SubspaceOptions::default())?;
-/// # Ok::<(), youla::Error>(())
+/// # Ok::<(), youla_io::Error>(())
 /// ```
 pub fn subspace_stream(
     stream: &mut dyn SampleStream,

@@ -44,7 +44,7 @@ impl Excitation {
     ///
     /// ```
     /// use rand::SeedableRng;
-    /// use youla::{lti::Discrete, record::{Excitation, Prbs}};
+    /// use youla::{lti::Discrete, signal::{Excitation, Prbs}};
     /// let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
     /// let prbs = Excitation::Prbs(Prbs { amplitude: 0.25, ..Prbs::default() });
     /// let alpha = prbs.generate(1000, 2, Discrete::new(2e-4)?, &mut rng)?;

@@ -15,7 +15,7 @@ use rand::Rng;
 ///
 /// ```
 /// use rand::SeedableRng;
-/// use youla::{lti::Discrete, record::RampedExcitation};
+/// use youla::{lti::Discrete, signal::RampedExcitation};
 /// let faded: RampedExcitation = toml::from_str("kind = \"prbs\"\namplitude = 0.5\nramp = 0.1").unwrap();
 /// let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
 /// let alpha = faded.generate(1001, 1, Discrete::new(1e-3)?, &mut rng)?;

@@ -60,13 +60,18 @@ fn every_loop_factorises_or_is_refused_for_a_reason() {
     assert!(failures.is_empty(), "{} of {loops} loops, such as\n{}", failures.len(), failures[..shown].join("\n"));
     // Nothing of this passes by refusing everything.
     let share = |names: &[&str]| names.iter().filter_map(|name| shares.get(name)).sum::<usize>() as f64 / loops as f64;
-    assert!(share(&ACCEPTED) > 0.65, "{shares:?}");
+    // The limits are those of the share of infinitely many loops; of these, it scatters as a binomial share.
+    let scatter = |share: f64| 3.0 * (share * (1.0 - share) / loops as f64).sqrt();
+    let above = |names: &[&str], least: f64| assert!(share(names) > least - scatter(least), "{names:?}: {shares:?}");
+    let below = |names: &[&str], most: f64| assert!(share(names) < most + scatter(most), "{names:?}: {shares:?}");
+    above(&ACCEPTED, 0.65);
     for (name, least) in ACCEPTED.iter().zip([0.14, 0.1, 0.14, 0.14, 0.05, 0.05]) {
-        assert!(share(&[name]) > least, "{name}: {shares:?}");
+        above(&[name], least);
     }
-    assert!(share(&["not stabilising"]) > 0.1 && share(&["gain refused"]) > 0.03, "{shares:?}");
-    assert!(share(&["out of reach", "nearly out of reach"]) < 0.08, "{shares:?}");
-    assert!(share(&ROUNDING) < 0.01, "{shares:?}");
+    above(&["not stabilising"], 0.1);
+    above(&["gain refused"], 0.03);
+    below(&["out of reach", "nearly out of reach"], 0.08);
+    below(&ROUNDING, 0.01);
 }
 
 /// Draws a loop, designs what its construction needs and judges what comes of it.

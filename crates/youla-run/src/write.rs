@@ -36,6 +36,9 @@ pub fn write_run(
     clock.run(Stage::Report, || {
         let page = page(found, &so_far, &name)?;
         folder.compact_json("report.json", &page)?;
+        // Drawn from the rounded numbers of report.json, so that `youla report` draws the same page again.
+        let as_written = serde_json::to_vec(&page).and_then(|bytes| serde_json::from_slice(&bytes));
+        let page = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
         Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)
     })?;
     let summary = summary(found, &clock.seconds)?;

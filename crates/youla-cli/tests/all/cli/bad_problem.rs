@@ -68,7 +68,11 @@ fn too_few_samples() {
     let fewer = settings("take = 1200", "take = 12");
     settings_refused("few", &fewer, &["record log", "12 samples are too few, at least 21", "`settle` in [factors]"]);
     let order = settings("fixed = 3", "fixed = 30");
-    settings_refused("few", &order, &["order 30 exceeds 9", "horizon of 10"]);
+    settings_refused(
+        "few",
+        &order,
+        &["a model of order 30 was asked for", "9 = (horizon - 1) x outputs", "horizon = 10"],
+    );
     let skip = settings("[hansen]", "[verification]\nskip = 100000\n\n[hansen]");
     settings_refused("few", &skip, &["record rest", "800 samples are too few", "`skip` in [verification]"]);
 }

@@ -211,7 +211,7 @@ fn excitation_that_rests() {
     let mut log = drive();
     log.column("d").fill(0.0);
     let found = check_run("rests", DRIVE, &log);
-    assert!(found.serious("excitation", Some("d"))["what"].as_str().is_some_and(|w| w.contains("does not move")));
+    assert!(found.serious("excitation", Some("d"))["what"].as_str().is_some_and(|w| w.contains("is constant")));
 }
 
 #[test]

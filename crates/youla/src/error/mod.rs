@@ -236,6 +236,15 @@ pub enum Error {
         /// The lowest of all orders that the controller stabilises.
         lowest: Option<f64>,
     },
+    /// No search for a model by likelihood ended with finite numbers.
+    #[error(
+        "no candidate model survives: no search on the {samples} samples ends with a finite likelihood; \
+         record longer, excite more, or state order and dead time"
+    )]
+    NoCandidate {
+        /// Samples of all records.
+        samples: usize,
+    },
     /// A channel, column or variable was asked for that does not exist.
     #[error("{what} has no {name:?}{}; known: {}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default(), Names(known))]
     UnknownChannel {
@@ -329,7 +338,8 @@ impl Error {
             | Error::AlgebraicLoop { .. }
             | Error::Diverged { .. }
             | Error::PoleOnBoundary { .. }
-            | Error::NoReducedOrder { .. } => ErrorKind::Numerical,
+            | Error::NoReducedOrder { .. }
+            | Error::NoCandidate { .. } => ErrorKind::Numerical,
             Error::Shape { .. }
             | Error::NotFinite { .. }
             | Error::OutOfRange { .. }

@@ -4,4 +4,5 @@ pub mod direct;
 pub mod fit;
 pub mod hansen;
 pub mod innovation_form;
+pub mod likelihood;
 pub mod subspace;

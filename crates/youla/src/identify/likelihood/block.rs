@@ -1,0 +1,114 @@
+//! One block of a model in block-diagonal form.
+
+use crate::linalg::real_schur;
+use faer::{Mat, c64};
+
+/// One block of s states.
+#[derive(Debug, Clone)]
+pub(crate) struct Block {
+    /// Number of states s.
+    pub(crate) states: usize,
+    /// A, s x s, row by row.
+    pub(crate) a: Vec<f64>,
+    /// B, s x m, row by row.
+    pub(crate) b: Vec<f64>,
+    /// C, p x s, row by row.
+    pub(crate) c: Vec<f64>,
+}
+
+impl Block {
+    /// Poles of the block.
+    pub(crate) fn poles(&self) -> Vec<c64> {
+        match self.states {
+            1 => vec![c64::new(self.a[0], 0.0)],
+            2 => {
+                let (half, det) = (0.5 * (self.a[0] + self.a[3]), self.a[0] * self.a[3] - self.a[1] * self.a[2]);
+                let root = 0.5 * (self.a[0] - self.a[3]);
+                let disc = root * root + self.a[1] * self.a[2];
+                if disc >= 0.0 {
+                    let far = half + half.signum() * disc.sqrt();
+                    let near = if far == 0.0 { 0.0 } else { det / far };
+                    vec![c64::new(far, 0.0), c64::new(near, 0.0)]
+                } else {
+                    vec![c64::new(half, (-disc).sqrt()), c64::new(half, -(-disc).sqrt())]
+                }
+            }
+            s => {
+                let a = Mat::from_fn(s, s, |i, j| self.a[i * s + j]);
+                real_schur("A", a.as_ref()).map(|f| f.eigenvalues()).unwrap_or_default()
+            }
+        }
+    }
+
+    /// (z I - A)^-1, row by row.
+    pub(crate) fn resolvent(&self, z: c64, out: &mut [c64]) {
+        match self.states {
+            1 => out[0] = (z - self.a[0]).inv(),
+            2 => {
+                let (p, q) = (z - self.a[0], z - self.a[3]);
+                let scale = (p * q - self.a[1] * self.a[2]).inv();
+                (out[0], out[1], out[2], out[3]) = (q * scale, scale * self.a[1], scale * self.a[2], p * scale);
+            }
+            s => invert(s, |i, j| if i == j { z - self.a[i * s + j] } else { c64::new(-self.a[i * s + j], 0.0) }, out),
+        }
+    }
+
+    /// States scaled so that each has a like share of B and C, in units of one.
+    pub(crate) fn levelled(mut self) -> Self {
+        let s = self.states;
+        let (m, p) = (self.b.len() / s, self.c.len() / s);
+        let size = |v: &mut dyn Iterator<Item = f64>| v.map(|x| x * x).sum::<f64>().sqrt();
+        let b = size(&mut self.b.iter().copied());
+        let c = size(&mut self.c.iter().copied());
+        if b > 0.0 && c > 0.0 && (b * c).is_finite() {
+            let scale = (c / b).sqrt();
+            self.b.iter_mut().for_each(|v| *v *= scale);
+            self.c.iter_mut().for_each(|v| *v /= scale);
+        }
+        debug_assert!(m * s == self.b.len() && p * s == self.c.len());
+        self
+    }
+}
+
+/// Gauss-Jordan with partial pivoting.
+fn invert(s: usize, entry: impl Fn(usize, usize) -> c64, out: &mut [c64]) {
+    let w = 2 * s;
+    let mut work = vec![c64::ZERO; s * w];
+    for i in 0..s {
+        for j in 0..s {
+            work[i * w + j] = entry(i, j);
+        }
+        work[i * w + s + i] = c64::ONE;
+    }
+    for col in 0..s {
+        let mut pivot = col;
+        for row in col + 1..s {
+            if work[row * w + col].norm_sqr() > work[pivot * w + col].norm_sqr() {
+                pivot = row;
+            }
+        }
+        if pivot != col {
+            for j in 0..w {
+                work.swap(pivot * w + j, col * w + j);
+            }
+        }
+        let inverse = work[col * w + col].inv();
+        for j in 0..w {
+            work[col * w + j] *= inverse;
+        }
+        for row in 0..s {
+            let factor = work[row * w + col];
+            if row != col && factor != c64::ZERO {
+                for j in 0..w {
+                    let above = work[col * w + j];
+                    work[row * w + j] -= factor * above;
+                }
+            }
+        }
+    }
+    for i in 0..s {
+        for j in 0..s {
+            out[i * s + j] = work[i * w + s + j];
+        }
+    }
+}

@@ -1,0 +1,67 @@
+//! The recommended model as an innovation form: plant, noise and Kalman gain.
+//!
+//! Each output carries an autoregression, `v(t) = -a_1 v(t-1) - ... + e(t)`, whose innovations are those of the whole where the
+//! plant is stable: K is zero for the states of the plant. Where it is not, the gain comes from the Riccati equation of plant and
+//! noise, which mirrors its poles.
+
+use super::noise::Noise;
+use super::recommendation::Predictor;
+use crate::linalg::{RiccatiProblem, block, block_diagonal, dare};
+use crate::lti::{Discrete, StateSpace};
+use faer::{Mat, Scale};
+
+/// Process noise that keeps poles on the circle within reach, as a share of the covariance of the innovations.
+const TRACE: f64 = 1e-12;
+
+/// Joins the plant (physical units) to the noise, whose covariance is in units of `sizes`.
+pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f64]) -> Predictor {
+    let [shift, enters, seen] = autoregressions(&noise.regression);
+    let (n, p, extra) = (plant.order(), plant.outputs(), shift.nrows());
+    let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * sizes[i] * sizes[j]);
+    let a = block_diagonal(plant.a(), shift.as_ref());
+    let b = block(&[&[plant.b()], &[Mat::zeros(extra, plant.inputs()).as_ref()]]);
+    let c = block(&[&[plant.c(), seen.as_ref()]]);
+    let gain = block(&[&[Mat::zeros(n, p).as_ref()], &[enters.as_ref()]]);
+    let stable = plant.is_stable().unwrap_or(false);
+    let k = if stable { Some(gain) } else { riccati(&a, &c, &gain, &covariance) };
+    Predictor { a, b, c, d: plant.d().to_owned(), k, covariance }
+}
+
+/// `w+ = A w + G e`, `v = C w + e` of all outputs in companion form.
+fn autoregressions(regression: &[Vec<f64>]) -> [Mat<f64>; 3] {
+    let (p, extra) = (regression.len(), regression.iter().map(Vec::len).sum());
+    let mut shift = Mat::<f64>::zeros(extra, extra);
+    let mut enters = Mat::<f64>::zeros(extra, p);
+    let mut seen = Mat::<f64>::zeros(p, extra);
+    let mut at = 0;
+    for (i, coefficients) in regression.iter().enumerate() {
+        for (j, value) in coefficients.iter().enumerate() {
+            seen[(i, at + j)] = -value;
+            shift[(at, at + j)] = -value;
+            if j > 0 {
+                shift[(at + j, at + j - 1)] = 1.0;
+            }
+        }
+        if !coefficients.is_empty() {
+            enters[(at, i)] = 1.0;
+        }
+        at += coefficients.len();
+    }
+    [shift, enters, seen]
+}
+
+/// `K = (A P C' + S) (C P C' + R)^-1` as the dual of the regulator.
+fn riccati(a: &Mat<f64>, c: &Mat<f64>, gain: &Mat<f64>, covariance: &Mat<f64>) -> Option<Mat<f64>> {
+    let q = gain * covariance * gain.transpose();
+    let trace = (0..covariance.nrows()).map(|i| covariance[(i, i)]).sum::<f64>() * TRACE;
+    let q = (&q + q.transpose()) * Scale(0.5) + Mat::<f64>::identity(a.nrows(), a.nrows()) * Scale(trace);
+    let s = gain * covariance;
+    let dual = RiccatiProblem {
+        a: a.transpose(),
+        b: c.transpose(),
+        q: q.as_ref(),
+        r: covariance.as_ref(),
+        s: Some(s.as_ref()),
+    };
+    dare("the predictor", &dual).ok().map(|solution| solution.gain.transpose().to_owned())
+}

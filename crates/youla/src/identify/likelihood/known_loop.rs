@@ -1,0 +1,64 @@
+//! What is known of the loop in which the records were taken.
+
+use crate::linalg::{check_finite, check_shape};
+use crate::lti::{Discrete, StateSpace};
+use crate::{Error, MatRef, Result};
+
+/// The signals of one record in the terms of the controller.
+///
+/// ```text
+/// u = K (y - r) + d:           seen = y - r,    explained = u - d,       excitation = d or r
+/// u = F x^ + alpha, observer:  seen = [u y],    explained = u - alpha,   excitation = alpha
+/// ```
+#[derive(Debug, Clone, Copy)]
+pub struct LoopSignals<'a> {
+    /// What the controller sees, N x its inputs.
+    pub seen: MatRef<'a, f64>,
+    /// The inputs of the plant that it explains: u without the excitation that is added to it, N x m.
+    pub explained: MatRef<'a, f64>,
+    /// The external excitation, wherever it enters, N x any number of channels; `None` where it is not known.
+    pub excitation: Option<MatRef<'a, f64>>,
+}
+
+/// The controller that ran, and the signals of each record in its terms.
+#[derive(Debug, Clone)]
+pub struct LoopKnowledge<'a> {
+    pub(super) controller: Option<&'a StateSpace<Discrete>>,
+    pub(super) estimation: Vec<LoopSignals<'a>>,
+    pub(super) verification: Vec<LoopSignals<'a>>,
+}
+
+impl<'a> LoopKnowledge<'a> {
+    /// From the controller (from what it sees to the inputs that it explains; `None` in open loop) and the signals of each record,
+    /// in the order of the experiments.
+    ///
+    /// # Errors
+    /// [`Error::Shape`] and [`Error::NotFinite`] with the record.
+    pub fn new(
+        controller: Option<&'a StateSpace<Discrete>>,
+        estimation: Vec<LoopSignals<'a>>,
+        verification: Vec<LoopSignals<'a>>,
+    ) -> Result<Self> {
+        for (kind, records) in [("estimation", &estimation), ("verification", &verification)] {
+            for (k, record) in records.iter().enumerate() {
+                check(controller, record).map_err(|e| e.within(format!("{kind} record {}", k + 1)))?;
+            }
+        }
+        Ok(LoopKnowledge { controller, estimation, verification })
+    }
+}
+
+fn check(controller: Option<&StateSpace<Discrete>>, record: &LoopSignals<'_>) -> Result<(), Error> {
+    let rows = record.seen.nrows();
+    if let Some(k) = controller {
+        check_shape("what the controller sees", record.seen, (rows, k.inputs()))?;
+        check_shape("what the controller explains", record.explained, (rows, k.outputs()))?;
+    }
+    check_finite("what the controller sees", record.seen)?;
+    check_finite("what the controller explains", record.explained)?;
+    if let Some(x) = record.excitation {
+        check_shape("the excitation", x, (rows, x.ncols()))?;
+        check_finite("the excitation", x)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,200 @@
+//! The model that a record supports, without a tuning key: maximum likelihood on the lines of the records' Fourier transforms,
+//! starts from long regressions, order and dead time by evidence.
+//!
+//! ```text
+//! Y(k) = G(z) U(k) + C (z I - A)^-1 z t + H(z) E(k),        z = exp(2 pi i k / N)
+//! -2 log likelihood = N log det Lambda + 2 N log |det A_u|
+//! ```
+//! The vector t stands for both ends of a record (`spectra`), H for an autoregression per output, A_u for the poles outside the
+//! unit circle (`search`). The plant and its noise are found together, so that the estimate holds in closed loop, where the
+//! input is correlated with the noise (Ljung, System Identification, section 13.4), and for unstable plants.
+//!
+//! | step | module |
+//! |---|---|
+//! | starts: states of long regressions of several pasts | `lag_sums`, `states`, `starts` |
+//! | dead time from the newest inputs of a regression | `dead_time` |
+//! | search in local coordinates, the noise estimated with it | `search`, `linearise`, `chart`, `noise` |
+//! | one mode more, one less, another dead time, until Schwarz's criterion falls no more | `solve`, `neighbours`, `grow` |
+//! | standard deviations: information of the record, and scatter of models that it does not tell apart | `deviation` |
+//! | questions to the records, each with a figure and a limit | `trust` |
+
+mod balancing;
+mod block;
+mod chart;
+mod dead_time;
+mod deviation;
+mod grouping;
+mod grow;
+mod innovation;
+mod known_loop;
+mod lag_sums;
+mod linearise;
+mod mode_estimates;
+mod model;
+mod neighbours;
+mod noise;
+mod options;
+mod physical;
+mod point;
+mod problem;
+mod recommendation;
+mod rows;
+mod search;
+mod solve;
+mod spectra;
+mod starts;
+mod states;
+mod trust;
+
+pub use super::subspace::Experiment;
+pub use known_loop::{LoopKnowledge, LoopSignals};
+pub use mode_estimates::ModeEstimate;
+pub use options::LikelihoodOptions;
+pub use recommendation::{Candidate, Evidence, Predictor, Recommendation, ResponseDeviation};
+
+use crate::linalg::{check_finite, check_shape};
+use crate::lti::Discrete;
+use crate::{Error, Mat, MatRef, Result};
+use problem::{Problem, Solution};
+use spectra::{Sizes, Spectra};
+
+/// Largest dead time that is tried, samples.
+const LARGEST_DEAD_TIME: usize = 12;
+/// Samples per parameter of the smallest model, below which nothing is tried.
+const SAMPLES_PER_PARAMETER: usize = 10;
+
+/// The model that the records support, with its evidence.
+///
+/// The records of `estimation` decide; those of `verification` (which may be empty) are asked whether they agree. What is known of
+/// the loop is asked too; without it nothing shows that an excitation, not the noise, moved the plant, and the model is not trusted.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`Error::Shape`], [`Error::NotFinite`] and [`Error::ConstantChannel`] name the channel, [`Error::TooFewSamples`] says how many
+/// are needed, [`Error::OutOfRange`] an option that cannot be met; [`Error::NoCandidate`] where no search ends.
+pub fn recommend(
+    estimation: &[Experiment<'_>],
+    verification: &[Experiment<'_>],
+    known: Option<&LoopKnowledge<'_>>,
+    time: Discrete,
+    options: &LikelihoodOptions,
+) -> Result<Recommendation> {
+    check(estimation, verification)?;
+    let problem = problem(estimation, options)?;
+    let mut candidates = Vec::new();
+    let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
+    let choice = &solution.chosen;
+    let spectra = problem.spectra(&choice.delays);
+    let shares = deviation::grid(spectra.samples());
+    let deviations = deviation::deviations(&spectra, &solution, &shares);
+    let evidence = evidence(&problem, &solution, &spectra, (&shares, &deviations), (verification, known));
+    let plant = physical::plant(choice, &problem.sizes, time)?;
+    Ok(Recommendation {
+        predictor: innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
+        plant,
+        dead_time: choice.delays.clone(),
+        order: choice.order(),
+        response_deviation: response_deviation(&problem.sizes, &shares, &deviations, time),
+        modes: mode_estimates::modes(&spectra, choice, time),
+        candidates,
+        evidence,
+    })
+}
+
+/// Shapes, finite entries, channels that move.
+fn check(estimation: &[Experiment<'_>], verification: &[Experiment<'_>]) -> Result<()> {
+    let (m, p) = estimation.first().map_or((0, 0), |e| (e.u.ncols(), e.y.ncols()));
+    for (kind, records) in [("estimation", estimation), ("verification", verification)] {
+        for (k, e) in records.iter().enumerate() {
+            let what = |signal: &str| format!("{signal} of {kind} record {}", k + 1);
+            check_shape(&what("u"), e.u, (e.u.nrows(), m))?;
+            check_shape(&what("y"), e.y, (e.u.nrows(), p))?;
+            check_finite(&what("u"), e.u)?;
+            check_finite(&what("y"), e.y)?;
+        }
+    }
+    check_moving("input", &estimation.iter().map(|e| e.u).collect::<Vec<_>>())?;
+    check_moving("output", &estimation.iter().map(|e| e.y).collect::<Vec<_>>())
+}
+
+/// Fails at the first channel that is constant in every record.
+fn check_moving(signal: &str, records: &[MatRef<'_, f64>]) -> Result<()> {
+    for j in 0..records.first().map_or(0, |r| r.ncols()) {
+        let first = records.iter().find(|r| r.nrows() > 0).map_or(0.0, |r| r[(0, j)]);
+        if records.iter().all(|r| r.col(j).iter().all(|v| *v == r[(0, j)])) {
+            return Err(Error::ConstantChannel { what: format!("{signal} {}", j + 1), value: first });
+        }
+    }
+    Ok(())
+}
+
+fn problem<'a>(experiments: &'a [Experiment<'a>], options: &LikelihoodOptions) -> Result<Problem<'a>> {
+    let (m, p) = experiments.first().map_or((0, 0), |e| (e.u.ncols(), e.y.ncols()));
+    let longest = experiments.iter().map(|e| e.u.nrows()).max().unwrap_or(0);
+    let order = options.order.unwrap_or(1);
+    let needed = SAMPLES_PER_PARAMETER * (order * (m + p) + 8);
+    if m == 0 || p == 0 || longest < needed {
+        return Err(Error::TooFewSamples { what: "the longest record".into(), found: longest, needed });
+    }
+    let given = options.dead_time.as_deref();
+    if let Some(given) = given.filter(|given| given.len() != m) {
+        return Err(Error::Ports { what: "the number of dead times".into(), expected: m, found: given.len() });
+    }
+    let skip = given.map_or(LARGEST_DEAD_TIME.min(longest / 16), |given| given.iter().copied().max().unwrap_or(0));
+    if skip > longest / 4 {
+        let must = "at most a quarter of the longest record, in samples";
+        return Err(Error::OutOfRange { what: "the dead time".into(), value: skip as f64, must });
+    }
+    if order == 0 || options.largest_order == 0 {
+        return Err(Error::OutOfRange { what: "the order".into(), value: 0.0, must: "at least one" });
+    }
+    Ok(Problem {
+        experiments,
+        sizes: Sizes::of(experiments),
+        skip,
+        feedthrough: options.feedthrough.unwrap_or(false),
+        order: options.order,
+        dead_time: options.dead_time.clone(),
+        largest_order: options.largest_order,
+    })
+}
+
+/// All questions, those to the model itself first.
+fn evidence(
+    problem: &Problem<'_>,
+    solution: &Solution,
+    spectra: &Spectra,
+    (shares, deviations): (&[f64], &[Vec<f64>]),
+    (fresh, known): (&[Experiment<'_>], Option<&LoopKnowledge<'_>>),
+) -> Vec<Evidence> {
+    let responses: Vec<_> = shares.iter().map(|s| deviation::response(&solution.chosen, *s)).collect();
+    let mut evidence = vec![trust::accuracy(&responses, deviations), trust::nonlinear(spectra, solution)];
+    evidence.extend(trust::parts(problem, solution, fresh));
+    if let Some((k, known)) = known.and_then(|known| Some((known.controller?, known))) {
+        let records: Vec<_> =
+            known.estimation.iter().chain(&known.verification).map(|r| (r.seen, r.explained)).collect();
+        evidence.extend(trust::controller(k, &records));
+    }
+    let excitation: Option<Vec<_>> = known.and_then(|known| known.estimation.iter().map(|r| r.excitation).collect());
+    match excitation {
+        Some(x) if x.iter().any(|x| x.norm_l2() > 0.0) => {
+            evidence.push(trust::residual_and_excitation(spectra, solution, &x, problem.skip));
+        }
+        _ => evidence.push(Evidence::new(
+            "Is no external excitation known in the estimation records (1: none)?",
+            1.0,
+            0.0,
+        )),
+    }
+    evidence
+}
+
+fn response_deviation(sizes: &Sizes, shares: &[f64], deviations: &[Vec<f64>], time: Discrete) -> ResponseDeviation {
+    let (m, p) = (sizes.u.len(), sizes.y.len());
+    let physical = |v: &Vec<f64>| Mat::from_fn(p, m, |i, j| v[i * m + j] * sizes.y[i] / sizes.u[j]);
+    ResponseDeviation {
+        hz: shares.iter().map(|share| share / time.ts()).collect(),
+        absolute: deviations.iter().map(physical).collect(),
+    }
+}

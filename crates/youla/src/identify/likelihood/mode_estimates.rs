@@ -1,0 +1,80 @@
+//! Modes of the recommended model with standard deviations, from the slopes of the poles in the parameters of their block:
+//!
+//! ```text
+//! var f = (df/dtheta) (J'J)^-1 (df/dtheta)',     f: natural frequency, damping ratio, magnitude
+//! ```
+
+use super::block::Block;
+use super::chart::Chart;
+use super::deviation::inverse_root;
+use super::linearise::linearise;
+use super::problem::Choice;
+use super::spectra::Spectra;
+use crate::lti::Discrete;
+use crate::lti::modes::{Mode, mode};
+use faer::{Mat, c64};
+
+/// Step of the central differences, in units of the entries of a balanced A.
+const STEP: f64 = 1e-6;
+
+/// One real pole or pair with standard deviations.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ModeEstimate {
+    /// Natural frequency, damping ratio and pole.
+    pub mode: Mode,
+    /// Standard deviation of the natural frequency, Hz.
+    pub hz_deviation: f64,
+    /// Standard deviation of the damping ratio.
+    pub zeta_deviation: f64,
+    /// Standard deviation of the magnitude of the pole.
+    pub magnitude_deviation: f64,
+}
+
+/// Modes of a choice, by natural frequency.
+pub(crate) fn modes(spectra: &Spectra, choice: &Choice, time: Discrete) -> Vec<ModeEstimate> {
+    let found = &choice.found;
+    let chart = Chart::new(&found.point.model, found.feedthrough);
+    let linearised = linearise(spectra, &found.point, &chart, &found.noise);
+    let root = inverse_root(&linearised.factor, chart.parameters());
+    let mut out = Vec::new();
+    let mut at = 0;
+    for (block, directions) in found.point.model.blocks.iter().zip(&chart.directions) {
+        for pole in block.poles().into_iter().filter(|p| p.im >= 0.0) {
+            let slopes = slopes(block, directions, pole, time);
+            let deviation = |figure: usize| {
+                let along =
+                    |c: usize| slopes.iter().enumerate().map(|(q, s)| s[figure] * root[(at + q, c)]).sum::<f64>();
+                (0..root.ncols()).map(|c| along(c).powi(2)).sum::<f64>().sqrt()
+            };
+            out.push(ModeEstimate {
+                mode: mode(time, pole),
+                hz_deviation: deviation(0),
+                zeta_deviation: deviation(1),
+                magnitude_deviation: deviation(2),
+            });
+        }
+        at += directions.ncols();
+    }
+    out.sort_by(|a, b| a.mode.hz.total_cmp(&b.mode.hz));
+    out
+}
+
+/// Slopes of frequency, damping and magnitude of a pole in each direction of its block, by central differences.
+fn slopes(block: &Block, directions: &Mat<f64>, pole: c64, time: Discrete) -> Vec<[f64; 3]> {
+    let figures = |pole: c64| {
+        let mode = mode(time, pole);
+        [mode.hz, mode.zeta, pole.norm()]
+    };
+    let moved = |q: usize, step: f64| {
+        let mut other = block.clone();
+        other.a.iter_mut().enumerate().for_each(|(i, a)| *a += step * directions[(i, q)]);
+        let distance = |p: &c64| (p - pole).norm();
+        let near = other.poles().into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
+        figures(near.unwrap_or(pole))
+    };
+    let slope = |q: usize| {
+        let (up, down) = (moved(q, STEP), moved(q, -STEP));
+        std::array::from_fn(|k| (up[k] - down[k]) / (2.0 * STEP))
+    };
+    (0..directions.ncols()).map(slope).collect()
+}

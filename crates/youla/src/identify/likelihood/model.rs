@@ -1,0 +1,134 @@
+//! A model in block-diagonal form, A = diag(A_1, ..., A_k): one block per real pole or pair, larger ones for poles too close
+//! to be told apart.
+//!
+//! The blocks make responses and sensitivities cheap: a block touches the entries of its own A, B and C only.
+
+use super::balancing::balanced;
+use super::block::Block;
+use super::grouping::{Grouped, grouped};
+use faer::prelude::*;
+use faer::{Mat, MatRef, c64};
+
+/// `y = sum of C_i (z I - A_i)^-1 B_i u + D u`.
+#[derive(Debug, Clone)]
+pub(crate) struct Model {
+    /// Inputs m.
+    pub(crate) inputs: usize,
+    /// Outputs p.
+    pub(crate) outputs: usize,
+    /// The blocks.
+    pub(crate) blocks: Vec<Block>,
+    /// D, p x m, row by row.
+    pub(crate) d: Vec<f64>,
+}
+
+impl Model {
+    /// The blocks of A, B, C; `None` where A has no Schur form.
+    pub(crate) fn of(a: MatRef<'_, f64>, b: MatRef<'_, f64>, c: MatRef<'_, f64>, d: Vec<f64>) -> Option<Self> {
+        Model::formed([a, b, c], d, true)
+    }
+
+    /// The same with a block for each pole or pair, as far as they can be told apart: what may be left out of a model.
+    pub(crate) fn separated(&self) -> Option<Self> {
+        let (a, b, c) = self.matrices();
+        Model::formed([a.as_ref(), b.as_ref(), c.as_ref()], self.d.clone(), false)
+    }
+
+    fn formed([a, b, c]: [MatRef<'_, f64>; 3], d: Vec<f64>, merge: bool) -> Option<Self> {
+        let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
+        if n == 0 {
+            return Some(Model { inputs: m, outputs: p, blocks: Vec::new(), d });
+        }
+        let [a, b, c] = balanced(a, b, c);
+        let Grouped { groups, basis } = grouped(a.as_ref(), merge)?;
+        let lu = basis.partial_piv_lu();
+        let (at, bt, ct) = (lu.solve(&a * &basis), lu.solve(&b), &c * &basis);
+        let row_by_row = |part: MatRef<'_, f64>| {
+            let (rows, columns) = (part.nrows(), part.ncols());
+            (0..rows * columns).map(|x| part[(x / columns, x % columns)]).collect::<Vec<f64>>()
+        };
+        let mut blocks = Vec::with_capacity(groups.len());
+        let mut start = 0;
+        for s in groups.iter().map(Vec::len) {
+            let block = Block {
+                states: s,
+                a: row_by_row(at.submatrix(start, start, s, s)),
+                b: row_by_row(bt.subrows(start, s)),
+                c: row_by_row(ct.subcols(start, s)),
+            };
+            blocks.push(block.levelled());
+            start += s;
+        }
+        Some(Model { inputs: m, outputs: p, blocks, d })
+    }
+
+    /// Number of states.
+    pub(crate) fn order(&self) -> usize {
+        self.blocks.iter().map(|b| b.states).sum()
+    }
+
+    /// A, B and C.
+    pub(crate) fn matrices(&self) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
+        let (n, m, p) = (self.order(), self.inputs, self.outputs);
+        let (mut a, mut b, mut c) = (Mat::zeros(n, n), Mat::zeros(n, m), Mat::zeros(p, n));
+        let mut at = 0;
+        for block in &self.blocks {
+            let s = block.states;
+            (0..s * s).for_each(|x| a[(at + x / s, at + x % s)] = block.a[x]);
+            (0..s * m).for_each(|x| b[(at + x / m, x % m)] = block.b[x]);
+            (0..p * s).for_each(|x| c[(x / s, at + x % s)] = block.c[x]);
+            at += s;
+        }
+        (a, b, c)
+    }
+
+    /// All poles.
+    pub(crate) fn poles(&self) -> Vec<c64> {
+        self.blocks.iter().flat_map(Block::poles).collect()
+    }
+
+    /// Sum of the logarithms of the poles outside the unit circle, log |det A_u|.
+    pub(crate) fn unstable(&self) -> f64 {
+        self.poles().iter().map(|p| p.norm().ln().max(0.0)).sum()
+    }
+
+    /// Mean square of the response in the upper half of the band.
+    pub(crate) fn fast_gain(&self) -> f64 {
+        let points = 32;
+        let of = |k: usize| {
+            let z = c64::cis(std::f64::consts::PI * (0.5 + 0.5 * (k as f64 + 0.5) / points as f64));
+            self.response(z).iter().map(|g| g.norm_sqr()).sum::<f64>()
+        };
+        (0..points).map(of).sum::<f64>() / points as f64
+    }
+
+    /// The same without the block at a place.
+    pub(crate) fn without(&self, place: usize) -> Self {
+        let mut model = self.clone();
+        model.blocks.remove(place);
+        model
+    }
+
+    /// G(z), p x m row by row.
+    pub(crate) fn response(&self, z: c64) -> Vec<c64> {
+        let (m, p) = (self.inputs, self.outputs);
+        let mut g: Vec<c64> = self.d.iter().map(|d| c64::new(*d, 0.0)).collect();
+        for block in &self.blocks {
+            let s = block.states;
+            let mut inverse = vec![c64::ZERO; s * s];
+            block.resolvent(z, &mut inverse);
+            for j in 0..m {
+                for i in 0..s {
+                    let mut x = c64::ZERO;
+                    for l in 0..s {
+                        x += inverse[i * s + l] * block.b[l * m + j];
+                    }
+                    for o in 0..p {
+                        g[o * m + j] += x * block.c[o * s + i];
+                    }
+                }
+            }
+        }
+        g
+    }
+}

@@ -1,0 +1,126 @@
+//! The records with what is fixed about the model, and the searches that are made on them.
+
+use super::Candidate;
+use super::point::Point;
+use super::search::{Found, SearchOptions, search};
+use super::spectra::{Sizes, Spectra};
+use crate::identify::subspace::Experiment;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Largest order of the autoregression of the noise.
+pub(crate) const NOISE_ORDER: usize = 12;
+
+/// A found model with the delays it was found for.
+#[derive(Clone)]
+pub(crate) struct Choice {
+    /// The model.
+    pub(crate) found: Found,
+    /// Delays of the inputs in samples.
+    pub(crate) delays: Vec<usize>,
+    /// Schwarz's criterion.
+    pub(crate) criterion: f64,
+    /// Where its start came from.
+    pub(crate) origin: String,
+}
+
+impl Choice {
+    /// States without those of the delays.
+    pub(crate) fn order(&self) -> usize {
+        self.found.point.model.order()
+    }
+}
+
+/// The chosen model and those that the data do not tell from it.
+pub(crate) struct Solution {
+    /// The model.
+    pub(crate) chosen: Choice,
+    /// Models whose likelihood is close.
+    pub(crate) rivals: Vec<Choice>,
+}
+
+/// A search to be done.
+pub(crate) struct Task {
+    /// The lines for the delays.
+    pub(crate) spectra: Arc<Spectra>,
+    /// Where it starts.
+    pub(crate) start: Point,
+    /// Delays of the inputs in samples.
+    pub(crate) delays: Vec<usize>,
+    /// Where the start came from.
+    pub(crate) origin: String,
+}
+
+/// Everything that a search needs to know of the records.
+#[derive(Clone)]
+pub(crate) struct Problem<'a> {
+    /// Records.
+    pub(crate) experiments: &'a [Experiment<'a>],
+    /// Sizes of the channels.
+    pub(crate) sizes: Sizes,
+    /// Samples kept as the past of delayed inputs: the largest dead time.
+    pub(crate) skip: usize,
+    /// Whether D moves.
+    pub(crate) feedthrough: bool,
+    /// The order where it is given.
+    pub(crate) order: Option<usize>,
+    /// The dead times where they are given.
+    pub(crate) dead_time: Option<Vec<usize>>,
+    /// Largest order.
+    pub(crate) largest_order: usize,
+}
+
+impl Problem<'_> {
+    /// The lines for given delays.
+    pub(crate) fn spectra(&self, delays: &[usize]) -> Spectra {
+        Spectra::new(self.experiments, &self.sizes, delays, self.skip)
+    }
+
+    /// Options of a search.
+    pub(crate) fn options(&self, steps: usize, tolerance: f64) -> SearchOptions {
+        SearchOptions { feedthrough: self.feedthrough, noise_order: NOISE_ORDER, steps, tolerance, aim: f64::INFINITY }
+    }
+
+    /// Inputs.
+    pub(crate) fn inputs(&self) -> usize {
+        self.sizes.u.len()
+    }
+
+    /// Outputs.
+    pub(crate) fn outputs(&self) -> usize {
+        self.sizes.y.len()
+    }
+
+    /// Samples of all records, and of the shortest.
+    pub(crate) fn samples(&self) -> (usize, usize) {
+        let rows = || self.experiments.iter().map(|e| e.u.nrows());
+        (rows().sum(), rows().min().unwrap_or(0))
+    }
+
+    /// Searches all tasks side by side and notes them in their order.
+    pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
+        let searched = |task: Task| {
+            let options = SearchOptions { aim, ..self.options(25, 0.3) };
+            let found = search(&task.spectra, task.start, &options)?;
+            let criterion = found.criterion(task.spectra.samples());
+            Some(Choice { found, delays: task.delays, criterion, origin: task.origin })
+        };
+        let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
+        let found: Vec<Choice> = found.into_iter().flatten().collect();
+        table.extend(found.iter().map(Candidate::of));
+        found
+    }
+}
+
+impl Candidate {
+    fn of(choice: &Choice) -> Self {
+        Candidate {
+            origin: choice.origin.clone(),
+            dead_time: choice.delays.clone(),
+            order: choice.order(),
+            deviance: choice.found.deviance,
+            criterion: choice.criterion,
+            steps: choice.found.steps,
+        }
+    }
+}

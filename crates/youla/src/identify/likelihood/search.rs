@@ -1,0 +1,239 @@
+//! Maximum likelihood from a start: Levenberg-Marquardt on the lines, the noise estimated anew after each step.
+//!
+//! ```text
+//! -2 log likelihood = N log det Lambda + 2 N log |det A_u|,     Lambda = covariance of the whitened residuals
+//! ```
+//! A_u holds the poles outside the unit circle. On the unit circle `Y - G U` exists for them too, and the predictor differs
+//! from it by an all-pass with their mirror images, whose gain |det A_u| appears in the likelihood: so poles may cross the
+//! circle, and neither a stable predictor nor a Kalman gain is needed to search.
+
+use super::chart::Chart;
+use super::linearise::{Linearised, linearise_quickly};
+use super::model::Model;
+use super::noise::Noise;
+use super::point::Point;
+use super::spectra::Spectra;
+use faer::{Mat, c64};
+
+/// Choices of a search.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SearchOptions {
+    /// Whether D moves.
+    pub(crate) feedthrough: bool,
+    /// Largest order of the autoregression of the noise.
+    pub(crate) noise_order: usize,
+    /// Largest number of steps.
+    pub(crate) steps: usize,
+    /// Ends where a step is expected to lower -2 log likelihood by less.
+    pub(crate) tolerance: f64,
+    /// Criterion to be undercut: a search that its steps will not bring there is given up.
+    pub(crate) aim: f64,
+}
+
+/// A search is given up where its distance to the aim is this many times what its last step gained.
+const HOPELESS: f64 = 20.0;
+
+/// Where a search ended.
+#[derive(Clone)]
+pub(crate) struct Found {
+    /// Model and ends of the records.
+    pub(crate) point: Point,
+    /// Noise.
+    pub(crate) noise: Noise,
+    /// -2 log likelihood.
+    pub(crate) deviance: f64,
+    /// Number of parameters of the model.
+    pub(crate) parameters: usize,
+    /// Steps taken.
+    pub(crate) steps: usize,
+    /// Whether D moved.
+    pub(crate) feedthrough: bool,
+}
+
+impl Found {
+    /// -2 log likelihood plus log N per parameter of model and noise (Schwarz).
+    pub(crate) fn criterion(&self, samples: usize) -> f64 {
+        self.deviance + penalty(self.parameters + self.noise.parameters(), samples)
+    }
+
+    /// -2 log likelihood plus 4 per parameter: between Akaike and Schwarz, for the weights of models beside the chosen one.
+    pub(crate) fn lenient(&self) -> f64 {
+        self.deviance + 4.0 * (self.parameters + self.noise.parameters()) as f64
+    }
+}
+
+fn penalty(parameters: usize, samples: usize) -> f64 {
+    (samples.max(2) as f64).ln() * parameters as f64
+}
+
+/// -2 log likelihood and noise of a point.
+pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
+    let residuals = point.residuals(spectra);
+    let noise = Noise::fit(spectra, &residuals, noise_order);
+    (of_noise(spectra, &noise, &point.model), noise)
+}
+
+fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
+    spectra.samples() as f64 * (noise.log_det + 2.0 * model.unstable())
+}
+
+/// B, D and the ends of the records by least squares, A and C kept.
+pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
+    let chart = Chart::inputs_only(&model, feedthrough);
+    let point = Point::at_rest(model, spectra.records.len());
+    let linearised = linearise_quickly(spectra, &point, &chart, noise);
+    let zero = vec![0.0; chart.parameters()];
+    let (step, _) = damped(&linearised.factor, &zero, 0.0);
+    moved(&point, &chart, &linearised, &step)
+}
+
+/// The ends of the records by least squares, the model kept.
+pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> Point {
+    let chart = Chart::fixed(&model);
+    let point = Point::at_rest(model, spectra.records.len());
+    let linearised = linearise_quickly(spectra, &point, &chart, noise);
+    moved(&point, &chart, &linearised, &[])
+}
+
+/// Searches from a start; `None` where nothing finite comes of it.
+pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
+    let mut point = reblocked(&start)?;
+    let (mut cost, mut noise) = deviance(spectra, &point, options.noise_order);
+    if !cost.is_finite() {
+        return None;
+    }
+    let (mut damping, mut steps) = (1e-6, 0);
+    let mut parameters = Chart::new(&point.model, options.feedthrough).parameters();
+    while steps < options.steps {
+        let chart = Chart::new(&point.model, options.feedthrough);
+        parameters = chart.parameters();
+        let linearised = linearise_quickly(spectra, &point, &chart, &noise);
+        let pull = pull_of_unstable(spectra, &point.model, &chart);
+        let mut best = None;
+        for _ in 0..9 {
+            let (step, predicted) = damped(&linearised.factor, &pull, damping);
+            if !(predicted > 0.5 * options.tolerance) {
+                break;
+            }
+            let trial = moved(&point, &chart, &linearised, &step);
+            let (value, new_noise) = deviance(spectra, &trial, options.noise_order);
+            if value < cost {
+                best = Some((trial, value, new_noise));
+                damping = if damping <= 1e-9 { 0.0 } else { damping * 0.1 };
+                break;
+            }
+            damping = (damping * 10.0).max(1e-6);
+            if damping > 1e4 {
+                break;
+            }
+        }
+        let Some((trial, value, new_noise)) = best else { break };
+        steps += 1;
+        let gain = cost - value;
+        (point, cost, noise) = (reblocked(&trial)?, value, new_noise);
+        if gain < options.tolerance {
+            break;
+        }
+        let penalty = penalty(parameters + noise.parameters(), spectra.samples());
+        if steps >= 3 && cost + penalty - options.aim > HOPELESS * gain {
+            break;
+        }
+    }
+    Some(Found { point, noise, deviance: cost, parameters, steps, feedthrough: options.feedthrough })
+}
+
+/// Blocks formed anew, the ends of the records carried along as if they were inputs.
+pub(crate) fn reblocked(point: &Point) -> Option<Point> {
+    let (n, m, records) = (point.model.order(), point.model.inputs, point.ends.len());
+    let (a, b, c) = point.model.matrices();
+    let finite = |x: &Mat<f64>| x.col_iter().all(|col| col.iter().all(|v| v.is_finite()));
+    if !(finite(&a) && finite(&b) && finite(&c)) {
+        return None;
+    }
+    let wide = Mat::from_fn(n, m + records, |i, j| if j < m { b[(i, j)] } else { point.ends[j - m][i] });
+    let whole = Model::of(a.as_ref(), wide.as_ref(), c.as_ref(), Vec::new())?;
+    let mut ends = vec![Vec::with_capacity(n); records];
+    let mut model = whole.clone();
+    model.inputs = m;
+    model.d = point.model.d.clone();
+    for (block, wide) in model.blocks.iter_mut().zip(&whole.blocks) {
+        let s = wide.states;
+        block.b = (0..s * m).map(|x| wide.b[(x / m) * (m + records) + x % m]).collect();
+        for (r, end) in ends.iter_mut().enumerate() {
+            end.extend((0..s).map(|i| wide.b[i * (m + records) + m + r]));
+        }
+    }
+    Some(Point { model, ends })
+}
+
+/// The point moved by a step of the parameters, t by what is best with it.
+fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) -> Point {
+    let n = point.model.order();
+    let mut ends = point.ends.clone();
+    for (end, rows) in ends.iter_mut().zip(&linearised.ends) {
+        let last = n + step.len();
+        let mut change = vec![0.0; n];
+        for i in (0..n.min(rows.nrows())).rev() {
+            let mut value = rows[(i, last)];
+            step.iter().enumerate().for_each(|(j, s)| value -= rows[(i, n + j)] * s);
+            (i + 1..n).for_each(|j| value -= rows[(i, j)] * change[j]);
+            let diagonal = rows[(i, i)];
+            change[i] = if diagonal.abs() > 1e-12 { value / diagonal } else { 0.0 };
+        }
+        end.iter_mut().zip(change).for_each(|(e, c)| *e += c);
+    }
+    Point { model: chart.moved(&point.model, step), ends }
+}
+
+/// The damped step of `1/2 |r - J s|^2 + pull' s` and the decrease that it promises, columns in units of their lengths.
+fn damped(factor: &Mat<f64>, pull: &[f64], damping: f64) -> (Vec<f64>, f64) {
+    let parameters = pull.len();
+    if parameters == 0 || factor.nrows() < parameters {
+        return (vec![0.0; parameters], 0.0);
+    }
+    let lengths: Vec<f64> = (0..parameters).map(|j| factor.col(j).norm_l2().max(1e-300)).collect();
+    let unit = Mat::from_fn(parameters, parameters, |i, j| factor[(i, j)] / lengths[j]);
+    let Ok(svd) = unit.svd() else { return (vec![0.0; parameters], 0.0) };
+    let s: Vec<f64> = svd.S().column_vector().iter().copied().collect();
+    let (u, v) = (svd.U(), svd.V());
+    let mut solved = vec![0.0; parameters];
+    let mut promised = 0.0;
+    let floor = 1e-20 * s[0] * s[0];
+    for k in 0..parameters {
+        let mut g = 0.0;
+        for i in 0..parameters {
+            g += s[k] * u[(i, k)] * factor[(i, parameters)] - v[(i, k)] * pull[i] / lengths[i];
+        }
+        let weight = s[k] * s[k] + damping * s[0] * s[0] + floor;
+        let along = g / weight;
+        promised += along * g - 0.5 * along * along * s[k] * s[k];
+        for i in 0..parameters {
+            solved[i] += v[(i, k)] * along;
+        }
+    }
+    (solved.iter().zip(&lengths).map(|(x, l)| x / l).collect(), promised)
+}
+
+/// Slope of `N log |det A_u|`, by differences.
+fn pull_of_unstable(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
+    let parameters = chart.parameters();
+    let mut out = vec![0.0; parameters];
+    let samples = spectra.samples() as f64;
+    let outside = |poles: Vec<c64>| poles.iter().map(|p| p.norm().ln().max(0.0)).sum::<f64>();
+    let mut at = 0;
+    for (block, directions) in model.blocks.iter().zip(&chart.directions) {
+        if outside(block.poles()) > 0.0 {
+            for q in 0..directions.ncols() {
+                let step = 1e-6;
+                let shifted = |sign: f64| {
+                    let mut moved = block.clone();
+                    moved.a.iter_mut().enumerate().for_each(|(i, a)| *a += sign * step * directions[(i, q)]);
+                    outside(moved.poles())
+                };
+                out[at + q] = samples * (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            }
+        }
+        at += directions.ncols();
+    }
+    out
+}

@@ -1,0 +1,107 @@
+//! The choice of order and dead time by the likelihood of the record: starts, then models one step away as long as Schwarz's
+//! criterion falls.
+
+use super::Candidate;
+use super::dead_time::dead_times;
+use super::lag_sums::LagSums;
+use super::problem::{Choice, Problem, Solution};
+use super::search::{search, with_best_inputs};
+use crate::identify::subspace::Experiment;
+
+/// Starts from long regressions that are searched without dead time.
+const FIRST: usize = 2;
+/// Samples of all records above which order and dead time are first chosen on a part of them.
+const LONG: usize = 30000;
+/// Samples of that part.
+const SHORT: usize = 15000;
+/// Least part of a record.
+const SHORTEST: usize = 500;
+/// Rounds of models one step away.
+const ROUNDS: usize = 10;
+/// Differences of the criterion that do not tell dead times apart: odds of e^4 to one.
+const INDISTINCT: f64 = 8.0;
+/// Differences of the lenient criterion up to which a model counts beside the best: weights of e^-6.
+const BESIDE: f64 = 12.0;
+
+fn best(tried: &[Choice]) -> Option<&Choice> {
+    tried.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+}
+
+impl Problem<'_> {
+    /// The model that the records support; what was tried is noted in the table. `None` where no search ends.
+    pub(crate) fn solve(&self, table: &mut Vec<Candidate>) -> Option<Solution> {
+        let samples = self.samples().0;
+        let (mut tried, rounds) =
+            if samples > LONG { (vec![self.from_short(samples, table)?], 1) } else { (self.first(table), ROUNDS) };
+        let mut at = best(&tried)?.clone();
+        for _ in 0..rounds {
+            let tasks = self.neighbours(&at);
+            tried.extend(self.run(tasks, at.criterion, table));
+            let better = best(&tried)?;
+            if better.criterion >= at.criterion - 0.5 {
+                break;
+            }
+            at = better.clone();
+        }
+        let mut chosen = calmest(&tried, &at)?.clone();
+        let spectra = self.spectra(&chosen.delays);
+        if let Some(found) = search(&spectra, chosen.found.point.clone(), &self.options(40, 0.01)) {
+            chosen.criterion = found.criterion(spectra.samples());
+            chosen.found = found;
+        }
+        let least = tried.iter().map(|c| c.found.lenient()).fold(f64::INFINITY, f64::min);
+        let rivals = tried.into_iter().filter(|c| c.found.lenient() <= least + BESIDE).collect();
+        Some(Solution { chosen, rivals })
+    }
+
+    /// Searches from long regressions, without dead time and with that which a long regression shows.
+    fn first(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
+        let zero = vec![0; self.inputs()];
+        let tasks = match &self.dead_time {
+            Some(delays) => self.first_tasks(delays, FIRST),
+            None => {
+                let past = 40.min(self.samples().1 / 8).max(2);
+                let sums = LagSums::new(self.experiments, &self.sizes, &zero, past);
+                let delays = dead_times(&sums, self.inputs(), self.skip);
+                let mut tasks = self.first_tasks(&zero, FIRST);
+                if delays != zero {
+                    tasks.extend(self.first_tasks(&delays, 1));
+                }
+                tasks
+            }
+        };
+        self.run(tasks, f64::INFINITY, table)
+    }
+
+    /// The choice for the first part of long records, searched again on all of them.
+    fn from_short(&self, samples: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
+        let share = SHORT as f64 / samples as f64;
+        let kept = |rows: usize| ((rows as f64 * share) as usize).max(SHORTEST).min(rows);
+        let cut = |e: &Experiment<'_>| {
+            let rows = kept(e.u.nrows());
+            (rows, e.u.subrows(0, rows).to_owned(), e.y.subrows(0, rows).to_owned())
+        };
+        let parts: Vec<_> = self.experiments.iter().map(cut).collect();
+        let short: Vec<Experiment<'_>> =
+            parts.iter().map(|(_, u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+        if parts.iter().map(|part| part.0).sum::<usize>() > LONG {
+            return None;
+        }
+        let part =
+            Problem { experiments: &short, sizes: self.sizes.clone(), dead_time: self.dead_time.clone(), ..*self };
+        let chosen = part.solve(table)?.chosen;
+        let spectra = self.spectra(&chosen.delays);
+        let start = with_best_inputs(&spectra, chosen.found.point.model, &chosen.found.noise, self.feedthrough);
+        let found = search(&spectra, start, &self.options(15, 0.3))?;
+        let criterion = found.criterion(spectra.samples());
+        Some(Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays })
+    }
+}
+
+/// Of those of the same order within [`INDISTINCT`] of the least criterion the one with the least gain at high frequencies, where
+/// physical machines have little and wrong dead times much.
+fn calmest<'a>(tried: &'a [Choice], at: &Choice) -> Option<&'a Choice> {
+    let calm = |c: &Choice| c.found.point.model.fast_gain();
+    let alike = |c: &&Choice| c.criterion <= at.criterion + INDISTINCT && c.order() == at.order();
+    tried.iter().filter(alike).min_by(|a, b| calm(a).total_cmp(&calm(b)))
+}

@@ -1,0 +1,130 @@
+//! Records as lines of their discrete Fourier transform.
+//!
+//! For `x+ = A x + B u`, `y = C x + D u` over N samples the transforms obey exactly, without any window,
+//! ```text
+//! Y(k) = (C (z I - A)^-1 B + D) U(k) + C (z I - A)^-1 z t,     t = (x(0) - x(N)) / sqrt(N),   z = exp(2 pi i k / N)
+//! ```
+//! so that one vector t of n numbers per record stands for both ends of it (Pintelon and Schoukens, System Identification,
+//! section 6.3). Constants of u and y touch the line k = 0 only, which is left out; what a constant input does to an integrator
+//! is a ramp, and t holds it. Nothing is subtracted from the data.
+
+use crate::identify::subspace::Experiment;
+use faer::{Mat, c64};
+use rustfft::FftPlanner;
+
+/// The lines of one record, from the first above zero to the Nyquist frequency.
+#[derive(Debug, Clone)]
+pub(crate) struct Lines {
+    /// Number of samples N.
+    pub(crate) samples: usize,
+    /// exp(2 pi i k / N).
+    pub(crate) z: Vec<c64>,
+    /// Root of the number of lines of the full circle for which the line stands: sqrt 2, or 1 at the Nyquist frequency.
+    pub(crate) weight: Vec<f64>,
+    /// Input, lines x m, row by row, scaled by 1 / sqrt(N).
+    pub(crate) u: Vec<c64>,
+    /// Output, lines x p, row by row.
+    pub(crate) y: Vec<c64>,
+}
+
+/// The lines of all records, channels divided by their sizes.
+#[derive(Debug, Clone)]
+pub(crate) struct Spectra {
+    /// Inputs m.
+    pub(crate) inputs: usize,
+    /// Outputs p.
+    pub(crate) outputs: usize,
+    /// Each record.
+    pub(crate) records: Vec<Lines>,
+}
+
+impl Spectra {
+    /// Transforms records whose input j is delayed by `delays[j]` samples; the first `skip` samples of each record serve as the
+    /// past of the delayed inputs, `skip >= max(delays)`.
+    pub(crate) fn new(experiments: &[Experiment<'_>], sizes: &Sizes, delays: &[usize], skip: usize) -> Self {
+        let (m, p) = (sizes.u.len(), sizes.y.len());
+        let mut planner = FftPlanner::new();
+        let records = experiments.iter().filter(|e| e.u.nrows() > skip + 8).map(|e| {
+            let samples = e.u.nrows() - skip;
+            let fft = planner.plan_fft_forward(samples);
+            let count = samples / 2;
+            let mut lines = Lines {
+                samples,
+                z: (1..=count).map(|k| c64::cis(std::f64::consts::TAU * k as f64 / samples as f64)).collect(),
+                weight: (1..=count).map(|k| if 2 * k == samples { 1.0 } else { 2.0_f64.sqrt() }).collect(),
+                u: vec![c64::ZERO; count * m],
+                y: vec![c64::ZERO; count * p],
+            };
+            let root = (samples as f64).sqrt();
+            let transform = |column: &dyn Fn(usize) -> f64, out: &mut [c64], channels: usize, at: usize| {
+                let mut work: Vec<c64> = (0..samples).map(|t| c64::new(column(t) / root, 0.0)).collect();
+                fft.process(&mut work);
+                (0..count).for_each(|k| out[k * channels + at] = work[k + 1]);
+            };
+            for j in 0..m {
+                let first = skip - delays[j];
+                transform(&|t| e.u[(t + first, j)] / sizes.u[j], &mut lines.u, m, j);
+            }
+            for i in 0..p {
+                transform(&|t| e.y[(t + skip, i)] / sizes.y[i], &mut lines.y, p, i);
+            }
+            lines
+        });
+        Spectra { inputs: m, outputs: p, records: records.collect() }
+    }
+
+    /// Every k-th line, for comparisons of starts.
+    pub(crate) fn thinned(&self, every: usize) -> Self {
+        let (m, p) = (self.inputs, self.outputs);
+        let of = |lines: &Lines| {
+            let kept: Vec<usize> = (0..lines.z.len()).step_by(every).collect();
+            Lines {
+                samples: lines.samples / every,
+                z: kept.iter().map(|k| lines.z[*k]).collect(),
+                weight: kept.iter().map(|k| lines.weight[*k]).collect(),
+                u: kept.iter().flat_map(|k| lines.u[k * m..(k + 1) * m].iter().copied()).collect(),
+                y: kept.iter().flat_map(|k| lines.y[k * p..(k + 1) * p].iter().copied()).collect(),
+            }
+        };
+        Spectra { inputs: m, outputs: p, records: self.records.iter().map(of).collect() }
+    }
+
+    /// Number of samples of all records.
+    pub(crate) fn samples(&self) -> usize {
+        self.records.iter().map(|r| r.samples).sum()
+    }
+}
+
+/// Sizes of the channels, by which they are divided.
+#[derive(Debug, Clone)]
+pub(crate) struct Sizes {
+    /// Of the inputs.
+    pub(crate) u: Vec<f64>,
+    /// Of the outputs.
+    pub(crate) y: Vec<f64>,
+}
+
+impl Sizes {
+    /// Standard deviations over all records, 1 for a channel that is constant.
+    pub(crate) fn of(experiments: &[Experiment<'_>]) -> Self {
+        let size = |pick: &dyn Fn(&Experiment<'_>) -> Mat<f64>, channels: usize| {
+            let parts: Vec<Mat<f64>> = experiments.iter().map(pick).collect();
+            let spread = |j: usize| {
+                let (mut sum, mut count) = (0.0, 0);
+                for part in &parts {
+                    let mean = part.col(j).iter().sum::<f64>() / part.nrows().max(1) as f64;
+                    sum += part.col(j).iter().map(|v| (v - mean) * (v - mean)).sum::<f64>();
+                    count += part.nrows();
+                }
+                let deviation = (sum / count.max(1) as f64).sqrt();
+                if deviation > 0.0 && deviation.is_finite() { deviation } else { 1.0 }
+            };
+            (0..channels).map(spread).collect::<Vec<f64>>()
+        };
+        let first = experiments.first();
+        Sizes {
+            u: size(&|e| e.u.to_owned(), first.map_or(0, |e| e.u.ncols())),
+            y: size(&|e| e.y.to_owned(), first.map_or(0, |e| e.y.ncols())),
+        }
+    }
+}

@@ -1,0 +1,98 @@
+//! Starts of the search from long regressions: of different pasts, ridges and orders the most promising.
+
+use super::lag_sums::LagSums;
+use super::model::Model;
+use super::noise::Noise;
+use super::problem::{NOISE_ORDER, Problem, Task};
+use super::search::{deviance, with_best_ends, with_best_inputs};
+use super::spectra::Spectra;
+use super::states::States;
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Starts are compared on every third line.
+pub(crate) const THINNED: usize = 3;
+/// Longest past of a regression, samples; and the most columns of it.
+const LONGEST_PAST: (usize, usize) = (120, 360);
+/// Most rows of the predictor whose singular vectors are the states.
+const LONGEST_FUTURE: usize = 30;
+/// Relative ridges: rounding only, and what tames empty bands.
+const RIDGES: [f64; 2] = [1e-10, 1e-5];
+
+/// Regressions of several pasts and ridges.
+struct Sources {
+    sums: LagSums,
+    states: Vec<(String, States)>,
+}
+
+/// A start that was judged.
+struct Judged {
+    criterion: f64,
+    order: usize,
+    source: usize,
+    model: Model,
+}
+
+impl Problem<'_> {
+    /// The most promising starts from long regressions, of different orders.
+    pub(crate) fn first_tasks(&self, delays: &[usize], count: usize) -> Vec<Task> {
+        let spectra = Arc::new(self.spectra(delays));
+        let thin = spectra.thinned(THINNED);
+        let sources = self.sources(delays);
+        let orders = self.order.map_or(1..=self.largest_order, |n| n..=n);
+        let trials: Vec<(usize, usize)> = orders.flat_map(|n| (0..sources.states.len()).map(move |s| (n, s))).collect();
+        let judged = |(order, source)| self.judged(&thin, &sources, order, source);
+        let mut starts: Vec<Judged> = trials.into_par_iter().filter_map(judged).collect();
+        starts.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+        let white = Noise::white(self.outputs());
+        let mut tasks: Vec<Task> = Vec::new();
+        let mut orders: Vec<usize> = Vec::new();
+        for Judged { order, source, model, .. } in starts {
+            let near = orders.first().is_none_or(|first| order <= first + 2);
+            let other = self.order.is_some() || !orders.contains(&order);
+            if orders.len() < count && near && other {
+                orders.push(order);
+                let start = with_best_ends(&spectra, model, &white);
+                let origin = sources.states[source].0.clone();
+                tasks.push(Task { spectra: spectra.clone(), start, delays: delays.to_vec(), origin });
+            }
+        }
+        tasks
+    }
+
+    /// A and C of a regression with B and the ends by least squares, twice: white, then weighted by the noise that is left.
+    fn judged(&self, thin: &Spectra, sources: &Sources, order: usize, source: usize) -> Option<Judged> {
+        let states = &sources.states[source].1;
+        if states.singular.len() < order {
+            return None;
+        }
+        let [a, b, c, _] = states.realise(&sources.sums, order)?;
+        let (m, p) = (self.inputs(), self.outputs());
+        let model = Model::of(a.as_ref(), b.as_ref(), c.as_ref(), vec![0.0; m * p])?;
+        let point = with_best_inputs(thin, model, &Noise::white(p), self.feedthrough);
+        let (first, noise) = deviance(thin, &point, NOISE_ORDER);
+        let again = with_best_inputs(thin, point.model.clone(), &noise, self.feedthrough);
+        let (second, _) = deviance(thin, &again, NOISE_ORDER);
+        let (value, point) = if second < first { (second, again) } else { (first, point) };
+        let per_order = (self.samples().0 as f64).ln() * (m + p) as f64;
+        let criterion = value * THINNED as f64 + per_order * order as f64;
+        value.is_finite().then_some(Judged { criterion, order, source, model: point.model })
+    }
+
+    fn sources(&self, delays: &[usize]) -> Sources {
+        let (m, p) = (self.inputs(), self.outputs());
+        let longest = LONGEST_PAST.0.min(self.samples().1 / 6).min(LONGEST_PAST.1 / (m + p)).max(4);
+        let sums = LagSums::new(self.experiments, &self.sizes, delays, longest);
+        let largest = self.order.unwrap_or(self.largest_order);
+        let mut states = Vec::new();
+        for past in [longest / 6, longest / 2, longest].map(|past| past.max(3)) {
+            for ridge in RIDGES {
+                let shape = [past, past.min(LONGEST_FUTURE), largest];
+                if let Some(found) = States::new(&sums, m, shape, ridge) {
+                    states.push((format!("predictor of {past} samples, ridge {ridge:.0e}"), found));
+                }
+            }
+        }
+        Sources { sums, states }
+    }
+}

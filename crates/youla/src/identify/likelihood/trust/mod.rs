@@ -1,0 +1,42 @@
+//! Whether the record supports the model: each figure has a limit, and a model is trusted where all hold.
+//!
+//! | figure | question |
+//! |---|---|
+//! | residual and excitation | does the excitation explain what the model leaves? |
+//! | parts | do the parts of the record, and fresh records, ask for the same parameters? |
+//! | noise of the parts | is the residual of fresh records as large as before? |
+//! | nonlinear | does a function of input or velocity, filtered by the model, explain what the model leaves? |
+//! | accuracy | how large is the stated deviation against the response? |
+
+mod loop_evidence;
+mod nonlinear;
+mod parts;
+
+pub(crate) use loop_evidence::{controller, residual_and_excitation};
+pub(crate) use nonlinear::nonlinear;
+pub(crate) use parts::parts;
+
+use super::Evidence;
+use faer::c64;
+
+/// Excess of chi-square over its mean in its standard deviations.
+pub(crate) fn excess(statistic: f64, degrees: f64) -> f64 {
+    // Wilson and Hilferty: the cube root is normal.
+    let part = 2.0 / (9.0 * degrees.max(1.0));
+    ((statistic / degrees.max(1.0)).max(0.0).cbrt() - (1.0 - part)) / part.sqrt()
+}
+
+/// Stated deviation against the response, median over the frequencies.
+pub(crate) fn accuracy(responses: &[Vec<c64>], deviations: &[Vec<f64>]) -> Evidence {
+    let mut shares: Vec<f64> = responses
+        .iter()
+        .zip(deviations)
+        .map(|(g, s)| {
+            let size = g.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
+            s.iter().map(|v| v * v).sum::<f64>().sqrt() / size.max(1e-300)
+        })
+        .collect();
+    shares.sort_by(f64::total_cmp);
+    let figure = shares.get(shares.len() / 2).copied().unwrap_or(f64::INFINITY);
+    Evidence::new("How large is the stated deviation against the response, in the median over frequency?", figure, 1.0)
+}

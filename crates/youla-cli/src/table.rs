@@ -25,7 +25,7 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
 /// Modes of G(S) with their standard deviations, where these were asked for.
 fn modes(found: &Identification) -> String {
     let mut text = String::new();
-    let Some(plant) = &found.uncertainty.plant else { return text };
+    let Some(plant) = found.uncertainty(youla_run::Method::Hansen) else { return text };
     for band in plant.modes.iter().filter(|band| band.mode.pole.im > 0.0) {
         let (mode, hz, zeta) = (band.mode, band.hz_deviation, band.zeta_deviation);
         let _ =

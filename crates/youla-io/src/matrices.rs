@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
-use youla::lti::{Discrete, StateSpace};
+use youla::lti::{Discrete, StateSpace, TimeDomain};
 use youla::{Mat, MatRef};
 
 /// A matrix by rows.
@@ -23,7 +23,7 @@ pub struct SystemMatrices {
 
 impl SystemMatrices {
     /// The matrices of a system.
-    pub fn new(system: &StateSpace<Discrete>) -> Self {
+    pub fn new<T: TimeDomain>(system: &StateSpace<T>) -> Self {
         SystemMatrices { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()), d: rows(system.d()) }
     }
 

@@ -156,6 +156,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
     };
     let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
     RunSettings {
+        recommended: Default::default(),
         name: "demo: gas bearing".into(),
         data: DataSettings {
             sample_time: Some(TS),

@@ -12,7 +12,7 @@ pub(super) fn align(response: &mut FrequencyResponse, role_of: impl Fn(&str) -> 
     }
     let mut models = response.models.clone();
     models.sort_by_key(|curve| match role_of(&curve.method) {
-        Role::Hansen => 0,
+        Role::Recommended | Role::Hansen => 0,
         Role::HansenReduced => 1,
         Role::Nominal => 3,
         _ => 2,

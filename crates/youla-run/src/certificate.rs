@@ -1,10 +1,9 @@
 //! `[certificate]`: what a run states about the loop of its model beyond the poles of the estimate.
 
-use super::context::RunContext;
+use super::context::SchemeContext;
 use super::controller_errors::{ControllerErrorEffect, ControllerErrorEntry, controller_errors};
 use super::entries::{BandEntry, IntervalEntry, finite, pairs};
 use super::robustness::channel_scales;
-use super::signals::DeviationSignals;
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -32,13 +31,10 @@ pub struct RunCertificate {
 ///
 /// # Errors
 /// Numerical conditions of the estimate itself.
-pub(super) fn certificate(
-    run: RunContext<'_>,
-    signals: &DeviationSignals,
-    hansen: &HansenModel,
-) -> Result<RunCertificate> {
+pub(super) fn certificate(context: SchemeContext<'_>, hansen: &HansenModel) -> Result<RunCertificate> {
+    let run = context.run;
     let settings = run.settings.certificate.unwrap_or_default();
-    let (factors, deviation) = (&run.factorisation.factors, &hansen.deviation);
+    let (factors, deviation) = (&context.factorisation.factors, &hansen.deviation);
     let exact = certify_deviation(factors, &deviation.model, None)?;
     let band = match &deviation.uncertainty {
         // K stabilises G(S) exactly where S is stable.
@@ -46,9 +42,9 @@ pub(super) fn certificate(
         None => None,
     };
     let asked = run.settings.certificate.is_some();
-    let margins = if exact.stable && asked { margins(run, hansen)? } else { Vec::new() };
+    let margins = if exact.stable && asked { margins(context, hansen)? } else { Vec::new() };
     let controller_errors =
-        if settings.controller_errors { controller_errors(run, signals, &settings)? } else { Vec::new() };
+        if settings.controller_errors { controller_errors(context, &settings)? } else { Vec::new() };
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 
@@ -56,9 +52,10 @@ pub(super) fn certificate(
 ///
 /// The delta method takes derivatives, and gets them from the responses of a loop at the frequencies where that of the estimate is
 /// critical; a bootstrap takes each replicate exactly.
-fn margins(run: RunContext<'_>, hansen: &HansenModel) -> Result<Vec<(String, Interval)>> {
+fn margins(context: SchemeContext<'_>, hansen: &HansenModel) -> Result<Vec<(String, Interval)>> {
     let Some(uncertainty) = &hansen.deviation.uncertainty else { return Ok(Vec::new()) };
-    let (factors, controller) = (&run.factorisation.factors, &run.factorisation.controller);
+    let SchemeContext { run, factorisation, .. } = context;
+    let (factors, controller) = (&factorisation.factors, &run.declared.controller);
     let scales = channel_scales(&run.records.estimation).ok();
     let intervals = match uncertainty {
         Uncertainty::Delta(delta) => {

@@ -4,12 +4,12 @@
 //! All variants, and the one without an error that they are compared with, use the factors of an arbitrary controller
 //! ([`youla::factor::CoprimeFactors::stacked`]): the choice of factors alone changes an estimate a little.
 
-use super::context::RunContext;
+use super::context::{RunContext, SchemeContext};
 use super::entries::{OrRefused, finite, finite_all};
 use super::factorise::factorise;
 use super::records::{LoopRecord, RunRecords};
 use super::settings::{CertificateSettings, Construction, Controller, FactorSettings};
-use super::signals::{DeviationSignals, deviation_signals};
+use super::signals::deviation_signals;
 use super::verdict::verify_record;
 use crate::Result;
 use faer::Scale;
@@ -102,11 +102,11 @@ fn mean<'a>(fits: impl Iterator<Item = &'a f64>) -> f64 {
 /// # Errors
 /// Those of the run without an error.
 pub(super) fn controller_errors(
-    run: RunContext<'_>,
-    signals: &DeviationSignals,
+    context: SchemeContext<'_>,
     settings: &CertificateSettings,
 ) -> Result<Vec<ControllerErrorEffect>> {
-    let plain = identified(run, signals.settle, ControllerError::None)?;
+    let (run, settle) = (context.run, context.signals.settle);
+    let plain = identified(run, settle, ControllerError::None)?;
     let modes: Vec<Mode> = plain.plant.modes()?.into_iter().filter(light).collect();
     let errors = [
         ControllerError::None,
@@ -119,7 +119,7 @@ pub(super) fn controller_errors(
     let effect = |error: &ControllerError| {
         let result = match error {
             ControllerError::None => Ok(plain.clone()),
-            error => identified(run, signals.settle, *error),
+            error => identified(run, settle, *error),
         };
         let outcome = result.and_then(|result| changed(run, &modes, &result)).map_err(|e| e.to_string());
         ControllerErrorEffect { error: *error, outcome }
@@ -134,7 +134,7 @@ fn light(mode: &Mode) -> bool {
 /// S and G(S) with an error in the description of the controller; an unstable S is a result here.
 fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Result<HansenModel> {
     let (settings, time) = (run.settings, run.records.time);
-    let controller = &run.factorisation.controller;
+    let controller = &run.declared.controller;
     let described = match error {
         ControllerError::Delay => {
             let m = controller.outputs();
@@ -149,7 +149,7 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
         ..run.records.clone()
     };
     let factors = FactorSettings { construction: Construction::Stacked, ..settings.factors };
-    let factors = factorise(&run.factorisation.nominal, &Controller::System(described), &records, &factors)?.factors;
+    let factors = factorise(&run.declared.nominal, &Controller::System(described), &records, &factors)?.factors;
     let dropped = if error == ControllerError::InitialState { 0 } else { settle };
     let signals = deviation_signals(&factors, &records.estimation, Some(dropped))?;
     let lines = records.disturbances(signals.settle);
@@ -203,7 +203,7 @@ fn changed(run: RunContext<'_>, modes: &[Mode], result: &HansenModel) -> Result<
         fit,
         deviation_fit: deviation.fit.percent.clone(),
         deviation_radius: deviation.model.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max),
-        stable: youla::validate::certify(plant, &run.factorisation.controller)?.stable,
+        stable: youla::validate::certify(plant, &run.declared.controller)?.stable,
     })
 }
 

@@ -80,6 +80,15 @@ impl Error {
         Error::Within { part: part.into(), source: Box::new(self) }
     }
 
+    /// Whether the records and the nominal model, although well formed, do not suffice for a method that another may replace.
+    pub(crate) fn is_of_the_records(&self) -> bool {
+        match self {
+            Error::Method(source) => source.is_of_the_records(),
+            Error::Within { source, .. } => source.is_of_the_records(),
+            _ => false,
+        }
+    }
+
     /// Whether the input is at fault or the computation is impossible on it.
     pub fn kind(&self) -> ErrorKind {
         match self {

@@ -5,22 +5,62 @@ use super::settings::{Construction, Controller, FactorSettings, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::Mat;
-use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, observer_controller};
 use youla::factor::CoprimeFactors;
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
 
-/// The factors of a run and what they rest on.
+/// Nominal model and controller as run.toml declares them.
 #[derive(Debug, Clone)]
-pub struct Factorisation {
-    /// The nominal model as given, in its own states.
+pub struct DeclaredLoop {
+    /// The nominal model in its own states.
     pub nominal: StateSpace<Discrete>,
-    /// The eight factors.
-    pub factors: CoprimeFactors<Discrete>,
     /// The controller that ran, `u = K y` (positive feedback).
     pub controller: StateSpace<Discrete>,
+    /// State feedback F, m x n, and observer gain L, n x p, where the controller is given by them.
+    pub gains: Option<[Mat<f64>; 2]>,
+}
+
+/// The factors of a loop.
+#[derive(Debug, Clone)]
+pub struct Factorisation {
+    /// The eight factors.
+    pub factors: CoprimeFactors<Discrete>,
     /// Largest relative residual of the Bezout identity (15) up to Nyquist.
     pub bezout_residual: f64,
+}
+
+/// Nominal model and controller that the settings of a run describe; paths in them are relative to `folder`.
+///
+/// # Errors
+/// Whatever is wrong with the given model or controller; [`youla::Error::Ports`] where they do not fit the records.
+pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<DeclaredLoop> {
+    let nominal = settings.nominal.realise(folder, records.time)?;
+    for (what, expected, found) in [
+        ("the number of inputs of the nominal model", records.inputs.len(), nominal.inputs()),
+        ("the number of outputs of the nominal model", records.outputs.len(), nominal.outputs()),
+    ] {
+        if expected != found {
+            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
+        }
+    }
+    let (controller, gains) = match settings.controller.realise(folder, records.time)? {
+        Controller::System(k) => (k, None),
+        Controller::Observer { f, l } => {
+            check_gains(&nominal, &f, &l)?;
+            let k = observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?;
+            (k, Some([f, l]))
+        }
+    };
+    for (what, expected, found) in [
+        ("the number of inputs of the controller", records.outputs.len(), controller.inputs()),
+        ("the number of outputs of the controller", records.inputs.len(), controller.outputs()),
+    ] {
+        if expected != found {
+            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
+        }
+    }
+    Ok(DeclaredLoop { nominal, controller, gains })
 }
 
 /// Builds the factors that the settings of a run describe; paths in them are relative to `folder`.
@@ -30,15 +70,12 @@ pub struct Factorisation {
 pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Factorisation> {
     let nominal = settings.nominal.realise(folder, records.time)?;
     let controller = settings.controller.realise(folder, records.time)?;
-    for (what, expected, found) in [
-        ("the number of inputs of the nominal model", records.inputs.len(), nominal.inputs()),
-        ("the number of outputs of the nominal model", records.outputs.len(), nominal.outputs()),
-    ] {
-        if expected != found {
-            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
-        }
-    }
     factorise(&nominal, &controller, records, &settings.factors)
+}
+
+fn check_gains(nominal: &StateSpace<Discrete>, f: &Mat<f64>, l: &Mat<f64>) -> Result<()> {
+    youla::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+    Ok(youla::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?)
 }
 
 /// Builds the factors of the nominal model and the controller. States are scaled by powers of two first: entries of
@@ -57,8 +94,7 @@ pub fn factorise(
     let balanced = nominal.with_scaled_states(&scale);
     let factors = match controller {
         Controller::Observer { f, l } => {
-            youla::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
-            youla::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+            check_gains(nominal, f, l)?;
             let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
             let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
             CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
@@ -79,7 +115,7 @@ pub fn factorise(
         }
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
-    Ok(Factorisation { nominal: nominal.clone(), controller: factors.controller()?, factors, bezout_residual })
+    Ok(Factorisation { factors, bezout_residual })
 }
 
 /// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.

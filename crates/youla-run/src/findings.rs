@@ -31,21 +31,22 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     for refusal in found.refusals() {
         add(Status::Info, format!("There is no {}: {}.", refusal.what, refusal.error));
     }
-    let refused = found.hansen.uncertainty.as_ref().and_then(Uncertainty::refusal);
+    let scheme = found.scheme();
+    let refused = scheme.and_then(|s| s.hansen.uncertainty.as_ref()).and_then(Uncertainty::refusal);
     if let Some(reason) = refused {
         add(Status::Caution, format!("There is no uncertainty of S and G(S): {reason}."));
     }
-    if let Some(Err(reason)) = &found.hansen.evidence {
+    if let Some(Some(Err(reason))) = scheme.map(|s| &s.hansen.evidence) {
         add(Status::Caution, format!("S = 0 was not tested: {reason}."));
     }
-    if let Some(Uncertainty::Bootstrap(bootstrap)) = &found.hansen.deviation.uncertainty {
+    if let Some(Some(Uncertainty::Bootstrap(bootstrap))) = scheme.map(|s| &s.hansen.deviation.uncertainty) {
         let (unstable, failed) = (bootstrap.unstable, bootstrap.failed);
         if unstable + failed > 0 {
             let text = format!("Of the resampled records, {unstable} gave an unstable S and {failed} no S.");
             add(Status::Info, text);
         }
     }
-    if let Some(Ok(run)) = &found.grey_box {
+    if let Some(run) = found.structure() {
         let model = &run.found.model;
         for sentence in model.undetermined.sentences() {
             add(Status::Caution, format!("Grey box: {sentence}."));
@@ -54,7 +55,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             add(Status::Caution, format!("Grey box: {} ended at its bound {}.", bound.parameter, bound.value));
         }
     }
-    for (name, model) in [("S", Some(&found.hansen.deviation)), ("the direct model", direct(found))] {
+    for (name, model) in [("S", scheme.map(|s| &s.hansen.deviation)), ("the direct model", found.direct())] {
         let moved = model.map_or(0, |m| m.stability.moved.len());
         if moved > 0 {
             add(
@@ -70,7 +71,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             }
         }
     }
-    if let Some(form) = &found.hansen.innovation_form {
+    if let Some(form) = scheme.and_then(|s| s.hansen.innovation_form.as_ref()) {
         let (status, settled) = match form.stop {
             Convergence::Converged => (Status::Info, "converged"),
             Convergence::Iterations => (Status::Caution, "did not converge"),
@@ -87,7 +88,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         );
         add(status, text);
     }
-    if let Some(refined) = &found.refinement {
+    if let Some(refined) = scheme.and_then(|s| s.refinement.as_ref()) {
         let (status, ended) = match refined.stop {
             Stop::Iterations => (Status::Caution, " (the limit `max_iterations`)"),
             _ => (Status::Info, ""),
@@ -117,7 +118,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
     if let Some(text) = disturbance_note(found) {
         add(Status::Info, text);
     }
-    let settle = found.signals.settle;
+    let settle = found.filtered.as_ref().map_or(0, |f| f.signals.settle);
     if settle > 0 {
         let text = format!(
             "The first {settle} samples of alpha and beta of each record were discarded (transient of the signal filter)."
@@ -130,7 +131,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
 /// The known lines that were removed from beta, with their amplitudes in each output, largest over the records.
 fn disturbance_note(found: &Identification) -> Option<String> {
     let labels = found.settings.data.disturbance.as_ref()?.labels();
-    let all: Vec<_> = found.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
+    let all: Vec<_> = found.scheme()?.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
     let of_line = |(j, label): (usize, &String)| {
         let largest = |i: usize| all.iter().map(|lines| lines[j][i].amplitude).fold(0.0, f64::max);
         let outputs = found.records.outputs.iter().enumerate();
@@ -143,8 +144,4 @@ fn disturbance_note(found: &Identification) -> Option<String> {
          Their largest amplitudes in beta over the records: {}.",
         lines.join("; ")
     ))
-}
-
-fn direct(found: &Identification) -> Option<&youla::identify::subspace::SubspaceModel> {
-    found.direct.as_ref()?.as_ref().ok()
 }

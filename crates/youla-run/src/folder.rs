@@ -2,7 +2,8 @@
 
 use super::artefacts::{ModelFile, Provenance, SCHEMA};
 use super::entries::{ModeEntry, OrRefused, Refused, finite_all, pairs};
-use super::identification::Identification;
+use super::identification::{Filtered, Identification, SchemeRun};
+use super::recommended::{self, RecommendedDetails};
 use super::records::{LoopRecord, RunRecords};
 use super::redesign;
 use super::reduction;
@@ -87,7 +88,14 @@ impl Writer<'_> {
 
     /// `2-factor/`: the two systems of (15), the controller and the nominal model.
     fn factors(&self) -> Result<()> {
-        let f = &self.found.factorisation;
+        let declared = &self.found.declared;
+        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+        self.model_with("2-factor/controller", &declared.controller, (y, u), &())?;
+        self.model("2-factor/nominal", &declared.nominal, &())?;
+        let f = match &self.found.filtered {
+            Ok(filtered) => &filtered.factorisation,
+            Err(reason) => return self.refused("2-factor/factors.json", reason),
+        };
         let details = FactorDetails { bezout_residual: f.bezout_residual };
         let loop_ports: Vec<Channel> =
             self.found.records.inputs.iter().chain(&self.found.records.outputs).cloned().collect();
@@ -98,15 +106,12 @@ impl Writer<'_> {
         };
         let (right, left) = (f.factors.right().system(), f.factors.left().system());
         self.model_with("2-factor/right", right, (youla(["eta", "epsilon"]), loop_ports.clone()), &details)?;
-        self.model_with("2-factor/left", left, (loop_ports, youla(["alpha", "beta"])), &details)?;
-        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
-        self.model_with("2-factor/controller", &f.controller, (y, u), &())?;
-        self.model("2-factor/nominal", &f.nominal, &())
+        self.model_with("2-factor/left", left, (loop_ports, youla(["alpha", "beta"])), &details)
     }
 
     /// `3-signals/`: alpha and beta of each estimation record.
     fn signals(&self) -> Result<()> {
-        let s = &self.found.signals;
+        let Ok(Filtered { signals: s, .. }) = &self.found.filtered else { return Ok(()) };
         for (record, YoulaSignals { alpha, beta }) in self.found.records.estimation.iter().zip(&s.experiments) {
             let variables = [
                 number("ts", record.time.ts()),
@@ -123,31 +128,48 @@ impl Writer<'_> {
     /// `4-identify/`, `5-recombine/`, `6-reduce/`: the models.
     fn models(&self) -> Result<()> {
         let found = self.found;
-        let (u, y) = (&found.records.inputs, &found.records.outputs);
-        let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
-            channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
-        };
-        let s = &found.hansen.deviation;
-        let details = DeviationDetails::new(&found.hansen, found.refinement.as_ref());
-        self.model_with("4-identify/deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
+        match &found.recommended {
+            Ok(model) => {
+                let name = recommended::FILE.trim_end_matches(".json");
+                self.model(name, &model.plant, &RecommendedDetails::new(model))?;
+            }
+            Err(e) => self.refused(recommended::FILE, e)?,
+        }
+        let y = &found.records.outputs;
         match &found.direct {
             Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))?,
             Some(Err(e)) => self.refused("4-identify/direct.json", e)?,
             None => {}
         }
-        self.diagram("4-identify/stabilisation_deviation", found.diagrams.deviation.as_ref(), &named("beta", y))?;
-        self.diagram("4-identify/stabilisation_direct", found.diagrams.direct.as_ref(), y)?;
-        self.model("5-recombine/hansen", &found.hansen.plant, &())?;
-        let known = &found.uncertainty;
+        self.diagram("4-identify/stabilisation_direct", found.direct_diagram.as_ref(), y)?;
+        match &found.scheme {
+            Some(Ok(scheme)) => self.scheme(scheme),
+            Some(Err(e)) => self.refused("4-identify/deviation.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// What the scheme gave.
+    fn scheme(&self, scheme: &SchemeRun) -> Result<()> {
+        let (u, y) = (&self.found.records.inputs, &self.found.records.outputs);
+        let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
+            channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
+        };
+        let s = &scheme.hansen.deviation;
+        let details = DeviationDetails::new(&scheme.hansen, scheme.refinement.as_ref());
+        self.model_with("4-identify/deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
+        self.diagram("4-identify/stabilisation_deviation", Some(&scheme.diagram), &named("beta", y))?;
+        self.model("5-recombine/hansen", &scheme.hansen.plant, &())?;
+        let known = &scheme.uncertainty;
         self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
         self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
         self.uncertainty("4-identify/grey_box_uncertainty.json", &known.grey_box)?;
-        match &found.grey_box {
+        match &scheme.grey_box {
             Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &run.details()?)?,
             Some(Err(e)) => self.refused("4-identify/grey_box.json", e)?,
             None => {}
         }
-        match &found.reduction {
+        match &scheme.reduction {
             Some(Ok(r)) => {
                 self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &r.details())?;
                 self.json("6-reduce/sweep.json", r.file())?;
@@ -172,12 +194,13 @@ impl Writer<'_> {
 
     /// `7-validate/certificate.json`.
     fn certificate(&self) -> Result<()> {
-        self.json("7-validate/certificate.json", self.found.certificate.entry())
+        let Some(scheme) = self.found.scheme() else { return Ok(()) };
+        self.json("7-validate/certificate.json", scheme.certificate.entry())
     }
 
     /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.
     fn redesign(&self) -> Result<()> {
-        match &self.found.redesign {
+        match self.found.scheme().and_then(|s| s.redesign.as_ref()) {
             Some(Ok(new)) => {
                 let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
                 self.model_with("8-redesign/new_controller", &new.controller.system, (y, u), &())?;

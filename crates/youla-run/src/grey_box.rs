@@ -1,11 +1,10 @@
 //! A physical structure in a run: the prediction-error method, started from the result of the scheme, with intervals, and
 //! beside other structures.
 
-use super::context::RunContext;
+use super::context::SchemeContext;
 use super::entries::OrRefused;
 use super::grey_box_loop::{Criterion, outputs_without_lines};
 use super::settings::{AlternativeStructure, GreyBoxSettings};
-use super::signals::DeviationSignals;
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use youla::identify::hansen::HansenModel;
@@ -29,25 +28,17 @@ pub struct GreyBoxRun {
 }
 
 /// Estimates the structure, where one is declared.
-pub(super) fn grey_box(
-    run: RunContext<'_>,
-    signals: &DeviationSignals,
-    hansen: &HansenModel,
-) -> Option<Result<GreyBoxRun>> {
-    let asked = run.settings.grey_box.as_ref()?;
-    Some(estimate(run, signals, hansen, asked).map_err(|e| e.within("[grey_box]")))
+pub(super) fn grey_box(context: SchemeContext<'_>, hansen: &HansenModel) -> Option<Result<GreyBoxRun>> {
+    let asked = context.run.settings.grey_box.as_ref()?;
+    Some(estimate(context, hansen, asked).map_err(|e| e.within("[grey_box]")))
 }
 
-fn estimate(
-    run: RunContext<'_>,
-    signals: &DeviationSignals,
-    hansen: &HansenModel,
-    asked: &GreyBoxSettings,
-) -> Result<GreyBoxRun> {
+fn estimate(context: SchemeContext<'_>, hansen: &HansenModel, asked: &GreyBoxSettings) -> Result<GreyBoxRun> {
+    let run = context.run;
     let outputs = outputs_without_lines(run.records)?;
     let options =
         HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.pem.clone(), ..HansenPemOptions::default() };
-    let criterion = Criterion::new(asked.prediction, run, signals, &outputs, &options)?;
+    let criterion = Criterion::new(asked.prediction, context, &outputs, &options)?;
     let of = |declaration: &Declaration| -> Result<(DeclaredStructure, HansenPem)> {
         let structure = DeclaredStructure::new(declaration)?;
         let nominal = asked.start_from_initial.then(|| structure.start());

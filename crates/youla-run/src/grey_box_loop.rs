@@ -7,9 +7,8 @@
 //! ```
 //! The second is for plants that integrate or are unstable, whose simulation drifts with every error of u.
 
-use super::context::RunContext;
+use super::context::SchemeContext;
 use super::disturbance::without_lines;
-use super::factorise::Factorisation;
 use super::records::{LoopRecord, RunRecords};
 use super::settings::Prediction;
 use super::signals::DeviationSignals;
@@ -59,15 +58,15 @@ struct Closed {
 impl<'a> Criterion<'a> {
     pub(super) fn new(
         prediction: Prediction,
-        run: RunContext<'a>,
-        signals: &'a DeviationSignals,
+        context: SchemeContext<'a>,
         outputs: &'a [Mat<f64>],
         options: &'a HansenPemOptions,
     ) -> Result<Self> {
-        let RunContext { records, factorisation, .. } = run;
+        let SchemeContext { run, factorisation, signals } = context;
+        let records = run.records;
         let closed = match prediction {
             Prediction::OpenLoop => None,
-            Prediction::ClosedLoop => Some(Closed::new(factorisation, records)?),
+            Prediction::ClosedLoop => Some(Closed::new(context)?),
         };
         Ok(Criterion { factors: &factorisation.factors, signals, records, outputs, options, closed })
     }
@@ -166,10 +165,10 @@ impl<'a> Criterion<'a> {
 }
 
 impl Closed {
-    fn new(factorisation: &Factorisation, records: &RunRecords) -> Result<Self> {
-        let Factorisation { factors, controller, .. } = factorisation;
+    fn new(context: SchemeContext<'_>) -> Result<Self> {
+        let (records, controller) = (context.run.records, &context.run.declared.controller);
         let with_alpha = records.estimation.iter().any(|r| r.alpha.is_some());
-        let ports = if with_alpha { factors.j_k()? } else { with_input_port(controller)? };
+        let ports = if with_alpha { context.factorisation.factors.j_k()? } else { with_input_port(controller)? };
         let (m, p) = (controller.outputs(), controller.inputs());
         let external = records.estimation.iter().map(|r| {
             let added = r.alpha.as_ref().or(r.input_excitation.as_ref());

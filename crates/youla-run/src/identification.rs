@@ -2,24 +2,25 @@
 
 use super::certificate::RunCertificate;
 use super::check::DataCheck;
-use super::factorise::Factorisation;
+use super::factorise::{DeclaredLoop, Factorisation};
 use super::grey_box::GreyBoxRun;
 use super::method::Method;
 use super::records::RunRecords;
 use super::reduction::RunReduction;
 use super::settings::RunSettings;
 use super::signals::DeviationSignals;
-use super::stabilisation::Diagrams;
-use super::uncertainty::RunUncertainty;
+use super::uncertainty::{RunUncertainty, SystemUncertainty};
 use super::verdict::Verdict;
 use crate::{Error, Result};
 use youla::identify::hansen::HansenModel;
+use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
+use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::signal::IndirectResponse;
 use youla_greybox::hansen_refine::Refinement;
 use youla_loop::redesign::Redesign;
 
-/// Everything that a run found.
+/// Everything that a run found. A method that is impossible does not end the run: its field holds the reason.
 #[derive(Debug)]
 pub struct Identification {
     /// What was asked for.
@@ -28,33 +29,53 @@ pub struct Identification {
     pub records: RunRecords,
     /// The check of the records.
     pub data: DataCheck,
-    /// Nominal model, controller and their factors.
+    /// Nominal model and controller.
+    pub declared: DeclaredLoop,
+    /// The recommended model with its evidence.
+    pub recommended: Result<Recommendation>,
+    /// The coprime factors, with alpha and beta of the estimation records.
+    pub filtered: Result<Filtered>,
+    /// The modified Hansen scheme and what rests on it; `None` where alpha and beta do not exist.
+    pub scheme: Option<Result<SchemeRun>>,
+    /// The direct model where it was asked for.
+    pub direct: Option<Result<SubspaceModel>>,
+    /// The stabilisation diagram of the direct model.
+    pub direct_diagram: Option<Result<StabilisationDiagram>>,
+    /// The non-parametric response of the plant where an excitation is known.
+    pub indirect: Option<Result<IndirectResponse>>,
+    /// Frequencies of the responses of all models, Hz.
+    pub hz: Vec<f64>,
+    /// Evidence on every model.
+    pub verdict: Verdict,
+}
+
+/// Factors and signals of the scheme.
+#[derive(Debug, Clone)]
+pub struct Filtered {
+    /// The factors of nominal model and controller.
     pub factorisation: Factorisation,
     /// alpha and beta of the estimation records.
     pub signals: DeviationSignals,
+}
+
+/// The modified Hansen scheme and what rests on it.
+#[derive(Debug)]
+pub struct SchemeRun {
     /// S and G(S).
     pub hansen: HansenModel,
     /// What the refinement of S changed, where it was asked for.
     pub refinement: Option<Refinement>,
-    /// Frequencies of the responses of all models, Hz.
-    pub hz: Vec<f64>,
+    /// The stabilisation diagram of S.
+    pub diagram: Result<StabilisationDiagram>,
     /// The uncertainty of S, of G(S) and of the physical structure.
     pub uncertainty: RunUncertainty,
-    /// `G_red(S)` in its loop where it was asked for, or the reason why there is none.
+    /// `G_red(S)` in its loop where it was asked for.
     pub reduction: Option<Result<RunReduction>>,
-    /// The direct model where it was asked for, or the reason why there is none.
-    pub direct: Option<Result<SubspaceModel>>,
-    /// The physical structure where one was declared, or the reason why it has no estimate.
+    /// The physical structure where one was declared.
     pub grey_box: Option<Result<GreyBoxRun>>,
-    /// Stabilisation diagrams.
-    pub diagrams: Diagrams,
-    /// The non-parametric response of the plant where an excitation is known, or the reason why there is none.
-    pub indirect: Option<Result<IndirectResponse>>,
-    /// Evidence on every model.
-    pub verdict: Verdict,
     /// The loop of G(S): the exact test, the region of S, errors in the description of the controller.
     pub certificate: RunCertificate,
-    /// The new controller where it was asked for, or the reason why there is none.
+    /// The new controller where it was asked for.
     pub redesign: Option<Result<Redesign>>,
 }
 
@@ -72,33 +93,57 @@ pub struct Refusal<'a> {
 impl Identification {
     /// What was asked for but is impossible, with the reasons.
     pub fn refusals(&self) -> Vec<Refusal<'_>> {
+        let scheme = self.scheme();
         [
+            refusal("recommended", "recommended model", Some(&self.recommended)),
+            refusal("factors", "coprime factorisation, and so no Hansen scheme", Some(&self.filtered)),
+            refusal(Method::Hansen.key(), "model by the Hansen scheme", self.scheme.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
-            refusal(Method::HansenReduced.key(), "reduced model", self.reduction.as_ref()),
-            refusal(Method::GreyBox.key(), "grey-box model", self.grey_box.as_ref()),
-            refusal("stabilisation", "stabilisation diagram of S", self.diagrams.deviation.as_ref()),
-            refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.diagrams.direct.as_ref()),
+            refusal(Method::HansenReduced.key(), "reduced model", scheme.and_then(|s| s.reduction.as_ref())),
+            refusal(Method::GreyBox.key(), "grey-box model", scheme.and_then(|s| s.grey_box.as_ref())),
+            refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
+            refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
-            refusal("redesign", "new controller", self.redesign.as_ref()),
+            refusal("redesign", "new controller", scheme.and_then(|s| s.redesign.as_ref())),
         ]
         .into_iter()
         .flatten()
         .collect()
     }
 
+    /// The scheme, where it gave a model.
+    pub fn scheme(&self) -> Option<&SchemeRun> {
+        found(self.scheme.as_ref())
+    }
+
+    /// The direct model, where there is one.
+    pub fn direct(&self) -> Option<&SubspaceModel> {
+        found(self.direct.as_ref())
+    }
+
     /// The reduced model, where there is one.
     pub(crate) fn reduced(&self) -> Option<&RunReduction> {
-        found(self.reduction.as_ref())
+        found(self.scheme()?.reduction.as_ref())
     }
 
     /// The estimate of the physical structure, where there is one.
     pub(crate) fn structure(&self) -> Option<&GreyBoxRun> {
-        found(self.grey_box.as_ref())
+        found(self.scheme()?.grey_box.as_ref())
     }
 
     /// The new controller, where there is one.
     pub(crate) fn new_controller(&self) -> Option<&Redesign> {
-        found(self.redesign.as_ref())
+        found(self.scheme()?.redesign.as_ref())
+    }
+
+    /// The uncertainty of the model that a method of the scheme gave.
+    pub fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
+        self.scheme()?.uncertainty.of(method)
+    }
+
+    /// Whether and how well the declared controller explains the inputs; see [`DeviationSignals::controller_mismatch`].
+    pub fn controller_mismatch(&self) -> Option<f64> {
+        self.filtered.as_ref().ok()?.signals.controller_mismatch
     }
 }
 

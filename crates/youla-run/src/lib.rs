@@ -25,6 +25,8 @@ mod noise_models;
 mod page;
 mod pipeline;
 mod plot;
+mod recommend;
+mod recommended;
 mod records;
 mod redesign;
 mod redraw;
@@ -62,11 +64,11 @@ pub use entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused}
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
 pub use export::{controller_for_export, model_for_export};
-pub use factorise::{Factorisation, factorise, factorise_run};
+pub use factorise::{DeclaredLoop, Factorisation, declared_loop, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::write_artefacts;
 pub use grey_box::{GreyBoxRun, PhysicalEntry};
-pub use identification::{Identification, Refusal};
+pub use identification::{Filtered, Identification, Refusal, SchemeRun};
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;
 pub use page::page;
@@ -87,7 +89,6 @@ pub use settings::{
     NominalModel, Polynomials, Prediction, RunSettings, StabilisationSettings, TachoUnit, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
-pub use stabilisation::Diagrams;
 pub use stage::{Stage, StageClock, StageTimes};
 pub use streaming::{
     LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,

@@ -6,6 +6,8 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Method {
+    /// Maximum likelihood: the model that a run recommends.
+    Likelihood,
     /// G(0).
     Nominal,
     /// Subspace identification from (u, y).
@@ -24,6 +26,7 @@ impl Method {
     /// Key in summary.json and in file names.
     pub fn key(self) -> &'static str {
         match self {
+            Method::Likelihood => "likelihood",
             Method::Nominal => "nominal",
             Method::Direct => "direct",
             Method::Hansen => "hansen",
@@ -36,6 +39,7 @@ impl Method {
     /// Name in tables and figures.
     pub fn label(self) -> &'static str {
         match self {
+            Method::Likelihood => "recommended",
             Method::Nominal => "nominal G(0)",
             Method::Direct => "direct N4SID",
             Method::Hansen => "Hansen G(S)",

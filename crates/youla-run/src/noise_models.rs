@@ -13,6 +13,7 @@ use super::settings::Prediction;
 use crate::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::HansenModel;
+use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace};
@@ -26,6 +27,21 @@ use youla_greybox::GreyBoxModel;
 pub(super) fn noise_of_direct(prediction: Prediction, direct: &SubspaceModel) -> Result<Option<StateSpace<Discrete>>> {
     let gain = direct.innovation.gain().filter(|_| prediction == Prediction::OpenLoop);
     gain.map(|gain| innovations(&direct.model, gain)).transpose()
+}
+
+/// H of the recommended model, from the gain of its predictor.
+///
+/// # Errors
+/// Ports.
+pub(super) fn noise_of_recommended(
+    prediction: Prediction,
+    found: &Recommendation,
+) -> Result<Option<StateSpace<Discrete>>> {
+    let predictor = &found.predictor;
+    let Some(gain) = predictor.k.as_ref().filter(|_| prediction == Prediction::OpenLoop) else { return Ok(None) };
+    let one = eye(predictor.c.nrows());
+    let h = StateSpace::new(predictor.a.clone(), gain.clone(), predictor.c.clone(), one, found.plant.time())?;
+    Ok(Some(h))
 }
 
 /// H of a physical structure in innovation form.

@@ -7,6 +7,7 @@ use super::findings::{further_lines, notes, verdict_lines};
 use super::grey_box::GreyBoxRun;
 use super::identification::Identification;
 use super::method::Method;
+use super::recommended;
 use super::records::{LoopRecord, channels_of};
 use super::redesign;
 use super::residual_view::drawn as drawn_residuals;
@@ -63,11 +64,12 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
         certificates: found.verdict.models.iter().map(|v| certificate(found, v)).collect(),
-        loop_tables: found.certificate.tables(),
+        loop_tables: found.scheme().map_or_else(Vec::new, |s| s.certificate.tables()),
+        recommended: recommended::tables(found),
         redesign: redesign(found)?,
         margins: found.verdict.models.iter().map(robustness::row).collect(),
         margins_caption: robustness::caption(found),
-        bezout_residual: Some(found.factorisation.bezout_residual),
+        bezout_residual: found.filtered.as_ref().ok().map(|f| f.factorisation.bezout_residual),
         stages: seconds.iter().map(|(s, t)| draw::Stage { name: s.name().into(), seconds: *t }).collect(),
     })
 }
@@ -75,9 +77,9 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
 fn summary_sentence(found: &Identification) -> String {
     let records = &found.records;
     let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
-    let how = match found.factorisation.controller.is_zero() {
-        true => "in open loop, as what the nominal model lacks,",
-        false => "in closed loop by the modified Hansen scheme",
+    let how = match found.declared.controller.is_zero() {
+        true => "in open loop",
+        false => "in closed loop",
     };
     format!(
         "Identified {how} from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
@@ -106,6 +108,7 @@ fn sources(found: &Identification) -> Vec<draw::Source> {
 
 fn method(method: Method) -> draw::Method {
     let role = match method {
+        Method::Likelihood => Role::Recommended,
         Method::Nominal => Role::Nominal,
         Method::Direct => Role::Direct,
         Method::Hansen => Role::Hansen,
@@ -160,7 +163,6 @@ fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {
 fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Experiment> {
     let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
     let (u, y) = (&found.records.inputs, &found.records.outputs);
-    let signals = &found.signals.experiments[k];
     let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
         channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
     };
@@ -188,8 +190,11 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
     }
     add(SignalKind::Input, u, &record.u)?;
     add(SignalKind::Output, y, &record.y)?;
-    add(SignalKind::Alpha, &named("alpha", u), &signals.alpha)?;
-    add(SignalKind::Beta, &named("beta", y), &signals.beta)?;
+    if let Ok(filtered) = &found.filtered {
+        let signals = &filtered.signals.experiments[k];
+        add(SignalKind::Alpha, &named("alpha", u), &signals.alpha)?;
+        add(SignalKind::Beta, &named("beta", y), &signals.beta)?;
+    }
     Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
 }
 
@@ -200,22 +205,19 @@ fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
         values: s.singular_values.clone(),
         chosen: s.order.order,
     };
-    let mut all = vec![choice(Method::Hansen, "S from alpha to beta", &found.hansen.deviation)];
-    if let Some(Ok(direct)) = &found.direct {
+    let mut all = Vec::new();
+    all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.hansen.deviation)));
+    if let Some(direct) = found.direct() {
         all.push(choice(Method::Direct, "plant from u to y", direct));
     }
     all
 }
 
 fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
-    let scheme = found.diagrams.deviation.as_ref().and_then(|d| d.as_ref().ok());
-    let direct = found.diagrams.direct.as_ref().and_then(|d| d.as_ref().ok());
-    let order_of_direct = found.direct.as_ref().and_then(|d| d.as_ref().ok()).map(|d| d.order.order);
+    let scheme = found.scheme().and_then(|s| Some((s.diagram.as_ref().ok()?, s.hansen.deviation.order.order)));
     let mut all = Vec::new();
-    all.extend(
-        scheme.map(|d| drawn(d, Method::Hansen.key(), "S from alpha to beta", found.hansen.deviation.order.order)),
-    );
-    let direct = direct.zip(order_of_direct);
+    all.extend(scheme.map(|(d, order)| drawn(d, Method::Hansen.key(), "S from alpha to beta", order)));
+    let direct = found.direct_diagram.as_ref().and_then(|d| d.as_ref().ok()).zip(found.direct().map(|d| d.order.order));
     all.extend(direct.map(|(d, order)| drawn(d, Method::Direct.key(), "plant from u to y", order)));
     all
 }
@@ -254,7 +256,10 @@ fn poles(v: &ModelVerdict) -> Result<draw::Poles> {
 }
 
 fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
-    let bands = found.uncertainty.of(v.method).map_or(&[][..], |known| &known.modes);
+    if let (Method::Likelihood, Ok(model)) = (v.method, &found.recommended) {
+        return Ok(recommended::modes(model));
+    }
+    let bands = found.uncertainty(v.method).map_or(&[][..], |known| &known.modes);
     let mode = |(k, m): (usize, &youla::lti::Mode)| draw::Mode {
         method: v.method.key().into(),
         hz: m.hz,
@@ -266,27 +271,28 @@ fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
 
 /// The present and the predicted loop.
 fn redesign(found: &Identification) -> Result<Option<draw::Redesign>> {
-    let Some(Ok(new)) = &found.redesign else { return Ok(None) };
+    let Some(new) = found.new_controller() else { return Ok(None) };
     let (loops, figure) = (redesign::loops().to_vec(), redesign::figure(new)?);
     Ok(Some(draw::Redesign { loops, figure, tables: redesign::tables(new) }))
 }
 
 /// The physical structure, where one was estimated.
 fn structure(found: &Identification) -> Option<&GreyBoxRun> {
-    found.grey_box.as_ref()?.as_ref().ok()
+    found.structure()
 }
 
 fn reduction(found: &Identification) -> Option<draw::Reduction> {
-    Some(found.reduction.as_ref()?.as_ref().ok()?.drawn())
+    Some(found.reduced()?.drawn())
 }
 
 fn certificate(found: &Identification, v: &ModelVerdict) -> draw::Certificate {
-    let from_s = matches!(v.method, Method::Hansen | Method::HansenReduced);
+    let from_s = matches!(v.method, Method::Hansen | Method::HansenReduced).then(|| found.scheme()).flatten();
+    let deviation = from_s.map(|s| &s.hansen.deviation);
     draw::Certificate {
         method: v.method.key().into(),
         order: v.model.order(),
-        s_order: from_s.then(|| found.hansen.deviation.model.order()),
-        s_stable: from_s.then_some(found.hansen.deviation.stability.stable),
+        s_order: deviation.map(|s| s.model.order()),
+        s_stable: deviation.map(|s| s.stability.stable),
         stabilised_by_controller: Some(v.certificate.stable),
         worst_closed_loop_pole: v.certificate.worst_pole.map(|p| [p.re, p.im]),
     }

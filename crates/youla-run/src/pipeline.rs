@@ -2,32 +2,33 @@
 
 use super::certificate::certificate;
 use super::check::check_records;
-use super::context::RunContext;
+use super::context::{RunContext, SchemeContext};
 use super::direct::direct;
-use super::factorise::factorise_run;
-use super::grey_box::grey_box;
-use super::identification::{Identification, found};
+use super::factorise::{declared_loop, factorise_run};
+use super::grey_box::{GreyBoxRun, grey_box};
+use super::identification::{Filtered, Identification, SchemeRun, found};
+use super::recommend::recommend;
 use super::records::RunRecords;
 use super::redesign::redesigned;
-use super::reduction::run_reduction;
+use super::reduction::{RunReduction, run_reduction};
 use super::response::{check_grid, grid, indirect};
 use super::scheme::{Scheme, require_length, scheme};
 use super::settings::RunSettings;
 use super::signals::deviation_signals;
-use super::stabilisation::Diagrams;
 use super::stage::{Stage, StageClock};
 use super::uncertainty::run_uncertainty;
 use super::verdict::{Candidates, verify};
 use crate::{Error, Result};
 use std::path::Path;
+use youla::ErrorKind;
 
-/// Runs the modified Hansen scheme on records of a closed loop, beside direct identification.
+/// Identifies the plant of a loop from its records: the recommended model by maximum likelihood, and beside it the modified
+/// Hansen scheme, direct identification and what else was asked for.
 ///
-/// A direct model, a reduction, an indirect response or a redesign that is impossible does not end the run: its field of the
-/// result holds the reason.
+/// A method that is impossible on these records does not end the run: its field of the result holds the reason.
 ///
 /// # Errors
-/// Whatever makes the scheme itself impossible; see the functions called here in turn.
+/// Bad input; where no method gives a model, the reason why the scheme gives none.
 pub fn identify(
     settings: RunSettings,
     records: RunRecords,
@@ -36,56 +37,114 @@ pub fn identify(
 ) -> Result<Identification> {
     settings.check()?;
     check_grid(&settings.frequency_response, records.time)?;
-    let factorisation = clock.run(Stage::Factor, || factorise_run(&settings, &records, folder))?; // (13)-(15)
-    let run = RunContext { settings: &settings, records: &records, factorisation: &factorisation };
-    let factors = &factorisation.factors;
-    let (signals, data) = clock.run(Stage::Signals, || {
-        let signals = deviation_signals(factors, &records.estimation, settings.factors.settle)?; // (28)
-        Ok::<_, Error>((signals, check_records(&settings, &records, &factorisation.controller)?))
-    })?;
-    require_length(&settings.hansen, &records, signals.settle)?;
-    let (scheme, direct, grey_box) = clock.run(Stage::Identify, || {
-        let (scheme, direct) = rayon::join(|| scheme(run, &signals), || direct(&records, &settings)); // (25), (17)
-        let grey_box = scheme.as_ref().ok().and_then(|scheme| grey_box(run, &signals, &scheme.hansen));
-        (scheme, direct, grey_box)
+    let declared = declared_loop(&settings, &records, folder)?;
+    let filtered = own_line(filtered(&settings, &records, folder, clock))?;
+    let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
+    let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
+    let context =
+        filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
+    let data = check_records(&settings, &records, &declared.controller)?;
+    let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
+        let others = || rayon::join(|| context.map(of_scheme), || direct(&records, &settings)); // (25), (17)
+        rayon::join(|| recommend(run), others)
     });
-    let Scheme { hansen, refinement, diagram } = scheme.map_err(|e| e.within(signals.context()))?;
-    let (direct, direct_diagram) = direct;
-    let diagrams = Diagrams { deviation: Some(diagram), direct: direct_diagram };
+    let (recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
     let reduction = clock.run(Stage::Reduce, || {
-        settings.reduction.as_ref().map(|options| run_reduction(factors, &hansen, &records, options)) // (29)
+        let (hansen, options) = (&found(s.as_ref())?.scheme.hansen, settings.reduction.as_ref()?);
+        Some(run_reduction(&context?.factorisation.factors, hansen, &records, options)) // (29)
     });
-    let hz = grid(&settings.frequency_response, [&factorisation.nominal, &hansen.plant])?;
-    let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
-    let uncertainty = run_uncertainty(&hansen, intervals, &hz, settings.hansen.uncertainty.level)?;
     let candidates = Candidates {
-        hansen: &hansen,
+        recommended: recommended.as_ref().ok(),
+        hansen: found(s.as_ref()).map(|s| &s.scheme.hansen),
         direct: found(direct.as_ref()),
         reduction: found(reduction.as_ref()),
-        grey_box: found(grey_box.as_ref()),
+        grey_box: found(s.as_ref()).and_then(|s| found(s.grey_box.as_ref())),
     };
+    let identified = candidates.identified();
+    if identified.is_empty() {
+        return Err(filtered.err().or_else(|| s?.err()).or_else(|| recommended.err()).unwrap_or_else(no_method));
+    }
+    let models = [&[&declared.nominal], &identified[..]].concat();
+    let hz = grid(&settings.frequency_response, &models, records.time)?;
     // (26), the loop certificate and the response that rests on no model.
-    let (indirect, verdict) =
-        clock.run(Stage::Validate, || Ok::<_, Error>((indirect(run, &signals), verify(run, &candidates)?)))?;
-    let certificate = clock.run(Stage::Certify, || certificate(run, &signals, &hansen))?;
-    let redesign = clock.run(Stage::Redesign, || redesigned(run, &hansen, candidates.reduction));
+    let (indirect, verdict) = clock.run(Stage::Validate, || {
+        Ok::<_, Error>((indirect(run, context.map(|c| c.signals)), verify(run, &candidates)?))
+    })?;
+    let scheme = match (s, context) {
+        (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, reduction, &hz, clock)?)),
+        (Some(Err(reason)), _) => Some(Err(reason)),
+        _ => None,
+    };
     Ok(Identification {
         settings,
         records,
         data,
-        factorisation,
-        signals,
-        hansen,
-        refinement,
-        hz,
-        uncertainty,
-        reduction,
+        declared,
+        recommended,
+        filtered,
+        scheme,
         direct,
-        grey_box,
-        diagrams,
+        direct_diagram,
         indirect,
+        hz,
         verdict,
-        certificate,
-        redesign,
     })
+}
+
+/// Separates what costs a method its line from what ends the run: a numerical condition, a record that is too short for the
+/// method and a nominal model that the controller does not stabilise are of the first kind, other bad input of the second.
+fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
+    match outcome {
+        Err(e) if e.kind() == ErrorKind::BadInput && !e.is_of_the_records() => Err(e),
+        outcome => Ok(outcome),
+    }
+}
+
+/// Factors of nominal model and controller, alpha and beta.
+fn filtered(
+    settings: &RunSettings,
+    records: &RunRecords,
+    folder: &Path,
+    clock: &mut StageClock<'_>,
+) -> Result<Filtered> {
+    let factorisation = clock.run(Stage::Factor, || factorise_run(settings, records, folder))?; // (13)-(15)
+    let settle = settings.factors.settle;
+    let signals =
+        clock.run(Stage::Signals, || deviation_signals(&factorisation.factors, &records.estimation, settle))?; // (28)
+    Ok(Filtered { factorisation, signals })
+}
+
+/// The scheme and the physical structure that is started from it.
+struct OfScheme {
+    scheme: Scheme,
+    grey_box: Option<Result<GreyBoxRun>>,
+}
+
+fn of_scheme(context: SchemeContext<'_>) -> Result<OfScheme> {
+    let SchemeContext { run, signals, .. } = context;
+    require_length(&run.settings.hansen, run.records, signals.settle)?;
+    let scheme = scheme(context).map_err(|e| e.within(signals.context()))?;
+    let grey_box = grey_box(context, &scheme.hansen);
+    Ok(OfScheme { scheme, grey_box })
+}
+
+/// Region, certificate and redesign of G(S).
+fn judged(
+    context: SchemeContext<'_>,
+    s: OfScheme,
+    reduction: Option<Result<RunReduction>>,
+    hz: &[f64],
+    clock: &mut StageClock<'_>,
+) -> Result<SchemeRun> {
+    let OfScheme { scheme: Scheme { hansen, refinement, diagram }, grey_box } = s;
+    let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
+    let uncertainty = run_uncertainty(&hansen, intervals, hz, context.run.settings.hansen.uncertainty.level)?;
+    let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
+    let redesign = clock.run(Stage::Redesign, || redesigned(context, &hansen, found(reduction.as_ref())));
+    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, grey_box, certificate, redesign })
+}
+
+/// Cannot happen while the recommended model is always tried.
+fn no_method() -> Error {
+    Error::Method(youla::Error::NoCandidate { samples: 0 })
 }

@@ -1,6 +1,6 @@
 //! `[redesign]`: a new controller on the model of a run, with what it is worth.
 
-use super::context::RunContext;
+use super::context::SchemeContext;
 use super::entries::{BandEntry, finite};
 use super::records::RunRecords;
 use super::reduction::RunReduction;
@@ -22,15 +22,16 @@ use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 /// # Errors
 /// As [`redesign`].
 pub(super) fn redesigned(
-    run: RunContext<'_>,
+    context: SchemeContext<'_>,
     hansen: &HansenModel,
     reduced: Option<&RunReduction>,
 ) -> Option<Result<Redesign>> {
+    let run = context.run;
     let options = run.settings.redesign.as_ref()?;
     let (input, output) = run.records.sizes();
     let problem = RedesignProblem {
         model: reduced.map_or(&hansen.plant, |r| &r.found.reduction.model),
-        factors: &run.factorisation.factors,
+        factors: &context.factorisation.factors,
         deviation: &hansen.deviation.model,
         uncertainty: hansen.deviation.uncertainty.as_ref(),
         input_size: &input,

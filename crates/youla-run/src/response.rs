@@ -19,7 +19,7 @@ use youla_report::data as draw;
 /// too, it is the image of all of them in alpha, so that none is mistaken for noise.
 ///
 /// The error is the reason why there is none: a record shorter than a window, an excitation without power at a frequency.
-pub(super) fn indirect(run: RunContext<'_>, signals: &DeviationSignals) -> Option<Result<IndirectResponse>> {
+pub(super) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) -> Option<Result<IndirectResponse>> {
     let settings = &run.settings.frequency_response;
     let records = &run.records.estimation;
     let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
@@ -30,7 +30,7 @@ pub(super) fn indirect(run: RunContext<'_>, signals: &DeviationSignals) -> Optio
             let alone = [&r.input_excitation, &r.alpha].into_iter().flatten().collect::<Vec<_>>();
             match alone[..] {
                 [d] if at_rest(r) => Some(d.clone()),
-                _ => signals.expected_alpha.get(k).cloned(),
+                _ => signals?.expected_alpha.get(k).cloned(),
             }
         })
         .collect();
@@ -84,13 +84,13 @@ const LIGHT: f64 = 0.1;
 const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
 
 /// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
-/// below Nyquist, and around each lightly damped mode of the models (nominal model and G(S)), at `f (1 + zeta tan(angle))`:
+/// below Nyquist, and around each lightly damped mode of the models, at `f (1 + zeta tan(angle))`:
 /// between the points of the logarithmic grid a peak would be cut off.
 ///
 /// # Errors
 /// [`youla::Error::NoConvergence`] of the eigenvalues.
-pub(super) fn grid(settings: &FrequencySettings, models: [&StateSpace<Discrete>; 2]) -> Result<Vec<f64>> {
-    let nyquist = 0.5 / models[0].time().ts();
+pub(super) fn grid(settings: &FrequencySettings, models: &[&StateSpace<Discrete>], time: Discrete) -> Result<Vec<f64>> {
+    let nyquist = 0.5 / time.ts();
     let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
     let last = settings.points.max(2) - 1;
     let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();

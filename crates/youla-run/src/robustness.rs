@@ -5,7 +5,7 @@
 //! taken in channels that are divided by their root mean square over the estimation records, about the mean of each record.
 
 use super::entries::{OrRefused, finite};
-use super::factorise::Factorisation;
+use super::factorise::DeclaredLoop;
 use super::records::LoopRecord;
 use crate::Result;
 use serde::{Deserialize, Serialize};
@@ -64,9 +64,9 @@ fn rms(records: &[LoopRecord], signal: impl Fn(&LoopRecord) -> &Mat<f64>) -> Vec
 
 /// The robustness of one model of a run; `plant` is G(S).
 pub(super) fn robustness(
-    Factorisation { nominal, controller, .. }: &Factorisation,
+    DeclaredLoop { nominal, controller, .. }: &DeclaredLoop,
     scales: &Result<ChannelScales, String>,
-    plant: &StateSpace<Discrete>,
+    plant: Option<&StateSpace<Discrete>>,
     model: &StateSpace<Discrete>,
 ) -> Robustness {
     let scaled = |plant: &StateSpace<Discrete>| -> Result<StateSpace<Discrete>, String> {
@@ -88,7 +88,7 @@ pub(super) fn robustness(
         }),
         coprime: coprime(),
         gap_to_nominal: gap_to(nominal),
-        gap_to_hansen: gap_to(plant),
+        gap_to_hansen: plant.map_or_else(|| Err("the scheme gave no model".to_owned()), gap_to),
     }
 }
 

@@ -1,8 +1,7 @@
 //! The modified Hansen scheme on the records of a run: S by (25), G(S) by (17), the diagram of S, its refinement.
 
-use super::context::RunContext;
+use super::context::SchemeContext;
 use super::records::RunRecords;
-use super::signals::DeviationSignals;
 use super::stabilisation::diagram;
 use crate::{Error, Result};
 use youla::identify::hansen::hansen_structured;
@@ -25,8 +24,9 @@ pub(super) struct Scheme {
 ///
 /// # Errors
 /// Those of [`hansen_structured`] and of the refinement.
-pub(super) fn scheme(run: RunContext<'_>, signals: &DeviationSignals) -> Result<Scheme> {
-    let (settings, factors) = (run.settings, &run.factorisation.factors);
+pub(super) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
+    let SchemeContext { run, factorisation, signals } = context;
+    let (settings, factors) = (run.settings, &factorisation.factors);
     let lines = run.records.disturbances(signals.settle);
     let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
     let hansen = hansen_structured(factors, &data, &settings.hansen, &settings.deviation.options())?;

@@ -14,15 +14,6 @@ use youla_report::data as draw;
 /// Orders that a diagram has at least, where the horizon allows them.
 const LEAST_ORDERS: usize = 20;
 
-/// The diagrams of S and of the direct model, or the reasons why there are none; absent where there is no model.
-#[derive(Debug)]
-pub struct Diagrams {
-    /// Of S, from alpha to beta.
-    pub deviation: Option<Result<StabilisationDiagram>>,
-    /// Of the plant, from u to y.
-    pub direct: Option<Result<StabilisationDiagram>>,
-}
-
 /// The diagram beside a model from the same data.
 pub(super) fn diagram(
     data: &SubspaceData<'_>,

@@ -6,6 +6,7 @@ use super::entries::{Fits, ModeEntry, OrRefused, finite, finite_all, pairs};
 use super::grey_box::PhysicalEntry;
 use super::identification::Identification;
 use super::method::Method;
+use super::recommended::RecommendedEntry;
 use super::redesign::{self, RedesignEntry};
 use super::reduction::ReductionEntry;
 use super::residual_tests::ResidualEntry;
@@ -35,9 +36,11 @@ pub struct Summary {
     pub schema: u32,
     /// Name of the machine or experiment.
     pub name: String,
+    /// The model that the run recommends; `null` where no candidate survives (the reason is under `refused`).
+    pub recommended: Option<RecommendedEntry>,
     /// The nominal model G(0).
     pub nominal: Option<ReferenceEntry>,
-    /// The identified models by method: `hansen`, `hansen_reduced`, `direct`, `grey_box`.
+    /// The identified models by method: `likelihood`, `hansen`, `hansen_reduced`, `direct`, `grey_box`.
     pub methods: BTreeMap<String, MethodEntry>,
     /// What was asked for but is impossible, with the reason.
     pub refused: BTreeMap<String, String>,
@@ -56,8 +59,8 @@ pub struct Summary {
     pub true_plant: Option<ReferenceEntry>,
     /// The sizes by which channels are scaled for `coprime_margin` and the nu-gaps.
     pub channel_scales: OrRefused<ScalesEntry>,
-    /// The loop of G(S).
-    pub certificate: CertificateEntry,
+    /// The loop of G(S); `null` where the scheme gave none.
+    pub certificate: Option<CertificateEntry>,
     /// The new controller, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<RedesignEntry>,
@@ -136,20 +139,21 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
     Ok(Summary {
         schema: SUMMARY_SCHEMA,
         name: run.settings.name.clone(),
+        recommended: run.recommended.as_ref().ok().map(RecommendedEntry::from),
         nominal: run.verdict.of(Method::Nominal).map(reference_entry),
         methods: methods.collect::<Result<_>>()?,
         refused: run.refusals().into_iter().map(|r| (r.key.to_owned(), r.error.to_string())).collect(),
         frequency_response: responses_entry(run)?,
         data: run.data.entry(),
-        bezout_residual: finite(run.factorisation.bezout_residual),
-        controller_mismatch: run.signals.controller_mismatch.and_then(finite),
+        bezout_residual: run.filtered.as_ref().ok().and_then(|f| finite(f.factorisation.bezout_residual)),
+        controller_mismatch: run.controller_mismatch().and_then(finite),
         seconds: seconds.iter().map(|(stage, seconds)| (stage.name().to_owned(), *seconds)).collect(),
         true_plant: run.verdict.of(Method::TruePlant).map(reference_entry),
         channel_scales: scales_entry(&run.verdict.scales),
-        certificate: run.certificate.entry(),
+        certificate: run.scheme().map(|s| s.certificate.entry()),
         redesign: run.new_controller().map(redesign::entry),
         reduction: run.reduced().map(|reduction| reduction.entry()),
-        uncertainty: UncertaintyEntry::new(&run.hansen, &run.settings.hansen.uncertainty),
+        uncertainty: run.scheme().and_then(|s| UncertaintyEntry::new(&s.hansen, &run.settings.hansen.uncertainty)),
     })
 }
 
@@ -180,12 +184,17 @@ fn reference_entry(v: &ModelVerdict) -> ReferenceEntry {
 }
 
 fn method_entry(run: &Identification, v: &ModelVerdict) -> Result<MethodEntry> {
-    let modes = match run.uncertainty.of(v.method) {
-        Some(known) => known.modes.iter().map(ModeEntry::from).collect(),
-        None => v.modes.iter().map(ModeEntry::from).collect(),
+    let recommended = run.recommended.as_ref().ok().filter(|_| v.method == Method::Likelihood);
+    let modes = match (recommended, run.uncertainty(v.method)) {
+        (Some(found), _) => RecommendedEntry::from(found).modes,
+        (_, Some(known)) => known.modes.iter().map(ModeEntry::from).collect(),
+        _ => v.modes.iter().map(ModeEntry::from).collect(),
     };
     let residuals = v.records.iter().filter_map(|r| Some((r.record.clone(), r.residuals.as_ref()?.into())));
-    let s = matches!(v.method, Method::Hansen | Method::HansenReduced).then_some(&run.hansen.deviation);
+    let s = matches!(v.method, Method::Hansen | Method::HansenReduced)
+        .then(|| run.scheme())
+        .flatten()
+        .map(|s| &s.hansen.deviation);
     let structure = run.structure().filter(|_| v.method == Method::GreyBox);
     Ok(MethodEntry {
         order: v.model.order(),

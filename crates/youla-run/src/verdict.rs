@@ -2,10 +2,9 @@
 
 use super::context::RunContext;
 use super::disturbance::without_lines;
-use super::factorise::Factorisation;
 use super::grey_box::GreyBoxRun;
 use super::method::Method;
-use super::noise_models::{noise_of_direct, noise_of_hansen, noise_of_structure};
+use super::noise_models::{noise_of_direct, noise_of_hansen, noise_of_recommended, noise_of_structure};
 use super::records::LoopRecord;
 use super::reduction::RunReduction;
 use super::residual_tests::{RecordResiduals, residual_tests};
@@ -15,6 +14,7 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use youla::control::{ChannelScales, with_input_port};
 use youla::identify::hansen::HansenModel;
+use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::lti::{Discrete, Mode, StateSpace};
 use youla::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
@@ -72,8 +72,10 @@ impl Verdict {
 
 /// The models that a run identified; nominal model and true plant are in its records and factors.
 pub(super) struct Candidates<'a> {
-    /// S and G(S).
-    pub(super) hansen: &'a HansenModel,
+    /// The recommended model, where there is one.
+    pub(super) recommended: Option<&'a Recommendation>,
+    /// S and G(S), where the scheme gave them.
+    pub(super) hansen: Option<&'a HansenModel>,
     /// The direct model, where there is one.
     pub(super) direct: Option<&'a SubspaceModel>,
     /// The reduced model, where there is one.
@@ -90,17 +92,33 @@ struct Candidate<'a> {
 }
 
 impl<'a> Candidates<'a> {
-    /// In the order nominal, direct, Hansen, reduced, grey box, true plant.
+    /// The models that were identified.
+    pub(super) fn identified(&self) -> Vec<&'a StateSpace<Discrete>> {
+        let recommended = self.recommended.map(|r| &r.plant);
+        let direct = self.direct.map(|d| &d.model);
+        let reduced = self.reduction.map(|r| &r.found.reduction.model);
+        let physical = self.grey_box.map(|g| &g.found.model.model);
+        [recommended, self.hansen.map(|h| &h.plant), direct, reduced, physical].into_iter().flatten().collect()
+    }
+
+    /// In the order recommended, nominal, direct, Hansen, reduced, grey box, true plant.
     fn all(&self, run: RunContext<'a>) -> Result<Vec<Candidate<'a>>> {
         let prediction = run.settings.verification.prediction;
         let plain = |method, model| Candidate { method, model, noise: None };
-        let mut all = vec![plain(Method::Nominal, &run.factorisation.nominal)];
+        let mut all = Vec::new();
+        if let Some(found) = self.recommended {
+            let noise = noise_of_recommended(prediction, found)?;
+            all.push(Candidate { method: Method::Likelihood, model: &found.plant, noise });
+        }
+        all.push(plain(Method::Nominal, &run.declared.nominal));
         if let Some(direct) = self.direct {
             let noise = noise_of_direct(prediction, direct)?;
             all.push(Candidate { method: Method::Direct, model: &direct.model, noise });
         }
-        let noise = noise_of_hansen(prediction, &run.factorisation.factors, self.hansen)?;
-        all.push(Candidate { method: Method::Hansen, model: &self.hansen.plant, noise });
+        if let Some((hansen, factorisation)) = self.hansen.zip(run.factorisation) {
+            let noise = noise_of_hansen(prediction, &factorisation.factors, hansen)?;
+            all.push(Candidate { method: Method::Hansen, model: &hansen.plant, noise });
+        }
         all.extend(self.reduction.map(|r| plain(Method::HansenReduced, &r.found.reduction.model)));
         if let Some(GreyBoxRun { found, .. }) = self.grey_box {
             let noise = noise_of_structure(prediction, &found.model)?;
@@ -117,7 +135,7 @@ impl<'a> Candidates<'a> {
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
 pub(super) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Verdict> {
     let scales = channel_scales(&run.records.estimation).map_err(|e| e.to_string());
-    let plant = &candidates.hansen.plant;
+    let plant = candidates.hansen.map(|h| &h.plant);
     let all = candidates.all(run)?;
     let verdicts: Vec<Result<ModelVerdict>> =
         all.par_iter().map(|candidate| verify_model(run, &scales, plant, candidate)).collect();
@@ -127,7 +145,7 @@ pub(super) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result
 fn verify_model(
     run: RunContext<'_>,
     scales: &Result<ChannelScales, String>,
-    plant: &StateSpace<Discrete>,
+    plant: Option<&StateSpace<Discrete>>,
     Candidate { method, model, noise }: &Candidate<'_>,
 ) -> Result<ModelVerdict> {
     let verify = |r: &LoopRecord| verify_record(run, model, noise.as_ref(), r);
@@ -137,8 +155,8 @@ fn verify_model(
         model: (*model).clone(),
         poles: model.poles()?,
         modes: model.modes()?,
-        certificate: certify(model, &run.factorisation.controller)?,
-        robustness: robustness(run.factorisation, scales, plant, model),
+        certificate: certify(model, &run.declared.controller)?,
+        robustness: robustness(run.declared, scales, plant, model),
         records,
     })
 }
@@ -155,8 +173,8 @@ pub(super) fn verify_record(
     let predicted = match run.settings.verification.prediction {
         Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
         Prediction::ClosedLoop => {
-            let Factorisation { factors, controller, .. } = run.factorisation;
-            let ports = if record.alpha.is_some() { factors.j_k()? } else { with_input_port(controller)? };
+            let factors = run.factorisation.filter(|_| record.alpha.is_some()).map(|f| &f.factors);
+            let ports = factors.map_or_else(|| with_input_port(&run.declared.controller), |f| f.j_k())?;
             let excitation = LoopExcitation {
                 input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
                 reference: record.reference.as_ref().map(|r| r.as_ref()),

@@ -27,13 +27,15 @@ fn between(all: &[ModeBand], from: f64, to: f64) -> ModeBand {
 #[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn two_inertias_of_the_flexible_drive() {
     let found = run();
-    let grey = found.grey_box.as_ref().unwrap().as_ref().unwrap();
+    let grey = found.scheme().unwrap().grey_box.as_ref().unwrap().as_ref().unwrap();
     let known = grey.intervals.as_ref().unwrap();
     for p in &known.parameters {
         println!("{} {:.5} +- {:.2e}", p.name, p.value, p.deviation);
     }
     println!("{}", known.verdict());
-    let Some(Uncertainty::Delta(plant)) = &found.hansen.uncertainty else { panic!("no uncertainty of G(S)") };
+    let Some(Uncertainty::Delta(plant)) = &found.scheme().unwrap().hansen.uncertainty else {
+        panic!("no uncertainty of G(S)")
+    };
     for (what, of_structure, of_plant, from, to, tolerance) in [
         ("resonance", known.modes().unwrap(), plant.modes().unwrap(), 53.0, 56.5, 0.01),
         ("anti-resonance", known.zeros().unwrap(), plant.zeros().unwrap(), 39.0, 43.0, 0.04),

@@ -57,15 +57,15 @@ fn flexible_drive() {
     assert!((53.0..=56.5).contains(&resonance), "resonance at {resonance} Hz");
     assert!((39.0..=43.0).contains(&anti), "anti-resonance at {anti} Hz");
     // The first resonance, in the loop with the controller for S, settles in both diagrams.
-    let settled = |diagram: &Option<youla_run::Result<StabilisationDiagram>>, from, to| {
-        let clusters = &diagram.as_ref().unwrap().as_ref().unwrap().clusters;
+    let settled = |diagram: &youla_run::Result<StabilisationDiagram>, from, to| {
+        let clusters = &diagram.as_ref().unwrap().clusters;
         clusters.iter().filter(|c| (from..to).contains(&c.hz) && (0.004..0.04).contains(&c.zeta)).count()
     };
-    assert_eq!(settled(&found.diagrams.deviation, 57.5, 59.5), 1);
-    assert_eq!(settled(&found.diagrams.direct, 53.0, 56.5), 1);
+    assert_eq!(settled(&found.scheme().unwrap().diagram, 57.5, 59.5), 1);
+    assert_eq!(settled(found.direct_diagram.as_ref().unwrap(), 53.0, 56.5), 1);
     let verdict = found.verdict.of(Method::Hansen).unwrap();
     assert!(verdict.certificate.stable, "the logged controller stabilises G(S)");
-    assert!(found.signals.controller_mismatch.unwrap() < 1e-3, "the logged controller is the declared one");
+    assert!(found.controller_mismatch().unwrap() < 1e-3, "the logged controller is the declared one");
     for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
         assert!(hansen.fit[0] > nominal.fit[0] + 15.0, "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
     }
@@ -82,14 +82,14 @@ fn rotary_pendulum() {
     let unstable: Vec<_> = verdict.poles.iter().filter(|p| p.norm() >= 1.0).collect();
     assert_eq!(unstable.len(), 1, "{unstable:?}");
     assert!(unstable[0].im == 0.0 && (1.02..1.04).contains(&unstable[0].re), "{unstable:?}");
-    assert!(verdict.certificate.stable && found.hansen.deviation.stability.stable);
-    assert!(found.hansen.deviation.stability.moved.is_empty(), "no pole was moved");
+    assert!(verdict.certificate.stable && found.scheme().unwrap().hansen.deviation.stability.stable);
+    assert!(found.scheme().unwrap().hansen.deviation.stability.moved.is_empty(), "no pole was moved");
     for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
         for (h, n) in hansen.fit.iter().zip(&nominal.fit) {
             assert!(h > &(n + 5.0), "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
         }
     }
-    let refusal = found.reduction.unwrap().unwrap_err();
+    let refusal = found.scheme().unwrap().reduction.as_ref().unwrap().as_ref().unwrap_err();
     assert!(matches!(refusal, youla_run::Error::Method(youla::Error::Unstable { .. })), "{refusal}");
 }
 

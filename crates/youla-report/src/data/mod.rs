@@ -99,6 +99,9 @@ pub struct ReportData {
     /// Further evidence on the loop, below the certificates.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub loop_tables: Vec<EvidenceTable>,
+    /// Evidence on the recommended model, in words.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub recommended: Vec<EvidenceTable>,
     /// A new controller.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<Redesign>,
@@ -129,6 +132,8 @@ pub struct Source {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Role {
+    /// The model that the run recommends.
+    Recommended,
     /// The model known before.
     Nominal,
     /// Prediction error from the nominal model.

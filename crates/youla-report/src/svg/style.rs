@@ -92,6 +92,7 @@ impl<'a> Styles<'a> {
         };
         let others = self.methods[..place].iter().filter(|method| method.role == Role::Other).count();
         match self.methods[place].role {
+            Role::Recommended => style("--recommended", "#c2185b", 1.15, &[], Marker::Circle),
             Role::Nominal => style("--nominal", "#7f868e", 0.8, &[1.5, 1.5], Marker::Plus),
             Role::Pem => style("--pem", "#b0457b", 0.85, &[5.5, 1.5], Marker::Up),
             Role::PemMultiStart => style("--pem-multi-start", "#8a7a00", 0.85, &[2.5, 1.2], Marker::Down),

@@ -1,5 +1,6 @@
 //! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
 
+use super::trust::{deviation_line, region_line};
 use crate::identification::Identification;
 use crate::method::Method;
 use youla::control::IsoZone;
@@ -8,7 +9,7 @@ use youla_report::data::{Evidence, Status, Verdict};
 
 /// Lines below the answer, each with its evidence.
 pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
-    [margin_line, redesign_line, reduction_line, grey_box_line, factor_line]
+    [deviation_line, region_line, margin_line, redesign_line, reduction_line, grey_box_line, factor_line]
         .iter()
         .filter_map(|line| line(found))
         .collect()
@@ -16,7 +17,7 @@ pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
 
 /// Margins of the loop of G(S); none where it is unstable, which the answer states, and where no controller ran.
 fn margin_line(found: &Identification) -> Option<Verdict> {
-    if found.factorisation.controller.is_zero() {
+    if found.declared.controller.is_zero() {
         return None;
     }
     let robustness = &found.verdict.of(Method::Hansen)?.robustness;
@@ -40,19 +41,19 @@ fn margin_line(found: &Identification) -> Option<Verdict> {
 }
 
 fn redesign_line(found: &Identification) -> Option<Verdict> {
-    let new = found.redesign.as_ref()?.as_ref().ok()?;
+    let new = found.new_controller()?;
     let status = if new.gains_damping() { Status::Good } else { Status::Caution };
     Some(Verdict { status, text: crate::redesign::sentence(new), evidence: Evidence::Redesign })
 }
 
 /// Whether the controller stabilises the reduced model, and the error of the reduction in the loop.
 fn reduction_line(found: &Identification) -> Option<Verdict> {
-    Some(found.reduction.as_ref()?.as_ref().ok()?.verdict())
+    Some(found.reduced()?.verdict())
 }
 
 /// The fit of the physical structure against that of G(S).
 fn grey_box_line(found: &Identification) -> Option<Verdict> {
-    let run = found.grey_box.as_ref()?.as_ref().ok()?;
+    let run = found.structure()?;
     let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
     let (model, plant) = (fit(&run.found.model.fit), fit(&run.found.fit_of_plant));
     let start = match run.found.won {
@@ -79,7 +80,7 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
 }
 
 fn factor_line(found: &Identification) -> Option<Verdict> {
-    let residual = found.factorisation.bezout_residual;
+    let residual = found.filtered.as_ref().ok()?.factorisation.bezout_residual;
     let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
     let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
     Some(Verdict { status, text, evidence: Evidence::Certificate })

@@ -1,18 +1,28 @@
-//! The answer to "Can it be trusted?" in five lines: fit on fresh data, residuals, data and controller, S, the loop.
+//! The answer to "Can it be trusted?": the recommended model with its evidence, fit and residuals on fresh data, data and controller,
+//! the loop.
 
 use crate::check::OF_SETTINGS;
 use crate::identification::Identification;
 use crate::method::Method;
+use crate::recommended;
 use crate::residual_tests::RecordResiduals;
 use crate::verdict::ModelVerdict;
 use youla::identify::subspace::Evidence as Information;
-use youla::validate::BandCertificate;
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{Evidence, Status, Verdict};
 
-/// The five lines, each with its evidence.
+/// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    [fit_line, residual_line, data_line, deviation_line, loop_line].iter().filter_map(|line| line(found)).collect()
+    let rest = [fit_line, residual_line, data_line, loop_line];
+    recommended::verdict_lines(found).into_iter().chain(rest.iter().filter_map(|line| line(found))).collect()
+}
+
+/// The model that the lines are about: the recommended one, G(S) where there is none.
+fn subject(found: &Identification) -> (Method, &'static str) {
+    match found.recommended {
+        Ok(_) => (Method::Likelihood, "the recommended model"),
+        Err(_) => (Method::Hansen, "G(S)"),
+    }
 }
 
 /// Mean fit over all verification records and outputs.
@@ -28,37 +38,44 @@ fn fit_line(found: &Identification) -> Option<Verdict> {
     }
     let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
     let of = |method: Method| found.verdict.of(method).map(mean_fit);
-    let (hansen, nominal) = (of(Method::Hansen)?, of(Method::Nominal)?);
+    let (method, name) = subject(found);
+    let (fit, nominal) = (of(method)?, of(Method::Nominal)?);
     let mut text =
-        format!("On fresh data G(S) has a mean fit of {}, the nominal model {}", percent(hansen), percent(nominal));
-    if let Some(direct) = of(Method::Direct) {
-        text += &format!(", direct identification {}", percent(direct));
+        format!("On fresh data {name} has a mean fit of {}, the nominal model {}", percent(fit), percent(nominal));
+    for (other, name) in [(Method::Hansen, "G(S)"), (Method::Direct, "the direct model")] {
+        if let Some(fit) = of(other).filter(|_| other != method) {
+            text += &format!(", {name} {}", percent(fit));
+        }
     }
     text.push('.');
-    let better = hansen.is_finite() && (!nominal.is_finite() || hansen > nominal);
-    Some(Verdict { status: if better { Status::Good } else { Status::Bad }, text, evidence: Evidence::Fits })
+    // A fit says how much of the output is not noise; a high one is no evidence of a right model.
+    let worse = !fit.is_finite() || nominal > fit;
+    Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: Evidence::Fits })
 }
 
-/// Whether the residual of G(S) depends on what excited the loop; nothing without a verification record.
+/// Whether the residual depends on what excited the loop; nothing without a verification record.
 fn residual_line(found: &Identification) -> Option<Verdict> {
-    let records = &found.verdict.of(Method::Hansen)?.records;
+    let (method, name) = subject(found);
+    let records = &found.verdict.of(method)?.records;
     let tested: Vec<_> = records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect();
     let (status, text) = match tested.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))? {
         (_, worst) if !worst.external => {
-            let text =
-                "No external excitation is known, so the residuals of G(S) were not tested for dependence on it.";
-            (Status::Caution, text.to_owned())
+            let text = format!(
+                "No external excitation is known, so the residuals of {name} were not tested for dependence on it."
+            );
+            (Status::Caution, text)
         }
         _ if tested.iter().all(|(_, r)| r.correlations.independent) => (
             Status::Good,
-            "The residual of G(S) on fresh data does not depend on past excitation: no missing dynamics detected."
-                .into(),
+            format!(
+                "The residual of {name} on fresh data does not depend on past excitation: no missing dynamics detected."
+            ),
         ),
         (record, worst) => {
             let at = worst.correlations.largest?;
             let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
             let text = format!(
-                "The residual of G(S) on fresh data depends on past excitation: the residual of {output} in {record} has a \
+                "The residual of {name} on fresh data depends on past excitation: the residual of {output} in {record} has a \
                  correlation of {:.3} with {input} at a lag of {} samples ({:.0} standard deviations).",
                 size(worst),
                 at.lag,
@@ -95,8 +112,8 @@ fn data_line(found: &Identification) -> Option<Verdict> {
 }
 
 fn controller_sentence(found: &Identification) -> (String, Status) {
-    let controller = &found.factorisation.controller;
-    match found.signals.controller_mismatch {
+    let controller = &found.declared.controller;
+    match found.controller_mismatch() {
         _ if controller.order() == 0 && controller.d().norm_max() == 0.0 => ("No controller ran.".into(), Status::Good),
         None => {
             let text = "No excitation is declared, so the declared controller could not be verified against the log.";
@@ -118,15 +135,17 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
 }
 
 /// Order and fit of S and, where its uncertainty is computed, whether it differs from noise.
-fn deviation_line(found: &Identification) -> Option<Verdict> {
-    let s = &found.hansen.deviation;
+pub(super) fn deviation_line(found: &Identification) -> Option<Verdict> {
+    let hansen = &found.scheme()?.hansen;
+    let s = &hansen.deviation;
     let stable = if s.stability.stable { "stable" } else { "unstable" };
     let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
     let text = format!("S has order {}, is {stable} and fits beta to {}", s.model.order(), fit.join(", "));
-    let of_stability = if s.stability.stable { Status::Good } else { Status::Bad };
-    let (more, of_evidence) = match found.hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
+    // Stability of S is no evidence that S is right.
+    let of_stability = if s.stability.stable { Status::Info } else { Status::Bad };
+    let (more, of_evidence) = match hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
         Some(evidence) => information(evidence),
-        None => (".".into(), Status::Good),
+        None => (".".into(), Status::Info),
     };
     Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: Evidence::Order })
 }
@@ -151,23 +170,26 @@ fn information(evidence: &Information) -> (String, Status) {
     }
 }
 
-/// Whether the controller stabilises G(S) and, where its uncertainty was asked for, every model within the region of S.
+/// Whether the controller stabilises the model.
 fn loop_line(found: &Identification) -> Option<Verdict> {
-    let v = found.verdict.of(Method::Hansen)?;
+    let (method, name) = subject(found);
+    let v = found.verdict.of(method)?;
     let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
     let (of_loop, verb, adjective) = match v.certificate.stable {
         true => (Status::Good, "stabilises", "stable"),
         false => (Status::Bad, "does not stabilise", "unstable"),
     };
-    let text = match found.factorisation.controller.is_zero() {
-        true => format!("G(S) is {adjective}: its largest pole has |z| = {worst:.5}."),
-        false => format!("The controller that ran {verb} G(S): the largest pole of the loop has |z| = {worst:.5}."),
+    let text = match found.declared.controller.is_zero() {
+        true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst:.5}."),
+        false => format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst:.5}."),
     };
-    let certificate = &found.certificate;
-    let band = certificate.band_sentence().zip(certificate.band.as_ref().map(BandCertificate::holds));
-    let (text, of_band) = match band {
-        Some((sentence, holds)) => (format!("{text} {sentence}"), if holds { Status::Good } else { Status::Caution }),
-        None => (text, Status::Good),
-    };
-    Some(Verdict { status: of_loop.max(of_band), text, evidence: Evidence::Certificate })
+    Some(Verdict { status: of_loop, text, evidence: Evidence::Certificate })
+}
+
+/// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
+pub(super) fn region_line(found: &Identification) -> Option<Verdict> {
+    let certificate = &found.scheme()?.certificate;
+    let (text, band) = certificate.band_sentence().zip(certificate.band.as_ref())?;
+    let status = if band.holds() { Status::Good } else { Status::Caution };
+    Some(Verdict { status, text, evidence: Evidence::Certificate })
 }

@@ -3,6 +3,7 @@
 use crate::Result;
 use crate::identification::Identification;
 use crate::method::Method;
+use crate::recommended;
 use crate::response::{self, decibel, magnitude, model_responses, phase};
 use crate::uncertainty::SystemUncertainty;
 use std::f64::consts::TAU;
@@ -15,8 +16,9 @@ const LEAST_BOUND: f64 = 1e-3;
 pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(&found.verdict, &found.hz)?;
     let models = responses.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
-    let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty.of(*method)?)));
-    let bands = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port))).collect();
+    let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty(*method)?)));
+    let of_scheme = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port)));
+    let bands = recommended(found, &responses).into_iter().chain(of_scheme).collect();
     let singular = singular(found, &responses)?;
     Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect: indirect(found), bands, singular })
 }
@@ -38,6 +40,13 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
     ports(found).map(entry).collect()
 }
 
+/// The region of the recommended model.
+fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<draw::Band> {
+    let Ok(model) = &found.recommended else { return Vec::new() };
+    let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
+    own.flat_map(|(_, r)| ports(found).map(move |port| recommended::band(model, r, &found.hz, port))).collect()
+}
+
 fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> draw::Band {
     let band = &known.response;
     let places: Vec<usize> = (0..band.response.omega.len()).map(|k| band.place(k, output, input)).collect();
@@ -55,7 +64,7 @@ fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -
     let mut all = Vec::new();
     for (method, response) in responses {
         let gains = response.gains()?;
-        let known = found.uncertainty.of(*method);
+        let known = found.uncertainty(*method);
         for place in 0..places {
             let (low_db, high_db) = known.map_or_else(Default::default, |k| {
                 bounds_db(k.response.gains.iter().map(|at| [at[place][1], at[place][2]]))

@@ -24,6 +24,7 @@ use explain::{explain, problem_at};
 use serde::{Deserialize, Serialize};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::SubspaceOptions;
 use youla::reduce::ReductionOptions;
 use youla_io::open;
@@ -42,6 +43,9 @@ pub struct RunSettings {
     pub nominal: NominalModel,
     /// The controller that ran while the data were logged.
     pub controller: ControllerSettings,
+    /// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
+    #[serde(default)]
+    pub recommended: LikelihoodOptions,
     /// How the coprime factors are built.
     #[serde(default)]
     pub factors: FactorSettings,

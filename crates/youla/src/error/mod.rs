@@ -324,6 +324,21 @@ impl Error {
         Error::Within { part: part.into(), source: Box::new(self) }
     }
 
+    /// Whether the records and the nominal model, although well formed, do not suffice for one method: a record that is too short
+    /// or excites too little, a controller that does not stabilise the nominal model.
+    pub fn is_of_the_records(&self) -> bool {
+        match self {
+            Error::Within { source, .. } => source.is_of_the_records(),
+            _ => matches!(
+                self,
+                Error::TooFewSamples { .. }
+                    | Error::InsufficientExcitation { .. }
+                    | Error::ConstantChannel { .. }
+                    | Error::NotStabilising { .. }
+            ),
+        }
+    }
+
     /// Whether the input is at fault or the computation is impossible on it.
     pub fn kind(&self) -> ErrorKind {
         match self {

@@ -1,0 +1,295 @@
+//! The recommended model in summary.json, in the run folder and in the report.
+
+use super::entries::{ModeEntry, finite};
+use super::identification::Identification;
+use super::method::Method;
+use super::response::decibel;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, ResponseDeviation};
+use youla::lti::{Continuous, FrequencyResponse, StateSpace};
+use youla::{Mat, MatRef};
+use youla_io::SystemMatrices;
+use youla_report::data as draw;
+
+/// The model's JSON in the run folder.
+pub(super) const FILE: &str = "4-identify/recommended.json";
+
+/// Level of the intervals and bands that are stated, and its quantile of the normal distribution.
+const LEVEL: (f64, f64) = (0.95, 1.959_963_984_540_054);
+
+/// 95 % quantile of chi-square with two degrees of freedom, for the region of a complex number.
+const ELLIPSE: f64 = 5.991_464_547_107_979;
+
+/// Share of the upper bound below which the lower bound of a magnitude is not drawn.
+const LEAST_BOUND: f64 = 1e-3;
+
+/// The recommended model in summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RecommendedEntry {
+    /// Key of the method; its fits, margins and residuals are under `methods`.
+    pub method: String,
+    /// Whether every figure of the evidence is within its limit.
+    pub trusted: bool,
+    /// Why the model is not trusted; empty where it is.
+    pub reasons: Vec<String>,
+    /// The model's JSON, relative to the run folder.
+    pub file: String,
+    /// Number of states without those of the dead time.
+    pub order: usize,
+    /// Dead time of each input, samples.
+    pub dead_time: Vec<usize>,
+    /// Modes with 95 % intervals.
+    pub modes: Vec<ModeEntry>,
+    /// Standard deviations of the frequency response.
+    pub response_deviation: DeviationEntry,
+    /// Questions to the records, each with its figure and limit.
+    pub evidence: Vec<EvidenceFigure>,
+}
+
+/// Standard deviations of the frequency response.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct DeviationEntry {
+    /// Frequencies, Hz.
+    pub hz: Vec<f64>,
+    /// Root mean square of the complex error, `[frequency][output][input]`, physical units.
+    pub absolute: Vec<Vec<Vec<Option<f64>>>>,
+}
+
+/// A question to the records.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct EvidenceFigure {
+    /// What was asked.
+    pub question: String,
+    /// What was found.
+    pub figure: Option<f64>,
+    /// The largest figure that is accepted.
+    pub limit: f64,
+    /// Whether the figure is within the limit.
+    pub holds: bool,
+}
+
+impl From<&Evidence> for EvidenceFigure {
+    fn from(e: &Evidence) -> Self {
+        EvidenceFigure { question: e.question.clone(), figure: finite(e.figure), limit: e.limit, holds: e.holds() }
+    }
+}
+
+impl From<&Recommendation> for RecommendedEntry {
+    fn from(found: &Recommendation) -> Self {
+        let deviation = &found.response_deviation;
+        RecommendedEntry {
+            method: Method::Likelihood.key().into(),
+            trusted: found.trusted(),
+            reasons: found.reasons(),
+            file: FILE.into(),
+            order: found.order,
+            dead_time: found.dead_time.clone(),
+            modes: found.modes.iter().map(mode).collect(),
+            response_deviation: DeviationEntry {
+                hz: deviation.hz.clone(),
+                absolute: deviation.absolute.iter().map(|at| rows(at.as_ref())).collect(),
+            },
+            evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
+        }
+    }
+}
+
+fn mode(m: &ModeEstimate) -> ModeEntry {
+    let interval =
+        |value: f64, deviation: f64| Some([value - LEVEL.1 * deviation, value + LEVEL.1 * deviation].map(finite));
+    ModeEntry {
+        hz_deviation: finite(m.hz_deviation),
+        zeta_deviation: finite(m.zeta_deviation),
+        hz_interval: interval(m.mode.hz, m.hz_deviation),
+        zeta_interval: interval(m.mode.zeta, m.zeta_deviation),
+        ..ModeEntry::from(&m.mode)
+    }
+}
+
+fn rows(m: MatRef<'_, f64>) -> Vec<Vec<Option<f64>>> {
+    (0..m.nrows()).map(|i| (0..m.ncols()).map(|j| finite(m[(i, j)])).collect()).collect()
+}
+
+/// `details` of the model's file: the same model in continuous time, as a predictor, and what was tried.
+#[derive(Serialize)]
+pub(super) struct RecommendedDetails<'a> {
+    order: usize,
+    dead_time: &'a [usize],
+    /// In continuous time with the input held between samples; absent where the model has no logarithm.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    continuous: Option<SystemMatrices>,
+    predictor: PredictorEntry,
+    modes: Vec<ModeEntry>,
+    candidates: &'a [youla::identify::likelihood::Candidate],
+    evidence: Vec<EvidenceFigure>,
+}
+
+/// `x+ = A x + B u + K e`, `y = C x + D u + e`, e white with the stated covariance.
+#[derive(Serialize)]
+struct PredictorEntry {
+    a: Vec<Vec<Option<f64>>>,
+    b: Vec<Vec<Option<f64>>>,
+    c: Vec<Vec<Option<f64>>>,
+    d: Vec<Vec<Option<f64>>>,
+    /// `null` where no predictor exists.
+    k: Option<Vec<Vec<Option<f64>>>>,
+    covariance: Vec<Vec<Option<f64>>>,
+}
+
+impl From<&Predictor> for PredictorEntry {
+    fn from(p: &Predictor) -> Self {
+        let all = |m: &Mat<f64>| rows(m.as_ref());
+        PredictorEntry {
+            a: all(&p.a),
+            b: all(&p.b),
+            c: all(&p.c),
+            d: all(&p.d),
+            k: p.k.as_ref().map(all),
+            covariance: all(&p.covariance),
+        }
+    }
+}
+
+impl<'a> RecommendedDetails<'a> {
+    pub(super) fn new(found: &'a Recommendation) -> Self {
+        RecommendedDetails {
+            order: found.order,
+            dead_time: &found.dead_time,
+            continuous: continuous(found).map(|system| SystemMatrices::new(&system)),
+            predictor: PredictorEntry::from(&found.predictor),
+            modes: found.modes.iter().map(mode).collect(),
+            candidates: &found.candidates,
+            evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
+        }
+    }
+}
+
+/// Dead time is a state at z = 0, which has no logarithm.
+fn continuous(found: &Recommendation) -> Option<StateSpace<Continuous>> {
+    found.plant.inverse_zoh().ok()
+}
+
+/// The line on the recommended model, then one line for each question that its evidence fails.
+pub(super) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
+    let line = |status, text: String| draw::Verdict { status, text, evidence: draw::Evidence::Recommended };
+    let model = match &found.recommended {
+        Ok(model) => model,
+        Err(reason) => {
+            return vec![line(draw::Status::Bad, format!("No model is recommended: {reason}."))];
+        }
+    };
+    let delays = &model.dead_time;
+    let dead_time = match delays.iter().any(|d| *d > 0) {
+        true => format!(
+            " and a dead time of {} samples",
+            delays.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+        ),
+        false => String::new(),
+    };
+    let what = format!("The recommended model has order {}{dead_time}", model.order);
+    let mut lines = Vec::new();
+    if model.trusted() {
+        let text =
+            format!("{what}. All {} questions to the records are answered within their limits.", model.evidence.len());
+        lines.push(line(draw::Status::Good, text));
+    } else {
+        lines.push(line(draw::Status::Bad, format!("{what}. It must not be trusted, for the reasons below.")));
+    }
+    lines.extend(model.evidence.iter().filter(|e| !e.holds()).map(|e| line(draw::Status::Bad, sentence(e))));
+    lines
+}
+
+fn sentence(e: &Evidence) -> String {
+    format!("{} {:.3}, with a limit of {}.", e.question, e.figure, e.limit)
+}
+
+/// Evidence and candidates as tables of the report.
+pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
+    let Ok(model) = &found.recommended else { return Vec::new() };
+    let evidence = |e: &Evidence| {
+        let held = if e.holds() { "yes" } else { "no" };
+        vec![e.question.clone(), format!("{:.3}", e.figure), format!("{}", e.limit), held.to_owned()]
+    };
+    let least = model.candidates.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
+    let mut candidates: Vec<_> = model.candidates.iter().collect();
+    candidates.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    candidates.truncate(MOST_CANDIDATES);
+    let candidate = |c: &&youla::identify::likelihood::Candidate| {
+        let delays: Vec<String> = c.dead_time.iter().map(usize::to_string).collect();
+        vec![c.order.to_string(), delays.join(", "), format!("{:.1}", c.criterion - least), c.origin.clone()]
+    };
+    vec![
+        draw::EvidenceTable {
+            title: "Evidence on the recommended model".into(),
+            text: "The model is trusted where every figure is within its limit.".into(),
+            columns: ["Question", "Figure", "Limit", "Within"].map(String::from).to_vec(),
+            rows: model.evidence.iter().map(evidence).collect(),
+            caption: String::new(),
+        },
+        draw::EvidenceTable {
+            title: "Candidates".into(),
+            text: "Order and dead time are those with the least criterion; dead times that the criterion does not separate are \
+                   decided by the least gain near the Nyquist frequency."
+                .into(),
+            columns: ["Order", "Dead time, samples", "Criterion above the least", "Start"].map(String::from).to_vec(),
+            rows: candidates.iter().map(candidate).collect(),
+            caption: "Schwarz's criterion: -2 log likelihood + log(samples) per parameter. A difference of 10 is strong evidence."
+                .into(),
+        },
+    ]
+}
+
+/// Between the frequencies at which deviations are stated, linear in log f; constant beyond them.
+fn deviation_at(known: &ResponseDeviation, hz: f64, (output, input): (usize, usize)) -> f64 {
+    let value = |k: usize| known.absolute[k][(output, input)];
+    let above = known.hz.partition_point(|f| *f < hz);
+    match (above, known.hz.len()) {
+        (_, 0) => f64::NAN,
+        (0, _) => value(0),
+        (k, count) if k == count => value(count - 1),
+        (k, _) => {
+            let share = (hz / known.hz[k - 1]).ln() / (known.hz[k] / known.hz[k - 1]).ln();
+            value(k - 1) + share * (value(k) - value(k - 1))
+        }
+    }
+}
+
+/// Modes with their deviations, as the report shows them.
+pub(super) fn modes(found: &Recommendation) -> Vec<draw::Mode> {
+    let drawn = |m: &ModeEstimate| draw::Mode {
+        method: Method::Likelihood.key().into(),
+        hz: m.mode.hz,
+        zeta: m.mode.zeta,
+        deviation: Some([m.hz_deviation, m.zeta_deviation]),
+    };
+    found.modes.iter().map(drawn).collect()
+}
+
+/// Rows of the table of candidates.
+const MOST_CANDIDATES: usize = 12;
+
+/// The 95 % region of the response from an input to an output on the frequencies of the report.
+pub(super) fn band(
+    found: &Recommendation,
+    response: &FrequencyResponse,
+    hz: &[f64],
+    (output, input): (usize, usize),
+) -> draw::Band {
+    let values = response.entry(output, input);
+    let deviation: Vec<f64> = hz.iter().map(|f| deviation_at(&found.response_deviation, *f, (output, input))).collect();
+    // One axis of a complex error has half of its mean square.
+    let half = |d: &f64| LEVEL.1 * d / std::f64::consts::SQRT_2;
+    let high: Vec<f64> = values.iter().zip(&deviation).map(|(g, d)| g.norm() + half(d)).collect();
+    let low =
+        values.iter().zip(&deviation).zip(&high).map(|((g, d), high)| (g.norm() - half(d)).max(LEAST_BOUND * high));
+    draw::Band {
+        method: Method::Likelihood.key().into(),
+        output,
+        input,
+        level: LEVEL.0,
+        low_db: low.map(decibel).collect(),
+        high_db: high.iter().copied().map(decibel).collect(),
+        region: deviation.iter().flat_map(|d| [d * d / 2.0 * ELLIPSE, 0.0, d * d / 2.0 * ELLIPSE]).collect(),
+    }
+}

@@ -3,6 +3,8 @@
 //! Every reference (a copy, a matrix product, the obvious loop) is measured in the same run, on the same data, next to the work
 //! that it belongs to. The ratios are what to compare between machines. One thread, unless the line says otherwise.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod timing;
 
 use faer::linalg::matmul::matmul;

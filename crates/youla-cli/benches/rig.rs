@@ -1,5 +1,7 @@
 //! Samples per second of the digital twin at its three levels: `cargo bench -p youla-cli --bench rig`.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 use std::hint::black_box;
 use std::time::Instant;
 use youla_paper::rig::{BearingRig, Fidelity, Rig, RigParameters};

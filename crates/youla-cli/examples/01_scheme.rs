@@ -2,6 +2,8 @@
 //!
 //! `cargo run -p youla-cli --example 01_scheme`
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod machine;
 
 use youla::Result;

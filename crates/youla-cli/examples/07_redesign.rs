@@ -2,6 +2,8 @@
 //!
 //! `cargo run -p youla-cli --example 07_redesign`
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod machine;
 
 use youla::identify::hansen::hansen;

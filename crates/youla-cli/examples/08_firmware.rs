@@ -2,6 +2,8 @@
 //!
 //! `cargo run -p youla-cli --example 08_firmware`
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod machine;
 
 use youla::control::real_time_controller;

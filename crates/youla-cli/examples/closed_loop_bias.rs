@@ -2,6 +2,8 @@
 //! docs/closed-loop.md. `cargo run --release -p youla-cli --example closed_loop_bias` writes docs/images/closed-loop-bias.svg and
 //! .csv in a few seconds.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 #[path = "../../youla/tests/all/common/mod.rs"]
 mod common;
 

@@ -4,6 +4,7 @@
 //! cargo run --release -p youla-cli --example coverage -- [delta|bootstrap] [a_factor] [noise/um] [samples] [order] [horizon] [runs] [method] [b_factor] [input_weight] [process_noise]
 //! ```
 #![allow(missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
 
 #[path = "../../youla/tests/all/common/mod.rs"]
 mod common;

@@ -3,7 +3,7 @@
 use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, compare, excite, export, init, paper, plot, study, subspace};
+use crate::{check, compare, excite, export, identify, init, paper, plot, study, subspace};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -69,14 +69,11 @@ pub(crate) enum Command {
         output: OutputFolder,
     },
     /// Identify a machine from records of its closed loop.
-    #[command(after_help = "Example:\n  youla identify examples/flexible-drive/run.toml --out drive-run")]
-    Identify {
-        /// Settings: records, channels, nominal model, controller, options.
-        #[arg(value_name = "RUN.TOML")]
-        settings: PathBuf,
-        #[command(flatten)]
-        output: OutputFolder,
-    },
+    ///
+    /// Channels, sample time, nominal model and controller are enough: method, order, dead time and noise model are chosen by the
+    /// evidence of the records. They are stated in a run.toml or, for a plain log, by flags.
+    #[command(after_help = identify::EXAMPLES)]
+    Identify(Box<identify::IdentifyArgs>),
     /// Write a first run.toml for a log.
     ///
     /// Lists the columns of the file, asks for what the flags do not state (on a terminal), and writes a commented run.toml. Nothing is

@@ -1,12 +1,11 @@
 //! `youla check`: what is wrong with the data.
 
-use crate::dialect::Dialect;
+use crate::log_flags::LogFlags;
 use crate::output::{Failure, Form, say};
 use crate::run_folder::folder_of;
 use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
-use youla_io::ChannelRef;
 use youla_loop::check::{Finding, Severity};
 use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, further, read_check_options};
 
@@ -25,26 +24,8 @@ pub(crate) struct CheckArgs {
     /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one record each.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Inputs, by name or as #3 for the third column, separated by commas.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "output")]
-    input: Vec<ChannelRef>,
-    /// Outputs, as the inputs.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
-    output: Vec<ChannelRef>,
-    /// Known excitation added at the plant input, one per input.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
-    excitation: Vec<ChannelRef>,
-    /// Known reference, one per output.
-    #[arg(long, value_name = "NAME", value_delimiter = ',', requires = "input")]
-    reference: Vec<ChannelRef>,
-    /// Sample time in seconds.
-    #[arg(long, value_name = "S", requires = "input", allow_negative_numbers = true)]
-    sample_time: Option<f64>,
-    /// Column with the time in seconds.
-    #[arg(long, value_name = "NAME", requires = "input")]
-    time: Option<ChannelRef>,
     #[command(flatten)]
-    dialect: Dialect,
+    log: LogFlags,
     /// Thresholds, as in [check] of run.toml.
     #[arg(long, value_name = "FILE", requires = "input")]
     options: Option<PathBuf>,
@@ -58,7 +39,7 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
     if let Some(folder) = args.out.as_ref().filter(|folder| folder.exists()) {
         return Err(youla_io::Error::OutputExists { path: folder.clone() }.into());
     }
-    let found = if args.input.is_empty() { of_run(args)? } else { of_files(args)? };
+    let found = if args.log.input.is_empty() { of_run(args)? } else { of_files(args)? };
     let json =
         serde_json::to_string_pretty(&found.entry()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;
     if let Some(folder) = &args.out {
@@ -75,7 +56,7 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
 }
 
 fn of_run(args: &CheckArgs) -> Result<DataCheck, Failure> {
-    if args.dialect.is_given() {
+    if args.log.dialect.is_given() {
         let problem = "a run.toml declares the form of its text files itself, in [data] csv".to_owned();
         return Err(youla_io::Error::Settings { path: args.files[0].clone(), at: None, problem }.into());
     }
@@ -90,13 +71,13 @@ fn of_files(args: &CheckArgs) -> Result<DataCheck, Failure> {
     let options = args.options.as_ref().map(read_check_options).transpose()?.unwrap_or_default();
     let files = CheckedFiles {
         files: args.files.clone(),
-        inputs: args.input.clone(),
-        outputs: args.output.clone(),
-        input_excitation: args.excitation.clone(),
-        reference: args.reference.clone(),
-        sample_time: args.sample_time,
-        time_column: args.time.clone(),
-        csv: args.dialect.options(),
+        inputs: args.log.input.clone(),
+        outputs: args.log.output.clone(),
+        input_excitation: args.log.excitation.clone(),
+        reference: args.log.reference.clone(),
+        sample_time: args.log.sample_time,
+        time_column: args.log.time.clone(),
+        csv: args.log.dialect.options(),
     };
     Ok(check_files(&files, &options)?)
 }

@@ -28,9 +28,9 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
             let (settings, records) = demo(*machine, *seed)?;
             identify_and_write(form, output, Path::new("."), settings, |_| Ok(records))
         }
-        Command::Identify { settings, output } => {
-            let folder = folder_of(settings);
-            identify_and_write(form, output, &folder, RunSettings::read(settings)?, |s| read_records(&s.data, &folder))
+        Command::Identify(args) => {
+            let (settings, folder) = args.settings()?;
+            identify_and_write(form, &args.output_folder, &folder, settings, |s| read_records(&s.data, &folder))
         }
         Command::Completions { shell } => manual::completions(*shell, Args::command()),
         Command::Man => manual::man_page(&Args::command()),

@@ -11,8 +11,9 @@ use youla_io::export::ExportedController;
 use youla_io::export::{ControllerExport, NamedModel, model_from_bytes, read_model};
 use youla_io::{open, sha256};
 
-/// The model files of a run folder; the first is what a run is exported as.
-const MODELS: [&str; 10] = [
+/// The model files of a run folder; the first that is there is what a run is exported as.
+const MODELS: [&str; 11] = [
+    "4-identify/recommended",
     "5-recombine/hansen",
     "6-reduce/hansen_reduced",
     "4-identify/direct",
@@ -86,9 +87,9 @@ fn parameter(path: &Path) -> Result<StateSpace<Discrete>> {
 
 fn model_file(run: &Path, name: Option<&str>) -> Result<PathBuf> {
     require_run(run)?;
-    let there: Vec<&str> = MODELS.into_iter().filter(|path| run.join(path).with_extension("json").is_file()).collect();
+    let there: Vec<&str> = MODELS.into_iter().filter(|path| run.join(path).with_extension("mat").is_file()).collect();
     let last = |path: &str| path.rsplit('/').next().unwrap_or(path).to_owned();
-    let name = name.map_or_else(|| last(MODELS[0]), str::to_owned);
+    let name = name.map_or_else(|| there.first().map_or_else(String::new, |path| last(path)), str::to_owned);
     match there.iter().find(|path| last(path) == name) {
         Some(path) => Ok(run.join(path).with_extension("json")),
         None => {

@@ -1,5 +1,6 @@
 //! Integration tests of the files: readers, exports, and the examples on measured data.
 #![allow(missing_docs)]
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
 
 mod common;
 mod exports;

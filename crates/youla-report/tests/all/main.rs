@@ -2,6 +2,8 @@
 //!
 //! The pages are written to the folder of temporary files of the build, where a browser can open them.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod sample;
 mod story;
 

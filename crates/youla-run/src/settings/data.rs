@@ -53,6 +53,28 @@ pub struct DataSettings {
     pub verification: Vec<DataFile>,
 }
 
+impl DataSettings {
+    /// Channels and estimation records, everything else by default.
+    pub fn new(inputs: Vec<ChannelSpec>, outputs: Vec<ChannelSpec>, estimation: Vec<DataFile>) -> Self {
+        DataSettings {
+            sample_time: None,
+            time_column: None,
+            time_tolerance: default_tolerance(),
+            gaps: Gaps::default(),
+            inputs,
+            outputs,
+            input_excitation: Vec::new(),
+            reference: Vec::new(),
+            alpha: Vec::new(),
+            csv: CsvOptions::default(),
+            detrend: Detrend::default(),
+            disturbance: None,
+            estimation,
+            verification: Vec::new(),
+        }
+    }
+}
+
 fn default_tolerance() -> f64 {
     1e-3
 }

@@ -88,6 +88,30 @@ pub struct RunSettings {
 }
 
 impl RunSettings {
+    /// What a user knows, everything else by default.
+    pub fn new(name: String, data: DataSettings, nominal: NominalModel, controller: ControllerSettings) -> Self {
+        RunSettings {
+            name,
+            data,
+            nominal,
+            controller,
+            recommended: LikelihoodOptions::default(),
+            factors: FactorSettings::default(),
+            hansen: SubspaceOptions::default(),
+            deviation: DeviationSettings::default(),
+            direct: None,
+            reduction: None,
+            grey_box: None,
+            certificate: None,
+            redesign: None,
+            stabilisation: StabilisationSettings::default(),
+            verification: VerificationSettings::default(),
+            check: CheckOptions::default(),
+            frequency_response: FrequencySettings::default(),
+            seed: None,
+        }
+    }
+
     /// Reads run.toml.
     ///
     /// # Errors

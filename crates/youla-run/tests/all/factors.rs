@@ -2,7 +2,9 @@
 
 use std::path::Path;
 use youla_paper::demo;
-use youla_run::{Construction, ControllerSettings, FactorSettings, Feedback, RunSettings, factorise_run};
+use youla_run::{
+    Construction, ControllerSettings, FactorSettings, Feedback, RunSettings, declared_loop, factorise_run,
+};
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.
 fn grid_to_nyquist(ts: f64, count: usize) -> Vec<f64> {
@@ -15,7 +17,8 @@ fn states_are_scaled_before_factorising() {
     let demo = demo(1).unwrap();
     let found = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
     assert!(found.bezout_residual < 1e-13, "{:.1e}", found.bezout_residual);
-    assert!(found.factors.nominal() != &found.nominal);
+    let declared = declared_loop(&demo.settings, &demo.records, Path::new(".")).unwrap();
+    assert!(found.factors.nominal() != &declared.nominal);
 }
 
 /// One controller written down in three ways gives the same loop: observer gains, and its matrices with either sign.
@@ -23,7 +26,7 @@ fn states_are_scaled_before_factorising() {
 fn forms_and_signs_of_one_controller_agree() {
     let demo = demo(1).unwrap();
     let observer = factorise_run(&demo.settings, &demo.records, Path::new(".")).unwrap();
-    let k = &observer.controller;
+    let k = &observer.factors.controller().unwrap();
     let rows = |m: youla::MatRef<'_, f64>, sign: f64| -> Vec<Vec<f64>> {
         (0..m.nrows()).map(|i| m.row(i).iter().map(|x| sign * x).collect()).collect()
     };
@@ -43,7 +46,7 @@ fn forms_and_signs_of_one_controller_agree() {
             let omega = grid_to_nyquist(k.time().ts(), 50);
             let (x, y) = (
                 youla::lti::frequency_response(k, &omega).unwrap(),
-                youla::lti::frequency_response(&found.controller, &omega).unwrap(),
+                youla::lti::frequency_response(&found.factors.controller().unwrap(), &omega).unwrap(),
             );
             let miss = (0..50).map(|i| (x.at(i) - y.at(i)).norm_l2() / x.at(i).norm_l2()).fold(0.0, f64::max);
             assert!(miss < 1e-9, "{construction:?}: {miss:.1e}");

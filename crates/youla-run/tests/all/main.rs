@@ -1,5 +1,7 @@
 //! Runs from settings to the folder of results.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod common;
 mod factors;
 mod models;

@@ -46,7 +46,8 @@ fn raw_factors(factors: &CoprimeFactors<Discrete>, s: &StateSpace<Discrete>, ord
 #[test]
 fn methods_rank_as_expected() {
     let found = identified(1);
-    let (factors, s) = (&found.factorisation.factors, &found.hansen.deviation.model);
+    let factors = &found.filtered.as_ref().unwrap().factorisation.factors;
+    let s = &found.scheme().unwrap().hansen.deviation.model;
     let model = ReductionLoop::new(factors, s).unwrap();
     assert_eq!(model.plant().order(), 16);
     let scales = (Some(vec![3.3; 2]), Some(vec![1.0; 2]));
@@ -68,6 +69,6 @@ fn methods_rank_as_expected() {
     let raw = raw_factors(factors, s, 6);
     let (open, _) = errors(&model, &raw);
     assert!(open > 1.0, "{open}");
-    let loop_poles = certify(&raw, &found.factorisation.controller).unwrap();
+    let loop_poles = certify(&raw, &found.declared.controller).unwrap();
     assert!(!loop_poles.stable, "{:?}", loop_poles.worst_pole);
 }

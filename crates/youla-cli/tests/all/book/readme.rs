@@ -32,6 +32,8 @@ pub(crate) fn write_scene(folder: &Path) {
     }
     write("log.csv", text.as_bytes());
 
+    write("model.json", MODEL.as_bytes());
+    write("K.json", controller().as_bytes());
     let rows = open_loop(20_000);
     let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}", rows.len());
     header += &" ".repeat(117 - header.len());
@@ -47,6 +49,16 @@ pub(crate) fn write_scene(folder: &Path) {
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
     packed.write_all(text.as_bytes()).expect("memory");
     write("bench.csv.gz", &packed.finish().expect("memory"));
+}
+
+/// The rigid body of the nominal model, sampled every 0.5 ms.
+const MODEL: &str = r#"{"ts": 5e-4, "a": [[1.99004983, -0.99004983], [1, 0]], "b": [[1], [0]], "c": [[3.1146e-4, 3.1042e-4]], "d": [[0]]}"#;
+
+/// The controller of README.md, `u = K (y - r)`: numerator less D times the denominator in the output matrix.
+fn controller() -> String {
+    let ([d, n1, n2], [a1, a2]) = ([-5.50311, -0.27062, 5.23249], [-1.14636, 0.41698]);
+    let (c1, c2) = (n1 - d * a1, n2 - d * a2);
+    format!(r#"{{"ts": 5e-4, "a": [[{}, {}], [1, 0]], "b": [[1], [0]], "c": [[{c1}, {c2}]], "d": [[{d}]]}}"#, -a1, -a2)
 }
 
 /// Two springs, each with an input and an output of its own: `u1, u2, y1, y2`.

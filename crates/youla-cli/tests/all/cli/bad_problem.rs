@@ -1,6 +1,7 @@
 //! Well-formed input on which the scheme is impossible: shapes, poles, ranks, lengths.
 
 use crate::common::{csv, log, loop_folder, refused, settings, settings_refused, youla};
+use std::path::Path;
 
 const NOMINAL: &str =
     "[nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [0.1]\ndenominator = [1.0, -0.9]\n";
@@ -55,10 +56,29 @@ fn controller_that_does_not_stabilise() {
     let sentence = ["the controller does not stabilise the nominal model", "pole 2.900000", "check the sign"];
     let wrong_sign =
         settings("feedback = \"negative\"\nnumerator = [2.0]", "feedback = \"positive\"\nnumerator = [20.0]");
-    settings_refused("wrong-sign", &wrong_sign, &sentence);
-    settings_refused("wrong-sign", &(wrong_sign + "[factors]\nconstruction = \"shifted\"\n"), &sentence);
+    scheme_refused("wrong-sign", &wrong_sign, &sentence);
+    scheme_refused("wrong-sign", &(wrong_sign + "[factors]\nconstruction = \"shifted\"\n"), &sentence);
     let gains = "[controller.observer]\nfeedback = \"positive\"\nstate_feedback = [[5.0]]\nobserver_gain = [[-0.1]]\n";
-    settings_refused("wrong-gain", &settings(CONTROLLER, gains), &["does not stabilise the nominal model", "pole 1.4"]);
+    scheme_refused("wrong-gain", &settings(CONTROLLER, gains), &["does not stabilise the nominal model", "pole 1.4"]);
+}
+
+/// The run ends well without the scheme: its reason is printed, the recommended model is there, but not trusted.
+fn scheme_refused(name: &str, settings: &str, sentences: &[&str]) {
+    let folder = loop_folder(name, &[("run.toml", settings.as_bytes())]);
+    recommended_without_scheme(&folder, "factors", sentences);
+}
+
+fn recommended_without_scheme(folder: &Path, key: &str, sentences: &[&str]) {
+    let found = youla(folder, &["identify", "run.toml", "--out", "out"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let summary = std::fs::read_to_string(folder.join("out/summary.json")).expect("written");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    let reason = summary["refused"][key].as_str().expect("the reason");
+    for sentence in sentences {
+        assert!(reason.contains(sentence) && found.stdout.contains(sentence), "{sentence}: {reason}");
+    }
+    assert!(summary["methods"].get("hansen").is_none() && summary["methods"]["likelihood"]["order"].is_u64());
+    assert_eq!(summary["recommended"]["trusted"], false);
 }
 
 #[test]
@@ -97,7 +117,11 @@ fn unstable_estimate() {
     let steep = settings("fixed = 3", "fixed = 9");
     let log = unstable_log();
     let folder = loop_folder("unstable", &[("run.toml", steep.as_bytes()), ("log.csv", log.as_bytes())]);
-    refused(&folder, 3, &["[hansen] S from alpha to beta", "must be stable, but has the pole"]);
+    recommended_without_scheme(
+        &folder,
+        "hansen",
+        &["[hansen] S from alpha to beta", "must be stable, but has the pole"],
+    );
 }
 
 /// A plant that the stated controller does not stabilise: y grows although u and d are logged truly.

@@ -12,14 +12,14 @@ fn done(found: &Outcome) {
 fn a_run_is_exported_in_every_format_and_reads_back() {
     let folder = empty_folder("export");
     let run = demo().to_str().expect("text");
-    let hansen = read_model(demo().join("5-recombine/hansen.json")).expect("a model");
+    let hansen = read_model(demo().join("4-identify/recommended.json")).expect("a model");
     let files = [
-        ("mat", "hansen.mat"),
-        ("json", "hansen.json"),
-        ("npz", "hansen.npz"),
-        ("python", "hansen.py"),
-        ("matlab", "hansen.m"),
-        ("c", "hansen.h"),
+        ("mat", "recommended.mat"),
+        ("json", "recommended.json"),
+        ("npz", "recommended.npz"),
+        ("python", "recommended.py"),
+        ("matlab", "recommended.m"),
+        ("c", "recommended.h"),
     ];
     for (format, file) in files {
         let found = youla(&folder, &["export", run, "--to", format]);
@@ -31,13 +31,13 @@ fn a_run_is_exported_in_every_format_and_reads_back() {
             assert_eq!(back.system, hansen.system, "{format}");
         } else {
             let text = String::from_utf8(bytes).expect("text");
-            assert!(text.contains("5-recombine/hansen.json, SHA-256 "), "{text}");
+            assert!(text.contains("4-identify/recommended.json, SHA-256 "), "{text}");
         }
     }
-    let original = fs::read(demo().join("5-recombine/hansen.json")).expect("readable");
+    let original = fs::read(demo().join("4-identify/recommended.json")).expect("readable");
     let (original, copy): (serde_json::Value, serde_json::Value) = (
         serde_json::from_slice(&original).expect("JSON"),
-        serde_json::from_slice(&fs::read(folder.join("hansen.json")).expect("written")).expect("JSON"),
+        serde_json::from_slice(&fs::read(folder.join("recommended.json")).expect("written")).expect("JSON"),
     );
     assert_eq!(original, copy, "a model of a run keeps its details and provenance");
 }
@@ -83,13 +83,16 @@ fn the_controller_of_a_run_goes_to_firmware() {
 fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     let folder = empty_folder("export-refused");
     let run = demo().to_str().expect("text");
-    fs::write(folder.join("hansen.npz"), "mine").expect("writable");
+    fs::write(folder.join("recommended.npz"), "mine").expect("writable");
     fs::write(folder.join("odd.json"), "{\"refused\": \"too few samples\"}").expect("writable");
     let cases: [(&[&str], &str); 8] = [
-        (&["export", run, "--to", "npz"], "hansen.npz exists already; choose another file, or replace it with --force"),
+        (
+            &["export", run, "--to", "npz"],
+            "recommended.npz exists already; choose another file, or replace it with --force",
+        ),
         (
             &["export", run, "--to", "npz", "--model", "hansn"],
-            "has no \"hansn\" (did you mean \"hansen\"?); known: hansen, ",
+            "has no \"hansn\" (did you mean \"hansen\"?); known: recommended, hansen, ",
         ),
         (&["export", ".", "--to", "npz"], "this is no run folder (there is no summary.json in it)"),
         (&["export", "none.json", "--to", "npz"], "none.json: no such file"),
@@ -109,8 +112,8 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     );
     let mut left: Vec<_> = fs::read_dir(&folder).expect("there").map(|e| e.expect("readable").file_name()).collect();
     left.sort();
-    assert_eq!(left, ["hansen.npz", "odd.json"]);
-    assert_eq!(fs::read(folder.join("hansen.npz")).expect("there"), b"mine");
+    assert_eq!(left, ["odd.json", "recommended.npz"]);
+    assert_eq!(fs::read(folder.join("recommended.npz")).expect("there"), b"mine");
     done(&youla(&folder, &["export", run, "--to", "npz", "--force"]));
-    assert!(read_model(folder.join("hansen.npz")).is_ok());
+    assert!(read_model(folder.join("recommended.npz")).is_ok());
 }

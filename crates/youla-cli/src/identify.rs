@@ -1,0 +1,92 @@
+//! `youla identify`: from a run.toml, or straight from a log with flags.
+
+use crate::log_flags::{LogFlags, specs};
+use crate::output::Failure;
+use crate::run_folder::{OutputFolder, folder_of};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings};
+
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla identify examples/flexible-drive/run.toml --out drive-run
+  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal model.json --controller K.json
+
+A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.";
+
+/// What is to be identified.
+#[derive(Debug, Args)]
+pub(crate) struct IdentifyArgs {
+    /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one estimation record each.
+    #[arg(value_name = "FILE", required = true)]
+    files: Vec<PathBuf>,
+    #[command(flatten)]
+    log: LogFlags,
+    /// File with the nominal model, in discrete time.
+    #[arg(long, value_name = "FILE", requires = "input")]
+    nominal: Option<PathBuf>,
+    /// File with the controller that ran, in discrete time.
+    #[arg(long, value_name = "FILE", requires = "input", conflicts_with = "open_loop")]
+    controller: Option<PathBuf>,
+    /// The controller of the file acts on the reference less the output, u = K (r - y); without this flag u = K y, as `youla`
+    /// writes controllers.
+    #[arg(long, requires = "controller")]
+    negative_feedback: bool,
+    /// No controller ran.
+    #[arg(long, requires = "input")]
+    open_loop: bool,
+    #[command(flatten)]
+    pub(crate) output_folder: OutputFolder,
+}
+
+impl IdentifyArgs {
+    /// The settings, and the folder to which their paths are relative.
+    pub(crate) fn settings(&self) -> Result<(RunSettings, PathBuf), Failure> {
+        if !self.log.input.is_empty() {
+            return Ok((self.of_log()?, PathBuf::new()));
+        }
+        let [settings] = &self.files[..] else {
+            let what = "the number of run.toml files (give --input and --output for a log)".into();
+            return Err(youla::Error::Ports { what, expected: 1, found: self.files.len() }.into());
+        };
+        Ok((RunSettings::read(settings)?, folder_of(settings)))
+    }
+
+    fn of_log(&self) -> Result<RunSettings, Failure> {
+        let file =
+            |path: &PathBuf| DataFile { file: path.clone(), skip: 0, take: None, segments: Vec::new(), name: None };
+        let log = &self.log;
+        let data = DataSettings {
+            sample_time: log.sample_time,
+            time_column: log.time.clone(),
+            input_excitation: specs(&log.excitation),
+            reference: specs(&log.reference),
+            csv: log.dialect.options(),
+            ..DataSettings::new(specs(&log.input), specs(&log.output), self.files.iter().map(file).collect())
+        };
+        let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
+        let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
+        let (m, p) = (log.input.len(), log.output.len());
+        let controller = match &self.controller {
+            Some(file) => {
+                let feedback = if self.negative_feedback { Feedback::Negative } else { Feedback::Positive };
+                ControllerSettings::ModelFile { feedback, file: file.clone() }
+            }
+            None if self.open_loop => ControllerSettings::StateSpace {
+                feedback: Feedback::Positive,
+                a: Vec::new(),
+                b: Vec::new(),
+                c: zeros(m, 0),
+                d: zeros(m, p),
+            },
+            None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
+        };
+        let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
+        Ok(RunSettings::new(name, data, NominalModel::ModelFile { file: nominal.clone() }, controller))
+    }
+
+    fn missing(&self, flag: &str) -> Failure {
+        let path = self.files.first().map_or(Path::new(""), PathBuf::as_path).to_owned();
+        youla_io::Error::Settings { path, at: None, problem: format!("a log needs {flag}") }.into()
+    }
+}

@@ -1,6 +1,5 @@
 //! Everything that can go wrong with physical structures, with the evidence.
 
-use youla::ErrorKind;
 use youla::c64;
 use youla::error::{Names, Pole, Seconds};
 
@@ -155,32 +154,9 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// The same error, said of a part of a larger task.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
-
-    /// Whether the input is at fault or the computation is impossible on it.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::Undetermined { .. } | Error::NoSteadyState { .. } => ErrorKind::Numerical,
-            Error::Declaration { .. }
-            | Error::MissingMatrix { .. }
-            | Error::Expression { .. }
-            | Error::UnknownName { .. }
-            | Error::BadName { .. }
-            | Error::CircularDefinition { .. }
-            | Error::NoInitialValue { .. }
-            | Error::EmptyBounds { .. }
-            | Error::OutsideBounds { .. }
-            | Error::UnusedParameter { .. }
-            | Error::EntryNotFinite { .. }
-            | Error::NoStart
-            | Error::MeasuredInputs { .. }
-            | Error::DiscreteStructure { .. } => ErrorKind::BadInput,
-        }
-    }
+youla::error_context! {
+    sources: Method;
+    numerical: Undetermined NoSteadyState;
+    bad_input: Declaration MissingMatrix Expression UnknownName BadName CircularDefinition NoInitialValue EmptyBounds
+        OutsideBounds UnusedParameter EntryNotFinite NoStart MeasuredInputs DiscreteStructure;
 }

@@ -1,7 +1,6 @@
 //! The errors of reading and writing files.
 
 use std::path::PathBuf;
-use youla::ErrorKind;
 use youla::error::Seconds;
 
 /// Result of every fallible function of this crate.
@@ -191,36 +190,11 @@ impl From<Error> for youla::Error {
     }
 }
 
-impl Error {
-    /// The same error with the part of a larger task in which it occurred.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
-
-    /// Whether the input is invalid or a computation failed.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::Settings { .. }
-            | Error::OutputExists { .. }
-            | Error::FileExists { .. }
-            | Error::NotAModel { .. }
-            | Error::Io { .. }
-            | Error::MissingFile { .. }
-            | Error::NoData { .. }
-            | Error::Cell { .. }
-            | Error::FieldCount { .. }
-            | Error::Delimiter { .. }
-            | Error::Corrupt { .. }
-            | Error::FormatNotRead { .. }
-            | Error::UnequalLength { .. }
-            | Error::WrongVariable { .. }
-            | Error::NonUniformTime { .. }
-            | Error::SampleTimeMissing { .. } => ErrorKind::BadInput,
-            Error::Json { .. } => ErrorKind::Numerical,
-        }
-    }
+youla::error_context! {
+    sources: Method;
+    numerical: Json;
+    bad_input: Settings OutputExists FileExists NotAModel Io MissingFile NoData Cell FieldCount Delimiter Corrupt
+        FormatNotRead UnequalLength WrongVariable NonUniformTime SampleTimeMissing;
 }
 
 /// Where a damaged file was found to be damaged.

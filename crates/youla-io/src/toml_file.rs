@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
+use youla::error::misspelt;
 
 /// Reads the text of a settings file; `path` is named in errors.
 ///
@@ -18,22 +19,18 @@ pub fn parse<T: DeserializeOwned>(text: &str, path: &Path) -> Result<T> {
 fn in_words(error: &toml::de::Error, text: &str, path: &Path) -> Error {
     let offset = error.span().map_or(0, |s| s.start.min(text.len()));
     let message = error.message();
-    let problem = nearest_name(message).unwrap_or_else(|| match key_at(text, offset) {
+    let problem = unknown_name(message).unwrap_or_else(|| match key_at(text, offset) {
         Some(key) => format!("{key}: {message}"),
         None => message.to_owned(),
     });
     Error::Settings { path: path.to_owned(), at: Some(TextPosition::of(text, offset)), problem }
 }
 
-/// For a key or choice that is not known, the known one that is spelt most like it.
-fn nearest_name(message: &str) -> Option<String> {
-    if !(message.starts_with("unknown field") || message.starts_with("unknown variant")) {
-        return None;
-    }
-    let mut words = message.split('`').skip(1).step_by(2);
-    let unknown = words.next()?;
-    let nearest = words.max_by(|a, b| strsim::jaro_winkler(unknown, a).total_cmp(&strsim::jaro_winkler(unknown, b)))?;
-    Some(format!("`{unknown}` is not known here; did you mean `{nearest}`? ({message})"))
+/// For a key or choice that is not known, the known one that is most similar.
+fn unknown_name(message: &str) -> Option<String> {
+    let (unknown, nearest) = misspelt(message)?;
+    let hint = nearest.map(|nearest| format!("; did you mean `{nearest}`?")).unwrap_or_default();
+    Some(format!("`{unknown}` is not known here{hint} ({message})"))
 }
 
 /// The dotted key of the value at this position of the text.

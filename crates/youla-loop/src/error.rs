@@ -1,7 +1,5 @@
 //! The errors of check, excitation and redesign.
 
-use youla::ErrorKind;
-
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -47,21 +45,10 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// The same error with the part of a larger task in which it occurred.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
-
-    /// Whether the input is invalid or a computation failed.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::NoRedesign { .. } => ErrorKind::Numerical,
-            Error::BeyondLimit { .. } => ErrorKind::BadInput,
-        }
-    }
+youla::error_context! {
+    sources: Method;
+    numerical: NoRedesign;
+    bad_input: BeyondLimit;
 }
 
 /// Prints the amplitudes of all inputs.

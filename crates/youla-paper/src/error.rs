@@ -1,7 +1,6 @@
 //! Everything that can go wrong with the paper, with the evidence.
 
 use std::path::PathBuf;
-use youla::ErrorKind;
 
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -83,27 +82,8 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// The same error, said of a part of a larger task.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
-
-    /// Whether the input is at fault or the computation is impossible on it.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::File(source) => source.kind(),
-            Error::GreyBox(source) => source.kind(),
-            Error::Report(source) => source.kind(),
-            Error::Run(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::NoController { .. }
-            | Error::BadShard { .. }
-            | Error::NotResults { .. }
-            | Error::InUse { .. }
-            | Error::OtherSettings { .. }
-            | Error::Parts { .. } => ErrorKind::BadInput,
-        }
-    }
+youla::error_context! {
+    sources: Method File GreyBox Report Run;
+    numerical:;
+    bad_input: NoController BadShard NotResults InUse OtherSettings Parts;
 }

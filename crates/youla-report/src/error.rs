@@ -1,7 +1,5 @@
 //! Everything that can go wrong with reports, with the evidence.
 
-use youla::ErrorKind;
-
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
@@ -34,18 +32,8 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// The same error, said of a part of a larger task.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
-
-    /// Whether the input is at fault or the computation is impossible on it.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::ReportData { .. } | Error::ReportTemplate { .. } => ErrorKind::Numerical,
-        }
-    }
+youla::error_context! {
+    sources: Method;
+    numerical: ReportData ReportTemplate;
+    bad_input:;
 }

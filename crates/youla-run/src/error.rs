@@ -1,7 +1,6 @@
 //! Everything that can go wrong with a run, with the evidence.
 
 use std::path::PathBuf;
-use youla::ErrorKind;
 use youla::error::Names;
 
 /// Result of every fallible function of this crate.
@@ -34,8 +33,8 @@ pub enum Error {
         /// What failed.
         source: Box<Error>,
     },
-    /// A figure is asked for a part that it does not tell apart.
-    #[error("the figure {figure:?} cannot be drawn for one {choice} alone; it knows {}", Names(known))]
+    /// A figure is asked for a part that it does not distinguish.
+    #[error("the figure {figure:?} cannot be drawn for one {choice} alone; its choices are: {}", Names(known))]
     ChoiceOfFigure {
         /// Its name.
         figure: &'static str,
@@ -74,35 +73,19 @@ pub enum Error {
     },
 }
 
-impl Error {
-    /// The same error, said of a part of a larger task.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
+youla::error_context! {
+    sources: Method File GreyBox Loop Report;
+    numerical:;
+    bad_input: ChoiceOfFigure NothingToDraw DuplicateRecord NotASummary NotAReport;
+}
 
+impl Error {
     /// Whether the records and the nominal model, although well formed, do not suffice for a method that another may replace.
     pub(crate) fn is_of_the_records(&self) -> bool {
         match self {
             Error::Method(source) => source.is_of_the_records(),
             Error::Within { source, .. } => source.is_of_the_records(),
             _ => false,
-        }
-    }
-
-    /// Whether the input is at fault or the computation is impossible on it.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Method(source) => source.kind(),
-            Error::File(source) => source.kind(),
-            Error::GreyBox(source) => source.kind(),
-            Error::Loop(source) => source.kind(),
-            Error::Report(source) => source.kind(),
-            Error::Within { source, .. } => source.kind(),
-            Error::ChoiceOfFigure { .. }
-            | Error::NothingToDraw { .. }
-            | Error::DuplicateRecord { .. }
-            | Error::NotASummary { .. }
-            | Error::NotAReport { .. } => ErrorKind::BadInput,
         }
     }
 }

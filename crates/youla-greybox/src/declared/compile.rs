@@ -1,10 +1,11 @@
 //! From a declaration to a structure: dependence, bounds, and every check of what was read.
 
 use super::declaration::{Declaration, ParameterDeclaration};
-use super::names::{Names, finite, nearest};
+use super::names::{Names, finite};
 use super::{Cell, DeclaredStructure, Formula, Parameter, Quantity};
 use crate::{Error, Result};
 use std::cmp::Ordering;
+use youla::error::nearest_name;
 use youla::lti::Discrete;
 
 impl DeclaredStructure {
@@ -69,7 +70,10 @@ impl DeclaredStructure {
                     .filter(|(j, _)| used(*j))
                     .map(|(_, name)| name.as_str())
                     .collect();
-                return Err(Error::UnusedParameter { name: name.clone(), nearest: nearest(name, &others) });
+                return Err(Error::UnusedParameter {
+                    name: name.clone(),
+                    nearest: nearest_name(name, others).map(str::to_owned),
+                });
             }
         }
         Ok(())

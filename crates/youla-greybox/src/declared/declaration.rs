@@ -5,6 +5,7 @@ use crate::{Error, Result};
 use indexmap::IndexMap;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use youla::error::misspelt;
 
 /// Matrices of `x' = A x + B u, y = C x + D u`, or of `x(k+1) = A x(k) + B u(k)` where a sample time is given, with entries that are numbers or expressions of named parameters.
 ///
@@ -103,7 +104,11 @@ impl Declaration {
     /// # Errors
     /// [`Error::Declaration`] with the line and what is wrong.
     pub fn parse(text: &str) -> Result<Self> {
-        toml::from_str(text).map_err(|e: toml::de::Error| Error::Declaration { problem: e.to_string() })
+        toml::from_str(text).map_err(|e: toml::de::Error| {
+            let hint = misspelt(e.message()).and_then(|(_, nearest)| nearest);
+            let hint = hint.map(|nearest| format!("did you mean `{nearest}`?")).unwrap_or_default();
+            Error::Declaration { problem: format!("{e}{hint}") }
+        })
     }
 
     /// The declaration without a template: that of the template, as amended by this one.

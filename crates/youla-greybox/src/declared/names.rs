@@ -8,9 +8,7 @@ use crate::Matrix;
 use crate::{Error, Result};
 use faer::Mat;
 use indexmap::IndexMap;
-
-/// Similarity from which on a known name is proposed for an unknown one.
-const SIMILAR: f64 = 0.7;
+use youla::error::nearest_name;
 
 /// The names that expressions may use; parameters come first.
 pub(super) struct Names<'a> {
@@ -44,7 +42,7 @@ impl<'a> Names<'a> {
                 Err(Error::Expression { place: place(), text, column, problem })
             }
             Err(Problem::Unknown { name }) => {
-                let nearest = nearest(&name, &self.known);
+                let nearest = nearest_name(&name, self.known.iter().copied()).map(str::to_owned);
                 let known = self.known.iter().map(|name| (*name).to_owned()).collect();
                 Err(Error::UnknownName { place: place(), text, name, known, nearest })
             }
@@ -131,13 +129,6 @@ impl<'a> Names<'a> {
 
 fn required<'a>(matrix: &'static str, rows: &'a Option<Vec<Vec<Entry>>>) -> Result<&'a [Vec<Entry>]> {
     rows.as_deref().ok_or(Error::MissingMatrix { matrix })
-}
-
-/// The most similar of the known names, where one is similar.
-pub(super) fn nearest(name: &str, known: &[&str]) -> Option<String> {
-    let similarity = |known: &str| strsim::jaro_winkler(name, known);
-    let nearest = known.iter().max_by(|a, b| similarity(a).total_cmp(&similarity(b)))?;
-    (similarity(nearest) >= SIMILAR).then(|| (*nearest).to_owned())
 }
 
 /// Refuses a value, or a derivative with respect to a parameter, that is not finite.

@@ -4,11 +4,14 @@
 //! An outcome that is not an error (an optimiser that reached its limit, an estimate that turned out unstable and was
 //! asked for as it is) is returned as data, never here.
 
+mod context;
 mod display;
 mod limits;
+mod names;
 
 pub use display::{Names, Pole, Seconds};
 pub use limits::OrderLimit;
+pub use names::{misspelt, nearest_name};
 
 use display::worst_pole;
 use faer::c64;
@@ -318,12 +321,16 @@ pub enum Error {
     Stream(Box<dyn std::error::Error + Send + Sync>),
 }
 
-impl Error {
-    /// The same error, said of a part of a larger task.
-    pub fn within(self, part: impl Into<String>) -> Self {
-        Error::Within { part: part.into(), source: Box::new(self) }
-    }
+crate::error_context! {
+    sources:;
+    numerical: Singular NoConvergence Unstable NoSolution NoLogarithm NotStabilisable NotDetectable AlgebraicLoop
+        Diverged PoleOnBoundary NoReducedOrder NoCandidate;
+    bad_input: Shape NotFinite OutOfRange SampleTimeMismatch NotSymmetric NotPositive Ports Polynomial NotStabilising
+        Order Unsupported UnknownChannel DuplicateChannel NotFiniteSample InsufficientExcitation TooFewSamples
+        ConstantChannel RecordChanged Stream;
+}
 
+impl Error {
     /// Whether the records and the nominal model, although well formed, do not suffice for one method: a record that is too short
     /// or excites too little, a controller that does not stabilise the nominal model.
     pub fn is_of_the_records(&self) -> bool {
@@ -336,44 +343,6 @@ impl Error {
                     | Error::ConstantChannel { .. }
                     | Error::NotStabilising { .. }
             ),
-        }
-    }
-
-    /// Whether the input is at fault or the computation is impossible on it.
-    pub fn kind(&self) -> ErrorKind {
-        match self {
-            Error::Within { source, .. } => source.kind(),
-            Error::Singular { .. }
-            | Error::NoConvergence { .. }
-            | Error::Unstable { .. }
-            | Error::NoSolution { .. }
-            | Error::NoLogarithm { .. }
-            | Error::NotStabilisable { .. }
-            | Error::NotDetectable { .. }
-            | Error::AlgebraicLoop { .. }
-            | Error::Diverged { .. }
-            | Error::PoleOnBoundary { .. }
-            | Error::NoReducedOrder { .. }
-            | Error::NoCandidate { .. } => ErrorKind::Numerical,
-            Error::Shape { .. }
-            | Error::NotFinite { .. }
-            | Error::OutOfRange { .. }
-            | Error::SampleTimeMismatch { .. }
-            | Error::NotSymmetric { .. }
-            | Error::NotPositive { .. }
-            | Error::Ports { .. }
-            | Error::Polynomial { .. }
-            | Error::NotStabilising { .. }
-            | Error::Order { .. }
-            | Error::Unsupported { .. }
-            | Error::UnknownChannel { .. }
-            | Error::DuplicateChannel { .. }
-            | Error::NotFiniteSample { .. }
-            | Error::InsufficientExcitation { .. }
-            | Error::TooFewSamples { .. }
-            | Error::ConstantChannel { .. }
-            | Error::RecordChanged
-            | Error::Stream(_) => ErrorKind::BadInput,
         }
     }
 }

@@ -122,7 +122,7 @@ polars.from_arrow(log).write_parquet(out, compression='zstd')
 put('parquet', 'zstd.parquet', out.getvalue())
 put('run_toml', 'drive.toml', (root / 'examples/flexible-drive/run.toml').read_bytes())
 put('subspace_toml', 'options.toml', 'horizon = 20\nmethod = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
-put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = { fixed = 4 }\nstability = "allow"\n')
+put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = 4\nstability = "allow"\n')
 for template in sorted((root / 'crates/youla-greybox/src/declared/templates').glob('*.toml')):
     put('structure', template.name, template.read_bytes())
 put('structure', 'small.toml', 'sample_time = 0.1\na = [["sqrt(k) ^ -2 * pi", "exp(-m)"], [0, "atan(k / m)"]]\nb = [["1 / m"], [1]]\n'

@@ -1,4 +1,4 @@
-//! The whole method in ten lines: from a log of the closed loop to a model, held against fresh data.
+//! The whole method in ten lines: from a log of the closed loop to a model, compared with fresh data.
 //!
 //! `cargo run -p youla-cli --example 01_scheme`
 

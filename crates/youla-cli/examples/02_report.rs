@@ -30,7 +30,7 @@ feedback = "positive"
 file = "controller.json"
 [hansen]
 horizon = 30
-order = { fixed = 12 }
+order = 12
 "#;
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {

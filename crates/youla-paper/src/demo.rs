@@ -23,8 +23,7 @@ use youla_loop::redesign::RedesignOptions;
 use youla_run::CertificateSettings;
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
-    DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, RunSettings, StabilisationSettings,
-    VerificationSettings,
+    DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings,
 };
 use youla_run::{LoopRecord, RunRecords, SourceFile};
 
@@ -43,7 +42,7 @@ const A_FACTOR: f64 = 0.5;
 /// Settings and simulated records of the demonstration.
 #[derive(Debug, Clone)]
 pub struct Demo {
-    /// What `youla identify` would be told.
+    /// The settings for `youla identify`.
     pub settings: RunSettings,
     /// What the rig would have logged.
     pub records: RunRecords,
@@ -161,7 +160,6 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         data: DataSettings {
             sample_time: Some(TS),
             time_column: None,
-            time_tolerance: 1e-3,
             gaps: Gaps::Refuse,
             inputs: channels(INPUTS, "u", "V"),
             outputs: channels(OUTPUTS, "y", "um"),
@@ -192,10 +190,9 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         deviation: DeviationSettings::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         grey_box: None,
-        certificate: Some(CertificateSettings { controller_errors: true, ..CertificateSettings::default() }),
+        certificate: Some(CertificateSettings { controller_errors: true }),
         redesign: Some(RedesignOptions::default()),
         check: CheckOptions::default(),
-        stabilisation: StabilisationSettings::default(),
         verification: VerificationSettings::default(),
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },
         seed: Some(seed),

@@ -10,7 +10,7 @@ use std::collections::BTreeMap;
 use youla::control::{LinearMargins, WorstMargins};
 use youla::identify::hansen::HansenModel;
 use youla::identify::subspace::{Interval, Uncertainty};
-use youla::validate::{BandCertificate, ExactCertificate, certify_band, certify_deviation};
+use youla::validate::{BandCertificate, BandOptions, ExactCertificate, certify_band, certify_deviation};
 use youla_report::{data as draw, with_minus};
 
 /// What a run states about the loop of G(S) with the controller that ran.
@@ -20,7 +20,7 @@ pub struct RunCertificate {
     pub exact: ExactCertificate,
     /// The controller on every model within the region of S; `None` without an uncertainty.
     pub band: Option<BandCertificate>,
-    /// Margins with intervals, by name, where `[certificate]` stands; empty without an uncertainty or where the loop of the
+    /// Margins with intervals, by name, where `[certificate]` is given; empty without an uncertainty or where the loop of the
     /// estimate is unstable.
     pub margins: Vec<(String, Interval)>,
     /// S with a controller that is described wrongly, where it was asked for.
@@ -38,13 +38,12 @@ pub(super) fn certificate(context: SchemeContext<'_>, hansen: &HansenModel) -> R
     let exact = certify_deviation(factors, &deviation.model, None)?;
     let band = match &deviation.uncertainty {
         // K stabilises G(S) exactly where S is stable.
-        Some(uncertainty) => certify_band(uncertainty, &settings.band, |_| Ok(true), |s| Ok(s.clone()))?,
+        Some(uncertainty) => certify_band(uncertainty, &BandOptions::default(), |_| Ok(true), |s| Ok(s.clone()))?,
         None => None,
     };
     let asked = run.settings.certificate.is_some();
     let margins = if exact.stable && asked { margins(context, hansen)? } else { Vec::new() };
-    let controller_errors =
-        if settings.controller_errors { controller_errors(context, &settings)? } else { Vec::new() };
+    let controller_errors = if settings.controller_errors { controller_errors(context)? } else { Vec::new() };
     Ok(RunCertificate { exact, band, margins, controller_errors })
 }
 

@@ -8,7 +8,7 @@ use super::context::{RunContext, SchemeContext};
 use super::entries::{OrRefused, finite, finite_all};
 use super::factorise::factorise;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::{CertificateSettings, Construction, Controller, FactorSettings};
+use super::settings::Controller;
 use super::signals::deviation_signals;
 use super::verdict::verify_record;
 use crate::Result;
@@ -23,7 +23,14 @@ use youla::lti::{Mode, StateSpace};
 use youla_report::{data as draw, with_minus};
 
 /// Modes with at least this damping are left out of the comparison.
+/// More damping leaves no peak from which frequency and damping could be read. Chosen, not measured.
 const WELL_DAMPED: f64 = 0.3;
+
+/// Relative error of the gain that is tried, both ways: the tolerance of an amplifier (chosen, not measured).
+const GAIN_ERROR: f64 = 0.05;
+
+/// Limit of u that is tried, as a part of its largest value in each record and channel: clips peaks only (chosen, not measured).
+const SATURATION: f64 = 0.9;
 
 /// What is wrong with the description of the controller.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -101,19 +108,16 @@ fn mean<'a>(fits: impl Iterator<Item = &'a f64>) -> f64 {
 ///
 /// # Errors
 /// Those of the run without an error.
-pub(super) fn controller_errors(
-    context: SchemeContext<'_>,
-    settings: &CertificateSettings,
-) -> Result<Vec<ControllerErrorEffect>> {
+pub(super) fn controller_errors(context: SchemeContext<'_>) -> Result<Vec<ControllerErrorEffect>> {
     let (run, settle) = (context.run, context.signals.settle);
     let plain = identified(run, settle, ControllerError::None)?;
     let modes: Vec<Mode> = plain.plant.modes()?.into_iter().filter(light).collect();
     let errors = [
         ControllerError::None,
         ControllerError::Delay,
-        ControllerError::Gain(settings.gain_error),
-        ControllerError::Gain(-settings.gain_error),
-        ControllerError::Saturation(settings.saturation),
+        ControllerError::Gain(GAIN_ERROR),
+        ControllerError::Gain(-GAIN_ERROR),
+        ControllerError::Saturation(SATURATION),
         ControllerError::InitialState,
     ];
     let effect = |error: &ControllerError| {
@@ -148,8 +152,8 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
         estimation: run.records.estimation.iter().map(|r| altered(r, error, settle)).collect(),
         ..run.records.clone()
     };
-    let factors = FactorSettings { construction: Construction::Stacked, ..settings.factors };
-    let factors = factorise(&run.declared.nominal, &Controller::System(described), &records, &factors)?.factors;
+    let described = Controller::System(described);
+    let factors = factorise(&run.declared.nominal, &described, &records, &settings.factors)?.factors;
     let dropped = if error == ControllerError::InitialState { 0 } else { settle };
     let signals = deviation_signals(&factors, &records.estimation, Some(dropped))?;
     let lines = records.disturbances(signals.settle);

@@ -1,7 +1,7 @@
 //! Direct identification from (u, y), for comparison.
 
 use super::records::RunRecords;
-use super::settings::{RunSettings, StabilisationSettings};
+use super::settings::RunSettings;
 use super::stabilisation::diagram;
 use crate::Result;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
@@ -12,20 +12,16 @@ pub(super) fn direct(
     records: &RunRecords,
     settings: &RunSettings,
 ) -> (Option<Result<SubspaceModel>>, Option<Result<StabilisationDiagram>>) {
-    match settings.direct.as_ref().map(|options| model(records, options, &settings.stabilisation)) {
+    match settings.direct.as_ref().map(|options| model(records, options)) {
         None => (None, None),
         Some(Err(reason)) => (Some(Err(reason)), None),
         Some(Ok((model, diagram))) => (Some(Ok(model)), Some(diagram)),
     }
 }
 
-fn model(
-    records: &RunRecords,
-    options: &SubspaceOptions,
-    settings: &StabilisationSettings,
-) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
+fn model(records: &RunRecords, options: &SubspaceOptions) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
     let data = SubspaceData::disturbed(&records.experiments(), &records.disturbances(0), records.time, options)?;
     let model = data.identify(options)?;
-    let diagram = diagram(&data, &model, options, settings);
+    let diagram = diagram(&data, &model, options);
     Ok((model, diagram))
 }

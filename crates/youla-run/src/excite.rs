@@ -151,12 +151,7 @@ fn without_data(settings: &RunSettings, time: Discrete) -> RunRecords {
 
 fn noise_of(settings: &RunSettings, on: &ExcitedLoop, file: &Path) -> Result<Vec<f64>> {
     let data = &settings.data;
-    let clock = TimeSource {
-        column: data.time_column.clone(),
-        ts: data.sample_time,
-        tolerance: data.time_tolerance,
-        ..TimeSource::default()
-    };
+    let clock = TimeSource { column: data.time_column.clone(), ts: data.sample_time, ..TimeSource::default() };
     let source = Source {
         path: file.to_owned(),
         format: Format::Detect,

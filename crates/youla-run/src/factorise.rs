@@ -1,11 +1,11 @@
 //! From nominal model and controller of a run to its coprime factors, with balanced states.
 
 use super::records::RunRecords;
-use super::settings::{Construction, Controller, FactorSettings, RunSettings};
+use super::settings::{Controller, FactorSettings, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::Mat;
-use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, observer_controller};
+use youla::control::{LqrWeights, lqr, observer_controller};
 use youla::factor::CoprimeFactors;
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
@@ -100,18 +100,8 @@ pub fn factorise(
             CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
         }
         Controller::System(k) => {
-            let weights = Weights::new(records, settings);
-            match settings.construction {
-                Construction::Stacked => {
-                    let f = weights.state_feedback(&balanced)?;
-                    let fk = controller_feedback(k)?;
-                    CoprimeFactors::stacked(&balanced, k, f.as_ref(), fk.as_ref())?
-                }
-                Construction::Shifted => {
-                    let (f, l) = (weights.state_feedback(&balanced)?, weights.observer_gain(&balanced)?);
-                    CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?.shifted_to(k)?
-                }
-            }
+            let f = state_feedback(&balanced, records, settings.input_weight)?;
+            CoprimeFactors::stacked(&balanced, k, f.as_ref(), controller_feedback(k)?.as_ref())?
         }
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
@@ -132,35 +122,13 @@ fn grid_to_nyquist(time: Discrete, count: usize) -> Vec<f64> {
     (0..count).map(|k| nyquist * 10f64.powf(-4.0 + 4.0 * k as f64 / count as f64)).collect()
 }
 
-/// Weights in the units of the machine: inputs and outputs count in their rms on the estimation records.
-struct Weights {
-    u: Vec<f64>,
-    y: Vec<f64>,
-    input_weight: f64,
-    output_noise: f64,
-}
-
-impl Weights {
-    fn new(records: &RunRecords, settings: &FactorSettings) -> Self {
-        let (u, y) = records.sizes();
-        Weights { u, y, input_weight: settings.input_weight, output_noise: settings.output_noise }
-    }
-
-    /// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs.
-    fn state_feedback(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-        let outputs = diagonal(self.y.iter().map(|s| 1.0 / (s * s)));
-        let inputs = diagonal(self.u.iter().map(|s| self.input_weight / (s * s)));
-        let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
-        gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
-    }
-
-    /// Kalman predictor with input noise of the size of the inputs and output noise of the size of the outputs.
-    fn observer_gain(&self, plant: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-        let input = diagonal(self.u.iter().map(|s| s * s));
-        let measurement = diagonal(self.y.iter().map(|s| self.output_noise * s * s));
-        let gain = || Ok(kalman(plant, &NoiseCovariance::at_inputs(plant, input.as_ref(), measurement.as_ref())?)?.l);
-        gain().map_err(|e: Error| e.within("observer gain L of the nominal model"))
-    }
+/// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs, rms on the estimation records.
+fn state_feedback(plant: &StateSpace<Discrete>, records: &RunRecords, input_weight: f64) -> Result<Mat<f64>> {
+    let (u, y) = records.sizes();
+    let outputs = diagonal(y.iter().map(|s| 1.0 / (s * s)));
+    let inputs = diagonal(u.iter().map(|s| input_weight / (s * s)));
+    let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
+    gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
 }
 
 fn diagonal(values: impl Iterator<Item = f64>) -> Mat<f64> {

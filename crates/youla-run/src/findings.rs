@@ -72,7 +72,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         }
     }
     if let Some(form) = scheme.and_then(|s| s.hansen.innovation_form.as_ref()) {
-        let (status, settled) = match form.stop {
+        let (status, converged) = match form.stop {
             Convergence::Converged => (Status::Info, "converged"),
             Convergence::Iterations => (Status::Caution, "did not converge"),
         };
@@ -80,7 +80,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
             format!(" The Kalman gain of the subspace method differs from K_s by {:.0} %.", 100.0 * x)
         });
         let text = format!(
-            "S is in innovation form: its gain K_s {settled} within {} refits (last relative change {:.1e}); it differs from the \
+            "S is in innovation form: its gain K_s {converged} within {} refits (last relative change {:.1e}); it differs from the \
              response of beta to output noise by {:.1} %.{kalman}",
             form.iterations,
             form.change,

@@ -10,7 +10,8 @@ use serde::{Deserialize, Serialize};
 use youla::identify::hansen::HansenModel;
 use youla_greybox::hansen_pem::{HansenPem, HansenPemOptions, PemRun, PemStart};
 use youla_greybox::{
-    Declaration, DeclaredStructure, GreyBoxIntervals, ResidualTest, Stop, Structure, compare, likelihood_ratio,
+    Declaration, DeclaredStructure, GreyBoxIntervals, IntervalOptions, ResidualTest, Stop, Structure, compare,
+    likelihood_ratio,
 };
 use youla_report::data::{PhysicalEstimate, PhysicalParameter, PhysicalStructure};
 
@@ -37,7 +38,7 @@ fn estimate(context: SchemeContext<'_>, hansen: &HansenModel, asked: &GreyBoxSet
     let run = context.run;
     let outputs = outputs_without_lines(run.records)?;
     let options =
-        HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.pem.clone(), ..HansenPemOptions::default() };
+        HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.search(), ..HansenPemOptions::default() };
     let criterion = Criterion::new(asked.prediction, context, &outputs, &options)?;
     let of = |declaration: &Declaration| -> Result<(DeclaredStructure, HansenPem)> {
         let structure = DeclaredStructure::new(declaration)?;
@@ -46,7 +47,8 @@ fn estimate(context: SchemeContext<'_>, hansen: &HansenModel, asked: &GreyBoxSet
         Ok((structure, found))
     };
     let (structure, found) = of(&asked.structure)?;
-    let intervals = criterion.intervals(&structure, &found.model, &asked.intervals);
+    let levels = IntervalOptions { level: run.settings.hansen.uncertainty.level, ..IntervalOptions::default() };
+    let intervals = criterion.intervals(&structure, &found.model, &levels);
     let others = asked.alternative.iter().map(|other| (other, of(&other.structure).map(|(_, found)| found)));
     let compared = if asked.alternative.is_empty() { Vec::new() } else { table(&found, &others.collect::<Vec<_>>())? };
     Ok(GreyBoxRun { structure, found, intervals, compared })
@@ -81,7 +83,7 @@ fn table(
                 let test =
                     if one.unknowns < two.unknowns { likelihood_ratio(one, two) } else { likelihood_ratio(two, one) };
                 let test =
-                    test.map_err(|e| e.within(format!("alternative {:?}, which is said to be nested", other.name)))?;
+                    test.map_err(|e| e.within(format!("alternative {:?}, which is declared as nested", other.name)))?;
                 if let Some(row) = rows.iter_mut().skip(1).find(|row| row.name == other.name) {
                     row.statistic = Some(test.statistic);
                     row.degrees_of_freedom = Some(test.degrees_of_freedom);
@@ -172,8 +174,8 @@ impl GreyBoxRun {
     /// What summary.json says of the structure.
     pub(super) fn entry(&self) -> Result<PhysicalEntry> {
         let PhysicalEstimate { level, verdict, correlations, structures, .. } = self.shown();
-        let (parameters, lost) = (self.rows()?, self.found.local_minimum_suspected());
-        Ok(PhysicalEntry { parameters, level, correlations, verdict, structures, lost })
+        let (parameters, local_minimum_suspected) = (self.rows()?, self.found.local_minimum_suspected());
+        Ok(PhysicalEntry { parameters, level, correlations, verdict, structures, local_minimum_suspected })
     }
 }
 
@@ -193,7 +195,7 @@ pub struct PhysicalEntry {
     #[schemars(with = "Vec<serde_json::Map<String, serde_json::Value>>")]
     pub structures: Vec<PhysicalStructure>,
     /// Whether the fit is clearly below that of G(S): a local minimum, or a structure that does not describe the plant.
-    pub lost: bool,
+    pub local_minimum_suspected: bool,
 }
 
 /// `details` of `4-identify/grey_box.json`.

@@ -84,9 +84,9 @@ pub use robustness::{DiskEntry, Robustness, RobustnessEntry, ScalesEntry};
 pub use schema::{settings_schema, summary_schema};
 pub use segments::RecordSegment;
 pub use settings::{
-    AlternativeStructure, CertificateSettings, Construction, Controller, ControllerSettings, DataFile, DataSettings,
+    AlternativeStructure, CertificateSettings, Controller, ControllerSettings, DataFile, DataSettings,
     DeviationSettings, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings,
-    NominalModel, Polynomials, Prediction, RunSettings, StabilisationSettings, TachoUnit, VerificationSettings,
+    NominalModel, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stage::{Stage, StageClock, StageTimes};

@@ -108,7 +108,7 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
         sources.push(file.source);
         segments.extend(file.segments);
         let (time, last): (Discrete, Discrete) = (records[0].time, records[records.len() - 1].time);
-        if (last.ts() / time.ts() - 1.0).abs() > settings.time_tolerance {
+        if (last.ts() / time.ts() - 1.0).abs() > TimeSource::default().tolerance {
             let what = format!("{} and {}", sources[0].path, sources[k].path);
             return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: time.ts(), right: last.ts() }));
         }
@@ -149,8 +149,8 @@ fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataF
         time: TimeSource {
             column: settings.time_column.clone(),
             ts: settings.sample_time,
-            tolerance: settings.time_tolerance,
             gaps: settings.gaps,
+            ..TimeSource::default()
         },
         channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
         csv: settings.csv.clone(),

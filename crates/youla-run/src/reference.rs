@@ -18,7 +18,7 @@ which editors complete and check a run.toml:
 and, as the first line of run.toml, `#:schema run.schema.json` (taplo, Even Better TOML).
 ";
 
-/// The reference, in Markdown.
+/// The reference, in Markdown: the only list of all keys, from the documentation of the structs that read them.
 ///
 /// ```
 /// assert!(youla_run::settings_reference().contains("## `[data]`"));
@@ -36,17 +36,13 @@ pub fn settings_reference() -> String {
 }
 
 /// Tables that most run files need; all others but `[check]` are further ones.
-const COMMON: [&str; 13] = [
+const COMMON: [&str; 9] = [
     "",
     "[data]",
     "[[data.inputs]]",
     "[[data.estimation]]",
     "[nominal]",
-    "[nominal.transfer_function]",
-    "[nominal.state_space]",
     "[controller]",
-    "[controller.difference_equation]",
-    "[controller.state_space]",
     "[direct]",
     "[hansen]",
     "[verification]",
@@ -89,7 +85,7 @@ impl<'a> Page<'a> {
         name_of(schema).and_then(|name| self.defs.get(name)).unwrap_or(schema)
     }
 
-    /// A table with its keys, or a choice of forms; then what stands below it.
+    /// A table with its keys, or a choice of forms; then what is below it.
     fn section(&mut self, path: &str, about: &str, schema: &'a Value) {
         self.at = part_of(path);
         let heading = if path.is_empty() { "The top level".to_owned() } else { format!("`{path}`") };
@@ -145,8 +141,7 @@ impl<'a> Page<'a> {
                 false => (self.kind(schema), self.choices(schema)),
             };
             let cells = [format!("`{key}`"), kind, default, text_of(schema).to_owned() + &choices];
-            let cells = cells.map(|cell| cell.replace('|', "\\|").replace("\n\n", "<br>"));
-            *self.part() += &format!("| {} |\n", cells.join(" | "));
+            *self.part() += &row(cells);
             let bare = path.trim_matches(['[', ']']);
             let place = if bare.is_empty() { key.clone() } else { format!("{bare}.{key}") };
             if let Some((brackets, table)) = self.table(schema) {
@@ -161,22 +156,36 @@ impl<'a> Page<'a> {
         below
     }
 
-    /// The forms of a choice of which each is a table with one key.
+    /// The forms of a choice of which some are tables with one key. Where all are, each form with its keys, then every key once;
+    /// else the tables as sections of their own.
     fn forms(&mut self, path: &str, own: &'a Value) -> Vec<(String, String, &'a Value)> {
         let bare = path.trim_matches(['[', ']']);
-        let mut below = Vec::new();
-        for form in own["oneOf"].as_array().into_iter().flatten() {
-            for (key, schema) in form["properties"].as_object().into_iter().flatten() {
-                if self.resolve(schema)["properties"].is_object() {
-                    below.push((format!("[{bare}.{key}]"), text_of(form).to_owned(), schema));
-                }
+        let (mut below, mut forms, mut all) = (Vec::new(), String::new(), Vec::<(&String, &Value)>::new());
+        for form in alternatives(own) {
+            for (name, schema) in form["properties"].as_object().into_iter().flatten() {
+                let table = self.resolve(schema);
+                let Some(keys) = table["properties"].as_object() else { continue };
+                below.push((format!("[{bare}.{name}]"), text_of(form).to_owned(), schema));
+                let needed = |key: &str| table["required"].as_array().is_some_and(|all| all.iter().any(|n| n == key));
+                let named = |key: &String| format!("`{key}`{}", if needed(key) { "" } else { " (optional)" });
+                let names: Vec<String> = keys.keys().map(named).collect();
+                forms += &format!("| `[{bare}.{name}]` | {} | {} |\n", names.join(", "), text_of(form));
+                all.extend(
+                    keys.iter().filter(|(key, _)| all.iter().all(|(known, _)| known != key)).collect::<Vec<_>>(),
+                );
             }
         }
-        if !below.is_empty() {
-            let names: Vec<String> = below.iter().map(|(heading, ..)| format!("`{heading}`")).collect();
-            *self.part() += &format!("\nWhat has keys of its own: {}.\n", names.join(", "));
+        if !self.only_tables(own) {
+            return below;
         }
-        below
+        *self.part() +=
+            &format!("\nExactly one of these tables:\n\n| table | keys | meaning |\n|---|---|---|\n{forms}");
+        *self.part() += "\n| key | type | meaning |\n|---|---|---|\n";
+        for (key, schema) in all {
+            let cells = [format!("`{key}`"), self.kind(schema), text_of(schema).to_owned() + &self.choices(schema)];
+            *self.part() += &row(cells);
+        }
+        Vec::new()
     }
 
     /// The table behind a key, where it has keys of its own, and how its heading is written.
@@ -187,9 +196,8 @@ impl<'a> Page<'a> {
             _ => (Brackets::One, schema),
         };
         let own = self.resolve(inner);
-        let forms = own["oneOf"].as_array().into_iter().flatten();
         let keys = |form: &'a Value| form["properties"].as_object().into_iter().flatten();
-        let nested = forms.flat_map(keys).any(|(_, schema)| self.resolve(schema)["properties"].is_object());
+        let nested = alternatives(own).flat_map(keys).any(|(_, schema)| self.resolve(schema)["properties"].is_object());
         (own["properties"].is_object() || nested).then_some((brackets, inner))
     }
 
@@ -204,7 +212,7 @@ impl<'a> Page<'a> {
         })
     }
 
-    /// What may stand behind a key.
+    /// What may be behind a key.
     fn kind(&self, schema: &'a Value) -> String {
         let own = self.resolve(schema);
         if let Some(choices) = own["oneOf"].as_array().or(own["anyOf"].as_array()) {
@@ -270,6 +278,17 @@ impl<'a> Page<'a> {
     }
 }
 
+/// The forms among which a value is chosen.
+fn alternatives(schema: &Value) -> impl Iterator<Item = &Value> {
+    schema["oneOf"].as_array().or(schema["anyOf"].as_array()).into_iter().flatten()
+}
+
+/// A line of a table.
+fn row<const N: usize>(cells: [String; N]) -> String {
+    let cells = cells.map(|cell| cell.replace('|', "\\|").replace("\n\n", "<br>"));
+    format!("| {} |\n", cells.join(" | "))
+}
+
 /// How the heading of a table is written.
 enum Brackets {
     One,
@@ -277,7 +296,7 @@ enum Brackets {
     Named,
 }
 
-/// A default as it would stand in the file.
+/// A default as it would be in the file.
 fn toml_of(value: &Value) -> String {
     match value {
         Value::Object(keys) => {
@@ -293,13 +312,17 @@ fn toml_of(value: &Value) -> String {
 mod tests {
     use super::*;
 
-    /// What a user reads first fits on one page.
+    /// Keys of a user and thresholds of the check are apart, and the former are few.
     #[test]
-    fn common_keys_are_few() {
+    fn keys_are_few() {
         let page = settings_reference();
-        let common = page.split("\n# Further keys\n").next().unwrap();
-        let keys = common.lines().filter(|line| line.starts_with("| `")).count();
-        assert!((40..=80).contains(&keys), "{keys}");
-        assert!(!common.contains("## `[check]`") && page.contains("## `[check]`"));
+        let (of_user, check) = page.split_once("\n# Thresholds of the check of the data\n").unwrap();
+        let tables = |line: &&str| line.contains("` | table |") || line.contains("` | list of table |");
+        let keys: Vec<&str> =
+            of_user.lines().filter(|line| line.starts_with("| `") && !line.starts_with("| `[")).collect();
+        let count = keys.iter().filter(|line| !tables(line)).count();
+        println!("{count} of {} rows: {keys:#?}", keys.len());
+        assert!((40..=80).contains(&count), "{count} keys:\n{}", keys.join("\n"));
+        assert!(!of_user.contains("## `[check]`") && check.contains("## `[check]`"));
     }
 }

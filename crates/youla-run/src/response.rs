@@ -47,7 +47,7 @@ pub(super) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) 
             ExcitedRecord { d: d.as_ref(), u, y }
         })
         .collect();
-    let options = Welch { window: settings.window, overlap: settings.overlap, ..Welch::default() };
+    let options = Welch { window: settings.window, ..Welch::default() };
     Some(indirect_response(&experiments, run.records.time, &options).map_err(Error::from))
 }
 
@@ -77,10 +77,16 @@ pub(super) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result
     }
 }
 
+/// Frequencies of the logarithmic grid: 160 to a decade over two decades and a half, below the width of a line in a figure (chosen, not
+/// measured).
+const POINTS: usize = 400;
+
 /// Modes with less damping have frequencies of their own.
+/// A resonance with more damping is wider than 20 % of its frequency, several points of the grid. Chosen, not measured.
 const LIGHT: f64 = 0.1;
 
 /// Angles in degrees of the response of a mode, seen from its peak, at which it is evaluated.
+/// From -15 to 15 degrees the response and its chords differ by less than 1 % of the peak, `1 - cos(7.5 degrees)`.
 const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
 
 /// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
@@ -92,7 +98,7 @@ const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0,
 pub(super) fn grid(settings: &FrequencySettings, models: &[&StateSpace<Discrete>], time: Discrete) -> Result<Vec<f64>> {
     let nyquist = 0.5 / time.ts();
     let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
-    let last = settings.points.max(2) - 1;
+    let last = POINTS - 1;
     let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
     for model in models {
         for mode in model.modes()?.into_iter().filter(|m| m.pole.im != 0.0 && m.zeta.abs() < LIGHT) {

@@ -13,7 +13,7 @@ use youla::Mat;
 use youla::control::{ChannelScales, DiskMargin, IsoZone, Margins, NuGap, coprime_margin, margins, nu_gap};
 use youla::lti::{Discrete, StateSpace};
 
-/// The robustness of one model. A reason stands where a figure cannot be had.
+/// The robustness of one model. A reason is where a figure cannot be had.
 #[derive(Debug, Clone)]
 pub struct Robustness {
     /// Margins with the controller that ran.

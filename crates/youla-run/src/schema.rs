@@ -83,7 +83,7 @@ fn without_null(map: &mut Map<String, Value>) {
     if let Some(Value::Array(mut choices)) = map.remove("anyOf") {
         choices.retain(|choice| choice["type"] != "null");
         match &choices[..] {
-            // What stands beside the choice, as the description of its key, is nearer than what it says of itself.
+            // What is beside the choice, as the description of its key, is nearer than what it says of itself.
             [Value::Object(only)] => only.iter().for_each(|(key, value)| {
                 map.entry(key).or_insert_with(|| value.clone());
             }),

@@ -30,10 +30,10 @@ pub(super) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     let lines = run.records.disturbances(signals.settle);
     let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
     let hansen = hansen_structured(factors, &data, &settings.hansen, &settings.deviation.options())?;
-    let diagram = diagram(&data, &hansen.deviation, &settings.hansen, &settings.stabilisation);
+    let diagram = diagram(&data, &hansen.deviation, &settings.hansen);
     let Some(options) = &settings.deviation.refine else { return Ok(Scheme { hansen, refinement: None, diagram }) };
     let refined = refine_hansen(hansen, factors, &signals.experiments, &lines, options);
-    let RefinedHansen { model, refinement } = refined.map_err(|e| e.within("[deviation.refine]"))?;
+    let RefinedHansen { model, refinement } = refined.map_err(|e| e.within("[deviation] refine"))?;
     Ok(Scheme { hansen: model, refinement: Some(refinement), diagram })
 }
 

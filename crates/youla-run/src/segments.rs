@@ -18,7 +18,7 @@ pub struct RecordSegment {
     pub rows: [usize; 2],
 }
 
-/// A part of a file and where it stands there.
+/// A part of a file and where it is there.
 pub(super) struct Part {
     pub(super) record: Record,
     /// Name in reports.

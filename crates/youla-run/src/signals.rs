@@ -28,6 +28,7 @@ pub struct DeviationSignals {
 }
 
 /// Relative miss of alpha from which the declared controller is named as a likely cause of a failure.
+/// Five times the caution of the check of the data, 1 %. Chosen, not measured.
 const SUSPICIOUS_MISMATCH: f64 = 0.05;
 
 impl DeviationSignals {
@@ -55,7 +56,7 @@ pub fn deviation_signals(
     records: &[LoopRecord],
     settle: Option<usize>,
 ) -> Result<DeviationSignals> {
-    let settle = settle.map_or_else(|| factors.settling_samples(SETTLED), Ok)?;
+    let settle = settle.map_or_else(|| factors.settling_samples(REMAINDER), Ok)?;
     let mut experiments = Vec::new();
     let mut expected_alpha = Vec::new();
     for record in records {
@@ -126,7 +127,8 @@ pub fn write_signals(records: &[Record], folder: &Path) -> Result<Vec<PathBuf>> 
 }
 
 /// Fraction to which the slowest transient of the filter must have decayed.
-const SETTLED: f64 = 1e-3;
+/// 60 dB below the start. Chosen, not measured.
+const REMAINDER: f64 = 1e-3;
 
 /// `alpha + Vt v1 - Ut r` of the known excitations.
 fn expected(factors: &CoprimeFactors<Discrete>, record: &LoopRecord) -> Result<Option<Mat<f64>>> {

@@ -1,17 +1,17 @@
 //! The stabilisation diagrams of a run: drawn from the data that the models come from.
 
 use super::entries::{pair, pairs};
-use super::settings::StabilisationSettings;
 use crate::Result;
 use serde::Serialize;
 use youla::identify::subspace::stabilisation::{
-    DiagramPole, ModeCluster, PoleStability, StabilisationDiagram, stabilisation,
+    DiagramPole, ModeCluster, PoleStability, StabilisationDiagram, StabilisationOptions, stabilisation,
 };
 use youla::identify::subspace::{SubspaceData, SubspaceModel, SubspaceOptions};
 use youla::signal::Channel;
 use youla_report::data as draw;
 
 /// Orders that a diagram has at least, where the horizon allows them.
+/// Ten modes; clusters need several orders above that of the model. Chosen, not measured.
 const LEAST_ORDERS: usize = 20;
 
 /// The diagram beside a model from the same data.
@@ -19,12 +19,10 @@ pub(super) fn diagram(
     data: &SubspaceData<'_>,
     found: &SubspaceModel,
     method: &SubspaceOptions,
-    settings: &StabilisationSettings,
 ) -> Result<StabilisationDiagram> {
     let held = (found.horizon - 1) * found.model.outputs();
-    let usual = (2 * found.order.order).max(LEAST_ORDERS).min(held);
-    let orders: Vec<usize> = (1..=settings.max_order.unwrap_or(usual)).collect();
-    Ok(stabilisation(data, &orders, method, &settings.criteria)?)
+    let orders: Vec<usize> = (1..=(2 * found.order.order).max(LEAST_ORDERS).min(held)).collect();
+    Ok(stabilisation(data, &orders, method, &StabilisationOptions::default())?)
 }
 
 /// A diagram as an artefact; numbers that are not finite are null.
@@ -45,7 +43,7 @@ struct PoleEntry {
     hz_deviation: Option<f64>,
     zeta_deviation: Option<f64>,
     stable: bool,
-    standing: PoleStability,
+    stability: PoleStability,
     cluster: Option<usize>,
     shape: Vec<[f64; 2]>,
 }
@@ -59,7 +57,7 @@ struct ClusterEntry {
     hz_deviation: Option<f64>,
     zeta_deviation: Option<f64>,
     orders: usize,
-    settled: usize,
+    stable_orders: usize,
     shape: Vec<[f64; 2]>,
 }
 
@@ -74,7 +72,7 @@ impl<'a> DiagramFile<'a> {
             hz_deviation: p.hz_deviation,
             zeta_deviation: p.zeta_deviation,
             stable: p.is_stable(),
-            standing: p.standing,
+            stability: p.standing,
             cluster: p.cluster,
             shape: pairs(&p.shape),
         };
@@ -86,7 +84,7 @@ impl<'a> DiagramFile<'a> {
             hz_deviation: c.hz_deviation,
             zeta_deviation: c.zeta_deviation,
             orders: c.orders,
-            settled: c.settled,
+            stable_orders: c.settled,
             shape: pairs(&c.shape),
         };
         DiagramFile {
@@ -102,14 +100,14 @@ impl<'a> DiagramFile<'a> {
 pub(super) fn as_csv(diagram: &StabilisationDiagram) -> String {
     let optional = |x: Option<f64>| x.map(|x| x.to_string()).unwrap_or_default();
     let outputs = diagram.poles.first().map_or(0, |p| p.shape.len());
-    let mut text = String::from("order,pole_re,pole_im,hz,zeta,hz_deviation,zeta_deviation,stable,standing,cluster");
+    let mut text = String::from("order,pole_re,pole_im,hz,zeta,hz_deviation,zeta_deviation,stable,stability,cluster");
     (1..=outputs).for_each(|i| text += &format!(",shape_{i}_re,shape_{i}_im"));
     text.push('\n');
     for p in &diagram.poles {
         let standing = match p.standing {
             PoleStability::New => "new",
             PoleStability::Frequency => "frequency",
-            PoleStability::Stable => "settled",
+            PoleStability::Stable => "stable",
         };
         let (z, stable) = (p.pole, p.is_stable());
         let cluster = p.cluster.map(|k| k.to_string()).unwrap_or_default();
@@ -146,7 +144,7 @@ pub(super) fn drawn(diagram: &StabilisationDiagram, method: &str, label: &str, c
         hz_deviation: c.hz_deviation,
         zeta_deviation: c.zeta_deviation,
         orders: c.orders,
-        settled: c.settled,
+        stable_orders: c.settled,
         shape: c.shape.iter().map(|x| [x.norm(), x.im.atan2(x.re).to_degrees()]).collect(),
     });
     draw::Stabilisation {

@@ -3,6 +3,7 @@
 use super::artefacts::{ModelFile, Provenance, SCHEMA};
 use super::folder::to_value;
 use super::records::SourceFile;
+use super::settings::{SubspaceTable, read_table};
 use super::subspace_details::{LongDetails, SubspaceDetails};
 use crate::{Error, Result};
 use faer::MatMut;
@@ -52,7 +53,7 @@ pub struct ReadingProgress {
     pub samples: u64,
 }
 
-/// Identifies a model from files in memory that does not depend on their length; `watch` is told of every piece read.
+/// Identifies a model from files in memory that does not depend on their length; `watch` receives every piece that is read.
 ///
 /// # Errors
 /// As [`subspace_stream`], [`CsvStream::open`] and [`NpyStream::open`]; [`youla::Error::SampleTimeMismatch`] where files differ,
@@ -120,12 +121,7 @@ pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<Subspa
 /// # Errors
 /// [`youla_io::Error::Settings`] with line, column and key.
 pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<SubspaceOptions> {
-    youla_io::toml_file::parse(text, path).map_err(|error| match error {
-        youla_io::Error::Settings { path, at, problem } if problem.starts_with("`weight` is not known") => {
-            Error::File(youla_io::Error::Settings { path, at, problem: "`weight` is now `method`".into() })
-        }
-        other => Error::File(other),
-    })
+    read_table::<SubspaceTable>(text, path, "direct").map(Into::into)
 }
 
 fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {
@@ -144,7 +140,7 @@ fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>,
     Ok((Box::new(stream), time))
 }
 
-/// A stream that tells how far it has been read.
+/// A stream that reports how far it has been read.
 struct Watched<'a, S> {
     inner: S,
     watch: &'a mut (dyn FnMut(ReadingProgress) + Send),

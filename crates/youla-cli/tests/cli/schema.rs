@@ -115,7 +115,7 @@ fn run_files_validate() {
     }
 }
 
-/// The parts of settings that stand in the documents.
+/// The parts of settings that are in the documents.
 #[test]
 fn settings_in_the_documents_validate() {
     let schema = schema();
@@ -150,13 +150,14 @@ fn wrong_files_do_not_validate() {
     let refused = [
         settings("name = \"loop\"", "nane = \"loop\""),
         settings("name = \"loop\"", "name = 3"),
-        settings("horizon = 10\norder = { fixed = 3 }", "horizon = 10\nordr = { fixed = 3 }"),
+        settings("horizon = 10\norder = 3", "horizon = 10\nordr = 3"),
         settings("horizon = 10", "horizon = \"10\""),
         settings("horizon = 10", "horizon = -1"),
         settings("horizon = 10", "horizon = 10.5"),
-        settings("order = { fixed = 3 }", "order = { fixd = 3 }"),
-        settings("order = { fixed = 3 }", "order = { fixed = 3, auto = { max = 4 } }"),
-        settings("order = { fixed = 3 }", "order = 3"),
+        settings("order = 3", "order = { fixd = 3 }"),
+        settings("order = 3", "order = { fixed = 3, auto = { max = 4 } }"),
+        settings("order = 3", "order = \"many\""),
+        settings("order = 3", "order = 3\nscaling = \"rms\""),
         settings("feedback = \"negative\"", "feedback = \"minus\""),
         settings("feedback = \"negative\"\n", ""),
         settings("[nominal.transfer_function]", "[nominal.transfer]"),

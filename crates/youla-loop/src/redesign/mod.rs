@@ -57,13 +57,16 @@ pub struct RedesignOptions {
     /// Weights of the inputs relative to the outputs that are tried, both in their rms. Smaller weights give more damping and more
     /// dependence on details of the model.
     pub input_weights: Vec<f64>,
-    /// Covariance of the output noise against that of the inputs, both in their rms, for the observer.
+    /// Covariance of the output noise against that of the inputs, both in their rms, for the observer; not a key of run.toml.
+    #[serde(skip)]
     pub output_noise: f64,
     /// Largest peak of the output sensitivity, channels in their rms. ISO 14839-3 calls up to 3 zone A.
     pub peak_sensitivity: f64,
-    /// Largest value of the small-gain product over the region of S, for `youla`; below 1.
+    /// Largest value of the small-gain product over the region of S, for `youla`; below 1; not a key of run.toml.
+    #[serde(skip)]
     pub small_gain: f64,
-    /// Models that are drawn from the region of S for the final test.
+    /// Models that are drawn from the region of S for the final test; not a key of run.toml.
+    #[serde(skip)]
     pub band: BandOptions,
 }
 

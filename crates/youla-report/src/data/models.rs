@@ -86,7 +86,7 @@ pub struct StabilisationCluster {
     /// Number of orders at which it appears.
     pub orders: usize,
     /// Number of orders at which it is stable: [`PoleStability::Stable`].
-    pub settled: usize,
+    pub stable_orders: usize,
     /// Mode shape: magnitude and phase in degrees of each output.
     pub shape: Vec<[f64; 2]>,
 }

@@ -161,7 +161,7 @@ pub fn run_figures(data: &ReportData) -> Result<Vec<RunFigure>> {
 
 /// The drawings of one figure: one per record, output or pair of output and input, as far as they are chosen.
 ///
-/// What a figure does not tell apart is not chosen in it: a pole map has no outputs. Keys tell the drawings apart and do not
+/// What a figure does not distinguish is not chosen in it: a pole map has no outputs. Keys distinguish the drawings and do not
 /// depend on the choice.
 ///
 /// # Errors

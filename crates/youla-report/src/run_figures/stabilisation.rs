@@ -128,7 +128,7 @@ fn whiskers(diagram: &Stabilisation, value: Value) -> Option<Curve> {
     (!x.is_empty()).then(|| Curve { method: "two standard deviations".into(), x, y, ..Curve::default() })
 }
 
-/// Their frequencies stand in one of two rows by turns.
+/// Their frequencies are in one of two rows by turns.
 fn clusters(diagram: &Stabilisation, ends: [f64; 2], rows: Option<[f64; 2]>) -> impl Iterator<Item = Guide> + '_ {
     diagram.clusters.iter().enumerate().map(move |(k, cluster)| Guide {
         kind: GuideKind::Level,

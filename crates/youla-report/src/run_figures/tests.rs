@@ -126,7 +126,7 @@ fn report() -> ReportData {
                 hz_deviation: None,
                 zeta_deviation: None,
                 orders: 2,
-                settled: 1,
+                stable_orders: 1,
                 shape: vec![],
             }],
         }],

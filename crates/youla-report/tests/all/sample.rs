@@ -315,7 +315,7 @@ fn diagram(plan: &Plan, method: &str, label: &str) -> Stabilisation {
         hz_deviation: Some(0.003 * hz),
         zeta_deviation: Some(0.08 * zeta),
         orders: 17,
-        settled: 15,
+        stable_orders: 15,
         shape: (0..plan.outputs.len()).map(|k| [1.0 / (k + 1) as f64, -20.0 * k as f64]).collect(),
     };
     Stabilisation {

@@ -1,6 +1,6 @@
 //! `youla check`: problems in the records of a run, or of files alone, before identification.
 //!
-//! Records are read as they stand, without taking means out and without refusing time columns that are not uniform: what the reader
+//! Records are read as they are, without taking means out and without refusing time columns that are not uniform: what the reader
 //! would refuse is what the check is to describe. Where the time column has gaps or repetitions, the other tests look at the longest
 //! stretch without any.
 
@@ -54,12 +54,7 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     let d = &settings.data;
     let job = Job {
         groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),
-        time: TimeSource {
-            column: d.time_column.clone(),
-            ts: d.sample_time,
-            tolerance: d.time_tolerance,
-            ..Default::default()
-        },
+        time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, ..Default::default() },
         csv: d.csv.clone(),
         options: with_order(&settings.check, &settings.hansen),
     };

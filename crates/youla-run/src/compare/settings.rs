@@ -56,7 +56,7 @@ fn add(all: &mut Flat, path: &str, value: &toml::Value) {
 /// Longest value that a table shows.
 const LONGEST: usize = 60;
 
-/// Of a long value the beginning and a digest, so that two that differ beyond it are still told apart.
+/// Of a long value the beginning and a digest, so that two that differ beyond it are still distinguished.
 fn shortened(text: &str) -> String {
     if text.chars().count() <= LONGEST {
         return text.to_owned();

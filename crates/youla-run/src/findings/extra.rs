@@ -81,6 +81,7 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
 
 fn factor_line(found: &Identification) -> Option<Verdict> {
     let residual = found.filtered.as_ref().ok()?.factorisation.bezout_residual;
+    // Half of the digits of double precision; scaled factors have 1e-13 (test `states_are_scaled_before_factorising`).
     let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
     let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
     Some(Verdict { status, text, evidence: Evidence::Certificate })

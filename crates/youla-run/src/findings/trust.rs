@@ -120,6 +120,7 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
             (text.into(), Status::Info)
         }
         Some(m) => {
+            // The thresholds `controller_caution` and `controller_defect` of the check of the data.
             let (status, words) = match m {
                 m if m < 0.01 => (Status::Good, "explains the logged input"),
                 m if m < 0.1 => (Status::Caution, "explains the logged input only roughly"),

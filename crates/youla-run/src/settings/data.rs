@@ -18,9 +18,6 @@ pub struct DataSettings {
     /// Column with the time in seconds; with `sample_time` both must agree.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub time_column: Option<ChannelRef>,
-    /// Greatest deviation of a time step, as a part of the sample time.
-    #[serde(default = "default_tolerance")]
-    pub time_tolerance: f64,
     /// What to do with a file whose time column has gaps.
     #[serde(default)]
     pub gaps: Gaps,
@@ -59,7 +56,6 @@ impl DataSettings {
         DataSettings {
             sample_time: None,
             time_column: None,
-            time_tolerance: default_tolerance(),
             gaps: Gaps::default(),
             inputs,
             outputs,
@@ -73,10 +69,6 @@ impl DataSettings {
             verification: Vec::new(),
         }
     }
-}
-
-fn default_tolerance() -> f64 {
-    1e-3
 }
 
 /// One file, or a part of it.
@@ -149,12 +141,8 @@ impl DataSettings {
 
     fn clock_problem(&self) -> Option<String> {
         let ts = self.sample_time.unwrap_or(1.0);
-        if !(ts > 0.0 && ts.is_finite()) {
-            return Some(format!("[data] sample_time is {ts}, but must be a positive number of seconds"));
-        }
-        let tolerance = self.time_tolerance;
-        let within = (0.0..1.0).contains(&tolerance);
-        (!within).then(|| format!("[data] time_tolerance is {tolerance}, but must be at least 0 and below 1"))
+        let fits = ts > 0.0 && ts.is_finite();
+        (!fits).then(|| format!("[data] sample_time is {ts}, but must be a positive number of seconds"))
     }
 
     fn record_problem(&self) -> Option<String> {

@@ -64,7 +64,7 @@ impl DisturbanceSettings {
         self.tacho.clone().map(|place| ChannelSpec::from(TACHO, place, ""))
     }
 
-    /// Each line in words, as the columns of the known signals stand.
+    /// Each line in words, as the columns of the known signals are.
     pub fn labels(&self) -> Vec<String> {
         match &self.tacho {
             None => self.frequencies_hz.iter().map(|hz| format!("{hz} Hz")).collect(),

@@ -5,19 +5,18 @@ use crate::Error;
 use serde::de::value::{Error as ProbeError, StrDeserializer};
 use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::path::Path;
-use youla::identify::subspace::Order;
-use youla::reduce::ReducedOrder;
+use youla::error::nearest_name;
 use youla_io::TextPosition;
 
-/// Similarity from which on a known word is proposed for an unknown one.
-const SIMILAR: f64 = 0.7;
-
 /// The parser's refusal with line, column, table and key, and the nearest known word for a misspelt one.
-pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path) -> Error {
+pub(super) fn explain(error: &toml::de::Error, text: &str, path: &Path, at: &str) -> Error {
     let span = error.span().unwrap_or(0..0);
     let start = span.start.min(text.len());
     let message = error.message().trim().replace('\n', "; ");
-    let place = Place::at(text, start, text.get(span).unwrap_or_default());
+    let mut place = Place::at(text, start, text.get(span).unwrap_or_default());
+    if place.table.is_empty() {
+        place.table = at.to_owned();
+    }
     let problem = match toml::from_str::<toml::Table>(text) {
         Ok(_) => sentence(&message, &place),
         Err(_) if message == "duplicate key" => format!("the key `{}` is given twice", place.found),
@@ -35,7 +34,7 @@ pub(super) fn problem_at(path: &Path, text: &str, start: usize, problem: String)
 struct Place<'a> {
     /// Path of the table, empty at the top level.
     table: String,
-    /// The key whose value, or whose inline table, is meant, where one stands before it on the same line.
+    /// The key whose value, or whose inline table, is meant, where one is before it on the same line.
     key: Option<&'a str>,
     /// The text that is meant.
     found: &'a str,
@@ -141,41 +140,22 @@ fn sentence(message: &str, place: &Place<'_>) -> String {
 
 /// A key or a choice that does not exist, with those that do.
 fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
-    if let Some(sentence) = renamed(word, known) {
-        return sentence;
-    }
     let (is, are) = if place.found.starts_with(['"', '\'']) { ("choice", "choices") } else { ("key", "keys") };
     let of = if is == "choice" { place.subject() } else { place.holder() };
-    let similarity = |k: &str| strsim::jaro_winkler(word, k);
-    let nearest = known.iter().copied().max_by(|a, b| similarity(a).total_cmp(&similarity(b)));
-    let hint = match nearest.filter(|k| similarity(k) >= SIMILAR) {
+    let hint = match nearest_name(word, known.iter().copied()) {
         Some(k) => format!("did you mean `{k}`? The"),
         None => "the".into(),
     };
     format!("`{word}` is not a {is} of {of}; {hint} {are} are {}", known.join(", "))
 }
 
-/// Keys of version 0.1 that have another name.
-fn renamed(word: &str, known: &[&str]) -> Option<String> {
-    match word {
-        "weight" if known.contains(&"method") => Some("`weight` is now `method`".into()),
-        "bearing" if known.contains(&"state_space") => Some(
-            "`bearing` is no longer a form of [nominal]; give the matrices of the model in [nominal.state_space]"
-                .into(),
-        ),
-        _ => None,
-    }
-}
-
 /// The forms among which the user chooses one, asked of the types themselves.
 fn forms_at(place: &Place<'_>) -> String {
     let table = place.table.split('.').next().unwrap_or_default();
-    match (place.key, table) {
-        (Some("order"), "reduction") => forms::<ReducedOrder>(),
-        (Some("order"), _) => forms::<Order>(),
-        _ if table == "controller" || place.found == "controller" => forms::<ControllerSettings>(),
-        _ => forms::<NominalModel>(),
+    if table == "controller" || place.found == "controller" {
+        return forms::<ControllerSettings>();
     }
+    forms::<NominalModel>()
 }
 
 fn forms<T: DeserializeOwned>() -> String {
@@ -227,7 +207,6 @@ mod tests {
 
     #[test]
     fn forms_come_from_the_types() {
-        assert_eq!(forms::<Order>(), "fixed, auto");
-        assert_eq!(forms::<ControllerSettings>(), "difference_equation, state_space, mat_file, model_file, observer");
+        assert_eq!(forms::<ControllerSettings>(), "difference_equation, state_space, model_file, observer");
     }
 }

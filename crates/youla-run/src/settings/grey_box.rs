@@ -1,8 +1,9 @@
-//! `[grey_box]`: a physical structure, its search and its intervals.
+//! `[grey_box]`: a physical structure and how it is compared with the data.
 
 use super::options::Prediction;
 use serde::{Deserialize, Serialize};
-use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, IntervalOptions};
+use youla_greybox::refine::RefineNoise;
+use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, InnovationStart, NoiseModel};
 
 /// What is known of the plant's physics, the table `[grey_box]` of run.toml.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -10,22 +11,22 @@ use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, IntervalOpti
 pub struct GreyBoxSettings {
     /// The structure; explained in `docs/grey-box.md`.
     pub structure: Declaration,
-    /// Whether the initial values of the parameters are a second start, beside the projection of G(S).
-    #[serde(default = "yes")]
-    pub start_from_initial: bool,
     /// What is compared with the outputs: the plant alone, driven by the measured u, or the loop with the declared controller,
     /// driven by the known excitations.
     #[serde(default)]
     pub prediction: Prediction,
-    /// The search.
+    /// The model of the noise.
     #[serde(default)]
-    pub pem: GreyBoxOptions,
-    /// Intervals of the parameters.
-    #[serde(default)]
-    pub intervals: IntervalOptions,
+    pub noise: RefineNoise,
+    /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub delays: Vec<usize>,
     /// Further structures, estimated in the same way and compared.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alternative: Vec<AlternativeStructure>,
+    /// Whether the initial values of the parameters are a second start, beside the projection of G(S); not a key of run.toml.
+    #[serde(skip, default = "yes")]
+    pub start_from_initial: bool,
 }
 
 /// A structure to compare with that of `[grey_box.structure]`.
@@ -46,12 +47,21 @@ impl GreyBoxSettings {
     pub fn new(structure: Declaration) -> Self {
         GreyBoxSettings {
             structure,
-            start_from_initial: yes(),
             prediction: Prediction::default(),
-            pem: GreyBoxOptions::default(),
-            intervals: IntervalOptions::default(),
+            noise: RefineNoise::default(),
+            delays: Vec::new(),
             alternative: Vec::new(),
+            start_from_initial: yes(),
         }
+    }
+
+    /// The options of the search.
+    pub(crate) fn search(&self) -> GreyBoxOptions {
+        let noise = match self.noise {
+            RefineNoise::OutputError => NoiseModel::OutputError,
+            RefineNoise::Innovation => NoiseModel::Innovation(InnovationStart::default()),
+        };
+        GreyBoxOptions { noise, delays: self.delays.clone(), ..GreyBoxOptions::default() }
     }
 
     /// What is wrong with a structure, beside `inputs` and `outputs` channels.

@@ -7,6 +7,9 @@ mod explain;
 mod grey_box;
 mod models;
 mod options;
+mod order;
+mod retired;
+mod shown;
 
 pub use certificate::CertificateSettings;
 pub use data::{DataFile, DataSettings};
@@ -14,14 +17,14 @@ pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
 pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
-pub use options::{
-    Construction, DeviationSettings, FactorSettings, FrequencySettings, Prediction, StabilisationSettings,
-    VerificationSettings,
-};
+pub use options::{DeviationSettings, FactorSettings, FrequencySettings, Prediction, VerificationSettings};
 
 use crate::{Error, Result};
 use explain::{explain, problem_at};
+use retired::retired;
 use serde::{Deserialize, Serialize};
+use shown::ReductionTable;
+pub(crate) use shown::SubspaceTable;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::LikelihoodOptions;
@@ -50,16 +53,19 @@ pub struct RunSettings {
     #[serde(default)]
     pub factors: FactorSettings,
     /// Identification of S from (alpha, beta).
-    #[serde(default)]
+    #[serde(default, with = "shown")]
+    #[schemars(with = "SubspaceTable")]
     pub hansen: SubspaceOptions,
     /// What is known of S beforehand.
     #[serde(default)]
     pub deviation: DeviationSettings,
     /// Direct identification from (u, y), for comparison; left out when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
+    #[schemars(with = "Option<SubspaceTable>")]
     pub direct: Option<SubspaceOptions>,
     /// Reduction of G(S); left out when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
+    #[schemars(with = "Option<ReductionTable>")]
     pub reduction: Option<ReductionOptions>,
     /// A physical structure, estimated from the result of the scheme on; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -70,10 +76,7 @@ pub struct RunSettings {
     /// A new controller on the identified model; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<RedesignOptions>,
-    /// The stabilisation diagrams of S and of the direct model.
-    #[serde(default)]
-    pub stabilisation: StabilisationSettings,
-    /// How models are held against the verification records.
+    /// How models are compared with the verification records.
     #[serde(default)]
     pub verification: VerificationSettings,
     /// Thresholds of the check of the data.
@@ -133,7 +136,7 @@ impl RunSettings {
     /// # Errors
     /// [`youla_io::Error::Settings`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let settings: Self = toml::from_str(text).map_err(|e| explain(&e, text, path))?;
+        let settings: Self = read_table(text, path, "")?;
         refuse(settings.problem(), path)?;
         Ok(settings)
     }
@@ -155,7 +158,7 @@ impl RunSettings {
         refuse(self.problem(), Path::new("run.toml"))
     }
 
-    /// The same settings as TOML.
+    /// The same settings as TOML. Options of the methods for which run.toml has no key are left out.
     ///
     /// # Errors
     /// [`youla_io::Error::Settings`] for values that TOML cannot hold.
@@ -166,9 +169,14 @@ impl RunSettings {
     }
 
     fn problem(&self) -> Option<String> {
+        let both = |table: &str, o: &SubspaceOptions| {
+            let twice = o.automatic_horizon.is_some() && o.past.is_some();
+            twice.then(|| format!("[{table}] horizon = \"auto\" chooses `past` too; leave `past` out"))
+        };
+        let horizons = || both("hansen", &self.hansen).or_else(|| both("direct", self.direct.as_ref()?));
         let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
         let problem = self.data.problem().or_else(|| self.loop_problem()).or_else(|| self.number_problem());
-        problem.or_else(structure).or_else(|| self.certificate.as_ref()?.problem())
+        problem.or_else(horizons).or_else(structure)
     }
 
     fn loop_problem(&self) -> Option<String> {
@@ -192,23 +200,27 @@ impl RunSettings {
     fn number_problem(&self) -> Option<String> {
         let (factors, response) = (&self.factors, &self.frequency_response);
         let positive = |x: f64| x > 0.0 && x.is_finite();
-        let part = |x: f64| (0.0..1.0).contains(&x);
-        let given = |x: Option<f64>| x.unwrap_or(1.0);
-        let (points, window) = (response.points, response.window);
+        let (from, window) = (response.from_hz.unwrap_or(1.0), response.window as f64);
         [
             ("[factors] input_weight", factors.input_weight, "positive", positive as fn(f64) -> bool),
-            ("[factors] output_noise", factors.output_noise, "positive", positive),
-            ("[stabilisation] max_order", given(self.stabilisation.max_order.map(|n| n as f64)), "at least 1", |x| {
-                x >= 1.0
-            }),
-            ("[frequency_response] overlap", response.overlap, "at least 0 and below 1", part),
-            ("[frequency_response] from_hz", given(response.from_hz), "a positive frequency", positive),
-            ("[frequency_response] window", window as f64, "at least 4 samples", |x| x >= 4.0),
-            ("[frequency_response] points", points as f64, "from 2 to 100000", |x| (2.0..=1e5).contains(&x)),
+            ("[frequency_response] from_hz", from, "a positive frequency", positive),
+            ("[frequency_response] window", window, "at least 4 samples", |x| x >= 4.0),
         ]
         .into_iter()
         .find(|(_, value, _, good)| !good(*value))
         .map(|(key, value, must, _)| format!("{key} is {value}, but must be {must}"))
+    }
+}
+
+/// Reads a text whose top level is the table `at` of run.toml, the whole of it where `at` is empty.
+///
+/// # Errors
+/// [`youla_io::Error::Settings`] with line and column: keys of earlier versions with what to write instead, misspelt ones with the
+/// nearest known key.
+pub(crate) fn read_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: &str) -> Result<T> {
+    match retired(text, at) {
+        Some((start, problem)) => Err(problem_at(path, text, start, problem)),
+        None => toml::from_str(text).map_err(|e| explain(&e, text, path, at)),
     }
 }
 

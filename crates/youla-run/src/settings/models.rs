@@ -73,17 +73,14 @@ pub enum NominalModel {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         d: Option<Vec<Vec<f64>>>,
     },
-    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3.
-    MatFile {
-        /// Path of the file, relative to run.toml.
-        file: PathBuf,
-        /// The domain in which it is given.
-        domain: Domain,
-    },
-    /// A discrete-time model that was exported or identified: JSON, MATLAB or NumPy file with its sample time.
+    /// A file: `a`, `b`, `c`, `d` and the sample time `ts`, as a run folder and `youla export` write them, in JSON, MATLAB (5 or
+    /// 7.3) or NumPy form. A MATLAB file may lack `ts`.
     ModelFile {
         /// Path of the file, relative to run.toml.
         file: PathBuf,
+        /// `"continuous"` for matrices in s of a MATLAB file; discrete when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        domain: Option<Domain>,
     },
 }
 
@@ -111,8 +108,9 @@ impl NominalModel {
                 let d = d.as_ref().map_or_else(|| Ok(Mat::zeros(c.nrows(), b.ncols())), |d| matrix("D", d))?;
                 sampled([a, b, c, d], *domain, time)
             }
-            NominalModel::MatFile { file, domain } => mat_model(&folder.join(file), *domain, time),
-            NominalModel::ModelFile { file } => exported(&folder.join(file), time),
+            NominalModel::ModelFile { file, domain } => {
+                model_file(&folder.join(file), domain.unwrap_or(Domain::Discrete), time)
+            }
         }
     }
 }
@@ -166,14 +164,8 @@ pub enum ControllerSettings {
         /// D of the controller.
         d: Vec<Vec<f64>>,
     },
-    /// Variables `a`, `b`, `c`, `d` of a MATLAB file, version 5 or 7.3, discrete-time.
-    MatFile {
-        /// Sign in which the controller is written down; never guessed.
-        feedback: Feedback,
-        /// Path of the file, relative to run.toml.
-        file: PathBuf,
-    },
-    /// A discrete-time model that was exported or identified, from y to u: JSON, MATLAB or NumPy file with its sample time.
+    /// A discrete-time model from y to u in a file: `a`, `b`, `c`, `d` and the sample time `ts` in JSON, MATLAB (5 or 7.3) or NumPy
+    /// form. A MATLAB file may lack `ts`.
     ModelFile {
         /// Sign in which the controller is written down; never guessed.
         feedback: Feedback,
@@ -224,8 +216,7 @@ impl ControllerSettings {
                 let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
                 (feedback, StateSpace::new(a, b, c, d, time)?)
             }
-            Self::MatFile { feedback, file } => (feedback, mat_model(&folder.join(file), Domain::Discrete, time)?),
-            Self::ModelFile { feedback, file } => (feedback, exported(&folder.join(file), time)?),
+            Self::ModelFile { feedback, file } => (feedback, model_file(&folder.join(file), Domain::Discrete, time)?),
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
@@ -243,23 +234,21 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
     }
 }
 
-/// Variables `a`, `b`, `c`, `d` of a MATLAB file. A discrete-time model whose file states a sample time `ts` must have that
-/// of the data.
-fn mat_model(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+/// The model of a file. A discrete-time one that states a sample time must have that of the data; only a MATLAB file may state none,
+/// or hold matrices in s.
+fn model_file(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let is_mat = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"));
+    if !is_mat && domain == Domain::Discrete {
+        let system = read_model(file)?.system;
+        check_sample_time(file, system.time().ts(), time)?;
+        return sampled([system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned()), domain, time);
+    }
     let variables = read_mat(file)?;
     if domain == Domain::Discrete && variables.variables().iter().any(|v| v.name == "ts") {
         check_sample_time(file, variables.scalar("ts")?, time)?;
     }
     let [a, b, c, d] = ["a", "b", "c", "d"].map(|name| variables.matrix(name));
     sampled([a?, b?, c?, d?], domain, time)
-}
-
-/// A model that states its sample time, which must be that of the data.
-fn exported(file: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
-    let system = read_model(file)?.system;
-    check_sample_time(file, system.time().ts(), time)?;
-    let parts = [system.a(), system.b(), system.c(), system.d()].map(|m| m.to_owned());
-    sampled(parts, Domain::Discrete, time)
 }
 
 fn check_sample_time(file: &Path, ts: f64, time: Discrete) -> Result<()> {

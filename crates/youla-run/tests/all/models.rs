@@ -6,7 +6,7 @@ use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::export::{ModelFormat, NamedModel, export_model};
-use youla_run::{Controller, ControllerSettings, NominalModel};
+use youla_run::{Controller, ControllerSettings, Domain, NominalModel};
 
 /// One file in three formats is the model that was written; another sample time is refused, the sign is stated.
 #[test]
@@ -20,7 +20,7 @@ fn a_model_that_was_written_is_read_again() {
     for format in [ModelFormat::Json, ModelFormat::Mat, ModelFormat::Npz] {
         let file = folder.path().join(format!("model.{}", format.extension()));
         std::fs::write(&file, export_model(&model, format).unwrap()).unwrap();
-        let nominal = NominalModel::ModelFile { file: file.clone() };
+        let nominal = NominalModel::ModelFile { file: file.clone(), domain: None };
         assert_eq!(nominal.realise(Path::new("/"), time).unwrap(), system);
         let error = nominal.realise(Path::new("/"), Discrete::new(2e-3).unwrap()).unwrap_err();
         assert!(error.to_string().contains("sample times differ"), "{error}");
@@ -28,5 +28,8 @@ fn a_model_that_was_written_is_read_again() {
         let settings: ControllerSettings = toml::from_str(&text).unwrap();
         let Controller::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
         assert_eq!(k, system.negated());
+        // Only a MATLAB file may hold matrices in s.
+        let continuous = NominalModel::ModelFile { file, domain: Some(Domain::Continuous) };
+        assert_eq!(continuous.realise(Path::new("/"), time).is_ok(), format == ModelFormat::Mat);
     }
 }

@@ -43,21 +43,56 @@ fn settings_without_a_record_are_refused_not_run() {
     refused(check_run(&settings, Path::new(".")).map(|_| ()));
     assert_eq!(whole.clone().checked().unwrap(), whole);
     let mut points = whole;
-    points.frequency_response.points = 1;
-    assert!(points.checked().unwrap_err().to_string().contains("[frequency_response] points is 1"));
+    points.frequency_response.window = 1;
+    assert!(points.checked().unwrap_err().to_string().contains("[frequency_response] window is 1"));
 }
 
 #[test]
 fn keys_of_version_0_1_name_their_successors() {
     for table in ["hansen", "direct"] {
         let error = parse(&format!("{MINIMAL}\n[{table}]\nweight = \"moesp\"\n")).unwrap_err().to_string();
-        assert!(error.contains("`weight` is now `method`"), "{error}");
+        assert!(error.contains(&format!("`weight` is no longer a key of [{table}]: write `method`")), "{error}");
     }
     let options = parse_subspace_options("weight = \"moesp\"", Path::new("options.toml")).unwrap_err().to_string();
-    assert!(options.contains("`weight` is now `method`"), "{options}");
+    assert!(options.contains("`weight` is no longer a key of [direct]: write `method`"), "{options}");
     let bearing = MINIMAL.replace("[nominal.transfer_function]", "[nominal.bearing]");
     let error = parse(&bearing).unwrap_err().to_string();
     assert!(error.contains("[nominal.state_space]"), "{error}");
+}
+
+/// Every form of an order, in run.toml and in the options of `youla subspace`; what is written reads back.
+#[test]
+fn orders_are_numbers_words_or_rules() {
+    use youla::identify::subspace::{AutoOrder, Order, OrderRule};
+    use youla::reduce::ReducedOrder;
+    let rule = AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(9) };
+    for (text, order) in [
+        ("8", Order::Fixed(8)),
+        ("{ fixed = 8 }", Order::Fixed(8)),
+        ("\"auto\"", Order::default()),
+        ("{ auto = {} }", Order::default()),
+        ("{ auto = { max = 9, rule = \"aic\" } }", Order::Auto(rule)),
+    ] {
+        let settings = parse(&format!("{MINIMAL}\n[hansen]\norder = {text}\n")).unwrap();
+        assert_eq!(settings.hansen.order, order);
+        assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
+        assert_eq!(parse_subspace_options(&format!("order = {text}"), Path::new("o.toml")).unwrap().order, order);
+    }
+    for (text, order) in [
+        ("6", ReducedOrder::Fixed(6)),
+        ("\"minimal\"", ReducedOrder::Minimal),
+        ("\"auto\"", ReducedOrder::ClosedLoop(0.05)),
+        ("{ bound = 0.1 }", ReducedOrder::Bound(0.1)),
+        ("{ closed-loop = 0.1 }", ReducedOrder::ClosedLoop(0.1)),
+    ] {
+        let settings = parse(&format!("{MINIMAL}\n[reduction]\norder = {text}\n")).unwrap();
+        assert_eq!(settings.reduction.as_ref().unwrap().order, order);
+        assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
+    }
+    let horizon =
+        parse(&format!("{MINIMAL}\n[hansen]\nhorizon = \"auto\"\n[deviation]\nrefine = \"innovation\"\n")).unwrap();
+    assert!(horizon.hansen.automatic_horizon.is_some() && horizon.deviation.refine.is_some());
+    assert_eq!(parse(&horizon.to_toml().unwrap()).unwrap(), horizon);
 }
 
 /// A first-order plant with a pole at 0.9 under u = d - y; d and the noise of the measured y are uniform.

@@ -106,7 +106,7 @@ impl ReductionOptions {
             ReducedOrder::Bound(_) if self.method == ReductionMethod::Weighted => {
                 return Err(Error::Unsupported {
                     what: "order = { bound = ... } with method = \"weighted\"",
-                    instead: "the weighted reduction has no error bound; take order = { fixed = ... } or { closed-loop = ... }",
+                    instead: "the weighted reduction has no error bound; give the number of states or order = { closed-loop = ... }",
                 });
             }
             _ => {}

@@ -88,7 +88,7 @@ pub(crate) fn targets_are_there(place: &str, command: &str, project: &Path) {
     }
 }
 
-/// A whole run.toml as it stands; tables of one in place of those of the flexible drive; the declaration of a structure in a
+/// A whole run.toml as it is; tables of one in place of those of the flexible drive; the declaration of a structure in a
 /// table of its own.
 pub(crate) fn run_settings(place: &str, text: &str, project: &Path) -> String {
     let read = |text: &str| text.parse::<toml::Table>().unwrap_or_else(|e| panic!("{place}: {e}\n{text}"));

@@ -40,7 +40,7 @@ pub(crate) fn write_scene(folder: &Path) {
     let mut long = [b"\x93NUMPY\x01\x00".as_slice(), &118_u16.to_le_bytes(), header.as_bytes(), b"\n"].concat();
     long.extend(rows.iter().flatten().flat_map(|x| x.to_le_bytes()));
     write("long.npy", &long);
-    write("options.toml", b"horizon = 10\norder = { fixed = 4 }\n");
+    write("options.toml", b"horizon = 10\norder = 4\n");
 
     let mut text = String::from("t,u,y\n");
     for (k, [u, _, y, _]) in rows.iter().enumerate() {

@@ -30,8 +30,8 @@ fn misspelt_keys_at_every_level() {
             &["run.toml:16:13:", "`difference_equations` is not a key of [controller]", "`difference_equation`?"],
         ),
         ("horizon = 10", "horizn = 10", &["run.toml:22:1:", "`horizn`", "[hansen]", "`horizon`"]),
-        ("{ fixed = 3 }", "{ fixd = 3 }", &["run.toml:23:11:", "`fixd`", "`order` in [hansen]", "`fixed`"]),
-        ("{ fixed = 3 }", "{ auto = { mx = 3 } }", &["run.toml:23:20:", "`mx`", "`auto` in [hansen]", "max"]),
+        ("order = 3", "order = { autp = {} }", &["run.toml:23:11:", "`autp`", "`order` in [hansen]", "`auto`"]),
+        ("order = 3", "order = { auto = { mx = 3 } }", &["run.toml:23:20:", "`mx`", "`auto` in [hansen]", "max"]),
         (
             "[nominal.transfer_function]",
             "[[data.verification]]\nfile = \"log.csv\"\nskp = 3\n\n[nominal.transfer_function]",
@@ -76,14 +76,14 @@ fn missing_keys_and_tables() {
         let replacement = if passage.starts_with("file") { "take" } else { "" };
         settings_refused("missing-key", &settings(passage, replacement), &[place, sentence]);
     }
-    let two = SETTINGS.to_owned() + "[nominal.bearing]\na_factor = 1.0\nb_factor = 1.0\n";
+    let two = SETTINGS.to_owned() + "[nominal.model_file]\nfile = \"model.json\"\n";
     settings_refused("missing-key", &two, &["[nominal] must hold exactly one of transfer_function", "more than one"]);
 }
 
 #[test]
 fn wrong_types() {
     let whole = "but must be a whole number, zero or positive";
-    let cases: [(&str, &str, &[&str]); 8] = [
+    let cases: [(&str, &str, &[&str]); 10] = [
         ("take = 1200", "take = \"many\"", &["run.toml:8:42:", "`take` in [data] is \"many\"", whole]),
         ("take = 1200", "take = -5", &["run.toml:8:42:", "`take` in [data] is -5", whole]),
         ("horizon = 10", "horizon = 1.5", &["run.toml:22:11:", "`horizon` in [hansen] is 1.5", whole]),
@@ -91,7 +91,9 @@ fn wrong_types() {
         ("numerator = [0.1]", "numerator = 0.1", &["run.toml:13:13:", "`numerator`", "a list of coefficients"]),
         ("unit = \"um\"", "from = 1.5", &["run.toml:6:33:", "`from` in [data] is 1.5", "name, or the number"]),
         ("name = \"loop\"", "name = 5", &["run.toml:1:8:", "`name` at the top level is 5", "text in quotes"]),
-        ("{ fixed = 3 }", "3", &["run.toml:23:9:", "`order` in [hansen] is 3", "a table"]),
+        ("order = 3", "order = 1.5", &["run.toml:23:9:", "`order` in [hansen] is 1.5", "a whole number, \"auto\""]),
+        ("order = 3", "order = \"al\"", &["run.toml:23:9:", "`order` in [hansen] is \"al\"", "\"auto\""]),
+        ("order = 3", "order = { fixed = 3, auto = {} }", &["run.toml:23:9:", "`order` in [hansen]", "whole number"]),
     ];
     for (passage, replacement, evidence) in cases {
         settings_refused("wrong-type", &settings(passage, replacement), evidence);
@@ -117,10 +119,15 @@ fn text_that_is_not_toml() {
 fn numbers_out_of_range() {
     let cases = [
         ("time_column = \"t\"", "sample_time = -1.0", "[data] sample_time is -1, but must be a positive"),
-        ("window = 256", "window = 256\noverlap = 2.0", "[frequency_response] overlap is 2"),
         ("window = 256", "window = 256\nfrom_hz = -2.0", "[frequency_response] from_hz is -2"),
         ("window = 256", "window = 256\nfrom_hz = 1e9", "Nyquist frequency of 50"),
-        ("window = 256", "window = 256\npoints = 9000000000000000000", "[frequency_response] points is"),
+        ("window = 256", "window = 2", "[frequency_response] window is 2"),
+        (
+            "order = 3",
+            "order = 3\nscaling = \"none\"",
+            "run.toml:24:1: `scaling` is no longer a key of [hansen]: channels",
+        ),
+        ("horizon = 10", "horizon = \"auto\"\npast = 3", "[hansen] horizon = \"auto\" chooses `past` too"),
         ("[hansen]", "[factors]\ninput_weight = -1.0\n[hansen]", "[factors] input_weight is -1"),
         ("horizon = 10", "horizon = 1", "horizon is 1, but must be at least 2"),
         ("take = 1200", "take = 100000", "is 100000"),

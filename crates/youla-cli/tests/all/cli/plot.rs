@@ -125,9 +125,9 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
         ),
         (
             &["plot", run, "poles", "--output", "y_h"],
-            &["\"poles\" cannot be drawn for one output alone; it knows methods"],
+            &["\"poles\" cannot be drawn for one output alone; its choices are: methods"],
         ),
-        (&["plot", run, "hankel", "--methods", "hansen"], &["\"hankel\" cannot be drawn", "it knows nothing"]),
+        (&["plot", run, "hankel", "--methods", "hansen"], &["\"hankel\" cannot be drawn", "its choices are: nothing"]),
         (&["plot", run, "bode", "--width", "3"], &["the width of the figure in cm", "between 4 and 100"]),
         (&["plot", run, "bode", "--height", "-1"], &["the height of the figure in cm"]),
         (&["plot", run, "data", "--height", "4"], &["figure data", "enough for its panels, labels and legend"]),

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::Path;
 use std::process::Command;
 
-const OPTIONS: &str = "horizon = 10\norder = { fixed = 2 }\n";
+const OPTIONS: &str = "horizon = 10\norder = 2\n";
 
 /// The small loop as `numpy.save` writes it, with one number replaced.
 fn npy(place: usize, number: f64) -> Vec<u8> {
@@ -108,7 +108,7 @@ fn impossible_computations_end_with_code_three() {
     });
     fs::write(folder.join("unstable.csv"), std::iter::once("u,y\n".to_owned()).chain(rows).collect::<String>())
         .unwrap();
-    fs::write(folder.join("first.toml"), "horizon = 5\norder = { fixed = 1 }\n").expect("written");
+    fs::write(folder.join("first.toml"), "horizon = 5\norder = 1\n").expect("written");
     let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
     command.args(["subspace", "unstable.csv", "--input", "u", "--output", "y", "--sample-time", "1"]);
     command.args(["--options", "first.toml", "--out", "model.json"]);

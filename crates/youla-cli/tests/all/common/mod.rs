@@ -31,11 +31,11 @@ denominator = [1.0]
 
 [hansen]
 horizon = 10
-order = { fixed = 3 }
+order = 3
 
 [direct]
 horizon = 10
-order = { fixed = 2 }
+order = 2
 
 [frequency_response]
 window = 256

@@ -6,7 +6,7 @@ use rand_chacha::ChaCha8Rng;
 
 const LONGEST: usize = 16384;
 
-/// What stands in the formats, and what their lengths and numbers may be taken for.
+/// What is in the formats, and what their lengths and numbers may be taken for.
 const WORDS: [&[u8]; 24] = [
     b"\xff\xff\xff\xff",
     b"\x00\x00\x00\x80",

@@ -1,0 +1,242 @@
+//! The options of the library's methods as run.toml shows them: the choices of a user. Options that no user sets keep their defaults,
+//! and are not written.
+
+use super::order::{self, OrderForm, ReducedForm};
+use serde::de::{DeserializeOwned, Error, Unexpected};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use youla::identify::subspace::{
+    AutomaticHorizon, Feedthrough, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod,
+    UncertaintyOptions,
+};
+use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
+use youla_greybox::refine::{RefineNoise, RefineOptions};
+
+/// Options with the table that shows them.
+pub(in crate::settings) trait Shown: Sized + Clone {
+    /// What run.toml says of them.
+    type Table: Serialize + DeserializeOwned + From<Self> + Into<Self>;
+}
+
+pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(options: &T, s: S) -> Result<S::Ok, S::Error> {
+    T::Table::from(options.clone()).serialize(s)
+}
+
+pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
+    T::Table::deserialize(d).map(Into::into)
+}
+
+/// The same of a table that may be absent.
+pub(in crate::settings) mod optional {
+    use super::{Deserialize, Deserializer, Serialize, Serializer, Shown};
+
+    pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(o: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
+        o.clone().map(T::Table::from).serialize(s)
+    }
+
+    pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<Option<T>, D::Error> {
+        Ok(Option::<T::Table>::deserialize(d)?.map(Into::into))
+    }
+}
+
+/// Choices of a subspace identification.
+#[derive(Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(crate) struct SubspaceTable {
+    /// The method: it sets the weights of the singular value decomposition.
+    method: SubspaceMethod,
+    /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the slowest mode.
+    #[serde(with = "horizon")]
+    #[schemars(with = "HorizonForm")]
+    horizon: Option<usize>,
+    /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the predictor and
+    /// should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable plant K is small, and this is
+    /// the decay of the plant itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    past: Option<usize>,
+    /// Order of the model, of S in `[hansen]`.
+    #[serde(with = "order")]
+    #[schemars(with = "OrderForm")]
+    order: Order,
+    /// Whether there is a direct path from u to y in the same sample.
+    feedthrough: Feedthrough,
+    /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model has them as
+    /// states with poles at 0, after those of `order`.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    delays: Vec<usize>,
+    /// What to do with an unstable estimate.
+    stability: Stability,
+    /// Whether and how the uncertainty of the estimate is found.
+    #[serde(skip_serializing_if = "UncertaintyTable::is_none")]
+    uncertainty: UncertaintyTable,
+}
+
+impl Default for SubspaceTable {
+    fn default() -> Self {
+        SubspaceOptions::default().into()
+    }
+}
+
+impl Shown for SubspaceOptions {
+    type Table = SubspaceTable;
+}
+
+impl From<SubspaceOptions> for SubspaceTable {
+    fn from(options: SubspaceOptions) -> Self {
+        let SubspaceOptions { method, past, order, feedthrough, delays, stability, uncertainty, .. } = options;
+        let horizon = options.automatic_horizon.is_none().then_some(options.horizon);
+        let uncertainty = UncertaintyTable { method: uncertainty.method, level: uncertainty.level };
+        SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty }
+    }
+}
+
+impl From<SubspaceTable> for SubspaceOptions {
+    fn from(table: SubspaceTable) -> Self {
+        let SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty } = table;
+        let usual = SubspaceOptions::default();
+        SubspaceOptions {
+            method,
+            automatic_horizon: horizon.is_none().then(AutomaticHorizon::default),
+            horizon: horizon.unwrap_or(usual.horizon),
+            past,
+            order,
+            feedthrough,
+            delays,
+            stability,
+            uncertainty: UncertaintyOptions {
+                method: uncertainty.method,
+                level: uncertainty.level,
+                ..UncertaintyOptions::default()
+            },
+            ..usual
+        }
+    }
+}
+
+/// Uncertainty of an estimate.
+#[derive(PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+struct UncertaintyTable {
+    /// The method.
+    method: UncertaintyMethod,
+    /// Probability with which an interval or region should hold the truth.
+    level: f64,
+}
+
+impl UncertaintyTable {
+    fn is_none(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+impl Default for UncertaintyTable {
+    fn default() -> Self {
+        let UncertaintyOptions { method, level, .. } = UncertaintyOptions::default();
+        UncertaintyTable { method, level }
+    }
+}
+
+/// A number of block rows.
+#[derive(Serialize, schemars::JsonSchema)]
+#[serde(untagged)]
+enum HorizonForm {
+    /// This number.
+    Number(usize),
+    /// Past and future from the data, by the order of a vector autoregression of at most 60 block rows.
+    Word(order::AutoWord),
+}
+
+/// A number of block rows, or `"auto"`, which is `None`.
+mod horizon {
+    use super::{Deserializer, Error, HorizonForm, Serialize, Serializer, Unexpected, order};
+    use serde::de::Visitor;
+    use std::fmt;
+
+    pub(super) fn serialize<S: Serializer>(rows: &Option<usize>, s: S) -> Result<S::Ok, S::Error> {
+        rows.map_or(HorizonForm::Word(order::AutoWord::Auto), HorizonForm::Number).serialize(s)
+    }
+
+    pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Option<usize>, D::Error> {
+        d.deserialize_any(Rows)
+    }
+
+    struct Rows;
+
+    impl Visitor<'_> for Rows {
+        type Value = Option<usize>;
+
+        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+            f.write_str("a whole number, zero or positive, or \"auto\"")
+        }
+
+        fn visit_i64<E: Error>(self, value: i64) -> Result<Option<usize>, E> {
+            usize::try_from(value).map(Some).map_err(|_| E::invalid_value(Unexpected::Signed(value), &self))
+        }
+
+        fn visit_u64<E: Error>(self, value: u64) -> Result<Option<usize>, E> {
+            usize::try_from(value).map(Some).map_err(|_| E::invalid_value(Unexpected::Unsigned(value), &self))
+        }
+
+        fn visit_str<E: Error>(self, value: &str) -> Result<Option<usize>, E> {
+            if value == "auto" { Ok(None) } else { Err(E::invalid_value(Unexpected::Str(value), &self)) }
+        }
+    }
+}
+
+/// Choices of the reduction.
+#[derive(Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(in crate::settings) struct ReductionTable {
+    /// How states are removed.
+    method: ReductionMethod,
+    /// Number of states that are kept.
+    #[serde(with = "order")]
+    #[schemars(with = "ReducedForm")]
+    order: ReducedOrder,
+    /// Poles at or beyond this modulus, from 0 to 1, are kept as they are and only the rest is reduced. Absent: everything is reduced,
+    /// and must be stable but for normalised coprime factors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    stability_boundary: Option<f64>,
+}
+
+impl Default for ReductionTable {
+    fn default() -> Self {
+        ReductionOptions::default().into()
+    }
+}
+
+impl Shown for ReductionOptions {
+    type Table = ReductionTable;
+}
+
+impl From<ReductionOptions> for ReductionTable {
+    fn from(ReductionOptions { method, order, stability_boundary, .. }: ReductionOptions) -> Self {
+        ReductionTable { method, order, stability_boundary }
+    }
+}
+
+impl From<ReductionTable> for ReductionOptions {
+    fn from(ReductionTable { method, order, stability_boundary }: ReductionTable) -> Self {
+        ReductionOptions { method, order, stability_boundary, ..ReductionOptions::default() }
+    }
+}
+
+impl Shown for RefineOptions {
+    type Table = RefineTable;
+}
+
+/// A refinement is named by its model of the noise.
+#[derive(Serialize, Deserialize)]
+#[serde(transparent)]
+pub(in crate::settings) struct RefineTable(RefineNoise);
+
+impl From<RefineOptions> for RefineTable {
+    fn from(options: RefineOptions) -> Self {
+        RefineTable(options.noise)
+    }
+}
+
+impl From<RefineTable> for RefineOptions {
+    fn from(RefineTable(noise): RefineTable) -> Self {
+        RefineOptions { noise, ..RefineOptions::default() }
+    }
+}

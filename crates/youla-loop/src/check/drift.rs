@@ -6,7 +6,7 @@
 //! ```
 //! so that the random walk of an integrating plant is not reported. F of g1 and g2 is divided by what the means of 20 blocks
 //! of the residual vary more than white residuals would, which leaves the test valid for slow residuals. The trend is at the output; where the plant
-//! integrates, `I - sum_i A_i` is singular and a trend of the sensor cannot be told from one of the machine. In a loop
+//! integrates, `I - sum_i A_i` is singular and a trend of the sensor cannot be distinguished from one of the machine. In a loop
 //! that holds such a plant at a constant reference the means of 20 blocks of `y - r` are regressed on time instead.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), section 14.1, for trends as parameters.
@@ -30,8 +30,11 @@ pub struct Drift {
     pub deviations: f64,
 }
 
+/// Blocks of the means of a record: 17 degrees of freedom beside a parabola. Chosen, not measured.
 const BLOCKS: usize = 20;
 /// Singular values of `I - sum A_i` below which the plant integrates.
+/// A pole of a first-order plant within 2 % of 1 is one of more than 50 samples, which 20 lags do not distinguish from an integrator.
+/// Chosen, not measured.
 const INTEGRATES: f64 = 0.02;
 
 /// Trends of all outputs; `first` is the place of the first output among the signals. `None` where the plant integrates.
@@ -129,6 +132,7 @@ impl Drift {
 }
 
 /// A probability of 3e-5 with 17 degrees of freedom.
+/// Chosen; no false alarm in 200 simulated clean records (`docs/check.md`).
 const DEVIATIONS: f64 = 4.0;
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ use youla::MatRef;
 use youla::signal::Channel;
 
 /// Default of the required order of persistency.
+/// Past and future horizon of the default identification, 20 block rows each.
 const ORDER: usize = 40;
 
 pub(super) fn constant(x: MatRef<'_, f64>) -> bool {

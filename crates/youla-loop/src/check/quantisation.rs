@@ -19,10 +19,13 @@ pub struct Quantisation {
 }
 
 /// Differences of distinct values below this share of the range are rounding of the file.
+/// Six digits, as logs in text are often written. Chosen, not measured.
 const ROUNDING: f64 = 1e-6;
 /// Distance from a whole multiple, in steps, up to which a difference is one.
+/// Uniform remainders fall within it in a tenth of the cases.
 const WHOLE: f64 = 0.05;
 /// Share of the differences that must be whole multiples; of numbers without steps a tenth is.
+/// Chance of 0.9 of 20 differences at a rate of a tenth: 1.5e-16 (binomial).
 const SHARE: f64 = 0.9;
 
 /// Finds the step of a channel. `None` where the values are not multiples of one, and for switched channels.
@@ -110,6 +113,7 @@ impl Quantisation {
 }
 
 /// Steps per standard deviation above which no note is reported.
+/// The variance of the steps is then `1 / (12 * 100^2)` = 8e-6 of that of the signal. Chosen, not measured.
 const FINE: f64 = 100.0;
 
 #[cfg(test)]

@@ -48,6 +48,7 @@ pub struct ChannelNames {
 }
 
 /// Samples of a record, at least.
+/// Fewer leave no degree of freedom to any test. Chosen, not measured.
 const SHORTEST: usize = 16;
 
 /// Runs all tests but that of the time column on one record; `controller` is the one that ran, with positive feedback, where

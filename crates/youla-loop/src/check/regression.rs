@@ -17,14 +17,20 @@ use youla::linalg::block;
 use youla::{Mat, MatRef};
 
 /// Future samples that are there besides.
+/// Enough for a cause that is logged up to three samples late. Chosen, not measured.
 pub(super) const AHEAD: usize = 3;
 /// Rows of one task; fixed, so that the result does not depend on the number of threads.
+/// Chosen, not measured.
 const CHUNK: usize = 8192;
 /// Most columns of past samples.
+/// 160^2 products for each sample. Chosen, not measured.
 const COLUMNS: usize = 160;
 /// Rows for each column at least.
+/// The F test then has at least four times as many degrees of freedom in its denominator as the model has coefficients. Chosen, not
+/// measured.
 const ROWS_PER_COLUMN: usize = 5;
 /// Singular values of the regressors, columns of unit length, below this share of the largest do not count.
+/// Chosen, not measured.
 const DEPENDENT: f64 = 1e-12;
 
 /// A record with the triangular factor of all its columns.

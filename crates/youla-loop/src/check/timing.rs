@@ -37,8 +37,10 @@ pub struct Timing {
 }
 
 /// Below this part of the median step a time counts as repeated.
+/// The jitter of a clock that repeats no sample is far smaller. Chosen, not measured.
 const REPEATED: f64 = 0.05;
 /// From this part on a step is a gap.
+/// A missing sample makes a step of 2; 1.5 is midway to a regular step of 1.
 const GAP: f64 = 1.5;
 
 /// Compares a time column with its own median step and against a declared sample time. `None` for less than three rows or

@@ -17,6 +17,7 @@ use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
 
 /// Fraction to which the response decays after the end of the sequence.
+/// The peak that is cut off is below the printed digits of a limit. Chosen, not measured.
 const DECAYED: f64 = 1e-8;
 
 /// The prediction of the nominal loop, with what follows the end of the sequence.

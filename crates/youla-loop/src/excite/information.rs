@@ -25,12 +25,17 @@ use youla::lti::{Discrete, Eigen, Mode, StateSpace, TimeDomain, modes::mode};
 use youla::{Mat, MatRef, c64};
 
 /// A pole nearer to the origin than this is a delay.
+/// A sampled mode with |z| below it has decayed by 95 % within one sample. Chosen, not measured.
 const DELAY: f64 = 0.05;
 /// Poles nearer to each other than this count as one that repeats.
+/// Residues of two poles this close cancel to half of the digits of double precision, `sqrt(2^-52) = 1.5e-8`, with a margin. Chosen,
+/// not measured.
 const APART: f64 = 1e-6;
 /// Fraction of the largest peak below which a pole is treated as not controllable.
+/// Chosen, not measured.
 const WEAKLY_CONTROLLABLE: f64 = 1e-10;
 /// Frequencies that are added up in one product.
+/// Memory of one product: 1024 complex columns, below 1 MB for 40 states. Chosen, not measured.
 const CHUNK: usize = 1024;
 
 /// The derivative of `c b / (z - p)` times u by one parameter, from p, c and b.

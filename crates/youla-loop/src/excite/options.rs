@@ -158,6 +158,7 @@ impl Default for ExciteOptions {
 }
 
 /// Most samples of a sequence.
+/// 128 MB for one channel. Chosen, not measured.
 const LONGEST: usize = 1 << 24;
 
 impl ExciteOptions {

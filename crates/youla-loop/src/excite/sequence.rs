@@ -16,6 +16,7 @@ use youla::signal::{Chirp, Excitation, Multisine, Prbs, SquareWaves, fade};
 use youla::{Mat, c64};
 
 /// Most bits of a register, [`Prbs::order`].
+/// A period of 1048575 samples; longer ones exceed usual experiments. Chosen, not measured.
 const LONGEST_REGISTER: usize = 20;
 
 /// A sequence and its description.

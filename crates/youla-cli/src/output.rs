@@ -52,7 +52,7 @@ pub(crate) fn fail(failure: &Failure) -> ExitCode {
     match failure {
         Failure::OutputClosed => ExitCode::SUCCESS,
         Failure::Refused(sentence, kind) => {
-            // Without standard error there is nobody to tell.
+            // Without standard error the progress is not shown.
             let _ = writeln!(std::io::stderr(), "error: {sentence}");
             match kind {
                 ErrorKind::BadInput => ExitCode::from(2),

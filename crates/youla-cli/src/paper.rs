@@ -105,7 +105,7 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
 
 fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
     let bar = Bar::new(form.quiet || form.json);
-    let written = paper(configuration, target, &|progress| bar.tell(progress))?;
+    let written = paper(configuration, target, &|progress| bar.show(progress))?;
     bar.bar.finish_and_clear();
     match &written.paper {
         _ if form.quiet => Ok(()),
@@ -136,7 +136,7 @@ impl Bar {
         Bar { bar, quiet: hidden }
     }
 
-    fn tell(&self, progress: PaperProgress<'_>) {
+    fn show(&self, progress: PaperProgress<'_>) {
         match progress {
             PaperProgress::Begins(stage, loops) => self.begin(stage.name(), loops),
             PaperProgress::Done(loops) => self.bar.set_position(loops as u64),
@@ -160,7 +160,7 @@ impl Bar {
     /// Above the bar, or on standard error where there is none to be seen.
     fn say(&self, text: &str) {
         if !self.quiet && self.bar.is_hidden() {
-            // Without standard error there is nobody to tell.
+            // Without standard error the progress is not shown.
             let _ = writeln!(std::io::stderr(), "{text}");
         } else {
             self.bar.println(text);

@@ -64,7 +64,7 @@ pub(crate) fn study(form: Form, args: &StudyCommand) -> Result<(), Failure> {
     }
 }
 
-/// Counts how often searches arrive.
+/// Counts how often searches converge.
 fn count(form: Form, args: &StartsArgs) -> Result<(), Failure> {
     let cases = args.cases.clone().unwrap_or_else(|| StartCase::ALL.to_vec());
     let settings = StartsSettings::shipped(&cases, args.items, args.seed);
@@ -90,7 +90,7 @@ fn count(form: Form, args: &StartsArgs) -> Result<(), Failure> {
 fn table(written: &WrittenStarts) -> String {
     let row = |c: &youla_paper::study::StartCount| {
         let without = if c.without_loop > 0 { format!(", {} without a loop", c.without_loop) } else { String::new() };
-        format!("{:<14}{:<20}{:>5} of {:>4} arrived{without}", c.case.key(), c.search.label(), c.arrived, c.items)
+        format!("{:<14}{:<20}{:>5} of {:>4} converged{without}", c.case.key(), c.search.label(), c.converged, c.items)
     };
     let lines: Vec<String> = written.counts.iter().map(row).collect();
     format!("{}\n\n{}", lines.join("\n"), written.folder.join("report.html").display())

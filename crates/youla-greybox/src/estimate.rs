@@ -93,7 +93,7 @@ pub(super) fn comparison<'a>(problem: &Problem<'a>, options: &'a GreyBoxOptions)
     }
 }
 
-/// The minimum from `start`, with its weights settled where residuals have some.
+/// The minimum from `start`, with converged weights where residuals have some.
 fn search(criterion: &mut Criterion<'_>, bounds: &Bounds, start: &[f64], options: &GreyBoxOptions) -> Result<Searched> {
     let mut outcome = minimise(criterion, bounds, start, options)?;
     let mut variance = 2.0 * outcome.point.cost / criterion.degrees_of_freedom as f64;

@@ -5,8 +5,8 @@
 //! theta_0 = arg min sum_k |((N + V S) - G_theta (M + U S)) W_k|^2        projection on the structure, no start needed
 //! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    prediction error from theta_0
 //! ```
-//! For white output noise the last line is the maximum-likelihood estimate, in closed loop too; its only weakness, local
-//! minima, is what the lines before it are for. They need not be accurate, only in the valley of the global minimum.
+//! For white output noise the last line is the maximum-likelihood estimate, in closed loop too. The lines before it give a start in the
+//! valley of the global minimum; a start there need not be accurate.
 //!
 //! The projection compares what alpha makes of y by S, `(N + V S) alpha`, with what the structure makes of the u that alpha
 //! causes, `(M + U S) alpha`: it is `|(G(S) - G_theta) u|^2` without a division by `M + U S`, whose zeros next to poles are the
@@ -44,8 +44,8 @@ pub struct HansenPemOptions {
     /// S whose time constant exceeds the record are smoothed by it. The modes of the plant should decay faster.
     pub decay: f64,
     /// Whether the prediction-error method starts a second time, at the projection of a model that PBSIDopt finds from u and y with
-    /// the horizons of `hansen`. It is consistent in closed loop and sees what noise that is fed back excites, which alpha does
-    /// not: for much noise and strong feedback. A model that cannot be found is left out.
+    /// the horizons of `hansen`. It is consistent in closed loop, and uses the excitation by noise that is fed back, which
+    /// alpha does not contain: for much noise and strong feedback. It is left out where PBSIDopt gives no model.
     pub direct_start: bool,
     /// The projection.
     pub projection: ProjectionOptions,

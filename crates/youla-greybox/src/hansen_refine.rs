@@ -47,7 +47,7 @@ pub struct Refinement {
     pub stable: bool,
 }
 
-/// A refined S and the plant that it stands for, with what the refinement changed.
+/// A refined S and the plant that follows from it, with what the refinement changed.
 #[derive(Debug, Clone)]
 pub struct RefinedHansen {
     /// The refined S and G(S).

@@ -2,7 +2,7 @@
 //!
 //! With the Jacobian `J = U diag(sigma) V'` of the outputs, columns of unit length, a right singular vector v with sigma = 0
 //! is a change of the parameters that the outputs do not show. Any basis of these directions would do; the one named here
-//! is reduced to echelon form with the largest pivots, so that independent ambiguities are told one by one. A parameter
+//! is reduced to echelon form with the largest pivots, so that independent ambiguities are reported one by one. A parameter
 //! whose own column is zero is named by itself. (Local identifiability: T. J. Rothenberg, Econometrica 39 (1971), 577.)
 
 use faer::{Mat, MatRef};
@@ -91,7 +91,7 @@ impl Combination {
         let changes: Vec<String> =
             self.parts.iter().map(|part| format!("{} by {:+.3} %", part.parameter, part.change)).collect();
         format!(
-            "the parameters {} cannot be told apart: changing {} together leaves the outputs as they are",
+            "the parameters {} cannot be distinguished: changing {} together leaves the outputs as they are",
             listed(&names),
             listed(&changes)
         )
@@ -170,7 +170,7 @@ mod tests {
         assert!((pair.parts[0].change + 0.5).abs() < 1e-12 && pair.parts[1].change == 1.0, "{pair:?}");
         assert_eq!(
             pair.sentence(),
-            "the parameters k and m cannot be told apart: changing k by -0.500 % and m by +1.000 % together leaves the \
+            "the parameters k and m cannot be distinguished: changing k by -0.500 % and m by +1.000 % together leaves the \
              outputs as they are"
         );
     }

@@ -84,7 +84,7 @@ pub(super) fn minimise(
     }
 }
 
-/// Whether the point is a minimum as far as the data or the arithmetic can tell.
+/// Whether the point is a minimum to the accuracy of the data or of the arithmetic.
 fn terminal(criterion: &Criterion<'_>, point: &Point, here: &Linearisation, options: &GreyBoxOptions) -> Option<Stop> {
     if 2.0 * point.cost <= ROUNDING * ROUNDING * criterion.energy {
         Some(Stop::Exact)

@@ -44,7 +44,7 @@ pub struct RobustReport {
     pub beyond: Vec<usize>,
 }
 
-/// The estimate with its weights settled.
+/// The estimate with converged weights.
 pub(super) struct Robust {
     pub(super) outcome: Outcome,
     pub(super) report: RobustReport,
@@ -61,18 +61,18 @@ pub(super) fn reweighted(
 ) -> Result<Robust> {
     let mut outcome = least_squares;
     let mut rounds = 0;
-    let mut settled = false;
-    while !settled && rounds < ROUNDS {
+    let mut converged = false;
+    while !converged && rounds < ROUNDS {
         let weighting = Weighting::new(criterion.residuals(&outcome.point)?, criterion.outputs());
         criterion.reweigh(weighting.roots());
         let next = minimise(criterion, bounds, &outcome.point.theta, options)?;
-        settled = next.work.iterations == 0;
+        converged = next.work.iterations == 0;
         outcome = Outcome { work: outcome.work.and(&next.work), ..next };
         rounds += 1;
     }
     let weighting = Weighting::new(criterion.residuals(&outcome.point)?, criterion.outputs());
     criterion.reweigh(Vec::new());
-    let stop = if settled { outcome.stop } else { Stop::Iterations };
+    let stop = if converged { outcome.stop } else { Stop::Iterations };
     Ok(Robust {
         outcome: Outcome { stop, ..outcome },
         report: weighting.report(rounds, criterion),

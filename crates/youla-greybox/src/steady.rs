@@ -10,7 +10,7 @@ use youla::linalg::{block, solve};
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
 
-/// A pole closer to 1 than this has no steady state that double precision can tell.
+/// A pole closer to 1 than this has no steady state that double precision can resolve.
 const INTEGRATING: f64 = 1e-7;
 
 /// The steady state at a constant input.

@@ -19,7 +19,7 @@ type Line = Vec<(usize, String)>;
 /// (`panel,method,note,x,low,high`), value of a box (`panel,method,note,value`) or cell of a map
 /// (`panel,row,column,winner,strength,text,detail`); a figure with several kinds of panel has the columns of all of them,
 /// empty where they do not apply. All values are there, none is thinned. Methods appear by their labels, panels by their
-/// titles or, where these do not tell them apart, by their numbers from 1. Numbers are the shortest that read back as they
+/// titles or, where these do not distinguish them, by their numbers from 1. Numbers are the shortest that read back as they
 /// were; NaN is an empty field.
 ///
 /// ```

@@ -74,7 +74,7 @@ pub struct Panel {
 pub struct Region {
     /// Key of a method, which gives the colour.
     pub method: String,
-    /// Added to the label of the method, for example "95 %"; mostly not empty, which tells it from the curve.
+    /// Added to the label of the method, for example "95 %"; mostly not empty, which distinguishes it from the curve.
     pub note: String,
     /// Where; ascending.
     pub x: Vec<f64>,
@@ -221,7 +221,7 @@ pub struct Cell {
     pub method: String,
     /// Strength of the colour, 0 to 1.
     pub strength: f64,
-    /// What stands in it.
+    /// What is in it.
     pub text: String,
     /// More, shown on demand.
     pub detail: String,

@@ -1,6 +1,6 @@
 //! What all pages share: one file with template, style, script, plotting library and data.
 //!
-//! The file makes no request (its content security policy forbids it). Data stands in the file as JSON in which every `<`
+//! The file makes no request (its content security policy forbids it). Data is in the file as JSON in which every `<`
 //! is written `\u003c`, so that no text of the user can end the script element or open a comment in it.
 
 use minijinja::syntax::SyntaxConfig;

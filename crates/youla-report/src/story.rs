@@ -1,4 +1,4 @@
-//! A page that tells a story: sections of text, tables and figures in order.
+//! A page: sections of text, tables and figures in order.
 
 use super::data::Method;
 use super::figure::Figure;
@@ -80,7 +80,7 @@ pub struct Table {
 pub struct Row {
     /// Key of the method that the row is about, for its colour; empty for none.
     pub method: String,
-    /// As the text of the first column, then one text per further column. Those that are numbers stand to the right.
+    /// As the text of the first column, then one text per further column. Those that are numbers are to the right.
     pub cells: Vec<String>,
 }
 

@@ -93,7 +93,7 @@ fn shown<'a>(section: &'a Section, most: usize) -> ShownSection<'a> {
     }
 }
 
-/// Which columns stand to the right: those with a number in at least half of the cells that hold something.
+/// Which columns are to the right: those with a number in at least half of the cells that hold something.
 fn columns_of_numbers(table: &Table) -> Vec<bool> {
     let column = |k: usize| {
         let cells = table.rows.iter().filter_map(move |row| row.cells.get(k)).filter(|cell| !cell.is_empty());

@@ -63,7 +63,7 @@ impl Timeline {
     }
 }
 
-/// A [`Timeline`] as it stands in a file.
+/// A [`Timeline`] as it is in a file.
 #[derive(Deserialize)]
 struct TimelineNumbers {
     sample_time: f64,
@@ -115,7 +115,7 @@ pub struct Trace {
     pub values: Vec<f64>,
 }
 
-/// A [`Trace`] as it stands in a file.
+/// A [`Trace`] as it is in a file.
 #[derive(Deserialize)]
 struct TraceNumbers {
     steps: Vec<usize>,

@@ -12,8 +12,8 @@ use youla::lti::{Discrete, FrequencyResponse, frequency_response};
 
 /// The page.
 pub(crate) fn page() -> Result<String> {
-    let about = "How exact results are, on seeded random problems and on the simulated gas bearing. What the tests promise stands beside \
-                 each function; these are the figures that come out.";
+    let about = "How exact results are, on seeded random problems and on the simulated gas bearing. The accuracy that the tests \
+                 check is documented at each function; these are measured figures.";
     Ok(head("Accuracy", about) + &equations()? + &bezout()? + &plants()? + &coverage())
 }
 

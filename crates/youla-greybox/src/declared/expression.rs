@@ -60,7 +60,7 @@ impl Expression {
         pop(&mut stack)
     }
 
-    /// The names that stand in it, by number.
+    /// The names that are in it, by number.
     pub(super) fn names(&self) -> impl Iterator<Item = usize> {
         self.program.iter().filter_map(|step| if let Step::Name(number) = step { Some(*number) } else { None })
     }

@@ -3,7 +3,7 @@
 //! ```text
 //! entry = f(theta, q(theta)),   d entry / d theta_j = df/dtheta_j + sum_k df/dq_k dq_k/dtheta_j
 //! ```
-//! with the derived quantities q, which may stand on each other. The derivatives are exact: parameters, derived quantities
+//! with the derived quantities q, which may depend on each other. The derivatives are exact: parameters, derived quantities
 //! and entries are evaluated in numbers that carry their derivative in one direction (`dual.rs`; A. Griewank and A.
 //! Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, chapter 3).
 //!

@@ -17,7 +17,7 @@ use serde::Serialize;
 /// Outcome of the likelihood-ratio test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct LikelihoodRatio {
-    /// `N ln(V_smaller / V_larger)`; negative where the search of the larger structure was lost.
+    /// `N ln(V_smaller / V_larger)`; negative where the search of the larger structure ended in a local minimum.
     pub statistic: f64,
     /// Unknowns by which the structures differ.
     pub degrees_of_freedom: usize,

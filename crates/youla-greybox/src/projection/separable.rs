@@ -2,7 +2,7 @@
 //! equation is multiplied out.
 //!
 //! Take p rows r of `s X = A X + B` out of the equations of the state response X. Where what is left and the measurement
-//! `C X = Y - D U` determine X at each frequency, the rows r are linear in the parameters that stand in them:
+//! `C X = Y - D U` determine X at each frequency, the rows r are linear in the parameters that are in them:
 //! ```text
 //! [ (sI - A) without r ]     [ (B without r) U ]
 //! [ C                  ] X = [ Y - D U         ],        s X_r = A_r(theta) X + B_r(theta) U
@@ -11,7 +11,7 @@
 //! error e of the rows r is one of `C (sI - A)^-1 e_r` in G: with theta of the iteration before as the weight the misfit
 //! counts where it is seen; before the first, A without its rows r and `s + shift`, the shift in the middle of the band, so that low
 //! frequencies do not count alone (C. K. Sanathanan and J. Koerner, IEEE Trans. Autom. Control 8 (1963), 56). The parameters that
-//! stand elsewhere, for the bearing P, run over a grid.
+//! are elsewhere, for the bearing P, run over a grid.
 //!
 //! The equation is that of continuous time, the response that of the sampled model, `G_d = sum_k h(s_k) G(s_k)` with
 //! `h(s) = (1 - exp(-s ts)) / (s ts)` and `s_k = s + 2 pi j k / ts`. The aliases (k not 0) are those of the iteration before.
@@ -24,8 +24,8 @@ use faer::{Mat, MatRef, c64};
 use youla::linalg::regress;
 use youla::lti::{Continuous, StateSpace};
 
-/// Relative change of the misfit below which the weights have settled.
-const SETTLED: f64 = 1e-3;
+/// Relative change of the misfit below which the weights have converged.
+const CONVERGED: f64 = 1e-3;
 /// Smallest over largest singular value, rows of unit length, from which the state response is determined.
 const DETERMINED: f64 = 1e-8;
 
@@ -87,9 +87,9 @@ impl Separation {
             let linear = self.solve(misfit, &theta, found.last(), shift).ok()?;
             self.linear.iter().zip(&linear).for_each(|((j, _), value)| theta[*j] = *value);
             let Ok(point) = misfit.evaluate(&theta) else { break };
-            let settled = found.last().is_some_and(|b| (b.cost - point.cost).abs() <= SETTLED * point.cost);
+            let converged = found.last().is_some_and(|b| (b.cost - point.cost).abs() <= CONVERGED * point.cost);
             found.push(point);
-            if settled {
+            if converged {
                 break;
             }
         }

@@ -178,8 +178,8 @@ pub fn refine(
         choices.noise = noise(&here);
         let found = search(&coordinates, &choices)?;
         (iterations, charts, diverged) = (iterations + found.iterations, charts + 1, diverged + found.diverged);
-        let settled = found.iterations == 0 || found.stop == Stop::Exact || iterations == options.max_iterations;
-        if settled {
+        let converged = found.iterations == 0 || found.stop == Stop::Exact || iterations == options.max_iterations;
+        if converged {
             return Ok(RefinedModel {
                 stable: found.stable,
                 deviations: choices.output_deviations,

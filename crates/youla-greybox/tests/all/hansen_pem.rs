@@ -87,7 +87,7 @@ fn a_record_without_noise_gives_the_parameters_by_projection_alone() {
     }
 }
 
-/// A nominal model of which all entries of A are a tenth of the true ones. The search from it is lost, that from the
+/// A nominal model of which all entries of A are a tenth of the true ones. The search from it ends in a local minimum, that from the
 /// projection ends where one from the true parameters does.
 #[test]
 fn a_nominal_model_that_is_90_percent_wrong() {

@@ -231,7 +231,7 @@ mod tests {
         ];
         let time = TimeSource::column("t".parse().unwrap());
         for bytes in bad {
-            // Files have names of their own, which stand before the line.
+            // Files have names of their own, which are before the line.
             let sentence = |error: Error| error.to_string().split_once(".csv").unwrap().1.to_owned();
             let (streamed, read) = (open(&bytes, &time).err(), in_memory(&bytes, &time).err());
             assert_eq!(streamed.map(sentence), read.map(sentence));

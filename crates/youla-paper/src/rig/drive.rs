@@ -5,7 +5,7 @@ use super::parameters::RigParameters;
 /// What became of a command.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Actuation {
-    /// The command within the limits, V: what an observer should be told.
+    /// The command within the limits, V: the one that an observer should use.
     pub applied: [f64; 2],
     /// Whether it had to be limited, per axis.
     pub saturated: [bool; 2],
@@ -37,13 +37,13 @@ impl Drive {
         Actuation { applied, saturated: [applied[0] != u[0], applied[1] != u[1]] }
     }
 
-    /// The command that arrives when `newest` is sent.
+    /// The command that is delivered when `newest` is sent.
     pub(super) fn delayed(&mut self, newest: [f64; 2]) -> [f64; 2] {
         let Some(slot) = self.queue.get_mut(self.next) else {
             return newest;
         };
-        let arrived = std::mem::replace(slot, newest);
+        let delivered = std::mem::replace(slot, newest);
         self.next = (self.next + 1) % self.queue.len();
-        arrived
+        delivered
     }
 }

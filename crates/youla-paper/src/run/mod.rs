@@ -42,7 +42,7 @@ impl PaperStage {
     }
 }
 
-/// What a listener is told.
+/// Events of a run.
 #[derive(Debug, Clone, Copy)]
 pub enum PaperProgress<'a> {
     /// A stage begins; the number of its loops, of which some may be done already.
@@ -82,20 +82,20 @@ pub struct WrittenPaper {
 pub fn paper(
     configuration: &Configuration,
     target: &Path,
-    tell: &(dyn Fn(PaperProgress<'_>) + Sync),
+    notify: &(dyn Fn(PaperProgress<'_>) + Sync),
 ) -> Result<WrittenPaper> {
     configuration.check()?;
     configuration.claim(target)?;
     let mut clock = Clock::default();
-    let study = clock.stage(PaperStage::Study, || study_loops(configuration, target, tell))?;
-    let map = clock.stage(PaperStage::Crossover, || map_loops(configuration, target, tell))?;
+    let study = clock.stage(PaperStage::Study, || study_loops(configuration, target, notify))?;
+    let map = clock.stage(PaperStage::Crossover, || map_loops(configuration, target, notify))?;
     if !configuration.shard.is_whole() {
         return Ok(WrittenPaper { folder: target.to_owned(), paper: None, claims: Vec::new() });
     }
-    tell(PaperProgress::Begins(PaperStage::Experiments, 0));
+    notify(PaperProgress::Begins(PaperStage::Experiments, 0));
     let Configuration { settings, rig, .. } = configuration;
     let found = clock.stage(PaperStage::Experiments, || experiments(rig, settings))?;
-    tell(PaperProgress::Begins(PaperStage::Report, 0));
+    notify(PaperProgress::Begins(PaperStage::Report, 0));
     let timing = clock.timing(settings, &[&study, &map]);
     let (settings, rig) = (settings.clone(), rig.clone());
     let mut paper = Paper { settings, rig, study: study.rows, crossover: map.rows, experiments: found, timing };
@@ -109,7 +109,7 @@ pub fn paper(
 fn study_loops(
     configuration: &Configuration,
     target: &Path,
-    tell: &(dyn Fn(PaperProgress<'_>) + Sync),
+    notify: &(dyn Fn(PaperProgress<'_>) + Sync),
 ) -> Result<Outcome> {
     let Configuration { settings, rig, .. } = configuration;
     let noise = rig.sensor.noise.value;
@@ -118,13 +118,13 @@ fn study_loops(
         let theta = item.theta;
         evaluate_item(&item, configuration).map_err(|e| e.within(format!("model {} (theta {theta:.3})", index + 1)))
     };
-    run_campaign(PaperStage::Study, configuration, target, settings.study.models, evaluate, tell)
+    run_campaign(PaperStage::Study, configuration, target, settings.study.models, evaluate, notify)
 }
 
 fn map_loops(
     configuration: &Configuration,
     target: &Path,
-    tell: &(dyn Fn(PaperProgress<'_>) + Sync),
+    notify: &(dyn Fn(PaperProgress<'_>) + Sync),
 ) -> Result<Outcome> {
     let settings = &configuration.settings;
     let evaluate = |index: usize| {
@@ -134,7 +134,7 @@ fn map_loops(
             other => other,
         }
     };
-    run_campaign(PaperStage::Crossover, configuration, target, crossover_items(settings), evaluate, tell)
+    run_campaign(PaperStage::Crossover, configuration, target, crossover_items(settings), evaluate, notify)
 }
 
 fn evaluate_item(item: &Item, configuration: &Configuration) -> Result<Evaluated> {
@@ -167,7 +167,7 @@ fn run_campaign(
     target: &Path,
     total: usize,
     evaluate: impl Fn(usize) -> Result<Evaluated> + Sync,
-    tell: &(dyn Fn(PaperProgress<'_>) + Sync),
+    notify: &(dyn Fn(PaperProgress<'_>) + Sync),
 ) -> Result<Outcome> {
     let file = match stage {
         PaperStage::Study => results::STUDY,
@@ -178,13 +178,13 @@ fn run_campaign(
         items: configuration.shard.items(total),
         rows_per_item: configuration.settings.compared().count(),
     };
-    tell(PaperProgress::Begins(stage, campaign.items.len()));
+    notify(PaperProgress::Begins(stage, campaign.items.len()));
     let continued = |loops: usize, redone: usize| {
         if loops + redone > 0 {
-            tell(PaperProgress::Continued { path: &campaign.path, loops, redone });
+            notify(PaperProgress::Continued { path: &campaign.path, loops, redone });
         }
     };
-    campaign.run(evaluate, &continued, &|done| tell(PaperProgress::Done(done)))
+    campaign.run(evaluate, &continued, &|done| notify(PaperProgress::Done(done)))
 }
 
 /// Wall time per stage.

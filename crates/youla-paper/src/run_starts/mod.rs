@@ -1,4 +1,4 @@
-//! `youla study starts`: how often searches arrive, in one results folder, resumable.
+//! `youla study starts`: how often searches converge, in one results folder, resumable.
 
 use crate::run::configuration::{FILE, claim, not_toml};
 use crate::run::results::{figure_files, folder, json, table_file};
@@ -15,7 +15,7 @@ use youla_io::folder::replace_file;
 use youla_report::story::Block;
 use youla_report::story_html;
 
-/// What a listener is told.
+/// Events of a run.
 #[derive(Debug, Clone, Copy)]
 pub enum StartsProgress<'a> {
     /// A case begins; the number of its items, of which some may be done already.
@@ -55,14 +55,14 @@ pub struct WrittenStarts {
 pub fn starts(
     settings: &StartsSettings,
     target: &Path,
-    tell: &(dyn Fn(StartsProgress<'_>) + Sync),
+    notify: &(dyn Fn(StartsProgress<'_>) + Sync),
 ) -> Result<WrittenStarts> {
     settings.check()?;
     claim(target, &configuration(settings)?, read)?;
     let mut found = Starts { settings: settings.clone(), cases: Vec::new() };
     let mut times = Vec::new();
     for case in &settings.cases {
-        let outcome = items(*case, settings, target, tell)?;
+        let outcome = items(*case, settings, target, notify)?;
         times.push(Time::of(*case, &outcome));
         found.cases.push((*case, outcome.rows));
     }
@@ -93,24 +93,24 @@ fn items(
     case: StartCase,
     settings: &StartsSettings,
     target: &Path,
-    tell: &(dyn Fn(StartsProgress<'_>) + Sync),
+    notify: &(dyn Fn(StartsProgress<'_>) + Sync),
 ) -> Result<Outcome<StartRow>> {
     let campaign = Campaign {
         path: target.join(format!("{}.csv", case.key())),
         items: 0..settings.items(case),
         rows_per_item: Search::of(case).count(),
     };
-    tell(StartsProgress::Begins(case, campaign.items.len()));
+    notify(StartsProgress::Begins(case, campaign.items.len()));
     let continued = |items: usize, redone: usize| {
         if items + redone > 0 {
-            tell(StartsProgress::Continued { path: &campaign.path, items, redone });
+            notify(StartsProgress::Continued { path: &campaign.path, items, redone });
         }
     };
     let evaluate = |index: usize| {
         let named = |e: Error| e.within(format!("item {index} of {}", case.key()));
         evaluate_starts(case, index, settings).map_err(named)
     };
-    campaign.run(evaluate, &continued, &|done| tell(StartsProgress::Done(done)))
+    campaign.run(evaluate, &continued, &|done| notify(StartsProgress::Done(done)))
 }
 
 /// Mean processor milliseconds per item of this call.

@@ -32,7 +32,7 @@ pub enum ClaimOutcome {
     Partly,
     /// Not.
     Fails,
-    /// The rows do not tell: methods or loops are missing.
+    /// The rows do not decide: methods or loops are missing.
     Unknown,
 }
 

@@ -41,7 +41,7 @@ pub fn paper_story(paper: &Paper) -> Result<Story> {
         title: "Closed-loop identification of a gas bearing, reproduced".into(),
         summary: format!(
             "The study of {}, the three experiments and every figure and table of the paper, computed on a digital twin of the \
-             rig from the paper's description alone, with seed {}. Published numbers stand beside ours.",
+             rig from the paper's description alone, with seed {}. Published numbers are given beside ours.",
             count(settings.study.models, "nominal model", "nominal models"),
             settings.seed
         ),
@@ -89,14 +89,14 @@ fn brief(paper: &Paper) -> Section {
     let table = plain(
         "claims",
         "Claims of the paper",
-        "What the paper says and whether it comes out here; the numbers stand in the sections below.",
+        "Each claim of the paper and whether it is reproduced; the numbers are in the sections below.",
         &["source", "claim", "here"],
         rows.collect(),
     );
     let text = format!(
         "The paper compares three ways to identify a gas bearing while its controller runs: prediction error with a physical \
          structure (PEM), subspace identification of the plant itself (direct), and subspace identification of the Youla \
-         deviation system S (modified Hansen scheme). Its data are not public, so a digital twin stands in for the rig. Every \
+         deviation system S (modified Hansen scheme). Its data are not public, so a digital twin replaces the rig. Every \
          verdict below is computed from the results of this run, with sensor noise of {} um rms; models are compared by the \
          fit (26), in percent, of the output that they simulate from the input alone.",
         short(paper.rig.sensor.noise.value, 3)

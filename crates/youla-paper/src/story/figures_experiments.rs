@@ -204,11 +204,11 @@ fn switch(alpha: MatRef<'_, f64>, from: usize) -> Option<usize> {
 pub(super) fn starts_in_words(experiment: &Experiment, tried: usize) -> String {
     let runs = &experiment.starts;
     let lowest = runs.iter().map(|s| s.cost).fold(f64::INFINITY, f64::min);
-    let arrived: Vec<f64> = runs.iter().filter(|s| s.cost <= 1.01 * lowest).map(|s| s.factor).collect();
-    let ends = arrived.iter().fold([f64::INFINITY, 0.0], |[l, h], f| [f64::min(l, *f), f64::max(h, *f)]);
+    let converged: Vec<f64> = runs.iter().filter(|s| s.cost <= 1.01 * lowest).map(|s| s.factor).collect();
+    let ends = converged.iter().fold([f64::INFINITY, 0.0], |[l, h], f| [f64::min(l, *f), f64::max(h, *f)]);
     let mut text = format!(
         "Of {tried} starts {} end within 1 % of the lowest criterion (factors on A from {} to {})",
-        arrived.len(),
+        converged.len(),
         short(ends[0], 3),
         short(ends[1], 3)
     );

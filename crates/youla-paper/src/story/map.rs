@@ -2,7 +2,7 @@
 
 use super::figures::axis;
 use super::words::{NONE, and, count, percent, range, sentence, short};
-use crate::study::{LOST, Method, Paper, Row, TIE, Winner, crossover, winner};
+use crate::study::{Method, POOR_FIT, Paper, Row, TIE, Winner, crossover, winner};
 use youla_report::figure::{Cell, Cells, Content, Figure, Layout, Panel};
 use youla_report::story::{Row as TableRow, Table};
 
@@ -137,15 +137,15 @@ pub(super) fn sentences(paper: &Paper) -> Vec<String> {
     let all: Vec<&MapCell> = cells.iter().collect();
     let of = |w: usize| all.iter().copied().filter(|c| c.place[0] == w).collect::<Vec<_>>();
     let weights = 0..paper.settings.crossover.command_weights.len();
-    let mut told: Vec<String> = weights.map(|w| sentence_of(&feedback(paper, w), &of(w))).collect();
-    told.push(sentence_of("in all", &all));
-    let best = |c: &&MapCell| c.winner.as_ref().is_some_and(|w| w.ranking[0].1 < LOST);
+    let mut sentences: Vec<String> = weights.map(|w| sentence_of(&feedback(paper, w), &of(w))).collect();
+    sentences.push(sentence_of("in all", &all));
+    let best = |c: &&MapCell| c.winner.as_ref().is_some_and(|w| w.ranking[0].1 < POOR_FIT);
     let lost: Vec<&MapCell> = cells.iter().filter(best).collect();
     if !lost.is_empty() {
         let (cells, noise) = (count(lost.len(), "cell", "cells"), span(&lost, 1));
-        told.push(format!("In {cells}, at a noise of {noise} um, even the best median stays below {LOST} %."));
+        sentences.push(format!("In {cells}, at a noise of {noise} um, even the best median stays below {POOR_FIT} %."));
     }
-    told
+    sentences
 }
 
 fn sentence_of(feedback: &str, cells: &[&MapCell]) -> String {

@@ -34,8 +34,10 @@ fn column(experiment: &Experiment, rig: &RigParameters, axis: usize, bound: f64)
     let ours = ROWS.map(|m| fit_of(experiment, m)[axis]);
     let theirs = experiment.case.published.map(|fit| fit[axis]);
     let differ: Vec<[usize; 2]> = PAIRS.into_iter().filter(|p| ahead(ours, *p) != ahead(theirs, *p)).collect();
-    let told: Vec<String> =
-        differ.iter().map(|p| format!("the paper has {}, here {}", tell(theirs, *p), tell(ours, *p))).collect();
+    let differences: Vec<String> = differ
+        .iter()
+        .map(|p| format!("the paper has {}, here {}", described(theirs, *p), described(ours, *p)))
+        .collect();
     let mut reasons: Vec<String> = Vec::new();
     for pair in &differ {
         let reason = reason(*pair, [ours, theirs].map(|fits| ahead(fits, *pair)), experiment, rig, bound);
@@ -44,7 +46,7 @@ fn column(experiment: &Experiment, rig: &RigParameters, axis: usize, bound: f64)
         }
     }
     let head = format!("{}, {}", experiment.case.title, AXES[axis]);
-    (!differ.is_empty()).then(|| format!("{head}: {}. {}", told.join("; "), reasons.join(" ")))
+    (!differ.is_empty()).then(|| format!("{head}: {}. {}", differences.join("; "), reasons.join(" ")))
 }
 
 fn ahead(fits: [f64; 4], [a, b]: [usize; 2]) -> Ahead {
@@ -55,7 +57,7 @@ fn ahead(fits: [f64; 4], [a, b]: [usize; 2]) -> Ahead {
     }
 }
 
-fn tell(fits: [f64; 4], [a, b]: [usize; 2]) -> String {
+fn described(fits: [f64; 4], [a, b]: [usize; 2]) -> String {
     let (first, second, lead) = (ROWS[a].label(), ROWS[b].label(), fits[a] - fits[b]);
     match ahead(fits, [a, b]) {
         Ahead::First => format!("{first} {} points ahead of {second}", percent(lead, 1)),

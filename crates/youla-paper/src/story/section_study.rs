@@ -39,7 +39,7 @@ pub(super) fn study(paper: &Paper) -> Section {
         count(s.verification_samples, "sample", "samples")
     );
     let failed = "No loop is dropped. A loop counts as failed for a method that finds no model, an unstable one, or one that \
-                  is lost. In the figures fits below the axis are drawn at its edge, and loops without a model there in a shape \
+                  has a poor fit. In the figures fits below the axis are drawn at its edge, and loops without a model there in a shape \
                   of their own; in medians and quartiles they count as the lowest.";
     let mut blocks = vec![
         Block::Text(loops),

@@ -19,7 +19,7 @@ const SCHEMA: u32 = 1;
 ///
 /// ```text
 /// {"schema":1, "seed", "models", "noise_um",
-///  "study":{method:{"all":D, "deciles":[D]}},   D = {"theta", "count", "median", "worse", "usable", "refused", "unstable", "lost"}
+///  "study":{method:{"all":D, "deciles":[D]}},   D = {"theta", "count", "median", "worse", "usable", "refused", "unstable", "poor_fit"}
 ///  "crossover":[{"command_weight", "noise_um", "theta", "winner", "lead", "ranking":[{"method", "fit"}]}],
 ///  "nominal":{"fit", "parameters":{name: value}},
 ///  "experiments":{key:{"title", "figure", "table_1":{method:{"fit", "paper", "order", "stable", "stabilised"}},
@@ -53,7 +53,7 @@ fn study_entry(paper: &Paper, method: Method) -> Value {
     let entry = |d: &Decile| {
         json!({
             "theta": d.theta, "count": d.count, "median": d.median, "worse": d.worse, "usable": d.usable(),
-            "refused": d.refused, "unstable": d.unstable, "lost": d.lost,
+            "refused": d.refused, "unstable": d.unstable, "poor_fit": d.poor_fit,
         })
     };
     let tenths = deciles(&paper.study, method, theta);

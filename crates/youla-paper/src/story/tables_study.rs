@@ -2,7 +2,7 @@
 
 use super::tables::{axes, fit_cells, method_row, plain, row};
 use super::words::range;
-use crate::study::{Decile, LOST, Method, Paper, deciles, overall};
+use crate::study::{Decile, Method, POOR_FIT, Paper, deciles, overall};
 use youla_report::story::Table;
 
 /// The methods of the study that have rows, the nominal model first.
@@ -46,16 +46,16 @@ pub(super) fn medians(paper: &Paper) -> Table {
 pub(super) fn failures(paper: &Paper) -> Table {
     let methods: Vec<Method> = compared(paper).into_iter().filter(|m| *m != Method::Nominal).collect();
     let lines = lines(paper, &methods);
-    let counts = |d: &Decile| [d.usable(), d.refused, d.unstable, d.lost].map(|n| n.to_string());
+    let counts = |d: &Decile| [d.usable(), d.refused, d.unstable, d.poor_fit].map(|n| n.to_string());
     let rows = lines
         .iter()
         .enumerate()
         .filter(|(_, line)| !line.is_empty())
         .map(|(k, line)| row(first(k, line).into_iter().chain(line.iter().flat_map(counts))));
-    let names = ["usable", "refused", "unstable", "lost"];
+    let names = ["usable", "refused", "unstable", "poor fit"];
     let caption = format!(
         "What became of every loop: a usable model, none at all (refused), an unstable one, or a stable one with a fit below \
-         {LOST} % on an axis (lost); the four add up to the loops of the line."
+         {POOR_FIT} % on an axis (poor fit); the four add up to the loops of the line."
     );
     Table {
         groups: grouped(&methods, 4),
@@ -72,18 +72,18 @@ fn grouped(methods: &[Method], width: usize) -> Vec<(String, usize)> {
 pub(super) fn sums(paper: &Paper) -> Table {
     let rows = compared(paper).into_iter().filter(|m| *m != Method::Nominal).map(|m| {
         let all = overall(&paper.study, m, paper.settings.study.theta);
-        let sum = all.usable() + all.refused + all.unstable + all.lost;
-        let counts = [all.usable(), all.refused, all.unstable, all.lost, sum].map(|n| n.to_string());
+        let sum = all.usable() + all.refused + all.unstable + all.poor_fit;
+        let counts = [all.usable(), all.refused, all.unstable, all.poor_fit, sum].map(|n| n.to_string());
         method_row(m, std::iter::once(m.label().to_owned()).chain(counts).chain(fit_cells(all.median, 1)))
     });
     plain(
         "study-sums",
         "The study in sums",
         format!(
-            "Usable, refused, unstable and lost models of the {} loops, their sum, and the median fits.",
+            "Usable, refused, unstable and poorly fitting models of the {} loops, their sum, and the median fits.",
             paper.settings.study.models
         ),
-        &["method", "usable", "refused", "unstable", "lost", "sum", "median horizontal, %", "median vertical, %"],
+        &["method", "usable", "refused", "unstable", "poor fit", "sum", "median horizontal, %", "median vertical, %"],
         rows.collect(),
     )
 }

@@ -285,7 +285,7 @@ fn texts(story: &Story) -> Vec<String> {
 fn the_summary_says_what_the_page_says() {
     let paper = paper(study(as_found));
     let summary = paper_summary(&paper).unwrap();
-    assert_eq!(summary["study"]["pem"]["all"]["lost"], 16);
+    assert_eq!(summary["study"]["pem"]["all"]["poor_fit"], 16);
     assert_eq!(summary["study"]["hansen"]["deciles"].as_array().unwrap().len(), 10);
     assert_eq!(summary["experiments"]["high-deviation"]["table_1"]["pem"]["paper"][0], 48.91);
     let (claims, page) = (summary["claims"].as_array().unwrap(), paper_claims(&paper));

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 use std::fmt::Display;
 use youla::signal::{Excitation, RampedExcitation};
 
-/// What stands where a method gave no model.
+/// What is where a method gave no model.
 pub(super) const NONE: &str = "none";
 
 /// Names of the axes in the order of the channels.

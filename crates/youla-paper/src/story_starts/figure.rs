@@ -1,10 +1,10 @@
-//! The share that arrived, as a map.
+//! The share that converged, as a map.
 
 use crate::study::{Search, StartCase, StartCount};
 use youla_report::figure::{Axis, Cell, Cells, Content, Figure, Panel};
 
 /// One cell per case and search; the searches without a start share a column.
-pub(super) fn arrived(counts: &[StartCount]) -> Figure {
+pub(super) fn converged(counts: &[StartCount]) -> Figure {
     let columns = Search::ALL.into_iter().filter(|search| *search != Search::SubspacePem);
     let named = |search: Search| if search.without_start() { "without a start" } else { search.label() };
     let mut cases: Vec<StartCase> = counts.iter().map(|c| c.case).collect();
@@ -20,9 +20,10 @@ pub(super) fn arrived(counts: &[StartCount]) -> Figure {
     let cells = cases.iter().flat_map(|case| columns.clone().map(|column| of(*case, column))).collect();
     Figure {
         key: "starts".into(),
-        title: "Searches that arrive".into(),
-        caption: "Items that arrived at the estimate of the search from the true parameters, of all items of the case."
-            .into(),
+        title: "Converged searches".into(),
+        caption:
+            "Items that converged to the estimate of the search from the true parameters, of all items of the case."
+                .into(),
         panels: vec![Panel {
             title: String::new(),
             x: Axis { label: "start".into(), ..Axis::default() },
@@ -39,11 +40,11 @@ pub(super) fn arrived(counts: &[StartCount]) -> Figure {
 }
 
 fn cell(count: &StartCount) -> Cell {
-    let share = count.arrived as f64 / count.items.max(1) as f64;
+    let share = count.converged as f64 / count.items.max(1) as f64;
     Cell {
         method: count.search.key().into(),
         strength: share,
-        text: if count.arrived == count.items { "all".into() } else { format!("{:.1} %", 100.0 * share) },
-        detail: format!("{}: {} of {} arrived", count.search.label(), count.arrived, count.items),
+        text: if count.converged == count.items { "all".into() } else { format!("{:.1} %", 100.0 * share) },
+        detail: format!("{}: {} of {} converged", count.search.label(), count.converged, count.items),
     }
 }

@@ -2,13 +2,13 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `figure` | the share that arrived, per case and search |
+//! | `figure` | the share that converged, per case and search |
 //! | `tables` | counts, failures of the searches without a start |
 
 mod figure;
 mod tables;
 
-use crate::study::{ARRIVED, Search, StartCase, StartRow, StartsSettings, start_counts, start_failures};
+use crate::study::{CONVERGED_WITHIN, Search, StartCase, StartRow, StartsSettings, start_counts, start_failures};
 use youla_report::data::{Method, Role};
 use youla_report::story::{Block, Story, section};
 
@@ -46,35 +46,35 @@ pub fn starts_story(starts: &Starts) -> Story {
     let counts: Vec<_> = starts.cases.iter().flat_map(|(case, rows)| start_counts(*case, rows)).collect();
     let failures: Vec<_> = starts.cases.iter().flat_map(|(case, rows)| start_failures(*case, rows)).collect();
     Story {
-        title: "How often a search arrives".into(),
+        title: "Convergence from different starts".into(),
         summary: format!(
-            "The prediction-error method from different starts, on records of the gas bearing, with seed {}. A search has arrived \
-             where its fit on a record without noise stays behind that of the search from the true parameters by at most {ARRIVED} \
-             point on each axis.",
+            "The prediction-error method from different starts, on records of the gas bearing, with seed {}. A search has converged \
+             where its fit on a record without noise is at most {CONVERGED_WITHIN} percentage points below that of the search from the true \
+             parameters, on each axis.",
             starts.settings.paper.seed
         ),
         program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
         methods: starts_methods(),
         sections: vec![
             section(
-                "arrived",
-                "What arrives",
-                "What arrives",
-                vec![Block::Figure(figure::arrived(&counts)), Block::Table(tables::counts(&counts))],
+                "converged",
+                "Converged searches",
+                "Converged searches",
+                vec![Block::Figure(figure::converged(&counts)), Block::Table(tables::counts(&counts))],
             ),
             section(
                 "failures",
-                "What the searches without a start leave",
-                "What the searches without a start leave",
+                "Failures of the searches without a start",
+                "Failures of the searches without a start",
                 vec![match failures.is_empty() {
-                    true => Block::Text("Nothing: all items arrived.".into()),
+                    true => Block::Text("All items converged.".into()),
                     false => Block::Table(tables::failures(&failures)),
                 }],
             ),
             section(
                 "settings",
-                "What was done",
-                "What was done",
+                "Settings",
+                "Settings",
                 vec![
                     Block::List(
                         starts.cases.iter().map(|(case, _)| format!("{}: {}.", case.key(), case.describe())).collect(),

@@ -123,7 +123,7 @@ impl Campaign {
     ///
     /// The file is a prefix of the result at any time: an item is written as soon as all items before it are. Its contents do
     /// not depend on the number of threads nor on interruptions, as long as `evaluate` depends on the item alone. Rows from the
-    /// first damaged one on are computed again. `continued` is told how many items the file holds and how many rows behind them are
+    /// first damaged one on are computed again. `continued` receives how many items the file holds and how many rows behind them are
     /// computed again, `progress` how many items are done.
     ///
     /// # Errors

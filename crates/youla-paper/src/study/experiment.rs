@@ -52,7 +52,7 @@ pub struct Experiment {
     pub design: Design,
     /// The record that the models are identified from.
     pub estimation: ExperimentRecord,
-    /// The record that they are held against.
+    /// The record that they are compared with.
     pub verification: ExperimentRecord,
     /// What alpha of the estimation record excites, for the horizon of S.
     pub excitation: ExcitationReport,
@@ -104,7 +104,7 @@ pub struct Start {
     pub stop: Stop,
 }
 
-/// What the models are found from and held against, without the samples at the start.
+/// What the models are found from and compared with, without the samples at the start.
 struct Data<'a> {
     settings: &'a PaperSettings,
     design: &'a Design,

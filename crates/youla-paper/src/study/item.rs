@@ -53,7 +53,7 @@ pub struct Evaluated<R = Row> {
 /// Runs one loop around the bearing `truth` and identifies it by every method.
 ///
 /// The data are those of the linear rig at rest: the plant behind a zero-order hold, white noise on the outputs. Models are
-/// held against a second record without noise, from rest, by the fit (26). A method that finds no model, or an unstable one,
+/// compared with a second record without noise, from rest, by the fit (26). A method that finds no model, or an unstable one,
 /// is an outcome.
 ///
 /// # Errors
@@ -150,7 +150,7 @@ struct LoopData<'a> {
     start: Bearing,
     /// The search from the nominal model, which several methods take part in.
     single: OnceCell<Result<GreyBoxModel, String>>,
-    /// S and G(S), on which several methods stand.
+    /// S and G(S), which several methods use.
     hansen: OnceCell<Result<HansenModel, String>>,
 }
 

@@ -11,7 +11,7 @@
 //! | `campaign` | many items on all cores, streamed to a file in order, resumable |
 //! | `experiment`, `experiments` | Table 1 and Figs 6 to 10 on the digital twin |
 //! | `paper` | everything that was found |
-//! | `starts` | how often a search from a start arrives, and from which |
+//! | `starts` | how often a search converges, and from which start |
 //! | `statistics` | quantiles, deciles, failures, winners |
 
 mod campaign;
@@ -45,8 +45,8 @@ pub use paper::{Paper, Timing};
 pub use row::{Line, Row, Status};
 pub use settings::{ControllerSettings, CrossoverSettings, ExperimentSettings, PaperSettings, StudySettings};
 pub use starts::{
-    ARRIVED, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts, start_counts,
-    start_failures,
+    CONVERGED_WITHIN, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts,
+    start_counts, start_failures,
 };
-pub use statistics::{Decile, LOST, TIE, Winner, deciles, median, overall, quantile, winner};
+pub use statistics::{Decile, POOR_FIT, TIE, Winner, deciles, median, overall, quantile, winner};
 pub use synchronous::without_harmonics;

@@ -25,7 +25,7 @@ pub enum Status {
     Stable,
     /// An unstable model.
     Unstable,
-    /// No model; the reason stands beside.
+    /// No model; the reason is beside.
     Refused,
     /// No loop: no weight of the command stabilises nominal model and plant with the margin.
     NoController,
@@ -88,7 +88,7 @@ impl Row {
     }
 
     /// The line of the file, without its end. Numbers are written such that they read back bit by bit; `check` is the
-    /// beginning of the SHA-256 of what stands before it.
+    /// beginning of the SHA-256 of what is before it.
     pub fn line(&self) -> String {
         let text = format!(
             "{},{},{},{},{},{},{},{},{},{},{},{}",
@@ -156,7 +156,7 @@ pub(super) fn checked(text: String) -> String {
     format!("{text},{check}")
 }
 
-/// What stands before the check, where that is right.
+/// What is before the check, where that is right.
 pub(super) fn unchecked(line: &str) -> Option<&str> {
     let (text, found) = line.rsplit_once(',')?;
     (check(text) == found).then_some(text)

@@ -3,13 +3,13 @@
 use super::method::Method;
 use super::row::{Row, Status};
 
-/// Fit of the worse axis, percent, below which a stable model counts as lost.
-pub const LOST: f64 = 50.0;
+/// Fit of the worse axis, percent, below which a stable model counts as a poor fit.
+pub const POOR_FIT: f64 = 50.0;
 
 impl Row {
-    /// Whether there is no usable model: none, an unstable one, or one that is lost on an axis.
+    /// Whether there is no usable model: none, an unstable one, or one with a poor fit on an axis.
     pub fn failed(&self) -> bool {
-        self.status != Status::Stable || self.worse_fit() < LOST
+        self.status != Status::Stable || self.worse_fit() < POOR_FIT
     }
 }
 
@@ -47,8 +47,8 @@ pub struct Decile {
     pub refused: usize,
     /// Loops with an unstable model.
     pub unstable: usize,
-    /// Loops with a stable model whose fit is below [`LOST`] on an axis.
-    pub lost: usize,
+    /// Loops with a stable model whose fit is below [`POOR_FIT`] on an axis.
+    pub poor_fit: usize,
 }
 
 impl Decile {
@@ -59,7 +59,7 @@ impl Decile {
 
     /// Loops without a usable model.
     pub fn failed(&self) -> usize {
-        self.refused + self.unstable + self.lost
+        self.refused + self.unstable + self.poor_fit
     }
 }
 
@@ -91,7 +91,7 @@ fn summary(method: Method, theta: [f64; 2], rows: &[&Row]) -> Decile {
         worse: median(&rows.iter().map(|r| r.worse_fit()).collect::<Vec<_>>()),
         refused: count(&|r| matches!(r.status, Status::Refused | Status::NoController)),
         unstable: count(&|r| r.status == Status::Unstable),
-        lost: count(&|r| r.status == Status::Stable && r.worse_fit() < LOST),
+        poor_fit: count(&|r| r.status == Status::Stable && r.worse_fit() < POOR_FIT),
     }
 }
 

@@ -88,7 +88,7 @@ fn draw_box(canvas: &mut Canvas, spread: &Spread, y: &Scale, (x, half): (f64, f6
     canvas.path(outliers, &Paint { width: 0.5, of: Some((of, "outliers")), ..line });
 }
 
-/// One triangle at each edge beyond which values lie; their number stands in the text below.
+/// One triangle at each edge beyond which values lie; their number is in the text below.
 fn draw_beyond(canvas: &mut Canvas, sample: &Sample, y: &Scale, x: f64, frame: Frame, styles: &Styles) {
     let colour = styles.of(&sample.method).colour;
     let paint = Paint { of: Some((&sample.method, "beyond")), ..Marker::Down.paint(colour, false) };

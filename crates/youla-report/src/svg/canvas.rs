@@ -34,7 +34,7 @@ impl Frame {
     }
 }
 
-/// Which end of a text stands at its place.
+/// Which end of a text is at its place.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Anchor {
     Start,
@@ -92,7 +92,7 @@ impl Canvas {
         }
     }
 
-    /// The same in the middle and with the paper around it, to stand on lines.
+    /// The same in the middle and with the paper around it, to be on lines.
     pub(super) fn text_on_lines(&mut self, text: &str, x: f64, y: f64, size: f64) {
         let node = text_node(text, size, Anchor::Middle).with("stroke", "#ffffff").with("stroke-width", "2");
         let node = node.with("paint-order", "stroke").with("stroke-linejoin", "round").with("fill", SOFT);

@@ -1,4 +1,4 @@
-//! What stands behind the curves of a panel: shaded parts, areas between curves, lines for orientation.
+//! What is behind the curves of a panel: shaded parts, areas between curves, lines for orientation.
 
 use super::canvas::{Canvas, Frame, GRID, INK, Paint, SOFT};
 use super::lines::joined;

@@ -55,7 +55,7 @@ fn prepared(figure: &Figure) -> Vec<Prepared<'_>> {
     all.iter().map(|panel| Prepared::new(panel, others)).collect()
 }
 
-/// Panels beside each other: what stands above their frames, and frames with what stands below them.
+/// Panels beside each other: what is above their frames, and frames with what is below them.
 struct Row {
     above: f64,
     frames: f64,

@@ -21,7 +21,7 @@ const APART: f64 = 14.0;
 const POINTS_PER_LINE: usize = 4000;
 const POINTS: usize = 32_000;
 
-/// What stands before a name.
+/// What is before a name.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 struct Swatch {
     line: bool,

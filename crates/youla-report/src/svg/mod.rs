@@ -2,7 +2,7 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `layout` | where the panels stand |
+//! | `layout` | where the panels are |
 //! | `panel` | scales and axes of one panel |
 //! | `curves`, `lines` | lines and clouds of points |
 //! | `boxes`, `spread` | box plots and what they show |

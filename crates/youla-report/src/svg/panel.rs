@@ -74,7 +74,7 @@ impl<'a> Prepared<'a> {
         }
     }
 
-    /// What stands at the edges of its frame.
+    /// What is at the edges of its frame.
     pub(super) fn edge(&self) -> Edge {
         let beyond = match &self.panel.content {
             Content::Boxes(_) => self.strips != (0.0, 0.0),

@@ -30,7 +30,7 @@ const AFTER: [(&str, Style); 5] = [
     ("open loop", style("--soft", "#59616b", 0.8, &[4.0, 1.5], Marker::Square)),
     ("bound", style("--ink", "#16191d", 0.7, &[1.2, 1.5], Marker::Down)),
 ];
-/// Dashes of further curves of one method, told apart by their notes.
+/// Dashes of further curves of one method, distinguished by their notes.
 const FURTHER_DASHES: [&[f64]; 3] = [&[1.2, 1.2], &[4.0, 1.0, 1.0, 1.0], &[7.0, 2.0]];
 
 /// Most strength of an area, so that dark text on it stays legible.
@@ -154,7 +154,7 @@ impl Marker {
         }
     }
 
-    /// A shape that can be filled, and so be told from its outline.
+    /// A shape that can be filled, and so be distinguished from its outline.
     pub(super) fn solid(self) -> Self {
         match self {
             Marker::Plus => Marker::Up,

@@ -38,7 +38,7 @@ pub(super) fn fitting(text: &str, size: f64, most: f64) -> f64 {
     size * most / widest
 }
 
-/// `label (unit)` as it stands at an axis.
+/// `label (unit)` as it is at an axis.
 pub(super) fn axis_label(axis: &Axis) -> String {
     match axis.unit.as_str() {
         "" => axis.label.clone(),

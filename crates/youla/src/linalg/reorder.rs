@@ -25,7 +25,7 @@ pub struct OrderedSchur {
 }
 
 impl OrderedSchur {
-    /// Eigenvalues in the order in which they stand on the diagonal of T.
+    /// Eigenvalues in the order in which they are on the diagonal of T.
     pub fn eigenvalues(&self) -> Vec<c64> {
         blocks(self.t.as_ref()).into_iter().flat_map(|b| block_eigenvalues(self.t.as_ref(), b)).collect()
     }

@@ -23,7 +23,7 @@ pub struct RealSchur {
 }
 
 impl RealSchur {
-    /// Eigenvalues in the order in which they stand on the diagonal of T; of a pair, the one with positive imaginary
+    /// Eigenvalues in the order in which they are on the diagonal of T; of a pair, the one with positive imaginary
     /// part comes first.
     pub fn eigenvalues(&self) -> Vec<c64> {
         blocks(self.t.as_ref()).into_iter().flat_map(|b| block_eigenvalues(self.t.as_ref(), b)).collect()

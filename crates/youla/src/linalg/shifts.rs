@@ -35,7 +35,7 @@ impl Shifts {
     }
 
     /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size. It is made of
-    /// differences to the shifts, so that eigenvalues that agree in many digits are still told apart.
+    /// differences to the shifts, so that eigenvalues that agree in many digits are still distinguished.
     pub(super) fn first_column(self, t: &Square, k: usize) -> [f64; 3] {
         let (a, b, c, d) = (t[(k, k)] - self.re, t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)] - self.re);
         let Shifts { im, split, .. } = self;

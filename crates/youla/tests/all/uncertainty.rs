@@ -1,4 +1,4 @@
-//! What the uncertainty of the Hansen scheme claims, held against many simulated records of the bearing.
+//! What the uncertainty of the Hansen scheme claims, compared with many simulated records of the bearing.
 
 use crate::common::bearing_loop::{Coverage, Design, Loop, options};
 use rayon::prelude::*;

@@ -151,7 +151,7 @@ fn parameters_that_cannot_be_told_apart_are_named() {
     assert_eq!(
         found.undetermined.sentences(),
         [
-            "the parameters k and m cannot be told apart: changing k by +1.000 % and m by +1.000 % together leaves the outputs \
+            "the parameters k and m cannot be distinguished: changing k by +1.000 % and m by +1.000 % together leaves the outputs \
           as they are"
         ]
     );
@@ -246,7 +246,7 @@ fn known_delays_are_taken_out() {
     );
 }
 
-/// The example of the documentation is read as it stands there.
+/// The example of the documentation is read as it is there.
 #[test]
 fn the_documentation_holds() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/grey-box.md");

@@ -114,6 +114,9 @@ fn matrices() {
     }
     let unknown = sentence("template = 'bearin'");
     assert!(unknown.contains("line 1, column 12") && unknown.contains("expected one of `bearing`,"), "{unknown}");
+    assert!(unknown.ends_with("did you mean `bearing`?"), "{unknown}");
+    let key = sentence("a = [[1]]\nb = [[1]]\nc = [[1]]\nparamters = {}");
+    assert!(key.ends_with("did you mean `parameters`?"), "{key}");
 }
 
 #[test]

@@ -194,7 +194,7 @@ fn bounds_and_what_is_not_determined() {
     let refused =
         greybox_intervals(&Problem::new(&Product, &records, time()), &found, &options, &IntervalOptions::default());
     let sentence = refused.unwrap_err().to_string();
-    assert!(sentence.contains("k and l cannot be told apart"), "{sentence}");
+    assert!(sentence.contains("k and l cannot be distinguished"), "{sentence}");
 
     let mut declared = Template::MassSpringDamper.declaration().unwrap();
     declared.parameters.get_mut("damping").unwrap().max = Some(12.0);

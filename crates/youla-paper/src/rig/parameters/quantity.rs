@@ -92,7 +92,7 @@ impl<U: Unit, T> Quantity<U, T> {
     }
 }
 
-/// What stands in a file.
+/// What is in a file.
 #[derive(serde::Serialize, serde::Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Written<T, S> {

@@ -1,4 +1,4 @@
-//! How many arrived, and why the others did not.
+//! How many searches converged, and why the others did not.
 
 use super::super::row::Status;
 use super::case::StartCase;
@@ -6,10 +6,11 @@ use super::row::StartRow;
 use super::search::Search;
 use serde::Serialize;
 
-/// Points of fit (26) by which a model may stay behind that of the search from the truth, on each axis, to count as arrived.
-pub const ARRIVED: f64 = 0.1;
+/// Percentage points of fit (26) by which a model may be below that of the search from the truth, on each axis, to count as converged: the
+/// scatter of the fit over equivalent minima is below 0.01 (chosen, not measured).
+pub const CONVERGED_WITHIN: f64 = 0.1;
 
-/// What became of the items of a case by one search.
+/// Outcomes of one search on the items of a case.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct StartCount {
     /// The case.
@@ -20,15 +21,15 @@ pub struct StartCount {
     pub items: usize,
     /// Items without one: no controller keeps the margin.
     pub without_loop: usize,
-    /// Items that arrived.
-    pub arrived: usize,
+    /// Items that converged.
+    pub converged: usize,
     /// Items without a model.
     pub refused: usize,
     /// Items with an unstable model.
     pub unstable: usize,
-    /// Searches without a start: items that did not arrive and of which the search itself says so, by `local_minimum_suspected()` or by refusing.
-    pub told: Option<usize>,
-    /// Searches without a start: items that arrive where the search from the start is run too and the lower criterion wins.
+    /// Searches without a start: items that did not converge and for which the search reports it, by `local_minimum_suspected()` or by refusing.
+    pub self_reported: Option<usize>,
+    /// Searches without a start: items that converge where the search from the start is run too and the lower criterion is taken.
     pub with_start: Option<usize>,
 }
 
@@ -66,7 +67,7 @@ pub fn start_failures(case: StartCase, rows: &[StartRow]) -> Vec<StartFailure> {
     let failure = |item: &[StartRow]| {
         let row = item.iter().find(|row| row.search.without_start())?;
         let behind = behind(row, item);
-        (!arrived(behind)).then(|| StartFailure {
+        (!converged(behind)).then(|| StartFailure {
             case,
             item: row.item,
             setting: row.setting,
@@ -94,9 +95,10 @@ fn count(case: StartCase, search: Search, items: &Items<'_>) -> StartCount {
     let row = |item: &[StartRow]| item.iter().find(|row| row.search == search).cloned();
     let closed = |item: &&[StartRow]| item.iter().all(|row| row.status != Status::NoController);
     let with = |status| items.all().filter_map(row).filter(|r| r.status == status).count();
-    let solved = |row: &StartRow, item: &[StartRow]| arrived(behind(row, item));
-    let told =
-        |item: &&[StartRow]| row(item).is_some_and(|r| !solved(&r, item) && (r.lost || r.status == Status::Refused));
+    let solved = |row: &StartRow, item: &[StartRow]| converged(behind(row, item));
+    let self_reported = |item: &&[StartRow]| {
+        row(item).is_some_and(|r| !solved(&r, item) && (r.local_minimum_suspected || r.status == Status::Refused))
+    };
     let either = |item: &&[StartRow]| {
         let start = item.iter().find(|row| row.search == Search::Pem).cloned();
         let lower = [row(item), start].into_iter().flatten().filter(|r| !r.cost.is_nan());
@@ -110,10 +112,10 @@ fn count(case: StartCase, search: Search, items: &Items<'_>) -> StartCount {
         search,
         items: items.all().filter(closed).count(),
         without_loop: with(Status::NoController),
-        arrived: items.all().filter(|item| row(item).is_some_and(|r| solved(&r, item))).count(),
+        converged: items.all().filter(|item| row(item).is_some_and(|r| solved(&r, item))).count(),
         refused: with(Status::Refused),
         unstable: with(Status::Unstable),
-        told: of_projection(&told),
+        self_reported: of_projection(&self_reported),
         with_start: of_projection(&either),
     }
 }
@@ -126,17 +128,17 @@ fn behind(row: &StartRow, item: &[StartRow]) -> [f64; 2] {
     })
 }
 
-fn arrived(behind: [f64; 2]) -> bool {
-    behind.iter().all(|points| *points <= ARRIVED)
+fn converged(behind: [f64; 2]) -> bool {
+    behind.iter().all(|points| *points <= CONVERGED_WITHIN)
 }
 
 fn reason(row: &StartRow) -> String {
     let state = match row.status {
         Status::NoController => "no loop",
         Status::Refused => "no model",
-        Status::Unstable if row.lost => "unstable model, local minimum suspected",
+        Status::Unstable if row.local_minimum_suspected => "unstable model, local minimum suspected",
         Status::Unstable => "unstable model",
-        Status::Stable if row.lost => "local minimum suspected",
+        Status::Stable if row.local_minimum_suspected => "local minimum suspected",
         Status::Stable => "another minimum",
     };
     if row.note.is_empty() { state.into() } else { format!("{state}: {}", row.note) }
@@ -159,15 +161,18 @@ mod tests {
                 row(k, Search::Truth, 99.0, 1.0),
                 row(k, Search::Pem, start, 100.0 - start),
                 row(k, Search::PemMultiStart, 99.0, 1.0),
-                StartRow { lost: projected < 90.0, ..row(k, Search::HansenPem, projected, 100.0 - projected) },
+                StartRow {
+                    local_minimum_suspected: projected < 90.0,
+                    ..row(k, Search::HansenPem, projected, 100.0 - projected)
+                },
             ]
         };
         let rows = [item(0, 98.95, 10.0), item(1, 80.0, 99.05), item(2, 98.8, 20.0)].concat();
         let counts = start_counts(StartCase::Loop02, &rows);
         let hansen = counts.iter().find(|c| c.search == Search::HansenPem).unwrap();
-        assert_eq!((hansen.items, hansen.arrived, hansen.told, hansen.with_start), (3, 1, Some(1), Some(2)));
+        assert_eq!((hansen.items, hansen.converged, hansen.self_reported, hansen.with_start), (3, 1, Some(1), Some(2)));
         let single = counts.iter().find(|c| c.search == Search::Pem).unwrap();
-        assert_eq!((single.arrived, single.told), (1, None));
+        assert_eq!((single.converged, single.self_reported), (1, None));
         let failures = start_failures(StartCase::Loop02, &rows);
         assert_eq!(failures.iter().map(|f| f.item).collect::<Vec<_>>(), [1, 2]);
         assert_eq!(

@@ -53,7 +53,7 @@ fn without_loop(case: StartCase, index: usize, settings: &StartsSettings, refuse
 /// The model of a search, and what its own diagnostics say.
 struct Found {
     model: GreyBoxModel,
-    lost: bool,
+    local_minimum_suspected: bool,
     note: String,
 }
 
@@ -64,12 +64,12 @@ fn row(problem: &Problem, index: usize, search: Search, settings: &StartsSetting
         Ok((fit, found))
     });
     match judged {
-        Ok((fit, Found { model, lost, note })) => StartRow {
+        Ok((fit, Found { model, local_minimum_suspected, note })) => StartRow {
             status: if model.stable { Status::Stable } else { Status::Unstable },
             fit,
             cost: model.cost,
             steps: Some(model.iterations),
-            lost,
+            local_minimum_suspected,
             note,
             ..empty
         },
@@ -80,7 +80,7 @@ fn row(problem: &Problem, index: usize, search: Search, settings: &StartsSetting
 fn find(problem: &Problem, search: Search, settings: &StartsSettings) -> Result<Found> {
     let (time, start, pem) = (problem.time, &problem.start, &settings.paper.pem);
     let record = [Experiment { u: problem.estimation.u.as_ref(), y: problem.estimation.y.as_ref() }];
-    let plain = |model| Found { model, lost: false, note: String::new() };
+    let plain = |model| Found { model, local_minimum_suspected: false, note: String::new() };
     match search {
         Search::Truth => {
             Ok(greybox(&GreyBoxProblem::new(&BearingStructure, &record, time), &problem.truth, pem).map(plain)?)
@@ -97,7 +97,7 @@ fn find(problem: &Problem, search: Search, settings: &StartsSettings) -> Result<
             let options = SubspacePemOptions { subspace, pem: pem.clone(), ..Default::default() };
             let found = subspace_pem(&GreyBoxProblem::new(&BearingStructure, &record, time), None, &options)?;
             let note = projection_note(&found.projections)?.unwrap_or_default();
-            Ok(Found { lost: found.local_minimum_suspected(), note, model: found.model })
+            Ok(Found { local_minimum_suspected: found.local_minimum_suspected(), note, model: found.model })
         }
     }
 }
@@ -114,7 +114,7 @@ fn from_hansen(problem: &Problem, record: &[Experiment<'_>], settings: &StartsSe
     let found = hansen_pem(data, &GreyBoxProblem::new(&BearingStructure, record, problem.time), None, &options)?;
     let notes = [Some(reflected(&found.hansen)).filter(|note| !note.is_empty()), projection_note(&found.projections)?];
     let note = notes.into_iter().flatten().collect::<Vec<_>>().join("; ");
-    Ok(Found { lost: found.local_minimum_suspected(), note, model: found.model })
+    Ok(Found { local_minimum_suspected: found.local_minimum_suspected(), note, model: found.model })
 }
 
 /// Whether the projection from which the search started is unstable.

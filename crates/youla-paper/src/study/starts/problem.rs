@@ -25,7 +25,7 @@ const PERIODIC: [f64; 2] = [50.0, 70.0];
 /// Part of the damping of the bearing that is left.
 const LIGHT: f64 = 0.05;
 
-/// What a search starts from and is held against.
+/// What a search starts from and is compared with.
 pub(super) struct Problem {
     pub(super) time: Discrete,
     /// True parameters.

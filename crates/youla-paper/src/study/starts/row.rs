@@ -21,8 +21,8 @@ pub struct StartRow {
     pub cost: f64,
     /// Steps of the last search.
     pub steps: Option<usize>,
-    /// Whether its own diagnostics say that it is lost; known of searches without a start only.
-    pub lost: bool,
+    /// Whether its own diagnostics suspect a local minimum; known of searches without a start only.
+    pub local_minimum_suspected: bool,
     /// Why there is no model, or what was done on the way.
     pub note: String,
 }
@@ -38,14 +38,15 @@ impl StartRow {
             fit: [f64::NAN; 2],
             cost: f64::NAN,
             steps: None,
-            lost: false,
+            local_minimum_suspected: false,
             note: String::new(),
         }
     }
 }
 
 impl Line for StartRow {
-    const HEADER: &str = "item,setting,search,status,fit_horizontal,fit_vertical,cost,steps,lost,note,check";
+    const HEADER: &str =
+        "item,setting,search,status,fit_horizontal,fit_vertical,cost,steps,local_minimum_suspected,note,check";
 
     fn item(&self) -> usize {
         self.item
@@ -62,14 +63,15 @@ impl Line for StartRow {
             self.fit[1],
             self.cost,
             self.steps.map_or_else(String::new, |steps| steps.to_string()),
-            if self.lost { "lost" } else { "" },
+            if self.local_minimum_suspected { "local minimum" } else { "" },
             in_one_field(&self.note),
         ))
     }
 
     fn parse(line: &str) -> Option<StartRow> {
         let fields: Vec<&str> = unchecked(line)?.split(',').collect();
-        let [item, setting, search, status, h, v, cost, steps, lost, note] = fields.as_slice().try_into().ok()?;
+        let [item, setting, search, status, h, v, cost, steps, local_minimum_suspected, note] =
+            fields.as_slice().try_into().ok()?;
         Some(StartRow {
             item: str::parse(item).ok()?,
             setting: str::parse(setting).ok()?,
@@ -78,8 +80,8 @@ impl Line for StartRow {
             fit: [str::parse(h).ok()?, str::parse(v).ok()?],
             cost: str::parse(cost).ok()?,
             steps: if str::is_empty(steps) { None } else { Some(str::parse(steps).ok()?) },
-            lost: match lost {
-                "lost" => true,
+            local_minimum_suspected: match local_minimum_suspected {
+                "local minimum" => true,
                 "" => false,
                 _ => return None,
             },
@@ -98,7 +100,7 @@ mod tests {
             fit: [f64::NEG_INFINITY, -1.0 / 3.0],
             cost: 1e-300,
             steps: Some(3),
-            lost: true,
+            local_minimum_suspected: true,
             note: "a, b".into(),
             ..StartRow::without_model(4, 0.1 + 0.2, Search::HansenPem)
         };

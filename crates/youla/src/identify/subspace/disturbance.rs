@@ -87,7 +87,7 @@ pub fn amplitudes(coefficients: MatRef<'_, f64>) -> Vec<Vec<Line>> {
     (0..coefficients.nrows() / 2).map(|j| (0..coefficients.ncols()).map(|i| line(j, i)).collect()).collect()
 }
 
-/// In which columns the regressors of the coefficients of disturbances stand.
+/// In which columns the regressors of the coefficients of disturbances are.
 #[derive(Clone, Copy)]
 pub(super) struct KnownColumns {
     /// Known signals.

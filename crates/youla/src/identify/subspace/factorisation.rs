@@ -96,7 +96,7 @@ impl HankelLq {
         Ok(frame.triangle(r, &data.scale_of_views(), total - taken, report))
     }
 
-    /// In which order the rows stand.
+    /// In which order the rows are.
     pub(super) fn arrangement(&self) -> HankelLayout {
         self.arrangement
     }

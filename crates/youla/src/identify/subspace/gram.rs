@@ -105,7 +105,7 @@ impl Gram {
     }
 }
 
-/// L of a positive definite matrix given by its lower triangle, in its place; what stands above the diagonal has no meaning.
+/// L of a positive definite matrix given by its lower triangle, in its place; what is above the diagonal has no meaning.
 fn cholesky(mut a: Mat<f64>) -> Option<Mat<f64>> {
     let mut memory = MemBuffer::new(cholesky_in_place_scratch::<f64>(a.nrows(), Par::Seq, Default::default()));
     let stack = MemStack::new(&mut memory);
@@ -168,7 +168,7 @@ impl View<'_> {
 
 /// `[L_0 L_1 ...]`, `L_j = sum_{t < columns} z(t) z(t + j)'`, q x q each.
 ///
-/// Frames of B samples stand as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
+/// Frames of B samples are as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
 /// memory; `X Y'` holds all products of samples up to b - 1 apart.
 pub(super) fn lag_sums(view: View<'_>, blocks: usize, columns: usize) -> Mat<f64> {
     let q = view.channels();

@@ -98,7 +98,7 @@ pub struct SubspaceModel {
     pub singular_values: Vec<f64>,
     /// The order, without the states of delays, and what other criteria would have proposed.
     pub order: OrderReport,
-    /// Delay of each input in samples, as given; its states stand behind the others, input by input, newest first.
+    /// Delay of each input in samples, as given; its states are behind the others, input by input, newest first.
     pub delays: Vec<usize>,
     /// The poles and what was done to them.
     pub stability: StabilityReport,

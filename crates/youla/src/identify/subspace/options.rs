@@ -192,7 +192,7 @@ impl AutoOrder {
     }
 }
 
-/// A rule that proposes an order; the formulas stand in `order.rs` and `order_models.rs`.
+/// A rule that proposes an order; the formulas are in `order.rs` and `order_models.rs`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

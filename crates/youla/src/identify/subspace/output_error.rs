@@ -3,7 +3,7 @@
 //!
 //! The regressors of each experiment are folded into a triangular factor `[R11 R12; 0 R22]` over `[x0 | B D y]`: `R22` holds
 //! all that an experiment says about B and D, so that any number of experiments costs no more than one
-//! (SLICOT working note 2000-4, section 2.3, for one experiment). The coefficients of known disturbances stand beside x0.
+//! (SLICOT working note 2000-4, section 2.3, for one experiment). The coefficients of known disturbances are beside x0.
 
 use super::channels::Channels;
 use super::condense::Factors;

@@ -3,7 +3,7 @@
 //! ```text
 //! y(k) = C x(k) + D u(k) + e(k),    then    x(k+1) = A x(k) + B u(k) + K e(k) + rest
 //! ```
-//! by two regressions. Because the innovations stand beside the inputs in the second, a controller that answers to y(k) in
+//! by two regressions. Because the innovations are beside the inputs in the second, a controller that answers to y(k) in
 //! u(k) does not bias it. K comes from the covariance of `[K e + rest; e]` by a Riccati equation: this is the K of the
 //! regression where A - K C is stable and the rest is small, and gives a stable predictor always.
 

@@ -24,7 +24,7 @@ pub(super) struct Predictor {
     pub(super) k: Option<Mat<f64>>,
 }
 
-/// What is sought, and where it stands among the columns.
+/// What is sought, and where it is among the columns.
 pub(super) struct Unknowns {
     pub(super) states: usize,
     pub(super) inputs: usize,
@@ -59,7 +59,7 @@ impl Unknowns {
         self.of_b() + self.of_d_above(self.outputs)
     }
 
-    /// Inputs that stand beside the modes for the sake of D: all or none.
+    /// Inputs that are beside the modes for the sake of D: all or none.
     pub(super) fn through(&self) -> usize {
         if self.direct.iter().any(|inputs| !inputs.is_empty()) { self.inputs } else { 0 }
     }

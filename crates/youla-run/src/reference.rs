@@ -128,7 +128,9 @@ impl<'a> Page<'a> {
         let mut below = Vec::new();
         *self.part() += "\n| key | type | default | meaning |\n|---|---|---|---|\n";
         let (first, rest): (Vec<_>, Vec<_>) = keys.iter().partition(|(key, _)| needed(key));
-        for (key, schema) in first.into_iter().chain(rest) {
+        for (key, schema) in
+            first.into_iter().chain(rest).filter(|(key, _)| !is_named_by_a(key, keys.contains_key("a")))
+        {
             let default = match &schema["default"] {
                 _ if needed(key) => "required".to_owned(),
                 Value::Null => String::new(),
@@ -140,7 +142,8 @@ impl<'a> Page<'a> {
                 true => ("table".to_owned(), String::new()),
                 false => (self.kind(schema), self.choices(schema)),
             };
-            let cells = [format!("`{key}`"), kind, default, text_of(schema).to_owned() + &choices];
+            let named = |name: &str| keys.get(name).map_or("", text_of);
+            let cells = [label(key), kind, default, about_key(key, schema, named) + &choices];
             *self.part() += &row(cells);
             let bare = path.trim_matches(['[', ']']);
             let place = if bare.is_empty() { key.clone() } else { format!("{bare}.{key}") };
@@ -181,8 +184,10 @@ impl<'a> Page<'a> {
         *self.part() +=
             &format!("\nExactly one of these tables:\n\n| table | keys | meaning |\n|---|---|---|\n{forms}");
         *self.part() += "\n| key | type | meaning |\n|---|---|---|\n";
-        for (key, schema) in all {
-            let cells = [format!("`{key}`"), self.kind(schema), text_of(schema).to_owned() + &self.choices(schema)];
+        let matrices = all.iter().any(|(key, _)| *key == "a");
+        let named = |name: &str| all.iter().find(|(key, _)| *key == name).map_or("", |(_, schema)| text_of(schema));
+        for (key, schema) in all.iter().filter(|(key, _)| !is_named_by_a(key, matrices)) {
+            let cells = [label(key), self.kind(schema), about_key(key, schema, named) + &self.choices(schema)];
             *self.part() += &row(cells);
         }
         Vec::new()
@@ -278,6 +283,19 @@ impl<'a> Page<'a> {
     }
 }
 
+/// Whether a key is one of the matrices of a model, which are described in one line with A.
+fn is_named_by_a(key: &str, with_a: bool) -> bool {
+    with_a && matches!(key, "b" | "c" | "d")
+}
+
+fn label(key: &str) -> String {
+    if key == "a" { "`a`, `b`, `c`, `d`".into() } else { format!("`{key}`") }
+}
+
+fn about_key<'a>(key: &str, schema: &'a Value, named: impl Fn(&str) -> &'a str) -> String {
+    if key == "a" { ["a", "b", "c", "d"].map(named).join(" ") } else { text_of(schema).to_owned() }
+}
+
 /// The forms among which a value is chosen.
 fn alternatives(schema: &Value) -> impl Iterator<Item = &Value> {
     schema["oneOf"].as_array().or(schema["anyOf"].as_array()).into_iter().flatten()
@@ -321,7 +339,6 @@ mod tests {
         let keys: Vec<&str> =
             of_user.lines().filter(|line| line.starts_with("| `") && !line.starts_with("| `[")).collect();
         let count = keys.iter().filter(|line| !tables(line)).count();
-        println!("{count} of {} rows: {keys:#?}", keys.len());
         assert!((40..=80).contains(&count), "{count} keys:\n{}", keys.join("\n"));
         assert!(!of_user.contains("## `[check]`") && check.contains("## `[check]`"));
     }

@@ -155,7 +155,7 @@ fn kernels(single: &rayon::ThreadPool) -> Result<()> {
     const SAMPLES: usize = 1_000_000;
     let (horizon, channels) = (20, 4);
     let (_, u, y) = bearing_record(SAMPLES)?;
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let width = 2 * horizon * channels;
     let lag_sums = 2.0 * (SAMPLES * channels * width) as f64;
     let by_qr = 2.0 * (SAMPLES * width * width) as f64;
@@ -237,7 +237,7 @@ fn whole_identification(single: &rayon::ThreadPool) -> Result<()> {
     let time = Discrete::new(TS)?;
     for (samples, horizon) in [(5_000, 20), (100_000, 20), (1_000_000, 20), (1_000_000, 40)] {
         let (_, u, y) = bearing_record(samples)?;
-        let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
         let options = SubspaceOptions { order: Order::Fixed(6), horizon, ..SubspaceOptions::default() };
         let by_qr = SubspaceOptions { factorisation: Factorisation::Qr, ..options.clone() };
         let call = || subspace(&experiments, time, &options);

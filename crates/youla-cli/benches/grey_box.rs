@@ -145,7 +145,7 @@ fn one(folder: &Path, factor: f64) -> Result<()> {
     let start: Vec<f64> = structure.start().iter().map(|value| factor * value).collect();
     assert_eq!(structure.names().len(), 16);
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..GreyBoxOptions::default() };
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
     let begun = Instant::now();
     let found = greybox(&Problem::new(&structure, &experiment, Discrete::new(TS)?), &start, &options)?;
     let seconds = begun.elapsed().as_secs_f64();

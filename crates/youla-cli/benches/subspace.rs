@@ -180,7 +180,7 @@ fn one(folder: &Path, horizon: usize, order: usize) -> Result<()> {
         ..SubspaceOptions::default()
     };
     let identify = |samples: usize| {
-        let experiment = Experiment { u: u.subrows(0, samples), y: y.subrows(0, samples) };
+        let experiment = Experiment::new(u.subrows(0, samples), y.subrows(0, samples));
         subspace(&[experiment], Discrete::new(TS)?, &options).map(|found| found.model)
     };
     let mut model = identify(2000)?;

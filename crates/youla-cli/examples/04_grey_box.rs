@@ -22,7 +22,7 @@ fn main() -> Result<()> {
 
     // Through the loop, from alpha: consistent whatever the noise, because alpha does not depend on it.
     let (controller, options) = (machine.factors.j_k()?, GreyBoxOptions::default());
-    let data = [Experiment { u: log.alpha.as_ref(), y: log.y.as_ref() }];
+    let data = [Experiment::new(log.alpha.as_ref(), log.y.as_ref())];
     let found = greybox(
         &Problem::new(&BearingStructure, &data, time).in_loop(&controller, LoopOutput::Plant),
         &start,

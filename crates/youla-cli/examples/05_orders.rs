@@ -7,7 +7,7 @@
 mod machine;
 
 use youla::Result;
-use youla::identify::hansen::{deviation_data, hansen};
+use youla::identify::hansen::HansenData;
 use youla::identify::subspace::stabilisation::{StabilisationOptions, stabilisation};
 use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::validate::{fit, predict_open_loop};
@@ -19,9 +19,9 @@ fn main() -> Result<()> {
     let of_order = |order| SubspaceOptions { horizon: 30, order: Order::Fixed(order), ..Default::default() };
 
     let options = of_order(20);
-    let data = deviation_data(&machine.factors, &signals, &[], &options)?;
+    let data = HansenData::new(&machine.factors, &signals, &options)?;
     let orders: Vec<usize> = (1..=20).collect();
-    let diagram = stabilisation(&data, &orders, &options, &StabilisationOptions::default())?;
+    let diagram = stabilisation(data.subspace(), &orders, &options, &StabilisationOptions::default())?;
     println!("modes of S that stay over the orders");
     for cluster in &diagram.clusters {
         println!("  {:8.2} Hz, damping ratio {:.4}, in {} of 20 orders", cluster.hz, cluster.zeta, cluster.orders);
@@ -29,7 +29,7 @@ fn main() -> Result<()> {
 
     println!("fit of G(S) on fresh data");
     for order in [2, 4, 6, 8, 12, 16] {
-        let found = hansen(&machine.factors, &signals, &of_order(order))?;
+        let found = data.identify(&of_order(order).into())?;
         let predicted = predict_open_loop(&found.plant, fresh.u.as_ref(), fresh.y.as_ref())?;
         println!("  S of order {order:2}: {:.2?} %", fit(fresh.y.as_ref(), predicted.as_ref())?);
     }

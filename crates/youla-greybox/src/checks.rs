@@ -32,7 +32,11 @@ pub(super) fn check_records(
     unknowns: usize,
 ) -> Result<usize> {
     let mut rows = 0;
-    for (k, Experiment { u, y }) in experiments.iter().enumerate() {
+    for (k, Experiment { u, y, disturbance }) in experiments.iter().enumerate() {
+        if disturbance.is_some() {
+            let (what, instead) = ("a known disturbance in a grey-box estimate", "subtract it from the outputs first");
+            return Err(Error::Method(youla::Error::Unsupported { what, instead }));
+        }
         let named = |what: &str| format!("the {what} record of experiment {}", k + 1);
         check_shape(&named("input"), *u, (u.nrows(), inputs))?;
         check_shape(&named("output"), *y, (u.nrows(), outputs))?;

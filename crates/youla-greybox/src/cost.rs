@@ -23,7 +23,7 @@ use crate::Result;
 /// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
 /// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
 /// let truth = bearing.start();
-/// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let records = [Experiment::new(u.as_ref(), y.as_ref())];
 /// assert!(greybox_cost(&Problem::new(&bearing, &records, time), &truth, &GreyBoxOptions::default())? < 1e-15);
 /// # Ok::<(), youla_greybox::Error>(())
 /// ```

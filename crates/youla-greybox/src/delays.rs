@@ -22,7 +22,7 @@ impl<'a> Shifted<'a> {
         if longest == 0 {
             return Ok(Shifted { delays, given, inputs: Vec::new() });
         }
-        for (k, Experiment { u, y }) in given.iter().enumerate() {
+        for (k, Experiment { u, y, .. }) in given.iter().enumerate() {
             check_shape(&format!("the input record of experiment {}", k + 1), *u, (u.nrows(), columns))?;
             check_shape(&format!("the output record of experiment {}", k + 1), *y, (u.nrows(), y.ncols()))?;
             if u.nrows() <= longest {
@@ -41,7 +41,7 @@ impl<'a> Shifted<'a> {
         }
         let longest = self.delays.longest();
         let pairs = self.inputs.iter().zip(self.given);
-        pairs.map(|(u, e)| Experiment { u: u.as_ref(), y: e.y.subrows(longest, u.nrows()) }).collect()
+        pairs.map(|(u, e)| Experiment::new(u.as_ref(), e.y.subrows(longest, u.nrows()))).collect()
     }
 
     /// The states of the structure with those of the delays behind them.

@@ -118,7 +118,7 @@ pub fn hansen_pem(
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
-    let found = hansen(data.factors, data.signals, &options.hansen)?;
+    let found = hansen(data.factors, data.signals, &options.hansen.clone().into())?;
     pem_from_hansen(found, data, problem, nominal, options)
 }
 
@@ -174,7 +174,7 @@ pub fn projection_target(
     options: &HansenPemOptions,
 ) -> Result<FrequencyTarget> {
     let (p, m, time) = (factors.outputs(), factors.inputs(), s.time());
-    let alpha: Vec<_> = signals.iter().map(|s| s.alpha.as_ref()).collect();
+    let alpha: Vec<_> = signals.iter().map(|s| s.alpha()).collect();
     let grid = Grid::new("alpha", &alpha, options.window, options.frequencies, time)?;
     let weights = grid.weights(&alpha, p, &options.pem)?;
     let decay = options.decay / grid.shortest;

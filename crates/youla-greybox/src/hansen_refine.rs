@@ -12,6 +12,7 @@ use super::refine::{RefineNoise, RefineOptions, RefinedModel, refine};
 use crate::Stop;
 use crate::{Error, Result};
 use serde::Serialize;
+use youla::Mat;
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::hansen::HansenModel;
 use youla::identify::innovation_form::InnovationForm;
@@ -20,7 +21,6 @@ use youla::identify::subspace::{
 };
 use youla::linalg::{block, check_shape};
 use youla::lti::{Discrete, StateSpace, simulate};
-use youla::{Mat, MatRef};
 
 /// What a refinement changed.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -60,8 +60,8 @@ pub struct RefinedHansen {
 ///
 /// The innovation form begins with K_s of [`HansenModel::innovation_form`] or the Kalman gain of S, at zero where there is none.
 /// The uncertainty of the subspace method is that of another fit then, and is refused; [`SubspaceModel::fit`] and
-/// [`SubspaceModel::stability`] are those of the refined S. `disturbances` are the known disturbances with which S was
-/// identified (none: an empty slice); their estimated size is subtracted from beta.
+/// [`SubspaceModel::stability`] are those of the refined S. `signals` are those from which S was identified; known disturbances
+/// are subtracted from beta with the size that was estimated with S.
 ///
 /// # Errors
 /// As [`refine`]; [`youla::Error::OutOfRange`] for an S with delays; [`youla::Error::AlgebraicLoop`] when G(S) is not well posed;
@@ -70,16 +70,17 @@ pub fn refine_hansen(
     found: HansenModel,
     factors: &CoprimeFactors<Discrete>,
     signals: &[YoulaSignals],
-    disturbances: &[MatRef<'_, f64>],
     options: &RefineOptions,
 ) -> Result<RefinedHansen> {
     if let Some(delay) = found.deviation.delays.iter().find(|delay| **delay > 0) {
         let (what, must) = ("a delay of an S that is to be refined".into(), "0");
         return Err(Error::Method(youla::Error::OutOfRange { what, value: *delay as f64, must }));
     }
-    let cleaned = without_disturbances(signals, disturbances, &found.deviation)?;
-    let experiments: Vec<Experiment<'_>> =
-        signals.iter().zip(&cleaned).map(|(s, beta)| Experiment { u: s.alpha.as_ref(), y: beta.as_ref() }).collect();
+    let cleaned = without_disturbances(signals, &found.deviation)?;
+    let mut experiments = Vec::new();
+    for (s, cleaned) in signals.iter().zip(&cleaned) {
+        experiments.push(Experiment::new(s.alpha(), cleaned.as_ref().map_or_else(|| s.beta(), |beta| beta.as_ref())));
+    }
     let form = found.innovation_form.as_ref().map(|form| form.gain.as_ref());
     let refined =
         refine(&found.deviation.model, form.or_else(|| found.deviation.innovation.gain()), &experiments, options)?;
@@ -114,26 +115,20 @@ pub fn refine_hansen(
     Ok(RefinedHansen { model, refinement })
 }
 
-/// beta less the disturbances that were found with S.
-fn without_disturbances(
-    signals: &[YoulaSignals],
-    disturbances: &[MatRef<'_, f64>],
-    deviation: &SubspaceModel,
-) -> Result<Vec<Mat<f64>>> {
-    let (expected, found) = (deviation.disturbances.len(), disturbances.len());
+/// beta less the disturbances that were found with S, for each experiment that has any.
+fn without_disturbances(signals: &[YoulaSignals], deviation: &SubspaceModel) -> Result<Vec<Option<Mat<f64>>>> {
+    let (expected, found) =
+        (deviation.disturbances.len(), signals.iter().filter_map(YoulaSignals::disturbance).count());
     if expected != found {
-        let what = "the number of matrices of known disturbances of an S that is to be refined".into();
+        let what = "the number of experiments with known disturbances of an S that is to be refined".into();
         return Err(Error::Method(youla::Error::Ports { what, expected, found }));
     }
-    if disturbances.is_empty() {
-        return Ok(signals.iter().map(|s| s.beta.clone()).collect());
-    }
-    let mut cleaned = Vec::new();
-    for ((s, known), size) in signals.iter().zip(disturbances).zip(&deviation.disturbances) {
-        check_shape("the known disturbances", *known, (s.beta.nrows(), size.nrows()))?;
-        cleaned.push(&s.beta - known * size);
-    }
-    Ok(cleaned)
+    let cleaned = |(k, s): (usize, &YoulaSignals)| {
+        let Some((known, size)) = s.disturbance().zip(deviation.disturbances.get(k)) else { return Ok(None) };
+        check_shape("the known disturbances", known, (s.samples(), size.nrows()))?;
+        Ok(Some(s.beta() - known * size))
+    };
+    signals.iter().enumerate().map(cleaned).collect()
 }
 
 /// The evidence of the subspace method with what belongs to the refined model in the place of what belonged to its own.

@@ -19,7 +19,7 @@
 //! let (truth, time) = (structure.start(), Discrete::new(5e-3)?);
 //! let u = Mat::from_fn(600, 1, |k, _| if (k * k / 90) % 2 == 0 { 1.0 } else { -1.0 });
 //! let y = simulate(&structure.sampled(&truth, time)?, u.as_ref(), &[0.0; 2])?;
-//! let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+//! let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
 //! let start: Vec<f64> = truth.iter().map(|v| 1.1 * v).collect();
 //! let estimate = greybox(&Problem::new(&structure, &experiments, time), &start, &GreyBoxOptions::default())?;
 //! assert!((estimate.parameters[0] / truth[0] - 1.0).abs() < 1e-6);
@@ -131,7 +131,7 @@ use estimate::estimate;
 /// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
 /// let truth = bearing.start();
 /// let start: Vec<f64> = truth.iter().map(|v| 0.9 * v).collect();
-/// let experiment = Experiment { u: u.as_ref(), y: y.as_ref() };
+/// let experiment = Experiment::new(u.as_ref(), y.as_ref());
 /// let found = greybox(&Problem::new(&bearing, &[experiment], time), &start, &GreyBoxOptions::default())?;
 /// assert!((found.parameters[0] / truth[0] - 1.0).abs() < 1e-6);
 /// # Ok::<(), youla_greybox::Error>(())

@@ -96,7 +96,7 @@ pub struct MultiStart {
 /// let truth = bearing.start();
 /// let start: Vec<f64> = truth.iter().map(|v| 1.3 * v).collect();
 /// let options = MultiStartOptions { starts: 4, searched: Some(1), ..Default::default() };
-/// let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
 /// let found =
 ///     greybox_multi_start(&Problem::new(&bearing, &experiments, time), &start, &options)?;
 /// assert_eq!((found.runs.len(), found.runs.iter().filter(|run| run.end.is_some()).count()), (4, 1));

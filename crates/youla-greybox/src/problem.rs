@@ -18,7 +18,7 @@ use youla::lti::{Discrete, Partitioned};
 /// use youla_greybox::{DeclaredStructure, Problem, Template};
 /// let structure = DeclaredStructure::new(&Template::MassSpringDamper.declaration()?)?;
 /// let (u, y) = (Mat::zeros(100, 1), Mat::zeros(100, 1));
-/// let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
 /// let problem = Problem::new(&structure, &experiments, Discrete::new(5e-3)?);
 /// assert_eq!(problem.experiments().len(), 1);
 /// # Ok::<(), youla_greybox::Error>(())

@@ -99,7 +99,7 @@ impl<'a> Simulated<'a> {
 
     /// The records, sample after sample, the outputs divided by their deviations.
     pub(super) fn samples(&self, experiment: &Experiment<'_>, deviations: &[f64]) -> Result<Samples> {
-        let Experiment { u, y } = *experiment;
+        let Experiment { u, y, .. } = *experiment;
         Ok(match self {
             Simulated::Plant | Simulated::Loop(_) => interleave(&[u], y, deviations),
             Simulated::Predictor(_) => interleave(&[u, y], y, deviations),

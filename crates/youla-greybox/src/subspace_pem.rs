@@ -107,7 +107,7 @@ impl SubspacePem {
 /// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
 /// let mut options = SubspacePemOptions::default();
 /// options.subspace.order = Order::Fixed(6);
-/// let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
 /// let problem = Problem::new(&bearing, &experiments, time);
 /// let found = subspace_pem(&problem, None, &options)?;
 /// assert!((found.model.parameters[4] / -1.869e6 - 1.0).abs() < 1e-6 && !found.local_minimum_suspected());

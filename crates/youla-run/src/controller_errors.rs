@@ -16,7 +16,7 @@ use faer::Scale;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use youla::Mat;
-use youla::identify::hansen::{HansenModel, deviation_data, hansen_structured};
+use youla::identify::hansen::{HansenModel, HansenOptions, hansen};
 use youla::identify::subspace::{Stability, SubspaceOptions, UncertaintyOptions};
 use youla::linalg::eye;
 use youla::lti::{Mode, StateSpace};
@@ -156,11 +156,10 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
     let factors = factorise(&run.declared.nominal, &described, &records, &settings.factors)?.factors;
     let dropped = if error == ControllerError::InitialState { 0 } else { settle };
     let signals = deviation_signals(&factors, &records.estimation, Some(dropped))?;
-    let lines = records.disturbances(signals.settle);
     let uncertainty = UncertaintyOptions::default();
-    let options = SubspaceOptions { uncertainty, stability: Stability::Allow, ..settings.hansen.clone() };
-    let data = deviation_data(&factors, &signals.experiments, &lines, &options)?;
-    Ok(hansen_structured(&factors, &data, &options, &settings.deviation.options())?)
+    let subspace = SubspaceOptions { uncertainty, stability: Stability::Allow, ..settings.hansen.clone() };
+    let options = HansenOptions { subspace, noise: settings.deviation.noise() };
+    Ok(hansen(&factors, &signals.experiments, &options)?)
 }
 
 /// The record as an error leaves it.

@@ -20,7 +20,7 @@ pub(super) fn direct(
 }
 
 fn model(records: &RunRecords, options: &SubspaceOptions) -> Result<(SubspaceModel, Result<StabilisationDiagram>)> {
-    let data = SubspaceData::disturbed(&records.experiments(), &records.disturbances(0), records.time, options)?;
+    let data = SubspaceData::new(&records.experiments(), records.time, options)?;
     let model = data.identify(options)?;
     let diagram = diagram(&data, &model, options);
     Ok((model, diagram))

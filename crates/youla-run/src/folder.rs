@@ -18,7 +18,6 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla::MatRef;
-use youla::factor::YoulaSignals;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
@@ -112,12 +111,12 @@ impl Writer<'_> {
     /// `3-signals/`: alpha and beta of each estimation record.
     fn signals(&self) -> Result<()> {
         let Ok(Filtered { signals: s, .. }) = &self.found.filtered else { return Ok(()) };
-        for (record, YoulaSignals { alpha, beta }) in self.found.records.estimation.iter().zip(&s.experiments) {
+        for (record, signals) in self.found.records.estimation.iter().zip(&s.experiments) {
             let variables = [
                 number("ts", record.time.ts()),
                 number("dropped_samples", s.settle as f64),
-                array("alpha", alpha.as_ref()),
-                array("beta", beta.as_ref()),
+                array("alpha", signals.alpha()),
+                array("beta", signals.beta()),
             ];
             self.mat(&format!("3-signals/{}.mat", record.name), &variables)?;
         }

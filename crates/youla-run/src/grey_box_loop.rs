@@ -76,7 +76,7 @@ impl<'a> Criterion<'a> {
             None => self.records.estimation[k].u.as_ref(),
             Some(closed) => closed.external[k].as_ref(),
         };
-        self.outputs.iter().enumerate().map(|(k, y)| Experiment { u: input(k), y: y.as_ref() }).collect()
+        self.outputs.iter().enumerate().map(|(k, y)| Experiment::new(input(k), y.as_ref())).collect()
     }
 
     /// The best of the searches from the projection of G(S) and from the initial values.

@@ -17,7 +17,7 @@ use super::stabilisation::drawn;
 use super::stage::StageTimes;
 use super::verdict::ModelVerdict;
 use crate::Result;
-use youla::Mat;
+use youla::MatRef;
 use youla::identify::subspace::SubspaceModel;
 use youla::signal::Channel;
 use youla_loop::check::{Finding, Severity};
@@ -167,12 +167,12 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
         channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
     };
     let mut drawn = Vec::new();
-    let mut add = |kind: SignalKind, channels: &[Channel], data: &Mat<f64>| -> Result<()> {
+    let mut add = |kind: SignalKind, channels: &[Channel], data: MatRef<'_, f64>| -> Result<()> {
         let dropped = record.samples() - data.nrows();
         for (j, channel) in channels.iter().enumerate() {
             // Samples dropped at the start are a gap, so that all signals share one clock.
             let mut values = vec![f64::NAN; dropped];
-            values.extend_from_slice(data.col_as_slice(j));
+            values.extend(data.col(j).iter());
             let trace = Trace::new(&channel.name, &values, &clock)?;
             drawn.push(draw::Signal { kind, channel: channel.clone(), trace });
         }
@@ -185,15 +185,15 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
         (&data.alpha, &record.alpha),
     ] {
         if let Some(excitation) = excitation {
-            add(SignalKind::Excitation, &channels_of(specs), excitation)?;
+            add(SignalKind::Excitation, &channels_of(specs), excitation.as_ref())?;
         }
     }
-    add(SignalKind::Input, u, &record.u)?;
-    add(SignalKind::Output, y, &record.y)?;
+    add(SignalKind::Input, u, record.u.as_ref())?;
+    add(SignalKind::Output, y, record.y.as_ref())?;
     if let Ok(filtered) = &found.filtered {
         let signals = &filtered.signals.experiments[k];
-        add(SignalKind::Alpha, &named("alpha", u), &signals.alpha)?;
-        add(SignalKind::Beta, &named("beta", y), &signals.beta)?;
+        add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
+        add(SignalKind::Beta, &named("beta", y), signals.beta())?;
     }
     Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
 }

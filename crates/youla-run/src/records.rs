@@ -8,11 +8,11 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
+use youla::Mat;
 use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::signal::Record;
-use youla::{Mat, MatRef};
 use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256};
 
 /// One record of a machine under feedback, samples x channels each.
@@ -76,15 +76,9 @@ impl RunRecords {
         (u, rms(estimation.map(|r| &r.y), self.outputs.len()))
     }
 
-    /// The estimation records as (u, y).
+    /// The estimation records as (u, y), with their known lines.
     pub fn experiments(&self) -> Vec<Experiment<'_>> {
-        self.estimation.iter().map(|r| Experiment { u: r.u.as_ref(), y: r.y.as_ref() }).collect()
-    }
-
-    /// The known lines of the estimation records without their first samples; none where no record has any.
-    pub fn disturbances(&self, dropped: usize) -> Vec<MatRef<'_, f64>> {
-        let known = self.estimation.iter().filter_map(|r| r.disturbance.as_ref());
-        known.map(|w| w.as_ref().subrows(dropped, w.nrows().saturating_sub(dropped))).collect()
+        self.estimation.iter().map(LoopRecord::experiment).collect()
     }
 }
 
@@ -187,6 +181,12 @@ impl LoopRecord {
             alpha: optional(alpha)?,
             disturbance: None,
         })
+    }
+
+    /// (u, y) with the known lines.
+    pub fn experiment(&self) -> Experiment<'_> {
+        let disturbance = self.disturbance.as_ref().map(|w| w.as_ref());
+        Experiment { disturbance, ..Experiment::new(self.u.as_ref(), self.y.as_ref()) }
     }
 
     /// Number of samples.

@@ -4,8 +4,7 @@ use super::context::SchemeContext;
 use super::records::RunRecords;
 use super::stabilisation::diagram;
 use crate::{Error, Result};
-use youla::identify::hansen::hansen_structured;
-use youla::identify::hansen::{HansenModel, deviation_data};
+use youla::identify::hansen::{HansenData, HansenModel, HansenOptions};
 use youla::identify::subspace::SubspaceOptions;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla_greybox::hansen_refine::{RefinedHansen, Refinement, refine_hansen};
@@ -23,16 +22,16 @@ pub(super) struct Scheme {
 /// S, G(S) and the diagram of S.
 ///
 /// # Errors
-/// Those of [`hansen_structured`] and of the refinement.
+/// Those of [`HansenData::identify`] and of the refinement.
 pub(super) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     let SchemeContext { run, factorisation, signals } = context;
     let (settings, factors) = (run.settings, &factorisation.factors);
-    let lines = run.records.disturbances(signals.settle);
-    let data = deviation_data(factors, &signals.experiments, &lines, &settings.hansen)?;
-    let hansen = hansen_structured(factors, &data, &settings.hansen, &settings.deviation.options())?;
-    let diagram = diagram(&data, &hansen.deviation, &settings.hansen);
+    let data = HansenData::new(factors, &signals.experiments, &settings.hansen)?;
+    let options = HansenOptions { subspace: settings.hansen.clone(), noise: settings.deviation.noise() };
+    let hansen = data.identify(&options)?;
+    let diagram = diagram(data.subspace(), &hansen.deviation, &settings.hansen);
     let Some(options) = &settings.deviation.refine else { return Ok(Scheme { hansen, refinement: None, diagram }) };
-    let refined = refine_hansen(hansen, factors, &signals.experiments, &lines, options);
+    let refined = refine_hansen(hansen, factors, &signals.experiments, options);
     let RefinedHansen { model, refinement } = refined.map_err(|e| e.within("[deviation] refine"))?;
     Ok(Scheme { hansen: model, refinement: Some(refinement), diagram })
 }

@@ -65,16 +65,19 @@ pub fn deviation_signals(
             let (found, needed) = (record.samples(), settle + 1);
             return Err(Error::Method(youla::Error::TooFewSamples { what, found, needed }));
         }
-        let kept = |m: &Mat<f64>| m.subrows(settle, m.nrows() - settle).to_owned();
         let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
-        experiments.push(YoulaSignals { alpha: kept(&signals.alpha), beta: kept(&signals.beta) });
+        let signals = match &record.disturbance {
+            Some(lines) => signals.with_disturbance(lines.clone())?,
+            None => signals,
+        };
+        experiments.push(signals.after(settle)?);
         if let Some(expected) = expected(factors, record)? {
-            expected_alpha.push(kept(&expected));
+            expected_alpha.push(expected.subrows(settle, expected.nrows() - settle).to_owned());
         }
     }
     let controller_mismatch = (!expected_alpha.is_empty()).then(|| {
         let pairs = || experiments.iter().zip(&expected_alpha);
-        let miss: f64 = pairs().map(|(s, e)| (&s.alpha - e).squared_norm_l2()).sum();
+        let miss: f64 = pairs().map(|(s, e)| (s.alpha() - e).squared_norm_l2()).sum();
         let size: f64 = pairs().map(|(_, e)| e.squared_norm_l2()).sum();
         (miss / size).sqrt()
     });
@@ -96,9 +99,11 @@ pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) 
     let (u, y) = (&records.inputs, &records.outputs);
     let channels = [named("alpha", u), named("beta", y), named("eta", u)].concat();
     let one = |record: &LoopRecord| {
-        let YoulaSignals { alpha: eta, beta } = factors.signals(record.u.as_ref(), record.y.as_ref())?;
-        let alpha = expected(factors, record)?.unwrap_or_else(|| eta.clone());
-        let data = block(&[&[alpha.as_ref(), beta.as_ref(), eta.as_ref()]]);
+        let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        let (eta, beta) = (signals.alpha(), signals.beta());
+        let expected = expected(factors, record)?;
+        let alpha = expected.as_ref().map_or(eta, |alpha| alpha.as_ref());
+        let data = block(&[&[alpha, beta, eta]]);
         Ok(Record::new(&record.name, channels.clone(), data, record.time)?)
     };
     records.estimation.iter().map(one).collect()

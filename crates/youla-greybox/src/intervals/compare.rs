@@ -59,7 +59,7 @@ pub struct ComparedStructure {
 /// let clean = simulate(&larger.model(&theta)?.zoh(time)?, u.as_ref(), &[0.0; 2])?;
 /// let noise = |k: usize| 1e-4 * (((k * 7919 + 13) * (k + 5)) % 1009) as f64 / 1009.0;
 /// let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + noise(k));
-/// let (records, options) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], GreyBoxOptions::default());
+/// let (records, options) = ([Experiment::new(u.as_ref(), y.as_ref())], GreyBoxOptions::default());
 /// let estimate = |s: &DeclaredStructure| greybox(&Problem::new(s, &records, time), &s.start(), &options);
 /// let test = likelihood_ratio(&estimate(&smaller)?, &estimate(&larger)?)?;
 /// assert!(test.degrees_of_freedom == 1 && test.p_value > 1e-4);

@@ -135,7 +135,7 @@ pub struct GreyBoxIntervals {
 /// let clean = simulate(&structure.model(&theta)?.zoh(time)?, u.as_ref(), &[0.0; 2])?;
 /// let noise = |k: usize| 1e-4 * (((k * 7919 + 13) * (k + 5)) % 1009) as f64 / 1009.0;
 /// let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + noise(k));
-/// let (records, options) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], GreyBoxOptions::default());
+/// let (records, options) = ([Experiment::new(u.as_ref(), y.as_ref())], GreyBoxOptions::default());
 /// let problem = Problem::new(&structure, &records, time);
 /// let found = greybox(&problem, &theta, &options)?;
 /// let known = greybox_intervals(&problem, &found, &options, &IntervalOptions::default())?;

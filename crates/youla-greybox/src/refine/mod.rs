@@ -144,7 +144,7 @@ pub struct RefinedModel {
 /// };
 /// let u = Mat::from_fn(300, 1, |k, _| ((k * k) as f64).sin());
 /// let y = simulate(&lag(0.7, 2.0)?, u.as_ref(), &[0.0])?;
-/// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let records = [Experiment::new(u.as_ref(), y.as_ref())];
 /// let found = refine(&lag(0.6, 1.8)?, None, &records, &RefineOptions::default())?;
 /// assert!((found.model.a()[(0, 0)] - 0.7).abs() < 1e-8);
 /// # Ok::<(), youla_greybox::Error>(())

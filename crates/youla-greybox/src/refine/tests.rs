@@ -68,7 +68,7 @@ fn local_coordinates_leave_the_states_alone() {
 #[test]
 fn similar_starts_end_alike() {
     let [u, y] = noisy(2000, 0.3, 1);
-    let experiment = Experiment { u: u.as_ref(), y: y.as_ref() };
+    let experiment = Experiment::new(u.as_ref(), y.as_ref());
     let start = n4sid(experiment, 6);
     let t = Mat::from_fn(6, 6, |i, j| if i == j { 2.0 } else { ((3 * i + 7 * j) as f64).sin() });
     let inverse = youla::linalg::solve("T", t.as_ref(), eye(6).as_ref()).unwrap();
@@ -98,7 +98,7 @@ fn a_refined_estimate_comes_near_the_grey_box() {
     let mut sums = [0.0; 3];
     for seed in 0..6 {
         let [u, y] = noisy(3000, 0.3, 10 + seed);
-        let experiment = Experiment { u: u.as_ref(), y: y.as_ref() };
+        let experiment = Experiment::new(u.as_ref(), y.as_ref());
         let start = n4sid(experiment, 6);
         let refined = refine(&start, None, &[experiment], &from_rest()).unwrap();
         assert!(refined.stop == Stop::Converged && refined.cost < refined.cost_before, "{:?}", refined.stop);
@@ -136,7 +136,7 @@ fn process_noise_is_refined_in_innovation_form() {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let w = Mat::from_fn(2000, 2, |_, _| rng.sample::<f64, _>(StandardNormal));
         let y = simulate(&disturbed, w.as_ref(), &[0.0; 2]).unwrap();
-        let experiment = Experiment { u: w.as_ref().subcols(0, 1), y: y.as_ref() };
+        let experiment = Experiment::new(w.as_ref().subcols(0, 1), y.as_ref());
         let options = SubspaceOptions { horizon: 10, order: Order::Fixed(2), ..SubspaceOptions::default() };
         let start = subspace(&[experiment], time, &options).unwrap();
         let refined = |noise| {
@@ -156,7 +156,7 @@ fn process_noise_is_refined_in_innovation_form() {
 #[test]
 fn an_unstable_start_is_refused_unless_asked_for() {
     let [u, y] = clean(300, 3);
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
     let stable = plant();
     let a = stable.a() * Scale(1.03);
     let start = StateSpace::new(a, stable.b().to_owned(), stable.c().to_owned(), stable.d().to_owned(), time());

@@ -34,7 +34,7 @@ fn log(noise: f64, seed: u64) -> (Mat<f64>, Mat<f64>) {
 #[test]
 fn a_record_without_noise_gives_the_parameters_without_a_start() {
     let (u, y) = log(0.0, 1);
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let found =
         subspace_pem(&Problem::new(bearing(), &experiments, Discrete::new(2e-4).unwrap()), None, &options()).unwrap();
     let truth = truth();
@@ -49,7 +49,7 @@ fn a_record_without_noise_gives_the_parameters_without_a_start() {
 #[test]
 fn noise_leaves_the_maximum_likelihood_estimate() {
     let (u, y) = log(0.5, 2);
-    let (time, experiments) = (Discrete::new(2e-4).unwrap(), [Experiment { u: u.as_ref(), y: y.as_ref() }]);
+    let (time, experiments) = (Discrete::new(2e-4).unwrap(), [Experiment::new(u.as_ref(), y.as_ref())]);
     let truth = truth();
     let nominal: Vec<f64> = truth.iter().map(|v| 0.1 * v).collect();
     let found = subspace_pem(&Problem::new(bearing(), &experiments, time), Some(&nominal), &options()).unwrap();
@@ -62,7 +62,7 @@ fn noise_leaves_the_maximum_likelihood_estimate() {
 #[test]
 fn a_record_that_is_too_short_is_refused() {
     let (u, y) = log(0.0, 1);
-    let experiments = [Experiment { u: u.as_ref().subrows(0, 60), y: y.as_ref().subrows(0, 60) }];
+    let experiments = [Experiment::new(u.as_ref().subrows(0, 60), y.as_ref().subrows(0, 60))];
     let mut few = options();
     few.subspace.horizon = 5;
     let refused = subspace_pem(&Problem::new(bearing(), &experiments, Discrete::new(2e-4).unwrap()), None, &few);
@@ -81,7 +81,7 @@ fn a_projection_beyond_a_bound_starts_at_the_bound() {
     declared.parameters.get_mut("damping_hh").unwrap().min = Some(-200.0);
     declared.parameters.get_mut("damping_hh").unwrap().initial = Some(-100.0);
     let structure = DeclaredStructure::new(&declared).unwrap();
-    let (time, experiments) = (Discrete::new(2e-4).unwrap(), [Experiment { u: u.as_ref(), y: y.as_ref() }]);
+    let (time, experiments) = (Discrete::new(2e-4).unwrap(), [Experiment::new(u.as_ref(), y.as_ref())]);
     let found = subspace_pem(&Problem::new(&structure, &experiments, time), None, &options()).unwrap();
     assert!((found.projections[0].parameters[0] / -224.9 - 1.0).abs() < 1e-6, "{:?}", found.projections[0].parameters);
     assert_eq!((found.model.parameters[0], found.model.at_bounds.len()), (-200.0, 1));
@@ -97,7 +97,7 @@ fn a_known_delay_is_not_projected_on_the_structure() {
     let mut options = options();
     (options.subspace.delays, options.pem.delays) = (vec![late, 0], vec![late, 0]);
     (options.subspace.initial_state, options.pem.initial_state) = (InitialState::Estimated, InitialState::Estimated);
-    let experiments = [Experiment { u: early.as_ref(), y: y.subrows(0, rows) }];
+    let experiments = [Experiment::new(early.as_ref(), y.subrows(0, rows))];
     let found =
         subspace_pem(&Problem::new(bearing(), &experiments, Discrete::new(2e-4).unwrap()), None, &options).unwrap();
     let truth = truth();

@@ -74,7 +74,7 @@ fn gradient_of_the_loop_is_that_of_the_criterion() {
     let (controller, theta) = (controller(), [3.9, 0.6, 12.5, 29.0]);
     for (output, seen) in [(LoopOutput::Plant, &y), (LoopOutput::Deviation, &beta)] {
         for initial in [InitialState::Zero, InitialState::Estimated, InitialState::SteadyState] {
-            let experiment = [Experiment { u: w.as_ref(), y: seen.as_ref() }];
+            let experiment = [Experiment::new(w.as_ref(), seen.as_ref())];
             let closure = Some(Closure::new(&controller, output));
             let compared = Comparison { closure, ..comparison(&NoiseModel::OutputError, initial, &[0.7]) };
             let criterion = Criterion::new(&Pendulum, &theta, &experiment, time(), compared).unwrap();
@@ -92,7 +92,7 @@ fn an_unstable_plant_is_found_in_its_loop() {
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..Default::default() };
     let find = |[w, _, y, beta]: &[Mat<f64>; 4], output| {
         let seen = if output == LoopOutput::Plant { y } else { beta };
-        let experiment = [Experiment { u: w.as_ref(), y: seen.as_ref() }];
+        let experiment = [Experiment::new(w.as_ref(), seen.as_ref())];
         greybox(&Problem::new(&Pendulum, &experiment, time()).in_loop(&controller, output), &start, &options).unwrap()
     };
     for output in [LoopOutput::Plant, LoopOutput::Deviation] {
@@ -114,8 +114,7 @@ fn an_unstable_plant_is_found_in_its_loop() {
         }
     }
     let [_, u, y, _] = record(6000, 0.02, 3);
-    let alone =
-        greybox(&Problem::new(&Pendulum, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time()), &start, &options);
+    let alone = greybox(&Problem::new(&Pendulum, &[Experiment::new(u.as_ref(), y.as_ref())], time()), &start, &options);
     assert!(
         matches!(alone, Err(Error::Method(youla::Error::Diverged { .. })))
             || alone.is_ok_and(|found| found.fit[0] < 0.0)
@@ -125,7 +124,7 @@ fn an_unstable_plant_is_found_in_its_loop() {
 #[test]
 fn loops_that_do_not_fit_are_refused() {
     let [w, _, y, _] = record(300, 0.0, 4);
-    let experiment = [Experiment { u: w.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(w.as_ref(), y.as_ref())];
     let wide = Partitioned::new(controller().system().clone(), 2, 1).unwrap();
     let refused = greybox(
         &Problem::new(&Pendulum, &experiment, time()).in_loop(&wide, LoopOutput::Plant),

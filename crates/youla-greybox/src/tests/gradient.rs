@@ -88,7 +88,7 @@ fn every_matrix_may_move() {
     let u = Mat::from_fn(60, 1, |k, _| ((k * k) as f64 * 0.37).sin());
     let y = Mat::from_fn(60, 1, |k, _| (k as f64 * 0.21).cos());
     let theta = [1.3, 0.7, -0.4, 0.2, 0.9];
-    let experiment = youla::identify::subspace::Experiment { u: u.as_ref(), y: y.as_ref() };
+    let experiment = youla::identify::subspace::Experiment::new(u.as_ref(), y.as_ref());
     let time = youla::lti::Discrete::new(0.2).unwrap();
     let compared = comparison(&NoiseModel::OutputError, InitialState::Estimated, &[]);
     let criterion = Criterion::new(&Everything, &theta, &[experiment], time, compared).unwrap();

@@ -43,7 +43,7 @@ fn parameters_that_cannot_be_told_apart_have_no_covariance() {
     let u = Mat::from_fn(200, 1, |k, _| ((k * k) as f64 * 0.37).sin());
     let time = youla::lti::Discrete::new(0.2).unwrap();
     let y = youla::lti::simulate(&Product.model(&[2.0, 3.0]).unwrap().zoh(time).unwrap(), u.as_ref(), &[0.0]).unwrap();
-    let experiment = Experiment { u: u.as_ref(), y: y.as_ref() };
+    let experiment = Experiment::new(u.as_ref(), y.as_ref());
     let found = greybox(&Problem::new(&Product, &[experiment], time), &[1.0, 1.0], &GreyBoxOptions::default()).unwrap();
     assert!((found.parameters[0] * found.parameters[1] - 6.0).abs() < 1e-9, "{:?}", found.parameters);
     assert_eq!((found.rank, found.covariance.is_none(), found.stop), (1, true, Stop::Exact));
@@ -72,7 +72,7 @@ impl Structure for Bounded {
 #[test]
 fn bounds_that_do_not_fit_are_refused() {
     let u = Mat::from_fn(200, 1, |k, _| ((k * k) as f64 * 0.37).sin());
-    let experiment = Experiment { u: u.as_ref(), y: u.as_ref() };
+    let experiment = Experiment::new(u.as_ref(), u.as_ref());
     let time = youla::lti::Discrete::new(0.2).unwrap();
     let refused = |bounds: &[(f64, f64)]| {
         let structure = Bounded(bounds.to_vec());
@@ -112,12 +112,12 @@ fn input_that_does_not_fit_is_refused() {
         refused(&truth(), &[], &ready()),
         Error::Method(youla::Error::TooFewSamples { found: 0, needed: 15, .. })
     ));
-    let short = Experiment { u: data.u.as_ref().subrows(0, 10), y: data.y.as_ref().subrows(0, 10) };
+    let short = Experiment::new(data.u.as_ref().subrows(0, 10), data.y.as_ref().subrows(0, 10));
     assert!(matches!(
         refused(&truth(), &[short], &ready()),
         Error::Method(youla::Error::TooFewSamples { found: 20, needed: 21, .. })
     ));
-    let narrow = Experiment { u: data.u.as_ref().subcols(0, 1), y: data.y.as_ref() };
+    let narrow = Experiment::new(data.u.as_ref().subcols(0, 1), data.y.as_ref());
     assert!(matches!(
         refused(&truth(), &[narrow], &ready()),
         Error::Method(youla::Error::Shape { expected: (300, 2), .. })

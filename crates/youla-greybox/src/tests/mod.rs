@@ -25,7 +25,7 @@ struct OpenLoop {
 
 impl OpenLoop {
     fn experiment(&self) -> Experiment<'_> {
-        Experiment { u: self.u.as_ref(), y: self.y.as_ref() }
+        Experiment::new(self.u.as_ref(), self.y.as_ref())
     }
 }
 

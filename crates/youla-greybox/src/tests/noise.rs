@@ -32,7 +32,7 @@ fn innovation() -> NoiseModel {
 fn gradients_are_those_of_the_criterion() {
     let u = Mat::from_fn(80, 1, |k, _| 0.7 + ((k * k) as f64 * 0.37).sin());
     let y = Mat::from_fn(80, 1, |k, _| 0.3 + (k as f64 * 0.21).cos());
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }; 2];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref()); 2];
     for noise in [NoiseModel::OutputError, innovation(), filter()] {
         for initial in [InitialState::Zero, InitialState::Estimated, InitialState::SteadyState] {
             let compared = comparison(&noise, initial, &[0.7]);
@@ -66,8 +66,7 @@ fn find(noise: &NoiseModel, [u, y]: &[Mat<f64>; 2]) -> GreyBoxModel {
     let options =
         GreyBoxOptions { noise: noise.clone(), initial_state: InitialState::Zero, ..GreyBoxOptions::default() };
     let start = THETA.map(|v| 0.9 * v);
-    greybox(&Problem::new(&Everything, &[Experiment { u: u.as_ref(), y: y.as_ref() }], time()), &start, &options)
-        .unwrap()
+    greybox(&Problem::new(&Everything, &[Experiment::new(u.as_ref(), y.as_ref())], time()), &start, &options).unwrap()
 }
 
 /// Root mean square over runs and parameters of the error in deviations, and of the error itself.
@@ -146,7 +145,7 @@ fn a_steady_start_is_exact_and_an_integrator_has_none() {
     let y = simulate(&plant, long.as_ref(), &[0.0; 2]).unwrap();
     let y = y.as_ref().subrows(1000, 400);
     let options = GreyBoxOptions { initial_state: InitialState::SteadyState, ..GreyBoxOptions::default() };
-    let experiment = [Experiment { u: u.as_ref(), y }];
+    let experiment = [Experiment::new(u.as_ref(), y)];
     let found = greybox(&Problem::new(&Everything, &experiment, time()), &THETA.map(|v| 0.9 * v), &options).unwrap();
     let worst = found.parameters.iter().zip(THETA).map(|(p, t)| (p / t - 1.0).abs()).fold(0.0, f64::max);
     assert!(worst < 1e-6, "{worst:e} {:?}", found.parameters);
@@ -161,7 +160,7 @@ fn noise_models_that_do_not_fit_are_refused() {
     let u = Mat::from_fn(80, 1, |k, _| ((k * k) as f64 * 0.37).sin());
     let refused = |noise: NoiseModel| {
         let options = GreyBoxOptions { noise, ..GreyBoxOptions::default() };
-        let experiment = [Experiment { u: u.as_ref(), y: u.as_ref() }];
+        let experiment = [Experiment::new(u.as_ref(), u.as_ref())];
         greybox(&Problem::new(&Everything, &experiment, time()), &THETA, &options).unwrap_err()
     };
     let one = |a: f64, b: f64, c: f64| {

@@ -61,7 +61,7 @@ fn controller() -> Partitioned<Discrete> {
 
 fn estimate(q: &Mat<f64>, reference: &[f64], velocity: &[f64], v_s: f64) -> GreyBoxModel {
     let w = Mat::from_fn(q.nrows(), 3, |k, j| [KV * KP * reference[k], (velocity[k] / v_s).tanh(), 1.0][j]);
-    let experiment = [Experiment { u: w.as_ref(), y: q.as_ref() }];
+    let experiment = [Experiment::new(w.as_ref(), q.as_ref())];
     let (time, options) = (Discrete::new(TS).unwrap(), GreyBoxOptions::default());
     let start = [80.0, 150.0, 15.0, 0.0];
     greybox(&Problem::new(&Joint, &experiment, time).in_loop(&controller(), LoopOutput::Plant), &start, &options)

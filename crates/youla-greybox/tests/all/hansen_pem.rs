@@ -31,7 +31,7 @@ struct Log {
 
 impl Log {
     fn experiment(&self) -> Experiment<'_> {
-        Experiment { u: self.u.as_ref(), y: self.y.as_ref() }
+        Experiment::new(self.u.as_ref(), self.y.as_ref())
     }
 }
 
@@ -78,7 +78,7 @@ fn a_record_without_noise_gives_the_parameters_by_projection_alone() {
     let log = bearing.log(0.0, 1);
     let (options, signals) = (options(), bearing.signals(&log));
     assert_eq!(options.hansen.order, Order::Fixed(12));
-    let found = hansen(&bearing.design.factors, &signals, &options.hansen).unwrap();
+    let found = hansen(&bearing.design.factors, &signals, &options.hansen.clone().into()).unwrap();
     let target = projection_target(&bearing.design.factors, &found.deviation.model, &signals, &options).unwrap();
     let projected = project(&BearingStructure, &target, &[], &options.projection).unwrap();
     let truth = BearingStructure::parameters(&Bearing::default());
@@ -185,11 +185,8 @@ fn records_that_do_not_fit_are_refused() {
     let bearing = Loop::new(0.5);
     let log = bearing.log(0.2, 1);
     let signals = bearing.signals(&log);
-    let found = hansen(&bearing.design.factors, &signals, &options().hansen).unwrap();
-    let short = [YoulaSignals {
-        alpha: signals[0].alpha.subrows(0, 40).to_owned(),
-        beta: signals[0].beta.subrows(0, 40).to_owned(),
-    }];
+    let found = hansen(&bearing.design.factors, &signals, &options().hansen.into()).unwrap();
+    let short = [YoulaSignals::new(signals[0].alpha().subrows(0, 40), signals[0].beta().subrows(0, 40)).unwrap()];
     let target = projection_target(&bearing.design.factors, &found.deviation.model, &short, &options());
     assert!(
         matches!(target, Err(Error::Method(youla::Error::TooFewSamples { found: 40, needed: 64, .. }))),

@@ -194,10 +194,10 @@ fn saturation<const N: usize, const M: usize, const P: usize>(l: &Loop, limit: f
     let saturated = (0..20_000).filter(|k| log.u.row(*k).norm_max() == limit).count();
     assert!((1000..19_000).contains(&saturated), "{saturated} samples are saturated");
     let signals = l.factors().signals(log.u.as_ref(), log.y.as_ref()).unwrap();
-    let error = distance(log.beta.as_ref(), signals.beta.as_ref());
+    let error = distance(log.beta.as_ref(), signals.beta());
     println!("beta: {error:.1e}, {saturated} of 20000 samples saturated");
     assert!(error <= EXACT, "beta misses by {error:.1e}");
-    assert!(distance(log.alpha.as_ref(), signals.alpha.as_ref()) > 0.1);
+    assert!(distance(log.alpha.as_ref(), signals.alpha()) > 0.1);
 
     // An observer that believes in its own command has another beta.
     let mut state = State::at_rest();
@@ -207,7 +207,7 @@ fn saturation<const N: usize, const M: usize, const P: usize>(l: &Loop, limit: f
         let output = controller.step(&mut state, &array(&row(&log.y), double), &array(&row(&log.alpha), double));
         output.beta.iter().enumerate().for_each(|(j, value)| deaf[(k, j)] = *value);
     }
-    let error = distance(deaf.as_ref(), signals.beta.as_ref());
+    let error = distance(deaf.as_ref(), signals.beta());
     assert!(error > 0.01, "without the applied input beta misses by {error:.1e} only");
 }
 

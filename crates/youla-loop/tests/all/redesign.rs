@@ -121,7 +121,7 @@ impl Bench {
     }
 
     /// Without the start and the harmonics of the speed.
-    fn clean(&self, signal: &Mat<f64>) -> Mat<f64> {
+    fn clean(&self, signal: MatRef<'_, f64>) -> Mat<f64> {
         let later = signal.subrows(SETTLE, signal.nrows() - SETTLE);
         without_harmonics(later, RPM / 60.0, 5, Discrete::new(2e-4).unwrap()).unwrap()
     }
@@ -129,7 +129,8 @@ impl Bench {
     fn identify(&self, seed: u64) -> (HansenModel, ExperimentRecord) {
         let log = self.record(&mut self.running(), seed);
         let signals = self.factors.signals(log.u_applied.as_ref(), log.y.as_ref()).unwrap();
-        let signals = YoulaSignals { alpha: self.clean(&signals.alpha), beta: self.clean(&signals.beta) };
+        let signals =
+            YoulaSignals::new(self.clean(signals.alpha()).as_ref(), self.clean(signals.beta()).as_ref()).unwrap();
         let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
         let options = SubspaceOptions {
             method: SubspaceMethod::Cva,
@@ -139,14 +140,14 @@ impl Bench {
             uncertainty,
             ..Default::default()
         };
-        (hansen(&self.factors, &[signals], &options).unwrap(), log)
+        (hansen(&self.factors, &[signals], &options.into()).unwrap(), log)
     }
 
     /// Figures of the loop from an experiment: an open-loop identification from a disturbance at the plant input to y.
     fn measured(&self, controller: impl LoopController, seed: u64, sizes: &[Vec<f64>; 2]) -> Measured {
         let mut disturbed = Disturbed { controller, excitation: Cell::new([0.0; 2]) };
         let log = self.record(&mut disturbed, seed);
-        let (v, y) = (self.clean(&log.alpha), self.clean(&log.y));
+        let (v, y) = (self.clean(log.alpha.as_ref()), self.clean(log.y.as_ref()));
         let options = SubspaceOptions {
             method: SubspaceMethod::Cva,
             horizon: 30,
@@ -154,7 +155,7 @@ impl Bench {
             initial_state: InitialState::Estimated,
             ..Default::default()
         };
-        let experiment = Experiment { u: v.as_ref(), y: y.as_ref() };
+        let experiment = Experiment::new(v.as_ref(), y.as_ref());
         let found = subspace(&[experiment], Discrete::new(2e-4).unwrap(), &options).unwrap().model;
         let found = found.in_units(&sizes[0], &sizes[1]);
         let modes = found.shared_modes().unwrap();
@@ -185,7 +186,7 @@ fn designed(
     log: &ExperimentRecord,
     options: &RedesignOptions,
 ) -> (Redesign, [Vec<f64>; 2]) {
-    let sizes = [&log.u_applied, &log.y].map(|signal| rms(&bench.clean(signal)));
+    let sizes = [&log.u_applied, &log.y].map(|signal| rms(&bench.clean(signal.as_ref())));
     let problem = RedesignProblem {
         model,
         factors: &bench.factors,

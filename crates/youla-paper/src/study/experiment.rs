@@ -215,8 +215,8 @@ fn data<'a>(
     turning: bool,
 ) -> Result<Data<'a>> {
     let signals = design.factors.signals(estimation.u_applied.as_ref(), estimation.y.as_ref())?;
-    let later = |signal: &Mat<f64>| signal.subrows(settle, signal.nrows() - settle).to_owned();
-    let clean = |signal: &Mat<f64>| {
+    let later = |signal: MatRef<'_, f64>| signal.subrows(settle, signal.nrows() - settle).to_owned();
+    let clean = |signal: MatRef<'_, f64>| {
         let later = later(signal);
         if !turning {
             return Ok(later);
@@ -228,11 +228,11 @@ fn data<'a>(
         settings,
         design,
         start,
-        u: clean(&estimation.u_applied)?,
-        y: clean(&estimation.y)?,
-        signals: YoulaSignals { alpha: clean(&signals.alpha)?, beta: clean(&signals.beta)? },
-        verification_u: later(&verification.u_applied),
-        verification_y: later(&verification.y),
+        u: clean(estimation.u_applied.as_ref())?,
+        y: clean(estimation.y.as_ref())?,
+        signals: YoulaSignals::new(clean(signals.alpha())?.as_ref(), clean(signals.beta())?.as_ref())?,
+        verification_u: later(verification.u_applied.as_ref()),
+        verification_y: later(verification.y.as_ref()),
         initial_state: if settle > 0 { InitialState::Estimated } else { settings.hansen.initial_state },
     })
 }
@@ -244,12 +244,12 @@ impl Data<'_> {
 
     fn hansen(&self) -> Result<HansenModel, String> {
         let options = SubspaceOptions { initial_state: self.initial_state, ..self.settings.hansen.clone() };
-        hansen(&self.design.factors, std::slice::from_ref(&self.signals), &options).map_err(text)
+        hansen(&self.design.factors, std::slice::from_ref(&self.signals), &options.into()).map_err(text)
     }
 
     fn pem(&self, factor: f64) -> Result<GreyBoxModel, String> {
         let start = self.start.degraded(factor, 1.0).map_err(text)?;
-        let experiment = [subspace::Experiment { u: self.u.as_ref(), y: self.y.as_ref() }];
+        let experiment = [subspace::Experiment::new(self.u.as_ref(), self.y.as_ref())];
         let options = GreyBoxOptions { initial_state: self.initial_state, ..self.settings.pem.clone() };
         greybox(
             &Problem::new(&BearingStructure, &experiment, self.time()),
@@ -261,7 +261,7 @@ impl Data<'_> {
 
     /// From the projection of G(S), or that from the nominal model, `single`, where its criterion is lower.
     fn hansen_pem(&self, found: HansenModel, single: &Result<GreyBoxModel, String>) -> Result<GreyBoxModel, String> {
-        let experiment = [subspace::Experiment { u: self.u.as_ref(), y: self.y.as_ref() }];
+        let experiment = [subspace::Experiment::new(self.u.as_ref(), self.y.as_ref())];
         let signals = std::slice::from_ref(&self.signals);
         let pem = GreyBoxOptions { initial_state: self.initial_state, ..self.settings.pem.clone() };
         let options = HansenPemOptions { pem, ..Default::default() };
@@ -329,8 +329,8 @@ impl Data<'_> {
     fn beta(&self, found: &HansenModel) -> Result<[Mat<f64>; 2]> {
         let signals = self.design.factors.signals(self.verification_u.as_ref(), self.verification_y.as_ref())?;
         let s = &found.deviation.model;
-        let predicted = simulate(s, signals.alpha.as_ref(), &vec![0.0; s.order()])?;
-        Ok([signals.beta, predicted])
+        let predicted = simulate(s, signals.alpha(), &vec![0.0; s.order()])?;
+        Ok([signals.beta().to_owned(), predicted])
     }
 }
 

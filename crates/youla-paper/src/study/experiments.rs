@@ -63,7 +63,7 @@ fn open_loop(parameters: &RigParameters, settings: &PaperSettings) -> Result<Ope
     let e = &settings.experiments;
     let alpha = excitation(&e.excitation, e.samples, rig.time(), settings.seed, FIRST + 1)?;
     let record = run_experiment(&mut rig, &mut OpenLoop, alpha.as_ref(), &parameters.safety)?;
-    let experiment = [subspace::Experiment { u: record.u_applied.as_ref(), y: record.y.as_ref() }];
+    let experiment = [subspace::Experiment::new(record.u_applied.as_ref(), record.y.as_ref())];
     let start = BearingStructure::parameters(&e.start);
     let found = greybox(&Problem::new(&BearingStructure, &experiment, rig.time()), &start, &settings.pem)?;
     if !found.stable {

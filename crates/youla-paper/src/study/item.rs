@@ -213,7 +213,7 @@ impl LoopData<'_> {
     }
 
     fn experiment(&self) -> [subspace::Experiment<'_>; 1] {
-        [subspace::Experiment { u: self.estimation.u.as_ref(), y: self.estimation.y.as_ref() }]
+        [subspace::Experiment::new(self.estimation.u.as_ref(), self.estimation.y.as_ref())]
     }
 
     fn pem(&self, start: &Bearing, settings: &PaperSettings) -> Result<GreyBoxModel, String> {
@@ -240,7 +240,7 @@ impl LoopData<'_> {
     }
 
     fn hansen(&self, settings: &PaperSettings) -> Result<&HansenModel, String> {
-        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen).map_err(text);
+        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen.clone().into()).map_err(text);
         self.hansen.get_or_init(found).as_ref().map_err(String::clone)
     }
 

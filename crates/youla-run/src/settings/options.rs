@@ -2,7 +2,7 @@
 
 use super::shown;
 use serde::{Deserialize, Serialize};
-use youla::identify::innovation_form::{DeviationOptions, Structure};
+use youla::identify::innovation_form::{InnovationOptions, NoiseForm};
 use youla_greybox::refine::{RefineNoise, RefineOptions};
 
 /// Options of the coprime factors.
@@ -63,12 +63,23 @@ impl Default for FrequencySettings {
     }
 }
 
+/// How the noise of beta is modelled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeviationStructure {
+    /// Not at all for a stable S: B and D from the simulated beta.
+    #[default]
+    Free,
+    /// As white noise at the outputs of a stable plant, through S itself.
+    Innovation,
+}
+
 /// What is known of S before it is identified.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct DeviationSettings {
     /// How the noise of beta is modelled.
-    pub structure: Structure,
+    pub structure: DeviationStructure,
     /// The model of the noise with which the prediction-error method refines S afterwards; no refinement when absent.
     #[serde(skip_serializing_if = "Option::is_none", with = "shown::optional")]
     #[schemars(with = "Option<RefineNoise>")]
@@ -76,8 +87,11 @@ pub struct DeviationSettings {
 }
 
 impl DeviationSettings {
-    /// The options of the identification of S.
-    pub fn options(&self) -> DeviationOptions {
-        DeviationOptions { structure: self.structure, ..DeviationOptions::default() }
+    /// The form of the noise of beta.
+    pub fn noise(&self) -> NoiseForm {
+        match self.structure {
+            DeviationStructure::Free => NoiseForm::Free,
+            DeviationStructure::Innovation => NoiseForm::Innovation(InnovationOptions::default()),
+        }
     }
 }

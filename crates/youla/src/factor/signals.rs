@@ -3,15 +3,79 @@
 use super::CoprimeFactors;
 use crate::linalg::{block, check_shape};
 use crate::lti::{Discrete, simulate};
-use crate::{Mat, MatRef, Result};
+use crate::{Error, Mat, MatRef, Result};
 
-/// The signals of the Youla deviation system, samples x channels.
-#[derive(Debug, Clone, PartialEq)]
+/// The signals of the Youla deviation system S, samples x channels: what [`crate::identify::hansen::hansen`] identifies from.
+#[derive(Debug, Clone)]
 pub struct YoulaSignals {
+    /// `[alpha beta]` as the filter gives them.
+    filtered: Mat<f64>,
+    inputs: usize,
+    /// Known signals of a disturbance of the outputs, of the same samples.
+    disturbance: Option<Mat<f64>>,
+    /// Samples at the start that do not count.
+    dropped: usize,
+}
+
+impl YoulaSignals {
+    /// From alpha (samples x m) and beta (samples x p) that were computed elsewhere.
+    ///
+    /// # Errors
+    /// [`crate::Error::Shape`] where they differ in length.
+    pub fn new(alpha: MatRef<'_, f64>, beta: MatRef<'_, f64>) -> Result<Self> {
+        check_shape("beta", beta, (alpha.nrows(), beta.ncols()))?;
+        Ok(Self::of_filter(block(&[&[alpha, beta]]), alpha.ncols()))
+    }
+
+    fn of_filter(filtered: Mat<f64>, inputs: usize) -> Self {
+        YoulaSignals { filtered, inputs, disturbance: None, dropped: 0 }
+    }
+
     /// `alpha = Vt u - Ut y`, the input of S (equals eta up to noise), samples x m.
-    pub alpha: Mat<f64>,
+    pub fn alpha(&self) -> MatRef<'_, f64> {
+        self.counted(&self.filtered).subcols(0, self.inputs)
+    }
+
     /// `beta = Mt y - Nt u` (28), the output of S plus noise (25), samples x p.
-    pub beta: Mat<f64>,
+    pub fn beta(&self) -> MatRef<'_, f64> {
+        self.counted(&self.filtered).subcols(self.inputs, self.filtered.ncols() - self.inputs)
+    }
+
+    /// Number of samples.
+    pub fn samples(&self) -> usize {
+        self.filtered.nrows() - self.dropped
+    }
+
+    /// Known signals of disturbances of the measured outputs, samples x signals, where there are any.
+    pub fn disturbance(&self) -> Option<MatRef<'_, f64>> {
+        self.disturbance.as_ref().map(|signals| self.counted(signals))
+    }
+
+    /// With disturbances of the measured outputs of known shape (samples x signals), as
+    /// [`crate::identify::subspace::lines`] gives them, over all samples of the record.
+    ///
+    /// # Errors
+    /// [`crate::Error::Shape`] for another number of samples.
+    pub fn with_disturbance(self, signals: Mat<f64>) -> Result<Self> {
+        check_shape("the known disturbance", signals.as_ref(), (self.filtered.nrows(), signals.ncols()))?;
+        Ok(YoulaSignals { disturbance: Some(signals), ..self })
+    }
+
+    /// Without the first `samples`, in which the filter settles; nothing is copied.
+    ///
+    /// # Errors
+    /// [`crate::Error::TooFewSamples`] where none is left.
+    pub fn after(self, samples: usize) -> Result<Self> {
+        if samples < self.samples() {
+            return Ok(YoulaSignals { dropped: self.dropped + samples, ..self });
+        }
+        let what = format!("alpha and beta, of which the first {samples} samples are to be dropped");
+        Err(Error::TooFewSamples { what, found: self.samples(), needed: samples.saturating_add(1) })
+    }
+
+    fn counted<'a>(&self, of: &'a Mat<f64>) -> MatRef<'a, f64> {
+        of.as_ref().subrows(self.dropped, self.samples())
+    }
 }
 
 impl CoprimeFactors<Discrete> {
@@ -32,9 +96,7 @@ impl CoprimeFactors<Discrete> {
         let m = self.inputs();
         check_shape("the record of plant inputs", u, (u.nrows(), m))?;
         check_shape("the record of plant outputs", y, (u.nrows(), self.outputs()))?;
-        let filtered = self.filter(block(&[&[u, y]]).as_ref())?;
-        let (alpha, beta) = filtered.split_at_col(m);
-        Ok(YoulaSignals { alpha: alpha.to_owned(), beta: beta.to_owned() })
+        Ok(YoulaSignals::of_filter(self.filter(block(&[&[u, y]]).as_ref())?, m))
     }
 
     /// The alpha that known excitations cause: `Vt v1 + Ut v2`, with `v1` (samples x m) added at the plant input and

@@ -7,13 +7,13 @@
 //! Because alpha does not depend on n, any open-loop method is unbiased here, with any noise model, even for an unstable
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
-use super::innovation_form::{self, DeviationOptions, InnovationForm, Structure};
+use super::innovation_form::{self, InnovationForm, NoiseForm};
 use super::subspace::subspace_stream;
 use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
+use crate::Result;
 use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
 use crate::lti::{Discrete, StateSpace};
 use crate::signal::SampleStream;
-use crate::{MatRef, Result};
 
 /// The identified deviation system and the plant that it stands for.
 #[derive(Debug, Clone)]
@@ -30,80 +30,95 @@ pub struct HansenModel {
     pub evidence: Option<Result<Evidence, NoUncertainty>>,
 }
 
-/// Identifies S from the signals of one or more experiments and recombines it to the plant G(S).
+/// Choices of [`hansen`]; those of the subspace method alone are options too: `subspace.into()`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct HansenOptions {
+    /// The subspace method that identifies S.
+    pub subspace: SubspaceOptions,
+    /// How the noise of beta is modelled.
+    pub noise: NoiseForm,
+}
+
+impl From<SubspaceOptions> for HansenOptions {
+    fn from(subspace: SubspaceOptions) -> Self {
+        HansenOptions { subspace, ..Default::default() }
+    }
+}
+
+/// Identifies S from alpha and beta of one or more experiments and recombines it to the plant G(S).
 ///
-/// The controller stabilises G(S) exactly when S is stable.
-///
-/// The uncertainty of S carries over to the plant by the linear part of
+/// The controller stabilises G(S) exactly when S is stable. The uncertainty of S carries over to the plant by the linear part of
 /// ```text
 /// G(S + dS) - G(S) = (Mt + (S + dS) Ut)^-1 dS (M + U S)^-1
 /// ```
+/// A known disturbance d of y ([`YoulaSignals::with_disturbance`]) is one of beta, `(Mt + S Ut) d`: for lines of constant
+/// frequency, or of a speed that changes slowly against the loop, of the same shape and another size.
 ///
 /// # Errors
-/// As [`super::subspace::subspace`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.
+/// As [`super::subspace::subspace`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed; for the innovation form
+/// [`crate::Error::Unstable`] where `A - K_s C` is not stable, as for an unstable plant, and [`crate::Error::Unsupported`] for
+/// delays.
 pub fn hansen(
     factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    options: &SubspaceOptions,
+    experiments: &[YoulaSignals],
+    options: &HansenOptions,
 ) -> Result<HansenModel> {
-    hansen_disturbed(factors, signals, &[], options)
+    HansenData::new(factors, experiments, &options.subspace)?.identify(options)
 }
 
-/// The same where the outputs carry disturbances of known shape, one matrix of known signals (samples x signals) for each
-/// experiment, or none at all. A disturbance d of y is one of beta, `(Mt + S Ut) d`: for lines of constant frequency, or of a
-/// speed that changes slowly against the loop, of the same shape and another size.
-///
-/// # Errors
-/// As [`hansen`]; shapes of the known signals.
-pub fn hansen_disturbed(
-    factors: &CoprimeFactors<Discrete>,
-    signals: &[YoulaSignals],
-    disturbances: &[MatRef<'_, f64>],
-    options: &SubspaceOptions,
-) -> Result<HansenModel> {
-    let data = deviation_data(factors, signals, disturbances, options)?;
-    hansen_structured(factors, &data, options, &DeviationOptions::default())
+impl YoulaSignals {
+    /// alpha as input and beta as output of S, with the known disturbance.
+    pub fn experiment(&self) -> Experiment<'_> {
+        Experiment { disturbance: self.disturbance(), ..Experiment::new(self.alpha(), self.beta()) }
+    }
 }
 
-/// The signals of one or more experiments, factored for the method of `options`: for models of several orders, or what else
-/// [`SubspaceData`] serves.
-///
-/// # Errors
-/// As [`SubspaceData::disturbed`].
-pub fn deviation_data<'a>(
-    factors: &CoprimeFactors<Discrete>,
-    signals: &'a [YoulaSignals],
-    disturbances: &[MatRef<'a, f64>],
-    options: &SubspaceOptions,
-) -> Result<SubspaceData<'a>> {
-    let experiments: Vec<_> = signals.iter().map(|s| Experiment { u: s.alpha.as_ref(), y: s.beta.as_ref() }).collect();
-    SubspaceData::disturbed(&experiments, disturbances, factors.nominal().time(), options)
+/// alpha and beta with the triangular factor of their block-Hankel matrix: models of several orders or structures and
+/// stabilisation diagrams from one pass over the data.
+pub struct HansenData<'a> {
+    factors: &'a CoprimeFactors<Discrete>,
+    data: SubspaceData<'a>,
 }
 
-/// Identifies S with the structure asked for from [`deviation_data`], and recombines it to G(S).
-///
-/// # Errors
-/// As [`hansen_disturbed`]; for the innovation form [`crate::Error::Unstable`] where `A - K_s C` is not stable, as for
-/// an unstable plant, and [`crate::Error::OutOfRange`] for delays, no refits or a tolerance below zero.
-pub fn hansen_structured(
-    factors: &CoprimeFactors<Discrete>,
-    data: &SubspaceData<'_>,
-    options: &SubspaceOptions,
-    deviation: &DeviationOptions,
-) -> Result<HansenModel> {
-    let (deviation, innovation_form) = match deviation.structure {
-        Structure::Free => (data.identify(options)?, None),
-        Structure::Innovation => {
-            innovation_form::check(options, deviation)?;
-            let (model, form) = innovation_form::refit(factors, data, options, deviation)?;
-            (model, Some(form))
-        }
-    };
-    let plant = factors.plant_of(&deviation.model)?;
-    let uncertainty = deviation.uncertainty.as_ref().map(|u| u.through(|s| factors.plant_of(s))).transpose()?;
-    let order = deviation.order.order;
-    let evidence = uncertainty.is_some().then(|| data.evidence(order, options));
-    Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
+impl<'a> HansenData<'a> {
+    /// Checks and factors the signals for the method of `options`.
+    ///
+    /// # Errors
+    /// As [`SubspaceData::new`].
+    pub fn new(
+        factors: &'a CoprimeFactors<Discrete>,
+        experiments: &'a [YoulaSignals],
+        options: &SubspaceOptions,
+    ) -> Result<Self> {
+        let experiments: Vec<Experiment<'a>> = experiments.iter().map(YoulaSignals::experiment).collect();
+        Ok(HansenData { factors, data: SubspaceData::new(&experiments, factors.nominal().time(), options)? })
+    }
+
+    /// The factored data: alpha as inputs, beta as outputs.
+    pub fn subspace(&self) -> &SubspaceData<'a> {
+        &self.data
+    }
+
+    /// Identifies S and recombines it to G(S).
+    ///
+    /// # Errors
+    /// As [`hansen`] and [`SubspaceData::identify`].
+    pub fn identify(&self, options: &HansenOptions) -> Result<HansenModel> {
+        let HansenOptions { subspace, noise } = options;
+        let (deviation, innovation_form) = match noise {
+            NoiseForm::Free => (self.data.identify(subspace)?, None),
+            NoiseForm::Innovation(refits) => {
+                innovation_form::check(subspace, refits)?;
+                let (model, form) = innovation_form::refit(self.factors, &self.data, subspace, refits)?;
+                (model, Some(form))
+            }
+        };
+        let plant = self.factors.plant_of(&deviation.model)?;
+        let uncertainty =
+            deviation.uncertainty.as_ref().map(|u| u.through(|s| self.factors.plant_of(s))).transpose()?;
+        let evidence = uncertainty.is_some().then(|| self.data.evidence(deviation.order.order, subspace));
+        Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
+    }
 }
 
 /// The same as [`hansen`] from a stream of u and y that need not fit into memory; the first `settle` samples of each experiment
@@ -147,16 +162,13 @@ mod tests {
             let y = simulate(&first_order(0.8), u.as_ref(), &[0.0]).unwrap() + noise;
             (u, y)
         });
-        let experiments = [0, 1].map(|k| Experiment { u: records[k].0.as_ref(), y: records[k].1.as_ref() });
+        let experiments = [0, 1].map(|k| Experiment::new(records[k].0.as_ref(), records[k].1.as_ref()));
         let options = SubspaceOptions { horizon: 5, order: Order::Fixed(2), ..Default::default() };
         let settle = factors.settling_samples(1e-3).unwrap();
         assert!(settle > 5);
-        let signals = [0, 1].map(|k| {
-            let all = factors.signals(experiments[k].u, experiments[k].y).unwrap();
-            let settled = |m: &Mat<f64>| m.as_ref().subrows(settle, m.nrows() - settle).to_owned();
-            YoulaSignals { alpha: settled(&all.alpha), beta: settled(&all.beta) }
-        });
-        let whole = hansen(&factors, &signals, &options).unwrap();
+        let signals =
+            [0, 1].map(|k| factors.signals(experiments[k].u, experiments[k].y).unwrap().after(settle).unwrap());
+        let whole = hansen(&factors, &signals, &options.clone().into()).unwrap();
         let stream = || ExperimentStream::new(&experiments).unwrap();
         let streamed = hansen_stream(&factors, stream(), settle, &options).unwrap();
         let gap = |a: &StateSpace<Discrete>, b: &StateSpace<Discrete>| {

@@ -18,37 +18,29 @@ use crate::linalg::{least_squares, observability};
 use crate::lti::{Discrete, StateSpace, simulate};
 use crate::{Error, Mat, Result};
 
-/// What is known of S before it is identified.
+/// How the noise of beta is modelled.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum NoiseForm {
+    /// Not at all for a stable S: B and D from the simulated beta.
+    #[default]
+    Free,
+    /// As white noise at the outputs of a stable plant, through S itself.
+    Innovation(InnovationOptions),
+}
+
+/// The refits of the innovation form.
 #[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct DeviationOptions {
-    /// How the noise of beta is modelled.
-    pub structure: Structure,
+pub struct InnovationOptions {
     /// Largest number of refits in the innovation form, at least 1.
     pub iterations: usize,
     /// Relative change of K_s below which it has settled.
     pub tolerance: f64,
 }
 
-impl Default for DeviationOptions {
+impl Default for InnovationOptions {
     fn default() -> Self {
-        DeviationOptions { structure: Structure::Free, iterations: 20, tolerance: 1e-6 }
+        InnovationOptions { iterations: 20, tolerance: 1e-6 }
     }
-}
-
-/// How the noise of beta is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
-pub enum Structure {
-    /// Not at all for a stable S: B and D from the simulated beta.
-    #[default]
-    Free,
-    /// As white noise at the outputs of a stable plant, through S itself.
-    Innovation,
 }
 
 /// Why the refits ended.
@@ -79,18 +71,18 @@ pub struct InnovationForm {
     pub from_kalman: Option<f64>,
 }
 
-pub(super) fn check(options: &SubspaceOptions, deviation: &DeviationOptions) -> Result<()> {
+pub(super) fn check(options: &SubspaceOptions, refits: &InnovationOptions) -> Result<()> {
     check_uncertainty(options)?;
     let refused = |what: &str, value: f64, must| Err(Error::OutOfRange { what: what.into(), value, must });
     if options.delays.iter().any(|delay| *delay > 0) {
         let (what, instead) = ("a delay with structure = \"innovation\"", "take structure = \"free\"");
         return Err(Error::Unsupported { what, instead });
     }
-    if deviation.iterations == 0 {
+    if refits.iterations == 0 {
         return refused("the number of iterations in [deviation]", 0.0, "at least 1");
     }
-    let sensible = deviation.tolerance >= 0.0 && deviation.tolerance < 1.0;
-    if sensible { Ok(()) } else { refused("tolerance in [deviation]", deviation.tolerance, "at least 0 and below 1") }
+    let sensible = refits.tolerance >= 0.0 && refits.tolerance < 1.0;
+    if sensible { Ok(()) } else { refused("tolerance in [deviation]", refits.tolerance, "at least 0 and below 1") }
 }
 
 /// K_s from S, S from K_s, until K_s settles. The uncertainty is not computed, since it would be that of another fit.
@@ -98,7 +90,7 @@ pub(super) fn refit(
     factors: &CoprimeFactors<Discrete>,
     data: &SubspaceData<'_>,
     options: &SubspaceOptions,
-    deviation: &DeviationOptions,
+    refits: &InnovationOptions,
 ) -> Result<(SubspaceModel, InnovationForm)> {
     let without = SubspaceOptions { uncertainty: UncertaintyOptions::default(), ..options.clone() };
     let mut model = data.identify(&without)?;
@@ -106,7 +98,7 @@ pub(super) fn refit(
     let mut now = gain_of(factors, &model)?;
     let mut change = f64::INFINITY;
     let mut iterations = 0;
-    while iterations < deviation.iterations && change > deviation.tolerance {
+    while iterations < refits.iterations && change > refits.tolerance {
         require_stable_predictor(&model.model, &now.gain)?;
         model = data.refit(model, now.gain.as_ref(), options)?;
         let next = gain_of(factors, &model)?;
@@ -114,7 +106,7 @@ pub(super) fn refit(
         now = next;
         iterations += 1;
     }
-    let stop = if change <= deviation.tolerance { Convergence::Converged } else { Convergence::Iterations };
+    let stop = if change <= refits.tolerance { Convergence::Converged } else { Convergence::Iterations };
     let from_kalman = kalman.map(|kalman| (&now.gain - kalman).norm_l2() / now.gain.norm_l2());
     let asked = options.uncertainty.method != UncertaintyMethod::None;
     model.uncertainty = asked.then_some(Uncertainty::Refused { reason: NoUncertainty::OtherFit });

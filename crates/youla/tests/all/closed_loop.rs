@@ -3,8 +3,8 @@
 
 use crate::common::feedback::{Loop, options};
 use youla::Mat;
-use youla::identify::hansen::{deviation_data, hansen, hansen_disturbed, hansen_structured};
-use youla::identify::innovation_form::{Convergence, DeviationOptions, Structure};
+use youla::identify::hansen::{HansenData, HansenOptions, hansen};
+use youla::identify::innovation_form::{Convergence, InnovationOptions, NoiseForm};
 use youla::identify::subspace::{
     AutomaticHorizon, Experiment, Order, SubspaceMethod, SubspaceOptions, lines, subspace,
 };
@@ -18,9 +18,9 @@ fn free_and_innovation(rig: &Loop, samples: usize, noise: f64, seed: u64) -> [f6
     let (u, y) = rig.record(samples, noise, seed);
     let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
     let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-    let data = deviation_data(&rig.factors, &signals, &[], &options).unwrap();
-    [DeviationOptions::default(), innovation()].map(|deviation| {
-        let found = hansen_structured(&rig.factors, &data, &options, &deviation).unwrap();
+    let data = HansenData::new(&rig.factors, &signals, &options).unwrap();
+    [options.clone().into(), innovation(&options)].map(|options| {
+        let found = data.identify(&options).unwrap();
         assert!(found.innovation_form.is_none_or(|form| form.stop == Convergence::Converged));
         rig.error(&found.plant)
     })
@@ -93,12 +93,10 @@ fn known_unbalance_takes_no_states() {
             let clean = signals(rig.record(8000, 0.1, seed));
             let disturbed = signals(rig.record_with(8000, 0.1, seed, &unbalance));
             let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(order), ..options() };
-            let model = |signals: &youla::factor::YoulaSignals, known: &[youla::MatRef<'_, f64>]| {
-                rig.error(
-                    &hansen_disturbed(&rig.factors, std::slice::from_ref(signals), known, &options).unwrap().plant,
-                )
-            };
-            [model(&clean, &[]), model(&disturbed, &[w.as_ref()]), model(&disturbed, &[])]
+            let known = disturbed.clone().with_disturbance(w.clone()).unwrap();
+            let options = options.into();
+            [clean, known, disturbed]
+                .map(|signals| rig.error(&hansen(&rig.factors, &[signals], &options).unwrap().plant))
         });
         let [clean, known, unknown] = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
         assert!(known < 1.05 * clean, "order {order}: {known:.4} with known lines, {clean:.4} without lines");
@@ -106,8 +104,8 @@ fn known_unbalance_takes_no_states() {
     }
 }
 
-fn innovation() -> DeviationOptions {
-    DeviationOptions { structure: Structure::Innovation, ..DeviationOptions::default() }
+fn innovation(subspace: &SubspaceOptions) -> HansenOptions {
+    HansenOptions { subspace: subspace.clone(), noise: NoiseForm::Innovation(InnovationOptions::default()) }
 }
 
 /// For exact data the gain of S is `[0; -L]` in the coordinates of plant and observer, and refitting changes nothing.
@@ -117,8 +115,7 @@ fn the_gain_of_the_exact_deviation_system() {
     let (u, y) = rig.record(4000, 0.0, 1);
     let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
     let options = SubspaceOptions { order: Order::Fixed(12), ..options() };
-    let data = deviation_data(&rig.factors, &signals, &[], &options).unwrap();
-    let found = hansen_structured(&rig.factors, &data, &options, &innovation()).unwrap();
+    let found = hansen(&rig.factors, &signals, &innovation(&options)).unwrap();
     let form = found.innovation_form.as_ref().unwrap();
     // Theory: x+ = At x + Bt F xh, xh+ = -L Ct x + (A + B F + L C) xh; beta = Ct x - C xh.
     let (g, g0) = (&rig.plant, rig.factors.nominal());
@@ -166,10 +163,10 @@ fn a_refined_deviation_system_errs_less() {
     let errors = [1, 2].map(|seed| {
         let (u, y) = rig.record(4000, 1.0, seed);
         let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-        let found = hansen(&rig.factors, &signals, &subspace).unwrap();
+        let found = hansen(&rig.factors, &signals, &subspace.clone().into()).unwrap();
         let refined = |noise| {
             let options = RefineOptions { noise, max_iterations: 12, ..RefineOptions::default() };
-            let refined = refine_hansen(found.clone(), &rig.factors, &signals, &[], &options).unwrap();
+            let refined = refine_hansen(found.clone(), &rig.factors, &signals, &options).unwrap();
             let (refined, change) = (refined.model, refined.refinement);
             assert!(change.stable && change.cost < 0.998 * change.cost_before, "{change:?}");
             assert_eq!(refined.deviation.stability.stable, refined.deviation.model.is_stable().unwrap());
@@ -188,8 +185,7 @@ fn innovation_form_refuses_an_unstable_plant() {
     let (u, y) = rig.record(8000, 0.1, 1);
     let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
     let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-    let data = deviation_data(&rig.factors, &signals, &[], &options).unwrap();
-    let refused = hansen_structured(&rig.factors, &data, &options, &innovation()).unwrap_err().to_string();
+    let refused = hansen(&rig.factors, &signals, &innovation(&options)).unwrap_err().to_string();
     assert!(refused.contains("A - K_s C of S"), "{refused}");
 }
 
@@ -203,7 +199,7 @@ fn automatic_horizons_do_nearly_as_well_as_known_ones() {
         let options = SubspaceOptions { method, automatic_horizon, order: Order::Fixed(6), ..options() };
         let errors = [1, 2, 3, 4, 5].map(|seed| {
             let (u, y) = bearing.record(16_000, 1.0, seed);
-            let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+            let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
             let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
             assert!(found.past > 30, "{method:?}: {}", found.past);
             [bearing.error(&found.model), bearing.error(&bearing.identify(method, &u, &y))]

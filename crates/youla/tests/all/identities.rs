@@ -190,7 +190,7 @@ fn external_excitation_reaches_alpha() {
     let at_output = &v2 + &noise;
     let z = run(&closed, beside(&v1, &at_output).as_ref());
     let measured = z.subcols(2, 2) - &v2;
-    let alpha = factors.signals(z.subcols(0, 2), measured.as_ref()).unwrap().alpha;
+    let alpha = factors.signals(z.subcols(0, 2), measured.as_ref()).unwrap().alpha().to_owned();
     let expected = factors.alpha_of_excitation(v1.as_ref(), v2.as_ref()).unwrap();
     let error = relative(alpha.as_ref(), expected.as_ref());
     assert!(error <= BEARING, "alpha of the excitation misses by {error:.1e}");

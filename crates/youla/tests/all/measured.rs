@@ -16,7 +16,7 @@ fn clock() -> Discrete {
 }
 
 fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
-    [Experiment { u: u.as_ref(), y: y.as_ref() }]
+    [Experiment::new(u.as_ref(), y.as_ref())]
 }
 
 /// Input and output columns of a file of the measured data.

@@ -93,8 +93,8 @@ fn signals_24_25_28_with_known_noise() {
         let (u, y, beta) = (z.subcols(0, 2), z.subcols(2, 2), z.subcols(4, 2));
 
         let measured = factors.signals(u, y).unwrap();
-        assert_close("(28) alpha", measured.alpha.as_ref(), alpha.as_ref(), EXACT);
-        assert_close("(28) beta", measured.beta.as_ref(), beta, EXACT);
+        assert_close("(28) alpha", measured.alpha(), alpha.as_ref(), EXACT);
+        assert_close("(28) beta", measured.beta(), beta, EXACT);
 
         let s = factors.deviation_of(&plant).unwrap();
         let residual = factors.residual_filter(&s).unwrap();
@@ -105,7 +105,7 @@ fn signals_24_25_28_with_known_noise() {
         assert!(without_noise.norm_l2() > 0.1 * beta.norm_l2(), "(25) without noise");
 
         let clean = factors.signals(u, (y - &n).as_ref()).unwrap();
-        let (eta, epsilon) = (clean.alpha, clean.beta);
+        let (eta, epsilon) = (clean.alpha(), clean.beta());
         let (to_eta, to_epsilon) = (run(&factors.u_t(), n.as_ref()), run(&factors.m_t(), n.as_ref()));
         assert_close("(24) eta", (&alpha + &to_eta).as_ref(), eta.as_ref(), EXACT);
         assert_close("(24) epsilon", (beta - to_epsilon).as_ref(), epsilon.as_ref(), EXACT);

@@ -17,7 +17,7 @@ fn with(method: UncertaintyMethod, order: usize) -> SubspaceOptions {
 fn changes_of_the_plant_follow_from_those_of_the_deviation() {
     let bearing = Loop::new(&Design { a_factor: 0.9, ..EASY });
     let signals = bearing.record(3000, 0.1, 1);
-    let found = hansen(&bearing.factors, &[signals], &with(UncertaintyMethod::Delta, 8)).unwrap();
+    let found = hansen(&bearing.factors, &[signals], &with(UncertaintyMethod::Delta, 8).into()).unwrap();
     let (Some(Uncertainty::Delta(s)), Some(Uncertainty::Delta(plant))) =
         (&found.deviation.uncertainty, &found.uncertainty)
     else {
@@ -49,6 +49,7 @@ fn no_evidence_without_a_deviation_and_always_with_one() {
         let bearing = Loop::new(&Design { a_factor, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 });
         let mut options = SubspaceOptions { horizon: 8, ..with(UncertaintyMethod::Delta, 8) };
         options.uncertainty.blocks = Some(10);
+        let options = options.into();
         let refutes = |seed: u64| {
             let found = hansen(&bearing.factors, &[bearing.record(1500, noise, seed)], &options).unwrap();
             found.evidence.unwrap().unwrap().against_nominal()

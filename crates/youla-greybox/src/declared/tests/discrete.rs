@@ -42,7 +42,7 @@ fn record() -> [Mat<f64>; 2] {
 #[test]
 fn exact_records_give_the_parameters_back() {
     let ([u, y], structure) = (record(), structure());
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
     let found = greybox(&Problem::new(&structure, &experiment, time()), &structure.start(), &GreyBoxOptions::default())
         .unwrap();
     assert!(found.parameters.iter().zip(TRUTH).all(|(p, t)| (p / t - 1.0).abs() < 1e-8), "{:?}", found.parameters);
@@ -56,7 +56,7 @@ fn gradients_are_those_of_the_criterion() {
     let innovation = NoiseModel::Innovation(InnovationStart { gain: vec![vec![0.2], vec![-0.1]] });
     for noise in [NoiseModel::OutputError, innovation] {
         for initial in [InitialState::Estimated, InitialState::SteadyState] {
-            let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+            let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
             let compared = comparison(&noise, initial, &[]);
             let criterion = Criterion::new(&structure, &TRUTH, &experiment, time(), compared).unwrap();
             let error = gradient_error(&criterion.start(&TRUTH), &criterion, 2e-4);
@@ -79,7 +79,7 @@ fn responses_are_projected_from_a_start() {
 #[test]
 fn another_sample_time_is_refused_with_both() {
     let ([u, y], structure) = (record(), structure());
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
     let other = Discrete::new(2e-3).unwrap();
     let refused =
         greybox(&Problem::new(&structure, &experiment, other), &structure.start(), &GreyBoxOptions::default())

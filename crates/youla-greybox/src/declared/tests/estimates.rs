@@ -46,7 +46,7 @@ fn estimate_with(
     data: &Records,
     options: GreyBoxOptions,
 ) -> GreyBoxModel {
-    let experiment = Experiment { u: data.u.as_ref(), y: data.y.as_ref() };
+    let experiment = Experiment::new(data.u.as_ref(), data.y.as_ref());
     let options = GreyBoxOptions { initial_state: InitialState::Zero, ..options };
     greybox(&Problem::new(structure, &[experiment], data.time), start, &options).unwrap()
 }
@@ -226,7 +226,7 @@ fn known_delays_are_taken_out() {
     let late = Mat::from_fn(3990, 1, |k, _| clean.y[(k + 7, 0)]);
     let data = Records { u: clean.u.as_ref().subrows(10, 3990).to_owned(), y: late, time: clean.time };
     let options = GreyBoxOptions { delays: vec![3], initial_state: InitialState::Estimated, ..Default::default() };
-    let experiment = Experiment { u: data.u.as_ref(), y: data.y.as_ref() };
+    let experiment = Experiment::new(data.u.as_ref(), data.y.as_ref());
     let found = greybox(&Problem::new(&mass, &[experiment], data.time), &off(&mass.start(), 0.2, 4), &options).unwrap();
     for (found, truth) in found.parameters.iter().zip(mass.start()) {
         assert!((found / truth - 1.0).abs() < 1e-6, "{found} for {truth}");
@@ -235,7 +235,7 @@ fn known_delays_are_taken_out() {
     let again = simulate(&found.model, data.u.as_ref().subrows(3, 3987), &found.initial_states[0]).unwrap();
     assert!((&again - data.y.as_ref().subrows(3, 3987)).norm_max() < 1e-9 * data.y.norm_max());
     let refused = |delays: Vec<usize>, rows: usize| {
-        let experiment = Experiment { u: data.u.as_ref().subrows(0, rows), y: data.y.as_ref().subrows(0, rows) };
+        let experiment = Experiment::new(data.u.as_ref().subrows(0, rows), data.y.as_ref().subrows(0, rows));
         let options = GreyBoxOptions { delays, ..Default::default() };
         greybox(&Problem::new(&mass, &[experiment], data.time), &mass.start(), &options).unwrap_err().to_string()
     };

@@ -43,7 +43,7 @@ fn slopes_are_exact() {
     let clean = simulate(&sampled(&structure.start()), late.as_ref(), &[0.0; 3]).unwrap();
     let n = noise(600, 0.3, 0.0, &mut rng);
     let y = Mat::from_fn(600, 1, |k, _| clean[(k, 0)] + n[k]);
-    let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let records = [Experiment::new(u.as_ref(), y.as_ref())];
     let options = GreyBoxOptions { delays: vec![2], ..Default::default() };
     let found = greybox(&Problem::new(&structure, &records, time), &structure.start(), &options).unwrap();
     let asked = IntervalOptions { residuals: ResidualAssumption::White, ..Default::default() };

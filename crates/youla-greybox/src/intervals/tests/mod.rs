@@ -22,7 +22,7 @@ pub(super) struct Log {
 
 impl Log {
     pub(super) fn experiment(&self) -> Experiment<'_> {
-        Experiment { u: self.u.as_ref(), y: self.y.as_ref() }
+        Experiment::new(self.u.as_ref(), self.y.as_ref())
     }
 }
 

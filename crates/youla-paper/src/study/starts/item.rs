@@ -79,7 +79,7 @@ fn row(problem: &Problem, index: usize, search: Search, settings: &StartsSetting
 
 fn find(problem: &Problem, search: Search, settings: &StartsSettings) -> Result<Found> {
     let (time, start, pem) = (problem.time, &problem.start, &settings.paper.pem);
-    let record = [Experiment { u: problem.estimation.u.as_ref(), y: problem.estimation.y.as_ref() }];
+    let record = [Experiment::new(problem.estimation.u.as_ref(), problem.estimation.y.as_ref())];
     let plain = |model| Found { model, local_minimum_suspected: false, note: String::new() };
     match search {
         Search::Truth => {

@@ -40,26 +40,22 @@ pub(super) struct Channels<'a> {
 }
 
 impl<'a> Channels<'a> {
-    pub(super) fn new(
-        experiments: &[Experiment<'a>],
-        disturbances: &[MatRef<'a, f64>],
-        options: &SubspaceOptions,
-    ) -> Result<Self> {
+    pub(super) fn new(experiments: &[Experiment<'a>], options: &SubspaceOptions) -> Result<Self> {
         check_blocks(options)?;
         let (inputs, _) = check_shapes(experiments)?;
-        check_disturbances(experiments, disturbances)?;
+        let disturbed = check_disturbances(experiments)?;
         let delays = Delays::new(&options.delays, inputs)?;
         let mut statistics = Statistics::new(inputs);
-        for (k, Experiment { u, y }) in experiments.iter().enumerate() {
+        for (k, Experiment { u, y, .. }) in experiments.iter().enumerate() {
             check_length(k, u.nrows(), least_blocks(options), delays.longest())?;
             statistics.add(View::of(*u, *y), k, 0)?;
         }
         let given: Vec<View<'a>> = experiments.iter().map(|e| View::of(e.u, e.y)).collect();
-        if disturbances.is_empty() && delays.longest() == 0 {
+        if !disturbed && delays.longest() == 0 {
             let channels = Channels::read(inputs, statistics, given.len(), options.scaling)?;
             return Ok(Channels { held: Storage::Borrowed(given), ..channels });
         }
-        Channels::made(experiments, disturbances, delays, options)
+        Channels::made(experiments, disturbed, delays, options)
     }
 
     /// Of records that were read in passing and are not held.
@@ -81,7 +77,7 @@ impl<'a> Channels<'a> {
     /// Copies from which the delays are taken, with the known signals beside them.
     fn made(
         experiments: &[Experiment<'a>],
-        disturbances: &[MatRef<'a, f64>],
+        disturbed: bool,
         delays: Delays,
         options: &SubspaceOptions,
     ) -> Result<Self> {
@@ -90,7 +86,7 @@ impl<'a> Channels<'a> {
         let from_start = |m: MatRef<'a, f64>| m.subrows(delays.longest(), m.nrows() - delays.longest());
         let u: Vec<_> = experiments.iter().map(|e| delays.shift(e.u)).collect();
         let y: Vec<_> = experiments.iter().map(|e| from_start(e.y)).collect();
-        let w: Vec<_> = disturbances.iter().map(|w| from_start(*w)).collect();
+        let w: Vec<_> = experiments.iter().filter(|_| disturbed).map(|e| from_start(e.known())).collect();
         // Lines larger than the rest must not set the weights of the outputs.
         let quiet = y.iter().zip(&w).map(|(y, w)| without(*y, *w)).collect::<Result<Vec<_>>>()?;
         let mut statistics = Statistics::new(inputs);
@@ -238,7 +234,7 @@ pub(super) fn check_shapes(experiments: &[Experiment<'_>]) -> Result<(usize, usi
     at_least("the number of experiments", experiments.len(), 1, "at least 1")?;
     let (m, p) = (experiments[0].u.ncols(), experiments[0].y.ncols());
     check_ports(m, p)?;
-    for (k, Experiment { u, y }) in experiments.iter().enumerate() {
+    for (k, Experiment { u, y, .. }) in experiments.iter().enumerate() {
         let named = |what: &str| format!("the {what} record of experiment {}", k + 1);
         check_shape(&named("input"), *u, (u.nrows(), m))?;
         check_shape(&named("output"), *y, (u.nrows(), p))?;
@@ -268,19 +264,15 @@ pub(super) fn check_length(k: usize, samples: usize, (past, horizon): (usize, us
     Err(Error::TooFewSamples { what, found: samples, needed })
 }
 
-/// One matrix per experiment, or none at all; as many signals and finite values in each.
-fn check_disturbances(experiments: &[Experiment<'_>], disturbances: &[MatRef<'_, f64>]) -> Result<()> {
-    let Some(first) = disturbances.first() else { return Ok(()) };
-    if disturbances.len() != experiments.len() {
-        let (value, must) = (disturbances.len() as f64, "one per experiment, or none");
-        return Err(Error::OutOfRange { what: "the number of known disturbances".into(), value, must });
-    }
-    for (k, (e, w)) in experiments.iter().zip(disturbances).enumerate() {
+/// As many known signals in each experiment, finite and of its length; whether there are any.
+fn check_disturbances(experiments: &[Experiment<'_>]) -> Result<bool> {
+    let signals = experiments[0].known().ncols();
+    for (k, e) in experiments.iter().enumerate() {
         let what = format!("the known disturbance of experiment {}", k + 1);
-        check_shape(&what, *w, (e.u.nrows(), first.ncols()))?;
-        check_finite(&what, *w)?;
+        check_shape(&what, e.known(), (e.u.nrows(), signals))?;
+        check_finite(&what, e.known())?;
     }
-    Ok(())
+    Ok(experiments.iter().any(|e| e.disturbance.is_some()))
 }
 
 /// What known signals do not explain of a record.

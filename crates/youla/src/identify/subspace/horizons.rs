@@ -97,7 +97,7 @@ impl SubspaceData<'_> {
     ///     y[(k + 1, 0)] = 1.2 * y[(k, 0)] - 0.7 * y[(k - 1, 0)] + u[(k, 0)];
     /// }
     /// let options = SubspaceOptions { horizon: 12, ..Default::default() };
-    /// let data = SubspaceData::new(&[Experiment { u: u.as_ref(), y: y.as_ref() }], Discrete::new(0.01)?, &options)?;
+    /// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.01)?, &options)?;
     /// for found in data.scan(&[4, 8, 12], &[2], &options)? {
     ///     let modes = found.model?.model.modes()?;
     ///     println!("s = {}: {:.2} Hz, damping ratio {:.3}", found.horizon, modes[0].hz, modes[0].zeta);

@@ -2,7 +2,7 @@
 
 use super::experiment::Experiment;
 use crate::signal::SampleStream;
-use crate::{MatRef, Result};
+use crate::{Error, MatRef, Result};
 use faer::MatMut;
 
 /// Experiments that are in memory already, as a stream of views: nothing is copied but what is asked for.
@@ -20,9 +20,13 @@ impl<'a> ExperimentStream<'a> {
     ///
     /// # Errors
     /// [`crate::Error::OutOfRange`] without experiments, inputs or outputs, [`crate::Error::Shape`] where the records differ
-    /// in length or channels.
+    /// in length or channels, [`Error::Unsupported`] for known disturbances.
     pub fn new(experiments: &'a [Experiment<'a>]) -> Result<Self> {
         super::channels::check_shapes(experiments)?;
+        if experiments.iter().any(|e| e.disturbance.is_some()) {
+            let instead = "identify from the records in memory, or leave the disturbance out";
+            return Err(Error::Unsupported { what: "a known disturbance in a stream of samples", instead });
+        }
         Ok(ExperimentStream { experiments, current: 0, next: 0 })
     }
 }
@@ -42,7 +46,7 @@ impl SampleStream for ExperimentStream<'_> {
     }
 
     fn read(&mut self, mut rows: MatMut<'_, f64>) -> Result<usize> {
-        let Experiment { u, y } = self.experiments[self.current];
+        let Experiment { u, y, .. } = self.experiments[self.current];
         let count = rows.nrows().min(u.nrows() - self.next);
         let mut copy = |from: MatRef<'_, f64>, to: usize| {
             rows.as_mut().submatrix_mut(0, to, count, from.ncols()).copy_from(from.subrows(self.next, count));

@@ -142,10 +142,11 @@ impl SubspaceModel {
 /// C, e : y(k) on x(k), u(k);    A : x(k+1) on x(k), u(k), e(k);    K, Lambda : from the residuals by a Riccati equation
 /// B, D, x0 : min sum |y - yhat|^2 over the one-step predicted outputs
 /// ```
-/// Experiments are joined as columns, never across their boundaries; each has its own initial state.
+/// Experiments are joined as columns, never across their boundaries; each has its own initial state, and its own coefficients of
+/// known disturbances.
 ///
 /// # Errors
-/// [`crate::Error::Shape`] where records differ in length or channels, [`crate::Error::NotFinite`],
+/// [`crate::Error::Shape`] where records differ in length, channels or number of known signals, [`crate::Error::NotFinite`],
 /// [`crate::Error::TooFewSamples`], [`crate::Error::ConstantChannel`], [`crate::Error::InsufficientExcitation`],
 /// [`crate::Error::Order`], [`crate::Error::OutOfRange`] for a horizon below 2 or an order of 0,
 /// [`crate::Error::Unstable`] unless unstable estimates are allowed.
@@ -166,7 +167,7 @@ impl SubspaceModel {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
 /// let options = SubspaceOptions { horizon: 5, order: Order::Fixed(1), ..Default::default() };
-/// let found = subspace(&[Experiment { u: u.as_ref(), y: y.as_ref() }], Discrete::new(0.1)?, &options)?;
+/// let found = subspace(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// assert!((found.poles()[0].re - 0.5).abs() < 1e-9);
 /// # Ok::<(), youla::Error>(())
 /// ```
@@ -191,7 +192,7 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
 /// let options = SubspaceOptions { horizon: 5, ..Default::default() };
-/// let data = SubspaceData::new(&[Experiment { u: u.as_ref(), y: y.as_ref() }], Discrete::new(0.1)?, &options)?;
+/// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// for n in 1..3 {
 ///     let found = data.identify(&SubspaceOptions { order: Order::Fixed(n), ..options.clone() })?;
 ///     assert!(found.poles().iter().any(|pole| (pole.re - 0.5).abs() < 1e-9));
@@ -209,36 +210,17 @@ pub struct SubspaceData<'a> {
 
 impl<'a> SubspaceData<'a> {
     /// Checks and factors the data for the horizon and past of `options`. The records are not copied, but where delays or
-    /// disturbances are taken out of them.
+    /// disturbances are taken out of them: known disturbances are projected out of the factor, and each model has their
+    /// coefficients in [`SubspaceModel::disturbances`].
     ///
     /// # Errors
     /// As [`subspace`], but for those of a model.
     pub fn new(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
-        Self::disturbed(experiments, &[], time, options)
+        in_pool(|| Self::factored(experiments, time, options))
     }
 
-    /// The same for outputs with additive disturbances of known shape, one matrix of known signals (samples x signals) for
-    /// each experiment, or none at all: see [`lines`] and [`harmonics`]. They are projected out of the factor, and each model
-    /// has their coefficients, own for each experiment, in [`SubspaceModel::disturbances`].
-    ///
-    /// # Errors
-    /// As [`Self::new`]; [`Error::Shape`] and [`Error::NotFinite`] for the known signals.
-    pub fn disturbed(
-        experiments: &[Experiment<'a>],
-        disturbances: &[MatRef<'a, f64>],
-        time: Discrete,
-        options: &SubspaceOptions,
-    ) -> Result<Self> {
-        in_pool(|| Self::factored(experiments, disturbances, time, options))
-    }
-
-    fn factored(
-        experiments: &[Experiment<'a>],
-        disturbances: &[MatRef<'a, f64>],
-        time: Discrete,
-        options: &SubspaceOptions,
-    ) -> Result<Self> {
-        let channels = Channels::new(experiments, disturbances, options)?;
+    fn factored(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
+        let channels = Channels::new(experiments, options)?;
         let arrangement = HankelLayout::of(options);
         let automatic =
             options.automatic_horizon.map(|choice| horizons::find(&channels, choice, options)).transpose()?;

@@ -105,9 +105,12 @@ fn cross_validation(
     let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), uncertainty, ..options.clone() };
     let experiments = data.channels.scaled();
     let parts: Vec<_> = experiments.iter().map(|signals| split(signals, leading)).collect();
-    let first: Vec<Experiment<'_>> = parts.iter().map(|([u, y, _], _)| Experiment { u: *u, y: *y }).collect();
-    let known: Vec<_> = parts.iter().map(|([_, _, w], _)| *w).filter(|w| w.ncols() > 0).collect();
-    let leading_data = SubspaceData::disturbed(&first, &known, data.time, options);
+    let disturbed = data.channels.disturbances() > 0;
+    let first: Vec<Experiment<'_>> = parts
+        .iter()
+        .map(|([u, y, w], _)| Experiment { disturbance: disturbed.then_some(*w), ..Experiment::new(*u, *y) })
+        .collect();
+    let leading_data = SubspaceData::new(&first, data.time, options);
     let leading_data = leading_data.map_err(|e| e.within("cross-validation"))?;
     let projected = leading_data.project(options)?;
     each_order(max, |n| {

@@ -103,7 +103,7 @@ pub(crate) const HZ: [f64; 8] = [30.0, 70.0, 120.0, 160.0, 200.0, 230.0, 300.0, 
 impl Coverage {
     pub(crate) fn add(&mut self, of: &Loop, signals: &YoulaSignals, options: &SubspaceOptions) {
         let omega: Vec<f64> = HZ.iter().map(|hz| std::f64::consts::TAU * hz).collect();
-        let found = hansen(&of.factors, std::slice::from_ref(signals), options).unwrap();
+        let found = hansen(&of.factors, std::slice::from_ref(signals), &options.clone().into()).unwrap();
         let HansenModel { deviation, uncertainty, evidence, .. } = &found;
         self.unstable += usize::from(!deviation.stability.stable);
         let uncertainty = uncertainty.as_ref().unwrap();

@@ -61,7 +61,7 @@ impl Loop {
     pub(crate) fn identify(&self, method: SubspaceMethod, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let past = method.is_for_closed_loops().then_some(100);
         let options = SubspaceOptions { method, past, order: Order::Fixed(6), ..options() };
-        let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
         subspace(&experiment, self.plant.time(), &options).unwrap().model
     }
 
@@ -69,7 +69,7 @@ impl Loop {
     pub(crate) fn hansen(&self, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let signals = self.factors.signals(u.as_ref(), y.as_ref()).unwrap();
         let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-        hansen(&self.factors, &[signals], &options).unwrap().plant
+        hansen(&self.factors, &[signals], &options.into()).unwrap().plant
     }
 
     /// Root of the summed squared error of the frequency response from 20 to 600 Hz, relative.

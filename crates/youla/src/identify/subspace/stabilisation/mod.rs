@@ -140,7 +140,7 @@ pub struct StabilisationDiagram {
 ///     y[(k + 1, 0)] = 1.2 * y[(k, 0)] - 0.7 * y[(k - 1, 0)] + u[(k, 0)] + 0.01 * ((7 * k * k) as f64).cos();
 /// }
 /// let method = SubspaceOptions { horizon: 12, ..Default::default() };
-/// let data = SubspaceData::new(&[Experiment { u: u.as_ref(), y: y.as_ref() }], Discrete::new(0.01)?, &method)?;
+/// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.01)?, &method)?;
 /// let orders: Vec<usize> = (1..=8).collect();
 /// let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default())?;
 /// assert_eq!(diagram.clusters.len(), 1);

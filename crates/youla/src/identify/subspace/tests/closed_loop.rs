@@ -67,7 +67,7 @@ fn unstable_system_and_several_experiments_without_noise() {
             (u, y)
         })
         .collect();
-    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
     for method in METHODS {
         let options = SubspaceOptions { method, stability: Stability::Allow, ..fixed(4, 6) };
         let found = subspace(&experiments, clock(), &options).unwrap();

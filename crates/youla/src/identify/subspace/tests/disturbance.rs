@@ -37,10 +37,8 @@ impl Disturbed {
     }
 
     fn identify(&self, options: &SubspaceOptions) -> SubspaceModel {
-        let experiments: Vec<_> =
-            self.u.iter().zip(&self.y).map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
-        let known: Vec<_> = self.w.iter().map(|w| w.as_ref()).collect();
-        SubspaceData::disturbed(&experiments, &known, clock(), options).unwrap().identify(options).unwrap()
+        let experiments = [0, 1].map(|k| one(&self.u[k], &self.y[k])[0].with_disturbance(self.w[k].as_ref()));
+        subspace(&experiments, clock(), options).unwrap()
     }
 }
 
@@ -70,7 +68,7 @@ fn lines_are_taken_out_exactly() {
     }
     // Without them four states go to the lines.
     let experiments: Vec<_> =
-        data.u.iter().zip(&data.y).map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+        data.u.iter().zip(&data.y).map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
     let options = SubspaceOptions { stability: Stability::Allow, ..fixed(4, 7) };
     let eaten = subspace(&experiments, clock(), &options).unwrap();
     let on_circle = eaten.poles().iter().filter(|z| (z.norm() - 1.0).abs() < 1e-3).count();
@@ -86,8 +84,7 @@ fn unstable_systems_have_their_lines_found_by_prediction() {
     let y = respond(&system, &u, 0.1, None) + &w * &a;
     for method in [SubspaceMethod::Moesp, SubspaceMethod::PbsidOpt] {
         let options = SubspaceOptions { method, stability: Stability::Allow, past: Some(8), ..fixed(4, 7) };
-        let data = SubspaceData::disturbed(&one(&u, &y), &[w.as_ref()], clock(), &options).unwrap();
-        let found = data.identify(&options).unwrap();
+        let found = subspace(&[one(&u, &y)[0].with_disturbance(w.as_ref())], clock(), &options).unwrap();
         assert_ne!(found.fit.by, InputFit::Simulation);
         assert!(distance(&found.model, &system) < 1e-5, "{method:?}: {:.1e}", distance(&found.model, &system));
         assert!((&found.disturbances[0] - &a).norm_max() < 1e-4);
@@ -126,12 +123,12 @@ fn amplitude_and_phase_of_a_line() {
 fn unfit_disturbances_are_refused() {
     let system = random_system(&[0.9], 1, 1, false, 6);
     let data = Disturbed::new(&system, two_lines, 1.0, 0.1);
-    let experiment = one(&data.u[0], &data.y[0]);
-    let refused = |w: &[MatRef<'_, f64>]| {
-        SubspaceData::disturbed(&experiment, w, clock(), &fixed(2, 5)).err().map(|e| e.to_string())
+    let experiments = [0, 1].map(|k| one(&data.u[k], &data.y[k])[0]);
+    let refused = |experiments: &[Experiment<'_>]| {
+        subspace(experiments, clock(), &fixed(2, 5)).err().map(|e| e.to_string()).unwrap()
     };
-    let short = refused(&[data.w[1].as_ref()]).unwrap();
+    let short = refused(&[experiments[0].with_disturbance(data.w[1].as_ref())]);
     assert!(short.contains("the known disturbance of experiment 1"), "{short}");
-    let many = refused(&[data.w[0].as_ref(), data.w[0].as_ref()]).unwrap();
-    assert!(many.contains("one per experiment"), "{many}");
+    let one_only = refused(&[experiments[0].with_disturbance(data.w[0].as_ref()), experiments[1]]);
+    assert!(one_only.contains("the known disturbance of experiment 2"), "{one_only}");
 }

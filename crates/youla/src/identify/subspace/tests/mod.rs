@@ -82,7 +82,7 @@ fn distance(left: &StateSpace<Discrete>, right: &StateSpace<Discrete>) -> f64 {
 }
 
 fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
-    [Experiment { u: u.as_ref(), y: y.as_ref() }]
+    [Experiment::new(u.as_ref(), y.as_ref())]
 }
 
 fn fixed(order: usize, horizon: usize) -> SubspaceOptions {

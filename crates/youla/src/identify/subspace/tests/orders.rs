@@ -25,7 +25,7 @@ fn records(seed: u64, noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
 }
 
 fn run(records: &[(Mat<f64>, Mat<f64>)], options: &SubspaceOptions) -> crate::Result<SubspaceModel> {
-    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
     subspace(&experiments, clock(), options)
 }
 

@@ -57,8 +57,8 @@ fn the_origin_of_time_does_not_matter() {
     let (u, y) = record(1500, 0.0);
     for method in WEIGHTS {
         let late = 40;
-        let (all, cut) = ([Experiment { u: u.as_ref(), y: y.as_ref() }], rows(&u, late, 1500));
-        let (first, second) = (model(&all, method), model(&[Experiment { u: cut, y: rows(&y, late, 1500) }], method));
+        let (all, cut) = ([Experiment::new(u.as_ref(), y.as_ref())], rows(&u, late, 1500));
+        let (first, second) = (model(&all, method), model(&[Experiment::new(cut, rows(&y, late, 1500))], method));
         let gap = distance(&second.model, &first.model);
         assert!(gap < 1e-6, "{method:?}: {gap:e}");
         let state = |found: &SubspaceModel| Mat::from_fn(4, 1, |i, _| found.initial_states[0][i]);
@@ -80,8 +80,7 @@ fn one_experiment_split_in_two() {
     let (middle, overlap) = (1400, PAST + HORIZON - 1);
     for method in WEIGHTS {
         let parts = |first_end: usize| {
-            [(0, first_end), (middle, 3000)]
-                .map(|(from, to)| Experiment { u: rows(&u, from, to), y: rows(&y, from, to) })
+            [(0, first_end), (middle, 3000)].map(|(from, to)| Experiment::new(rows(&u, from, to), rows(&y, from, to)))
         };
         let (whole, same, cut) =
             (model(&one(&u, &y), method), model(&parts(middle + overlap), method), model(&parts(middle), method));
@@ -106,7 +105,7 @@ fn noise_free_parts_give_the_model_of_the_whole() {
     let (u, y) = record(1500, 0.0);
     let whole: Vec<_> = WEIGHTS.iter().map(|method| model(&one(&u, &y), *method).model).collect();
     let parts = [(0, 500), (500, 700), (700, 1500)];
-    let parts = parts.map(|(from, to)| Experiment { u: rows(&u, from, to), y: rows(&y, from, to) });
+    let parts = parts.map(|(from, to)| Experiment::new(rows(&u, from, to), rows(&y, from, to)));
     for (method, whole) in WEIGHTS.into_iter().zip(&whole) {
         let gap = distance(&model(&parts, method).model, whole);
         assert!(gap < 1e-6, "{method:?}: {gap:e}");

@@ -71,7 +71,7 @@ fn several_experiments_recover_one_system() {
             (u, y)
         })
         .collect();
-    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
     let found = subspace(&experiments, clock(), &fixed(4, 8)).unwrap();
     assert!(distance(&found.model, &system) < 1e-8);
     assert_eq!(found.columns, 300 + 170 + 90 - 3 * 15);
@@ -186,7 +186,7 @@ fn same_bits_on_one_and_two_threads() {
     let e = 0.1 * uniform(20_000, 2, rng);
     let y = respond(&system, &u, 0.0, Some((&Mat::zeros(4, 2), &e)));
     let (u1, y1) = (u.as_ref().split_at_row(13_000), y.as_ref().split_at_row(13_000));
-    let experiments = [Experiment { u: u1.0, y: y1.0 }, Experiment { u: u1.1, y: y1.1 }];
+    let experiments = [Experiment::new(u1.0, y1.0), Experiment::new(u1.1, y1.1)];
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| subspace(&experiments, clock(), &fixed(4, 10)).unwrap())

@@ -48,7 +48,7 @@ fn records() -> Vec<(Mat<f64>, Mat<f64>)> {
 }
 
 fn views(records: &[(Mat<f64>, Mat<f64>)]) -> Vec<Experiment<'_>> {
-    records.iter().map(|(u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect()
+    records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect()
 }
 
 /// To the last bit.
@@ -163,7 +163,7 @@ fn streams_are_checked() {
     assert!(matches!(run(&experiments, Some(2)), Err(Error::RecordChanged)));
     let (u, mut y) = records[0].clone();
     y[(250_000, 1)] = f64::INFINITY;
-    let late = [experiments[0], Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let late = [experiments[0], Experiment::new(u.as_ref(), y.as_ref())];
     let error = run(&late, None).unwrap_err();
     let place = "the output record of experiment 2 holds a value that is not finite in row 250001, column 2";
     assert!(error.to_string().starts_with(place), "{error}");
@@ -171,12 +171,12 @@ fn streams_are_checked() {
     let (mut y, at) = (y, records[0].0.nrows() - 1);
     y.col_mut(1).fill(2.0);
     y[(at, 1)] = 2.5;
-    let moves = run(&[Experiment { u: u.as_ref(), y: y.as_ref() }], None);
+    let moves = run(&[Experiment::new(u.as_ref(), y.as_ref())], None);
     assert!(!matches!(moves, Err(Error::ConstantChannel { .. })));
     y[(at, 1)] = 2.0;
     let mut other = records[1].1.clone();
     other.col_mut(1).fill(3.0);
-    let still = [Experiment { u: u.as_ref(), y: y.as_ref() }, Experiment { u: experiments[0].u, y: other.as_ref() }];
+    let still = [Experiment::new(u.as_ref(), y.as_ref()), Experiment::new(experiments[0].u, other.as_ref())];
     let error = run(&still, None).unwrap_err();
     assert!(matches!(error, Error::ConstantChannel { ref what, value: 2.0 } if what == "output channel 2"), "{error}");
 }

@@ -130,7 +130,7 @@ fn the_deviation_system_may_be_delayed() {
     let signals = factors.signals(z.as_ref().subcols(0, 1), z.as_ref().subcols(1, 1)).unwrap();
     let feedthrough = Feedthrough::None;
     let options = SubspaceOptions { delays: vec![2], feedthrough, stability: Stability::Allow, ..fixed(8, 14) };
-    let found = crate::identify::hansen::hansen(&factors, &[signals], &options).unwrap();
+    let found = crate::identify::hansen::hansen(&factors, &[signals], &options.into()).unwrap();
     assert_eq!(found.deviation.model.order(), 10);
     let error = distance(&found.plant, &plant);
     assert!(error < 1e-5, "{error:.1e}");

@@ -87,7 +87,7 @@ impl SubspaceData<'_> {
             .iter()
             .map(|s| {
                 let (start, length) = part(s.u.as_ref(), half);
-                Experiment { u: s.u.as_ref().subrows(start, length), y: s.y.as_ref().subrows(start, length) }
+                Experiment::new(s.u.as_ref().subrows(start, length), s.y.as_ref().subrows(start, length))
             })
             .collect();
         let model = SubspaceData::new(&halves, self.time, options)?.identify(options)?.model;

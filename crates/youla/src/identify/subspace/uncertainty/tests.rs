@@ -52,7 +52,7 @@ fn options(method: SubspaceMethod) -> SubspaceOptions {
 }
 
 fn identify(records: &[(MatRef<'_, f64>, MatRef<'_, f64>)], options: &SubspaceOptions) -> SubspaceModel {
-    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment { u: *u, y: *y }).collect();
+    let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(*u, *y)).collect();
     subspace(&experiments, Discrete::new(1.0).unwrap(), options).unwrap()
 }
 
@@ -173,7 +173,7 @@ fn bootstrap_agrees_and_refuses() {
     let trace = |band: &ResponseBand| band.covariance.iter().map(|v| v[0] + v[2]).sum::<f64>();
     let ratio = trace(&delta) / trace(&band);
     assert!((0.6..1.6).contains(&ratio), "{ratio}");
-    let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
     let refused = subspace(&experiment, Discrete::new(1.0).unwrap(), &bootstrap(SubspaceMethod::PbsidOpt));
     assert!(matches!(refused, Err(crate::Error::Unsupported { .. })));
 }
@@ -230,9 +230,8 @@ fn known_lines_leave_the_deviations_as_they_are() {
             delta(found).response(&OMEGA).unwrap().covariance.iter().map(|v| v[0] + v[2]).sum()
         };
         let clean = identify(&[(u.as_ref(), y.as_ref())], &options(method));
-        let experiment = [Experiment { u: u.as_ref(), y: disturbed.as_ref() }];
-        let data = SubspaceData::disturbed(&experiment, &[w.as_ref()], time, &options(method)).unwrap();
-        let known = data.identify(&options(method)).unwrap();
+        let experiment = [Experiment::new(u.as_ref(), disturbed.as_ref()).with_disturbance(w.as_ref())];
+        let known = subspace(&experiment, time, &options(method)).unwrap();
         let ratio = trace(&known) / trace(&clean);
         assert!((ratio - 1.0).abs() < 0.05, "{method:?}: {ratio}");
     }
@@ -244,7 +243,7 @@ fn the_diagram_knows_the_deviations_of_the_modes() {
     let (u, y) = record(4000, 10);
     for method in [SubspaceMethod::Moesp, SubspaceMethod::Ssarx] {
         let options = options(method);
-        let experiment = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
         let data = SubspaceData::new(&experiment, Discrete::new(1.0).unwrap(), &options).unwrap();
         let mode = delta(&data.identify(&options).unwrap()).modes().unwrap()[0];
         let diagram = stabilisation::stabilisation(

@@ -16,7 +16,7 @@ fn main() -> Result<()> {
     let (log, fresh) = (machine.log(20_000, 0.3, 1)?, machine.log(10_000, 0.3, 2)?);
 
     let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?; // (28): one filter of [u; y]
-    let options = SubspaceOptions { horizon: 30, order: Order::Fixed(12), ..Default::default() }.into();
+    let options = SubspaceOptions { horizon: 30.into(), order: Order::Fixed(12), ..Default::default() }.into();
     let found = hansen(&machine.factors, &[signals], &options)?; // (25): S; (17): G(S)
     let certificate = certify(&found.plant, &machine.factors.controller()?)?;
 

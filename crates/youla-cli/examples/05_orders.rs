@@ -16,7 +16,7 @@ fn main() -> Result<()> {
     let machine = machine::bearing()?;
     let (log, fresh) = (machine.log(20_000, 0.3, 1)?, machine.log(10_000, 0.3, 2)?);
     let signals = [machine.factors.signals(log.u.as_ref(), log.y.as_ref())?];
-    let of_order = |order| SubspaceOptions { horizon: 30, order: Order::Fixed(order), ..Default::default() };
+    let of_order = |order| SubspaceOptions { horizon: 30.into(), order: Order::Fixed(order), ..Default::default() };
 
     let options = of_order(20);
     let data = HansenData::new(&machine.factors, &signals, &options)?;

@@ -18,7 +18,8 @@ fn main() -> Result<()> {
     let log = machine.log(20_000, 0.3, 1)?;
     let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
     let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
-    let options = SubspaceOptions { horizon: 30, order: Order::Fixed(10), uncertainty, ..Default::default() }.into();
+    let options =
+        SubspaceOptions { horizon: 30.into(), order: Order::Fixed(10), uncertainty, ..Default::default() }.into();
     let found = hansen(&machine.factors, &[signals], &options)?;
 
     let Some(known) = &found.uncertainty else { return Ok(()) };

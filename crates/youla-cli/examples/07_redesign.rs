@@ -19,7 +19,7 @@ fn main() -> Result<()> {
     let machine = machine::bearing()?;
     let log = machine.log(20_000, 0.3, 1)?;
     let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
-    let options = SubspaceOptions { horizon: 30, order: Order::Fixed(12), ..Default::default() }.into();
+    let options = SubspaceOptions { horizon: 30.into(), order: Order::Fixed(12), ..Default::default() }.into();
     let found = hansen(&machine.factors, &[signals], &options)?;
 
     let inside = ReductionLoop::new(&machine.factors, &found.deviation.model)?;

@@ -33,7 +33,7 @@ fn main() {
     });
     let options = youla::identify::subspace::SubspaceOptions {
         method: subspace,
-        horizon: number(5, 20.0) as usize,
+        horizon: (number(5, 20.0) as usize).into(),
         order: youla::identify::subspace::Order::Fixed(number(4, 8.0) as usize),
         uncertainty: UncertaintyOptions { method, ..Default::default() },
         ..bearing_loop::options()

@@ -41,7 +41,7 @@ pub(super) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
 /// # Errors
 /// [`youla::Error::TooFewSamples`].
 pub(super) fn require_length(options: &SubspaceOptions, records: &RunRecords, settle: usize) -> Result<()> {
-    let (past, horizon) = (options.past(), options.horizon);
+    let (past, horizon) = (options.horizon.past(), options.horizon.future());
     let delay = options.delays.iter().copied().max().unwrap_or(0);
     let needed = [past, horizon, delay, settle].into_iter().fold(0, usize::saturating_add);
     let of_file = |name: &str| records.segments.iter().any(|segment| segment.record == name);

@@ -7,7 +7,9 @@ use crate::timing::middle;
 use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions};
+use youla::identify::subspace::{
+    Horizon, Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
+};
 use youla::lti::{Discrete, FrequencyResponse, frequency_response};
 
 /// The page.
@@ -57,7 +59,13 @@ fn plants() -> Result<String> {
     for (noise, horizon, order) in
         [(0.0, 20, Order::Fixed(12)), (0.03, 30, Order::Fixed(12)), (0.3, 30, Order::Fixed(10))]
     {
-        let options = SubspaceOptions { horizon, order, method: SubspaceMethod::Moesp, ..Default::default() }.into();
+        let options = SubspaceOptions {
+            horizon: Horizon::from(horizon),
+            order,
+            method: SubspaceMethod::Moesp,
+            ..Default::default()
+        }
+        .into();
         let errors = (0..5)
             .map(|seed| {
                 let found = hansen(&bearing.factors, &[bearing.record(20_000, noise, seed)], &options)?;
@@ -75,7 +83,8 @@ fn coverage() -> String {
     const RUNS: u64 = 200;
     let bearing = Loop::new(&Design { a_factor: 0.97, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 });
     let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, blocks: Some(40), ..Default::default() };
-    let options = SubspaceOptions { horizon: 16, order: Order::Fixed(12), uncertainty, ..bearing_loop::options() };
+    let options =
+        SubspaceOptions { horizon: 16.into(), order: Order::Fixed(12), uncertainty, ..bearing_loop::options() };
     let mut found = Coverage::default();
     for seed in 0..RUNS {
         found.add(&bearing, &bearing.record(6000, 0.1, seed), &options);

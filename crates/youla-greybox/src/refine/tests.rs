@@ -39,7 +39,7 @@ fn noisy(samples: usize, noise: f64, seed: u64) -> [Mat<f64>; 2] {
 }
 
 fn n4sid(experiment: Experiment<'_>, order: usize) -> StateSpace<Discrete> {
-    let options = SubspaceOptions { horizon: 20, order: Order::Fixed(order), ..SubspaceOptions::default() };
+    let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(order), ..SubspaceOptions::default() };
     subspace(&[experiment], time(), &options).unwrap().model
 }
 
@@ -137,7 +137,7 @@ fn process_noise_is_refined_in_innovation_form() {
         let w = Mat::from_fn(2000, 2, |_, _| rng.sample::<f64, _>(StandardNormal));
         let y = simulate(&disturbed, w.as_ref(), &[0.0; 2]).unwrap();
         let experiment = Experiment::new(w.as_ref().subcols(0, 1), y.as_ref());
-        let options = SubspaceOptions { horizon: 10, order: Order::Fixed(2), ..SubspaceOptions::default() };
+        let options = SubspaceOptions { horizon: 10.into(), order: Order::Fixed(2), ..SubspaceOptions::default() };
         let start = subspace(&[experiment], time, &options).unwrap();
         let refined = |noise| {
             let options = RefineOptions { noise, ..from_rest() };

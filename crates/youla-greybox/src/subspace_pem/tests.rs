@@ -64,7 +64,7 @@ fn a_record_that_is_too_short_is_refused() {
     let (u, y) = log(0.0, 1);
     let experiments = [Experiment::new(u.as_ref().subrows(0, 60), y.as_ref().subrows(0, 60))];
     let mut few = options();
-    few.subspace.horizon = 5;
+    few.subspace.horizon = 5.into();
     let refused = subspace_pem(&Problem::new(bearing(), &experiments, Discrete::new(2e-4).unwrap()), None, &few);
     assert!(
         matches!(refused, Err(Error::Method(youla::Error::TooFewSamples { found: 60, needed: 64, .. }))),

@@ -134,7 +134,7 @@ impl Bench {
         let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
         let options = SubspaceOptions {
             method: SubspaceMethod::Cva,
-            horizon: 30,
+            horizon: 30.into(),
             order: Order::Fixed(12),
             initial_state: InitialState::Estimated,
             uncertainty,
@@ -150,7 +150,7 @@ impl Bench {
         let (v, y) = (self.clean(log.alpha.as_ref()), self.clean(log.y.as_ref()));
         let options = SubspaceOptions {
             method: SubspaceMethod::Cva,
-            horizon: 30,
+            horizon: 30.into(),
             order: Order::Fixed(8),
             initial_state: InitialState::Estimated,
             ..Default::default()

@@ -140,7 +140,7 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
 }
 
 fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
-    let horizons = hansen.automatic_horizon.is_none().then(|| hansen.past() + hansen.horizon);
+    let horizons = (!hansen.horizon.is_auto()).then(|| hansen.horizon.past() + hansen.horizon.future());
     CheckOptions { excitation_order: options.excitation_order.or(horizons), ..options.clone() }
 }
 

@@ -163,7 +163,7 @@ mod tests {
             (u, y)
         });
         let experiments = [0, 1].map(|k| Experiment::new(records[k].0.as_ref(), records[k].1.as_ref()));
-        let options = SubspaceOptions { horizon: 5, order: Order::Fixed(2), ..Default::default() };
+        let options = SubspaceOptions { horizon: 5.into(), order: Order::Fixed(2), ..Default::default() };
         let settle = factors.settling_samples(1e-3).unwrap();
         assert!(settle > 5);
         let signals =

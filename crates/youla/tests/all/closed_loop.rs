@@ -5,9 +5,7 @@ use crate::common::feedback::{Loop, options};
 use youla::Mat;
 use youla::identify::hansen::{HansenData, HansenOptions, hansen};
 use youla::identify::innovation_form::{Convergence, InnovationOptions, NoiseForm};
-use youla::identify::subspace::{
-    AutomaticHorizon, Experiment, Order, SubspaceMethod, SubspaceOptions, lines, subspace,
-};
+use youla::identify::subspace::{Experiment, Horizon, Order, SubspaceMethod, SubspaceOptions, lines, subspace};
 use youla::linalg::{block, least_squares};
 use youla::lti::{Discrete, StateSpace};
 use youla_greybox::hansen_refine::refine_hansen;
@@ -195,8 +193,8 @@ fn innovation_form_refuses_an_unstable_plant() {
 fn automatic_horizons_do_nearly_as_well_as_known_ones() {
     let bearing = Loop::new(0.0);
     for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
-        let automatic_horizon = Some(AutomaticHorizon { max: 150 });
-        let options = SubspaceOptions { method, automatic_horizon, order: Order::Fixed(6), ..options() };
+        let horizon = Horizon::Auto { max_past: 150 };
+        let options = SubspaceOptions { method, horizon, order: Order::Fixed(6), ..options() };
         let errors = [1, 2, 3, 4, 5].map(|seed| {
             let (u, y) = bearing.record(16_000, 1.0, seed);
             let experiment = [Experiment::new(u.as_ref(), y.as_ref())];

@@ -47,7 +47,7 @@ const EASY: Design = Design { a_factor: 1.0, b_factor: 0.7, input_weight: 1000.0
 fn no_evidence_without_a_deviation_and_always_with_one() {
     let refuted = |a_factor: f64, noise: f64, runs: u64| {
         let bearing = Loop::new(&Design { a_factor, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 });
-        let mut options = SubspaceOptions { horizon: 8, ..with(UncertaintyMethod::Delta, 8) };
+        let mut options = SubspaceOptions { horizon: 8.into(), ..with(UncertaintyMethod::Delta, 8) };
         options.uncertainty.blocks = Some(10);
         let options = options.into();
         let refutes = |seed: u64| {
@@ -82,7 +82,7 @@ type Kind = fn(&Coverage) -> f64;
 #[test]
 fn regions_and_modes_are_covered_as_claimed() {
     let design = Design { a_factor: 0.97, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 };
-    let mut options = SubspaceOptions { horizon: 16, ..with(UncertaintyMethod::Delta, 12) };
+    let mut options = SubspaceOptions { horizon: 16.into(), ..with(UncertaintyMethod::Delta, 12) };
     options.uncertainty.blocks = Some(40);
     let share = cover(&design, 6000, 0.1, &options);
     let kinds: [(&str, Kind); 4] =
@@ -95,7 +95,7 @@ fn regions_and_modes_are_covered_as_claimed() {
 /// The bands of the magnitude, 95 %: B of the nominal model is 30 % off and the controller gentle.
 #[test]
 fn bands_of_the_magnitude_are_covered_as_claimed() {
-    let mut options = SubspaceOptions { horizon: 16, ..with(UncertaintyMethod::Delta, 8) };
+    let mut options = SubspaceOptions { horizon: 16.into(), ..with(UncertaintyMethod::Delta, 8) };
     options.uncertainty.blocks = Some(40);
     let share = cover(&EASY, 4000, 0.3, &options);
     let kinds: [(&str, Kind); 3] = [("S", |c| c.deviation), ("G(S)", |c| c.plant), ("magnitude", |c| c.magnitude)];

@@ -47,7 +47,7 @@ impl StartsSettings {
             multi_start: MultiStartOptions { starts: 32, searched: Some(4), pem, ..Default::default() },
             subspace: SubspaceOptions {
                 method: SubspaceMethod::Cva,
-                horizon: 20,
+                horizon: 20.into(),
                 order: Order::Fixed(6),
                 stability: Stability::Allow,
                 initial_state: InitialState::Zero,

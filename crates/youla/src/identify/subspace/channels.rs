@@ -6,7 +6,7 @@ use super::experiment::Experiment;
 use super::output_pair::OutputPair;
 use super::statistics::Statistics;
 use super::view::{Signals, View};
-use super::{ChannelScaling, InitialState, SubspaceOptions};
+use super::{ChannelScaling, Horizon, InitialState, SubspaceOptions};
 use crate::linalg::{check_finite, check_shape, regress};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
@@ -250,7 +250,7 @@ pub(super) fn check_ports(inputs: usize, outputs: usize) -> Result<()> {
 
 /// Block rows that each experiment must hold, whatever horizon is found.
 pub(super) fn least_blocks(options: &SubspaceOptions) -> (usize, usize) {
-    options.automatic_horizon.map_or((options.past(), options.horizon), |automatic| (automatic.max, 1))
+    (options.horizon.past(), options.horizon.future())
 }
 
 /// Refuses an experiment without a Hankel column.
@@ -293,11 +293,13 @@ pub(super) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
             instead: "it serves physical structures only; take \"estimated\" or \"zero\"",
         });
     }
-    if let Some(automatic) = options.automatic_horizon {
-        return at_least("the largest past", automatic.max, 1, "at least 1 block row");
+    match options.horizon {
+        Horizon::Auto { max_past } => at_least("the largest past", max_past, 1, "at least 1 block row"),
+        Horizon::Fixed { future, past } => {
+            at_least("the horizon", future, 2, "at least 2 block rows")?;
+            at_least("the past", past, 1, "at least 1 block row")
+        }
     }
-    at_least("the horizon", options.horizon, 2, "at least 2 block rows")?;
-    at_least("the past", options.past(), 1, "at least 1 block row")
 }
 
 fn at_least(what: &str, value: usize, least: usize, must: &'static str) -> Result<()> {

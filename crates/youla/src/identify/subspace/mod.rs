@@ -21,6 +21,7 @@ mod factorisation;
 mod gram;
 mod hankel;
 mod hankel_layout;
+mod horizon;
 mod horizons;
 mod innovation;
 mod memory;
@@ -53,12 +54,13 @@ mod view;
 
 pub use disturbance::{Line, amplitudes, harmonics, lines};
 pub use experiment::Experiment;
+pub use horizon::Horizon;
 pub use horizons::{HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
 pub use memory::ExperimentStream;
 pub use options::{
-    AutoOrder, AutomaticHorizon, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order,
-    OrderRule, Stability, SubspaceMethod, SubspaceOptions,
+    AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
+    SubspaceMethod, SubspaceOptions,
 };
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
@@ -166,7 +168,7 @@ impl SubspaceModel {
 /// for k in 0..299 {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
-/// let options = SubspaceOptions { horizon: 5, order: Order::Fixed(1), ..Default::default() };
+/// let options = SubspaceOptions { horizon: 5.into(), order: Order::Fixed(1), ..Default::default() };
 /// let found = subspace(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// assert!((found.poles()[0].re - 0.5).abs() < 1e-9);
 /// # Ok::<(), youla::Error>(())
@@ -191,7 +193,7 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// for k in 0..299 {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
-/// let options = SubspaceOptions { horizon: 5, ..Default::default() };
+/// let options = SubspaceOptions { horizon: 5.into(), ..Default::default() };
 /// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// for n in 1..3 {
 ///     let found = data.identify(&SubspaceOptions { order: Order::Fixed(n), ..options.clone() })?;
@@ -205,6 +207,8 @@ pub struct SubspaceData<'a> {
     time: Discrete,
     /// With the horizons that were found, where that was asked for.
     factored: SubspaceOptions,
+    /// The horizon as it was asked for.
+    asked: Horizon,
     automatic_horizon: Option<HorizonReport>,
 }
 
@@ -222,22 +226,26 @@ impl<'a> SubspaceData<'a> {
     fn factored(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
         let channels = Channels::new(experiments, options)?;
         let arrangement = HankelLayout::of(options);
-        let automatic =
-            options.automatic_horizon.map(|choice| horizons::find(&channels, choice, options)).transpose()?;
-        let blocks = automatic.as_ref().map_or((options.past(), options.horizon), |found| (found.past, found.horizon));
+        let automatic_horizon = match options.horizon {
+            Horizon::Auto { max_past } => Some(horizons::find(&channels, max_past, options)?),
+            Horizon::Fixed { .. } => None,
+        };
+        let horizon = automatic_horizon.as_ref().map_or(options.horizon, HorizonReport::chosen);
+        let blocks = (horizon.past(), horizon.future());
         channels.check_lengths(blocks)?;
         let triangle = HankelLq::new(&channels, blocks, arrangement, options.factorisation)?;
-        let factored = SubspaceOptions { past: Some(blocks.0), horizon: blocks.1, ..options.clone() };
-        Ok(SubspaceData { channels, triangle, time, factored, automatic_horizon: automatic })
+        let factored = SubspaceOptions { horizon, ..options.clone() };
+        Ok(SubspaceData { channels, triangle, time, factored, asked: options.horizon, automatic_horizon })
     }
 
     /// The same inputs with other outputs, in scaled units, factored alike.
     fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Result<SubspaceData<'_>> {
         let channels = self.channels.with_outputs(outputs);
         let options = &self.factored;
-        let blocks = (options.past(), options.horizon);
+        let blocks = (options.horizon.past(), options.horizon.future());
         let triangle = HankelLq::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
-        Ok(SubspaceData { channels, triangle, time: self.time, factored: options.clone(), automatic_horizon: None })
+        let factored = options.clone();
+        Ok(SubspaceData { channels, triangle, time: self.time, factored, asked: self.asked, automatic_horizon: None })
     }
 
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
@@ -254,9 +262,9 @@ impl<'a> SubspaceData<'a> {
     /// Options that these data serve, with the horizons that were found where they ask for that.
     fn checked(&self, options: &SubspaceOptions) -> Result<SubspaceOptions> {
         let held = &self.factored;
-        let automatic = options.automatic_horizon.is_some();
+        let automatic = options.horizon.is_auto();
         if (options.scaling, options.factorisation, &options.delays) != (held.scaling, held.factorisation, &held.delays)
-            || automatic && options.automatic_horizon != held.automatic_horizon
+            || automatic && options.horizon != self.asked
         {
             return Err(Error::Unsupported {
                 what: "another scaling, factorisation, delay or automatic horizon than that of the factored data",
@@ -266,10 +274,8 @@ impl<'a> SubspaceData<'a> {
         check_blocks(options)?;
         options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
         check_uncertainty(options)?;
-        Ok(match automatic {
-            true => SubspaceOptions { horizon: held.horizon, past: held.past, ..options.clone() },
-            false => options.clone(),
-        })
+        let horizon = if automatic { held.horizon } else { options.horizon };
+        Ok(SubspaceOptions { horizon, ..options.clone() })
     }
 
     /// What all orders share.
@@ -320,9 +326,9 @@ impl<'a> SubspaceData<'a> {
             delays: options.delays.clone(),
             stability,
             fit: fitted.quality,
-            horizon: options.horizon,
-            past: options.past(),
-            automatic_horizon: self.automatic_horizon.clone().filter(|_| options.automatic_horizon.is_some()),
+            horizon: options.horizon.future(),
+            past: options.horizon.past(),
+            automatic_horizon: self.automatic_horizon.clone().filter(|found| found.chosen() == options.horizon),
             columns,
             excitation_rcond: projected.excitation_rcond(),
             factor,

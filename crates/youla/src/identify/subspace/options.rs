@@ -1,6 +1,6 @@
 //! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
 
-use super::UncertaintyOptions;
+use super::{Horizon, UncertaintyOptions};
 use crate::{Error, Result};
 
 /// Choices of [`super::subspace`].
@@ -8,7 +8,7 @@ use crate::{Error, Result};
 /// ```
 /// use youla::identify::subspace::{Order, SubspaceOptions, SubspaceMethod};
 /// let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(8), ..Default::default() };
-/// assert_eq!(options.horizon, 20);
+/// assert_eq!(options.horizon, 20.into());
 /// ```
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -17,17 +17,8 @@ use crate::{Error, Result};
 pub struct SubspaceOptions {
     /// The method: it sets the weights of the singular value decomposition.
     pub method: SubspaceMethod,
-    /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the
-    /// slowest mode.
-    pub horizon: usize,
-    /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the
-    /// predictor and should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable
-    /// plant K is small, and this is the decay of the plant itself.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub past: Option<usize>,
-    /// Both from the data instead, by the order of a vector autoregression; `horizon` and `past` have no meaning then.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
-    pub automatic_horizon: Option<AutomaticHorizon>,
+    /// Block rows of past and future: a number for both, `{ future, past }`, or `{ max_past }` for a choice by the data.
+    pub horizon: Horizon,
     /// Order of the model, of S in `[hansen]`; a rule proposes one when absent.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
@@ -53,9 +44,7 @@ impl Default for SubspaceOptions {
     fn default() -> Self {
         SubspaceOptions {
             method: SubspaceMethod::default(),
-            horizon: 20,
-            past: None,
-            automatic_horizon: None,
+            horizon: Horizon::default(),
             order: Order::default(),
             feedthrough: Feedthrough::default(),
             delays: Vec::new(),
@@ -69,33 +58,12 @@ impl Default for SubspaceOptions {
 }
 
 impl SubspaceOptions {
-    /// Block rows of the past.
-    pub fn past(&self) -> usize {
-        self.past.unwrap_or(self.horizon)
-    }
-
     /// Largest order that is asked for.
     pub fn largest_order(&self) -> usize {
         match self.order {
             Order::Fixed(order) => order,
             Order::Auto(auto) => auto.max,
         }
-    }
-}
-
-/// Choice of past and future by the data.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct AutomaticHorizon {
-    /// Largest past to consider, block rows.
-    pub max: usize,
-}
-
-impl Default for AutomaticHorizon {
-    fn default() -> Self {
-        AutomaticHorizon { max: 60 }
     }
 }
 

@@ -102,7 +102,7 @@ fn cross_validation(
     }
     // The horizons stay those of all data.
     let uncertainty = UncertaintyOptions::default();
-    let options = &SubspaceOptions { automatic_horizon: None, delays: Vec::new(), uncertainty, ..options.clone() };
+    let options = &SubspaceOptions { delays: Vec::new(), uncertainty, ..options.clone() };
     let experiments = data.channels.scaled();
     let parts: Vec<_> = experiments.iter().map(|signals| split(signals, leading)).collect();
     let disturbed = data.channels.disturbances() > 0;

@@ -46,7 +46,14 @@ pub fn subspace_stream(
 ) -> Result<SubspaceModel> {
     require_passes(options)?;
     let (triangle, channels, lengths) = factor(stream, options)?;
-    let data = SubspaceData { channels, triangle, time, factored: options.clone(), automatic_horizon: None };
+    let data = SubspaceData {
+        channels,
+        triangle,
+        time,
+        factored: options.clone(),
+        asked: options.horizon,
+        automatic_horizon: None,
+    };
     let options = data.checked(options)?;
     let projected = data.project(&options)?;
     let by_models =
@@ -64,7 +71,7 @@ const NEEDS_MEMORY: &str = "it needs the records in memory: read them as a whole
 fn require_passes(options: &SubspaceOptions) -> Result<()> {
     let by_models = matches!(options.order, Order::Auto(auto) if auto.rule.needs_models());
     let refused = [
-        (options.automatic_horizon.is_some(), "an automatic horizon"),
+        (options.horizon.is_auto(), "an automatic horizon"),
         (by_models, "an order by the models of all orders"),
         (options.delays.iter().any(|delay| *delay > 0), "a delay of an input"),
         (options.uncertainty.method != UncertaintyMethod::None, "an uncertainty"),
@@ -83,7 +90,7 @@ pub(super) fn factor(
     check_blocks(options)?;
     let ports = (stream.inputs(), stream.outputs());
     check_ports(ports.0, ports.1)?;
-    let blocks = (options.past(), options.horizon);
+    let blocks = (options.horizon.past(), options.horizon.future());
     let frame = Frame::new(ports, blocks, HankelLayout::of(options));
     let pass = |lengths| Pass { overlap: frame.blocks() - 1, lengths };
     let mut statistics = Statistics::new(ports.0);

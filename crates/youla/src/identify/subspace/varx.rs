@@ -57,7 +57,7 @@ pub(super) struct StateMap {
 impl Varx {
     pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
         let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
-        let (past, horizon) = (options.past(), options.horizon);
+        let (past, horizon) = (options.horizon.past(), options.horizon.future());
         let r = data.arranged(HankelLayout::Chronological, past, horizon)?;
         let direct = options.feedthrough.inputs_of_outputs(inputs, outputs);
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));

@@ -64,7 +64,7 @@ impl Loop {
 pub(crate) fn options() -> SubspaceOptions {
     SubspaceOptions {
         method: SubspaceMethod::Cva,
-        horizon: 20,
+        horizon: 20.into(),
         order: Order::Fixed(8),
         stability: Stability::Allow,
         ..SubspaceOptions::default()

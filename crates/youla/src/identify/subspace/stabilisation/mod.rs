@@ -139,7 +139,7 @@ pub struct StabilisationDiagram {
 /// for k in 1..899 {
 ///     y[(k + 1, 0)] = 1.2 * y[(k, 0)] - 0.7 * y[(k - 1, 0)] + u[(k, 0)] + 0.01 * ((7 * k * k) as f64).cos();
 /// }
-/// let method = SubspaceOptions { horizon: 12, ..Default::default() };
+/// let method = SubspaceOptions { horizon: 12.into(), ..Default::default() };
 /// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.01)?, &method)?;
 /// let orders: Vec<usize> = (1..=8).collect();
 /// let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default())?;

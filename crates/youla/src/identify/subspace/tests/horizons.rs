@@ -6,7 +6,7 @@ use crate::linalg::least_squares;
 
 fn automatic(max: usize, order: usize) -> SubspaceOptions {
     SubspaceOptions {
-        automatic_horizon: Some(AutomaticHorizon { max }),
+        horizon: Horizon::Auto { max_past: max },
         order: Order::Fixed(order),
         stability: Stability::Allow,
         ..Default::default()
@@ -102,30 +102,46 @@ fn what_cannot_be_chosen_is_refused() {
     assert!(matches!(run(&automatic(20, 200)), Some(Error::TooFewSamples { .. })));
     let data = SubspaceData::new(&one(&u, &y), time, &automatic(10, 4)).unwrap();
     assert!(matches!(data.identify(&automatic(11, 4)), Err(Error::Unsupported { .. })));
-    let table = "automatic_horizon = { max = 30 }";
-    assert_eq!(toml::from_str::<SubspaceOptions>(table).unwrap().automatic_horizon, Some(AutomaticHorizon { max: 30 }));
+    let read = |text: &str| toml::from_str::<SubspaceOptions>(text).map(|options| options.horizon);
+    for (text, horizon) in [
+        ("horizon = 30", Horizon::from(30)),
+        ("horizon = { future = 30, past = 60 }", Horizon::Fixed { future: 30, past: 60 }),
+        ("horizon = { max_past = 30 }", Horizon::Auto { max_past: 30 }),
+    ] {
+        assert_eq!(read(text), Ok(horizon));
+        let options = SubspaceOptions { horizon, ..Default::default() };
+        assert_eq!(toml::from_str::<SubspaceOptions>(&toml::to_string(&options).unwrap()), Ok(options));
+    }
+    for text in ["horizon = \"auto\"", "horizon = { max_past = 30, past = 2 }", "horizon = -1"] {
+        let refused = read(text).unwrap_err().to_string();
+        assert!(refused.contains("a number of block rows, `{ future = 30, past = 60 }`"), "{refused}");
+    }
 }
 
 /// A scan gives the models that an identification of its own gives, from one factor.
 #[test]
 fn a_scan_gives_the_models_of_each_horizon() {
     let (u, y, time) = bearing_record(6000, 0.1, 3);
-    let options =
-        SubspaceOptions { method: SubspaceMethod::Cva, horizon: 30, stability: Stability::Allow, ..Default::default() };
+    let options = SubspaceOptions {
+        method: SubspaceMethod::Cva,
+        horizon: 30.into(),
+        stability: Stability::Allow,
+        ..Default::default()
+    };
     let data = SubspaceData::new(&one(&u, &y), time, &options).unwrap();
-    let found = data.scan(&[3, 15, 30], &[6, 8], &options).unwrap();
+    let found = data.scan(&[3, 15, 30].map(Horizon::from), &[6, 8], &options).unwrap();
     assert_eq!(found.len(), 6);
     for scanned in &found {
         let wanted =
             SubspaceOptions { horizon: scanned.horizon, order: Order::Fixed(scanned.order), ..options.clone() };
         match (&scanned.model, data.identify(&wanted)) {
             (Ok(model), Ok(own)) => assert_eq!(model.model, own.model),
-            (Err(Error::Order { .. }), Err(_)) => assert!(scanned.horizon == 3),
+            (Err(Error::Order { .. }), Err(_)) => assert!(scanned.horizon == 3.into()),
             other => panic!("{other:?}"),
         }
     }
     let modes = |k: usize| found[k].model.as_ref().unwrap().model.modes().unwrap();
     let error = |k: usize| modes(k).iter().map(|m| (m.hz - 217.6).abs()).fold(f64::INFINITY, f64::min);
     assert!(error(4) < 0.05, "{} Hz with 30 block rows, {} Hz with 15", error(4), error(2));
-    assert!(data.scan(&[31], &[6], &options).is_err());
+    assert!(data.scan(&[31.into()], &[6], &options).is_err());
 }

@@ -86,7 +86,12 @@ fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
 }
 
 fn fixed(order: usize, horizon: usize) -> SubspaceOptions {
-    SubspaceOptions { order: Order::Fixed(order), horizon, feedthrough: Feedthrough::Estimated, ..Default::default() }
+    SubspaceOptions {
+        order: Order::Fixed(order),
+        horizon: horizon.into(),
+        feedthrough: Feedthrough::Estimated,
+        ..Default::default()
+    }
 }
 
 /// The bearing of the paper at 5 kHz, in open loop: inputs of +-0.5 V held for 8 samples, white output noise (um).

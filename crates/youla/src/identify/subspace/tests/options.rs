@@ -102,7 +102,7 @@ fn options_read_from_a_table_and_refuse_unknown_names() {
     let options: SubspaceOptions = toml::from_str(text).unwrap();
     let expected = SubspaceOptions {
         method: SubspaceMethod::Cva,
-        horizon: 30,
+        horizon: 30.into(),
         order: Order::Fixed(8),
         stability: Stability::Allow,
         ..Default::default()

@@ -41,7 +41,7 @@ fn every_rule_on_ten_systems() {
             let options = SubspaceOptions {
                 method: SubspaceMethod::Cva,
                 order: by(rule, 8),
-                horizon: 10,
+                horizon: 10.into(),
                 stability: Stability::Allow,
                 ..Default::default()
             };
@@ -68,7 +68,7 @@ fn cross_validation_takes_the_lowest_order_within_its_tolerance() {
         let auto = AutoOrder { max: 8, rule: OrderRule::CrossValidation, leading, tolerance };
         let options = SubspaceOptions {
             order: Order::Auto(auto),
-            horizon: 10,
+            horizon: 10.into(),
             stability: Stability::Allow,
             ..Default::default()
         };
@@ -95,8 +95,12 @@ fn rules_on_models_without_noise_and_without_stability() {
     let system = random_system(&[0.95, 0.8], 1, 1, false, 41);
     let u = uniform(600, 1, &mut ChaCha8Rng::seed_from_u64(42));
     let quiet = [(u.clone(), respond(&system, &u, 0.0, None))];
-    let options =
-        |rule| SubspaceOptions { order: by(rule, 7), horizon: 9, stability: Stability::Allow, ..Default::default() };
+    let options = |rule| SubspaceOptions {
+        order: by(rule, 7),
+        horizon: 9.into(),
+        stability: Stability::Allow,
+        ..Default::default()
+    };
     let found = run(&quiet, &options(OrderRule::Aic)).unwrap();
     assert_eq!(found.order.order, 4, "{:?}", found.order);
     assert!(distance(&found.model, &system) < 1e-8);

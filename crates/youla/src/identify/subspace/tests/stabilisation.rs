@@ -19,7 +19,7 @@ const WEIGHTS: [SubspaceMethod; 6] = [
 fn poles_and_shapes_are_those_of_the_models() {
     let (u, y, time) = bearing_record(2000, 0.1, 1);
     for method in WEIGHTS {
-        let method = SubspaceOptions { method, horizon: 10, stability: Stability::Allow, ..Default::default() };
+        let method = SubspaceOptions { method, horizon: 10.into(), stability: Stability::Allow, ..Default::default() };
         let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
         let diagram = stabilisation(&data, &[3, 6, 7], &method, &StabilisationOptions::default()).unwrap();
         for order in [3, 6, 7] {
@@ -57,7 +57,7 @@ fn clusters_find_the_modes_of_the_bearing() {
     for seed in 1..=3 {
         let (u, y, time) = bearing_record(20_000, 0.2, seed);
         for method in WEIGHTS {
-            let method = SubspaceOptions { method, horizon: 30, ..Default::default() };
+            let method = SubspaceOptions { method, horizon: 30.into(), ..Default::default() };
             let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
             let draw = |share| {
                 let options = StabilisationOptions { share, ..Default::default() };
@@ -79,7 +79,7 @@ fn clusters_find_the_modes_of_the_bearing() {
 #[test]
 fn what_makes_no_diagram_is_refused() {
     let (u, y, time) = bearing_record(1000, 0.1, 1);
-    let method = SubspaceOptions { horizon: 5, ..Default::default() };
+    let method = SubspaceOptions { horizon: 5.into(), ..Default::default() };
     let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
     let draw = |orders: &[usize], options| stabilisation(&data, orders, &method, &options).err();
     let usual = StabilisationOptions::default();
@@ -97,7 +97,7 @@ fn what_makes_no_diagram_is_refused() {
 #[test]
 fn standings_and_clusters_agree_with_the_poles() {
     let (u, y, time) = bearing_record(4000, 0.1, 2);
-    let method = SubspaceOptions { horizon: 20, ..Default::default() };
+    let method = SubspaceOptions { horizon: 20.into(), ..Default::default() };
     let data = SubspaceData::new(&one(&u, &y), time, &method).unwrap();
     let orders: Vec<usize> = (2..=16).collect();
     let diagram = stabilisation(&data, &orders, &method, &StabilisationOptions::default()).unwrap();

@@ -45,7 +45,7 @@ pub(super) fn pair_changes(
     time: Discrete,
 ) -> Result<Vec<PairChange>> {
     let weights = BlockWeights::new(triangle);
-    let gamma = observability(base.pair.a.as_ref(), base.pair.c.as_ref(), options.horizon);
+    let gamma = observability(base.pair.a.as_ref(), base.pair.c.as_ref(), options.horizon.future());
     // The directions that known disturbances take are the same for all blocks but for ends of the size of the horizon.
     let experiments = channels.beyond_disturbances()?;
     let changes: Vec<Result<PairChange>> = blocks
@@ -72,7 +72,7 @@ fn change(
     let gain = if with_gain { projected.innovation(&pair)?.gain().map(|gain| gain.to_owned()) } else { None };
     let choice = if base.poles_moved { Stability::Constrain } else { Stability::Allow };
     let (pair, _) = stability::apply(choice, pair, time)?;
-    let of_pair = observability(pair.a.as_ref(), pair.c.as_ref(), options.horizon);
+    let of_pair = observability(pair.a.as_ref(), pair.c.as_ref(), options.horizon.future());
     let turn = least_squares("an observability matrix", of_pair.as_ref(), gamma.as_ref())?;
     let back = |m: &Mat<f64>| solve("the change of states", turn.x.as_ref(), m.as_ref());
     let pair = OutputPair { a: back(&(&pair.a * &turn.x))?, c: &pair.c * &turn.x };

@@ -169,7 +169,7 @@ fn delta(
     model: &StateSpace<Discrete>,
 ) -> Result<Delta> {
     let samples: Vec<usize> = data.channels.views().iter().map(View::samples).collect();
-    let held = (data.factored.past(), data.factored.horizon);
+    let held = (data.factored.horizon.past(), data.factored.horizon.future());
     let blocks = blocks::cut(&samples, held.0, held.1, options.uncertainty.blocks)?;
     let pairs = influence::pair_changes(&data.channels, &data.triangle, &blocks, base, options, data.time)?;
     let inputs = inputs::input_changes(&data.channels, &blocks, &pairs, base)?;

@@ -20,7 +20,7 @@ pub(in super::super) fn pole_deviations(
     poles: &[Vec<c64>],
 ) -> Result<Vec<Vec<[f64; 2]>>> {
     let samples: Vec<usize> = data.channels.views().iter().map(View::samples).collect();
-    let held = (data.factored.past(), data.factored.horizon);
+    let held = (data.factored.horizon.past(), data.factored.horizon.future());
     let blocks = blocks::cut(&samples, held.0, held.1, method.uncertainty.blocks)?;
     let experiments = data.channels.beyond_disturbances()?;
     let weights = BlockWeights::new(&data.triangle);

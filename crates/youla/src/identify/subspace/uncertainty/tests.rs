@@ -42,8 +42,7 @@ fn truth() -> StateSpace<Discrete> {
 fn options(method: SubspaceMethod) -> SubspaceOptions {
     SubspaceOptions {
         method,
-        horizon: 6,
-        past: Some(8),
+        horizon: Horizon::Fixed { future: 6, past: 8 },
         order: Order::Fixed(2),
         scaling: ChannelScaling::None,
         uncertainty: UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() },
@@ -186,7 +185,7 @@ fn refusals() {
     (0..399).for_each(|k| y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)]);
     for method in [UncertaintyMethod::Delta, UncertaintyMethod::Bootstrap] {
         let uncertainty = UncertaintyOptions { method, ..Default::default() };
-        let options = SubspaceOptions { horizon: 5, order: Order::Fixed(1), uncertainty, ..Default::default() };
+        let options = SubspaceOptions { horizon: 5.into(), order: Order::Fixed(1), uncertainty, ..Default::default() };
         let found = identify(&[(u.as_ref(), y.as_ref())], &options);
         assert_eq!(found.uncertainty.unwrap().refusal(), Some(&NoUncertainty::NoiseFree));
     }

@@ -27,43 +27,140 @@
 //! | [`reduce`] | balanced truncation, singular perturbation, weighted by the loop, normalised coprime factors; every order judged in the loop |
 //! | [`validate`] | fit, variance accounted for, residual tests, certificates of the loop, prediction of fresh data |
 //!
-//! # The scheme in a few lines
+//! # Ten programs
 //!
 //! Feedback is positive everywhere, `u = K y`; records are samples x channels; the sample time is never guessed.
 //!
+//! In all of them `machine` is an oscillator of 10 Hz, of which the nominal model says 9 Hz; `f` and `l` are the gains of the
+//! controller that ran, `alpha` is the excitation of the loop, `u` and `y` are the log.
+//!
+//! 1. Factorise a nominal model and its controller
+//!
 //! ```
-//! use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
+#![doc = include_str!("../assets/docs/loop.txt")]
 //! use youla::factor::CoprimeFactors;
-//! use youla::identify::{hansen::hansen, subspace::{Order, SubspaceOptions}};
-//! use youla::linalg::{block, eye};
-//! use youla::lti::{Discrete, simulate};
-//! use youla::signal::{Excitation, SquareWaves};
-//! use youla_paper::rig::{Bearing, degraded};
-//! use youla::{Mat, validate::certify};
-//! # use faer::Scale;
-//! # use {rand::{RngExt, SeedableRng}, rand_chacha::ChaCha8Rng, rand_distr::StandardNormal};
-//!
-//! let time = Discrete::new(2e-4)?;
-//! let machine = Bearing::default().plant()?.zoh(time)?;
-//! let nominal = degraded(&Bearing::default().plant()?, 0.5, 1.0)?.zoh(time)?.balanced()?; // every entry of A halved
-//! let (one, calm) = (eye(2), Scale(100.0) * eye(2)); // a gentle controller, which stabilises the machine too
-//! let f = lqr(&nominal, &LqrWeights::on_outputs(&nominal, one.as_ref(), calm.as_ref())?)?.f;
-//! let l = kalman(&nominal, &NoiseCovariance::at_inputs(&nominal, one.as_ref(), calm.as_ref())?)?.l;
 //! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?; // (13)-(15)
+//! let (n, m, controller) = (factors.n(), factors.m(), factors.controller()?);
+//! assert_eq!((n.order(), m.order(), controller.order()), (2, 2, 2));
+//! # Ok::<(), youla::Error>(())
+//! ```
 //!
-//! // What the rig would log: alpha excites the loop, n is output noise.
-//! let mut rng = ChaCha8Rng::seed_from_u64(1);
-//! let waves = SquareWaves { amplitude: 0.5, hold_min: 5, hold_max: 40 };
-//! let alpha = Excitation::SquareWaves(waves).generate(8000, 2, time, &mut rng)?;
-//! let n = Mat::from_fn(8000, 2, |_, _| 0.3 * rng.sample::<f64, _>(StandardNormal));
-//! let rig = closed_loop(&machine, &factors.j_k()?)?;
-//! let log = simulate(&rig, block(&[&[alpha.as_ref(), n.as_ref()]]).as_ref(), &vec![0.0; rig.order()])?;
+//! 2. Bezout identity
 //!
-//! let signals = factors.signals(log.subcols(0, 2), log.subcols(2, 2))?; // (28): one filter of [u; y]
-//! let options = SubspaceOptions { horizon: 30, order: Order::Fixed(8), ..Default::default() };
-//! let found = hansen(&factors, &[signals], &options)?; // (25), (17)
-//! let verdict = certify(&found.plant, &factors.controller()?)?;
-//! assert!(verdict.stable);
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::factor::CoprimeFactors;
+//! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let residual = factors.bezout_residual(&[1.0, 10.0, 60.0, 300.0])?; // at these rad/s, relative
+//! assert!(residual < 1e-12);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 3. From (u, y) to (alpha, beta)
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::factor::CoprimeFactors;
+//! let factors = CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let signals = factors.signals(u.as_ref(), y.as_ref())?; // (28): one filter of [u; y], from rest
+//! assert!((signals.alpha() - &alpha).norm_max() < 1e-9); // alpha is the excitation of this loop
+//! let settled = signals.after(factors.settling_samples(1e-3)?)?;
+//! assert!(settled.samples() < 4000);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 4. The modified Hansen scheme
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::identify::{Order, SubspaceOptions, hansen};
+//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let signals = factors.signals(u.as_ref(), y.as_ref())?;
+//! let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(4), ..Default::default() };
+//! let found = hansen(&factors, &[signals], &options.into())?; // (25): S; (17): G(S)
+//! let modes = found.plant.modes()?;
+//! assert!(modes.iter().any(|mode| (mode.hz - 10.0).abs() < 0.1)); // the nominal model says 9 Hz
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 5. Direct identification from (u, y)
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::identify::{Experiment, Order, SubspaceMethod, SubspaceOptions, direct};
+//! let method = SubspaceMethod::PbsidOpt; // consistent in closed loop
+//! let options = SubspaceOptions { method, horizon: 20.into(), order: Order::Fixed(2), ..Default::default() };
+//! let found = direct(&[Experiment::new(u.as_ref(), y.as_ref())], time, &options)?;
+//! assert!((found.model.modes()?[0].hz - 10.0).abs() < 0.1);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 6. Uncertainty of a frequency response
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::identify::{Order, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, hansen};
+//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! # let signals = factors.signals(u.as_ref(), y.as_ref())?;
+//! let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
+//! let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(4), uncertainty, ..Default::default() };
+//! let found = hansen(&factors, &[signals], &options.into())?;
+//! let band = found.uncertainty.as_ref().and_then(|known| known.response(&[60.0]).transpose()).transpose()?;
+//! let [low, high] = band.map_or([0.0; 2], |band| band.magnitude[0]); // of G(S) at 60 rad/s, 95 %
+//! assert!(0.0 < low && low < high);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 7. Reduction in the loop
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::reduce::{ReducedOrder, ReductionLoop, ReductionOptions, reduce_in_loop};
+//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let deviation = factors.deviation_of(&machine)?; // S, here the exact one
+//! let inside = ReductionLoop::new(&factors, &deviation)?; // G(S), of order n + n_S, in the loop that ran
+//! let options = ReductionOptions { order: ReducedOrder::Fixed(2), ..Default::default() };
+//! let reduced = reduce_in_loop(&inside, &options)?;
+//! assert!((reduced.reduction.model.modes()?[0].hz - 10.0).abs() < 1e-6);
+//! assert!(reduced.row().is_some_and(|row| row.stabilised)); // by the controller
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 8. Margins and nu-gap
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::control::{margins, nu_gap};
+//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let controller = factors.controller()?;
+//! let found = margins(&machine, &controller)?; // gain, phase, delay and disk margins, sensitivity peaks
+//! let gap = nu_gap(&machine, &nominal)?;
+//! assert!(found.coprime > 0.0 && 0.0 < gap.value && gap.value <= 1.0);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 9. Riccati and Lyapunov equations
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::linalg::{RiccatiProblem, dare, discrete_lyapunov};
+//! let (q, r) = (eye(2), eye(1));
+//! let problem = RiccatiProblem { a: nominal.a(), b: nominal.b(), q: q.as_ref(), r: r.as_ref(), s: None };
+//! let riccati = dare("the weights of the feedback", &problem)?;
+//! let closed = nominal.a() - nominal.b() * &riccati.gain; // stable: K in the sign of the textbooks
+//! let gramian = discrete_lyapunov(closed.as_ref(), q.as_ref())?; // A X A' - X + Q = 0
+//! assert!(riccati.relative_residual < 1e-12 && gramian.residual < 1e-12);
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 10. Certificate of a loop
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::validate::certify;
+//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
+//! let certificate = certify(&machine, &factors.controller()?)?;
+//! assert!(certificate.stable && certificate.poles.len() == 4);
 //! # Ok::<(), youla::Error>(())
 //! ```
 

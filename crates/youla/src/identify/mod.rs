@@ -6,3 +6,11 @@ pub mod hansen;
 pub mod innovation_form;
 pub mod likelihood;
 pub mod subspace;
+
+pub use direct::direct;
+pub use hansen::{HansenData, HansenModel, HansenOptions, hansen, hansen_stream};
+pub use innovation_form::{InnovationOptions, NoiseForm};
+pub use subspace::{
+    Experiment, Horizon, Order, Stability, SubspaceData, SubspaceMethod, SubspaceModel, SubspaceOptions,
+    UncertaintyMethod, UncertaintyOptions, subspace, subspace_stream,
+};

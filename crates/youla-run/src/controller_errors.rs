@@ -15,6 +15,7 @@ use crate::Result;
 use faer::Scale;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use youla::Mat;
 use youla::identify::hansen::{HansenModel, HansenOptions, hansen};
 use youla::identify::subspace::{Stability, SubspaceOptions, UncertaintyOptions};
@@ -148,10 +149,7 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
         ControllerError::Gain(g) => controller.map_output(&(Scale(1.0 + g) * eye(controller.outputs()))),
         _ => controller.clone(),
     };
-    let records = RunRecords {
-        estimation: run.records.estimation.iter().map(|r| altered(r, error, settle)).collect(),
-        ..run.records.clone()
-    };
+    let records = altered(run.records, error, settle);
     let described = Controller::System(described);
     let factors = factorise(&run.declared.nominal, &described, &records, &settings.factors)?.factors;
     let dropped = if error == ControllerError::InitialState { 0 } else { settle };
@@ -162,33 +160,50 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
     Ok(hansen(&factors, &signals.experiments, &options)?)
 }
 
-/// The record as an error leaves it.
-fn altered(record: &LoopRecord, error: ControllerError, settle: usize) -> LoopRecord {
+/// The estimation records as an error leaves them; errors of the controller alone leave them as they are.
+fn altered(records: &RunRecords, error: ControllerError, settle: usize) -> Cow<'_, RunRecords> {
+    let alter: &dyn Fn(&LoopRecord) -> LoopRecord = match error {
+        ControllerError::Saturation(part) => &move |record| saturated(record, part),
+        ControllerError::InitialState => &move |record| begun_late(record, settle),
+        ControllerError::None | ControllerError::Delay | ControllerError::Gain(_) => return Cow::Borrowed(records),
+    };
+    Cow::Owned(RunRecords {
+        time: records.time,
+        inputs: records.inputs.clone(),
+        outputs: records.outputs.clone(),
+        estimation: records.estimation.iter().map(alter).collect(),
+        verification: Vec::new(),
+        sources: Vec::new(),
+        segments: Vec::new(),
+        true_plant: None,
+    })
+}
+
+/// u cut at a part of its largest value.
+fn saturated(record: &LoopRecord, part: f64) -> LoopRecord {
     let mut record = record.clone();
-    match error {
-        ControllerError::Saturation(part) => {
-            for column in record.u.as_mut().col_iter_mut() {
-                let limit = part * column.norm_max();
-                column.iter_mut().for_each(|u| *u = u.clamp(-limit, limit));
-            }
-        }
-        ControllerError::InitialState => {
-            let skip = settle.max(record.samples() / 10);
-            let later = |m: &Mat<f64>| m.subrows(skip, m.nrows() - skip).to_owned();
-            let both = |m: &Option<Mat<f64>>| m.as_ref().map(later);
-            record = LoopRecord {
-                u: later(&record.u),
-                y: later(&record.y),
-                input_excitation: both(&record.input_excitation),
-                reference: both(&record.reference),
-                alpha: both(&record.alpha),
-                disturbance: both(&record.disturbance),
-                ..record
-            };
-        }
-        _ => {}
+    for column in record.u.as_mut().col_iter_mut() {
+        let limit = part * column.norm_max();
+        column.iter_mut().for_each(|u| *u = u.clamp(-limit, limit));
     }
     record
+}
+
+/// The record without its first tenth, at least the samples in which the filter settles.
+fn begun_late(record: &LoopRecord, settle: usize) -> LoopRecord {
+    let skip = settle.max(record.samples() / 10);
+    let later = |m: &Mat<f64>| m.subrows(skip, m.nrows() - skip).to_owned();
+    let both = |m: &Option<Mat<f64>>| m.as_ref().map(later);
+    LoopRecord {
+        name: record.name.clone(),
+        time: record.time,
+        u: later(&record.u),
+        y: later(&record.y),
+        input_excitation: both(&record.input_excitation),
+        reference: both(&record.reference),
+        alpha: both(&record.alpha),
+        disturbance: both(&record.disturbance),
+    }
 }
 
 fn changed(run: RunContext<'_>, modes: &[Mode], result: &HansenModel) -> Result<Changed> {

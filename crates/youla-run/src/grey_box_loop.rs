@@ -171,10 +171,9 @@ impl Closed {
         let ports = if with_alpha { context.factorisation.factors.j_k()? } else { with_input_port(controller)? };
         let (m, p) = (controller.outputs(), controller.inputs());
         let external = records.estimation.iter().map(|r| {
-            let added = r.alpha.as_ref().or(r.input_excitation.as_ref());
-            let added = added.cloned().unwrap_or_else(|| Mat::zeros(r.samples(), m));
-            let reference = r.reference.clone().unwrap_or_else(|| Mat::zeros(r.samples(), p));
-            block(&[&[added.as_ref(), reference.as_ref()]])
+            let (no_input, no_reference) = (Mat::zeros(r.samples(), m), Mat::zeros(r.samples(), p));
+            let added = r.alpha.as_ref().or(r.input_excitation.as_ref()).unwrap_or(&no_input);
+            block(&[&[added.as_ref(), r.reference.as_ref().unwrap_or(&no_reference).as_ref()]])
         });
         let external = external.collect();
         Ok(Closed { controller: with_reference(&ports, m, p)?, ports, external })

@@ -5,6 +5,7 @@ use super::entries::{finite, finite_all};
 use super::records::{LoopRecord, channels_of};
 use crate::Result;
 use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
@@ -79,17 +80,17 @@ pub(super) fn residual_tests(
     let (x, channels) = match known.is_empty() {
         false => {
             let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();
-            (block(&[&parts]), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
+            (Cow::Owned(block(&[&parts])), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
         }
-        true => (record.u.clone(), run.records.inputs.clone()),
+        true => (Cow::Borrowed(&record.u), run.records.inputs.clone()),
     };
-    let rest = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
-    let e = rest((measured - predicted).as_ref());
-    let (k_step_fits, predictor) = fits_ahead(rest(measured).as_ref(), rest(predicted).as_ref(), noise)?;
+    let (measured, predicted) = (measured.get(skip.., ..), predicted.get(skip.., ..));
+    let e = measured - predicted;
+    let (k_step_fits, predictor) = fits_ahead(measured, predicted, noise)?;
     Ok(RecordResiduals {
         excitations: channels.into_iter().map(|c| c.name).collect(),
         external,
-        correlations: residual_correlations(e.as_ref(), rest(x.as_ref()).as_ref())?,
+        correlations: residual_correlations(e.as_ref(), (*x).as_ref().get(skip.., ..))?,
         k_step_fits,
         predictor,
     })

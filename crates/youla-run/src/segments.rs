@@ -35,7 +35,8 @@ pub(super) struct Part {
 /// [`youla::Error::OutOfRange`] for rows that the file does not have, and those of [`Record::trim`].
 pub(super) fn parts(file: &DataFile, mut continuous: Vec<Record>) -> Result<Vec<Part>> {
     if continuous.len() == 1 && file.segments.is_empty() {
-        let record = continuous.remove(0).trim(file.skip, file.take)?;
+        let whole = continuous.remove(0);
+        let record = if file.skip == 0 && file.take.is_none() { whole } else { whole.trim(file.skip, file.take)? };
         let rows = [file.skip + 1, file.skip + record.samples()];
         return Ok(vec![Part { record, name: file.label(), rows, cut: false }]);
     }

@@ -140,9 +140,10 @@ fn expected(factors: &CoprimeFactors<Discrete>, record: &LoopRecord) -> Result<O
     let outside = match (&record.input_excitation, &record.reference) {
         (None, None) => None,
         (v1, r) => {
-            let v1 = v1.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.inputs()));
-            let r = r.clone().unwrap_or_else(|| Mat::zeros(record.samples(), factors.outputs()));
-            Some(factors.alpha_of_excitation(v1.as_ref(), (Scale(-1.0) * &r).as_ref())?)
+            let none = |channels| Mat::zeros(record.samples(), channels);
+            let (no_v1, no_r) = (none(factors.inputs()), none(factors.outputs()));
+            let v2 = Scale(-1.0) * r.as_ref().unwrap_or(&no_r);
+            Some(factors.alpha_of_excitation(v1.as_ref().unwrap_or(&no_v1).as_ref(), v2.as_ref())?)
         }
     };
     Ok(match (&record.alpha, outside) {

@@ -190,9 +190,8 @@ pub(super) fn verify_record(
     let record_name = record.name.clone();
     match predicted {
         Ok(predicted) => {
-            let counted = |m: MatRef<'_, f64>| m.get(skip.., ..).to_owned();
-            let lines = lines.map(counted);
-            let rest = |m: &Mat<f64>| without_lines(counted(m.as_ref()).as_ref(), lines.as_ref().map(|w| w.as_ref()));
+            let lines = lines.map(|w| w.get(skip.., ..));
+            let rest = |m: &Mat<f64>| without_lines(m.as_ref().get(skip.., ..), lines);
             let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
             let residuals = Some(residual_tests(run, record, noise, measured.as_ref(), predicted.as_ref())?);

@@ -2,7 +2,7 @@
 
 use super::CoprimeFactors;
 use crate::linalg::{block, check_shape};
-use crate::lti::{Discrete, simulate};
+use crate::lti::{Discrete, simulate_joined};
 use crate::{Error, Mat, MatRef, Result};
 
 /// The signals of the Youla deviation system S, samples x channels: what [`crate::identify::hansen::hansen`] identifies from.
@@ -96,7 +96,7 @@ impl CoprimeFactors<Discrete> {
         let m = self.inputs();
         check_shape("the record of plant inputs", u, (u.nrows(), m))?;
         check_shape("the record of plant outputs", y, (u.nrows(), self.outputs()))?;
-        Ok(YoulaSignals::of_filter(self.filter(block(&[&[u, y]]).as_ref())?, m))
+        Ok(YoulaSignals::of_filter(self.filter(&[u, y])?, m))
     }
 
     /// The alpha that known excitations cause: `Vt v1 + Ut v2`, with `v1` (samples x m) added at the plant input and
@@ -108,7 +108,9 @@ impl CoprimeFactors<Discrete> {
     /// [`crate::Error::Shape`] when the records do not fit the factors.
     pub fn alpha_of_excitation(&self, v1: MatRef<'_, f64>, v2: MatRef<'_, f64>) -> Result<Mat<f64>> {
         let minus_v2 = faer::Scale(-1.0) * v2;
-        Ok(self.filter(block(&[&[v1, minus_v2.as_ref()]]).as_ref())?.subcols(0, self.inputs()).to_owned())
+        check_shape("the excitation of the plant inputs", v1, (v1.nrows(), self.inputs()))?;
+        check_shape("the excitation of the plant outputs", v2, (v1.nrows(), self.outputs()))?;
+        Ok(self.filter(&[v1, minus_v2.as_ref()])?.subcols(0, self.inputs()).to_owned())
     }
 
     /// Samples after which a transient of the signal filter has decayed to `fraction` (for example 1e-3).
@@ -120,8 +122,8 @@ impl CoprimeFactors<Discrete> {
         Ok(if slowest == 0.0 { 0 } else { (fraction.ln() / slowest.ln()).ceil() as usize })
     }
 
-    fn filter(&self, signals: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    fn filter(&self, signals: &[MatRef<'_, f64>]) -> Result<Mat<f64>> {
         let filter = self.left().system();
-        simulate(filter, signals, &vec![0.0; filter.order()])
+        simulate_joined(filter, signals, &vec![0.0; filter.order()])
     }
 }

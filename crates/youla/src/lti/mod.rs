@@ -25,6 +25,7 @@ pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings};
 pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
 pub use partitioned::Partitioned;
 pub use response::{FrequencyResponse, frequency_response};
+pub(crate) use simulate::simulate_joined;
 pub use simulate::{SimulationState, Simulator, simulate};
 pub use state_space::StateSpace;
 pub use time::{Continuous, Discrete, TimeDomain};

@@ -159,8 +159,13 @@ fn entry(system: &StateSpace<Discrete>, row: usize, column: usize) -> f64 {
 /// # Ok::<(), youla::Error>(())
 /// ```
 pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -> Result<Mat<f64>> {
-    let samples = u.nrows();
-    check_shape("the input record", u, (samples, system.inputs()))?;
+    check_shape("the input record", u, (u.nrows(), system.inputs()))?;
+    simulate_joined(system, &[u], x0)
+}
+
+/// The same with the inputs in several records of the same length, side by side; their columns together are the inputs.
+pub(crate) fn simulate_joined(system: &StateSpace<Discrete>, u: &[MatRef<'_, f64>], x0: &[f64]) -> Result<Mat<f64>> {
+    let samples = u.first().map_or(0, |u| u.nrows());
     let simulator = Simulator::new(system);
     let mut state = simulator.start(x0)?;
     let mut y = Mat::zeros(samples, system.outputs());
@@ -168,7 +173,7 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
     if is_finite(&state, &y) {
         return Ok(y);
     }
-    check_finite("the input record", u)?;
+    u.iter().try_for_each(|u| check_finite("the input record", *u))?;
     let sample = (0..samples).find(|k| y.row(*k).iter().any(|v| !v.is_finite())).unwrap_or(samples);
     Err(Error::Diverged { what: "the simulation".into(), sample: sample + 1, pole: system.worst_pole()? })
 }
@@ -177,7 +182,7 @@ pub fn simulate(system: &StateSpace<Discrete>, u: MatRef<'_, f64>, x0: &[f64]) -
 struct Run<'a> {
     simulator: &'a Simulator,
     state: &'a mut SimulationState,
-    u: MatRef<'a, f64>,
+    u: &'a [MatRef<'a, f64>],
     y: &'a mut Mat<f64>,
 }
 
@@ -187,11 +192,15 @@ impl NullaryFnOnce for Run<'_> {
     #[inline(always)]
     fn call(self) {
         let Run { simulator, state, u, y } = self;
-        let copy = if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() };
-        let inputs: Vec<&[f64]> = match u.try_as_col_major() {
-            Some(u) => u.col_iter().map(|c| c.as_slice()).collect(),
-            None => (0..copy.ncols()).map(|j| copy.col_as_slice(j)).collect(),
-        };
+        let copies: Vec<Mat<f64>> =
+            u.iter().map(|u| if u.try_as_col_major().is_none() { u.to_owned() } else { Mat::new() }).collect();
+        let mut inputs: Vec<&[f64]> = Vec::new();
+        for (u, copy) in u.iter().zip(&copies) {
+            match u.try_as_col_major() {
+                Some(u) => inputs.extend(u.col_iter().map(|c| c.as_slice())),
+                None => inputs.extend((0..copy.ncols()).map(|j| copy.col_as_slice(j))),
+            }
+        }
         let samples = y.nrows();
         let mut outputs: Vec<&mut [f64]> =
             y.col_iter_mut().filter_map(|c| c.try_as_col_major_mut()).map(|c| c.as_slice_mut()).collect();

@@ -4,7 +4,6 @@
 
 use super::Record;
 use crate::Result;
-use faer::Mat;
 
 /// What to take out of every channel.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -45,13 +44,14 @@ impl Record {
     ///
     /// # Errors
     /// [`crate::Error::NotFiniteSample`] where values near the largest number overflow.
-    pub fn detrend(&self, kind: Detrend) -> Result<Detrended> {
+    pub fn detrend(self, kind: Detrend) -> Result<Detrended> {
         let ts = self.time().ts();
         let removed: Vec<Trend> = self.columns().map(|values| trend(values, ts, kind)).collect();
-        let data = Mat::from_fn(self.samples(), removed.len(), |i, j| {
-            self.data()[(i, j)] - (removed[j].offset + removed[j].slope * (i as f64 * ts))
-        });
-        Ok(Detrended { record: self.with_data(data)?, removed })
+        let line = |i: usize, trend: &Trend| trend.offset + trend.slope * (i as f64 * ts);
+        let record = self.map_columns(|j, column| {
+            column.iter_mut().enumerate().for_each(|(i, value)| *value -= line(i, &removed[j]));
+        })?;
+        Ok(Detrended { record, removed })
     }
 }
 
@@ -74,17 +74,17 @@ fn trend(values: &[f64], ts: f64, kind: Detrend) -> Trend {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::{lti::Discrete, signal::Channel};
+    use crate::{Mat, lti::Discrete, signal::Channel};
 
     #[test]
     fn a_line_is_removed_and_returned() {
         let data = Mat::from_fn(101, 1, |i, _| 3.0 - 2.0 * (i as f64 * 0.1) + if i % 2 == 0 { 0.5 } else { -0.5 });
         let record = Record::new("line", vec![Channel::new("y", "m")], data, Discrete::new(0.1).unwrap()).unwrap();
-        let out = record.detrend(Detrend::Linear).unwrap();
+        let out = record.clone().detrend(Detrend::Linear).unwrap();
         assert!((out.removed[0].slope + 2.0).abs() < 1e-12, "{:?}", out.removed);
         assert!((out.removed[0].offset - (3.0 + 0.5 / 101.0)).abs() < 1e-12, "{:?}", out.removed);
-        let again = out.record.detrend(Detrend::Linear).unwrap();
+        let again = out.record.clone().detrend(Detrend::Linear).unwrap();
         assert!(again.removed[0].slope.abs() < 1e-13 && again.removed[0].offset.abs() < 1e-13);
-        assert_eq!(record.detrend(Detrend::None).unwrap().record, record);
+        assert_eq!(record.clone().detrend(Detrend::None).unwrap().record, record);
     }
 }

@@ -15,6 +15,6 @@ pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
 pub use persistency::{Persistency, persistency, persistency_order};
-pub use record::{Record, Segments, Split};
+pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
 pub use stream::{JoinedStreams, SampleStream};

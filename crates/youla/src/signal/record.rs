@@ -22,7 +22,7 @@ pub struct Record {
 
 /// A record in two consecutive parts.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Split {
+pub struct SplitRecord {
     /// The first part.
     pub first: Record,
     /// The rest.
@@ -169,11 +169,11 @@ impl Record {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] where a part would be empty.
-    pub fn split(&self, at: usize) -> Result<Split> {
+    pub fn split(&self, at: usize) -> Result<SplitRecord> {
         if at == 0 || at >= self.samples() {
             return Err(self.too_short("the row to split at", at, "inside of the record"));
         }
-        Ok(Split { first: self.rows(0, at), second: self.rows(at, self.samples() - at) })
+        Ok(SplitRecord { first: self.rows(0, at), second: self.rows(at, self.samples() - at) })
     }
 
     /// Pieces of `length` samples, each starting `step` samples after the one before.
@@ -192,9 +192,10 @@ impl Record {
         Ok(Segments { segments, unused: self.samples() - ((count - 1) * step + length) })
     }
 
-    /// The same channels and clock with other values, for the operations of this module.
-    pub(super) fn with_data(&self, data: Mat<f64>) -> Result<Record> {
-        Record::new(self.name.clone(), self.channels.clone(), data, self.time)?.starting_at(self.start)
+    /// The same record with its columns changed in place, for the operations of this module.
+    pub(super) fn map_columns(mut self, change: impl Fn(usize, &mut [f64])) -> Result<Record> {
+        (0..self.channels.len()).for_each(|j| change(j, self.data.col_as_slice_mut(j)));
+        Record::new(self.name, self.channels, self.data, self.time)?.starting_at(self.start)
     }
 
     fn index(&self, name: &str) -> Result<usize> {

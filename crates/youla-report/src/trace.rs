@@ -11,7 +11,7 @@ use crate::{Error, Result};
 pub const MAX_POINTS: usize = 4000;
 
 /// Most rows of a record: what a number on the page counts exactly.
-const MAX_ROWS: usize = 1 << 53;
+const MAX_ROWS: usize = if usize::BITS > 53 { (1_u64 << 53) as usize } else { usize::MAX };
 
 /// Most samples in the window in which every sample is drawn.
 const MAX_DETAIL: usize = 1600;

@@ -35,8 +35,8 @@ pub(super) fn estimate(problem: &Problem<'_>, start: &[f64], options: &GreyBoxOp
         return Err(Error::Method(youla::Error::OutOfRange { what, value: 0.0, must }));
     }
     if problem.closure.is_some() && options.delays.iter().any(|delay| *delay > 0) {
-        let (what, must) = ("the delay of an input inside of the loop".into(), "0: put it into the controller");
-        return Err(Error::Method(youla::Error::OutOfRange { what, value: 1.0, must }));
+        let (what, instead) = ("a delay of an input inside of a simulated loop", "put it into the controller");
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
     let shifted = Shifted::new(problem.experiments, &options.delays)?;
     let experiments = &shifted.experiments();

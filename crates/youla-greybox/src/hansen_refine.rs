@@ -64,7 +64,7 @@ pub struct RefinedHansen {
 /// are subtracted from beta with the size that was estimated with S.
 ///
 /// # Errors
-/// As [`refine`]; [`youla::Error::OutOfRange`] for an S with delays; [`youla::Error::AlgebraicLoop`] when G(S) is not well posed;
+/// As [`refine`]; [`youla::Error::Unsupported`] for an S with delays; [`youla::Error::AlgebraicLoop`] when G(S) is not well posed;
 /// [`youla::Error::Ports`] and [`youla::Error::Shape`] for other disturbances than those of S.
 pub fn refine_hansen(
     found: HansenModel,
@@ -72,9 +72,9 @@ pub fn refine_hansen(
     signals: &[YoulaSignals],
     options: &RefineOptions,
 ) -> Result<RefinedHansen> {
-    if let Some(delay) = found.deviation.delays.iter().find(|delay| **delay > 0) {
-        let (what, must) = ("a delay of an S that is to be refined".into(), "0");
-        return Err(Error::Method(youla::Error::OutOfRange { what, value: *delay as f64, must }));
+    if found.deviation.delays.iter().any(|delay| *delay > 0) {
+        let (what, instead) = ("the refinement of an S with delays", "leave `refine` or `delays` out");
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
     let cleaned = without_disturbances(signals, &found.deviation)?;
     let mut experiments = Vec::new();

@@ -34,8 +34,8 @@ impl<'a> Simulated<'a> {
         match (closure, noise) {
             (Some(closure), NoiseModel::OutputError) => Ok(Simulated::Loop(closure)),
             (Some(_), _) => {
-                let (what, must) = ("the number of noise models inside of the loop".into(), "0: take \"output-error\"");
-                Err(Error::Method(youla::Error::OutOfRange { what, value: 1.0, must }))
+                let (what, instead) = ("a noise model inside of a simulated loop", "take noise = \"output-error\"");
+                Err(Error::Method(youla::Error::Unsupported { what, instead }))
             }
             (None, NoiseModel::OutputError) => Ok(Simulated::Plant),
             (None, NoiseModel::Innovation(start)) => {

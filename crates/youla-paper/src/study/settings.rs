@@ -188,9 +188,9 @@ impl PaperSettings {
         within("experiments.rpm", e.rpm, f64::MIN_POSITIVE, f64::MAX, "a positive number")?;
         filled("experiments.start_factors", &e.start_factors)?;
         count("methods", self.methods.len(), 1, Method::ALL.len())?;
-        if let Some(twice) = (1..self.methods.len()).find(|k| self.methods[..*k].contains(&self.methods[*k])) {
-            let what = format!("the number of times that methods names {}", self.methods[twice].key());
-            return Err(Error::Method(youla::Error::OutOfRange { what, value: 2.0, must: "1" }));
+        for method in &self.methods {
+            let times = self.methods.iter().filter(|other| *other == method).count();
+            within(&format!("the number of times that methods names {}", method.key()), times as f64, 1.0, 1.0, "1")?;
         }
         for (what, samples) in [
             ("study.samples", s.samples),

@@ -103,9 +103,9 @@ fn find(problem: &Problem, search: Search, settings: &StartsSettings) -> Result<
 }
 
 fn from_hansen(problem: &Problem, record: &[Experiment<'_>], settings: &StartsSettings) -> Result<Found> {
-    let (what, must) = ("the loop of an item".into(), "closed for this search");
+    let (what, instead) = ("hansen_pem on a record of an open loop", "take another search");
     let Some(design) = &problem.design else {
-        return Err(Error::Method(youla::Error::OutOfRange { what, value: 0.0, must }));
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     };
     let signals = [design.factors.signals(record[0].u, record[0].y)?];
     let paper = &settings.paper;

@@ -72,9 +72,12 @@ impl StartsSettings {
         if self.items == Some(0) {
             return refused("the number of items of a case", "at least 1");
         }
-        if let Some(twice) = (1..self.cases.len()).find(|k| self.cases[..*k].contains(&self.cases[*k])) {
-            let what = format!("the number of times that the case {} is named", self.cases[twice].key());
-            return Err(Error::Method(youla::Error::OutOfRange { what, value: 2.0, must: "1" }));
+        for case in &self.cases {
+            let times = self.cases.iter().filter(|other| *other == case).count();
+            if times > 1 {
+                let what = format!("the number of times that the case {} is named", case.key());
+                return Err(Error::Method(youla::Error::OutOfRange { what, value: times as f64, must: "1" }));
+            }
         }
         if self.cases.is_empty() {
             return refused("the number of cases", "at least 1");

@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 use youla::identify::subspace::{Factorisation, InputFit};
 use youla_paper::run::WrittenPaper;
-use youla_paper::study::{Experiment, Method, Paper};
+use youla_paper::study::{Method, Paper, StudyExperiment};
 use youla_run::{Identification, LongModel, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
@@ -66,7 +66,7 @@ pub(crate) fn subspace(model: &LongModel, peak_memory: Option<f64>) -> youla_run
 /// Table 1, what became of the paper's claims, and where everything is.
 pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
     let experiments = &paper.experiments.list;
-    let row = |label: &str, fits: &dyn Fn(&Experiment) -> [f64; 2]| {
+    let row = |label: &str, fits: &dyn Fn(&StudyExperiment) -> [f64; 2]| {
         let cells = experiments.iter().flat_map(fits).map(|fit| format!("{fit:.1}"));
         std::iter::once(label.to_owned()).chain(cells).collect()
     };

@@ -156,11 +156,11 @@ fn findings(found: &Identification) -> Vec<draw::DataFinding> {
     found.data.grouped().into_iter().map(one).collect()
 }
 
-fn experiments(found: &Identification) -> Result<Vec<draw::Experiment>> {
+fn experiments(found: &Identification) -> Result<Vec<draw::DrawnExperiment>> {
     found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
 }
 
-fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Experiment> {
+fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::DrawnExperiment> {
     let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
     let (u, y) = (&found.records.inputs, &found.records.outputs);
     let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
@@ -195,7 +195,7 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
         add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
         add(SignalKind::Beta, &named("beta", y), signals.beta())?;
     }
-    Ok(draw::Experiment { name: record.name.clone(), clock, signals: drawn })
+    Ok(draw::DrawnExperiment { name: record.name.clone(), clock, signals: drawn })
 }
 
 fn orders(found: &Identification) -> Vec<draw::OrderChoice> {

@@ -4,7 +4,9 @@ use super::entries::pair;
 use serde::Serialize;
 use youla::identify::hansen::HansenModel;
 use youla::identify::innovation_form::{Convergence, InnovationForm};
-use youla::identify::subspace::{DataFactor, HorizonReport, Line, OrderReport, OutputFit, SubspaceModel, amplitudes};
+use youla::identify::subspace::{
+    DataFactor, HorizonReport, LineAmplitude, OrderReport, OutputFit, SubspaceModel, amplitudes,
+};
 use youla_greybox::hansen_refine::Refinement;
 
 /// Horizons, order, excitation, moved poles, disturbances.
@@ -23,7 +25,7 @@ pub(super) struct SubspaceDetails<'a> {
     moved_poles: Vec<[[f64; 2]; 2]>,
     initial_states: &'a [Vec<f64>],
     delays: &'a [usize],
-    disturbances: Vec<Vec<Vec<Line>>>,
+    disturbances: Vec<Vec<Vec<LineAmplitude>>>,
 }
 
 impl<'a> From<&'a SubspaceModel> for SubspaceDetails<'a> {

@@ -18,7 +18,7 @@ use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::lti::{Discrete, Mode, StateSpace};
 use youla::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
-use youla::{Mat, MatRef, c64};
+use youla::{Mat, c64};
 
 /// Prediction of one verification record by one model.
 #[derive(Debug, Clone)]

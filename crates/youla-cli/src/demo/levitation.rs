@@ -30,7 +30,7 @@ const DENOMINATOR: f64 = -0.5;
 /// White sensor noise, mm rms.
 const NOISE: f64 = 0.05;
 /// A record to simulate.
-struct Experiment {
+struct Recording {
     name: &'static str,
     samples: usize,
     /// Amplitude of the excitation at the plant input, A.
@@ -38,9 +38,9 @@ struct Experiment {
 }
 
 /// 40 s with a weak excitation to identify from; 20 s with four times the amplitude, so that the motion exceeds the noise, to verify.
-const EXPERIMENTS: [Experiment; 2] = [
-    Experiment { name: "estimation", samples: 40_000, amplitude: 0.25 },
-    Experiment { name: "verification", samples: 20_000, amplitude: 1.0 },
+const EXPERIMENTS: [Recording; 2] = [
+    Recording { name: "estimation", samples: 40_000, amplitude: 0.25 },
+    Recording { name: "verification", samples: 20_000, amplitude: 1.0 },
 ];
 
 /// Settings and records; the same seed gives the same records.
@@ -80,8 +80,8 @@ fn plant() -> youla::Result<StateSpace<Continuous>> {
 }
 
 /// One experiment from rest, sample by sample.
-fn record(plant: &StateSpace<Discrete>, experiment: &Experiment, rng: &mut impl Rng) -> Result<LoopRecord, Failure> {
-    let &Experiment { name, samples, amplitude } = experiment;
+fn record(plant: &StateSpace<Discrete>, experiment: &Recording, rng: &mut impl Rng) -> Result<LoopRecord, Failure> {
+    let &Recording { name, samples, amplitude } = experiment;
     let waves = SquareWaves { amplitude, hold_min: 2, hold_max: 20 };
     let d = Excitation::SquareWaves(waves).generate(samples, 1, plant.time(), rng)?;
     let mut x = Mat::<f64>::zeros(plant.order(), 1);

@@ -3,7 +3,7 @@
 use super::claims::{Claim, ClaimOutcome, SIMILAR};
 use super::figures_experiments::{fit_of, of};
 use super::words::{both, fixed, percent, short};
-use crate::study::{Experiment, Method, Paper, TIE};
+use crate::study::{Method, Paper, StudyExperiment, TIE};
 use youla::Mat;
 
 /// All of them; the keys are those of the experiments.
@@ -25,7 +25,7 @@ pub(super) fn claims(paper: &Paper) -> Vec<Claim> {
 }
 
 /// Lead of one method over another per axis, percentage points.
-pub(super) fn lead(experiment: &Experiment, of: Method, over: Method) -> [f64; 2] {
+pub(super) fn lead(experiment: &StudyExperiment, of: Method, over: Method) -> [f64; 2] {
     let (a, b) = (fit_of(experiment, of), fit_of(experiment, over));
     [a[0] - b[0], a[1] - b[1]]
 }
@@ -35,7 +35,7 @@ pub(super) fn points([h, v]: [f64; 2]) -> String {
     format!("{} and {} points", percent(h, 1), percent(v, 1))
 }
 
-fn high_deviation(experiment: &Experiment) -> Claim {
+fn high_deviation(experiment: &StudyExperiment) -> Claim {
     let published = experiment.case.published;
     let theirs = [0, 1].map(|i| published[2][i] - published[1][i]);
     let ours = lead(experiment, Method::Hansen, Method::Pem);
@@ -59,7 +59,7 @@ fn high_deviation(experiment: &Experiment) -> Claim {
     Claim { key: "table-1-high-deviation", source: "Table 1, Fig. 6", claim, outcome, text }
 }
 
-fn speed(experiment: &Experiment) -> Claim {
+fn speed(experiment: &StudyExperiment) -> Claim {
     let gains = [Method::Pem, Method::Hansen].map(|m| lead(experiment, m, Method::Nominal));
     let higher: Vec<bool> = gains.iter().flatten().map(|gain| *gain >= TIE).collect();
     let text = format!(
@@ -72,7 +72,7 @@ fn speed(experiment: &Experiment) -> Claim {
     Claim { key: "table-1-speed", source: "Table 1, Fig. 7", claim, outcome: ClaimOutcome::of(&higher), text }
 }
 
-fn similar(experiment: &Experiment) -> Claim {
+fn similar(experiment: &StudyExperiment) -> Claim {
     let ahead = lead(experiment, Method::Hansen, Method::Pem);
     let text = format!(
         "{}: PEM reaches {}, Hansen {} (similar means up to {SIMILAR} points apart).",
@@ -85,7 +85,7 @@ fn similar(experiment: &Experiment) -> Claim {
     Claim { key: "table-1-small-deviation", source: "Table 1, Fig. 9", claim, outcome, text }
 }
 
-fn vertical(experiment: &Experiment) -> Claim {
+fn vertical(experiment: &StudyExperiment) -> Claim {
     let gains = [Method::Pem, Method::Hansen].map(|m| lead(experiment, m, Method::Nominal));
     let text = format!(
         "{}: horizontal and vertical, PEM gains {} over the nominal model and Hansen {}.",
@@ -124,7 +124,7 @@ fn explained(measured: &Mat<f64>, predicted: &Mat<f64>, i: usize) -> f64 {
     1.0 - rest / all
 }
 
-fn reduction(list: &[Experiment]) -> Claim {
+fn reduction(list: &[StudyExperiment]) -> Claim {
     let losses = list.iter().flat_map(|e| lead(e, Method::Hansen, Method::HansenReduced)).collect::<Vec<_>>();
     let greatest =
         losses.iter().copied().fold(f64::NEG_INFINITY, |a, b| if b.is_nan() { f64::INFINITY } else { a.max(b) });

@@ -3,7 +3,7 @@
 use super::figures::{axis, fit_axis, line, logarithmic, points, ranged};
 use super::words::{AXES, both, short};
 use crate::study::ExcitedChannel;
-use crate::study::{Experiment, ExperimentModel, Method, Paper, Start};
+use crate::study::{ExperimentModel, Method, Paper, Start, StudyExperiment};
 use std::f64::consts::TAU;
 use youla::{Mat, MatRef};
 use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, MEASURED, Panel};
@@ -20,17 +20,17 @@ const ZOOM_RECORD: f64 = 0.2;
 const SHOWN: [Method; 3] = [Method::Nominal, Method::Pem, Method::Hansen];
 
 /// The model of a method.
-pub(super) fn of(experiment: &Experiment, method: Method) -> Option<&ExperimentModel> {
+pub(super) fn of(experiment: &StudyExperiment, method: Method) -> Option<&ExperimentModel> {
     experiment.models.iter().find(|m| m.method == method)
 }
 
 /// Its fit, NaN where there is none.
-pub(super) fn fit_of(experiment: &Experiment, method: Method) -> [f64; 2] {
+pub(super) fn fit_of(experiment: &StudyExperiment, method: Method) -> [f64; 2] {
     of(experiment, method).map_or([f64::NAN; 2], |m| m.fit)
 }
 
 /// Figures 6, 7 and 9: measured and predicted displacement.
-pub(super) fn verification(experiment: &Experiment) -> Figure {
+pub(super) fn verification(experiment: &StudyExperiment) -> Figure {
     let rows = 0..used(experiment);
     Figure {
         key: format!("figure-{}", experiment.case.figure),
@@ -46,7 +46,7 @@ pub(super) fn verification(experiment: &Experiment) -> Figure {
 }
 
 /// Figure 10: the same closely, around a switch of the excitation in the middle of the record.
-pub(super) fn zoom(experiment: &Experiment) -> Figure {
+pub(super) fn zoom(experiment: &StudyExperiment) -> Figure {
     let (ts, samples, settle) = (experiment.verification.time.ts(), used(experiment), experiment.settle);
     let switch =
         switch(experiment.verification.alpha.as_ref(), settle + samples / 2).map_or(samples / 2, |k| k - settle);
@@ -69,7 +69,7 @@ pub(super) fn zoom(experiment: &Experiment) -> Figure {
 }
 
 /// Figure 8: beta of the verification record, measured and predicted from alpha.
-pub(super) fn beta(experiment: &Experiment, [measured, predicted]: &[Mat<f64>; 2]) -> Figure {
+pub(super) fn beta(experiment: &StudyExperiment, [measured, predicted]: &[Mat<f64>; 2]) -> Figure {
     let rows = 0..measured.nrows();
     let time = || times(experiment, rows.clone());
     let panel = |i: usize| {
@@ -92,7 +92,7 @@ pub(super) fn beta(experiment: &Experiment, [measured, predicted]: &[Mat<f64>; 2
 }
 
 /// Where the prediction-error method ends over where it starts.
-pub(super) fn starts(experiment: &Experiment) -> Figure {
+pub(super) fn starts(experiment: &StudyExperiment) -> Figure {
     let runs = &experiment.starts;
     let lowest = runs.iter().map(|s| s.cost).fold(f64::INFINITY, f64::min);
     let over =
@@ -133,17 +133,17 @@ fn factor_axis() -> Axis {
 }
 
 /// Samples of the verification record from `settle` on.
-fn used(experiment: &Experiment) -> usize {
+fn used(experiment: &StudyExperiment) -> usize {
     experiment.verification.y.nrows().saturating_sub(experiment.settle)
 }
 
-fn first_view(experiment: &Experiment) -> [f64; 2] {
+fn first_view(experiment: &StudyExperiment) -> [f64; 2] {
     let start = experiment.settle as f64 * experiment.verification.time.ts();
     [rounded(start, 6), rounded(start + VIEW, 6)]
 }
 
 /// The fits of a caption.
-fn fits(experiment: &Experiment) -> String {
+fn fits(experiment: &StudyExperiment) -> String {
     let fit = |m: &Method| {
         let note = match of(experiment, *m).map(|model| &model.model) {
             Some(Err(_)) | None => " (no model)",
@@ -154,7 +154,7 @@ fn fits(experiment: &Experiment) -> String {
     format!("fits horizontal and vertical: {}", SHOWN.iter().map(fit).collect::<Vec<_>>().join(", "))
 }
 
-fn displacement(experiment: &Experiment, rows: std::ops::Range<usize>, view: [f64; 2]) -> Vec<Panel> {
+fn displacement(experiment: &StudyExperiment, rows: std::ops::Range<usize>, view: [f64; 2]) -> Vec<Panel> {
     let panel = |i: usize| {
         let from = experiment.settle;
         let y = column(&experiment.verification.y, i, rows.start + from..rows.end + from);
@@ -184,7 +184,7 @@ fn time_panel(i: usize, label: &str, view: [f64; 2], curves: Vec<Curve>) -> Pane
 }
 
 /// Times of rows counted from `settle`, to a nanosecond.
-fn times(experiment: &Experiment, rows: std::ops::Range<usize>) -> Vec<f64> {
+fn times(experiment: &StudyExperiment, rows: std::ops::Range<usize>) -> Vec<f64> {
     let ts = experiment.verification.time.ts();
     rows.map(|k| rounded((k + experiment.settle) as f64 * ts, 9)).collect()
 }
@@ -201,7 +201,7 @@ fn switch(alpha: MatRef<'_, f64>, from: usize) -> Option<usize> {
 }
 
 /// How the starts of the prediction-error method ended, in sentences.
-pub(super) fn starts_in_words(experiment: &Experiment, tried: usize) -> String {
+pub(super) fn starts_in_words(experiment: &StudyExperiment, tried: usize) -> String {
     let runs = &experiment.starts;
     let lowest = runs.iter().map(|s| s.cost).fold(f64::INFINITY, f64::min);
     let converged: Vec<f64> = runs.iter().filter(|s| s.cost <= 1.01 * lowest).map(|s| s.factor).collect();

@@ -4,7 +4,7 @@ use super::figures_experiments::fit_of;
 use super::words::{AXES, and, percent};
 use crate::Result;
 use crate::rig::{BearingRig, Fidelity, RigParameters};
-use crate::study::{Experiment, Method, TIE};
+use crate::study::{Method, StudyExperiment, TIE};
 use youla::validate::{fit, predict_open_loop};
 
 /// The rows of the paper's table.
@@ -25,12 +25,12 @@ enum Ahead {
 ///
 /// # Errors
 /// Those of [`rig_fit`].
-pub(super) fn differences(experiment: &Experiment, rig: &RigParameters) -> Result<Vec<String>> {
+pub(super) fn differences(experiment: &StudyExperiment, rig: &RigParameters) -> Result<Vec<String>> {
     let bound = rig_fit(experiment, rig)?;
     Ok((0..2).filter_map(|axis| column(experiment, rig, axis, bound[axis])).collect())
 }
 
-fn column(experiment: &Experiment, rig: &RigParameters, axis: usize, bound: f64) -> Option<String> {
+fn column(experiment: &StudyExperiment, rig: &RigParameters, axis: usize, bound: f64) -> Option<String> {
     let ours = ROWS.map(|m| fit_of(experiment, m)[axis]);
     let theirs = experiment.case.published.map(|fit| fit[axis]);
     let differ: Vec<[usize; 2]> = PAIRS.into_iter().filter(|p| ahead(ours, *p) != ahead(theirs, *p)).collect();
@@ -70,7 +70,7 @@ fn described(fits: [f64; 4], [a, b]: [usize; 2]) -> String {
 fn reason(
     pair: [usize; 2],
     [ours, theirs]: [Ahead; 2],
-    experiment: &Experiment,
+    experiment: &StudyExperiment,
     rig: &RigParameters,
     bound: f64,
 ) -> String {
@@ -120,7 +120,7 @@ pub(super) fn lacking_in_words(rig: &RigParameters) -> Option<String> {
 ///
 /// # Errors
 /// Those of the plant and of its simulation.
-pub(super) fn rig_fit(experiment: &Experiment, rig: &RigParameters) -> Result<[f64; 2]> {
+pub(super) fn rig_fit(experiment: &StudyExperiment, rig: &RigParameters) -> Result<[f64; 2]> {
     let plant = BearingRig::new(rig, experiment.case.fidelity, 0)?.true_plant()?;
     let (record, settle) = (&experiment.verification, experiment.settle);
     let rows = record.y.nrows().saturating_sub(settle);

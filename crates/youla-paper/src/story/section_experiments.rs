@@ -6,7 +6,7 @@ use super::section_study::points;
 use super::words::{both, count, excitation, short};
 use super::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
 use crate::Result;
-use crate::study::{Experiment, Method, Paper};
+use crate::study::{Method, Paper, StudyExperiment};
 use youla_report::figure::Figure;
 use youla_report::story::{Block, Section};
 
@@ -37,7 +37,7 @@ pub(super) fn experiments(paper: &Paper) -> Result<Section> {
 }
 
 /// Figures 6 to 10 as the paper numbers them.
-fn figures_in_order(list: &[Experiment]) -> Vec<Figure> {
+fn figures_in_order(list: &[StudyExperiment]) -> Vec<Figure> {
     let mut numbered: Vec<(usize, Figure)> = list.iter().map(|x| (x.case.figure, figures::verification(x))).collect();
     for x in list.iter().filter(|x| x.case.key == "small-deviation") {
         numbered.extend(x.beta.as_ref().map(|beta| (8, figures::beta(x, beta))));
@@ -48,7 +48,7 @@ fn figures_in_order(list: &[Experiment]) -> Vec<Figure> {
 }
 
 /// A nominal model that is far below the paper's.
-fn nominal_below(paper: &Paper, x: &Experiment) -> Option<String> {
+fn nominal_below(paper: &Paper, x: &StudyExperiment) -> Option<String> {
     let (ours, theirs) = (figures::fit_of(x, Method::Nominal), x.case.published[0]);
     if x.case.a_factor > 0.9 || (0..2).all(|i| ours[i] > theirs[i] - 20.0) {
         return None;
@@ -68,7 +68,7 @@ fn nominal_below(paper: &Paper, x: &Experiment) -> Option<String> {
 }
 
 /// Why the paper's PEM is low with a poor nominal model.
-fn local_minimum(paper: &Paper, x: &Experiment) -> String {
+fn local_minimum(paper: &Paper, x: &StudyExperiment) -> String {
     let single = figures::fit_of(x, Method::Pem);
     let best = figures::fit_of(x, Method::PemMultiStart);
     let published = x.case.published[1];

@@ -7,7 +7,7 @@ use super::tables_experiments::TABLE_1;
 use super::tables_study::compared;
 use crate::BearingStructure;
 use crate::Result;
-use crate::study::{Decile, Experiment, Method, Paper, deciles, overall};
+use crate::study::{Decile, Method, Paper, StudyExperiment, deciles, overall};
 use serde_json::{Map, Value, json};
 use youla_greybox::Structure;
 
@@ -80,7 +80,7 @@ fn nominal_entry(paper: &Paper) -> Value {
     json!({"fit": found.fit, "parameters": parameters.collect::<Map<_, _>>()})
 }
 
-fn experiment_entry(e: &Experiment) -> Value {
+fn experiment_entry(e: &StudyExperiment) -> Value {
     let model = |(method, published): (Method, Option<usize>)| {
         let mut entry = json!({"fit": fit_of(e, method), "paper": published.map(|k| e.case.published[k])});
         if let Some(found) = e.models.iter().find(|m| m.method == method) {

@@ -4,7 +4,7 @@ use super::tables::{plain, row};
 use super::words::short;
 use crate::rig::{ExperimentRecord, Fidelity};
 use crate::study::ExcitedChannel;
-use crate::study::{Experiment, Paper};
+use crate::study::{Paper, StudyExperiment};
 use serde::Deserialize;
 use std::f64::consts::TAU;
 use youla_report::story::{Row, Table};
@@ -86,7 +86,7 @@ pub(super) fn level(fidelity: Fidelity) -> (&'static str, f64) {
 
 /// What the safety of the rig did in every record.
 pub(super) fn outcomes(paper: &Paper) -> Table {
-    let records = |e: &Experiment| {
+    let records = |e: &StudyExperiment| {
         [("estimation", &e.estimation), ("verification", &e.verification)]
             .map(|(name, record)| outcome(&format!("{}, {name}", e.case.title), record, e.settle))
     };

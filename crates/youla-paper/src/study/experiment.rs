@@ -45,7 +45,7 @@ pub struct Case {
 
 /// Records, models and evidence.
 #[derive(Debug, Clone)]
-pub struct Experiment {
+pub struct StudyExperiment {
     /// What was done.
     pub case: Case,
     /// The controller; its margin with the true plant is that with the linear part of the rig.
@@ -129,7 +129,7 @@ pub(super) fn run(
     parameters: &RigParameters,
     settings: &PaperSettings,
     stream: u64,
-) -> Result<Experiment> {
+) -> Result<StudyExperiment> {
     let start = nominal.degraded(case.a_factor, case.b_factor)?;
     let rig = BearingRig::new(parameters, case.fidelity, 0)?;
     let time = crate::rig::Rig::time(&rig);
@@ -164,7 +164,7 @@ pub(super) fn run(
     let reflected = hansen.0.as_ref().map_or(0, |found| found.deviation.stability.moved.len());
     let beta = hansen.0.ok().map(|found| data.beta(&found)).transpose()?;
     let starts = starts.into_iter().map(|(start, _)| start).collect();
-    Ok(Experiment { case, design, estimation, verification, excitation, settle, models, starts, reflected, beta })
+    Ok(StudyExperiment { case, design, estimation, verification, excitation, settle, models, starts, reflected, beta })
 }
 
 /// Fails for a record that ended, because the rotor touched, before it can be used.

@@ -1,6 +1,6 @@
 //! Table 1: the nominal model from an open-loop experiment, and the three experiments around it.
 
-use super::experiment::{Case, Experiment, run};
+use super::experiment::{Case, StudyExperiment, run};
 use super::item::{excitation, generator};
 use super::settings::PaperSettings;
 use crate::BearingStructure;
@@ -31,7 +31,7 @@ pub struct Experiments {
     /// The nominal model.
     pub nominal: OpenLoopFit,
     /// The columns of Table 1.
-    pub list: Vec<Experiment>,
+    pub list: Vec<StudyExperiment>,
 }
 
 /// Identifies the nominal model in open loop at 0 rpm, degrades it in the three ways of the paper and runs the three

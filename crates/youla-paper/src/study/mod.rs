@@ -36,7 +36,7 @@ pub use crossover::{count as crossover_items, crossover};
 pub use excitation_report::{
     ExcitationReport, ExcitationReportOptions, ExcitedChannel, PowerBand, describe_excitation,
 };
-pub use experiment::{Case, Experiment, ExperimentModel, Start};
+pub use experiment::{Case, ExperimentModel, Start, StudyExperiment};
 pub use experiments::{Experiments, OpenLoopFit, experiments};
 pub use item::{Evaluated, Item, evaluate};
 pub use method::Method;

@@ -69,7 +69,7 @@ pub struct ReportData {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub findings: Vec<DataFinding>,
     /// Records used for estimation.
-    pub experiments: Vec<Experiment>,
+    pub experiments: Vec<DrawnExperiment>,
     /// How orders were chosen.
     pub orders: Vec<OrderChoice>,
     /// Poles over orders.

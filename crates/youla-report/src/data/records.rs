@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::numbers;
 use crate::trace::{Timeline, Trace};
 use youla::signal::Channel;
 
@@ -36,7 +37,7 @@ pub enum SignalKind {
 
 /// One record used for estimation, with the signals derived from it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Experiment {
+pub struct DrawnExperiment {
     /// Name of the record.
     pub name: String,
     /// Time axis of all its signals.
@@ -129,7 +130,8 @@ pub struct ResidualTest {
 /// A correlation over lags with the band of noise.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Correlation {
-    /// Values.
+    /// Values; one that does not exist is not a number here and `null` in JSON.
+    #[serde(with = "numbers")]
     pub values: Vec<f64>,
     /// Band of a single value at 99 %.
     pub band: f64,
@@ -138,7 +140,7 @@ pub struct Correlation {
 impl Correlation {
     /// Values to four decimal places, which is what a figure shows.
     pub fn new(values: &[f64], band: f64) -> Self {
-        let round = |v: f64| if v.is_finite() { (1e4 * v).round() / 1e4 } else { 0.0 };
+        let round = |v: f64| (1e4 * v).round() / 1e4;
         Correlation { values: values.iter().map(|v| round(*v)).collect(), band: (1e5 * band).round() / 1e5 }
     }
 }

@@ -27,7 +27,7 @@ fn report() -> ReportData {
     let clock = Timeline::new(TS, 500);
     let signal =
         |kind, name: &str, phase| Signal { kind, channel: Channel::new(name, "V"), trace: trace(phase, &clock) };
-    let experiment = Experiment {
+    let experiment = DrawnExperiment {
         name: "first".into(),
         clock: clock.clone(),
         signals: vec![

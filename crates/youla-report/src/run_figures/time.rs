@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::{RunFigure, axis, choice, key};
-use crate::data::{Experiment, Signal, SignalKind};
+use crate::data::{DrawnExperiment, Signal, SignalKind};
 use crate::figure::{Axis, Content, Curve, Figure, Panel};
 use crate::trace::{Timeline, Trace};
 
@@ -22,8 +22,8 @@ pub(super) fn signals(chosen: &Chosen) -> Vec<Figure> {
 }
 
 fn figures(chosen: &Chosen, figure: RunFigure, kinds: &[SignalKind], sentence: &str) -> Vec<Figure> {
-    let shown = |e: &Experiment| e.signals.iter().filter(|s| kinds.contains(&s.kind)).cloned().collect::<Vec<_>>();
-    let drawn = |(experiment, signals): (&Experiment, Vec<Signal>)| {
+    let shown = |e: &DrawnExperiment| e.signals.iter().filter(|s| kinds.contains(&s.kind)).cloned().collect::<Vec<_>>();
+    let drawn = |(experiment, signals): (&DrawnExperiment, Vec<Signal>)| {
         let height = Some((TALLEST / signals.len() as f64).min(1.0)).filter(|height| *height < 1.0);
         let panel = |signal: &Signal| Panel {
             x: Axis { range: detail(&experiment.clock), ..axis("Time", "s") },

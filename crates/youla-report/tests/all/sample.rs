@@ -384,7 +384,7 @@ fn reduced_to(order: usize) -> ReductionOrder {
     }
 }
 
-fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> Experiment {
+fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> DrawnExperiment {
     let clock = Timeline::around_largest_swing(plan.ts, &y[0]);
     let mut signals = Vec::new();
     let mut add = |kind, channel: Channel, samples: &[f64]| {
@@ -405,7 +405,7 @@ fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> Experiment {
         let beta: Vec<f64> = y[k].windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]).collect();
         add(SignalKind::Beta, Channel::new(format!("beta_{}", k + 1), &channel.unit), &beta);
     }
-    Experiment { name: "estimation".into(), clock, signals }
+    DrawnExperiment { name: "estimation".into(), clock, signals }
 }
 
 fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: usize) -> FrequencyResponse {

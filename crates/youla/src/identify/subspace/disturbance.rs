@@ -70,7 +70,7 @@ fn check_frequency(what: &str, hz: f64, time: Discrete) -> Result<()> {
 /// A line of one output: `amplitude cos(theta - phase)`, theta the angle of its cosine and sine.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Line {
+pub struct LineAmplitude {
     /// In the unit of the output.
     pub amplitude: f64,
     /// Radians, from -pi to pi.
@@ -79,10 +79,10 @@ pub struct Line {
 
 /// Amplitude and phase per output (inner) and frequency (outer), from the coefficients of cosines and sines (signals x
 /// outputs) that [`super::SubspaceModel::disturbances`] holds for each experiment.
-pub fn amplitudes(coefficients: MatRef<'_, f64>) -> Vec<Vec<Line>> {
+pub fn amplitudes(coefficients: MatRef<'_, f64>) -> Vec<Vec<LineAmplitude>> {
     let line = |j: usize, i: usize| {
         let (a, b) = (coefficients[(2 * j, i)], coefficients[(2 * j + 1, i)]);
-        Line { amplitude: a.hypot(b), phase: b.atan2(a) }
+        LineAmplitude { amplitude: a.hypot(b), phase: b.atan2(a) }
     };
     (0..coefficients.nrows() / 2).map(|j| (0..coefficients.ncols()).map(|i| line(j, i)).collect()).collect()
 }

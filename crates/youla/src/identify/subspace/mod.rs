@@ -52,7 +52,7 @@ pub mod uncertainty;
 mod varx;
 mod view;
 
-pub use disturbance::{Line, amplitudes, harmonics, lines};
+pub use disturbance::{LineAmplitude, amplitudes, harmonics, lines};
 pub use experiment::Experiment;
 pub use horizon::Horizon;
 pub use horizons::{HorizonReport, ScannedModel};

@@ -7,6 +7,7 @@
 
 use super::chart::Chart;
 use super::linearise::linearise;
+use super::missed::Missed;
 use super::problem::{Choice, Solution};
 use super::spectra::Spectra;
 use faer::{Mat, c64};
@@ -39,8 +40,16 @@ pub(crate) fn response(choice: &Choice, share: f64) -> Vec<c64> {
     g
 }
 
+/// What the records say beyond their information.
+pub(crate) struct More<'a> {
+    /// Factor of the variance of the parameters: their scatter over pieces of the records.
+    pub(crate) scatter: f64,
+    /// The error that the excitation shows.
+    pub(crate) missed: Option<&'a Missed>,
+}
+
 /// Standard deviation of each entry of G (row by row) at each frequency, scaled channels.
-pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64], more: &More<'_>) -> Vec<Vec<f64>> {
     let found = &solution.chosen.found;
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let linearised = linearise(spectra, &found.point, &chart, &found.noise);
@@ -54,9 +63,12 @@ pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64])
         let g = response(&solution.chosen, *share);
         let mut variance: Vec<f64> = (0..slopes.nrows())
             .map(|i| {
-                (0..root.ncols())
-                    .map(|k| (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]).norm_sqr())
-                    .sum()
+                more.scatter
+                    * (0..root.ncols())
+                        .map(|k| {
+                            (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]).norm_sqr()
+                        })
+                        .sum::<f64>()
             })
             .collect();
         for (rival, weight) in solution.rivals.iter().zip(&weights) {
@@ -64,6 +76,8 @@ pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64])
                 *v += weight / total * (other - g).norm_sqr();
             }
         }
+        let missed = more.missed.map_or_else(Vec::new, |missed| missed.near(*share, variance.len()));
+        variance.iter_mut().zip(missed).for_each(|(v, m)| *v += m);
         variance.into_iter().map(f64::sqrt).collect()
     };
     shares.iter().map(at).collect()

@@ -46,6 +46,12 @@ impl<'a> LoopKnowledge<'a> {
         }
         Ok(LoopKnowledge { controller, estimation, verification })
     }
+
+    /// The excitation of each estimation record, where all are known and one is not zero.
+    pub(super) fn excitation(&self) -> Option<Vec<MatRef<'a, f64>>> {
+        let all: Vec<MatRef<'a, f64>> = self.estimation.iter().map(|r| r.excitation).collect::<Option<_>>()?;
+        all.iter().any(|x| x.norm_l2() > 0.0).then_some(all)
+    }
 }
 
 fn check(controller: Option<&StateSpace<Discrete>>, record: &LoopSignals<'_>) -> Result<(), Error> {

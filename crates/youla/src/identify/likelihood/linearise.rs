@@ -8,10 +8,11 @@
 //! Helmersson and Ribarits, Automatica 40 (2004), 1629). The columns of t are eliminated record by record.
 
 use super::chart::Chart;
+use super::lanes::LANES;
 use super::noise::Noise;
 use super::point::Point;
-use super::rows::Rows;
-use super::spectra::{Lines, Spectra};
+use super::rows::{Place, Rows};
+use super::spectra::Spectra;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, Par, c64};
 
@@ -24,7 +25,7 @@ pub(crate) struct Linearised {
 }
 
 /// Rows that are brought to triangular form together.
-const CHUNK: usize = 768;
+const CHUNK: usize = 1024;
 
 /// Further columns of the slopes: per record lines x p x count, row by row.
 pub(crate) struct Extra<'a> {
@@ -60,7 +61,8 @@ pub(crate) fn linearise_with(
     let mut ends = Vec::with_capacity(spectra.records.len());
     for (k, (lines, t)) in spectra.records.iter().zip(&point.ends).enumerate() {
         let values = extra.values.get(k).map_or(&[][..], Vec::as_slice);
-        let r = triangle(lines, t, point, chart, noise, extra, values);
+        let place = Place { lines, t, model: &point.model, chart, noise, more: (values, extra.count) };
+        let r = triangle(place, extra.quick);
         ends.push(r.submatrix(0, 0, n.min(r.nrows()), n + width).to_owned());
         let below = r.nrows().saturating_sub(n);
         let rest = r.submatrix(n.min(r.nrows()), n, below, width);
@@ -69,53 +71,41 @@ pub(crate) fn linearise_with(
     Linearised { factor, ends }
 }
 
-fn stacked(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn stacked(a: &Mat<f64>, b: &Mat<f64>) -> Mat<f64> {
     Mat::from_fn(a.nrows() + b.nrows(), a.ncols(), |i, j| if i < a.nrows() { a[(i, j)] } else { b[(i - a.nrows(), j)] })
 }
 
-fn compressed(rows: &Mat<f64>) -> Mat<f64> {
+pub(crate) fn compressed(rows: &Mat<f64>) -> Mat<f64> {
     rows.qr().thin_R().to_owned()
 }
 
 /// `[t parameters residual]` of one record in triangular form.
-fn triangle(
-    lines: &Lines,
-    t: &[f64],
-    point: &Point,
-    chart: &Chart,
-    noise: &Noise,
-    extra: &Extra<'_>,
-    values: &[c64],
-) -> Mat<f64> {
-    let (model, p) = (&point.model, point.model.outputs);
-    let n = model.order();
-    let columns = n + chart.parameters() + extra.count + 1;
-    let mut row = Rows::new(model, columns);
-    let per_line = 2 * p;
-    let chunk = (CHUNK.max(3 * columns) / per_line).max(1);
-    let mut work = Mat::<f64>::zeros(columns + chunk * per_line, columns);
-    let mut filled = 0;
-    let mut held = 0;
+fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
+    let Place { lines, model, chart, more, .. } = place;
+    let columns = model.order() + chart.parameters() + more.1 + 1;
+    let mut rows = Rows::new(model, columns);
+    let group = 2 * model.outputs * LANES;
+    let groups = (CHUNK.max(3 * columns) / group).max(1);
+    let mut work = Mat::<f64>::zeros(columns + groups * group, columns);
+    let (mut held, mut filled) = (0, 0);
     let mut gram = Mat::<f64>::zeros(columns, columns);
-    for (k, z) in lines.z.iter().enumerate() {
-        let more = if extra.count == 0 { &[][..] } else { &values[k * p * extra.count..(k + 1) * p * extra.count] };
-        row.fill(lines, k, *z, t, model, chart, noise, more);
-        row.write(&mut work, held + filled, lines.weight[k]);
-        filled += per_line;
-        if filled == chunk * per_line || k + 1 == lines.z.len() {
-            let rows = work.subrows(0, held + filled);
-            if extra.quick {
-                let (all, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-                triangular::matmul(gram.as_mut(), lower, Accum::Add, rows.transpose(), all, rows, all, 1.0, Par::Seq);
+    for first in (0..lines.z.len()).step_by(LANES) {
+        rows.fill(place, first);
+        filled += rows.write(lines, first, &mut work, held + filled);
+        if filled == groups * group || first + LANES >= lines.z.len() {
+            let all = work.subrows(0, held + filled);
+            if quick {
+                let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
+                triangular::matmul(gram.as_mut(), lower, Accum::Add, all.transpose(), whole, all, whole, 1.0, Par::Seq);
             } else {
-                let r = rows.qr().thin_R().to_owned();
+                let r = all.qr().thin_R().to_owned();
                 held = r.nrows();
                 work.subrows_mut(0, held).copy_from(&r);
             }
             filled = 0;
         }
     }
-    if extra.quick {
+    if quick {
         return root_of(&gram);
     }
     let mut r = Mat::zeros(columns, columns);

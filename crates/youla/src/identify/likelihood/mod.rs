@@ -28,7 +28,9 @@ mod grow;
 mod innovation;
 mod known_loop;
 mod lag_sums;
+mod lanes;
 mod linearise;
+mod missed;
 mod mode_estimates;
 mod model;
 mod neighbours;
@@ -55,8 +57,10 @@ pub use recommendation::{Candidate, Evidence, Predictor, Recommendation, Respons
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, Mat, MatRef, Result};
-use problem::{Problem, Solution};
-use spectra::{Sizes, Spectra};
+use deviation::More;
+use problem::Problem;
+use spectra::Sizes;
+use trust::Parts;
 
 /// Largest dead time that is tried, samples.
 const LARGEST_DEAD_TIME: usize = 12;
@@ -87,8 +91,14 @@ pub fn recommend(
     let choice = &solution.chosen;
     let spectra = problem.spectra(&choice.delays);
     let shares = deviation::grid(spectra.samples());
-    let deviations = deviation::deviations(&spectra, &solution, &shares);
-    let evidence = evidence(&problem, &solution, &spectra, (&shares, &deviations), (verification, known));
+    let parts = Parts::new(&problem, &solution, verification);
+    let excitation = known.and_then(LoopKnowledge::excitation);
+    let missed = excitation.map(|x| missed::missed(&spectra, choice, &x, problem.skip));
+    let more = More { scatter: parts.scatter, missed: missed.as_ref() };
+    let deviations = deviation::deviations(&spectra, &solution, &shares, &more);
+    let mut evidence = trust::of_model(&spectra, &solution, &shares, &deviations);
+    evidence.extend(parts.evidence(&solution));
+    evidence.extend(trust::of_loop(&spectra, &solution, known, missed.as_ref()));
     let plant = physical::plant(choice, &problem.sizes, time)?;
     Ok(Recommendation {
         predictor: innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
@@ -158,36 +168,6 @@ fn problem<'a>(experiments: &'a [Experiment<'a>], options: &LikelihoodOptions) -
         dead_time: options.dead_time.clone(),
         largest_order: options.largest_order,
     })
-}
-
-/// All questions, those to the model itself first.
-fn evidence(
-    problem: &Problem<'_>,
-    solution: &Solution,
-    spectra: &Spectra,
-    (shares, deviations): (&[f64], &[Vec<f64>]),
-    (fresh, known): (&[Experiment<'_>], Option<&LoopKnowledge<'_>>),
-) -> Vec<Evidence> {
-    let responses: Vec<_> = shares.iter().map(|s| deviation::response(&solution.chosen, *s)).collect();
-    let mut evidence = vec![trust::accuracy(&responses, deviations), trust::nonlinear(spectra, solution)];
-    evidence.extend(trust::parts(problem, solution, fresh));
-    if let Some((k, known)) = known.and_then(|known| Some((known.controller?, known))) {
-        let records: Vec<_> =
-            known.estimation.iter().chain(&known.verification).map(|r| (r.seen, r.explained)).collect();
-        evidence.extend(trust::controller(k, &records));
-    }
-    let excitation: Option<Vec<_>> = known.and_then(|known| known.estimation.iter().map(|r| r.excitation).collect());
-    match excitation {
-        Some(x) if x.iter().any(|x| x.norm_l2() > 0.0) => {
-            evidence.push(trust::residual_and_excitation(spectra, solution, &x, problem.skip));
-        }
-        _ => evidence.push(Evidence::new(
-            "Is no external excitation known in the estimation records (1: none)?",
-            1.0,
-            0.0,
-        )),
-    }
-    evidence
 }
 
 fn response_deviation(sizes: &Sizes, shares: &[f64], deviations: &[Vec<f64>], time: Discrete) -> ResponseDeviation {

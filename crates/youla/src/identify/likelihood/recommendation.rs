@@ -91,21 +91,33 @@ pub struct Evidence {
     pub figure: f64,
     /// The largest figure that is accepted.
     pub limit: f64,
+    /// By how many standard deviations the records show it beyond chance; `None` where that is no question. A figure that chance
+    /// explains is accepted whatever its size.
+    pub significance: Option<f64>,
 }
+
+/// Standard deviations beyond chance up to which a figure is accepted whatever its size: of the 10^4 figures of many runs none
+/// exceeds it by chance.
+const BEYOND_CHANCE: f64 = 5.0;
 
 impl Evidence {
     pub(super) fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
-        Evidence { question: question.into(), figure, limit }
+        Evidence { question: question.into(), figure, limit, significance: None }
     }
 
-    /// Whether the figure is within its limit.
+    pub(super) fn beyond_chance(self, significance: f64) -> Self {
+        Evidence { significance: Some(significance), ..self }
+    }
+
+    /// Whether the figure is within its limit, or explained by chance.
     pub fn holds(&self) -> bool {
-        self.figure <= self.limit
+        self.figure <= self.limit || self.significance.is_some_and(|s| s <= BEYOND_CHANCE)
     }
 }
 
 impl std::fmt::Display for Evidence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {:.3} (limit {})", self.question, self.figure, self.limit)
+        write!(f, "{} {:.3} (limit {})", self.question, self.figure, self.limit)?;
+        self.significance.map_or(Ok(()), |s| write!(f, ", {s:.1} standard deviations beyond chance"))
     }
 }

@@ -1,156 +1,224 @@
-//! The rows of the slopes that one line gives.
+//! The rows of the slopes and of the residual that a group of lines gives, whitened.
 
+use super::block::Block;
 use super::chart::Chart;
+use super::lanes::{LANES, Lanes};
 use super::model::Model;
 use super::noise::Noise;
 use super::spectra::Lines;
 use faer::{Mat, c64};
+use pulp::{Arch, NullaryFnOnce};
 
-/// The p rows of one line, whitened.
+/// The point at which the rows are taken: a record, its t, and where it is linearised.
+#[derive(Clone, Copy)]
+pub(crate) struct Place<'a> {
+    pub(crate) lines: &'a Lines,
+    pub(crate) t: &'a [f64],
+    pub(crate) model: &'a Model,
+    pub(crate) chart: &'a Chart,
+    pub(crate) noise: &'a Noise,
+    /// Further columns, lines x p x count, and their count.
+    pub(crate) more: (&'a [c64], usize),
+}
+
+/// The rows of [`LANES`] lines.
 pub(crate) struct Rows {
     /// Output by column.
-    values: Vec<c64>,
+    values: Vec<Lanes>,
     columns: usize,
-    outputs: usize,
-    inverse: Vec<c64>,
-    x: Vec<c64>,
-    left: Vec<c64>,
-    full: Vec<c64>,
-    filters: Vec<c64>,
+    inverse: Vec<Lanes>,
+    x: Vec<Lanes>,
+    left: Vec<Lanes>,
+    full: Vec<Lanes>,
+    filters: Vec<Lanes>,
+}
+
+/// One group of lines, computed with the widest instructions that the processor has.
+struct Group<'a, 'b> {
+    rows: &'a mut Rows,
+    place: Place<'b>,
+    first: usize,
+}
+
+impl NullaryFnOnce for Group<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn call(self) {
+        self.rows.group(&self.place, self.first);
+    }
 }
 
 impl Rows {
     pub(crate) fn new(model: &Model, columns: usize) -> Self {
         let (p, m) = (model.outputs, model.inputs);
         let s = model.blocks.iter().map(|b| b.states).max().unwrap_or(0);
+        let zeros = |count: usize| vec![Lanes::ZERO; count];
         Rows {
-            values: vec![c64::ZERO; p * columns],
+            values: zeros(p * columns),
             columns,
-            outputs: p,
-            inverse: vec![c64::ZERO; s * s],
-            x: vec![c64::ZERO; s],
-            left: vec![c64::ZERO; p * s],
-            full: vec![c64::ZERO; s * (s + m + p)],
-            filters: vec![c64::ZERO; p],
+            inverse: zeros(s * s),
+            x: zeros(s),
+            left: zeros(p * s),
+            full: zeros(s * (s + m)),
+            filters: zeros(p),
         }
     }
 
-    #[allow(clippy::too_many_arguments)]
-    pub(crate) fn fill(
-        &mut self,
-        lines: &Lines,
-        k: usize,
-        z: c64,
-        t: &[f64],
-        model: &Model,
-        chart: &Chart,
-        noise: &Noise,
-        more: &[c64],
-    ) {
+    /// The rows of the lines from `first` on; lines beyond the last count nothing.
+    pub(crate) fn fill(&mut self, place: Place<'_>, first: usize) {
+        Arch::new().dispatch(Group { rows: self, place, first });
+    }
+
+    #[inline(always)]
+    fn group(&mut self, place: &Place<'_>, first: usize) {
+        let Place { lines, model, chart, .. } = *place;
         let (m, p, columns) = (model.inputs, model.outputs, self.columns);
-        let u = &lines.u[k * m..(k + 1) * m];
-        let y = &lines.y[k * p..(k + 1) * p];
-        let last = columns - 1;
+        let last = lines.z.len() - 1;
+        let line = |l: usize| (first + l).min(last);
+        let z = Lanes::gather(|l| lines.z[line(l)]);
+        let u: Vec<Lanes> = (0..m).map(|j| Lanes::gather(|l| lines.u[line(l) * m + j])).collect();
         for o in 0..p {
-            self.values[o * columns + last] = y[o];
+            self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
         let (mut state, mut column) = (0, model.order());
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
-            let s = block.states;
-            block.resolvent(z, &mut self.inverse);
-            for i in 0..s {
-                let mut x = c64::ZERO;
-                for j in 0..s {
-                    let mut drive = z * t[state + j];
-                    for l in 0..m {
-                        drive += u[l] * block.b[j * m + l];
-                    }
-                    x += self.inverse[i * s + j] * drive;
-                }
-                self.x[i] = x;
-            }
-            for o in 0..p {
-                for j in 0..s {
-                    let mut sum = c64::ZERO;
-                    for i in 0..s {
-                        sum += self.inverse[i * s + j] * block.c[o * s + i];
-                    }
-                    self.left[o * s + j] = sum;
-                }
-            }
-            for o in 0..p {
-                let left = &self.left[o * s..(o + 1) * s];
-                let mut g = c64::ZERO;
-                for i in 0..s {
-                    g += self.x[i] * block.c[o * s + i];
-                    for j in 0..s {
-                        self.full[i * s + j] = left[i] * self.x[j];
-                    }
-                    for j in 0..m {
-                        self.full[s * s + i * m + j] = left[i] * u[j];
-                    }
-                    self.values[o * columns + state + i] = left[i] * z;
-                }
-                self.values[o * columns + last] -= g;
-                let entries = s * (s + m);
-                for q in 0..directions.ncols() {
-                    let direction = directions.col(q);
-                    let mut sum = c64::ZERO;
-                    for e in 0..entries {
-                        sum += self.full[e] * direction[e];
-                    }
-                    for j in 0..s {
-                        sum += self.x[j] * direction[entries + o * s + j];
-                    }
-                    self.values[o * columns + column + q] = sum;
-                }
-            }
-            state += s;
+            self.states(block, &z, &u, &place.t[state..state + block.states]);
+            self.slopes(block, directions, (&z, &u), [state, column]);
+            state += block.states;
             column += directions.ncols();
         }
+        self.direct(place, &u, column);
+        let (more, count) = place.more;
         for o in 0..p {
-            for j in 0..m {
-                self.values[o * columns + last] -= u[j] * model.d[o * m + j];
+            for e in 0..count {
+                self.values[o * columns + columns - 1 - count + e] =
+                    Lanes::gather(|l| more[(line(l) * p + o) * count + e]);
             }
         }
-        if chart.feedthrough {
-            for o in 0..p {
-                for j in 0..m {
+        self.whiten(place.noise, &z);
+    }
+
+    /// `X = M (B U + z t)` and `L = C M` of one block.
+    #[inline(always)]
+    fn states(&mut self, block: &Block, z: &Lanes, u: &[Lanes], t: &[f64]) {
+        let (s, m) = (block.states, u.len());
+        resolvent(block, z, &mut self.inverse);
+        self.x[..s].fill(Lanes::ZERO);
+        for j in 0..s {
+            let mut drive = z.scaled(t[j]);
+            (0..m).for_each(|l| drive.add_scaled(&u[l], block.b[j * m + l]));
+            (0..s).for_each(|i| self.x[i].add_product(&self.inverse[i * s + j], &drive));
+        }
+        for o in 0..block.c.len() / s {
+            for j in 0..s {
+                let mut sum = Lanes::ZERO;
+                (0..s).for_each(|i| sum.add_scaled(&self.inverse[i * s + j], block.c[o * s + i]));
+                self.left[o * s + j] = sum;
+            }
+        }
+    }
+
+    /// The columns of t and of the directions of one block, and its share of the residual.
+    #[inline(always)]
+    fn slopes(&mut self, block: &Block, directions: &Mat<f64>, (z, u): (&Lanes, &[Lanes]), at: [usize; 2]) {
+        let (s, m, columns) = (block.states, u.len(), self.columns);
+        let entries = s * (s + m);
+        for o in 0..block.c.len() / s {
+            for i in 0..s {
+                let left = self.left[o * s + i];
+                self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
+                self.values[o * columns + at[0] + i] = left.times(z);
+                if directions.ncols() > 0 {
+                    (0..s).for_each(|j| self.full[i * s + j] = left.times(&self.x[j]));
+                    (0..m).for_each(|j| self.full[s * s + i * m + j] = left.times(&u[j]));
+                }
+            }
+            for q in 0..directions.ncols() {
+                let direction = directions.col(q);
+                let mut sum = Lanes::ZERO;
+                (0..entries).for_each(|e| sum.add_scaled(&self.full[e], direction[e]));
+                (0..s).for_each(|j| sum.add_scaled(&self.x[j], direction[entries + o * s + j]));
+                self.values[o * columns + at[1] + q] = sum;
+            }
+        }
+    }
+
+    /// The share of D in the residual, and its columns.
+    #[inline(always)]
+    fn direct(&mut self, place: &Place<'_>, u: &[Lanes], column: usize) {
+        let (m, p, columns) = (u.len(), place.model.outputs, self.columns);
+        for o in 0..p {
+            for j in 0..m {
+                self.values[o * columns + columns - 1].add_scaled(&u[j], -place.model.d[o * m + j]);
+                if place.chart.feedthrough {
                     for l in 0..p {
-                        self.values[l * columns + column + o * m + j] = if l == o { u[j] } else { c64::ZERO };
+                        self.values[l * columns + column + o * m + j] = if l == o { u[j] } else { Lanes::ZERO };
                     }
                 }
             }
         }
-        let count = more.len() / p;
-        for o in 0..p {
-            for e in 0..count {
-                self.values[o * columns + last - count + e] = more[o * count + e];
-            }
+    }
+
+    /// Autoregression of each output, then the inverse root of the covariance.
+    #[inline(always)]
+    fn whiten(&mut self, noise: &Noise, z: &Lanes) {
+        let (p, columns) = (self.filters.len(), self.columns);
+        let mut back = *z;
+        back.im.iter_mut().for_each(|v| *v = -*v);
+        for (filter, coefficients) in self.filters.iter_mut().zip(&noise.regression) {
+            let mut sum = Lanes::ZERO;
+            coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(&back));
+            *filter = sum.shifted(1.0);
         }
-        noise.filters(z, &mut self.filters);
         for c in 0..columns {
             for o in (0..p).rev() {
-                let mut sum = c64::ZERO;
+                let mut sum = Lanes::ZERO;
                 for l in 0..=o {
-                    sum += self.filters[l] * self.values[l * columns + c] * noise.root[(o, l)];
+                    let filtered = self.filters[l].times(&self.values[l * columns + c]);
+                    sum.add_scaled(&filtered, noise.root[(o, l)]);
                 }
                 self.values[o * columns + c] = sum;
             }
         }
     }
 
-    pub(crate) fn write(&self, work: &mut Mat<f64>, at: usize, weight: f64) {
+    /// Writes the rows of the lines from `first` on, real and imaginary parts below each other, and says how many they are.
+    pub(crate) fn write(&self, lines: &Lines, first: usize, work: &mut Mat<f64>, at: usize) -> usize {
+        let count = LANES.min(lines.z.len() - first);
+        let weight = &lines.weight[first..first + count];
+        let outputs = self.filters.len();
         for c in 0..self.columns {
-            let column = work.col_mut(c);
-            let column = column.try_as_col_major_mut();
-            if let Some(column) = column {
-                let slots = column.as_slice_mut();
-                for o in 0..self.outputs {
-                    let v = self.values[o * self.columns + c];
-                    slots[at + 2 * o] = v.re * weight;
-                    slots[at + 2 * o + 1] = v.im * weight;
-                }
+            let Some(column) = work.col_mut(c).try_as_col_major_mut() else { continue };
+            let slots = &mut column.as_slice_mut()[at..at + 2 * count * outputs];
+            for (o, rows) in slots.chunks_exact_mut(2 * count).enumerate() {
+                let v = &self.values[o * self.columns + c];
+                let (re, im) = rows.split_at_mut(count);
+                re.iter_mut().zip(&v.re).zip(weight).for_each(|((r, v), w)| *r = v * w);
+                im.iter_mut().zip(&v.im).zip(weight).for_each(|((r, v), w)| *r = v * w);
+            }
+        }
+        2 * count * outputs
+    }
+}
+
+/// (z I - A)^-1 of each line, row by row.
+#[inline(always)]
+fn resolvent(block: &Block, z: &Lanes, out: &mut [Lanes]) {
+    let s = block.states;
+    match s {
+        1 => out[0] = z.shifted(-block.a[0]).inverse(),
+        2 => {
+            let (p, q) = (z.shifted(-block.a[0]), z.shifted(-block.a[3]));
+            let scale = p.times(&q).shifted(-block.a[1] * block.a[2]).inverse();
+            (out[0], out[3]) = (q.times(&scale), p.times(&scale));
+            (out[1], out[2]) = (scale.scaled(block.a[1]), scale.scaled(block.a[2]));
+        }
+        _ => {
+            let mut one = vec![c64::ZERO; s * s];
+            for l in 0..LANES {
+                block.resolvent(c64::new(z.re[l], z.im[l]), &mut one);
+                out.iter_mut().zip(&one).for_each(|(out, v)| (out.re[l], out.im[l]) = (v.re, v.im));
             }
         }
     }

@@ -9,7 +9,7 @@
 //! is a ramp, and t holds it. Nothing is subtracted from the data.
 
 use crate::identify::subspace::Experiment;
-use faer::{Mat, c64};
+use faer::{Mat, MatRef, c64};
 use rustfft::FftPlanner;
 
 /// The lines of one record, from the first above zero to the Nyquist frequency.
@@ -44,7 +44,7 @@ impl Spectra {
     pub(crate) fn new(experiments: &[Experiment<'_>], sizes: &Sizes, delays: &[usize], skip: usize) -> Self {
         let (m, p) = (sizes.u.len(), sizes.y.len());
         let mut planner = FftPlanner::new();
-        let records = experiments.iter().filter(|e| e.u.nrows() > skip + 8).map(|e| {
+        let records = experiments.iter().filter(|e| long_enough(e.u.nrows(), skip)).map(|e| {
             let samples = e.u.nrows() - skip;
             let fft = planner.plan_fft_forward(samples);
             let count = samples / 2;
@@ -93,6 +93,29 @@ impl Spectra {
     pub(crate) fn samples(&self) -> usize {
         self.records.iter().map(|r| r.samples).sum()
     }
+}
+
+/// Whether a record has lines behind its first `skip` samples.
+pub(crate) fn long_enough(rows: usize, skip: usize) -> bool {
+    rows > skip + 8
+}
+
+/// Lines of further signals, samples x channels, without their first `skip` samples.
+pub(crate) fn lines_of(signal: MatRef<'_, f64>, skip: usize) -> Vec<c64> {
+    let (samples, q) = (signal.nrows().saturating_sub(skip), signal.ncols());
+    let count = samples / 2;
+    let mut out = vec![c64::ZERO; count * q];
+    if samples < 2 {
+        return out;
+    }
+    let fft = FftPlanner::new().plan_fft_forward(samples);
+    let root = (samples as f64).sqrt();
+    for j in 0..q {
+        let mut work: Vec<c64> = (0..samples).map(|t| c64::new(signal[(t + skip, j)] / root, 0.0)).collect();
+        fft.process(&mut work);
+        (0..count).for_each(|k| out[k * q + j] = work[k + 1]);
+    }
+    out
 }
 
 /// Sizes of the channels, by which they are divided.

@@ -12,11 +12,13 @@ mod loop_evidence;
 mod nonlinear;
 mod parts;
 
-pub(crate) use loop_evidence::{controller, residual_and_excitation};
-pub(crate) use nonlinear::nonlinear;
-pub(crate) use parts::parts;
+pub(crate) use loop_evidence::of_loop;
+pub(crate) use parts::Parts;
 
 use super::Evidence;
+use super::deviation::response;
+use super::problem::Solution;
+use super::spectra::Spectra;
 use faer::c64;
 
 /// Excess of chi-square over its mean in its standard deviations.
@@ -26,8 +28,19 @@ pub(crate) fn excess(statistic: f64, degrees: f64) -> f64 {
     ((statistic / degrees.max(1.0)).max(0.0).cbrt() - (1.0 - part)) / part.sqrt()
 }
 
+/// What the model and its residual say.
+pub(crate) fn of_model(
+    spectra: &Spectra,
+    solution: &Solution,
+    shares: &[f64],
+    deviations: &[Vec<f64>],
+) -> Vec<Evidence> {
+    let responses: Vec<_> = shares.iter().map(|s| response(&solution.chosen, *s)).collect();
+    vec![accuracy(&responses, deviations), nonlinear::nonlinear(spectra, solution)]
+}
+
 /// Stated deviation against the response, median over the frequencies.
-pub(crate) fn accuracy(responses: &[Vec<c64>], deviations: &[Vec<f64>]) -> Evidence {
+fn accuracy(responses: &[Vec<c64>], deviations: &[Vec<f64>]) -> Evidence {
     let mut shares: Vec<f64> = responses
         .iter()
         .zip(deviations)

@@ -1,73 +1,114 @@
-//! Nonlinear functions at the inputs.
+//! Nonlinear functions at the inputs: does a function of the input, or of the velocity that it causes, explain what the model
+//! leaves?
+//!
+//! ```text
+//! y - G u = G f theta + e,     f = u^3, u |u|, u^2, u beyond a limit, tanh(velocity / small)
+//! ```
+//! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
 use super::super::Evidence;
 use super::super::chart::Chart;
 use super::super::linearise::{Extra, linearise_with};
+use super::super::point::energy;
 use super::super::problem::Solution;
-use super::super::spectra::Spectra;
+use super::super::spectra::{Lines, Spectra};
 use super::excess;
 use faer::c64;
 use rustfft::FftPlanner;
 
+/// Largest share of a nonlinear function, both weighted by the inverse of the noise.
+const LARGEST_SHARE: f64 = 0.01;
+/// Functions of the input in units of its standard deviation: smooth ones, and what saturation takes away.
+const OF_INPUT: [fn(f64) -> f64; 5] =
+    [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
+/// Velocity of which friction changes its sign, in standard deviations.
+const SMALL_VELOCITY: f64 = 0.1;
+/// Functions for each input.
+const FUNCTIONS: usize = OF_INPUT.len() + 1;
+
 /// Does a nonlinear function of the input, or of the velocity, act at the input?
 pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let found = &solution.chosen.found;
-    let (m, p) = (spectra.inputs, spectra.outputs);
-    let model = &found.point.model;
     let residuals = found.point.residuals(spectra);
-    let functions: usize = 4;
-    let count = functions * m;
+    let pairs = spectra.records.iter().zip(&residuals);
+    let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
     let mut planner = FftPlanner::new();
-    let mut values = Vec::new();
-    for (lines, residual) in spectra.records.iter().zip(&residuals) {
-        let (samples, half) = (lines.samples, lines.z.len());
-        let (forward, inverse) = (planner.plan_fft_forward(samples), planner.plan_fft_inverse(samples));
-        let root = (samples as f64).sqrt();
-        let in_time = |pick: &dyn Fn(usize) -> c64| {
-            let mut work = vec![c64::ZERO; samples];
+    let pairs = spectra.records.iter().zip(&clean);
+    let values: Vec<Vec<c64>> =
+        pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
+    let chart = Chart::new(&found.point.model, found.feedthrough);
+    let count = FUNCTIONS * spectra.inputs;
+    let extra = Extra { count, values: &values, quick: false };
+    let factor = linearise_with(spectra, &found.point, &chart, &found.noise, &extra).factor;
+    let parameters = chart.parameters();
+    let rows = parameters..(parameters + count).min(factor.nrows());
+    let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, c)].powi(2)).sum::<f64>();
+    let distinct: Vec<usize> = rows.clone().filter(|i| factor[(*i, *i)].powi(2) > DISTINCT * length(*i)).collect();
+    let statistic: f64 = distinct.iter().map(|i| factor[(*i, parameters + count)].powi(2)).sum();
+    // the most telling single function
+    let single = |f: usize| {
+        let along: f64 = rows.clone().map(|i| factor[(i, parameters + f)] * factor[(i, parameters + count)]).sum();
+        let own: f64 = rows.clone().map(|i| factor[(i, parameters + f)].powi(2)).sum();
+        if own > DISTINCT * length(parameters + f) { along.abs() / own.sqrt() } else { 0.0 }
+    };
+    let telling = (0..count).map(single).fold(0.0, f64::max);
+    let moved = energy(spectra, &clean, &found.noise).max(1e-300);
+    Evidence::new(
+        "How large is what a nonlinear function at the inputs explains, relative to what the model explains, beyond chance?",
+        ((statistic - distinct.len() as f64).max(0.0) / moved).sqrt(),
+        LARGEST_SHARE,
+    )
+    .beyond_chance(excess(statistic, distinct.len() as f64).max(telling))
+}
+
+/// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.
+const DISTINCT: f64 = 1e-8;
+
+/// The functions of one record seen through the model, lines x p x functions.
+fn columns(
+    spectra: &Spectra,
+    solution: &Solution,
+    lines: &Lines,
+    clean: &[c64],
+    planner: &mut FftPlanner<f64>,
+) -> Vec<c64> {
+    let (m, p, half) = (spectra.inputs, spectra.outputs, lines.z.len());
+    let count = FUNCTIONS * m;
+    let model = &solution.chosen.found.point.model;
+    let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
+    let mut columns = vec![c64::ZERO; half * p * count];
+    for j in 0..m {
+        let u = in_time(lines, planner, |k| lines.u[k * m + j]);
+        // velocity of the output that this input moves most
+        let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
+        let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
+        let velocity = in_time(lines, planner, |k| clean[k * p + seen] * (c64::ONE - lines.z[k].conj()));
+        for f in 0..FUNCTIONS {
+            let shaped =
+                |t: usize| OF_INPUT.get(f).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |of| of(u[t]));
+            let root = (lines.samples as f64).sqrt();
+            let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
+            planner.plan_fft_forward(lines.samples).process(&mut work);
             for k in 0..half {
-                let v = pick(k);
-                work[k + 1] = v;
-                work[samples - 1 - k] = v.conj();
-            }
-            inverse.process(&mut work);
-            work.iter().map(|v| v.re / root).collect::<Vec<f64>>()
-        };
-        let mut columns = vec![c64::ZERO; half * p * count];
-        let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
-        for j in 0..m {
-            let u = in_time(&|k| lines.u[k * m + j]);
-            // velocity of the output that this input moves most
-            let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
-            let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
-            let clean = in_time(&|k| (lines.y[k * p + seen] - residual[k * p + seen]) * (c64::ONE - lines.z[k].conj()));
-            let size = |v: &[f64]| (v.iter().map(|x| x * x).sum::<f64>() / v.len().max(1) as f64).sqrt().max(1e-300);
-            let (su, sv) = (size(&u), size(&clean));
-            let shapes: [&dyn Fn(usize) -> f64; 4] =
-                [&|t| (u[t] / su).powi(3), &|t| (u[t] / su) * (u[t] / su).abs(), &|t| (u[t] / su).powi(2), &|t| {
-                    (clean[t] / (0.1 * sv)).tanh()
-                }];
-            for (f, shape) in shapes.iter().enumerate() {
-                let mut work: Vec<c64> = (0..samples).map(|t| c64::new(shape(t) / root, 0.0)).collect();
-                forward.process(&mut work);
-                for k in 0..half {
-                    for i in 0..p {
-                        columns[(k * p + i) * count + f * m + j] = responses[k][i * m + j] * work[k + 1];
-                    }
+                for i in 0..p {
+                    columns[(k * p + i) * count + f * m + j] = responses[k][i * m + j] * work[k + 1];
                 }
             }
         }
-        values.push(columns);
     }
-    let chart = Chart::new(model, found.feedthrough);
-    let linearised =
-        linearise_with(spectra, &found.point, &chart, &found.noise, &Extra { count, values: &values, quick: false });
-    let (parameters, factor) = (chart.parameters(), &linearised.factor);
-    let statistic: f64 =
-        (parameters..(parameters + count).min(factor.nrows())).map(|i| factor[(i, parameters + count)].powi(2)).sum();
-    Evidence::new(
-        "Does a nonlinear function at the inputs explain what the model leaves, in standard deviations beyond chance?",
-        excess(statistic, count as f64),
-        5.0,
-    )
+    columns
+}
+
+/// A signal in time from its lines, without its mean and of unit size.
+fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) -> c64) -> Vec<f64> {
+    let samples = lines.samples;
+    let mut work = vec![c64::ZERO; samples];
+    for k in 0..lines.z.len() {
+        let v = pick(k);
+        work[k + 1] = v;
+        work[samples - 1 - k] = v.conj();
+    }
+    planner.plan_fft_inverse(samples).process(&mut work);
+    let size = (work.iter().map(|v| v.re * v.re).sum::<f64>() / samples.max(1) as f64).sqrt().max(1e-300);
+    work.iter().map(|v| v.re / size).collect()
 }

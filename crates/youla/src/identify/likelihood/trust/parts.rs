@@ -1,22 +1,50 @@
-//! Parts of the records against each other.
+//! Parts of the records against each other and against fresh records: do they ask for the same model, with the same noise?
+//!
+//! With `[R_k r_k]` the triangular factor of part k and `[R r]` that of all parts together,
+//! ```text
+//! sum_k |r_k|^2 - |r|^2 ~ chi-square with (K - 1) parameters degrees of freedom
+//! ```
+//! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
 use super::super::Evidence;
 use super::super::chart::Chart;
 use super::super::deviation::inverse_root;
-use super::super::linearise::linearise;
+use super::super::linearise::{compressed, linearise, stacked};
 use super::super::point::energy;
 use super::super::problem::{Problem, Solution};
 use super::super::search::with_best_ends;
 use super::super::spectra::Spectra;
 use super::excess;
 use crate::identify::subspace::Experiment;
-use faer::Mat;
+use faer::{Mat, c64};
+
+/// Pieces of a record with at least so many samples each.
+const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
+/// Standard deviations beyond chance from which pieces differ.
+const BEYOND_CHANCE: f64 = 3.0;
+/// Largest relative difference of the responses that parts ask for.
+const LARGEST_DIFFERENCE: f64 = 0.1;
+/// Largest ratio of the powers of the noise.
+const LARGEST_RATIO: f64 = 2.0;
+/// Frequencies at which the responses of parts are compared, and the largest relative deviation at which they are.
+const COMPARED: (usize, f64) = (100, 0.3);
 
 /// Triangular factor of a part of the records at the model.
 struct Part {
     factor: Mat<f64>,
     energy: f64,
     samples: f64,
+}
+
+/// The parts of the records.
+pub(crate) struct Parts {
+    halves: [Option<Part>; 2],
+    whole: Option<Part>,
+    fresh: Option<Part>,
+    parameters: usize,
+    /// How many times the scatter of the parameters over the pieces exceeds what the information of the records says, where that is
+    /// beyond chance; else 1.
+    pub(crate) scatter: f64,
 }
 
 impl Part {
@@ -33,80 +61,118 @@ impl Part {
         Some(Part { factor: linearised.factor, energy, samples: (spectra.samples() * spectra.outputs) as f64 })
     }
 
-    /// Chi-square of the difference of the parameters that two parts ask for, as excess; and how often it exceeds its mean.
-    fn against(&self, other: &Part, parameters: usize) -> f64 {
-        let wanted = |part: &Part| {
-            let root = inverse_root(&part.factor, parameters);
-            // Newton step = root root' R' r
-            let gradient: Vec<f64> = (0..parameters)
-                .map(|j| {
-                    (0..parameters.min(part.factor.nrows()))
-                        .map(|i| part.factor[(i, j)] * part.factor[(i, parameters)])
-                        .sum()
-                })
-                .collect();
-            let inner: Vec<f64> =
-                (0..root.ncols()).map(|k| (0..parameters).map(|j| root[(j, k)] * gradient[j]).sum()).collect();
-            let step: Vec<f64> =
-                (0..parameters).map(|j| (0..root.ncols()).map(|k| root[(j, k)] * inner[k]).sum()).collect();
-            (step, &root * root.transpose())
-        };
-        let ((a, ca), (b, cb)) = (wanted(self), wanted(other));
-        let covariance = ca + cb;
-        let Ok(eigen) = covariance.self_adjoint_eigen(faer::Side::Lower) else { return 0.0 };
-        let (u, s) = (eigen.U(), eigen.S().column_vector());
-        let statistic: f64 = (0..parameters)
-            .map(|k| {
-                let along: f64 = (0..parameters).map(|j| u[(j, k)] * (a[j] - b[j])).sum();
-                along * along / s[k].max(1e-14 * s[parameters - 1])
-            })
-            .sum();
-        excess(statistic, parameters as f64)
+    fn together(parts: &[&Part]) -> Option<Part> {
+        let (first, others) = parts.split_first()?;
+        let mut factor = first.factor.clone();
+        others.iter().for_each(|part| factor = compressed(&stacked(&factor, &part.factor)));
+        let sum = |of: fn(&Part) -> f64| parts.iter().map(|p| of(p)).sum::<f64>();
+        Some(Part { factor, energy: sum(|p| p.energy), samples: sum(|p| p.samples) })
+    }
+
+    /// `|r|^2`, what the parameters of this part alone lower the sum of squares by.
+    fn explained(&self, parameters: usize) -> f64 {
+        (0..parameters.min(self.factor.nrows())).map(|i| self.factor[(i, parameters)].powi(2)).sum()
+    }
+
+    /// The step that this part asks for, and the root of its covariance.
+    fn step(&self, parameters: usize) -> (Vec<f64>, Mat<f64>) {
+        let root = inverse_root(&self.factor, parameters);
+        let rows = parameters.min(self.factor.nrows());
+        let gradient = |j: usize| (0..rows).map(|i| self.factor[(i, j)] * self.factor[(i, parameters)]).sum::<f64>();
+        let gradient: Vec<f64> = (0..parameters).map(gradient).collect();
+        let inner: Vec<f64> =
+            (0..root.ncols()).map(|k| (0..parameters).map(|j| root[(j, k)] * gradient[j]).sum()).collect();
+        let step = (0..parameters).map(|j| (0..root.ncols()).map(|k| root[(j, k)] * inner[k]).sum()).collect();
+        (step, root)
     }
 }
 
-/// Do both halves of the record, and fresh records, ask for the same parameters, with the same noise?
-pub(crate) fn parts(problem: &Problem<'_>, solution: &Solution, fresh: &[Experiment<'_>]) -> Vec<Evidence> {
-    let half = |second: bool| -> Vec<Experiment<'_>> {
-        let cut = |e: &Experiment<'_>| {
-            let (rows, middle) = (e.u.nrows(), e.u.nrows() / 2);
-            let (from, count) = if second { (middle, rows - middle) } else { (0, middle) };
-            (from, count)
-        };
-        problem
-            .experiments
-            .iter()
-            .map(|e| {
-                let (f, c) = cut(e);
-                Experiment { u: e.u.subrows(f, c), y: e.y.subrows(f, c) }
-            })
-            .collect()
-    };
-    let parameters = Chart::new(&solution.chosen.found.point.model, solution.chosen.found.feedthrough).parameters();
-    let (first, second) = (Part::new(problem, solution, &half(false)), Part::new(problem, solution, &half(true)));
-    let mut out = Vec::new();
-    let mut compare = |a: &Option<Part>, b: &Option<Part>, question: &str, noise: &str| {
-        if let (Some(a), Some(b)) = (a, b) {
-            out.push(Evidence::new(question, a.against(b, parameters), 5.0));
-            let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(1e-300);
-            out.push(Evidence::new(noise, ratio.max(1.0 / ratio), 1.3));
+/// Chow's statistic of some parts, in standard deviations beyond chance, and over its degrees of freedom.
+fn chow(parts: &[&Part], parameters: usize) -> Option<(f64, f64)> {
+    let whole = Part::together(parts)?;
+    let degrees = ((parts.len() - 1) * parameters) as f64;
+    let statistic = parts.iter().map(|p| p.explained(parameters)).sum::<f64>() - whole.explained(parameters);
+    (degrees > 0.0).then(|| (excess(statistic, degrees), statistic / degrees))
+}
+
+impl Parts {
+    /// The pieces of the records, and fresh records.
+    pub(crate) fn new(problem: &Problem<'_>, solution: &Solution, fresh: &[Experiment<'_>]) -> Self {
+        let found = &solution.chosen.found;
+        let parameters = Chart::new(&found.point.model, found.feedthrough).parameters();
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        for e in problem.experiments {
+            let rows = e.u.nrows();
+            let count = PIECES.iter().find(|(count, least)| rows >= count * least).map_or(2, |(count, _)| *count);
+            for k in 0..count {
+                let (from, to) = ((k * rows / count).saturating_sub(problem.skip), (k + 1) * rows / count);
+                let piece = Experiment { u: e.u.subrows(from, to - from), y: e.y.subrows(from, to - from) };
+                let part = Part::new(problem, solution, &[piece]);
+                if k < count / 2 { first.extend(part) } else { second.extend(part) }
+            }
         }
-    };
-    compare(
-        &first,
-        &second,
-        "Do the halves of the records ask for other parameters, in standard deviations beyond chance?",
-        "How many times is the noise of one half of the records that of the other (powers)?",
-    );
-    if !fresh.is_empty() {
-        let all = Part::new(problem, solution, problem.experiments);
-        let new = Part::new(problem, solution, fresh);
-        compare(
-            &all,
-            &new,
-            "Do fresh records ask for other parameters, in standard deviations beyond chance?",
-            "How many times is the noise of fresh records that of the others (powers)?",
-        );
+        let pieces: Vec<&Part> = first.iter().chain(&second).collect();
+        let scatter = chow(&pieces, parameters).filter(|(significance, _)| *significance > BEYOND_CHANCE);
+        let refs = |parts: &'_ [Part]| Part::together(&parts.iter().collect::<Vec<_>>());
+        Parts {
+            halves: [refs(&first), refs(&second)],
+            whole: Part::together(&pieces),
+            fresh: if fresh.is_empty() { None } else { Part::new(problem, solution, fresh) },
+            parameters,
+            scatter: scatter.map_or(1.0, |(_, ratio)| ratio.max(1.0)),
+        }
     }
-    out
+
+    /// The questions whether halves and fresh records agree.
+    pub(crate) fn evidence(&self, solution: &Solution) -> Vec<Evidence> {
+        let mut out = Vec::new();
+        if let [Some(a), Some(b)] = &self.halves {
+            out.extend(self.compared(a, b, solution, "the two halves of the records"));
+        }
+        if let (Some(a), Some(b)) = (&self.whole, &self.fresh) {
+            out.extend(self.compared(a, b, solution, "the estimation and the verification records"));
+        }
+        out
+    }
+
+    fn compared(&self, a: &Part, b: &Part, solution: &Solution, which: &str) -> Vec<Evidence> {
+        let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
+        let difference = self.difference(a, b, solution);
+        let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(1e-300);
+        let question =
+            format!("How far apart are the responses that {which} ask for, relative to them, beyond chance?");
+        let noise = format!("How many times is the power of the noise the smaller between {which}?");
+        vec![
+            Evidence::new(question, difference, LARGEST_DIFFERENCE).beyond_chance(significance),
+            Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_RATIO),
+        ]
+    }
+
+    /// Root mean square over frequency of the relative difference of the responses of two parts, less what chance explains, where
+    /// both know the response.
+    fn difference(&self, a: &Part, b: &Part, solution: &Solution) -> f64 {
+        let found = &solution.chosen.found;
+        let model = &found.point.model;
+        let chart = Chart::new(model, found.feedthrough);
+        let ((sa, ra), (sb, rb)) = (a.step(self.parameters), b.step(self.parameters));
+        let (mut sum, mut count) = (0.0, 0);
+        for k in 0..COMPARED.0 {
+            let share = 0.002 * (0.49_f64 / 0.002).powf(k as f64 / (COMPARED.0 - 1) as f64);
+            let z = c64::cis(std::f64::consts::TAU * share);
+            let slopes = chart.response_slopes(model, z);
+            let size: f64 = model.response(z).iter().map(|g| g.norm_sqr()).sum();
+            let along = |i: usize, v: &dyn Fn(usize) -> f64| {
+                (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j)).norm_sqr()
+            };
+            let of = |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)])).sum::<f64>();
+            let entries = 0..slopes.nrows();
+            let variance: f64 = entries.clone().map(|i| of(&ra, i) + of(&rb, i)).sum();
+            if variance < COMPARED.1 * COMPARED.1 * size {
+                let apart: f64 = entries.map(|i| along(i, &|j| sa[j] - sb[j])).sum();
+                sum += (apart - variance) / size;
+                count += 1;
+            }
+        }
+        if count > 0 { (sum / count as f64).max(0.0).sqrt() } else { 0.0 }
+    }
 }

@@ -82,7 +82,7 @@ impl IdentifyArgs {
             None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
         };
         let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
-        Ok(RunSettings::new(name, data, NominalModel::ModelFile { file: nominal.clone() }, controller))
+        Ok(RunSettings::new(name, data, NominalModel::ModelFile { file: nominal.clone(), domain: None }, controller))
     }
 
     fn missing(&self, flag: &str) -> Failure {

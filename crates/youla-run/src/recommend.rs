@@ -30,7 +30,7 @@ pub(super) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
 }
 
 fn experiments<'a>(records: &'a [LoopRecord], outputs: &'a [Mat<f64>]) -> Vec<Experiment<'a>> {
-    records.iter().zip(outputs).map(|(r, y)| Experiment { u: r.u.as_ref(), y: y.as_ref() }).collect()
+    records.iter().zip(outputs).map(|(r, y)| Experiment::new(r.u.as_ref(), y.as_ref())).collect()
 }
 
 fn views(all: &[Signals]) -> Vec<LoopSignals<'_>> {

@@ -121,7 +121,11 @@ pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<Subspa
 /// # Errors
 /// [`youla_io::Error::Settings`] with line, column and key.
 pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<SubspaceOptions> {
-    read_table::<SubspaceTable>(text, path, "direct").map(Into::into)
+    let refused = |problem: &str| {
+        let (path, problem) = (path.to_owned(), problem.to_owned());
+        Error::File(youla_io::Error::Settings { path, at: None, problem })
+    };
+    read_table::<SubspaceTable>(text, path, "direct")?.try_into().map_err(refused)
 }
 
 fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {

@@ -107,7 +107,6 @@ impl RunSettings {
             grey_box: None,
             certificate: None,
             redesign: None,
-            stabilisation: StabilisationSettings::default(),
             verification: VerificationSettings::default(),
             check: CheckOptions::default(),
             frequency_response: FrequencySettings::default(),
@@ -169,14 +168,9 @@ impl RunSettings {
     }
 
     fn problem(&self) -> Option<String> {
-        let both = |table: &str, o: &SubspaceOptions| {
-            let twice = o.automatic_horizon.is_some() && o.past.is_some();
-            twice.then(|| format!("[{table}] horizon = \"auto\" chooses `past` too; leave `past` out"))
-        };
-        let horizons = || both("hansen", &self.hansen).or_else(|| both("direct", self.direct.as_ref()?));
         let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
         let problem = self.data.problem().or_else(|| self.loop_problem()).or_else(|| self.number_problem());
-        problem.or_else(horizons).or_else(structure)
+        problem.or_else(structure)
     }
 
     fn loop_problem(&self) -> Option<String> {

@@ -5,8 +5,7 @@ use super::order::{self, OrderForm, ReducedForm};
 use serde::de::{DeserializeOwned, Error, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use youla::identify::subspace::{
-    AutomaticHorizon, Feedthrough, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod,
-    UncertaintyOptions,
+    Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
 };
 use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
 use youla_greybox::refine::{RefineNoise, RefineOptions};
@@ -14,7 +13,7 @@ use youla_greybox::refine::{RefineNoise, RefineOptions};
 /// Options with the table that shows them.
 pub(in crate::settings) trait Shown: Sized + Clone {
     /// What run.toml says of them.
-    type Table: Serialize + DeserializeOwned + From<Self> + Into<Self>;
+    type Table: Serialize + DeserializeOwned + From<Self> + TryInto<Self, Error: std::fmt::Display>;
 }
 
 pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(options: &T, s: S) -> Result<S::Ok, S::Error> {
@@ -22,19 +21,19 @@ pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(options: &T, s: S)
 }
 
 pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
-    T::Table::deserialize(d).map(Into::into)
+    T::Table::deserialize(d)?.try_into().map_err(D::Error::custom)
 }
 
 /// The same of a table that may be absent.
 pub(in crate::settings) mod optional {
-    use super::{Deserialize, Deserializer, Serialize, Serializer, Shown};
+    use super::{Deserialize, Deserializer, Error, Serialize, Serializer, Shown};
 
     pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(o: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
         o.clone().map(T::Table::from).serialize(s)
     }
 
     pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<Option<T>, D::Error> {
-        Ok(Option::<T::Table>::deserialize(d)?.map(Into::into))
+        Option::<T::Table>::deserialize(d)?.map(|table| table.try_into().map_err(D::Error::custom)).transpose()
     }
 }
 
@@ -82,22 +81,32 @@ impl Shown for SubspaceOptions {
 
 impl From<SubspaceOptions> for SubspaceTable {
     fn from(options: SubspaceOptions) -> Self {
-        let SubspaceOptions { method, past, order, feedthrough, delays, stability, uncertainty, .. } = options;
-        let horizon = options.automatic_horizon.is_none().then_some(options.horizon);
+        let SubspaceOptions { method, horizon, order, feedthrough, delays, stability, uncertainty, .. } = options;
+        let (horizon, past) = match horizon {
+            Horizon::Fixed { future, past } => (Some(future), (past != future).then_some(past)),
+            Horizon::Auto { .. } => (None, None),
+        };
         let uncertainty = UncertaintyTable { method: uncertainty.method, level: uncertainty.level };
         SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty }
     }
 }
 
-impl From<SubspaceTable> for SubspaceOptions {
-    fn from(table: SubspaceTable) -> Self {
+/// Longest past that `horizon = "auto"` considers, block rows; chosen, not measured.
+const LONGEST_PAST: usize = 60;
+
+impl TryFrom<SubspaceTable> for SubspaceOptions {
+    type Error = &'static str;
+
+    fn try_from(table: SubspaceTable) -> Result<Self, Self::Error> {
         let SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty } = table;
-        let usual = SubspaceOptions::default();
-        SubspaceOptions {
+        let horizon = match (horizon, past) {
+            (Some(future), past) => Horizon::Fixed { future, past: past.unwrap_or(future) },
+            (None, None) => Horizon::Auto { max_past: LONGEST_PAST },
+            (None, Some(_)) => return Err("horizon = \"auto\" chooses `past` too; leave `past` out"),
+        };
+        Ok(SubspaceOptions {
             method,
-            automatic_horizon: horizon.is_none().then(AutomaticHorizon::default),
-            horizon: horizon.unwrap_or(usual.horizon),
-            past,
+            horizon,
             order,
             feedthrough,
             delays,
@@ -107,8 +116,8 @@ impl From<SubspaceTable> for SubspaceOptions {
                 level: uncertainty.level,
                 ..UncertaintyOptions::default()
             },
-            ..usual
-        }
+            ..SubspaceOptions::default()
+        })
     }
 }
 

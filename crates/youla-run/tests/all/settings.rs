@@ -91,7 +91,7 @@ fn orders_are_numbers_words_or_rules() {
     }
     let horizon =
         parse(&format!("{MINIMAL}\n[hansen]\nhorizon = \"auto\"\n[deviation]\nrefine = \"innovation\"\n")).unwrap();
-    assert!(horizon.hansen.automatic_horizon.is_some() && horizon.deviation.refine.is_some());
+    assert!(horizon.hansen.horizon.is_auto() && horizon.deviation.refine.is_some());
     assert_eq!(parse(&horizon.to_toml().unwrap()).unwrap(), horizon);
 }
 

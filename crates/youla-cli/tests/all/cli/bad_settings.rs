@@ -127,7 +127,7 @@ fn numbers_out_of_range() {
             "order = 3\nscaling = \"none\"",
             "run.toml:24:1: `scaling` is no longer a key of [hansen]: channels",
         ),
-        ("horizon = 10", "horizon = \"auto\"\npast = 3", "[hansen] horizon = \"auto\" chooses `past` too"),
+        ("horizon = 10", "horizon = \"auto\"\npast = 3", "horizon = \"auto\" chooses `past` too"),
         ("[hansen]", "[factors]\ninput_weight = -1.0\n[hansen]", "[factors] input_weight is -1"),
         ("horizon = 10", "horizon = 1", "horizon is 1, but must be at least 2"),
         ("take = 1200", "take = 100000", "is 100000"),

@@ -83,7 +83,7 @@ impl Problem<'_> {
         };
         let parts: Vec<_> = self.experiments.iter().map(cut).collect();
         let short: Vec<Experiment<'_>> =
-            parts.iter().map(|(_, u, y)| Experiment { u: u.as_ref(), y: y.as_ref() }).collect();
+            parts.iter().map(|(_, u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
         if parts.iter().map(|part| part.0).sum::<usize>() > LONG {
             return None;
         }

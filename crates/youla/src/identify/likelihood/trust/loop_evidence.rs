@@ -56,7 +56,7 @@ fn error(spectra: &Spectra, solution: &Solution, missed: &Missed) -> Evidence {
 
 /// How well a controller explains the inputs: rms of `u - K (y - r) - d` over rms of `u - d`, ends of the records free.
 fn controller(controller: &StateSpace<Discrete>, records: &[(MatRef<'_, f64>, MatRef<'_, f64>)]) -> Option<Evidence> {
-    let experiments: Vec<Experiment<'_>> = records.iter().map(|(from, to)| Experiment { u: *from, y: *to }).collect();
+    let experiments: Vec<Experiment<'_>> = records.iter().map(|(from, to)| Experiment::new(*from, *to)).collect();
     let (m, p) = (controller.inputs(), controller.outputs());
     let d = (0..p * m).map(|x| controller.d()[(x / m, x % m)]).collect();
     let model = Model::of(controller.a(), controller.b(), controller.c(), d)?;

@@ -106,7 +106,7 @@ impl Parts {
             let count = PIECES.iter().find(|(count, least)| rows >= count * least).map_or(2, |(count, _)| *count);
             for k in 0..count {
                 let (from, to) = ((k * rows / count).saturating_sub(problem.skip), (k + 1) * rows / count);
-                let piece = Experiment { u: e.u.subrows(from, to - from), y: e.y.subrows(from, to - from) };
+                let piece = Experiment::new(e.u.subrows(from, to - from), e.y.subrows(from, to - from));
                 let part = Part::new(problem, solution, &[piece]);
                 if k < count / 2 { first.extend(part) } else { second.extend(part) }
             }

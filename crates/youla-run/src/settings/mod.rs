@@ -23,8 +23,8 @@ use crate::{Error, Result};
 use explain::{explain, problem_at};
 use retired::retired;
 use serde::{Deserialize, Serialize};
-use shown::ReductionTable;
 pub(crate) use shown::SubspaceTable;
+use shown::{RecommendedTable, ReductionTable};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::LikelihoodOptions;
@@ -47,7 +47,8 @@ pub struct RunSettings {
     /// The controller that ran while the data were logged.
     pub controller: ControllerSettings,
     /// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
-    #[serde(default)]
+    #[serde(default, with = "shown")]
+    #[schemars(with = "RecommendedTable")]
     pub recommended: LikelihoodOptions,
     /// How the coprime factors are built.
     #[serde(default)]

@@ -4,6 +4,7 @@
 use super::order::{self, OrderForm, ReducedForm};
 use serde::de::{DeserializeOwned, Error, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::{
     Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
 };
@@ -44,7 +45,7 @@ pub(crate) struct SubspaceTable {
     /// The method: it sets the weights of the singular value decomposition.
     method: SubspaceMethod,
     /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the slowest mode.
-    #[serde(with = "horizon")]
+    #[serde(with = "number_or_auto")]
     #[schemars(with = "HorizonForm")]
     horizon: Option<usize>,
     /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the predictor and
@@ -154,8 +155,8 @@ enum HorizonForm {
     Word(order::AutoWord),
 }
 
-/// A number of block rows, or `"auto"`, which is `None`.
-mod horizon {
+/// A number, or `"auto"`, which is `None`.
+mod number_or_auto {
     use super::{Deserializer, Error, HorizonForm, Serialize, Serializer, Unexpected, order};
     use serde::de::Visitor;
     use std::fmt;
@@ -188,6 +189,57 @@ mod horizon {
         fn visit_str<E: Error>(self, value: &str) -> Result<Option<usize>, E> {
             if value == "auto" { Ok(None) } else { Err(E::invalid_value(Unexpected::Str(value), &self)) }
         }
+    }
+}
+
+/// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
+#[derive(Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub(in crate::settings) struct RecommendedTable {
+    /// Number of states, those of the dead time not counted.
+    #[serde(with = "number_or_auto")]
+    #[schemars(with = "StatesForm")]
+    order: Option<usize>,
+    /// Dead time of each input in samples, beyond the one sample of a plant without feedthrough; chosen when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    dead_time: Option<Vec<usize>>,
+    /// Whether an input acts on the outputs of the same sample; chosen when absent.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    feedthrough: Option<bool>,
+    /// Largest order that is tried.
+    largest_order: usize,
+}
+
+/// A number of states.
+#[derive(Serialize, schemars::JsonSchema)]
+#[serde(untagged)]
+#[allow(dead_code, reason = "the schema is made of it")]
+enum StatesForm {
+    /// This number.
+    Number(usize),
+    /// The number that the evidence of the records asks for.
+    Word(order::AutoWord),
+}
+
+impl Default for RecommendedTable {
+    fn default() -> Self {
+        LikelihoodOptions::default().into()
+    }
+}
+
+impl Shown for LikelihoodOptions {
+    type Table = RecommendedTable;
+}
+
+impl From<LikelihoodOptions> for RecommendedTable {
+    fn from(LikelihoodOptions { order, dead_time, feedthrough, largest_order }: LikelihoodOptions) -> Self {
+        RecommendedTable { order, dead_time, feedthrough, largest_order }
+    }
+}
+
+impl From<RecommendedTable> for LikelihoodOptions {
+    fn from(RecommendedTable { order, dead_time, feedthrough, largest_order }: RecommendedTable) -> Self {
+        LikelihoodOptions { order, dead_time, feedthrough, largest_order }
     }
 }
 

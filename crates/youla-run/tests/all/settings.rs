@@ -78,6 +78,11 @@ fn orders_are_numbers_words_or_rules() {
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
         assert_eq!(parse_subspace_options(&format!("order = {text}"), Path::new("o.toml")).unwrap().order, order);
     }
+    for (text, order) in [("4", Some(4)), ("\"auto\"", None)] {
+        let settings = parse(&format!("{MINIMAL}\n[recommended]\norder = {text}\n")).unwrap();
+        assert_eq!(settings.recommended.order, order);
+        assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
+    }
     for (text, order) in [
         ("6", ReducedOrder::Fixed(6)),
         ("\"minimal\"", ReducedOrder::Minimal),

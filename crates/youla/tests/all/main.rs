@@ -7,6 +7,7 @@ mod closed_loop;
 mod common;
 mod excitation;
 mod identities;
+mod likelihood;
 mod measured;
 mod paper;
 mod random_loops;

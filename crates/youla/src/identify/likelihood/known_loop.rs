@@ -1,8 +1,9 @@
 //! What is known of the loop in which the records were taken.
 
+use super::spectra::Sizes;
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
-use crate::{Error, MatRef, Result};
+use crate::{Error, Mat, MatRef, Result};
 
 /// The signals of one record in the terms of the controller.
 ///
@@ -45,6 +46,15 @@ impl<'a> LoopKnowledge<'a> {
             }
         }
         Ok(LoopKnowledge { controller, estimation, verification })
+    }
+
+    /// K_d from y to u, m x p in units of the sizes: zero in open loop; `None` where the controller does not see all of y.
+    pub(super) fn direct(&self, sizes: &Sizes) -> Option<Mat<f64>> {
+        let (m, p) = (sizes.u.len(), sizes.y.len());
+        let Some(k) = self.controller else { return Some(Mat::zeros(m, p)) };
+        // what it sees ends with y: y - r, or [u; y] for an observer
+        let first = k.inputs().checked_sub(p)?;
+        (k.outputs() == m).then(|| Mat::from_fn(m, p, |j, i| k.d()[(j, first + i)] * sizes.y[i] / sizes.u[j]))
     }
 
     /// The excitation of each estimation record, where all are known and one is not zero.

@@ -23,6 +23,7 @@ mod block;
 mod chart;
 mod dead_time;
 mod deviation;
+mod feedthrough;
 mod grouping;
 mod grow;
 mod innovation;
@@ -46,6 +47,8 @@ mod solve;
 mod spectra;
 mod starts;
 mod states;
+#[cfg(test)]
+mod tests;
 mod trust;
 
 pub use super::subspace::Experiment;
@@ -85,7 +88,7 @@ pub fn recommend(
     options: &LikelihoodOptions,
 ) -> Result<Recommendation> {
     check(estimation, verification)?;
-    let problem = problem(estimation, options)?;
+    let problem = problem(estimation, known, options)?;
     let mut candidates = Vec::new();
     let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
     let choice = &solution.chosen;
@@ -139,7 +142,11 @@ fn check_moving(signal: &str, records: &[MatRef<'_, f64>]) -> Result<()> {
     Ok(())
 }
 
-fn problem<'a>(experiments: &'a [Experiment<'a>], options: &LikelihoodOptions) -> Result<Problem<'a>> {
+fn problem<'a>(
+    experiments: &'a [Experiment<'a>],
+    known: Option<&LoopKnowledge<'_>>,
+    options: &LikelihoodOptions,
+) -> Result<Problem<'a>> {
     let (m, p) = experiments.first().map_or((0, 0), |e| (e.u.ncols(), e.y.ncols()));
     let longest = experiments.iter().map(|e| e.u.nrows()).max().unwrap_or(0);
     let order = options.order.unwrap_or(1);
@@ -159,9 +166,13 @@ fn problem<'a>(experiments: &'a [Experiment<'a>], options: &LikelihoodOptions) -
     if order == 0 || options.largest_order == 0 {
         return Err(Error::OutOfRange { what: "the order".into(), value: 0.0, must: "at least one" });
     }
+    let sizes = Sizes::of(experiments);
+    let direct = known.and_then(|known| known.direct(&sizes)).filter(|_| options.feedthrough != Some(false));
     Ok(Problem {
         experiments,
-        sizes: Sizes::of(experiments),
+        direct,
+        open_loop: known.is_some_and(|known| known.controller.is_none()),
+        sizes,
         skip,
         feedthrough: options.feedthrough.unwrap_or(false),
         order: options.order,

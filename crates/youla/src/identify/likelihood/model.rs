@@ -92,6 +92,16 @@ impl Model {
         self.poles().iter().map(|p| p.norm().ln().max(0.0)).sum()
     }
 
+    /// Draws blocks with poles outside of the unit circle inside, for a start.
+    pub(crate) fn draw_inside(&mut self) {
+        for block in &mut self.blocks {
+            let radius = block.poles().iter().map(|p| p.norm()).fold(0.0, f64::max);
+            if radius >= 1.0 {
+                block.a.iter_mut().for_each(|a| *a *= 0.999 / radius);
+            }
+        }
+    }
+
     /// Mean square of the response in the upper half of the band.
     pub(crate) fn fast_gain(&self) -> f64 {
         let points = 32;

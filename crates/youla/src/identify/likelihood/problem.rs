@@ -5,11 +5,15 @@ use super::point::Point;
 use super::search::{Found, SearchOptions, search};
 use super::spectra::{Sizes, Spectra};
 use crate::identify::subspace::Experiment;
+use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Largest order of the autoregression of the noise.
 pub(crate) const NOISE_ORDER: usize = 12;
+
+/// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less.
+const GROWTH: f64 = 2.0;
 
 /// A found model with the delays it was found for.
 #[derive(Clone)]
@@ -62,6 +66,11 @@ pub(crate) struct Problem<'a> {
     pub(crate) skip: usize,
     /// Whether D moves.
     pub(crate) feedthrough: bool,
+    /// Whether D may be chosen by the evidence, and the answer of the controller in the same sample, m x p in units of the sizes:
+    /// D is not told from the noise without it.
+    pub(crate) direct: Option<Mat<f64>>,
+    /// Whether the records are of an open loop, in which nothing unstable stays within bounds.
+    pub(crate) open_loop: bool,
     /// The order where it is given.
     pub(crate) order: Option<usize>,
     /// The dead times where they are given.
@@ -77,8 +86,19 @@ impl Problem<'_> {
     }
 
     /// Options of a search.
-    pub(crate) fn options(&self, steps: usize, tolerance: f64) -> SearchOptions {
-        SearchOptions { feedthrough: self.feedthrough, noise_order: NOISE_ORDER, steps, tolerance, aim: f64::INFINITY }
+    pub(crate) fn options(&self, steps: usize, tolerance: f64, delays: &[usize]) -> SearchOptions {
+        let (m, p) = (self.inputs(), self.outputs());
+        let known = self.direct.as_ref();
+        let direct = known
+            .map_or_else(Mat::new, |known| Mat::from_fn(m, p, |j, i| if delays[j] == 0 { known[(j, i)] } else { 0.0 }));
+        let radius = if self.open_loop { 1.0 + GROWTH / self.samples().0 as f64 } else { f64::INFINITY };
+        let aim = f64::INFINITY;
+        SearchOptions { feedthrough: self.feedthrough, noise_order: NOISE_ORDER, steps, tolerance, aim, direct, radius }
+    }
+
+    /// The same with D moving or not.
+    pub(crate) fn with_feedthrough(&self, feedthrough: bool) -> Self {
+        Problem { feedthrough, ..self.clone() }
     }
 
     /// Inputs.
@@ -100,7 +120,7 @@ impl Problem<'_> {
     /// Searches all tasks side by side and notes them in their order.
     pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let searched = |task: Task| {
-            let options = SearchOptions { aim, ..self.options(25, 0.3) };
+            let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
             let found = search(&task.spectra, task.start, &options)?;
             let criterion = found.criterion(task.spectra.samples());
             Some(Choice { found, delays: task.delays, criterion, origin: task.origin })

@@ -8,6 +8,7 @@
 //! circle, and neither a stable predictor nor a Kalman gain is needed to search.
 
 use super::chart::Chart;
+use super::feedthrough;
 use super::linearise::{Linearised, linearise_quickly};
 use super::model::Model;
 use super::noise::Noise;
@@ -16,7 +17,7 @@ use super::spectra::Spectra;
 use faer::{Mat, c64};
 
 /// Choices of a search.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) struct SearchOptions {
     /// Whether D moves.
     pub(crate) feedthrough: bool,
@@ -28,6 +29,10 @@ pub(crate) struct SearchOptions {
     pub(crate) tolerance: f64,
     /// Criterion to be undercut: a search that its steps will not bring there is given up.
     pub(crate) aim: f64,
+    /// K_d, the answer of the controller in the same sample, m x p; without entries where it is not known.
+    pub(crate) direct: Mat<f64>,
+    /// Largest magnitude of a pole.
+    pub(crate) radius: f64,
 }
 
 /// A search is given up where its distance to the aim is this many times what its last step gained.
@@ -98,7 +103,11 @@ pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> 
 /// Searches from a start; `None` where nothing finite comes of it.
 pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
     let mut point = reblocked(&start)?;
-    let (mut cost, mut noise) = deviance(spectra, &point, options.noise_order);
+    let cost_of = |point: &Point| {
+        let (value, noise) = deviance(spectra, point, options.noise_order);
+        (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
+    };
+    let (mut cost, mut noise) = cost_of(&point);
     if !cost.is_finite() {
         return None;
     }
@@ -108,7 +117,7 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
         let linearised = linearise_quickly(spectra, &point, &chart, &noise);
-        let pull = pull_of_unstable(spectra, &point.model, &chart);
+        let pull = pull(spectra, &point.model, &chart, options);
         let mut best = None;
         for _ in 0..9 {
             let (step, predicted) = damped(&linearised.factor, &pull, damping);
@@ -116,8 +125,9 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
                 break;
             }
             let trial = moved(&point, &chart, &linearised, &step);
-            let (value, new_noise) = deviance(spectra, &trial, options.noise_order);
-            if value < cost {
+            let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
+            let (value, new_noise) = cost_of(&trial);
+            if value < cost && (options.radius.is_infinite() || inside()) {
                 best = Some((trial, value, new_noise));
                 damping = if damping <= 1e-9 { 0.0 } else { damping * 0.1 };
                 break;
@@ -212,6 +222,17 @@ fn damped(factor: &Mat<f64>, pull: &[f64], damping: f64) -> (Vec<f64>, f64) {
         }
     }
     (solved.iter().zip(&lengths).map(|(x, l)| x / l).collect(), promised)
+}
+
+/// Slopes of the terms of half the deviance that are no squares.
+fn pull(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
+    let mut out = pull_of_unstable(spectra, model, chart);
+    if chart.feedthrough {
+        let slopes = feedthrough::slopes(model, &options.direct);
+        let first = out.len() - slopes.len();
+        out[first..].iter_mut().zip(slopes).for_each(|(o, s)| *o += spectra.samples() as f64 * s);
+    }
+    out
 }
 
 /// Slope of `N log |det A_u|`, by differences.

@@ -4,9 +4,10 @@
 use super::Candidate;
 use super::dead_time::dead_times;
 use super::lag_sums::LagSums;
-use super::problem::{Choice, Problem, Solution};
-use super::search::{search, with_best_inputs};
+use super::problem::{Choice, Problem, Solution, Task};
+use super::search::{search, with_best_ends};
 use crate::identify::subspace::Experiment;
+use std::sync::Arc;
 
 /// Starts from long regressions that are searched without dead time.
 const FIRST: usize = 2;
@@ -33,25 +34,50 @@ impl Problem<'_> {
         let samples = self.samples().0;
         let (mut tried, rounds) =
             if samples > LONG { (vec![self.from_short(samples, table)?], 1) } else { (self.first(table), ROUNDS) };
-        let mut at = best(&tried)?.clone();
-        for _ in 0..rounds {
-            let tasks = self.neighbours(&at);
-            tried.extend(self.run(tasks, at.criterion, table));
-            let better = best(&tried)?;
-            if better.criterion >= at.criterion - 0.5 {
-                break;
+        let now = best(&tried)?.found.feedthrough;
+        let mut at = self.with_feedthrough(now).improved(&mut tried, rounds, table)?;
+        if self.direct.is_some() && !now {
+            let wider = self.with_feedthrough(true);
+            tried.extend(wider.run(vec![wider.same(&at)], at.criterion, table));
+            if best(&tried)?.found.feedthrough {
+                at = wider.improved(&mut tried, rounds, table)?;
             }
-            at = better.clone();
         }
         let mut chosen = calmest(&tried, &at)?.clone();
         let spectra = self.spectra(&chosen.delays);
-        if let Some(found) = search(&spectra, chosen.found.point.clone(), &self.options(40, 0.01)) {
+        let last = self.with_feedthrough(chosen.found.feedthrough);
+        if let Some(found) = search(&spectra, chosen.found.point.clone(), &last.options(40, 0.01, &chosen.delays)) {
             chosen.criterion = found.criterion(spectra.samples());
             chosen.found = found;
         }
         let least = tried.iter().map(|c| c.found.lenient()).fold(f64::INFINITY, f64::min);
         let rivals = tried.into_iter().filter(|c| c.found.lenient() <= least + BESIDE).collect();
         Some(Solution { chosen, rivals })
+    }
+
+    /// Models one step away as long as the criterion falls.
+    fn improved(&self, tried: &mut Vec<Choice>, rounds: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
+        let mut at = best(tried)?.clone();
+        for _ in 0..rounds {
+            let tasks = self.neighbours(&at);
+            tried.extend(self.run(tasks, at.criterion, table));
+            let better = best(tried)?;
+            if better.criterion >= at.criterion - 0.5 {
+                break;
+            }
+            at = better.clone();
+        }
+        Some(at)
+    }
+
+    /// The same model as a start, for D to move.
+    fn same(&self, choice: &Choice) -> Task {
+        Task {
+            spectra: Arc::new(self.spectra(&choice.delays)),
+            start: choice.found.point.clone(),
+            delays: choice.delays.clone(),
+            origin: "feedthrough".into(),
+        }
     }
 
     /// Searches from long regressions, without dead time and with that which a long regression shows.
@@ -87,12 +113,12 @@ impl Problem<'_> {
         if parts.iter().map(|part| part.0).sum::<usize>() > LONG {
             return None;
         }
-        let part =
-            Problem { experiments: &short, sizes: self.sizes.clone(), dead_time: self.dead_time.clone(), ..*self };
+        let part = Problem { experiments: &short, ..self.clone() };
         let chosen = part.solve(table)?.chosen;
         let spectra = self.spectra(&chosen.delays);
-        let start = with_best_inputs(&spectra, chosen.found.point.model, &chosen.found.noise, self.feedthrough);
-        let found = search(&spectra, start, &self.options(15, 0.3))?;
+        let whole = self.with_feedthrough(chosen.found.feedthrough);
+        let start = with_best_ends(&spectra, chosen.found.point.model, &chosen.found.noise);
+        let found = search(&spectra, start, &whole.options(15, 0.3, &chosen.delays))?;
         let criterion = found.criterion(spectra.samples());
         Some(Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays })
     }
@@ -102,6 +128,7 @@ impl Problem<'_> {
 /// physical machines have little and wrong dead times much.
 fn calmest<'a>(tried: &'a [Choice], at: &Choice) -> Option<&'a Choice> {
     let calm = |c: &Choice| c.found.point.model.fast_gain();
-    let alike = |c: &&Choice| c.criterion <= at.criterion + INDISTINCT && c.order() == at.order();
+    let same = |c: &Choice| c.order() == at.order() && c.found.feedthrough == at.found.feedthrough;
+    let alike = |c: &&Choice| c.criterion <= at.criterion + INDISTINCT && same(c);
     tried.iter().filter(alike).min_by(|a, b| calm(a).total_cmp(&calm(b)))
 }

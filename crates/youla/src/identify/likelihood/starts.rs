@@ -68,7 +68,10 @@ impl Problem<'_> {
         }
         let [a, b, c, _] = states.realise(&sources.sums, order)?;
         let (m, p) = (self.inputs(), self.outputs());
-        let model = Model::of(a.as_ref(), b.as_ref(), c.as_ref(), vec![0.0; m * p])?;
+        let mut model = Model::of(a.as_ref(), b.as_ref(), c.as_ref(), vec![0.0; m * p])?;
+        if self.open_loop {
+            model.draw_inside();
+        }
         let point = with_best_inputs(thin, model, &Noise::white(p), self.feedthrough);
         let (first, noise) = deviance(thin, &point, NOISE_ORDER);
         let again = with_best_inputs(thin, point.model.clone(), &noise, self.feedthrough);

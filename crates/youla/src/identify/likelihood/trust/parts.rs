@@ -25,7 +25,7 @@ const BEYOND_CHANCE: f64 = 3.0;
 /// Largest relative difference of the responses that parts ask for.
 const LARGEST_DIFFERENCE: f64 = 0.1;
 /// Largest ratio of the powers of the noise.
-const LARGEST_RATIO: f64 = 2.0;
+const LARGEST_RATIO: f64 = 3.0;
 /// Frequencies at which the responses of parts are compared, and the largest relative deviation at which they are.
 const COMPARED: (usize, f64) = (100, 0.3);
 

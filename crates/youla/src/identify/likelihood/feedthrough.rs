@@ -1,0 +1,35 @@
+//! D in a closed loop. Where the controller answers in the same sample, `u(t) = K_d y(t) + ...`, the input holds the noise of its own
+//! sample, and least squares would take this for a feedthrough. The likelihood of y given the excitation does not:
+//!
+//! ```text
+//! v = y - D u - ... = (I - D K_d) y - ...,      -2 log likelihood = N log det Lambda - 2 N log |det (I - D K_d)|
+//! ```
+//! so that D is found from (u, y) where K_d is known, and only there.
+
+use super::model::Model;
+use faer::Mat;
+use faer::prelude::*;
+
+/// `log |det (I - D K_d)|`, K_d m x p; 0 without D.
+pub(crate) fn log_loop(model: &Model, direct: &Mat<f64>) -> f64 {
+    if model.d.iter().all(|d| *d == 0.0) || direct.nrows() != model.inputs {
+        return 0.0;
+    }
+    around(model, direct).determinant().abs().max(1e-300).ln()
+}
+
+/// Slopes of `-log |det (I - D K_d)|` in the entries of D, row by row: those of `K_d (I - D K_d)^-1`, transposed.
+pub(crate) fn slopes(model: &Model, direct: &Mat<f64>) -> Vec<f64> {
+    let (m, p) = (model.inputs, model.outputs);
+    if direct.nrows() != m {
+        return vec![0.0; m * p];
+    }
+    let right = around(model, direct).transpose().partial_piv_lu().solve(direct.transpose());
+    (0..p * m).map(|x| right[(x / m, x % m)]).collect()
+}
+
+fn around(model: &Model, direct: &Mat<f64>) -> Mat<f64> {
+    let (m, p) = (model.inputs, model.outputs);
+    let product = |i: usize, j: usize| (0..m).map(|l| model.d[i * m + l] * direct[(l, j)]).sum::<f64>();
+    Mat::from_fn(p, p, |i, j| if i == j { 1.0 } else { 0.0 } - product(i, j))
+}

@@ -62,6 +62,7 @@ impl<'de, T: Written> Visitor<'de> for OrderVisitor<T> {
 /// The order of a model.
 #[derive(Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
+#[schemars(deny_unknown_fields)]
 pub(in crate::settings) enum OrderForm {
     /// This order.
     Number(usize),
@@ -125,7 +126,7 @@ pub(in crate::settings) struct OrderKeys {
 impl Written for Order {
     type Form = OrderForm;
     type Keys = OrderKeys;
-    const MUST: &'static str = "a whole number, \"auto\", or { auto = { max = ..., rule = ... } }";
+    const MUST: &'static str = "a whole number, \"auto\", or a table with the key auto";
 
     fn of_number(order: usize) -> Self {
         Order::Fixed(order)
@@ -147,6 +148,7 @@ impl Written for Order {
 /// The order of a reduced model.
 #[derive(Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
+#[schemars(deny_unknown_fields)]
 pub(in crate::settings) enum ReducedForm {
     /// This number of states, with those of the poles that are kept apart.
     Number(usize),
@@ -202,7 +204,7 @@ pub(in crate::settings) struct ReducedKeys {
 impl Written for ReducedOrder {
     type Form = ReducedForm;
     type Keys = ReducedKeys;
-    const MUST: &'static str = "a whole number, \"minimal\", \"auto\", { bound = ... } or { closed-loop = ... }";
+    const MUST: &'static str = "a whole number, \"minimal\", \"auto\", or a table with the key bound or closed-loop";
 
     fn of_number(order: usize) -> Self {
         ReducedOrder::Fixed(order)

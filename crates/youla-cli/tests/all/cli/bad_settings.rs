@@ -93,7 +93,7 @@ fn wrong_types() {
         ("name = \"loop\"", "name = 5", &["run.toml:1:8:", "`name` at the top level is 5", "text in quotes"]),
         ("order = 3", "order = 1.5", &["run.toml:23:9:", "`order` in [hansen] is 1.5", "a whole number, \"auto\""]),
         ("order = 3", "order = \"al\"", &["run.toml:23:9:", "`order` in [hansen] is \"al\"", "\"auto\""]),
-        ("order = 3", "order = { fixed = 3, auto = {} }", &["run.toml:23:9:", "`order` in [hansen]", "whole number"]),
+        ("order = 3", "order = {fixed = 3, auto = {}}", &["run.toml:23:9:", "`order` in [hansen]", "whole number"]),
     ];
     for (passage, replacement, evidence) in cases {
         settings_refused("wrong-type", &settings(passage, replacement), evidence);

@@ -54,7 +54,7 @@ fn blocks_of(system: &StateSpace<Discrete>) -> Model {
 
 fn unscaled(u: &Mat<f64>, y: &Mat<f64>, delays: &[usize], skip: usize) -> Spectra {
     let sizes = Sizes { u: vec![1.0; u.ncols()], y: vec![1.0; y.ncols()] };
-    Spectra::new(&[Experiment { u: u.as_ref(), y: y.as_ref() }], &sizes, delays, skip)
+    Spectra::new(&[Experiment::new(u.as_ref(), y.as_ref())], &sizes, delays, skip)
 }
 
 #[test]
@@ -183,7 +183,7 @@ fn stated_deviations_are_those_of_the_scatter_over_seeds() {
     for seed in 0..30 {
         let (u, y) = record(&plant, 800, 1.0, 100 + seed);
         let options = LikelihoodOptions { order: Some(1), dead_time: Some(vec![0]), ..Default::default() };
-        let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+        let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
         let found = recommend(&experiments, &[], None, time(), &options).unwrap();
         let deviation = &found.response_deviation;
         for k in (10..140).step_by(30) {
@@ -215,7 +215,7 @@ fn poles_outside_the_unit_circle_are_found_outside() {
     let own = &u - &d;
     let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), excitation: Some(d.as_ref()) };
     let known = LoopKnowledge::new(Some(&k), vec![signals], Vec::new()).unwrap();
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let found = recommend(&experiments, &[], Some(&known), time(), &LikelihoodOptions::default()).unwrap();
     assert_eq!((found.order, found.dead_time.as_slice()), (1, &[0][..]));
     assert!(found.trusted(), "{:?}", found.reasons());
@@ -236,7 +236,7 @@ fn a_controller_that_did_not_run_costs_the_trust() {
     let own = &u - &d;
     let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), excitation: Some(d.as_ref()) };
     let known = LoopKnowledge::new(Some(&wrong), vec![signals], Vec::new()).unwrap();
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let found = recommend(&experiments, &[], Some(&known), time(), &LikelihoodOptions::default()).unwrap();
     assert!(!found.trusted());
     assert!(found.reasons()[0].contains("stated controller"), "{:?}", found.reasons());
@@ -245,7 +245,7 @@ fn a_controller_that_did_not_run_costs_the_trust() {
 #[test]
 fn the_number_of_threads_changes_nothing() {
     let (u, y) = record(&machine(), 1500, 0.2, 9);
-    let experiments = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+    let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| recommend(&experiments, &[], None, time(), &LikelihoodOptions::default()).unwrap())
@@ -261,7 +261,7 @@ fn what_cannot_be_identified_is_refused_with_evidence() {
     let (u, y) = record(&machine(), 600, 0.2, 10);
     let options = LikelihoodOptions::default();
     let of = |u: &Mat<f64>, y: &Mat<f64>, options: &LikelihoodOptions| {
-        recommend(&[Experiment { u: u.as_ref(), y: y.as_ref() }], &[], None, time(), options).unwrap_err()
+        recommend(&[Experiment::new(u.as_ref(), y.as_ref())], &[], None, time(), options).unwrap_err()
     };
     let still = Mat::from_fn(600, 2, |i, j| if j == 0 { u[(i, 0)] } else { 0.25 });
     assert!(matches!(of(&still, &y, &options), Error::ConstantChannel { what, value: 0.25 } if what == "input 2"));
@@ -280,7 +280,7 @@ fn what_cannot_be_identified_is_refused_with_evidence() {
 fn what_is_given_is_kept() {
     let (u, y) = record(&machine(), 1500, 0.2, 11);
     let options = LikelihoodOptions { order: Some(4), dead_time: Some(vec![0, 0]), ..Default::default() };
-    let found = recommend(&[Experiment { u: u.as_ref(), y: y.as_ref() }], &[], None, time(), &options).unwrap();
+    let found = recommend(&[Experiment::new(u.as_ref(), y.as_ref())], &[], None, time(), &options).unwrap();
     assert_eq!((found.order, found.plant.order()), (4, 4));
     assert!(found.candidates.iter().all(|c| c.order == 4 && c.dead_time == [0, 0]));
 }
@@ -290,7 +290,7 @@ fn the_problem_is_scaled_by_what_the_channels_are() {
     let (u, y) = record(&machine(), 800, 0.1, 12);
     let scaled = Mat::from_fn(800, 1, |i, _| 1e6 * y[(i, 0)]);
     let options = LikelihoodOptions::default();
-    let of = |y: &Mat<f64>| recommend(&[Experiment { u: u.as_ref(), y: y.as_ref() }], &[], None, time(), &options);
+    let of = |y: &Mat<f64>| recommend(&[Experiment::new(u.as_ref(), y.as_ref())], &[], None, time(), &options);
     let (one, two) = (of(&y).unwrap(), of(&scaled).unwrap());
     assert_eq!(one.order, two.order);
     let response = |system: &StateSpace<Discrete>| frequency_response(system, &[150.0]).unwrap().at(0)[(0, 1)];

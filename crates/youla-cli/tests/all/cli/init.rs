@@ -40,7 +40,7 @@ fn a_log_without_a_controller_runs_at_once() {
     for (words, said) in [
         ("No controller ran.", true),
         ("in open loop", true),
-        ("G(S) is stable", true),
+        ("the recommended model is stable", true),
         ("The controller that ran", false),
         ("No excitation from outside", false),
         ("peak sensitivity of the loop", false),

@@ -235,6 +235,31 @@ fn pull(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions
     out
 }
 
+/// `[R r]` of a point whose residual goes with the slope of `N log |det A_u|`: `R' r` becomes the slope of half the deviance.
+///
+/// The residual of an unstable plant on the lines is that of its two-sided inverse, whose product with the sensitivities has the
+/// mean of this slope, not zero; parts of the records with other excitations would seem to disagree.
+pub(crate) fn with_slope_of_unstable(mut factor: Mat<f64>, spectra: &Spectra, model: &Model, chart: &Chart) -> Mat<f64> {
+    let slope = pull_of_unstable(spectra, model, chart);
+    if slope.iter().all(|s| *s == 0.0) {
+        return factor;
+    }
+    let columns = factor.ncols() - 1;
+    let rows = columns.min(factor.nrows());
+    let largest = (0..rows).map(|i| factor[(i, i)].abs()).fold(0.0, f64::max);
+    // R' w = slope by forward substitution; directions that the record does not determine take no part.
+    let mut w = vec![0.0; rows];
+    for i in 0..rows {
+        let known: f64 = (0..i).map(|k| factor[(k, i)] * w[k]).sum();
+        let diagonal = factor[(i, i)];
+        if diagonal.abs() > 1e-10 * largest {
+            w[i] = (slope.get(i).copied().unwrap_or(0.0) - known) / diagonal;
+        }
+    }
+    w.iter().enumerate().for_each(|(i, w)| factor[(i, columns)] -= w);
+    factor
+}
+
 /// Slope of `N log |det A_u|`, by differences.
 fn pull_of_unstable(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
     let parameters = chart.parameters();

@@ -11,6 +11,7 @@ use super::super::chart::Chart;
 use super::super::linearise::{Extra, linearise_with};
 use super::super::point::energy;
 use super::super::problem::Solution;
+use super::super::search::with_slope_of_unstable;
 use super::super::spectra::{Lines, Spectra};
 use super::excess;
 use faer::c64;
@@ -40,6 +41,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let count = FUNCTIONS * spectra.inputs;
     let extra = Extra { count, values: &values, quick: false };
     let factor = linearise_with(spectra, &found.point, &chart, &found.noise, &extra).factor;
+    let factor = with_slope_of_unstable(factor, spectra, &found.point.model, &chart);
     let parameters = chart.parameters();
     let rows = parameters..(parameters + count).min(factor.nrows());
     let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, c)].powi(2)).sum::<f64>();
@@ -82,7 +84,9 @@ fn columns(
         // velocity of the output that this input moves most
         let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
         let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
-        let velocity = in_time(lines, planner, |k| clean[k * p + seen] * (c64::ONE - lines.z[k].conj()));
+        // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
+        let moved = if model.unstable() > 0.0 { &lines.y } else { clean };
+        let velocity = in_time(lines, planner, |k| moved[k * p + seen] * (c64::ONE - lines.z[k].conj()));
         for f in 0..FUNCTIONS {
             let shaped =
                 |t: usize| OF_INPUT.get(f).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |of| of(u[t]));

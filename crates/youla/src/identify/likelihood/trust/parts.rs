@@ -12,7 +12,7 @@ use super::super::deviation::inverse_root;
 use super::super::linearise::{compressed, linearise, stacked};
 use super::super::point::energy;
 use super::super::problem::{Problem, Solution};
-use super::super::search::with_best_ends;
+use super::super::search::{with_best_ends, with_slope_of_unstable};
 use super::super::spectra::Spectra;
 use super::excess;
 use crate::identify::subspace::Experiment;
@@ -58,7 +58,8 @@ impl Part {
         let chart = Chart::new(&point.model, found.feedthrough);
         let linearised = linearise(&spectra, &point, &chart, &found.noise);
         let energy = energy(&spectra, &point.residuals(&spectra), &found.noise);
-        Some(Part { factor: linearised.factor, energy, samples: (spectra.samples() * spectra.outputs) as f64 })
+        let factor = with_slope_of_unstable(linearised.factor, &spectra, &point.model, &chart);
+        Some(Part { factor, energy, samples: (spectra.samples() * spectra.outputs) as f64 })
     }
 
     fn together(parts: &[&Part]) -> Option<Part> {

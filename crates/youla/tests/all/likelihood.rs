@@ -17,11 +17,11 @@ fn time() -> Discrete {
     Discrete::new(1e-3).unwrap()
 }
 
-/// A light mode at 48 Hz (damping 0.02) with a feedthrough d, unit static gain apart from it.
+/// A light mode at 48 Hz (damping 0.02) with a feedthrough d.
 fn mode(d: f64) -> StateSpace<Discrete> {
     let pole = c64::cis(0.3) * 0.994;
     let a = matrix([[pole.re, pole.im], [-pole.im, pole.re]]);
-    StateSpace::new(a, matrix([[0.0], [0.3]]), matrix([[1.0, 0.0]]), matrix([[d]]), time()).unwrap()
+    StateSpace::new(a, matrix([[0.1], [0.3]]), matrix([[1.0, 0.0]]), matrix([[d]]), time()).unwrap()
 }
 
 /// `u = K y + d`, K a gain with an integrator, which answers in the same sample.

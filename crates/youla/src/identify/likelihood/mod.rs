@@ -66,7 +66,7 @@ use spectra::Sizes;
 use trust::Parts;
 
 /// Largest dead time that is tried, samples.
-const LARGEST_DEAD_TIME: usize = 12;
+const LARGEST_DEAD_TIME: usize = 20;
 /// Samples per parameter of the smallest model, below which nothing is tried.
 const SAMPLES_PER_PARAMETER: usize = 10;
 
@@ -80,6 +80,26 @@ const SAMPLES_PER_PARAMETER: usize = 10;
 /// # Errors
 /// [`Error::Shape`], [`Error::NotFinite`] and [`Error::ConstantChannel`] name the channel, [`Error::TooFewSamples`] says how many
 /// are needed, [`Error::OutOfRange`] an option that cannot be met; [`Error::NoCandidate`] where no search ends.
+///
+/// ```
+/// use youla::identify::likelihood::{Experiment, LikelihoodOptions, recommend};
+/// use youla::{Mat, lti::Discrete};
+/// # use rand::{RngExt, SeedableRng};
+/// # let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+/// # let mut random = || rng.random::<f64>() - 0.5;
+/// let u = Mat::from_fn(2000, 1, |_, _| random());
+/// let (mut x, mut y) = (0.0, Mat::zeros(2000, 1));
+/// for t in 0..2000 {
+///     y[(t, 0)] = x + 0.1 * random();
+///     x = 0.9 * x + u[(t, 0)];
+/// }
+/// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let found = recommend(&records, &[], None, Discrete::new(1e-3)?, &LikelihoodOptions::default())?;
+/// assert_eq!((found.order, found.dead_time[0]), (1, 0));
+/// assert!((found.plant.a()[(0, 0)] - 0.9).abs() < 0.005);
+/// assert!(!found.trusted()); // nothing is known of what moved u
+/// # Ok::<(), youla::Error>(())
+/// ```
 pub fn recommend(
     estimation: &[Experiment<'_>],
     verification: &[Experiment<'_>],

@@ -9,6 +9,9 @@ use super::starts::THINNED;
 use rayon::prelude::*;
 use std::sync::Arc;
 
+/// Largest change of the dead time of a single input in a step, samples.
+const REACH: usize = 12;
+
 /// The lines for other delays.
 struct Around {
     spectra: Arc<Spectra>,
@@ -40,7 +43,7 @@ impl Problem<'_> {
         let mut starts: Vec<(f64, Step)> = steps.into_par_iter().map(judged).collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut tasks = Vec::new();
-        for step in self.promising(&starts) {
+        for step in self.promising(best, &around, &starts) {
             let Around { spectra, delays } = &around[step.around];
             let start = with_best_inputs(spectra, start_of(step), noise, self.feedthrough);
             let origin = if step.without.is_some() { "one mode less" } else { "another dead time" };
@@ -68,9 +71,11 @@ impl Problem<'_> {
         steps
     }
 
-    /// The first of each kind.
-    fn promising(&self, starts: &[(f64, Step)]) -> Vec<Step> {
-        let whole = starts.iter().filter(|s| s.1.without.is_none()).take(2);
+    /// The first of each kind, and for a single input the dead times next to the best.
+    fn promising(&self, best: &Choice, around: &[Around], starts: &[(f64, Step)]) -> Vec<Step> {
+        let next = |s: &Step| self.inputs() == 1 && around[s.around].delays[0].abs_diff(best.delays[0]) == 1;
+        let whole = starts.iter().filter(|s| s.1.without.is_none()).enumerate();
+        let whole = whole.filter(|(place, s)| *place < 2 || next(&s.1)).map(|(_, s)| s);
         let less = starts.iter().filter(|s| s.1.without.is_some()).take(if self.inputs() == 1 { 2 } else { 1 });
         whole.chain(less).map(|s| s.1).collect()
     }
@@ -88,12 +93,12 @@ impl Problem<'_> {
         Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "one mode more".into() })
     }
 
-    /// Other delays, input by input: all of a single input, up to two samples away for several.
+    /// Other delays, input by input: many of a single input, up to two samples away for several.
     fn shifted(&self, delays: &[usize]) -> Vec<Vec<usize>> {
         if self.dead_time.is_some() {
             return Vec::new();
         }
-        let reach = if delays.len() == 1 { self.skip } else { 2 };
+        let reach = if delays.len() == 1 { REACH } else { 2 };
         let mut out = Vec::new();
         for j in 0..delays.len() {
             for d in delays[j].saturating_sub(reach)..=(delays[j] + reach).min(self.skip) {

@@ -121,7 +121,7 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
         let mut best = None;
         for _ in 0..9 {
             let (step, predicted) = damped(&linearised.factor, &pull, damping);
-            if !(predicted > 0.5 * options.tolerance) {
+            if predicted.is_nan() || predicted <= 0.5 * options.tolerance {
                 break;
             }
             let trial = moved(&point, &chart, &linearised, &step);

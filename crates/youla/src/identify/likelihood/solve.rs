@@ -32,13 +32,20 @@ impl Problem<'_> {
     /// The model that the records support; what was tried is noted in the table. `None` where no search ends.
     pub(crate) fn solve(&self, table: &mut Vec<Candidate>) -> Option<Solution> {
         let samples = self.samples().0;
-        let (mut tried, rounds) =
-            if samples > LONG { (vec![self.from_short(samples, table)?], 1) } else { (self.first(table), ROUNDS) };
+        let (mut tried, rounds) = if samples > LONG {
+            (vec![self.chosen_on_a_part(samples, table)?], 1)
+        } else {
+            (self.first(table), ROUNDS)
+        };
         let now = best(&tried)?.found.feedthrough;
         let mut at = self.with_feedthrough(now).improved(&mut tried, rounds, table)?;
         if self.direct.is_some() && !now {
             let wider = self.with_feedthrough(true);
-            tried.extend(wider.run(vec![wider.same(&at)], at.criterion, table));
+            // a dead time that the record does not tell from none hides what acts in the same sample
+            let at_once = tried.iter().filter(|c| c.delays.iter().all(|d| *d == 0) && c.delays != at.delays);
+            let at_once = at_once.min_by(|a, b| a.criterion.total_cmp(&b.criterion));
+            let tasks = std::iter::once(&at).chain(at_once).map(|c| wider.same(c)).collect();
+            tried.extend(wider.run(tasks, at.criterion, table));
             if best(&tried)?.found.feedthrough {
                 at = wider.improved(&mut tried, rounds, table)?;
             }
@@ -100,7 +107,7 @@ impl Problem<'_> {
     }
 
     /// The choice for the first part of long records, searched again on all of them.
-    fn from_short(&self, samples: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
+    fn chosen_on_a_part(&self, samples: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
         let share = SHORT as f64 / samples as f64;
         let kept = |rows: usize| ((rows as f64 * share) as usize).max(SHORTEST).min(rows);
         let cut = |e: &Experiment<'_>| {

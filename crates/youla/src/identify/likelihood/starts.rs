@@ -14,6 +14,8 @@ use std::sync::Arc;
 pub(crate) const THINNED: usize = 3;
 /// Longest past of a regression, samples; and the most columns of it.
 const LONGEST_PAST: (usize, usize) = (120, 360);
+/// Largest order of a start; larger models grow from it where the records ask for them.
+const LARGEST_START: usize = 12;
 /// Most rows of the predictor whose singular vectors are the states.
 const LONGEST_FUTURE: usize = 30;
 /// Relative ridges: rounding only, and what tames empty bands.
@@ -39,7 +41,7 @@ impl Problem<'_> {
         let spectra = Arc::new(self.spectra(delays));
         let thin = spectra.thinned(THINNED);
         let sources = self.sources(delays);
-        let orders = self.order.map_or(1..=self.largest_order, |n| n..=n);
+        let orders = self.order.map_or(1..=self.largest_order.min(LARGEST_START), |n| n..=n);
         let trials: Vec<(usize, usize)> = orders.flat_map(|n| (0..sources.states.len()).map(move |s| (n, s))).collect();
         let judged = |(order, source)| self.judged(&thin, &sources, order, source);
         let mut starts: Vec<Judged> = trials.into_par_iter().filter_map(judged).collect();
@@ -86,7 +88,7 @@ impl Problem<'_> {
         let (m, p) = (self.inputs(), self.outputs());
         let longest = LONGEST_PAST.0.min(self.samples().1 / 6).min(LONGEST_PAST.1 / (m + p)).max(4);
         let sums = LagSums::new(self.experiments, &self.sizes, delays, longest);
-        let largest = self.order.unwrap_or(self.largest_order);
+        let largest = self.order.unwrap_or(self.largest_order.min(LARGEST_START));
         let mut states = Vec::new();
         for past in [longest / 6, longest / 2, longest].map(|past| past.max(3)) {
             for ridge in RIDGES {

@@ -18,7 +18,7 @@ pub(crate) struct CompareArgs {
     /// Run folders; the others are compared with the first.
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
-    /// Model of each run: hansen, or hansen_reduced, direct, grey_box, nominal.
+    /// Model of each run: hansen, or likelihood (the recommended one), hansen_reduced, direct, grey_box, nominal.
     #[arg(long, value_name = "NAME", default_value = "hansen")]
     model: String,
     /// Page to write; its data are written next to it as JSON.

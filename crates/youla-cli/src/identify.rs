@@ -10,7 +10,7 @@ use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalMod
 pub(crate) const EXAMPLES: &str = "\
 Example:
   youla identify examples/flexible-drive/run.toml --out drive-run
-  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal model.json --controller K.json
+  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal nominal.json --controller K.json
 
 A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.";
 

@@ -82,7 +82,11 @@ impl Law {
         let explained = r.input_excitation.as_ref().map_or_else(|| r.u.clone(), |d| &r.u - d);
         let known: Vec<_> = [&r.input_excitation, &r.reference, &r.alpha].into_iter().flatten().collect();
         let parts: Vec<_> = known.iter().map(|x| x.as_ref()).collect();
-        let excitation = (!parts.is_empty()).then(|| block(&[&parts]));
+        // Without feedback the inputs come from outside.
+        let excitation = match parts.is_empty() {
+            true => self.controller.is_zero().then(|| r.u.clone()),
+            false => Some(block(&[&parts])),
+        };
         Signals { seen, explained, excitation }
     }
 }

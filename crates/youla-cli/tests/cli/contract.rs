@@ -32,6 +32,7 @@ fn summary_has_the_documented_structure() {
         "channel_scales",
         "controller_mismatch",
         "data",
+        "recommended",
         "redesign",
         "reduction",
         "seconds",
@@ -56,6 +57,29 @@ fn summary_has_the_documented_structure() {
     assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
 }
 
+/// The contract on the recommended model; its file is a model, and its deviations have one number per frequency, output and input.
+#[test]
+fn summary_recommends_one_model() {
+    let recommended = &json(&demo().join("summary.json"))["recommended"];
+    let expected =
+        ["dead_time", "evidence", "file", "method", "modes", "order", "reasons", "response_deviation", "trusted"];
+    assert_eq!(keys(recommended), expected);
+    assert!(recommended["method"] == "likelihood" && recommended["trusted"] == true, "{:?}", recommended["reasons"]);
+    let model = json(&demo().join(recommended["file"].as_str().expect("a path")));
+    for matrix in ["a", "b", "c", "d", "ts"] {
+        assert!(!model[matrix].is_null(), "{matrix}");
+    }
+    let deviation = &recommended["response_deviation"];
+    let hz = numbers(&deviation["hz"]);
+    let absolute = deviation["absolute"].as_array().expect("an array");
+    assert!(hz.windows(2).all(|w| w[0] < w[1]) && absolute.len() == hz.len());
+    let positive = |row: &Value| numbers(row).len() == 2 && numbers(row).iter().all(|s| *s > 0.0);
+    assert!(absolute.iter().all(|at| at.as_array().is_some_and(|rows| rows.len() == 2 && rows.iter().all(positive))));
+    for e in recommended["evidence"].as_array().expect("an array") {
+        assert!(e["question"].as_str().is_some_and(|q| q.ends_with('?')) && e["limit"].is_number(), "{e}");
+    }
+}
+
 /// The file fits the schema that `summary_schema` states, and the type reads it back.
 #[test]
 fn summary_fits_its_schema() {
@@ -72,7 +96,7 @@ fn summary_fits_its_schema() {
 #[test]
 fn summary_describes_every_method() {
     let summary = json(&demo().join("summary.json"));
-    assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced"]);
+    assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced", "likelihood"]);
     let common = ["fit", "modes", "order", "poles", "residuals", "robustness", "stabilised_by_controller"];
     let hansen = [
         "fit",
@@ -85,9 +109,12 @@ fn summary_describes_every_method() {
         "s_stable",
         "stabilised_by_controller",
     ];
-    for (name, expected, order) in
-        [("direct", &common[..], 6), ("hansen", &hansen[..], 16), ("hansen_reduced", &hansen[..], 6)]
-    {
+    for (name, expected, order) in [
+        ("direct", &common[..], 6),
+        ("hansen", &hansen[..], 16),
+        ("hansen_reduced", &hansen[..], 6),
+        ("likelihood", &common[..], 6),
+    ] {
         let method = &summary["methods"][name];
         assert_eq!(keys(method), expected, "{name}");
         assert_eq!(method["order"], order, "{name}");
@@ -98,7 +125,7 @@ fn summary_describes_every_method() {
         assert!(poles.iter().all(|p| numbers(p).len() == 2));
         let modes = method["modes"].as_array().expect("an array");
         let with_deviations = ["hz", "hz_deviation", "hz_interval", "zeta", "zeta_deviation", "zeta_interval"];
-        let of_mode = if name == "hansen" { &with_deviations[..] } else { &["hz", "zeta"] };
+        let of_mode = if ["hansen", "likelihood"].contains(&name) { &with_deviations[..] } else { &["hz", "zeta"] };
         assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == of_mode), "{name}");
     }
     assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
@@ -246,6 +273,7 @@ fn frequency_responses_share_one_grid() {
         "hansen_reduced_db",
         "hz",
         "indirect_db",
+        "likelihood_db",
         "nominal_db",
         "true_plant_db",
     ];

@@ -32,7 +32,7 @@ pub(crate) fn write_scene(folder: &Path) {
     }
     write("log.csv", text.as_bytes());
 
-    write("model.json", MODEL.as_bytes());
+    write("nominal.json", MODEL.as_bytes());
     write("K.json", controller().as_bytes());
     let rows = open_loop(20_000);
     let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}", rows.len());

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 /// The small loop, identified with S of order 3 and of order 2.
 fn two_orders(name: &str) -> PathBuf {
     let folder = loop_folder(name, &[]);
-    let other = settings("order = { fixed = 3 }", "order = { fixed = 2 }");
+    let other = settings("order = 3", "order = 2");
     fs::write(folder.join("other.toml"), other).expect("written");
     for (file, out) in [("run.toml", "three"), ("other.toml", "two")] {
         assert_eq!(youla(&folder, &["identify", file, "--out", out, "--quiet"]).code, Some(0));
@@ -24,7 +24,7 @@ fn two_runs_stand_side_by_side() {
     let folder = two_orders("compare");
     let found = youla(&folder, &["compare", "three", "two"]);
     assert!(found.code == Some(0) && found.stderr.is_empty(), "{:?} {}", found.code, found.stderr);
-    for text in ["Runs", "Distance of the models", "hansen.order.fixed", "report: comparison.html"] {
+    for text in ["Runs", "Distance of the models", "hansen.order", "report: comparison.html"] {
         assert!(found.stdout.contains(text), "{text} is missing in\n{}", found.stdout);
     }
     let data = json(&folder.join("comparison.json"));

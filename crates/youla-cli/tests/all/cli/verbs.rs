@@ -28,7 +28,7 @@ fn wrong_arguments_end_with_code_two() {
     let folder = loop_folder("arguments", &[]);
     let cases: [(&[&str], &str); 4] = [
         (&["identfy"], "identify"),
-        (&["identify"], "RUN.TOML"),
+        (&["identify"], "<FILE>..."),
         (&["identify", "run.toml", "--force"], "--out"),
         (&["identify", "run.toml", "--quiet", "--json"], "cannot be used with"),
     ];

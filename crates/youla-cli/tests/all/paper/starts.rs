@@ -18,18 +18,18 @@ fn a_small_study_is_written_continued_and_kept_apart() {
     let folder = empty_folder("starts-small");
     let done = outcome(study(&folder, &SMALL).env("RAYON_NUM_THREADS", "1"));
     assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""), "{}", done.stdout);
-    assert!(done.stdout.contains("periodic      PEM from subspace       2 of    2 arrived"), "{}", done.stdout);
+    assert!(done.stdout.contains("periodic      PEM from subspace       2 of    2 converged"), "{}", done.stdout);
     let results = ["periodic.csv", "slow-squares.csv", "summary.json", "figures/starts.svg", "tables/counts.csv"];
     let read = |name: &str| fs::read(folder.join("small").join(name)).unwrap_or_else(|e| panic!("{name}: {e}"));
     let before: Vec<Vec<u8>> = results.iter().map(|name| read(name)).collect();
     let rows = String::from_utf8(before[0].clone()).expect("text");
     assert_eq!(rows.lines().count(), 1 + 2 * 4, "{rows}");
     assert!(rows.starts_with("item,setting,search,status,fit_horizontal"), "{rows}");
-    assert!(String::from_utf8(read("report.html")).expect("text").contains("How often a search arrives"));
+    assert!(String::from_utf8(read("report.html")).expect("text").contains("Convergence from different starts"));
     let summary: serde_json::Value = serde_json::from_slice(&before[2]).expect("JSON");
     let counts = summary["counts"].as_array().expect("counts");
     assert_eq!(counts.len(), 8);
-    assert!(counts.iter().filter(|c| c["search"] == "truth").all(|c| c["arrived"] == 2), "{summary}");
+    assert!(counts.iter().filter(|c| c["search"] == "truth").all(|c| c["converged"] == 2), "{summary}");
 
     // Cut off within the second item, and gone on with on another number of threads.
     fs::write(folder.join("small/periodic.csv"), &before[0][..before[0].len() * 7 / 10]).expect("written");

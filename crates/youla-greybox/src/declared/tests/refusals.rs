@@ -83,7 +83,7 @@ fn parameters() {
         ("initial = 3\nscale = 0", "the scale of the parameter \"rate\" is 0, but must be a positive number"),
         (
             "intial = 3",
-            "the declaration cannot be read: TOML parse error at line 6, column 1\n  |\n6 | intial = 3\n  | ^^^^^^\nunknown field `intial`, expected one of `initial`, `unit`, `min`, `max`, `scale`, `fixed`\n",
+            "the declaration cannot be read: TOML parse error at line 6, column 1\n  |\n6 | intial = 3\n  | ^^^^^^\nunknown field `intial`, expected one of `initial`, `unit`, `min`, `max`, `scale`, `fixed`\ndid you mean `initial`?",
         ),
         (
             "initial = 3\n[parameters.rte]\ninitial = 1",

@@ -239,7 +239,12 @@ fn pull(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions
 ///
 /// The residual of an unstable plant on the lines is that of its two-sided inverse, whose product with the sensitivities has the
 /// mean of this slope, not zero; parts of the records with other excitations would seem to disagree.
-pub(crate) fn with_slope_of_unstable(mut factor: Mat<f64>, spectra: &Spectra, model: &Model, chart: &Chart) -> Mat<f64> {
+pub(crate) fn with_slope_of_unstable(
+    mut factor: Mat<f64>,
+    spectra: &Spectra,
+    model: &Model,
+    chart: &Chart,
+) -> Mat<f64> {
     let slope = pull_of_unstable(spectra, model, chart);
     if slope.iter().all(|s| *s == 0.0) {
         return factor;

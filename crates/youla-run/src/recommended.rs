@@ -181,6 +181,7 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
     };
     let delays = &model.dead_time;
     let dead_time = match delays.iter().any(|d| *d > 0) {
+        true if delays[..] == [1] => " and a dead time of 1 sample".to_owned(),
         true => format!(
             " and a dead time of {} samples",
             delays.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")

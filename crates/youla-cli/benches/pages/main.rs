@@ -1,6 +1,8 @@
 //! The pages of the book on accuracy and speed, measured: `cargo bench -p youla-cli --bench pages` writes `docs/book/accuracy.md` and
 //! `docs/book/speed.md`. Everything is seeded; what differs between machines is time, and the last digits of residuals.
 
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
+
 mod accuracy;
 mod equations;
 mod page;

@@ -10,7 +10,7 @@ use crate::{Error, Result};
 /// let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(8), ..Default::default() };
 /// assert_eq!(options.horizon, 20.into());
 /// ```
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -38,23 +38,6 @@ pub struct SubspaceOptions {
     /// Whether and how the uncertainty of the estimate is found.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "UncertaintyOptions::is_default"))]
     pub uncertainty: UncertaintyOptions,
-}
-
-impl Default for SubspaceOptions {
-    fn default() -> Self {
-        SubspaceOptions {
-            method: SubspaceMethod::default(),
-            horizon: Horizon::default(),
-            order: Order::default(),
-            feedthrough: Feedthrough::default(),
-            delays: Vec::new(),
-            factorisation: Factorisation::default(),
-            stability: Stability::default(),
-            scaling: ChannelScaling::default(),
-            initial_state: InitialState::default(),
-            uncertainty: UncertaintyOptions::default(),
-        }
-    }
 }
 
 impl SubspaceOptions {

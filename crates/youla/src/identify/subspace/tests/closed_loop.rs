@@ -220,7 +220,7 @@ fn past_and_future_of_different_length_for_open_loops() {
     let y = respond(&system, &u, 0.5, None);
     for method in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva] {
         for past in [3, 12] {
-            let options = SubspaceOptions { method, horizon: Horizon::Fixed { future: 6, past: past }, ..fixed(4, 6) };
+            let options = SubspaceOptions { method, horizon: Horizon::Fixed { future: 6, past }, ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             assert!(
                 distance(&found.model, &system) < 1e-8,

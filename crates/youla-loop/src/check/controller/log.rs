@@ -3,7 +3,7 @@
 use super::{Change, ControllerRecord};
 use crate::error::Result;
 use youla::Mat;
-use youla::linalg::least_squares;
+use youla::linalg::{block, eye, least_squares};
 use youla::lti::{Discrete, StateSpace, simulate_best};
 
 /// Signals of the controller: `w = K e`.
@@ -21,7 +21,7 @@ impl<'a> Log<'a> {
     }
 
     pub(super) fn residual(&self, k: &StateSpace<Discrete>, e: &Mat<f64>, w: &Mat<f64>) -> Result<f64> {
-        Ok(relative(&(w - simulate_best(k, e.as_ref(), w.as_ref())?), w))
+        Ok(relative(&(w - simulate_best(&with_constant(k)?, e.as_ref(), w.as_ref())?), w))
     }
 
     /// Every change with the residual that it leaves.
@@ -105,7 +105,7 @@ impl<'a> Log<'a> {
 
     fn saturation(&self, k: &StateSpace<Discrete>) -> Result<Option<(Change, f64)>> {
         let u = self.record.u;
-        let free = simulate_best(k, self.e.as_ref(), self.w.as_ref())?;
+        let free = simulate_best(&with_constant(k)?, self.e.as_ref(), self.w.as_ref())?;
         let free = self.record.input_excitation.map_or_else(|| free.clone(), |d| &free + d);
         let limits = |j: usize| {
             let values = u.col(j);
@@ -117,6 +117,16 @@ impl<'a> Log<'a> {
         let left = relative(&(u - held), &u.to_owned());
         Ok(all.first().map(|limits| (Change::Saturation(*limits), left)))
     }
+}
+
+/// The controller with a constant at each of its inputs as further states. The mean that was taken out of a record is such a constant,
+/// and an integrator makes a ramp of it.
+fn with_constant(k: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    let (n, p) = (k.order(), k.inputs());
+    let zero = Mat::<f64>::zeros(p, n);
+    let a = block(&[&[k.a(), k.b()], &[zero.as_ref(), eye(p).as_ref()]]);
+    let b = block(&[&[k.b()], &[Mat::<f64>::zeros(p, p).as_ref()]]);
+    Ok(StateSpace::new(a, b, block(&[&[k.c(), k.d()]]), k.d().to_owned(), k.time())?)
 }
 
 /// `e(k - rows)` beside `w(k)`.
@@ -134,4 +144,26 @@ fn centred(x: &Mat<f64>) -> Mat<f64> {
 fn relative(left: &Mat<f64>, of: &Mat<f64>) -> f64 {
     let size = centred(of).norm_l2();
     if size > 0.0 { centred(left).norm_l2() / size } else { f64::INFINITY }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A PI controller on records whose means were removed: explained to rounding, and not with the other sign.
+    #[test]
+    fn removed_means_are_no_error_of_an_integrator() {
+        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+        let time = Discrete::new(1e-3).unwrap();
+        let k = StateSpace::new(number(1.0), number(1.0), number(0.02), number(0.5), time).unwrap();
+        let y = Mat::from_fn(2000, 1, |t, _| (0.07 * t as f64).sin() + (0.011 * t as f64).cos() + 0.3);
+        let d = Mat::from_fn(2000, 1, |t, _| if (t / 37) % 2 == 0 { 1.0 } else { -1.0 });
+        let u = youla::lti::simulate(&k, y.as_ref(), &[2.0]).unwrap() + &d;
+        let (u, y, d) = (centred(&u), centred(&y), centred(&d));
+        let record =
+            ControllerRecord { u: u.as_ref(), y: y.as_ref(), input_excitation: Some(d.as_ref()), reference: None };
+        let log = Log::new(record);
+        assert!(log.residual(&k, &log.e, &log.w).unwrap() < 1e-9);
+        assert!(log.residual(&k.negated(), &log.e, &log.w).unwrap() > 0.1);
+    }
 }

@@ -93,7 +93,7 @@ const SAMPLES_PER_PARAMETER: usize = 10;
 ///     y[(t, 0)] = x + 0.1 * random();
 ///     x = 0.9 * x + u[(t, 0)];
 /// }
-/// let records = [Experiment { u: u.as_ref(), y: y.as_ref() }];
+/// let records = [Experiment::new(u.as_ref(), y.as_ref())];
 /// let found = recommend(&records, &[], None, Discrete::new(1e-3)?, &LikelihoodOptions::default())?;
 /// assert_eq!((found.order, found.dead_time[0]), (1, 0));
 /// assert!((found.plant.a()[(0, 0)] - 0.9).abs() < 0.005);

@@ -3,7 +3,7 @@
 use super::entries::{ModeEntry, finite};
 use super::identification::Identification;
 use super::method::Method;
-use super::response::decibel;
+use super::response::bounds_db;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, ResponseDeviation};
@@ -20,9 +20,6 @@ const LEVEL: (f64, f64) = (0.95, 1.959_963_984_540_054);
 
 /// 95 % quantile of chi-square with two degrees of freedom, for the region of a complex number.
 const ELLIPSE: f64 = 5.991_464_547_107_979;
-
-/// Share of the upper bound below which the lower bound of a magnitude is not drawn.
-const LEAST_BOUND: f64 = 1e-3;
 
 /// The recommended model in summary.json.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -281,16 +278,15 @@ pub(super) fn band(
     let deviation: Vec<f64> = hz.iter().map(|f| deviation_at(&found.response_deviation, *f, (output, input))).collect();
     // One axis of a complex error has half of its mean square.
     let half = |d: &f64| LEVEL.1 * d / std::f64::consts::SQRT_2;
-    let high: Vec<f64> = values.iter().zip(&deviation).map(|(g, d)| g.norm() + half(d)).collect();
-    let low =
-        values.iter().zip(&deviation).zip(&high).map(|((g, d), high)| (g.norm() - half(d)).max(LEAST_BOUND * high));
+    let (low_db, high_db) =
+        bounds_db(values.iter().zip(&deviation).map(|(g, d)| [g.norm() - half(d), g.norm() + half(d)]));
     draw::Band {
         method: Method::Likelihood.key().into(),
         output,
         input,
         level: LEVEL.0,
-        low_db: low.map(decibel).collect(),
-        high_db: high.iter().copied().map(decibel).collect(),
+        low_db,
+        high_db,
         region: deviation.iter().flat_map(|d| [d * d / 2.0 * ELLIPSE, 0.0, d * d / 2.0 * ELLIPSE]).collect(),
     }
 }

@@ -141,3 +141,12 @@ pub(super) fn phase(values: &[c64]) -> Vec<f64> {
 pub(super) fn decibel(magnitude: f64) -> f64 {
     20.0 * magnitude.log10()
 }
+
+/// Lowest bound that is drawn, over the upper one: a bound of zero is drawn far below the curve.
+/// 60 dB, below the axis of every figure. Chosen, not measured.
+const LEAST_BOUND: f64 = 1e-3;
+
+/// Lower and upper bounds in dB.
+pub(super) fn bounds_db(bounds: impl Iterator<Item = [f64; 2]>) -> (Vec<f64>, Vec<f64>) {
+    bounds.map(|[low, high]| (decibel(low.max(LEAST_BOUND * high)), decibel(high))).unzip()
+}

@@ -4,15 +4,11 @@ use crate::Result;
 use crate::identification::Identification;
 use crate::method::Method;
 use crate::recommended;
-use crate::response::{self, decibel, magnitude, model_responses, phase};
+use crate::response::{self, bounds_db, decibel, magnitude, model_responses, phase};
 use crate::uncertainty::SystemUncertainty;
 use std::f64::consts::TAU;
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
-
-/// Lowest bound that is drawn, over the upper one: a bound of zero is drawn far below the curve.
-/// 60 dB, below the axis of every figure. Chosen, not measured.
-const LEAST_BOUND: f64 = 1e-3;
 
 pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(&found.verdict, &found.hz)?;
@@ -81,11 +77,6 @@ fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -
         }
     }
     Ok(all)
-}
-
-/// Lower and upper bounds in dB.
-fn bounds_db(bounds: impl Iterator<Item = [f64; 2]>) -> (Vec<f64>, Vec<f64>) {
-    bounds.map(|[low, high]| (decibel(low.max(LEAST_BOUND * high)), decibel(high))).unzip()
 }
 
 /// All pairs of output and input.

@@ -6,9 +6,9 @@ use super::method::Method;
 use super::response::bounds_db;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, ResponseDeviation};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation};
 use youla::lti::{Continuous, FrequencyResponse, StateSpace};
-use youla::{Mat, MatRef};
+use youla::{Mat, MatRef, c64};
 use youla_io::SystemMatrices;
 use youla_report::data as draw;
 
@@ -238,21 +238,6 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
     ]
 }
 
-/// Between the frequencies at which deviations are stated, linear in log f; constant beyond them.
-fn deviation_at(known: &ResponseDeviation, hz: f64, (output, input): (usize, usize)) -> f64 {
-    let value = |k: usize| known.absolute[k][(output, input)];
-    let above = known.hz.partition_point(|f| *f < hz);
-    match (above, known.hz.len()) {
-        (_, 0) => f64::NAN,
-        (0, _) => value(0),
-        (k, count) if k == count => value(count - 1),
-        (k, _) => {
-            let share = (hz / known.hz[k - 1]).ln() / (known.hz[k] / known.hz[k - 1]).ln();
-            value(k - 1) + share * (value(k) - value(k - 1))
-        }
-    }
-}
-
 /// Modes with their deviations, as the report shows them.
 pub(super) fn modes(found: &Recommendation) -> Vec<draw::Mode> {
     let drawn = |m: &ModeEstimate| draw::Mode {
@@ -274,12 +259,10 @@ pub(super) fn band(
     hz: &[f64],
     (output, input): (usize, usize),
 ) -> draw::Band {
-    let values = response.entry(output, input);
-    let deviation: Vec<f64> = hz.iter().map(|f| deviation_at(&found.response_deviation, *f, (output, input))).collect();
-    // One axis of a complex error has half of its mean square.
-    let half = |d: &f64| LEVEL.1 * d / std::f64::consts::SQRT_2;
+    let (values, known) = (response.entry(output, input), &found.response_deviation);
+    let half = |g: &c64, f: &f64| LEVEL.1 * known.of_magnitude(*g, *f, (output, input));
     let (low_db, high_db) =
-        bounds_db(values.iter().zip(&deviation).map(|(g, d)| [g.norm() - half(d), g.norm() + half(d)]));
+        bounds_db(values.iter().zip(hz).map(|(g, f)| [g.norm() - half(g, f), g.norm() + half(g, f)]));
     draw::Band {
         method: Method::Likelihood.key().into(),
         output,
@@ -287,6 +270,6 @@ pub(super) fn band(
         level: LEVEL.0,
         low_db,
         high_db,
-        region: deviation.iter().flat_map(|d| [d * d / 2.0 * ELLIPSE, 0.0, d * d / 2.0 * ELLIPSE]).collect(),
+        region: hz.iter().flat_map(|f| known.covariance(*f, (output, input)).map(|v| ELLIPSE * v)).collect(),
     }
 }

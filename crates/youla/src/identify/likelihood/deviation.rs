@@ -2,8 +2,9 @@
 //! does not tell apart.
 //!
 //! ```text
-//! var G = slopes (J'J)^-1 slopes^* + sum of w_c |G_c - G|^2,     w_c ~ exp(-(deviance + 4 parameters) / 2)
+//! var G = slopes (J'J)^-1 slopes^* + sum of w_c |G_c - G|^2,     w_c ~ exp(-criterion / 2)
 //! ```
+//! The weights are those of Schwarz's criterion, which approximates the posterior probability of a model.
 
 use super::chart::Chart;
 use super::linearise::linearise;
@@ -23,9 +24,20 @@ pub(crate) fn inverse_root(factor: &Mat<f64>, parameters: usize) -> Mat<f64> {
     Mat::from_fn(parameters, rows, |i, j| v[(i, j)] / s[j].max(1e-10 * s[0]) / lengths[i])
 }
 
-/// Frequencies as shares of the sample rate at which deviations are stated.
+/// Frequencies as shares of the sample rate over which the evidence is averaged: from that of 20 periods in the records.
 pub(crate) fn grid(samples: usize) -> Vec<f64> {
-    let (from, to, points) = ((20.0 / samples.max(40) as f64).clamp(1e-4, 1e-2), 0.495_f64, 150);
+    geometric((20.0 / samples.max(40) as f64).clamp(1e-4, 1e-2), 0.495, 150)
+}
+
+/// Frequencies below those, from that of one period in the records: deviations are stated there too.
+pub(crate) fn slow(samples: usize) -> Vec<f64> {
+    let to = grid(samples)[0];
+    let from = (1.0 / samples.max(40) as f64).min(0.9 * to);
+    let points = (10.0 * (to / from).ln()) as usize + 1;
+    geometric(from, to, points + 1).into_iter().take(points).collect()
+}
+
+fn geometric(from: f64, to: f64, points: usize) -> Vec<f64> {
     (0..points).map(|k| from * (to / from).powf(k as f64 / (points - 1) as f64)).collect()
 }
 
@@ -48,37 +60,49 @@ pub(crate) struct More<'a> {
     pub(crate) missed: Option<&'a Missed>,
 }
 
-/// Standard deviation of each entry of G (row by row) at each frequency, scaled channels.
-pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64], more: &More<'_>) -> Vec<Vec<f64>> {
+/// Second moments of the error e of an entry of G: `E |e|^2` and `E e^2`.
+#[derive(Clone, Copy)]
+pub(crate) struct Moments {
+    pub(crate) variance: f64,
+    pub(crate) pseudo_variance: c64,
+}
+
+impl Moments {
+    const ZERO: Self = Moments { variance: 0.0, pseudo_variance: c64::ZERO };
+
+    fn add(&mut self, error: c64, weight: f64) {
+        self.variance += weight * error.norm_sqr();
+        self.pseudo_variance += error * error * weight;
+    }
+}
+
+/// Moments of the error of each entry of G (row by row) at each frequency, scaled channels.
+pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64], more: &More<'_>) -> Vec<Vec<Moments>> {
     let found = &solution.chosen.found;
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let linearised = linearise(spectra, &found.point, &chart, &found.noise);
     let root = inverse_root(&linearised.factor, chart.parameters());
-    let least = solution.rivals.iter().map(|c| c.found.lenient()).fold(f64::INFINITY, f64::min);
-    let weights: Vec<f64> = solution.rivals.iter().map(|c| (-0.5 * (c.found.lenient() - least)).exp()).collect();
+    let least = solution.rivals.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
+    let weights: Vec<f64> = solution.rivals.iter().map(|c| (-0.5 * (c.criterion - least)).exp()).collect();
     let total: f64 = weights.iter().sum::<f64>().max(1e-300);
     let at = |share: &f64| {
         let z = c64::cis(std::f64::consts::TAU * share);
         let slopes = chart.response_slopes(&found.point.model, z);
         let g = response(&solution.chosen, *share);
-        let mut variance: Vec<f64> = (0..slopes.nrows())
-            .map(|i| {
-                more.scatter
-                    * (0..root.ncols())
-                        .map(|k| {
-                            (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]).norm_sqr()
-                        })
-                        .sum::<f64>()
-            })
-            .collect();
+        let along = |i: usize, k: usize| (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]);
+        let mut moments = vec![Moments::ZERO; slopes.nrows()];
+        for (i, of) in moments.iter_mut().enumerate() {
+            (0..root.ncols()).for_each(|k| of.add(along(i, k), more.scatter));
+        }
         for (rival, weight) in solution.rivals.iter().zip(&weights) {
-            for ((v, other), g) in variance.iter_mut().zip(response(rival, *share)).zip(&g) {
-                *v += weight / total * (other - g).norm_sqr();
+            for ((of, other), g) in moments.iter_mut().zip(response(rival, *share)).zip(&g) {
+                of.add(other - g, weight / total);
             }
         }
-        let missed = more.missed.map_or_else(Vec::new, |missed| missed.near(*share, variance.len()));
-        variance.iter_mut().zip(missed).for_each(|(v, m)| *v += m);
-        variance.into_iter().map(f64::sqrt).collect()
+        // What the excitation shows of the error is its size, not its phase.
+        let missed = more.missed.map_or_else(Vec::new, |missed| missed.at_most(*share, moments.len()));
+        moments.iter_mut().zip(missed).for_each(|(of, m)| of.variance += m);
+        moments
     };
     shares.iter().map(at).collect()
 }

@@ -49,11 +49,34 @@ pub(crate) struct Missed {
 }
 
 impl Missed {
-    /// Mean square of the error of each entry of G near a frequency (share of the sample rate); zero where chance explains it.
+    /// Mean square of the error of each entry of G near a frequency (share of the sample rate) beyond what chance explains.
     pub(crate) fn near(&self, share: f64, entries: usize) -> Vec<f64> {
+        let (mut sum, mut chance) = (vec![0.0; entries], vec![0.0; entries]);
+        let near = self.window(share);
+        for band in near {
+            sum.iter_mut().zip(&band.excess).for_each(|(s, e)| *s += e / near.len() as f64);
+            chance.iter_mut().zip(&band.variance).for_each(|(s, v)| *s += (v / near.len() as f64).powi(2));
+        }
+        sum.iter_mut().zip(chance).for_each(|(s, c)| *s = if *s > TOLD * c.sqrt() { *s } else { 0.0 });
+        sum
+    }
+
+    /// The largest mean square of this error that the excitation does not refute: what it shows with its own variance. Zero where
+    /// chance explains the errors of all bands.
+    pub(crate) fn at_most(&self, share: f64, entries: usize) -> Vec<f64> {
         let mut sum = vec![0.0; entries];
-        if self.significance <= BEYOND_CHANCE || self.bands.is_empty() {
-            return sum;
+        let near = self.window(share);
+        for band in near {
+            let all = band.excess.iter().zip(&band.variance);
+            sum.iter_mut().zip(all).for_each(|(s, (e, v))| *s += (e + v) / near.len() as f64);
+        }
+        sum
+    }
+
+    /// The bands around a frequency; none where chance explains the errors of all.
+    fn window(&self, share: f64) -> &[Band] {
+        if self.significance <= BEYOND_CHANCE {
+            return &[];
         }
         let (from, to) = (share / WINDOW.0, share * WINDOW.0);
         let mut first = self.bands.partition_point(|b| b.share < from);
@@ -62,13 +85,7 @@ impl Missed {
             first = first.saturating_sub(1);
             end = (end + 1).min(self.bands.len());
         }
-        let mut chance = vec![0.0; entries];
-        for band in &self.bands[first..end] {
-            sum.iter_mut().zip(&band.excess).for_each(|(s, e)| *s += e / (end - first) as f64);
-            chance.iter_mut().zip(&band.variance).for_each(|(s, v)| *s += (v / (end - first) as f64).powi(2));
-        }
-        sum.iter_mut().zip(chance).for_each(|(s, c)| *s = if *s > TOLD * c.sqrt() { *s } else { 0.0 });
-        sum
+        &self.bands[first..end]
     }
 }
 

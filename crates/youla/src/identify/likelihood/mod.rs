@@ -60,7 +60,7 @@ pub use recommendation::{Candidate, Evidence, Predictor, Recommendation, Respons
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, Mat, MatRef, Result};
-use deviation::More;
+use deviation::{Moments, More};
 use problem::Problem;
 use spectra::Sizes;
 use trust::Parts;
@@ -113,13 +113,14 @@ pub fn recommend(
     let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
     let choice = &solution.chosen;
     let spectra = problem.spectra(&choice.delays);
-    let shares = deviation::grid(spectra.samples());
+    let slow = deviation::slow(spectra.samples());
+    let shares = [slow.as_slice(), &deviation::grid(spectra.samples())].concat();
     let parts = Parts::new(&problem, &solution, verification);
     let excitation = known.and_then(LoopKnowledge::excitation);
     let missed = excitation.map(|x| missed::missed(&spectra, choice, &x, problem.skip));
     let more = More { scatter: parts.scatter, missed: missed.as_ref() };
     let deviations = deviation::deviations(&spectra, &solution, &shares, &more);
-    let mut evidence = trust::of_model(&spectra, &solution, &shares, &deviations);
+    let mut evidence = trust::of_model(&spectra, &solution, &shares[slow.len()..], &deviations[slow.len()..]);
     evidence.extend(parts.evidence(&solution));
     evidence.extend(trust::of_loop(&spectra, &solution, known, missed.as_ref()));
     let plant = physical::plant(choice, &problem.sizes, time)?;
@@ -201,11 +202,23 @@ fn problem<'a>(
     })
 }
 
-fn response_deviation(sizes: &Sizes, shares: &[f64], deviations: &[Vec<f64>], time: Discrete) -> ResponseDeviation {
+fn response_deviation(
+    sizes: &Sizes,
+    shares: &[f64],
+    deviations: &[Vec<Moments>],
+    time: Discrete,
+) -> ResponseDeviation {
     let (m, p) = (sizes.u.len(), sizes.y.len());
-    let physical = |v: &Vec<f64>| Mat::from_fn(p, m, |i, j| v[i * m + j] * sizes.y[i] / sizes.u[j]);
+    let unit = |i: usize, j: usize| sizes.y[i] / sizes.u[j];
     ResponseDeviation {
         hz: shares.iter().map(|share| share / time.ts()).collect(),
-        absolute: deviations.iter().map(physical).collect(),
+        absolute: deviations
+            .iter()
+            .map(|of| Mat::from_fn(p, m, |i, j| of[i * m + j].variance.sqrt() * unit(i, j)))
+            .collect(),
+        pseudo_variance: deviations
+            .iter()
+            .map(|of| Mat::from_fn(p, m, |i, j| of[i * m + j].pseudo_variance * unit(i, j).powi(2)))
+            .collect(),
     }
 }

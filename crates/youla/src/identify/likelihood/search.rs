@@ -60,11 +60,6 @@ impl Found {
     pub(crate) fn criterion(&self, samples: usize) -> f64 {
         self.deviance + penalty(self.parameters + self.noise.parameters(), samples)
     }
-
-    /// -2 log likelihood plus 4 per parameter: between Akaike and Schwarz, for the weights of models beside the chosen one.
-    pub(crate) fn lenient(&self) -> f64 {
-        self.deviance + 4.0 * (self.parameters + self.noise.parameters()) as f64
-    }
 }
 
 fn penalty(parameters: usize, samples: usize) -> f64 {

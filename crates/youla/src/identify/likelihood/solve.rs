@@ -21,7 +21,7 @@ const SHORTEST: usize = 500;
 const ROUNDS: usize = 10;
 /// Differences of the criterion that do not tell dead times apart: odds of e^4 to one.
 const INDISTINCT: f64 = 8.0;
-/// Differences of the lenient criterion up to which a model counts beside the best: weights of e^-6.
+/// Differences of the criterion up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 
 fn best(tried: &[Choice]) -> Option<&Choice> {
@@ -57,8 +57,8 @@ impl Problem<'_> {
             chosen.criterion = found.criterion(spectra.samples());
             chosen.found = found;
         }
-        let least = tried.iter().map(|c| c.found.lenient()).fold(f64::INFINITY, f64::min);
-        let rivals = tried.into_iter().filter(|c| c.found.lenient() <= least + BESIDE).collect();
+        let least = best(&tried)?.criterion;
+        let rivals = tried.into_iter().filter(|c| c.criterion <= least + BESIDE).collect();
         Some(Solution { chosen, rivals })
     }
 
@@ -68,11 +68,10 @@ impl Problem<'_> {
         for _ in 0..rounds {
             let tasks = self.neighbours(&at);
             tried.extend(self.run(tasks, at.criterion, table));
-            let better = best(tried)?;
-            if better.criterion >= at.criterion - 0.5 {
+            let before = std::mem::replace(&mut at, best(tried)?.clone());
+            if at.criterion >= before.criterion - 0.5 {
                 break;
             }
-            at = better.clone();
         }
         Some(at)
     }

@@ -1,10 +1,11 @@
 //! `youla identify`: from a run.toml, or straight from a log with flags.
 
-use crate::log_flags::{LogFlags, specs};
+use crate::log_flags::LogFlags;
 use crate::output::Failure;
 use crate::run_folder::{OutputFolder, folder_of};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use youla_io::ChannelSpec;
 use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings};
 
 pub(crate) const EXAMPLES: &str = "\
@@ -59,10 +60,14 @@ impl IdentifyArgs {
         let data = DataSettings {
             sample_time: log.sample_time,
             time_column: log.time.clone(),
-            input_excitation: specs(&log.excitation),
-            reference: specs(&log.reference),
+            input_excitation: ChannelSpec::chosen(&log.excitation),
+            reference: ChannelSpec::chosen(&log.reference),
             csv: log.dialect.options(),
-            ..DataSettings::new(specs(&log.input), specs(&log.output), self.files.iter().map(file).collect())
+            ..DataSettings::new(
+                ChannelSpec::chosen(&log.input),
+                ChannelSpec::chosen(&log.output),
+                self.files.iter().map(file).collect(),
+            )
         };
         let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];

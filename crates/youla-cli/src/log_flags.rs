@@ -2,7 +2,7 @@
 
 use crate::dialect::Dialect;
 use clap::Args;
-use youla_io::{ChannelRef, ChannelSpec};
+use youla_io::ChannelRef;
 
 /// Channels and clock of a log.
 #[derive(Debug, Args)]
@@ -27,9 +27,4 @@ pub(crate) struct LogFlags {
     pub(crate) time: Option<ChannelRef>,
     #[command(flatten)]
     pub(crate) dialect: Dialect,
-}
-
-/// Channels under the names by which they were given.
-pub(crate) fn specs(chosen: &[ChannelRef]) -> Vec<ChannelSpec> {
-    chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
 }

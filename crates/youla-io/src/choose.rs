@@ -51,6 +51,11 @@ impl ChannelSpec {
         ChannelSpec { name: name.into(), from: Some(from), unit: unit.into() }
     }
 
+    /// Channels under the names or numbers by which they are chosen, without units.
+    pub fn chosen(columns: &[ChannelRef]) -> Vec<Self> {
+        columns.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
+    }
+
     /// The column of the channel in the file.
     pub fn source(&self) -> ChannelRef {
         self.from.clone().unwrap_or_else(|| ChannelRef::Name(self.name.clone()))

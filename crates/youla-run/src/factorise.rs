@@ -44,14 +44,7 @@ pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path
             return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
         }
     }
-    let (controller, gains) = match settings.controller.realise(folder, records.time)? {
-        Controller::System(k) => (k, None),
-        Controller::Observer { f, l } => {
-            check_gains(&nominal, &f, &l)?;
-            let k = observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?;
-            (k, Some([f, l]))
-        }
-    };
+    let (controller, gains) = declared_controller(settings, folder, records.time)?;
     for (what, expected, found) in [
         ("the number of inputs of the controller", records.outputs.len(), controller.inputs()),
         ("the number of outputs of the controller", records.inputs.len(), controller.outputs()),
@@ -61,6 +54,23 @@ pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path
         }
     }
     Ok(DeclaredLoop { nominal, controller, gains })
+}
+
+/// The declared controller `u = K y` (positive feedback), and its gains F and L where it is given by them.
+pub(super) fn declared_controller(
+    settings: &RunSettings,
+    folder: &Path,
+    time: Discrete,
+) -> Result<(StateSpace<Discrete>, Option<[Mat<f64>; 2]>)> {
+    match settings.controller.realise(folder, time)? {
+        Controller::System(k) => Ok((k, None)),
+        Controller::Observer { f, l } => {
+            let nominal = settings.nominal.realise(folder, time)?;
+            check_gains(&nominal, &f, &l)?;
+            let k = observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?;
+            Ok((k, Some([f, l])))
+        }
+    }
 }
 
 /// Builds the factors that the settings of a run describe; paths in them are relative to `folder`.

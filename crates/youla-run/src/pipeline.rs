@@ -61,8 +61,10 @@ pub fn identify(
         grey_box: found(s.as_ref()).and_then(|s| found(s.grey_box.as_ref())),
     };
     let identified = candidates.identified();
-    if identified.is_empty() {
-        return Err(filtered.err().or_else(|| s?.err()).or_else(|| recommended.err()).unwrap_or_else(no_method));
+    if identified.is_empty()
+        && let Err(reason) = recommended
+    {
+        return Err(filtered.err().or_else(|| s?.err()).unwrap_or(reason));
     }
     let models = [&[&declared.nominal], &identified[..]].concat();
     let hz = grid(&settings.frequency_response, &models, records.time)?;
@@ -142,9 +144,4 @@ fn judged(
     let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
     let redesign = clock.run(Stage::Redesign, || redesigned(context, &hansen, found(reduction.as_ref())));
     Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, grey_box, certificate, redesign })
-}
-
-/// Cannot happen while the recommended model is always tried.
-fn no_method() -> Error {
-    Error::Method(youla::Error::NoCandidate { samples: 0 })
 }

@@ -9,15 +9,15 @@ mod result;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
+use super::factorise::declared_controller;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::{Controller, DataFile, RunSettings};
+use super::settings::{DataFile, RunSettings};
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::ErrorKind;
-use youla::control::observer_controller;
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::{Discrete, StateSpace};
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, TimeSource};
@@ -59,7 +59,7 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
         options: with_order(&settings.check, &settings.hansen),
     };
     let files: Vec<&DataFile> = d.estimation.iter().chain(&d.verification).collect();
-    let controller = |time: Discrete| declared(settings, folder, time).map(Some);
+    let controller = |time: Discrete| Ok(Some(declared_controller(settings, folder, time)?.0));
     let mut found = check_all(&job, &files, folder, &controller)?;
     found.findings.extend(method_finding(settings));
     by_severity(&mut found.findings);
@@ -80,15 +80,12 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
             return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
         }
     }
-    let specs = |chosen: &[ChannelRef]| -> Vec<ChannelSpec> {
-        chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
-    };
     let job = Job {
         groups: [
-            specs(&files.inputs),
-            specs(&files.outputs),
-            specs(&files.input_excitation),
-            specs(&files.reference),
+            ChannelSpec::chosen(&files.inputs),
+            ChannelSpec::chosen(&files.outputs),
+            ChannelSpec::chosen(&files.input_excitation),
+            ChannelSpec::chosen(&files.reference),
             Vec::new(),
         ],
         time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
@@ -142,17 +139,6 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
 fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
     let horizons = (!hansen.horizon.is_auto()).then(|| hansen.horizon.past() + hansen.horizon.future());
     CheckOptions { excitation_order: options.excitation_order.or(horizons), ..options.clone() }
-}
-
-/// The declared controller with positive feedback.
-fn declared(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<StateSpace<Discrete>> {
-    match settings.controller.realise(folder, time)? {
-        Controller::System(k) => Ok(k),
-        Controller::Observer { f, l } => {
-            let nominal = settings.nominal.realise(folder, time)?;
-            Ok(observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?)
-        }
-    }
 }
 
 /// What stands for a record in findings on the settings.

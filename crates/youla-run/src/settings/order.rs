@@ -16,10 +16,21 @@ pub(in crate::settings) trait Written: Sized {
     type Keys: DeserializeOwned;
     /// What a value must be, for messages.
     const MUST: &'static str;
-    fn of_number(order: usize) -> Self;
-    fn of_word(word: &str) -> Option<Self>;
-    /// `None` unless exactly one key is given.
-    fn of_keys(keys: Self::Keys) -> Option<Self>;
+    /// `None` for an unknown word, and unless exactly one key of a table is given.
+    fn read(value: Value<'_, Self::Keys>) -> Option<Self>;
+}
+
+/// What may stand for an order.
+pub(in crate::settings) enum Value<'a, K> {
+    Number(usize),
+    Word(&'a str),
+    Table(K),
+}
+
+impl<T: Written> OrderVisitor<T> {
+    fn read<E: Error>(self, value: Value<'_, T::Keys>, unexpected: Unexpected<'_>) -> Result<T, E> {
+        T::read(value).ok_or_else(|| E::invalid_value(unexpected, &self))
+    }
 }
 
 pub(in crate::settings) fn serialize<T: Written + Copy, S: Serializer>(order: &T, s: S) -> Result<S::Ok, S::Error> {
@@ -41,21 +52,21 @@ impl<'de, T: Written> Visitor<'de> for OrderVisitor<T> {
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<T, E> {
         let order = usize::try_from(value).map_err(|_| E::invalid_value(Unexpected::Signed(value), &self))?;
-        Ok(T::of_number(order))
+        self.read(Value::Number(order), Unexpected::Signed(value))
     }
 
     fn visit_u64<E: Error>(self, value: u64) -> Result<T, E> {
         let order = usize::try_from(value).map_err(|_| E::invalid_value(Unexpected::Unsigned(value), &self))?;
-        Ok(T::of_number(order))
+        self.read(Value::Number(order), Unexpected::Unsigned(value))
     }
 
     fn visit_str<E: Error>(self, value: &str) -> Result<T, E> {
-        T::of_word(value).ok_or_else(|| E::invalid_value(Unexpected::Str(value), &self))
+        self.read(Value::Word(value), Unexpected::Str(value))
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
         let keys = T::Keys::deserialize(MapAccessDeserializer::new(map))?;
-        T::of_keys(keys).ok_or_else(|| A::Error::invalid_value(Unexpected::Map, &self))
+        self.read(Value::Table(keys), Unexpected::Map)
     }
 }
 
@@ -128,18 +139,15 @@ impl Written for Order {
     type Keys = OrderKeys;
     const MUST: &'static str = "a whole number, \"auto\", or a table with the key auto";
 
-    fn of_number(order: usize) -> Self {
-        Order::Fixed(order)
-    }
-
-    fn of_word(word: &str) -> Option<Self> {
-        (word == "auto").then(Order::default)
-    }
-
-    fn of_keys(keys: OrderKeys) -> Option<Self> {
-        match (keys.fixed, keys.auto) {
-            (Some(order), None) => Some(Order::Fixed(order)),
-            (None, Some(AutoTable { max, rule })) => Some(Order::Auto(AutoOrder { max, rule, ..AutoOrder::default() })),
+    fn read(value: Value<'_, OrderKeys>) -> Option<Self> {
+        match value {
+            Value::Number(order) | Value::Table(OrderKeys { fixed: Some(order), auto: None }) => {
+                Some(Order::Fixed(order))
+            }
+            Value::Word("auto") => Some(Order::default()),
+            Value::Table(OrderKeys { fixed: None, auto: Some(AutoTable { max, rule }) }) => {
+                Some(Order::Auto(AutoOrder { max, rule, ..AutoOrder::default() }))
+            }
             _ => None,
         }
     }
@@ -206,20 +214,15 @@ impl Written for ReducedOrder {
     type Keys = ReducedKeys;
     const MUST: &'static str = "a whole number, \"minimal\", \"auto\", or a table with the key bound or closed-loop";
 
-    fn of_number(order: usize) -> Self {
-        ReducedOrder::Fixed(order)
-    }
-
-    fn of_word(word: &str) -> Option<Self> {
-        match word {
-            "minimal" => Some(ReducedOrder::Minimal),
-            "auto" => Some(ReducedOrder::ClosedLoop(AUTO_ERROR)),
-            _ => None,
-        }
-    }
-
-    fn of_keys(keys: ReducedKeys) -> Option<Self> {
-        match (keys.fixed, keys.bound, keys.closed_loop) {
+    fn read(value: Value<'_, ReducedKeys>) -> Option<Self> {
+        let keys = match value {
+            Value::Number(order) => return Some(ReducedOrder::Fixed(order)),
+            Value::Word("minimal") => return Some(ReducedOrder::Minimal),
+            Value::Word("auto") => return Some(ReducedOrder::ClosedLoop(AUTO_ERROR)),
+            Value::Word(_) => return None,
+            Value::Table(keys) => (keys.fixed, keys.bound, keys.closed_loop),
+        };
+        match keys {
             (Some(order), None, None) => Some(ReducedOrder::Fixed(order)),
             (None, Some(bound), None) => Some(ReducedOrder::Bound(bound)),
             (None, None, Some(error)) => Some(ReducedOrder::ClosedLoop(error)),

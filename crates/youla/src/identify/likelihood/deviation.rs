@@ -1,5 +1,5 @@
 //! Standard deviations of the response, from the information of the record and from the scatter over models that the record
-//! does not tell apart.
+//! does not distinguish.
 //!
 //! ```text
 //! var G = slopes (J'J)^-1 slopes^* + sum of w_c |G_c - G|^2,     w_c ~ exp(-criterion / 2)

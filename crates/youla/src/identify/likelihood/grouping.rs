@@ -1,4 +1,4 @@
-//! Which poles share a block: those too close to each other to be told apart.
+//! Which poles share a block: those too close to each other to be distinguished.
 
 use crate::linalg::{RealSchur, real_schur};
 use faer::{Mat, MatRef, c64};
@@ -6,7 +6,7 @@ use faer::{Mat, MatRef, c64};
 /// Condition of the transformation to blocks above which blocks are merged.
 const LARGEST_CONDITION: f64 = 20.0;
 
-/// The same for blocks that stand for single poles: beyond it their bases hold no digits of use.
+/// The same for blocks of single poles: beyond it their bases hold no digits of use.
 const SEPARABLE: f64 = 1e6;
 
 /// States of the largest block that overlap alone makes.

@@ -5,7 +5,7 @@
 //! Y(k) = G(z) U(k) + C (z I - A)^-1 z t + H(z) E(k),        z = exp(2 pi i k / N)
 //! -2 log likelihood = N log det Lambda + 2 N log |det A_u|
 //! ```
-//! The vector t stands for both ends of a record (`spectra`), H for an autoregression per output, A_u for the poles outside the
+//! The vector t describes both ends of a record (`spectra`), H for an autoregression per output, A_u for the poles outside the
 //! unit circle (`search`). The plant and its noise are found together, so that the estimate holds in closed loop, where the
 //! input is correlated with the noise (Ljung, System Identification, section 13.4), and for unstable plants.
 //!
@@ -15,7 +15,7 @@
 //! | dead time from the newest inputs of a regression | `dead_time` |
 //! | search in local coordinates, the noise estimated with it | `search`, `linearise`, `chart`, `noise` |
 //! | one mode more, one less, another dead time, until Schwarz's criterion falls no more | `solve`, `neighbours`, `grow` |
-//! | standard deviations: information of the record, and scatter of models that it does not tell apart | `deviation` |
+//! | standard deviations: information of the record, and scatter of models that it does not distinguish | `deviation` |
 //! | questions to the records, each with a figure and a limit | `trust` |
 
 mod balancing;
@@ -79,7 +79,8 @@ const SAMPLES_PER_PARAMETER: usize = 10;
 ///
 /// # Errors
 /// [`Error::Shape`], [`Error::NotFinite`] and [`Error::ConstantChannel`] name the channel, [`Error::TooFewSamples`] says how many
-/// are needed, [`Error::OutOfRange`] an option that cannot be met; [`Error::NoCandidate`] where no search ends.
+/// are needed, [`Error::OutOfRange`] an option that cannot be met, [`Error::Unsupported`] refuses a known disturbance;
+/// [`Error::NoCandidate`] where no search ends.
 ///
 /// ```
 /// use youla::identify::likelihood::{Experiment, LikelihoodOptions, recommend};
@@ -146,6 +147,12 @@ fn check(estimation: &[Experiment<'_>], verification: &[Experiment<'_>]) -> Resu
             check_shape(&what("y"), e.y, (e.u.nrows(), p))?;
             check_finite(&what("u"), e.u)?;
             check_finite(&what("y"), e.y)?;
+            if e.disturbance.is_some_and(|w| w.ncols() > 0) {
+                return Err(Error::Unsupported {
+                    what: "the recommended model of an Experiment with a known disturbance",
+                    instead: "subtract the disturbance from the outputs first, or use subspace, which estimates it",
+                });
+            }
         }
     }
     check_moving("input", &estimation.iter().map(|e| e.u).collect::<Vec<_>>())?;

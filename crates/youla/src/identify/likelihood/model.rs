@@ -1,5 +1,5 @@
 //! A model in block-diagonal form, A = diag(A_1, ..., A_k): one block per real pole or pair, larger ones for poles too close
-//! to be told apart.
+//! to be distinguished.
 //!
 //! The blocks make responses and sensitivities cheap: a block touches the entries of its own A, B and C only.
 
@@ -28,7 +28,7 @@ impl Model {
         Model::formed([a, b, c], d, true)
     }
 
-    /// The same with a block for each pole or pair, as far as they can be told apart: what may be left out of a model.
+    /// The same with a block for each pole or pair, as far as they can be distinguished: what may be left out of a model.
     pub(crate) fn separated(&self) -> Option<Self> {
         let (a, b, c) = self.matrices();
         Model::formed([a.as_ref(), b.as_ref(), c.as_ref()], self.d.clone(), false)

@@ -4,7 +4,7 @@
 //! ```text
 //! Y(k) = (C (z I - A)^-1 B + D) U(k) + C (z I - A)^-1 z t,     t = (x(0) - x(N)) / sqrt(N),   z = exp(2 pi i k / N)
 //! ```
-//! so that one vector t of n numbers per record stands for both ends of it (Pintelon and Schoukens, System Identification,
+//! so that one vector t of n numbers per record describes both ends of it (Pintelon and Schoukens, System Identification,
 //! section 6.3). Constants of u and y touch the line k = 0 only, which is left out; what a constant input does to an integrator
 //! is a ramp, and t holds it. Nothing is subtracted from the data.
 

@@ -297,3 +297,16 @@ fn the_problem_is_scaled_by_what_the_channels_are() {
     let (one, two) = (response(&one.plant), response(&two.plant));
     assert!((two / 1e6 - one).norm() < 1e-3 * one.norm());
 }
+
+/// What the search would ignore is refused, in either group of records.
+#[test]
+fn known_disturbances_are_refused() {
+    let (u, y) = record(&machine(), 1000, 0.1, 1);
+    let hum = normal(&mut ChaCha8Rng::seed_from_u64(2), 1000, 1, 1.0);
+    let plain = [Experiment::new(u.as_ref(), y.as_ref())];
+    let disturbed = [plain[0].with_disturbance(hum.as_ref())];
+    for (estimation, verification) in [(&disturbed, &plain), (&plain, &disturbed)] {
+        let refused = recommend(estimation, verification, None, time(), &LikelihoodOptions::default()).err();
+        assert!(matches!(refused, Some(Error::Unsupported { .. })), "{refused:?}");
+    }
+}

@@ -140,7 +140,7 @@ fn report(plan: &Plan) -> ReportData {
     ];
     let mut data = ReportData {
         summary: "Identified in closed loop by the Hansen scheme and by direct N4SID; compared on records that were not used.".into(),
-        program: "youla 0.1.0".into(),
+        program: "youla 0.2.0".into(),
         settings: "[data]\nestimation = [\"record.csv\"]\nsample_time = 2e-4\n\n[controller]\nfeedback = \"negative\"\n\n[identify]\norder = 8\nfeedthrough = \"none\"\nstability = \"require\"\n".into(),
         sources: vec![Source {
             path: "record.csv".into(),

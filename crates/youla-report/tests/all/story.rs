@@ -101,7 +101,7 @@ fn story() -> Story {
     Story {
         title: "The gas bearing".into(),
         summary: "What came out.".into(),
-        program: "youla 0.1.0".into(),
+        program: "youla 0.2.0".into(),
         methods: vec![
             Method::nominal(),
             Method::pem(),

@@ -7,6 +7,7 @@ use super::settings::{SubspaceTable, read_table};
 use super::subspace_details::{LongDetails, SubspaceDetails};
 use crate::{Error, Result};
 use faer::MatMut;
+use serde_json::Value;
 use std::path::PathBuf;
 use youla::identify::subspace::{SubspaceModel, SubspaceOptions, subspace_stream};
 use youla::lti::Discrete;
@@ -78,7 +79,7 @@ pub fn identify_long(
     Ok(LongModel { found, inputs, outputs, samples: stream.at.samples, passes: stream.at.pass })
 }
 
-/// The model as an artefact, with SHA-256 of the files (which takes a pass over each) and the options.
+/// The model as an artefact, with SHA-256 of the files (which takes a pass over each) and the options as `[direct]` of run.toml has them.
 ///
 /// # Errors
 /// [`youla_io::Error::Io`]; [`youla::Error::NoConvergence`] of the poles.
@@ -86,7 +87,7 @@ pub fn long_model_file(
     model: &LongModel,
     records: &LongRecords,
     options: &SubspaceOptions,
-) -> Result<ModelFile<SubspaceOptions>> {
+) -> Result<ModelFile<Value>> {
     let source = |file: &PathBuf| {
         Ok(SourceFile { path: file.display().to_string(), purpose: "estimation".into(), sha256: sha256(file)? })
     };
@@ -95,7 +96,7 @@ pub fn long_model_file(
         program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
         seed: None,
         sources: records.files.iter().map(source).collect::<Result<_>>()?,
-        options: options.clone(),
+        options: to_value(&SubspaceTable::from(options.clone()))?,
     };
     let subspace = SubspaceDetails::from(&model.found);
     let details = to_value(&LongDetails { subspace, fit: &model.found.fit, samples: model.samples })?;
@@ -135,10 +136,7 @@ fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>,
         };
         return Ok((Box::new(NpyStream::open(file, &records.inputs, &records.outputs)?), Discrete::new(ts)?));
     }
-    let specs = |chosen: &[ChannelRef]| -> Vec<ChannelSpec> {
-        chosen.iter().map(|c| ChannelSpec::from(c.to_string(), c.clone(), "")).collect()
-    };
-    let (u, y) = (specs(&records.inputs), specs(&records.outputs));
+    let (u, y) = (ChannelSpec::chosen(&records.inputs), ChannelSpec::chosen(&records.outputs));
     let stream = CsvStream::open(file, &u, &y, &records.time, &records.csv)?;
     let time = stream.time();
     Ok((Box::new(stream), time))

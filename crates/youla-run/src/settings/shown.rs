@@ -92,9 +92,6 @@ impl From<SubspaceOptions> for SubspaceTable {
     }
 }
 
-/// Longest past that `horizon = "auto"` considers, block rows; chosen, not measured.
-const LONGEST_PAST: usize = 60;
-
 impl TryFrom<SubspaceTable> for SubspaceOptions {
     type Error = &'static str;
 
@@ -102,7 +99,7 @@ impl TryFrom<SubspaceTable> for SubspaceOptions {
         let SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty } = table;
         let horizon = match (horizon, past) {
             (Some(future), past) => Horizon::Fixed { future, past: past.unwrap_or(future) },
-            (None, None) => Horizon::Auto { max_past: LONGEST_PAST },
+            (None, None) => Horizon::AUTO,
             (None, Some(_)) => return Err("horizon = \"auto\" chooses `past` too; leave `past` out"),
         };
         Ok(SubspaceOptions {

@@ -6,7 +6,7 @@
 /// predictor and should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable plant K is
 /// small, and this is the decay of the plant itself.
 ///
-/// In files: `30` for both, `{ future = 30, past = 60 }`, or `{ max_past = 60 }`.
+/// In files: `30` for both, `{ future = 30, past = 60 }`, `"auto"` for [`Horizon::AUTO`], or `{ max_past = 150 }`.
 ///
 /// ```
 /// use youla::identify::subspace::Horizon;
@@ -44,6 +44,9 @@ impl From<usize> for Horizon {
 }
 
 impl Horizon {
+    /// Left to the data, with a past of at most 60 block rows; chosen, not measured.
+    pub const AUTO: Horizon = Horizon::Auto { max_past: 60 };
+
     /// Block rows of the past; the longest one considered where the data choose.
     pub fn past(self) -> usize {
         match self {
@@ -73,15 +76,27 @@ impl Horizon {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "the horizon is a number of block rows, `{ future = 30, past = 60 }` or `{ max_past = 60 }`"
+    expecting = "the horizon is a number of block rows, `{ future = 30, past = 60 }`, \"auto\" or `{ max_past = 150 }`"
 )]
 enum HorizonKeys {
     /// Block rows of the past and of the future.
     Equal(usize),
     /// Block rows of each.
     Fixed { future: usize, past: usize },
-    /// Both from the data, by the order of a vector autoregression; the longest past to consider.
+    /// Both from the data, by the order of a vector autoregression of at most 60 block rows.
+    Word(AutoWord),
+    /// The same with the longest past to consider.
     Auto { max_past: usize },
+}
+
+/// The word for a choice by the data.
+#[cfg(feature = "serde")]
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
+#[serde(rename_all = "kebab-case")]
+enum AutoWord {
+    /// The data choose.
+    Auto,
 }
 
 #[cfg(feature = "serde")]
@@ -90,6 +105,7 @@ impl From<HorizonKeys> for Horizon {
         match keys {
             HorizonKeys::Equal(rows) => Horizon::from(rows),
             HorizonKeys::Fixed { future, past } => Horizon::Fixed { future, past },
+            HorizonKeys::Word(AutoWord::Auto) => Horizon::AUTO,
             HorizonKeys::Auto { max_past } => Horizon::Auto { max_past },
         }
     }
@@ -101,6 +117,7 @@ impl From<Horizon> for HorizonKeys {
         match horizon {
             Horizon::Fixed { future, past } if future == past => HorizonKeys::Equal(past),
             Horizon::Fixed { future, past } => HorizonKeys::Fixed { future, past },
+            Horizon::AUTO => HorizonKeys::Word(AutoWord::Auto),
             Horizon::Auto { max_past } => HorizonKeys::Auto { max_past },
         }
     }

@@ -106,13 +106,14 @@ fn what_cannot_be_chosen_is_refused() {
     for (text, horizon) in [
         ("horizon = 30", Horizon::from(30)),
         ("horizon = { future = 30, past = 60 }", Horizon::Fixed { future: 30, past: 60 }),
+        ("horizon = \"auto\"", Horizon::AUTO),
         ("horizon = { max_past = 30 }", Horizon::Auto { max_past: 30 }),
     ] {
         assert_eq!(read(text), Ok(horizon));
         let options = SubspaceOptions { horizon, ..Default::default() };
         assert_eq!(toml::from_str::<SubspaceOptions>(&toml::to_string(&options).unwrap()), Ok(options));
     }
-    for text in ["horizon = \"auto\"", "horizon = { max_past = 30, past = 2 }", "horizon = -1"] {
+    for text in ["horizon = \"automatic\"", "horizon = { max_past = 30, past = 2 }", "horizon = -1"] {
         let refused = read(text).unwrap_err().to_string();
         assert!(refused.contains("a number of block rows, `{ future = 30, past = 60 }`"), "{refused}");
     }

@@ -1,6 +1,6 @@
 //! What the stages of a run take: what was asked for, the records, the loop that ran, and its coprime factors.
 
-use super::factorise::{DeclaredLoop, Factorisation};
+use super::factorise::{DeclaredLoop, LoopFactors};
 use super::records::RunRecords;
 use super::settings::RunSettings;
 use super::signals::DeviationSignals;
@@ -15,7 +15,7 @@ pub(crate) struct RunContext<'a> {
     /// Nominal model and controller.
     pub(crate) declared: &'a DeclaredLoop,
     /// The factors of the loop, where they exist.
-    pub(crate) factorisation: Option<&'a Factorisation>,
+    pub(crate) factorisation: Option<&'a LoopFactors>,
 }
 
 /// The same where the factors and the signals alpha and beta exist.
@@ -24,7 +24,7 @@ pub(crate) struct SchemeContext<'a> {
     /// Settings, records and loop.
     pub(crate) run: RunContext<'a>,
     /// The factors of the loop.
-    pub(crate) factorisation: &'a Factorisation,
+    pub(crate) factorisation: &'a LoopFactors,
     /// alpha and beta.
     pub(crate) signals: &'a DeviationSignals,
 }

@@ -8,7 +8,7 @@ use super::context::{RunContext, SchemeContext};
 use super::entries::{OrRefused, finite, finite_all};
 use super::factorise::factorise;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::Controller;
+use super::settings::RealisedController;
 use super::signals::deviation_signals;
 use super::verdict::verify_record;
 use crate::Result;
@@ -150,7 +150,7 @@ fn identified(run: RunContext<'_>, settle: usize, error: ControllerError) -> Res
         _ => controller.clone(),
     };
     let records = altered(run.records, error, settle);
-    let described = Controller::System(described);
+    let described = RealisedController::System(described);
     let factors = factorise(&run.declared.nominal, &described, &records, &settings.factors)?.factors;
     let dropped = if error == ControllerError::InitialState { 0 } else { settle };
     let signals = deviation_signals(&factors, &records.estimation, Some(dropped))?;

@@ -3,7 +3,7 @@
 use super::excite_figure::figure;
 use super::factorise::factorise;
 use super::records::{RunRecords, channels_of, read_records};
-use super::settings::{Controller, RunSettings};
+use super::settings::{RealisedController, RunSettings};
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -104,8 +104,8 @@ fn sample_time(settings: &RunSettings, folder: &Path) -> Result<Discrete> {
     }
 }
 
-fn usual_port(settings: &RunSettings, controller: &Controller) -> ExcitationPort {
-    let observer = matches!(controller, Controller::Observer { .. });
+fn usual_port(settings: &RunSettings, controller: &RealisedController) -> ExcitationPort {
+    let observer = matches!(controller, RealisedController::Observer { .. });
     match (settings.data.input_excitation.is_empty(), settings.data.alpha.is_empty(), observer) {
         (false, ..) | (true, true, false) => ExcitationPort::Input,
         (true, false, _) | (true, true, true) => ExcitationPort::Alpha,
@@ -117,16 +117,16 @@ fn ported(
     settings: &RunSettings,
     folder: &Path,
     nominal: &StateSpace<Discrete>,
-    controller: &Controller,
+    controller: &RealisedController,
     port: ExcitationPort,
 ) -> Result<Partitioned<Discrete>> {
     let records = match (controller, port) {
-        (Controller::System(k), ExcitationPort::Input) => return Ok(with_input_port(k)?),
-        (Controller::System(_), ExcitationPort::Alpha) => {
+        (RealisedController::System(k), ExcitationPort::Input) => return Ok(with_input_port(k)?),
+        (RealisedController::System(_), ExcitationPort::Alpha) => {
             let part = "the port alpha of a controller without observer gains rests on the estimation records (or take the port input)";
             read_records(&settings.data, folder).map_err(|e| e.within(part))?
         }
-        (Controller::Observer { .. }, _) => without_data(settings, nominal.time()),
+        (RealisedController::Observer { .. }, _) => without_data(settings, nominal.time()),
     };
     let factors = factorise(nominal, controller, &records, &settings.factors)?.factors;
     match port {

@@ -1,7 +1,7 @@
 //! From nominal model and controller of a run to its coprime factors, with balanced states.
 
 use super::records::RunRecords;
-use super::settings::{Controller, FactorSettings, RunSettings};
+use super::settings::{FactorSettings, RealisedController, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::Mat;
@@ -23,7 +23,7 @@ pub struct DeclaredLoop {
 
 /// The factors of a loop.
 #[derive(Debug, Clone)]
-pub struct Factorisation {
+pub struct LoopFactors {
     /// The eight factors.
     pub factors: CoprimeFactors<Discrete>,
     /// Largest relative residual of the Bezout identity (15) up to Nyquist.
@@ -63,8 +63,8 @@ pub(super) fn declared_controller(
     time: Discrete,
 ) -> Result<(StateSpace<Discrete>, Option<[Mat<f64>; 2]>)> {
     match settings.controller.realise(folder, time)? {
-        Controller::System(k) => Ok((k, None)),
-        Controller::Observer { f, l } => {
+        RealisedController::System(k) => Ok((k, None)),
+        RealisedController::Observer { f, l } => {
             let nominal = settings.nominal.realise(folder, time)?;
             check_gains(&nominal, &f, &l)?;
             let k = observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?;
@@ -77,7 +77,7 @@ pub(super) fn declared_controller(
 ///
 /// # Errors
 /// As [`factorise`], and whatever is wrong with the given model or controller.
-pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Factorisation> {
+pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<LoopFactors> {
     let nominal = settings.nominal.realise(folder, records.time)?;
     let controller = settings.controller.realise(folder, records.time)?;
     factorise(&nominal, &controller, records, &settings.factors)
@@ -96,26 +96,26 @@ fn check_gains(nominal: &StateSpace<Discrete>, f: &Mat<f64>, l: &Mat<f64>) -> Re
 /// the conditions of the Riccati equations.
 pub fn factorise(
     nominal: &StateSpace<Discrete>,
-    controller: &Controller,
+    controller: &RealisedController,
     records: &RunRecords,
     settings: &FactorSettings,
-) -> Result<Factorisation> {
+) -> Result<LoopFactors> {
     let scale = nominal.state_scales()?;
     let balanced = nominal.with_scaled_states(&scale);
     let factors = match controller {
-        Controller::Observer { f, l } => {
+        RealisedController::Observer { f, l } => {
             check_gains(nominal, f, l)?;
             let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
             let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
             CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
         }
-        Controller::System(k) => {
+        RealisedController::System(k) => {
             let f = state_feedback(&balanced, records, settings.input_weight)?;
             CoprimeFactors::stacked(&balanced, k, f.as_ref(), controller_feedback(k)?.as_ref())?
         }
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
-    Ok(Factorisation { factors, bezout_residual })
+    Ok(LoopFactors { factors, bezout_residual })
 }
 
 /// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.

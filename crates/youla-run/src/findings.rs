@@ -12,13 +12,13 @@ use youla::identify::innovation_form::Convergence;
 use youla::identify::subspace::{Uncertainty, amplitudes};
 use youla_greybox::Stop;
 use youla_greybox::refine::RefineNoise;
-use youla_report::data::{Evidence, Note, Status};
+use youla_report::data::{Note, ReportPart, Status};
 
 /// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.
 pub fn cautions(found: &Identification) -> Vec<String> {
     let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
     // The line on the data counts its findings; here each has its own sentence.
-    let trust = verdict_lines(found).into_iter().filter(|line| line.evidence != Evidence::Data);
+    let trust = verdict_lines(found).into_iter().filter(|line| line.evidence != ReportPart::Data);
     let lines = trust.chain(further_lines(found)).map(|v| weigh(v.status, v.text));
     let rest = lines.chain(notes(found).into_iter().map(|n| weigh(n.status, n.text))).flatten();
     found.data.sentences().into_iter().chain(rest).collect()

@@ -1,27 +1,27 @@
 //! The numbered artefacts of a run folder, written stage by stage.
 
+mod files;
+
+pub(crate) use files::ModelFacts;
+
 use super::artefacts::{ModelFile, Provenance, SCHEMA};
-use super::entries::{ModeEntry, OrRefused, Refused, finite_all, pairs};
+use super::entries::Refused;
 use super::identification::{Filtered, Identification, SchemeRun};
 use super::recommended::{self, RecommendedDetails};
-use super::records::{LoopRecord, RunRecords};
+use super::records::LoopRecord;
 use super::redesign;
 use super::reduction;
-use super::residual_tests::{RecordResiduals, step_keys};
-use super::robustness::{RobustnessFile, ScalesEntry, scales_entry};
-use super::segments::RecordSegment;
+use super::robustness::scales_entry;
 use super::stabilisation::{DiagramFile, as_csv};
 use super::subspace_details::{DeviationDetails, SubspaceDetails};
 use super::uncertainty::SystemUncertainty;
-use super::verdict::ModelVerdict;
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictEntry, VerdictFile};
+use serde::Serialize;
 use youla::MatRef;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
-use youla::validate::RESIDUAL_LAGS;
 use youla_io::folder::RunFolder;
 use youla_io::{Packing, Value, Variable, write_mat};
 use youla_report::{figure_csv, svg};
@@ -292,130 +292,4 @@ fn number(name: &str, value: f64) -> Variable {
 
 fn array(name: &str, value: MatRef<'_, f64>) -> Variable {
     Variable { name: name.into(), value: Value::matrix(value) }
-}
-
-/// What a stage found, and where it comes from.
-#[derive(Serialize)]
-struct Artefact<'a, T> {
-    #[serde(flatten)]
-    content: T,
-    provenance: &'a Provenance,
-}
-
-/// `1-record/records.json`.
-#[derive(Serialize)]
-struct RecordsFile<'a> {
-    sample_time: f64,
-    inputs: &'a [Channel],
-    outputs: &'a [Channel],
-    estimation: Vec<RecordLength<'a>>,
-    verification: Vec<RecordLength<'a>>,
-    segments: &'a [RecordSegment],
-}
-
-#[derive(Serialize)]
-struct RecordLength<'a> {
-    name: &'a str,
-    samples: usize,
-}
-
-impl<'a> From<&'a RunRecords> for RecordsFile<'a> {
-    fn from(records: &'a RunRecords) -> Self {
-        let lengths = |group: &'a [LoopRecord]| {
-            group.iter().map(|r| RecordLength { name: &r.name, samples: r.samples() }).collect()
-        };
-        RecordsFile {
-            sample_time: records.time.ts(),
-            inputs: &records.inputs,
-            outputs: &records.outputs,
-            estimation: lengths(&records.estimation),
-            verification: lengths(&records.verification),
-            segments: &records.segments,
-        }
-    }
-}
-
-/// `details` of `2-factor/left.json` and `right.json`.
-#[derive(Serialize)]
-struct FactorDetails {
-    bezout_residual: f64,
-}
-
-/// `3-signals/signals.json`.
-#[derive(Serialize)]
-struct SignalsFile {
-    dropped_samples: usize,
-    controller_mismatch: Option<f64>,
-}
-
-/// `7-validate/verdict.json`.
-#[derive(Serialize)]
-struct VerdictFile<'a> {
-    models: BTreeMap<String, VerdictEntry<'a>>,
-    channel_scales: OrRefused<ScalesEntry>,
-}
-
-#[derive(Serialize)]
-struct VerdictEntry<'a> {
-    #[serde(flatten)]
-    facts: ModelFacts,
-    robustness: RobustnessFile<'a>,
-}
-
-/// A model in `7-validate/verdict.json`, without its robustness.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct ModelFacts {
-    pub(super) order: usize,
-    pub(super) poles: Vec<[f64; 2]>,
-    pub(super) modes: Vec<ModeEntry>,
-    pub(super) stabilised_by_controller: bool,
-    pub(super) closed_loop_poles: Vec<[f64; 2]>,
-    pub(super) records: Vec<RecordFacts>,
-}
-
-/// A model on a record.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(super) struct RecordFacts {
-    pub(super) record: String,
-    pub(super) fit: Vec<Option<f64>>,
-    pub(super) vaf: Vec<Option<f64>>,
-    pub(super) failure: Option<String>,
-}
-
-impl<'a> From<&'a ModelVerdict> for VerdictEntry<'a> {
-    fn from(v: &'a ModelVerdict) -> Self {
-        let record = |r: &super::verdict::RecordVerdict| RecordFacts {
-            record: r.record.clone(),
-            fit: finite_all(&r.fit),
-            vaf: finite_all(&r.vaf),
-            failure: r.predicted.as_ref().err().cloned(),
-        };
-        let facts = ModelFacts {
-            order: v.model.order(),
-            poles: pairs(&v.poles),
-            modes: v.modes.iter().map(ModeEntry::from).collect(),
-            stabilised_by_controller: v.certificate.stable,
-            closed_loop_poles: pairs(&v.certificate.poles),
-            records: v.records.iter().map(record).collect(),
-        };
-        VerdictEntry { facts, robustness: RobustnessFile::from(&v.robustness) }
-    }
-}
-
-/// `7-validate/residuals.json`.
-#[derive(Serialize)]
-struct ResidualsFile<'a> {
-    lags: usize,
-    steps: Vec<String>,
-    models: BTreeMap<&'a str, BTreeMap<&'a str, &'a RecordResiduals>>,
-}
-
-impl<'a> From<&'a [ModelVerdict]> for ResidualsFile<'a> {
-    fn from(models: &'a [ModelVerdict]) -> Self {
-        let tests = |v: &'a ModelVerdict| {
-            v.records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect()
-        };
-        let models = models.iter().map(|v| (v.method.key(), tests(v))).collect();
-        ResidualsFile { lags: RESIDUAL_LAGS, steps: step_keys(), models }
-    }
 }

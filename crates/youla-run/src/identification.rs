@@ -2,7 +2,7 @@
 
 use super::certificate::RunCertificate;
 use super::check::DataCheck;
-use super::factorise::{DeclaredLoop, Factorisation};
+use super::factorise::{DeclaredLoop, LoopFactors};
 use super::grey_box::GreyBoxRun;
 use super::method::Method;
 use super::records::RunRecords;
@@ -53,7 +53,7 @@ pub struct Identification {
 #[derive(Debug, Clone)]
 pub struct Filtered {
     /// The factors of nominal model and controller.
-    pub factorisation: Factorisation,
+    pub factorisation: LoopFactors,
     /// alpha and beta of the estimation records.
     pub signals: DeviationSignals,
 }

@@ -64,7 +64,7 @@ pub use entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused}
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
 pub use export::{controller_for_export, model_for_export};
-pub use factorise::{DeclaredLoop, Factorisation, declared_loop, factorise, factorise_run};
+pub use factorise::{DeclaredLoop, LoopFactors, declared_loop, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::write_artefacts;
 pub use grey_box::{GreyBoxRun, PhysicalEntry};
@@ -79,14 +79,14 @@ pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry};
 pub use redraw::redraw;
 pub use reduction::{ReductionEntry, RunReduction};
 pub use reference::settings_reference;
-pub use residual_tests::{LargestEntry, Predictor, RecordResiduals, ResidualEntry};
+pub use residual_tests::{LargestEntry, RecordResiduals, ResidualEntry, ResidualPredictor};
 pub use robustness::{DiskEntry, Robustness, RobustnessEntry, ScalesEntry};
 pub use schema::{settings_schema, summary_schema};
 pub use segments::RecordSegment;
 pub use settings::{
-    AlternativeStructure, CertificateSettings, Controller, ControllerSettings, DataFile, DataSettings,
-    DeviationSettings, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings,
-    NominalModel, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
+    AlternativeStructure, CertificateSettings, ControllerSettings, DataFile, DataSettings, DeviationSettings,
+    DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, NominalModel,
+    Polynomials, Prediction, RealisedController, RunSettings, TachoUnit, VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stage::{Stage, StageClock, StageTimes};

@@ -169,7 +169,7 @@ fn continuous(found: &Recommendation) -> Option<StateSpace<Continuous>> {
 
 /// The line on the recommended model, then one line for each question that its evidence fails.
 pub(super) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
-    let line = |status, text: String| draw::Verdict { status, text, evidence: draw::Evidence::Recommended };
+    let line = |status, text: String| draw::Verdict { status, text, evidence: draw::ReportPart::Recommended };
     let model = match &found.recommended {
         Ok(model) => model,
         Err(reason) => {

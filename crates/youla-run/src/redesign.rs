@@ -13,7 +13,7 @@ use youla::lti::{SharedMode, frequency_response};
 use youla::validate::ExactCertificate;
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
-use youla_loop::redesign::{Candidate, LoopFigures, Redesign, RedesignMethod, RedesignProblem, redesign};
+use youla_loop::redesign::{LoopFigures, Redesign, RedesignMethod, RedesignProblem, TriedWeight, redesign};
 use youla_report::data as draw;
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 
@@ -73,7 +73,7 @@ pub struct RedesignEntry {
     /// The exact test of G(S) with K(Q), for `youla`.
     pub exact: Option<ExactEntry>,
     /// All weights that were tried.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<TriedWeight>,
 }
 
 /// Figures of a loop.
@@ -174,7 +174,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
         figures.modes.iter().filter(|m| m.share >= 0.05).map(row).collect::<Vec<_>>()
     };
     let number = |v: Option<f64>| v.map_or("–".to_owned(), |v| format!("{v:.3}"));
-    let candidate = |c: &Candidate| {
+    let candidate = |c: &TriedWeight| {
         let taken = if c.input_weight == redesign.input_weight { "selected" } else { "" };
         let remark = c.refused.clone().unwrap_or_else(|| taken.into());
         vec![
@@ -195,7 +195,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
                 .into(),
         },
         draw::EvidenceTable {
-            title: "Candidate weights".into(),
+            title: "TriedWeight weights".into(),
             text: String::new(),
             columns: ["Weight of u", "Minimum damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
             rows: redesign.candidates.iter().map(candidate).collect(),

@@ -10,7 +10,7 @@ use youla::lti::Discrete;
 use youla::reduce::{
     LoopReduction, ReductionLoop, ReductionMethod, ReductionOptions, ReductionSweep, SweepRow, reduce_in_loop,
 };
-use youla_report::data::{self as draw, Evidence, Status};
+use youla_report::data::{self as draw, ReportPart, Status};
 
 /// Closed-loop error from which a reduction is to be looked at.
 /// The demonstration reduced from 16 to 6 states has 0.054 (`docs/reduction.md`). Chosen, not measured.
@@ -119,7 +119,7 @@ impl RunReduction {
             (true, Some(error)) if error < LARGE_ERROR && found.reduction.unstable_pole.is_none() => Status::Good,
             _ => Status::Caution,
         };
-        draw::Verdict { status, text: found.sentence(), evidence: Evidence::Reduction }
+        draw::Verdict { status, text: found.sentence(), evidence: ReportPart::Reduction }
     }
 
     /// As the report draws it.

@@ -28,24 +28,24 @@ pub struct RecordResiduals {
     /// Fits in percent over the second half: per [`youla::validate::PREDICTION_STEPS`] and last for the simulation, per output.
     pub k_step_fits: Vec<Vec<f64>>,
     /// What predicts the residual of the simulation in them.
-    pub predictor: Predictor,
+    pub predictor: ResidualPredictor,
 }
 
 /// What predicts the residual of a simulation some steps ahead.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Predictor {
+pub enum ResidualPredictor {
     /// The noise model of the model itself, from its Kalman gain or that of S.
     Kalman,
     /// An autoregression of the residual.
     Autoregression,
 }
 
-impl Predictor {
+impl ResidualPredictor {
     pub(super) fn words(self) -> &'static str {
         match self {
-            Predictor::Kalman => "Kalman gain",
-            Predictor::Autoregression => "autoregression",
+            ResidualPredictor::Kalman => "Kalman gain",
+            ResidualPredictor::Autoregression => "autoregression",
         }
     }
 }
@@ -101,13 +101,13 @@ fn fits_ahead(
     measured: MatRef<'_, f64>,
     predicted: MatRef<'_, f64>,
     noise: Option<&StateSpace<Discrete>>,
-) -> Result<(Vec<Vec<f64>>, Predictor)> {
+) -> Result<(Vec<Vec<f64>>, ResidualPredictor)> {
     match noise.map(|noise| k_step_fits_by_noise(measured, predicted, noise)) {
-        Some(Ok(fits)) => Ok((fits, Predictor::Kalman)),
+        Some(Ok(fits)) => Ok((fits, ResidualPredictor::Kalman)),
         Some(Err(error)) if !matches!(error, youla::Error::Unstable { .. } | youla::Error::Singular { .. }) => {
             Err(error.into())
         }
-        _ => Ok((k_step_fits(measured, predicted)?, Predictor::Autoregression)),
+        _ => Ok((k_step_fits(measured, predicted)?, ResidualPredictor::Autoregression)),
     }
 }
 
@@ -126,7 +126,7 @@ pub struct ResidualEntry {
     /// Fits in percent over the second half of the record, per output: some samples ahead, and of the simulation.
     pub k_step_fits: BTreeMap<String, Vec<Option<f64>>>,
     /// What predicts the residual in them.
-    pub predictor: Predictor,
+    pub predictor: ResidualPredictor,
 }
 
 /// Where a residual depends most on past excitation.

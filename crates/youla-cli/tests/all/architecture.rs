@@ -1,6 +1,6 @@
-//! The arrows of docs/architecture.md: which crate may use which, and no circle among the modules of the method.
+//! The arrows of docs/architecture.md: which crate may use which. The length of files, and the version.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -46,37 +46,29 @@ fn crates_use_only_what_the_page_shows() {
     }
 }
 
+/// Lines of the longest source; a file with more holds more than one idea.
+const LONGEST: usize = 400;
+
 #[test]
-fn modules_of_the_method_form_no_circle() {
-    let root = crates().join("youla/src");
-    let mut uses: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-    for file in sources(&root) {
-        let place = file.strip_prefix(&root).expect("below");
-        let module = place.components().next().expect("a module").as_os_str().to_string_lossy();
-        let module = module.trim_end_matches(".rs").to_owned();
-        if module == "lib" || place.ends_with("tests.rs") || place.ends_with("reference.rs") {
-            continue;
-        }
-        let text = fs::read_to_string(&file).expect("readable");
-        let text = text.split("#[cfg(test)]").next().unwrap_or_default();
-        let code = text.lines().filter(|line| !line.trim_start().starts_with("//"));
-        let used = code.flat_map(|line| line.split("crate::").skip(1).map(first_name)).filter(|name| *name != module);
-        uses.entry(module.clone()).or_default().extend(used.filter(|name| root.join(name).exists()));
-    }
-    // Take away modules that use no other until none is left.
-    while !uses.is_empty() {
-        let leaf = uses.iter().find(|(_, used)| used.is_empty()).map(|(module, _)| module.clone());
-        let Some(leaf) = leaf else { panic!("a circle among {uses:?}") };
-        uses.remove(&leaf);
-        for used in uses.values_mut() {
-            used.remove(&leaf);
-        }
+fn no_file_is_too_long() {
+    for file in sources(&crates()) {
+        let lines = fs::read_to_string(&file).expect("readable").lines().count();
+        assert!(lines <= LONGEST, "{} has {lines} lines, at most {LONGEST}", file.display());
     }
 }
 
-/// The module in what follows `crate::`.
-fn first_name(path: &str) -> String {
-    path.trim_start_matches('{').chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect()
+/// The program, the crates that use each other, the citation and the change log name one version.
+#[test]
+fn one_version_everywhere() {
+    let version = env!("CARGO_PKG_VERSION");
+    let text = |name: &str| fs::read_to_string(crates().join("..").join(name)).expect("readable");
+    let manifest: toml::Table = text("Cargo.toml").parse().expect("TOML");
+    let dependencies = manifest["workspace"]["dependencies"].as_table().expect("a table");
+    for (name, dependency) in dependencies.iter().filter(|(name, _)| name.starts_with("youla")) {
+        assert_eq!(dependency["version"].as_str(), Some(version), "{name}");
+    }
+    assert!(text("CITATION.cff").lines().any(|line| line == format!("version: {version}")));
+    assert!(text("CHANGELOG.md").contains(&format!("\n## [{version}]\n")));
 }
 
 fn sources(folder: &Path) -> Vec<PathBuf> {

@@ -8,10 +8,8 @@ mod browser;
 mod check;
 mod cli;
 mod common;
-#[path = "../cli/contract.rs"]
 mod contract;
 mod demo;
 mod examples;
 mod paper;
-#[path = "../cli/schema.rs"]
 mod schema;

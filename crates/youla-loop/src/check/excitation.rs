@@ -15,7 +15,7 @@ use youla::signal::{Welch, cross_spectrum, persistency, persistency_order};
 
 /// Properties of an excitation.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Excitation {
+pub struct ExcitationCheck {
     /// Standard deviation of each channel.
     pub deviations: Vec<f64>,
     /// Greatest distance from the mean over the standard deviation, of each channel; NaN for a constant one.
@@ -54,7 +54,7 @@ const WORTH: f64 = 0.1;
 /// assert_eq!((found.order, found.reached), (20, 4));
 /// # Ok::<(), youla_loop::Error>(())
 /// ```
-pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Result<Excitation> {
+pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Result<ExcitationCheck> {
     let n = signal.nrows();
     let mut centred = signal.to_owned();
     let (mut deviations, mut crest) = (Vec::new(), Vec::new());
@@ -89,10 +89,10 @@ pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Resu
             *end = Some(density.omega[last] / TAU);
         }
     }
-    Ok(Excitation { deviations, crest, order, reached, condition: found.condition, band_end })
+    Ok(ExcitationCheck { deviations, crest, order, reached, condition: found.condition, band_end })
 }
 
-impl Excitation {
+impl ExcitationCheck {
     /// `declared` where the signal is a known excitation and not the input; `may_rest` for a reference.
     pub(super) fn findings(
         &self,

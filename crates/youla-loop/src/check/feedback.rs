@@ -12,7 +12,7 @@ use crate::error::Result;
 
 /// Dependence of the inputs on past outputs.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Feedback {
+pub struct FeedbackCheck {
     /// Input, counted from 0, that depends most.
     pub input: usize,
     /// Share of what its own past and the excitations leave of it that past outputs explain.
@@ -25,18 +25,24 @@ pub struct Feedback {
 
 /// Tests all inputs; the signals are m inputs, p outputs, then the excitations. Two per cent of what is new in the input is
 /// the least share, `options.share`.
-pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize, options: &CheckOptions) -> Result<Feedback> {
+pub(super) fn of_record(
+    lagged: &Lagged,
+    m: usize,
+    p: usize,
+    known: usize,
+    options: &CheckOptions,
+) -> Result<FeedbackCheck> {
     let outside = m + p..m + p + known;
     let without = [lagged.past(0..m, 1), lagged.past(outside, 0), vec![lagged.trend(0)]].concat();
     let with = [without.clone(), lagged.past(m..m + p, 1)].concat();
     let targets: Vec<usize> = (0..m).map(|s| lagged.column(s, 0)).collect();
     let (without, with) = (lagged.fit(&targets, without)?, lagged.fit(&targets, with)?);
-    let mut strongest = Feedback { input: 0, share: 0.0, deviations: 0.0, detected: false };
+    let mut strongest = FeedbackCheck { input: 0, share: 0.0, deviations: 0.0, detected: false };
     for input in 0..m {
         let gain = lagged.gain(&without, &with, input);
         let detected = gain.deviations > options.significance && gain.share > options.share;
         if (detected, gain.deviations) > (strongest.detected, strongest.deviations) {
-            strongest = Feedback { input, share: gain.share, deviations: gain.deviations, detected };
+            strongest = FeedbackCheck { input, share: gain.share, deviations: gain.deviations, detected };
         }
     }
     Ok(strongest)
@@ -64,11 +70,11 @@ pub fn feedback(
     u: youla::MatRef<'_, f64>,
     y: youla::MatRef<'_, f64>,
     options: &CheckOptions,
-) -> Result<Option<Feedback>> {
+) -> Result<Option<FeedbackCheck>> {
     Lagged::new(&[u, y], options.lags).map(|lagged| of_record(&lagged, u.ncols(), y.ncols(), 0, options)).transpose()
 }
 
-impl Feedback {
+impl FeedbackCheck {
     /// `expected` where a controller is declared.
     pub(super) fn finding(&self, record: &str, input: &str, expected: bool) -> Option<Finding> {
         let (severity, what, advice) = match (self.detected, expected) {

@@ -18,7 +18,7 @@ use youla::signal::Channel;
 
 /// A line in a signal.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
+pub struct SpectralLine {
     /// Frequency, Hz; between bins by the ratio of the neighbours.
     pub hz: f64,
     /// Amplitude, in the unit of the channel.
@@ -62,7 +62,7 @@ const PERIODIC: f64 = 0.02;
 /// assert!((found[0].hz - 7.958).abs() < 0.01 && (found[0].amplitude - 0.2).abs() < 0.02);
 /// # Ok::<(), youla_loop::Error>(())
 /// ```
-pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOptions) -> Vec<Line> {
+pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOptions) -> Vec<SpectralLine> {
     let n = values.len();
     let Some(spectrum) = Spectrum::new(values) else { return Vec::new() };
     let threshold = spectrum.threshold(options.line_false_alarm);
@@ -71,7 +71,7 @@ pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOp
         return Vec::new();
     }
     let known: Vec<Spectrum> = known.iter().filter_map(|k| Spectrum::new(k)).collect();
-    let mut found: Vec<Line> = Vec::new();
+    let mut found: Vec<SpectralLine> = Vec::new();
     for k in candidates {
         let shared = |other: &Spectrum| (k - 1..=k + 1).any(|i| other.ratio(i) > SHARED * threshold) || other.periodic;
         if known.iter().any(shared) {
@@ -79,7 +79,7 @@ pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOp
         }
         let hz = spectrum.between(k) / (n as f64 * time.ts());
         let amplitude = spectrum.amplitude(k);
-        found.push(Line { hz, amplitude, ratio: spectrum.ratio(k), threshold, multiple: None });
+        found.push(SpectralLine { hz, amplitude, ratio: spectrum.ratio(k), threshold, multiple: None });
     }
     let bin = 1.0 / (n as f64 * time.ts());
     if let Some(first) = found.first().map(|line| line.hz) {
@@ -176,7 +176,7 @@ impl Spectrum {
 }
 
 /// One finding for the lines of a channel.
-pub(super) fn finding(lines: &[Line], record: &str, channel: &Channel) -> Option<Finding> {
+pub(super) fn finding(lines: &[SpectralLine], record: &str, channel: &Channel) -> Option<Finding> {
     let strongest = lines.iter().max_by(|a, b| a.amplitude.total_cmp(&b.amplitude))?;
     let listed: Vec<String> = lines
         .iter()

@@ -17,7 +17,7 @@ pub struct Gap {
 
 /// Properties of a time column.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Timing {
+pub struct TimingCheck {
     /// Median step, seconds as declared by the column.
     pub step: f64,
     /// Root mean square of the deviations of the other steps, as a part of the median.
@@ -52,7 +52,7 @@ const GAP: f64 = 1.5;
 /// let found = timing(&times, None, 1e-3).unwrap();
 /// assert_eq!((found.gaps[0].row, found.gaps[0].missing), (41, 3));
 /// ```
-pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Timing> {
+pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<TimingCheck> {
     if times.len() < 3 {
         return None;
     }
@@ -63,7 +63,7 @@ pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Ti
         return None;
     }
     let (irregular, gaps, repeated, back) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    let mut found = Timing { step, jitter: 0.0, worst: 0.0, irregular, gaps, repeated, back, unit: None };
+    let mut found = TimingCheck { step, jitter: 0.0, worst: 0.0, irregular, gaps, repeated, back, unit: None };
     let (mut energy, mut count) = (0.0, 0);
     for (k, pair) in times.windows(2).enumerate() {
         let (row, relative) = (k + 2, (pair[1] - pair[0]) / step);
@@ -86,7 +86,7 @@ pub fn timing(times: &[f64], declared: Option<f64>, tolerance: f64) -> Option<Ti
     Some(found)
 }
 
-impl Timing {
+impl TimingCheck {
     /// The findings; `first` is the row of the file, counted from 1, of the first time.
     pub fn findings(&self, record: &str, first: usize) -> Vec<Finding> {
         let mut all = Vec::new();

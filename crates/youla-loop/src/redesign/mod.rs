@@ -103,7 +103,7 @@ pub struct RedesignProblem<'a> {
 
 /// One weight that was tried.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct Candidate {
+pub struct TriedWeight {
     /// Weight of the inputs.
     pub input_weight: f64,
     /// Least damping of the modes that matter; absent where the loop is unstable or the design failed.
@@ -147,7 +147,7 @@ pub struct Redesign {
     /// The new loop over the region of S, where it is known.
     pub band: Option<BandCertificate>,
     /// All weights that were tried, in the order of the options.
-    pub candidates: Vec<Candidate>,
+    pub candidates: Vec<TriedWeight>,
 }
 
 impl Redesign {
@@ -170,7 +170,7 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
     let running = problem.factors.controller()?;
     let sizes = (problem.input_size, problem.output_size);
     let present = LoopFigures::new(problem.model, &running, sizes)?;
-    let mut tried: Vec<(Candidate, Option<(NewController, LoopFigures)>)> = Vec::new();
+    let mut tried: Vec<(TriedWeight, Option<(NewController, LoopFigures)>)> = Vec::new();
     for weight in &options.input_weights {
         tried.push(try_weight(problem, options, &plant, *weight)?);
     }
@@ -226,8 +226,8 @@ fn try_weight(
     options: &RedesignOptions,
     plant: &StateSpace<Discrete>,
     weight: f64,
-) -> Result<(Candidate, Option<(NewController, LoopFigures)>)> {
-    let mut candidate = Candidate {
+) -> Result<(TriedWeight, Option<(NewController, LoopFigures)>)> {
+    let mut candidate = TriedWeight {
         input_weight: weight,
         least_damping: None,
         peak_sensitivity: None,

@@ -9,8 +9,8 @@ pub use merge::merge;
 
 use crate::story::{Claim, paper_claims};
 use crate::study::{
-    Campaign, Evaluated, Item, Method, Outcome, Paper, PaperSettings, Row, Status, Timing, crossover, crossover_items,
-    evaluate, experiments, monte_carlo,
+    Campaign, Evaluated, Item, Method, Outcome, Paper, PaperSettings, PaperTiming, Row, Status, crossover,
+    crossover_items, evaluate, experiments, monte_carlo,
 };
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
@@ -199,13 +199,13 @@ impl Clock {
         result
     }
 
-    fn timing(&self, settings: &PaperSettings, outcomes: &[&Outcome]) -> Timing {
+    fn timing(&self, settings: &PaperSettings, outcomes: &[&Outcome]) -> PaperTiming {
         let loops: usize = outcomes.iter().map(|o| o.computed).sum();
         let mean = |part: usize| {
             let seconds: f64 = outcomes.iter().filter_map(|o| o.durations.get(part)).map(|d| d.as_secs_f64()).sum();
             if loops == 0 { 0.0 } else { 1e3 * seconds / loops as f64 }
         };
-        Timing {
+        PaperTiming {
             threads: rayon::current_num_threads(),
             stages: self.0.clone(),
             loops,

@@ -3,7 +3,7 @@
 use super::*;
 use crate::rig::RigParameters;
 use crate::study::{
-    Experiments, Method, Paper, PaperSettings, Row, Status, Timing, crossover, crossover_items, experiments,
+    Experiments, Method, Paper, PaperSettings, PaperTiming, Row, Status, crossover, crossover_items, experiments,
 };
 use std::collections::BTreeSet;
 use std::sync::OnceLock;
@@ -81,7 +81,7 @@ fn paper(study: Vec<Row>) -> Paper {
         rig: RigParameters::shipped(),
         study,
         experiments: shared_experiments(),
-        timing: Timing::default(),
+        timing: PaperTiming::default(),
     }
 }
 
@@ -293,6 +293,6 @@ fn the_summary_says_what_the_page_says() {
     assert!(claims.iter().zip(&page).all(|(a, b)| a["text"] == b.text.as_str() && a["key"] == b.key));
     assert_eq!(summary["crossover"][0]["winner"], serde_json::Value::Null);
     assert_eq!(summary["crossover"][3]["winner"], "hansen");
-    let other = Paper { timing: Timing { threads: 7, loop_ms: 3.0, ..Timing::default() }, ..paper };
+    let other = Paper { timing: PaperTiming { threads: 7, loop_ms: 3.0, ..PaperTiming::default() }, ..paper };
     assert_eq!(paper_summary(&other).unwrap(), summary);
 }

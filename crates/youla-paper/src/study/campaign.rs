@@ -2,7 +2,7 @@
 //! continued.
 
 use super::item::Evaluated;
-use super::row::{Line, Row};
+use super::row::{ResultLine, Row};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -99,7 +99,7 @@ impl FromStr for Shard {
 /// Items whose rows go to one file.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// The results file: [`Line::HEADER`], then the rows of item after item.
+    /// The results file: [`ResultLine::HEADER`], then the rows of item after item.
     pub path: PathBuf,
     /// The items.
     pub items: Range<usize>,
@@ -129,7 +129,7 @@ impl Campaign {
     /// # Errors
     /// Of the item with the lowest number that fails; rows before it stay. [`Error::NotResults`] where the file is something
     /// else, [`Error::InUse`] where another process writes to it, [`youla_io::Error::Io`].
-    pub fn run<R: Line>(
+    pub fn run<R: ResultLine>(
         &self,
         evaluate: impl Fn(usize) -> Result<Evaluated<R>> + Sync,
         continued: &dyn Fn(usize, usize),
@@ -182,7 +182,7 @@ struct Writer<R> {
     failure: Option<Error>,
 }
 
-impl<R: Line> Writer<R> {
+impl<R: ResultLine> Writer<R> {
     fn take(&mut self, item: usize, evaluated: Result<Evaluated<R>>, path: &Path) {
         self.waiting.insert(item, evaluated);
         while self.failure.is_none()
@@ -227,7 +227,7 @@ struct Found<R> {
     damaged: usize,
 }
 
-impl<R: Line> Found<R> {
+impl<R: ResultLine> Found<R> {
     /// Reads the complete items at the beginning of a file.
     fn read(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Self> {
         let text =
@@ -260,6 +260,6 @@ impl<R: Line> Found<R> {
     }
 }
 
-fn complete<R: Line>(line: &[u8]) -> Option<R> {
+fn complete<R: ResultLine>(line: &[u8]) -> Option<R> {
     R::parse(std::str::from_utf8(line).ok()?.strip_suffix('\n')?)
 }

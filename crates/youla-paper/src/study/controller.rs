@@ -1,6 +1,6 @@
 //! The controller of one nominal model: LQG, the strongest of a list that keeps a margin.
 
-use super::settings::ControllerSettings;
+use super::settings::StudyController;
 use crate::{Error, Result};
 use faer::Scale;
 use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, peak_sensitivity};
@@ -34,7 +34,7 @@ pub fn design_with(
     nominal: &StateSpace<Discrete>,
     plant: &StateSpace<Discrete>,
     command_weight: f64,
-    settings: &ControllerSettings,
+    settings: &StudyController,
 ) -> Result<Design> {
     let weights = [settings.displacement_weight, settings.velocity_weight, 0.0];
     let n = nominal.order();
@@ -63,7 +63,7 @@ pub fn design(
     nominal: &StateSpace<Discrete>,
     plant: &StateSpace<Discrete>,
     command_weights: &[f64],
-    settings: &ControllerSettings,
+    settings: &StudyController,
 ) -> Result<Design> {
     let mut lowest = None;
     for &weight in command_weights {

@@ -41,9 +41,9 @@ pub use experiments::{Experiments, OpenLoopFit, experiments};
 pub use item::{Evaluated, Item, evaluate};
 pub use method::Method;
 pub use monte_carlo::monte_carlo;
-pub use paper::{Paper, Timing};
-pub use row::{Line, Row, Status};
-pub use settings::{ControllerSettings, CrossoverSettings, ExperimentSettings, PaperSettings, StudySettings};
+pub use paper::{Paper, PaperTiming};
+pub use row::{ResultLine, Row, Status};
+pub use settings::{CrossoverSettings, ExperimentSettings, PaperSettings, StudyController, StudySettings};
 pub use starts::{
     CONVERGED_WITHIN, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts,
     start_counts, start_failures,

@@ -21,13 +21,13 @@ pub struct Paper {
     /// Table 1 and Figs 6 to 10.
     pub experiments: Experiments,
     /// What took how long.
-    pub timing: Timing,
+    pub timing: PaperTiming,
 }
 
 /// Where the time went. Not part of the results: it differs from run to run.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Timing {
+pub struct PaperTiming {
     /// Threads.
     pub threads: usize,
     /// Wall seconds per stage, of this call.

@@ -4,7 +4,7 @@ use super::method::Method;
 use sha2::{Digest, Sha256};
 
 /// One line of a results file of [`super::Campaign`].
-pub trait Line: Sized + Send {
+pub trait ResultLine: Sized + Send {
     /// The first line of the file.
     const HEADER: &str;
 
@@ -129,7 +129,7 @@ impl Row {
     }
 }
 
-impl Line for Row {
+impl ResultLine for Row {
     const HEADER: &str = Row::HEADER;
 
     fn item(&self) -> usize {

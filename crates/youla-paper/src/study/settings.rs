@@ -26,7 +26,7 @@ pub struct PaperSettings {
     /// Methods that the study and the map compare.
     pub methods: Vec<Method>,
     /// Controllers.
-    pub controller: ControllerSettings,
+    pub controller: StudyController,
     /// Figs 4 and 5.
     pub study: StudySettings,
     /// The crossover map.
@@ -46,7 +46,7 @@ pub struct PaperSettings {
 /// Controllers on nominal models.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ControllerSettings {
+pub struct StudyController {
     /// Weight of a displacement, per um^2.
     pub displacement_weight: f64,
     /// Weight of a velocity, per (um/s)^2.

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// A part of the report to which a line of the verdict leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Evidence {
+pub enum ReportPart {
     /// Evidence on the recommended model.
     Recommended,
     /// Table of fits.
@@ -58,7 +58,7 @@ pub struct Verdict {
     /// One sentence.
     pub text: String,
     /// Where the report shows it.
-    pub evidence: Evidence,
+    pub evidence: ReportPart,
 }
 
 /// A remark on the data or the run.

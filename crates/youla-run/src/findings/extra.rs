@@ -5,7 +5,7 @@ use crate::identification::Identification;
 use crate::method::Method;
 use youla::control::IsoZone;
 use youla_greybox::hansen_pem::PemStart;
-use youla_report::data::{Evidence, Status, Verdict};
+use youla_report::data::{ReportPart, Status, Verdict};
 
 /// Lines below the answer, each with its evidence.
 pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
@@ -37,13 +37,13 @@ fn margin_line(found: &Identification) -> Option<Verdict> {
         IsoZone::C => Status::Caution,
         IsoZone::D => Status::Bad,
     };
-    Some(Verdict { status, text, evidence: Evidence::Margins })
+    Some(Verdict { status, text, evidence: ReportPart::Margins })
 }
 
 fn redesign_line(found: &Identification) -> Option<Verdict> {
     let new = found.new_controller()?;
     let status = if new.gains_damping() { Status::Good } else { Status::Caution };
-    Some(Verdict { status, text: crate::redesign::sentence(new), evidence: Evidence::Redesign })
+    Some(Verdict { status, text: crate::redesign::sentence(new), evidence: ReportPart::Redesign })
 }
 
 /// Whether the controller stabilises the reduced model, and the error of the reduction in the loop.
@@ -76,7 +76,7 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
         Err(reason) => (true, format!("There are no intervals: {reason}.")),
     };
     let status = if doubt { Status::Caution } else { status };
-    Some(Verdict { status, text: format!("{text} {residuals}"), evidence: Evidence::Fits })
+    Some(Verdict { status, text: format!("{text} {residuals}"), evidence: ReportPart::Fits })
 }
 
 fn factor_line(found: &Identification) -> Option<Verdict> {
@@ -84,5 +84,5 @@ fn factor_line(found: &Identification) -> Option<Verdict> {
     // Half of the digits of double precision; scaled factors have 1e-13 (test `states_are_scaled_before_factorising`).
     let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
     let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
-    Some(Verdict { status, text, evidence: Evidence::Certificate })
+    Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

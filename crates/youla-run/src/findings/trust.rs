@@ -7,9 +7,9 @@ use crate::method::Method;
 use crate::recommended;
 use crate::residual_tests::RecordResiduals;
 use crate::verdict::ModelVerdict;
-use youla::identify::subspace::Evidence as Information;
+use youla::identify::subspace::DeviationEvidence;
 use youla_loop::check::{Finding, Severity};
-use youla_report::data::{Evidence, Status, Verdict};
+use youla_report::data::{ReportPart, Status, Verdict};
 
 /// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
@@ -34,7 +34,7 @@ fn mean_fit(v: &ModelVerdict) -> f64 {
 fn fit_line(found: &Identification) -> Option<Verdict> {
     if found.records.verification.is_empty() {
         let text = "No verification record was given, so the fit on fresh data is unknown.".into();
-        return Some(Verdict { status: Status::Caution, text, evidence: Evidence::Fits });
+        return Some(Verdict { status: Status::Caution, text, evidence: ReportPart::Fits });
     }
     let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
     let of = |method: Method| found.verdict.of(method).map(mean_fit);
@@ -50,7 +50,7 @@ fn fit_line(found: &Identification) -> Option<Verdict> {
     text.push('.');
     // A fit says how much of the output is not noise; a high one is no evidence of a right model.
     let worse = !fit.is_finite() || nominal > fit;
-    Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: Evidence::Fits })
+    Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: ReportPart::Fits })
 }
 
 /// Whether the residual depends on what excited the loop; nothing without a verification record.
@@ -84,7 +84,7 @@ fn residual_line(found: &Identification) -> Option<Verdict> {
             (Status::Caution, text)
         }
     };
-    Some(Verdict { status, text, evidence: Evidence::Residuals })
+    Some(Verdict { status, text, evidence: ReportPart::Residuals })
 }
 
 /// The causal correlation that is largest in its standard deviations.
@@ -107,7 +107,7 @@ fn data_line(found: &Identification) -> Option<Verdict> {
         (n, _) => (format!("{n} data defect{}", if n == 1 { "" } else { "s" }), Status::Bad),
     };
     let text = format!("{controller} {checked}.");
-    let evidence = if of_controller > of_check { Evidence::Signals } else { Evidence::Data };
+    let evidence = if of_controller > of_check { ReportPart::Signals } else { ReportPart::Data };
     Some(Verdict { status: of_controller.max(of_check), text, evidence })
 }
 
@@ -148,10 +148,10 @@ pub(super) fn deviation_line(found: &Identification) -> Option<Verdict> {
         Some(evidence) => information(evidence),
         None => (".".into(), Status::Info),
     };
-    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: Evidence::Order })
+    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: ReportPart::Order })
 }
 
-fn information(evidence: &Information) -> (String, Status) {
+fn information(evidence: &DeviationEvidence) -> (String, Status) {
     let figures = format!(
         "t = {:.1}, threshold {:.1} at {:.0} %",
         evidence.statistic,
@@ -184,7 +184,7 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
         true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst:.5}."),
         false => format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst:.5}."),
     };
-    Some(Verdict { status: of_loop, text, evidence: Evidence::Certificate })
+    Some(Verdict { status: of_loop, text, evidence: ReportPart::Certificate })
 }
 
 /// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
@@ -192,5 +192,5 @@ pub(super) fn region_line(found: &Identification) -> Option<Verdict> {
     let certificate = &found.scheme()?.certificate;
     let (text, band) = certificate.band_sentence().zip(certificate.band.as_ref())?;
     let status = if band.holds() { Status::Good } else { Status::Caution };
-    Some(Verdict { status, text, evidence: Evidence::Certificate })
+    Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

@@ -16,7 +16,7 @@ pub use data::{DataFile, DataSettings};
 pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
-pub use models::{Controller, ControllerSettings, Domain, Feedback, NominalModel, Polynomials};
+pub use models::{ControllerSettings, Domain, Feedback, NominalModel, Polynomials, RealisedController};
 pub use options::{DeviationSettings, FactorSettings, FrequencySettings, Prediction, VerificationSettings};
 
 use crate::{Error, Result};

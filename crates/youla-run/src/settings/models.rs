@@ -185,7 +185,7 @@ pub enum ControllerSettings {
 
 /// A controller in the library's convention, positive feedback.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Controller {
+pub enum RealisedController {
     /// `u = K y`.
     System(StateSpace<Discrete>),
     /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
@@ -202,11 +202,11 @@ impl ControllerSettings {
     ///
     /// # Errors
     /// Whatever is wrong with the matrices, polynomials or file.
-    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
         self.controller(folder, time).map_err(|e| e.within("[controller]"))
     }
 
-    fn controller(&self, folder: &Path, time: Discrete) -> Result<Controller> {
+    fn controller(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
         let (feedback, system) = match self {
             Self::DifferenceEquation { feedback, numerator, denominator } => {
                 let (p, m) = numerator.shape();
@@ -220,10 +220,10 @@ impl ControllerSettings {
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
-                return Ok(Controller::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
+                return Ok(RealisedController::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
             }
         };
-        Ok(Controller::System(if *feedback == Feedback::Negative { system.negated() } else { system }))
+        Ok(RealisedController::System(if *feedback == Feedback::Negative { system.negated() } else { system }))
     }
 }
 

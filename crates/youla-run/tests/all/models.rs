@@ -6,7 +6,7 @@ use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::export::{ModelFormat, NamedModel, export_model};
-use youla_run::{Controller, ControllerSettings, Domain, NominalModel};
+use youla_run::{ControllerSettings, Domain, NominalModel, RealisedController};
 
 /// One file in three formats is the model that was written; another sample time is refused, the sign is stated.
 #[test]
@@ -26,7 +26,7 @@ fn a_model_that_was_written_is_read_again() {
         assert!(error.to_string().contains("sample times differ"), "{error}");
         let text = format!("model_file = {{ feedback = \"negative\", file = {file:?} }}");
         let settings: ControllerSettings = toml::from_str(&text).unwrap();
-        let Controller::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
+        let RealisedController::System(k) = settings.realise(Path::new("/"), time).unwrap() else { panic!("a system") };
         assert_eq!(k, system.negated());
         // Only a MATLAB file may hold matrices in s.
         let continuous = NominalModel::ModelFile { file, domain: Some(Domain::Continuous) };

@@ -9,7 +9,9 @@
 
 use super::innovation_form::{self, InnovationForm, NoiseForm};
 use super::subspace::subspace_stream;
-use super::subspace::{Evidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty};
+use super::subspace::{
+    DeviationEvidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty,
+};
 use crate::Result;
 use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
 use crate::lti::{Discrete, StateSpace};
@@ -27,7 +29,7 @@ pub struct HansenModel {
     /// That of G(S), where it was asked for; that of S is with `deviation`.
     pub uncertainty: Option<Uncertainty>,
     /// Whether the data contradict the nominal model, where an uncertainty was asked for.
-    pub evidence: Option<Result<Evidence, NoUncertainty>>,
+    pub evidence: Option<Result<DeviationEvidence, NoUncertainty>>,
 }
 
 /// Choices of [`hansen`]; those of the subspace method alone are options too: `subspace.into()`.

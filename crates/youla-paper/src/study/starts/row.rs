@@ -1,6 +1,6 @@
 //! One line of a results file: one item by one search, with a check of its own.
 
-use super::super::row::{Line, Status, checked, in_one_field, unchecked};
+use super::super::row::{ResultLine, Status, checked, in_one_field, unchecked};
 use super::search::Search;
 
 /// The result of one search on one item.
@@ -44,7 +44,7 @@ impl StartRow {
     }
 }
 
-impl Line for StartRow {
+impl ResultLine for StartRow {
     const HEADER: &str =
         "item,setting,search,status,fit_horizontal,fit_vertical,cost,steps,local_minimum_suspected,note,check";
 

@@ -68,8 +68,8 @@ pub use stability::{MovedPole, StabilityReport};
 pub use stream::subspace_stream;
 pub(crate) use uncertainty::check as check_uncertainty;
 pub use uncertainty::{
-    BlockInfluence, Bootstrap, Delta, Draw, Evidence, Interval, ModeBand, NoUncertainty, ResponseBand, Uncertainty,
-    UncertaintyMethod, UncertaintyOptions,
+    BlockInfluence, Bootstrap, Delta, DeviationEvidence, Draw, Interval, ModeBand, NoUncertainty, ResponseBand,
+    Uncertainty, UncertaintyMethod, UncertaintyOptions,
 };
 
 use crate::lti::{Discrete, StateSpace};

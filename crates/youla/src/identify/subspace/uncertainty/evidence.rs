@@ -26,7 +26,7 @@ const BLOCKS: (usize, usize) = (10, 30);
 
 /// The outcome of the test of S = 0.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evidence {
+pub struct DeviationEvidence {
     /// Mean of the two values of Student's t.
     pub statistic: f64,
     /// What it exceeds under S = 0 with a probability of one less the level, at most.
@@ -35,7 +35,7 @@ pub struct Evidence {
     pub level: f64,
 }
 
-impl Evidence {
+impl DeviationEvidence {
     /// Whether the data contradict the nominal model. Where they do not, S carries no information.
     pub fn against_nominal(&self) -> bool {
         self.statistic > self.threshold
@@ -48,7 +48,7 @@ impl SubspaceData<'_> {
     ///
     /// # Errors
     /// [`NoUncertainty`] where half of the data gives no model.
-    pub fn evidence(&self, order: usize, options: &SubspaceOptions) -> Result<Evidence, NoUncertainty> {
+    pub fn evidence(&self, order: usize, options: &SubspaceOptions) -> Result<DeviationEvidence, NoUncertainty> {
         let failed = |error: crate::Error| {
             NoUncertainty::Failed(format!("the test of S = 0 on halves of the record is not possible: {error}"))
         };
@@ -61,7 +61,7 @@ impl SubspaceData<'_> {
         let (first, second) = (first.map_err(failed)?, second.map_err(failed)?);
         let level = options.uncertainty.level;
         let threshold = student(level, count as f64 / 1.5);
-        Ok(Evidence { statistic: 0.5 * (first + second), threshold, level })
+        Ok(DeviationEvidence { statistic: 0.5 * (first + second), threshold, level })
     }
 
     /// Those of the model, for records that are shifted by the delays already.

@@ -21,7 +21,7 @@ pub use band::Reach;
 pub use band::{ModeBand, ResponseBand};
 pub use bootstrap::Bootstrap;
 pub use delta::{BlockInfluence, Delta};
-pub use evidence::Evidence;
+pub use evidence::DeviationEvidence;
 pub use figures::{Draw, Interval};
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 pub(super) use poles::pole_deviations;

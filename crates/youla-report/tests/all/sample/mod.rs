@@ -1,57 +1,13 @@
 //! Reports with data like that of real runs: sums of modes with square-wave excitation and noise.
 
-use std::f64::consts::TAU;
+mod curves;
+mod modal;
 
-use faer::c64;
-use rand::SeedableRng;
-use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
+use curves::{estimation, experiment, frequency};
+use modal::Modal;
 use youla::signal::Channel;
 use youla_report::data::*;
 use youla_report::{ReportData, Timeline, Trace};
-
-/// A plant as a sum of modes `gain * w^2 / (s^2 + 2 zeta w s + w^2)`.
-#[derive(Clone)]
-struct Modal {
-    modes: Vec<(f64, f64, Vec<Vec<f64>>)>,
-}
-
-impl Modal {
-    fn with(&self, frequency: f64, damping: f64, gain: f64) -> Self {
-        let changed = |gains: &Vec<Vec<f64>>| gains.iter().map(|row| row.iter().map(|g| g * gain).collect()).collect();
-        Modal { modes: self.modes.iter().map(|(hz, zeta, g)| (hz * frequency, zeta * damping, changed(g))).collect() }
-    }
-
-    fn pole(hz: f64, zeta: f64, ts: f64) -> c64 {
-        let w = TAU * hz * ts;
-        c64::from_polar((-zeta * w).exp(), w * (1.0 - zeta * zeta).sqrt())
-    }
-
-    fn response(&self, hz: f64, output: usize, input: usize) -> c64 {
-        let term = |(f, zeta, gain): &(f64, f64, Vec<Vec<f64>>)| {
-            let ratio = hz / f;
-            c64::new(gain[output][input], 0.0) / c64::new(1.0 - ratio * ratio, 2.0 * zeta * ratio)
-        };
-        self.modes.iter().map(term).fold(c64::new(0.0, 0.0), |sum, t| sum + t)
-    }
-
-    fn simulate(&self, u: &[Vec<f64>], output: usize, ts: f64) -> Vec<f64> {
-        let samples = u[0].len();
-        let mut y = vec![0.0; samples];
-        for (hz, zeta, gain) in &self.modes {
-            let z = Self::pole(*hz, *zeta, ts);
-            let (a1, a2) = (2.0 * z.re, z.re * z.re + z.im * z.im);
-            let (mut x1, mut x2) = (0.0, 0.0);
-            for k in 0..samples {
-                y[k] += x1;
-                let drive: f64 = u.iter().zip(&gain[output]).map(|(u, g)| u[k] * g).sum();
-                let next = a1 * x1 - a2 * x2 + (1.0 - a1 + a2) * drive;
-                (x2, x1) = (x1, next);
-            }
-        }
-        y
-    }
-}
 
 struct Plan {
     plant: Modal,
@@ -155,7 +111,7 @@ fn report(plan: &Plan) -> ReportData {
         further: vec![Verdict {
             status: Status::Bad,
             text: "The peak sensitivity of the loop is 7.46.".into(),
-            evidence: Evidence::Margins,
+            evidence: ReportPart::Margins,
         }],
         notes: vec![
             Note { status: Status::Caution, text: "Input u was saturated in 0.3 % of the samples; the measured input was used.".into() },
@@ -330,43 +286,14 @@ fn diagram(plan: &Plan, method: &str, label: &str) -> Stabilisation {
 
 fn verdict() -> Vec<Verdict> {
     [
-        (Status::Good, "The Hansen model predicts unused data with fits of 83.1 to 91.4 %, against 21.5 % at best for the nominal model.", Evidence::Fits),
-        (Status::Good, "S is stable and the logged controller stabilises G(S): worst closed-loop pole at |z| = 0.9865.", Evidence::Certificate),
-        (Status::Good, "It follows the model-free indirect response to 0.8 dB rms over 20 to 400 Hz.", Evidence::Frequency),
-        (Status::Caution, "Directly identified, the model is not stabilised by the controller under which the data were taken.", Evidence::Poles),
-        (Status::Good, "Four states suffice: the reduced model loses 0.4 points of fit.", Evidence::Reduction),
+        (Status::Good, "The Hansen model predicts unused data with fits of 83.1 to 91.4 %, against 21.5 % at best for the nominal model.", ReportPart::Fits),
+        (Status::Good, "S is stable and the logged controller stabilises G(S): worst closed-loop pole at |z| = 0.9865.", ReportPart::Certificate),
+        (Status::Good, "It follows the model-free indirect response to 0.8 dB rms over 20 to 400 Hz.", ReportPart::Frequency),
+        (Status::Caution, "Directly identified, the model is not stabilised by the controller under which the data were taken.", ReportPart::Poles),
+        (Status::Good, "Four states suffice: the reduced model loses 0.4 points of fit.", ReportPart::Reduction),
     ]
     .map(|(status, text, evidence)| Verdict { status, text: text.into(), evidence })
     .into()
-}
-
-/// Inputs and noisy outputs of one record.
-fn experiment(plan: &Plan, seed: u64) -> (Vec<Vec<f64>>, Vec<Vec<f64>>) {
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let mut noise = |size: f64| -> f64 {
-        let value: f64 = StandardNormal.sample(&mut random);
-        value * size
-    };
-    let u: Vec<Vec<f64>> = (0..plan.inputs.len())
-        .map(|_| {
-            let mut level = 1.0;
-            (0..plan.samples)
-                .map(|k| {
-                    if k % plan.hold == 0 {
-                        level = if noise(1.0) > 0.0 { 1.0 } else { -1.0 };
-                    }
-                    level + noise(0.02)
-                })
-                .collect()
-        })
-        .collect();
-    let y = (0..plan.outputs.len())
-        .map(|output| {
-            let clean = plan.plant.simulate(&u, output, plan.ts);
-            clean.iter().map(|y| y + noise(plan.noise)).collect()
-        })
-        .collect();
-    (u, y)
 }
 
 /// An order of the reduction; the first two are not stabilised, and the last has no model.
@@ -382,96 +309,6 @@ fn reduced_to(order: usize) -> ReductionOrder {
         worst_pole: Some([0.99, 0.01]),
         failure: (order == 6).then(|| "the reduced model must be stable".into()),
     }
-}
-
-fn estimation(plan: &Plan, u: &[Vec<f64>], y: &[Vec<f64>]) -> DrawnExperiment {
-    let clock = Timeline::around_largest_swing(plan.ts, &y[0]);
-    let mut signals = Vec::new();
-    let mut add = |kind, channel: Channel, samples: &[f64]| {
-        let trace = Trace::new(&channel.name, samples, &clock).unwrap();
-        signals.push(Signal { kind, channel, trace });
-    };
-    for (k, channel) in plan.inputs.iter().enumerate() {
-        let square: Vec<f64> = u[k].iter().map(|u| u.signum() * 0.5).collect();
-        add(SignalKind::Excitation, Channel::new(format!("d_{}", k + 1), &channel.unit), &square);
-    }
-    plan.inputs.iter().zip(u).for_each(|(channel, u)| add(SignalKind::Input, channel.clone(), u));
-    plan.outputs.iter().zip(y).for_each(|(channel, y)| add(SignalKind::Output, channel.clone(), y));
-    for (k, channel) in plan.inputs.iter().enumerate() {
-        let alpha: Vec<f64> = u[k].iter().map(|u| u * 0.7).collect();
-        add(SignalKind::Alpha, Channel::new(format!("alpha_{}", k + 1), &channel.unit), &alpha);
-    }
-    for (k, channel) in plan.outputs.iter().enumerate() {
-        let beta: Vec<f64> = y[k].windows(2).map(|pair| pair[1] - pair[0]).chain([0.0]).collect();
-        add(SignalKind::Beta, Channel::new(format!("beta_{}", k + 1), &channel.unit), &beta);
-    }
-    DrawnExperiment { name: "estimation".into(), clock, signals }
-}
-
-fn frequency(plan: &Plan, models: &[(Method, Modal)], outputs: usize, inputs: usize) -> FrequencyResponse {
-    let grid = |points: usize| -> Vec<f64> {
-        let ratio = plan.band.1 / plan.band.0;
-        (0..points).map(|k| plan.band.0 * ratio.powf(k as f64 / (points - 1) as f64)).collect()
-    };
-    let hz = grid(500);
-    let mut random = ChaCha8Rng::seed_from_u64(5);
-    let mut noise = move || -> f64 { StandardNormal.sample(&mut random) };
-    let mut response = FrequencyResponse { hz: hz.clone(), ..FrequencyResponse::default() };
-    for output in 0..outputs {
-        for input in 0..inputs {
-            for (method, model) in models {
-                let values: Vec<c64> = hz.iter().map(|&f| model.response(f, output, input)).collect();
-                if method.key == "hansen" {
-                    response.bands.push(region(output, input, &values));
-                }
-                response.models.push(ModelResponse {
-                    method: method.key.clone(),
-                    output,
-                    input,
-                    magnitude_db: values.iter().map(|g| 20.0 * g.norm().log10()).collect(),
-                    phase_deg: values.iter().map(|g| g.arg().to_degrees()).collect(),
-                });
-            }
-            let points = grid(280);
-            let mut indirect = Indirect {
-                output,
-                input,
-                hz: points.clone(),
-                magnitude_db: vec![],
-                phase_deg: vec![],
-                coherence: vec![],
-            };
-            for f in points {
-                let g = plan.plant.response(f, output, input);
-                let disturbance = 0.02 * plan.noise * (f / 50.0).sqrt();
-                let coherence = g.norm() / (g.norm() + disturbance);
-                let g = g + c64::new(noise(), noise()) * (disturbance * 0.7);
-                indirect.magnitude_db.push(20.0 * g.norm().log10());
-                indirect.phase_deg.push(g.arg().to_degrees());
-                indirect.coherence.push(coherence);
-            }
-            response.indirect.push(indirect);
-        }
-    }
-    if outputs.min(inputs) > 1 {
-        response.singular = (0..outputs.min(inputs)).map(|place| singular(&hz, place)).collect();
-    }
-    response
-}
-
-/// A region of 5 % about each value.
-fn region(output: usize, input: usize, values: &[c64]) -> Band {
-    let db = |factor: f64| values.iter().map(|g| 20.0 * (factor * g.norm()).log10()).collect();
-    let circle = |g: &c64| [(0.05 * g.norm()).powi(2), 0.0, (0.05 * g.norm()).powi(2)];
-    let region = values.iter().flat_map(circle).collect();
-    Band { method: "hansen".into(), output, input, level: 0.95, low_db: db(0.95), high_db: db(1.05), region }
-}
-
-/// Made up: one curve above the other.
-fn singular(hz: &[f64], place: usize) -> SingularValue {
-    let value_db: Vec<f64> = hz.iter().map(|f| 20.0 - 10.0 * place as f64 - 5.0 * f.log10()).collect();
-    let (low_db, high_db) = value_db.iter().map(|v| (v - 1.0, v + 1.0)).unzip();
-    SingularValue { method: "hansen".into(), place, value_db, level: Some(0.95), low_db, high_db }
 }
 
 fn fit(measured: &[f64], residual: &[f64]) -> f64 {

@@ -1,0 +1,165 @@
+//! What programs may rely on: summary.json, artefacts, signals, and the same result for the same seed.
+
+mod loops;
+mod reproduction;
+
+use crate::common::demo;
+use crate::schema::problem;
+use serde_json::{Map, Value};
+use std::fs;
+use std::path::Path;
+use youla_run::{Summary, summary_schema};
+
+fn json(path: &Path) -> Value {
+    serde_json::from_str(&fs::read_to_string(path).expect("readable")).expect("JSON")
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    value.as_object().expect("an object").keys().map(String::as_str).collect()
+}
+
+fn numbers(value: &Value) -> Vec<f64> {
+    value.as_array().expect("an array").iter().map(|x| x.as_f64().expect("a number")).collect()
+}
+
+#[test]
+fn summary_has_the_documented_structure() {
+    let summary = json(&demo().join("summary.json"));
+    let mut expected =
+        ["schema", "name", "nominal", "methods", "refused", "frequency_response", "bezout_residual"].to_vec();
+    expected.extend([
+        "certificate",
+        "channel_scales",
+        "controller_mismatch",
+        "data",
+        "recommended",
+        "redesign",
+        "reduction",
+        "seconds",
+        "true_plant",
+        "uncertainty",
+    ]);
+    expected.sort_unstable();
+    assert_eq!(keys(&summary), expected);
+    assert_eq!(summary["schema"], 2);
+    assert_eq!(summary["refused"], Value::Object(Map::new()));
+    for fit in [&summary["nominal"]["fit"], &summary["true_plant"]["fit"]] {
+        assert_eq!(keys(fit), ["verification"]);
+        assert_eq!(numbers(&fit["verification"]).len(), 2);
+    }
+    assert!(summary["bezout_residual"].as_f64().expect("a number") < 1e-12);
+    assert!(summary["controller_mismatch"].as_f64().expect("a number") < 1e-9);
+    assert_eq!(keys(&summary["uncertainty"]), ["blocks", "evidence", "level", "method"]);
+    assert_eq!(summary["uncertainty"]["evidence"]["against_nominal"], true);
+    let stages =
+        ["certify", "factor", "identify", "record", "redesign", "reduce", "report", "signals", "validate", "write"];
+    assert_eq!(keys(&summary["seconds"]), stages);
+    assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
+}
+
+/// The contract on the recommended model; its file is a model, and its deviations have one number per frequency, output and input.
+#[test]
+fn summary_recommends_one_model() {
+    let recommended = &json(&demo().join("summary.json"))["recommended"];
+    let expected =
+        ["dead_time", "evidence", "file", "method", "modes", "order", "reasons", "response_deviation", "trusted"];
+    assert_eq!(keys(recommended), expected);
+    assert!(recommended["method"] == "likelihood" && recommended["trusted"] == true, "{:?}", recommended["reasons"]);
+    let model = json(&demo().join(recommended["file"].as_str().expect("a path")));
+    for matrix in ["a", "b", "c", "d", "ts"] {
+        assert!(!model[matrix].is_null(), "{matrix}");
+    }
+    let deviation = &recommended["response_deviation"];
+    let hz = numbers(&deviation["hz"]);
+    let absolute = deviation["absolute"].as_array().expect("an array");
+    assert!(hz.windows(2).all(|w| w[0] < w[1]) && absolute.len() == hz.len());
+    let positive = |row: &Value| numbers(row).len() == 2 && numbers(row).iter().all(|s| *s > 0.0);
+    assert!(absolute.iter().all(|at| at.as_array().is_some_and(|rows| rows.len() == 2 && rows.iter().all(positive))));
+    for e in recommended["evidence"].as_array().expect("an array") {
+        assert!(e["question"].as_str().is_some_and(|q| q.ends_with('?')) && e["limit"].is_number(), "{e}");
+    }
+}
+
+/// The file fits the schema that `summary_schema` states, and the type reads it back.
+#[test]
+fn summary_fits_its_schema() {
+    let summary = json(&demo().join("summary.json"));
+    let schema = summary_schema();
+    assert_eq!(problem(&schema, &schema, &summary, "summary.json"), None);
+    let mut wrong = summary.clone();
+    wrong["methods"]["hansen"]["order"] = "sixteen".into();
+    assert!(problem(&schema, &schema, &wrong, "summary.json").is_some());
+    let read = Summary::read(demo()).expect("a summary");
+    assert_eq!(serde_json::to_value(&read).expect("JSON"), summary);
+}
+
+#[test]
+fn summary_describes_every_method() {
+    let summary = json(&demo().join("summary.json"));
+    assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced", "likelihood"]);
+    let common = ["fit", "modes", "order", "poles", "residuals", "robustness", "stabilised_by_controller"];
+    let hansen = [
+        "fit",
+        "modes",
+        "order",
+        "poles",
+        "residuals",
+        "robustness",
+        "s_order",
+        "s_stable",
+        "stabilised_by_controller",
+    ];
+    for (name, expected, order) in [
+        ("direct", &common[..], 6),
+        ("hansen", &hansen[..], 16),
+        ("hansen_reduced", &hansen[..], 6),
+        ("likelihood", &common[..], 6),
+    ] {
+        let method = &summary["methods"][name];
+        assert_eq!(keys(method), expected, "{name}");
+        assert_eq!(method["order"], order, "{name}");
+        assert!(method["stabilised_by_controller"].is_boolean());
+        assert!(numbers(&method["fit"]["verification"]).iter().all(|f| (20.0..100.0).contains(f)), "{name}");
+        let poles = method["poles"].as_array().expect("an array");
+        assert_eq!(poles.len(), order);
+        assert!(poles.iter().all(|p| numbers(p).len() == 2));
+        let modes = method["modes"].as_array().expect("an array");
+        let with_deviations = ["hz", "hz_deviation", "hz_interval", "zeta", "zeta_deviation", "zeta_interval"];
+        let of_mode = if ["hansen", "likelihood"].contains(&name) { &with_deviations[..] } else { &["hz", "zeta"] };
+        assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == of_mode), "{name}");
+    }
+    assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
+    assert_eq!(summary["methods"]["hansen"]["s_stable"], true);
+}
+
+#[test]
+fn frequency_responses_share_one_grid() {
+    let response = &json(&demo().join("summary.json"))["frequency_response"];
+    let all = [
+        "coherence",
+        "direct_db",
+        "hansen_db",
+        "hansen_reduced_db",
+        "hz",
+        "indirect_db",
+        "likelihood_db",
+        "nominal_db",
+        "true_plant_db",
+    ];
+    assert_eq!(keys(response), all);
+    let hz = numbers(&response["hz"]);
+    assert!(hz.len() > 100 && hz.windows(2).all(|w| w[0] < w[1]));
+    // Two inputs and two outputs: [output][input][frequency], coherence [output][frequency].
+    let array = |value: &Value| value.as_array().expect("an array").clone();
+    for key in all.iter().filter(|key| key.ends_with("_db")) {
+        let outputs = array(&response[key]);
+        assert_eq!(outputs.len(), 2, "{key}");
+        for curves in outputs.iter().map(array) {
+            assert!(curves.len() == 2 && curves.iter().all(|curve| numbers(curve).len() == hz.len()), "{key}");
+        }
+    }
+    let coherence = array(&response["coherence"]);
+    assert_eq!(coherence.len(), 2);
+    assert!(coherence.iter().all(|c| numbers(c).len() == hz.len()));
+    assert!(coherence.iter().flat_map(numbers).all(|c| (0.0..=1.0 + 1e-12).contains(&c)));
+}

@@ -2,18 +2,13 @@
 //! The QR transformation, Comput. J. 4 (1961-62), 265 and 332; the test for deflation is that of M. Ahues and F. Tisseur,
 //! LAPACK Working Note 122 (1997).
 
-use super::bulge_chasing::{Memory, sweep};
+use super::bulge_chasing::sweep;
 use super::schur::standardise;
-use super::shifts::{Shifts, trailing};
+use super::shifts::Shifts;
 use super::square::Square;
 use crate::{Error, Result};
 use faer::Mat;
 use pulp::{Arch, Simd, WithSimd};
-
-/// Order from which on an unreduced block is swept by a chain of bulges, and how many: the time of the iteration at n = 200 is the
-/// same for 3 to 8, shorter than for one; blocks of order 40 take longer with any chain.
-const LARGE: usize = 64;
-const CHAIN: usize = 4;
 
 /// Turns the Hessenberg matrix `t` into quasi-triangular form, deflating from the bottom until nothing is left, and
 /// accumulates the transformations in `q`.
@@ -35,11 +30,10 @@ impl WithSimd for Iteration<'_> {
     type Output = Result<()>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Result<()> {
+    fn with_simd<S: Simd>(self, _: S) -> Result<()> {
         let Iteration { what, t, q } = self;
         let n = t.order();
         let limit = 30 * n.max(10);
-        let mut memory = Memory::new(n);
         let (mut end, mut total, mut since_deflation) = (n, 0, 0);
         while end > 0 {
             let start = deflate(t, end);
@@ -56,25 +50,13 @@ impl WithSimd for Iteration<'_> {
                 _ => {
                     total += 1;
                     since_deflation += 1;
-                    let (first, shifts) = choose(t, start, end, since_deflation);
-                    sweep(simd, t, q, start..end, first, &shifts, &mut memory);
+                    let shifts = Shifts::choose(t, start, end, since_deflation);
+                    sweep(t, q, start..end, shifts.first_row(t, start, end), shifts);
                 }
             }
         }
         Ok(())
     }
-}
-
-/// The row in which the next sweep begins and its shifts.
-fn choose(t: &Square, start: usize, end: usize, sweeps: usize) -> (usize, Vec<Shifts>) {
-    if end - start >= LARGE && !sweeps.is_multiple_of(10) {
-        let shifts = trailing(t, end, CHAIN);
-        if !shifts.is_empty() {
-            return (start, shifts);
-        }
-    }
-    let shifts = Shifts::choose(t, start, end, sweeps);
-    (shifts.first_row(t, start, end), vec![shifts])
 }
 
 /// Sets the lowest negligible subdiagonal entry above row `end` to zero and returns the first row of the unreduced block.

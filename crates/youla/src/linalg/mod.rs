@@ -6,7 +6,6 @@
 mod balance;
 mod bulge_chasing;
 mod complex_schur;
-mod deferred_reflections;
 mod definite;
 mod expm;
 mod francis;

@@ -1,8 +1,7 @@
 //! Real Schur form `A = Q T Q'`: Q orthogonal, T quasi-triangular with 1 x 1 blocks for real eigenvalues and 2 x 2 blocks
 //! `[a b; c a]`, b c < 0, for the pairs `a +- i sqrt(-b c)`.
 //!
-//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5),
-//! for large n with several pairs of shifts at a time.
+//! Hessenberg reduction, then the double-shift QR iteration (Golub and Van Loan, Matrix Computations, 4th ed., section 7.5).
 
 use super::francis::quasi_triangular;
 use super::reflector::Rotation;

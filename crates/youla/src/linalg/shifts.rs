@@ -1,17 +1,12 @@
 //! Shifts of the QR iteration, always two at a time so that the arithmetic stays real.
 
-use super::eye;
-use super::francis::quasi_triangular;
-use super::schur::{block_eigenvalues, blocks};
 use super::square::Square;
-use faer::Mat;
 
-/// Two shifts: a conjugate pair `re +- i im`, or the real numbers `re +- split`; one of `im` and `split` is zero.
+/// Two shifts: a conjugate pair `re +- i im`, or twice the real number `re`.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Shifts {
     re: f64,
     im: f64,
-    split: f64,
 }
 
 impl Shifts {
@@ -23,28 +18,28 @@ impl Shifts {
         if sweeps.is_multiple_of(10) {
             let k = if sweeps.is_multiple_of(20) { n } else { start + 2 };
             let size = t[(k, k - 1)].abs() + t[(k - 1, k - 2)].abs();
-            return Shifts { re: t[(k, k)] + 0.75 * size, im: 0.4375_f64.sqrt() * size, split: 0.0 };
+            return Shifts { re: t[(k, k)] + 0.75 * size, im: 0.4375_f64.sqrt() * size };
         }
         let half = 0.5 * (a - d);
         let discriminant = half * half + b * c;
         if discriminant < 0.0 {
-            return Shifts { re: d + half, im: (-discriminant).sqrt(), split: 0.0 };
+            return Shifts { re: d + half, im: (-discriminant).sqrt() };
         }
         let away = half + discriminant.sqrt().copysign(half);
-        Shifts { re: if away == 0.0 { d } else { d - b * c / away }, im: 0.0, split: 0.0 }
+        Shifts { re: if away == 0.0 { d } else { d - b * c / away }, im: 0.0 }
     }
 
     /// The first column of `(T - s1 I)(T - s2 I)` for the block that begins in row k, divided by its size. It is made of
     /// differences to the shifts, so that eigenvalues that agree in many digits are still distinguished.
     pub(super) fn first_column(self, t: &Square, k: usize) -> [f64; 3] {
         let (a, b, c, d) = (t[(k, k)] - self.re, t[(k, k + 1)], t[(k + 1, k)], t[(k + 1, k + 1)] - self.re);
-        let Shifts { im, split, .. } = self;
-        let size = a.abs() + im.abs() + split.abs() + c.abs();
+        let im = self.im;
+        let size = a.abs() + im.abs() + c.abs();
         if size == 0.0 {
             return [0.0; 3];
         }
         let r = c / size;
-        [r * b + (a - split) * ((a + split) / size) + im * (im / size), r * (a + d), r * t[(k + 2, k + 1)]]
+        [r * b + a * (a / size) + im * (im / size), r * (a + d), r * t[(k + 2, k + 1)]]
     }
 
     /// The row in which a sweep may begin: the lowest below which the shifts act as if the rows above were split off, because
@@ -59,26 +54,4 @@ impl Shifts {
         }
         start
     }
-}
-
-/// The eigenvalues of the last `2 pairs` rows above row `end`, in pairs; none where they do not converge.
-pub(super) fn trailing(t: &Square, end: usize, pairs: usize) -> Vec<Shifts> {
-    let (size, from) = (2 * pairs, end - 2 * pairs);
-    let mut window = Mat::from_fn(size, size, |i, j| t[(from + i, from + j)]);
-    if quasi_triangular("a window", &mut window, &mut eye(size)).is_err() {
-        return Vec::new();
-    }
-    let (mut found, mut single) = (Vec::with_capacity(pairs), None::<f64>);
-    for block in blocks(window.as_ref()) {
-        let p = block_eigenvalues(window.as_ref(), block)[0];
-        match (block.size, single.take()) {
-            (1, None) => single = Some(p.re),
-            (1, Some(other)) => found.push(Shifts { re: 0.5 * (p.re + other), im: 0.0, split: 0.5 * (p.re - other) }),
-            (_, other) => {
-                single = other;
-                found.push(Shifts { re: p.re, im: p.im, split: 0.0 });
-            }
-        }
-    }
-    found
 }

@@ -3,10 +3,7 @@
 use faer::{Mat, MatRef};
 use std::ops::{Index, IndexMut};
 
-/// The height of the columns is a multiple of this.
-pub(super) const LANES: usize = 32;
-
-/// n x n, column after column; rows of zeros fill the columns up.
+/// n x n, column after column; a few rows of zeros may fill the columns up.
 #[derive(Debug, Clone)]
 pub(super) struct Square {
     n: usize,
@@ -17,9 +14,8 @@ pub(super) struct Square {
 impl Square {
     pub(super) fn new(m: MatRef<'_, f64>) -> Self {
         let n = m.nrows();
-        let height = n.next_multiple_of(LANES);
         // Columns a power of two apart would share few lines of the fastest memory.
-        let height = if height.is_multiple_of(64) { height + LANES } else { height }.max(LANES);
+        let height = if n.is_multiple_of(64) { n + 8 } else { n };
         let mut entries = vec![0.0; n * height];
         for (j, column) in entries.chunks_exact_mut(height).enumerate() {
             for (i, x) in column[..n].iter_mut().enumerate() {

@@ -4,15 +4,21 @@ use crate::common::{SETTINGS, csv, demo, empty_folder, log, settings, youla};
 use serde_json::Value;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 fn project() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
+/// Printed once for all tests: two at a time would empty one folder.
 fn schema() -> Value {
-    let found = youla(&empty_folder("schema"), &["schema"]);
-    assert!(found.code == Some(0) && found.stderr.is_empty(), "{}", found.stderr);
-    serde_json::from_str(&found.stdout).expect("JSON")
+    static SCHEMA: OnceLock<Value> = OnceLock::new();
+    let printed = || {
+        let found = youla(&empty_folder("schema"), &["schema"]);
+        assert!(found.code == Some(0) && found.stderr.is_empty(), "{}", found.stderr);
+        serde_json::from_str(&found.stdout).expect("JSON")
+    };
+    SCHEMA.get_or_init(printed).clone()
 }
 
 /// What keeps a value from a schema, for the keywords that ours has; any other keyword ends the test.

@@ -6,8 +6,8 @@ use super::row::StartRow;
 use super::search::Search;
 use serde::Serialize;
 
-/// Percentage points of fit (26) by which a model may be below that of the search from the truth, on each axis, to count as converged: the
-/// scatter of the fit over equivalent minima is below 0.01 (chosen, not measured).
+/// Percentage points of fit (26) by which a model may be below that of the search from the truth, on each axis, to count as converged.
+/// Chosen, not measured: the decimal in which the tables of the paper state a fit.
 pub const CONVERGED_WITHIN: f64 = 0.1;
 
 /// Outcomes of one search on the items of a case.

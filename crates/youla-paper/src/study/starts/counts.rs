@@ -7,7 +7,7 @@ use super::search::Search;
 use serde::Serialize;
 
 /// Percentage points of fit (26) by which a model may be below that of the search from the truth, on each axis, to count as converged.
-/// Chosen, not measured: the decimal in which the tables of the paper state a fit.
+/// Chosen, not measured.
 pub const CONVERGED_WITHIN: f64 = 0.1;
 
 /// Outcomes of one search on the items of a case.

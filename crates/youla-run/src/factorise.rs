@@ -56,12 +56,11 @@ pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path
     Ok(DeclaredLoop { nominal, controller, gains })
 }
 
-/// The declared controller `u = K y` (positive feedback), and its gains F and L where it is given by them.
-pub(super) fn declared_controller(
-    settings: &RunSettings,
-    folder: &Path,
-    time: Discrete,
-) -> Result<(StateSpace<Discrete>, Option<[Mat<f64>; 2]>)> {
+/// A controller, and its gains F and L where it is given by them.
+type WithGains = (StateSpace<Discrete>, Option<[Mat<f64>; 2]>);
+
+/// The declared controller `u = K y` (positive feedback).
+pub(super) fn declared_controller(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<WithGains> {
     match settings.controller.realise(folder, time)? {
         RealisedController::System(k) => Ok((k, None)),
         RealisedController::Observer { f, l } => {

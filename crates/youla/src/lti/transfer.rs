@@ -27,6 +27,7 @@ impl<T: TimeDomain> StateSpace<T> {
     /// ```
     pub fn transfer_matrix(numerator: &PolynomialMatrix, denominator: &PolynomialMatrix, time: T) -> Result<Self> {
         let (p, m) = check_matrix(numerator, denominator)?;
+        check_proper(numerator, denominator)?;
         let common = denominator.iter().flatten().all(|d| d == &denominator[0][0]);
         if common && p <= m {
             // One row of the transposed system at a time would double the states; the dual needs only its columns.
@@ -44,6 +45,8 @@ impl<T: TimeDomain> StateSpace<T> {
 impl StateSpace<Discrete> {
     /// Realises the difference equations `denominator(z^-1) u = numerator(z^-1) y` per entry, coefficients in
     /// **ascending** powers of z^-1 (the first is that of the present sample), as controllers are logged and programmed.
+    ///
+    /// Every such equation is causal, also with more coefficients in the numerator (a FIR filter, a PD controller).
     ///
     /// # Errors
     /// As [`Self::transfer_matrix`].
@@ -85,11 +88,18 @@ fn check_matrix(numerator: &PolynomialMatrix, denominator: &PolynomialMatrix) ->
     if denominator.iter().flatten().any(|d| d[0] == 0.0) {
         return bad("the first coefficient of a denominator is zero");
     }
+    Ok((p, m))
+}
+
+/// Of a matrix in descending powers that [`check_matrix`] accepts.
+fn check_proper(numerator: &PolynomialMatrix, denominator: &PolynomialMatrix) -> Result<()> {
+    let (p, m) = (numerator.len(), numerator[0].len());
     let degree = |c: &[f64]| c.len() - c.iter().take_while(|&&x| x == 0.0).count();
     if (0..p).any(|i| (0..m).any(|j| degree(&numerator[i][j]) > denominator[i][j].len())) {
-        return bad("a numerator has a higher degree than its denominator (the system is not proper)");
+        let problem = "a numerator has a higher degree than its denominator (the system is not proper)";
+        return Err(Error::Polynomial { problem });
     }
-    Ok((p, m))
+    Ok(())
 }
 
 /// Controllable canonical form of each input column, all with the same denominator.
@@ -208,6 +218,20 @@ mod tests {
             let free: f64 = (1..3).map(|d| a[d] * past(&y, k, d)).sum();
             assert!((y[(k, 0)] - (forced - free) / a[0]).abs() < 1e-12);
         }
+    }
+
+    /// u(k) = 0.8 y(k) - 0.75 y(k-1) + 0.1 y(k-2): a numerator longer than its denominator delays, and is causal.
+    #[test]
+    fn finite_impulse_responses_are_difference_equations() {
+        let taps = [0.8, -0.75, 0.1];
+        let time = Discrete::new(1e-3).unwrap();
+        let fir = StateSpace::difference_equation(&vec![vec![taps.to_vec()]], &vec![vec![vec![1.0]]], time).unwrap();
+        assert_eq!(fir.order(), 2);
+        let y = Mat::from_fn(6, 1, |k, _| f64::from(k == 0));
+        let u = simulate(&fir, y.as_ref(), &[0.0; 2]).unwrap();
+        assert!((0..6).all(|k| (u[(k, 0)] - taps.get(k).copied().unwrap_or(0.0)).abs() < 1e-15));
+        let bad = |d: Vec<f64>| StateSpace::difference_equation(&vec![vec![vec![1.0, 2.0]]], &vec![vec![d]], time);
+        assert!(bad(vec![0.0, 1.0]).is_err() && bad(Vec::new()).is_err());
     }
 
     #[test]

@@ -22,7 +22,7 @@ pub const PREDICTION_STEPS: [usize; 3] = [1, 5, 20];
 const ORDER: usize = 20;
 
 /// Fits (26) in percent of predictions [`PREDICTION_STEPS`] ahead and of the simulation alone, over the second half: per number
-/// of steps and output, the simulation last.
+/// of steps and output, the simulation last; NaN for records of fewer than 160 samples.
 ///
 /// # Errors
 /// [`crate::Error::Shape`] where the two differ in shape.
@@ -37,6 +37,9 @@ const ORDER: usize = 20;
 pub fn k_step_fits(measured: MatRef<'_, f64>, simulated: MatRef<'_, f64>) -> Result<Vec<Vec<f64>>> {
     check_shape("the simulated record", simulated, (measured.nrows(), measured.ncols()))?;
     let v = (measured - simulated).to_owned();
+    if too_short(v.nrows()) {
+        return Ok(no_fits(v.ncols()));
+    }
     let weights: Vec<Vec<Vec<f64>>> = (0..v.ncols())
         .map(|j| {
             let first: Vec<f64> = v.col(j).iter().take(v.nrows() / 2).copied().collect();
@@ -100,13 +103,22 @@ fn predictor(noise: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
     StateSpace::new(whitening.a().to_owned(), whitening.b().to_owned(), c, d, noise.time())
 }
 
+/// Whether half of a record is too short for the autoregression: less than four samples per coefficient.
+fn too_short(samples: usize) -> bool {
+    samples / 2 < 4 * ORDER
+}
+
+fn no_fits(outputs: usize) -> Vec<Vec<f64>> {
+    vec![vec![f64::NAN; outputs]; PREDICTION_STEPS.len() + 1]
+}
+
 /// The fits from the residual v of the simulation and what is foreseen of it, by place in [`PREDICTION_STEPS`], sample and
 /// output.
 fn fits(measured: MatRef<'_, f64>, v: MatRef<'_, f64>, foreseen: impl Fn(usize, usize, usize) -> f64) -> Vec<Vec<f64>> {
     let n = v.nrows();
     let half = n / 2;
-    let mut all = vec![vec![f64::NAN; v.ncols()]; PREDICTION_STEPS.len() + 1];
-    if half < 4 * ORDER {
+    let mut all = no_fits(v.ncols());
+    if too_short(n) {
         return all;
     }
     for j in 0..v.ncols() {
@@ -201,6 +213,18 @@ mod tests {
             assert!((fit[0] - expected).abs() < 0.6, "{steps}: {} and {expected}", fit[0]);
             assert!((fit[0] - same[0]).abs() < 1e-9, "{steps}: {} and {}", fit[0], same[0]);
         }
+    }
+
+    /// Half of the record does not reach the lags of the autoregression below 42 samples.
+    #[test]
+    fn short_records_have_no_fits() {
+        for samples in [0, 1, 2, 29, 30, 41, 42, 159] {
+            let y = Mat::from_fn(samples, 2, |k, j| (k as f64 + j as f64).sin());
+            let fits = k_step_fits(y.as_ref(), Mat::zeros(samples, 2).as_ref()).unwrap();
+            assert!(fits.len() == 4 && fits.iter().flatten().all(|f| f.is_nan()), "{samples}");
+        }
+        let y = Mat::from_fn(160, 1, |k, _| (0.3 * k as f64).sin());
+        assert!(k_step_fits(y.as_ref(), Mat::zeros(160, 1).as_ref()).unwrap()[0][0].is_finite());
     }
 
     #[test]

@@ -5,6 +5,7 @@
 
 mod balance;
 mod bulge_chasing;
+mod complex_eigenvalues;
 mod complex_schur;
 mod definite;
 mod expm;
@@ -28,6 +29,7 @@ mod substitution;
 mod sylvester;
 
 pub use balance::{Balanced, balance};
+pub(crate) use complex_eigenvalues::complex_eigenvalues;
 pub(crate) use definite::check_semidefinite;
 pub use expm::expm;
 pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
@@ -152,18 +154,13 @@ pub fn reciprocal_condition(a: MatRef<'_, f64>) -> f64 {
     }
 }
 
-/// Eigenvalues of a square matrix, balanced first: states in very different units cost no digits.
+/// Eigenvalues of a square matrix, balanced first: states in very different units cost no digits. The iteration is that of
+/// [`real_schur`], whose number of steps is bounded for every matrix.
 ///
 /// # Errors
 /// [`Error::NoConvergence`], [`Error::NotFinite`] and [`Error::Shape`] naming `what`.
 pub fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
-    if a.nrows() == 0 {
-        return Ok(Vec::new());
-    }
-    balance(what, a)?
-        .a
-        .eigenvalues()
-        .map_err(|_| Error::NoConvergence { what: format!("the eigenvalues of {what}"), iterations: 0 })
+    schur::eigenvalues(what, balance(what, a)?.a.as_ref())
 }
 
 /// `[C; C A; ...; C A^(blocks-1)]`.

@@ -81,6 +81,13 @@ pub fn real_schur(what: &str, a: MatRef<'_, f64>) -> Result<RealSchur> {
     Ok(RealSchur { q, t, residual })
 }
 
+/// The eigenvalues alone.
+pub(super) fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
+    let Hessenberg { mut q, h: mut t } = hessenberg(what, a)?;
+    quasi_triangular(what, &mut t, &mut q)?;
+    Ok(blocks(t.as_ref()).into_iter().flat_map(|b| block_eigenvalues(t.as_ref(), b)).collect())
+}
+
 /// `||A - Q T Q'|| / ||A||`, zero for a zero matrix.
 pub(super) fn relative_residual(a: MatRef<'_, f64>, q: &Mat<f64>, t: &Mat<f64>) -> f64 {
     let norm = a.norm_l2();

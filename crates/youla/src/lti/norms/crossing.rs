@@ -15,6 +15,7 @@ use super::curve::Curve;
 use super::hamiltonian::Image;
 use super::level::between;
 use super::peak::frequencies_of_poles;
+use crate::linalg::complex_eigenvalues;
 use crate::lti::{StateSpace, TimeDomain};
 use crate::{Error, Mat, Result, c64};
 use faer::prelude::*;
@@ -128,8 +129,7 @@ fn zeros<T: TimeDomain>(system: &StateSpace<T>, part: Part, value: impl Fn(f64) 
     if !matrix.is_all_finite() {
         return Err(Error::PoleOnBoundary { omega: frequency });
     }
-    let refused = |_| Error::NoConvergence { what: "the crossings of a response".into(), iterations: 0 };
-    let values = matrix.eigenvalues().map_err(refused)?;
+    let values = complex_eigenvalues("the crossings of a response", matrix)?;
     Ok(values.into_iter().map(|w| image.frequency((shift + real(1.0) / w).im.abs())).collect())
 }
 

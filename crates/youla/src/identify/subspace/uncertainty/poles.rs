@@ -9,7 +9,7 @@ use super::delta::covariance;
 use super::influence::STEP;
 use super::response::mode_change;
 use super::{SubspaceOptions, blocks};
-use crate::{Error, Result, c64};
+use crate::{Result, c64};
 use rayon::prelude::*;
 
 /// Standard deviations of natural frequency (Hz) and damping ratio of `poles[k]`, the poles of the model of order `orders[k]`.
@@ -49,8 +49,7 @@ pub(in super::super) fn pole_deviations(
 }
 
 fn eigenvalues(projected: &Projected, order: usize) -> Result<Vec<c64>> {
-    let failed = |_| Error::NoConvergence { what: format!("the poles of order {order}"), iterations: 0 };
-    projected.realise(order)?.a.eigenvalues().map_err(failed)
+    crate::linalg::eigenvalues(&format!("the poles of order {order}"), projected.realise(order)?.a.as_ref())
 }
 
 /// To the pole of the moved model that is nearest, over the step.

@@ -10,7 +10,7 @@
 
 use super::disturbance::KnownColumns;
 use super::sensitivity::{Predictor, Unknowns};
-use crate::linalg::SequentialQr;
+use crate::linalg::{Eigenvectors, SequentialQr};
 use crate::{Mat, MatRef, c64};
 use faer::prelude::*;
 use faer::{MatMut, RowRef};
@@ -36,9 +36,12 @@ pub(super) struct Modes {
 impl Modes {
     /// `None` where the eigenvectors of A are nearly dependent.
     pub(super) fn of(predictor: &Predictor) -> Option<Modes> {
-        let eigen = predictor.a.eigen().ok()?;
+        let eigen = Eigenvectors::of("the state matrix of the predictor", predictor.a.as_ref()).ok()?;
         let n = predictor.a.nrows();
-        let mut v = eigen.U().to_owned();
+        if !eigen.complete() {
+            return None;
+        }
+        let mut v = eigen.right;
         for j in 0..n {
             let length = v.col(j).norm_l2();
             v.col_mut(j).iter_mut().for_each(|x| *x /= length);
@@ -48,7 +51,7 @@ impl Modes {
             return None;
         }
         let inverse = v.partial_piv_lu().solve(Mat::<c64>::identity(n, n));
-        let lambda: Vec<c64> = eigen.S().column_vector().iter().copied().collect();
+        let lambda = eigen.values;
         let chosen: Vec<usize> = (0..n).filter(|j| lambda[*j].im >= 0.0).collect();
         let pairs = chosen.iter().filter(|j| lambda[**j].im > 0.0).count();
         if chosen.len() + pairs != n {

@@ -5,10 +5,9 @@
 
 use super::Stability;
 use super::output_pair::OutputPair;
-use crate::linalg::{check_finite, eigenvalues};
+use crate::linalg::{Eigenvectors, check_finite, eigenvalues};
 use crate::lti::{Discrete, TimeDomain};
 use crate::{Error, Result};
-use faer::prelude::*;
 use faer::{Mat, c64};
 
 /// Largest magnitude of a reflected pole, for poles on the unit circle itself.
@@ -70,15 +69,11 @@ fn reflect(z: c64) -> c64 {
 
 /// Replaces the eigenvalues that `target` changes, and nothing else.
 fn move_poles(pair: &OutputPair, target: impl Fn(c64) -> c64) -> Result<(Mat<f64>, Vec<MovedPole>)> {
-    let failed =
-        |_| Error::NoConvergence { what: "the eigenvectors of the estimated state matrix".into(), iterations: 0 };
-    let eigen = pair.a.eigen().map_err(failed)?;
+    let Eigenvectors { values, right, left, .. } = Eigenvectors::of("the estimated state matrix", pair.a.as_ref())?;
     let n = pair.a.nrows();
-    let right = eigen.U().to_owned();
-    let left = right.partial_piv_lu().solve(Mat::<c64>::identity(n, n));
     let mut a = pair.a.clone();
     let mut moved = Vec::new();
-    for (k, from) in eigen.S().column_vector().iter().copied().enumerate() {
+    for (k, from) in values.into_iter().enumerate() {
         let to = target(from);
         if to != from {
             moved.push(MovedPole { from, to });

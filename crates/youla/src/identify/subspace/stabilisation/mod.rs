@@ -19,6 +19,7 @@ pub use cluster::ModeCluster;
 use super::projected::Projected;
 use super::uncertainty::pole_deviations;
 use super::{SubspaceData, SubspaceOptions, UncertaintyMethod};
+use crate::linalg::Eigenvectors;
 use crate::lti::modes::mode;
 use crate::{Error, Mat, MatRef, Result, c64};
 use rayon::prelude::*;
@@ -220,9 +221,7 @@ fn check(orders: &[usize], options: &StabilisationOptions) -> Result<()> {
 fn poles(data: &SubspaceData<'_>, projected: &Projected, order: usize) -> Result<Vec<DiagramPole>> {
     super::order::check(order)?;
     let pair = projected.realise(order)?;
-    let failed = |_| Error::NoConvergence { what: format!("the poles of order {order}"), iterations: 0 };
-    let eigen = pair.a.eigen().map_err(failed)?;
-    let values = eigen.S().column_vector();
+    let Eigenvectors { values, right, .. } = Eigenvectors::of(&format!("the model of order {order}"), pair.a.as_ref())?;
     let mut found: Vec<DiagramPole> = (0..order)
         .filter(|j| values[*j].im >= 0.0)
         .map(|j| {
@@ -234,7 +233,7 @@ fn poles(data: &SubspaceData<'_>, projected: &Projected, order: usize) -> Result
                 zeta: mode.zeta,
                 hz_deviation: None,
                 zeta_deviation: None,
-                shape: shape(&pair.c, eigen.U(), j, data.channels.y_scale()),
+                shape: shape(&pair.c, right.as_ref(), j, data.channels.y_scale()),
                 standing: PoleStability::New,
                 cluster: None,
             }

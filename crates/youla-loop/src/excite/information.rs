@@ -8,38 +8,42 @@
 //!
 //! Whitened by the sensitivity, the loop drops out of the derivative: what counts is the input that alpha makes. The noise colours y by
 //! S_y, which depends on theta too; that information is neglected, so the bound is conservative. Sums over frequencies hold for
-//! unstable plants as well. The parameters are those of every simple pole: `G = sum of c b / (z - p)` with the pole p, its
-//! direction c at the outputs and b at the inputs, one entry of b held. Poles that repeat or lie at the origin (delays), with
-//! their residues, hidden ones and the feedthrough count as known.
+//! unstable plants as well. The parameters are those of every pole p: `G = sum of C (z - P)^-1 B`, where P is r x r with `P = p I` at
+//! the nominal model. A simple pole has r = 1: p, its direction C at the outputs and B at the inputs, one entry of B held. Equal poles with
+//! r independent directions (a symmetric rotor) vary with all of P, C and B, r columns of B held as the identity: so each of
+//! them has an input of its own, and its deviation is that of its diagonal entry of P. Delays are known: `G = G_0 diag(z^-d)`, and
+//! the parameters are those of G_0. Poles without a complete set of directions, hidden ones and the feedthrough count as known.
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), sections 7.4 and 9.4; compared with a Monte-Carlo study in
-//! `tests::the_bound_is_what_prediction_error_reaches`.
+//! `tests::the_bound_is_what_prediction_error_reaches`, and with finite differences of the response in `bound.rs`.
 
 use super::energy::transform;
+use super::pole::Pole;
 use crate::error::Result;
 use faer::linalg::solvers::Solve;
 use serde::Serialize;
 use std::f64::consts::TAU;
 use youla::linalg::reciprocal_condition;
-use youla::lti::{Discrete, Eigen, Mode, StateSpace, TimeDomain, modes::mode};
+use youla::lti::{Discrete, Eigen, StateSpace, TimeDomain};
 use youla::{Mat, MatRef, c64};
 
 /// A pole nearer to the origin than this is a delay.
 /// A sampled mode with |z| below it has decayed by 95 % within one sample. Chosen, not measured.
 const DELAY: f64 = 0.05;
-/// Poles nearer to each other than this count as one that repeats.
-/// Residues of two poles this close cancel to half of the digits of double precision, `sqrt(2^-52) = 1.5e-8`, with a margin. Chosen,
-/// not measured.
+/// Poles of the list of modes this near to one of the bound, over the pole, are that one. Chosen, not measured.
 const APART: f64 = 1e-6;
+/// Singular value of the residue of equal poles, over the largest, below which there is no further direction: half of the digits.
+/// Chosen, not measured.
+pub(super) const DIRECTION: f64 = 1e-8;
 /// Fraction of the largest peak below which a pole is treated as not controllable.
 /// Chosen, not measured.
 const WEAKLY_CONTROLLABLE: f64 = 1e-10;
+/// Fraction of the largest value of an impulse response below which it has not begun.
+/// Rounding of products of some tens of factors. Chosen, not measured.
+const BEGUN: f64 = 1e-12;
 /// Frequencies that are added up in one product.
 /// Memory of one product: 1024 complex columns, below 1 MB for 40 states. Chosen, not measured.
 const CHUNK: usize = 1024;
-
-/// The derivative of `c b / (z - p)` times u by one parameter, from p, c and b.
-type Derivative<'a> = dyn Fn(c64, &[c64], &[c64]) -> Vec<c64> + 'a;
 
 /// Predicted accuracy of one mode.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,99 +61,81 @@ pub struct ModeAccuracy {
     pub needed: Option<f64>,
 }
 
-/// One pole of an upper half plane with its parameters.
-struct Pole {
-    mode: Mode,
-    value: c64,
-    c: Vec<c64>,
-    b: Vec<c64>,
-    held: usize,
-}
-
 /// The oscillating modes of the nominal model with their accuracies under the input `u` (samples x m, until the loop is at rest).
 pub(super) fn accuracy(nominal: &StateSpace<Discrete>, u: MatRef<'_, f64>, noise: &[f64]) -> Result<Vec<ModeAccuracy>> {
-    let poles = simple_poles(nominal)?;
-    let information = information(nominal, &poles, u, noise);
-    let deviations = deviations(&poles, &information, nominal.time());
+    let delays = delays(nominal)?;
+    let poles = poles(nominal, &delays)?;
+    let information = information(nominal, &poles, &Input { u, delays }, noise);
+    let mut known = deviations(&poles, &information, nominal.time());
     let all = nominal.modes()?;
     let oscillating = all.into_iter().filter(|m| m.pole.im > 0.0 && m.pole.norm() >= DELAY);
     Ok(oscillating
         .map(|m| {
-            let near = |p: &&(Mode, Option<[f64; 2]>)| (p.0.pole - m.pole).norm() < APART;
-            let found = deviations.iter().find(near).and_then(|p| p.1);
+            let near = |p: &(c64, [f64; 2])| (p.0 - m.pole).norm() < APART * m.pole.norm();
+            // Each of the equal ones once.
+            let found = known.iter().position(near).map(|place| known.remove(place).1);
             let [hz_deviation, zeta_deviation] = [found.map(|d| d[0]), found.map(|d| d[1])];
             ModeAccuracy { hz: m.hz, zeta: m.zeta, hz_deviation, zeta_deviation, needed: None }
         })
         .collect())
 }
 
-fn simple_poles(nominal: &StateSpace<Discrete>) -> Result<Vec<Pole>> {
+/// Whole samples by which each input is late beyond the hold, where poles at the origin make it so: the zeros at the start of its
+/// impulse response, but for the one of a plant without direct path.
+fn delays(nominal: &StateSpace<Discrete>) -> Result<Vec<usize>> {
+    let at_origin = nominal.poles()?.iter().filter(|p| p.norm() < DELAY).count();
+    let mut state = nominal.b().to_owned();
+    let mut responses = vec![nominal.d().to_owned()];
+    for _ in 0..=at_origin {
+        responses.push(nominal.c() * &state);
+        state = nominal.a() * &state;
+    }
+    let begins = |j: usize| {
+        let sizes: Vec<f64> = responses.iter().map(|h| h.col(j).norm_max()).collect();
+        let largest = sizes.iter().copied().fold(0.0, f64::max);
+        sizes.iter().position(|size| *size > BEGUN * largest).unwrap_or(0)
+    };
+    let begins: Vec<usize> = (0..nominal.inputs()).map(begins).collect();
+    let direct = begins.iter().sum::<usize>() == at_origin;
+    Ok(begins.into_iter().map(|k| if direct { k } else { k.saturating_sub(1).min(at_origin) }).collect())
+}
+
+/// The poles of G_0 that are parameters, one for each pair.
+fn poles(nominal: &StateSpace<Discrete>, delays: &[usize]) -> Result<Vec<Pole>> {
     if nominal.order() == 0 {
         return Ok(Vec::new());
     }
     let eigen = Eigen::new(nominal)?;
     let all = eigen.poles();
-    let alone = |k: usize| {
-        all[k].norm() >= DELAY && (0..all.len()).all(|j| j == k || (all[j] - all[k]).norm() >= APART * all[k].norm())
-    };
-    let size = |v: &[c64]| v.iter().map(|x| x.norm_sqr()).sum::<f64>().sqrt();
-    let candidates = (0..all.len()).filter(|k| all[*k].im >= 0.0 && alone(*k)).map(|k| {
-        let (c, b) = eigen.directions(k, nominal);
-        let held = (0..b.len()).max_by(|i, j| b[*i].norm().total_cmp(&b[*j].norm())).unwrap_or(0);
-        Pole { mode: mode(nominal.time(), all[k]), value: all[k], c, b, held }
-    });
-    let mut poles: Vec<Pole> = candidates.collect();
-    let peak = |p: &Pole| size(&p.c) * size(&p.b) / (1.0 - p.value.norm()).abs().max(1e-12);
+    let mut poles = Vec::new();
+    for group in eigen.complete_groups() {
+        let value = group.iter().fold(c64::ZERO, |sum, k| sum + all[*k]) / group.len() as f64;
+        if value.norm() < DELAY || value.im < 0.0 {
+            continue;
+        }
+        let mut residue = Mat::<c64>::zeros(nominal.outputs(), nominal.inputs());
+        for k in group {
+            let (c, b) = eigen.directions(*k, nominal);
+            let late = |j: usize| value.powu(delays[j] as u32);
+            residue += Mat::from_fn(c.len(), b.len(), |i, j| c[i] * b[j] * late(j));
+        }
+        poles.extend(Pole::new(value, &residue, group.len()));
+    }
+    let peak = |p: &Pole| p.size / (1.0 - p.value.norm()).abs().max(1e-12);
     let largest = poles.iter().map(peak).fold(0.0, f64::max);
     poles.retain(|p| peak(p) > WEAKLY_CONTROLLABLE * largest);
     Ok(poles)
 }
 
-impl Pole {
-    /// Real parameters, for p, c and b but for the entry that is held: twice as many for a pair.
-    fn parameters(&self) -> usize {
-        (if self.value.im > 0.0 { 2 } else { 1 }) * (self.c.len() + self.b.len())
-    }
-
-    /// The columns `dG/dtheta U` of this pole at z, each of p values.
-    fn columns(&self, z: c64, u: &[c64], mut take: impl FnMut(&[c64])) {
-        let pair = self.value.im > 0.0;
-        let mut emit = |one: Vec<c64>, other: Vec<c64>| {
-            if pair {
-                take(&one.iter().zip(&other).map(|(a, b)| a + b).collect::<Vec<_>>());
-                let turned = |(a, b): (&c64, &c64)| c64::new(0.0, 1.0) * (a - b);
-                take(&one.iter().zip(&other).map(turned).collect::<Vec<_>>());
-            } else {
-                take(&one);
-            }
-        };
-        // Each derivative of the term and of its conjugate.
-        let both = |derive: &Derivative| {
-            let conjugate = |v: &[c64]| v.iter().map(|x| x.conj()).collect::<Vec<_>>();
-            (derive(self.value, &self.c, &self.b), derive(self.value.conj(), &conjugate(&self.c), &conjugate(&self.b)))
-        };
-        let along = |b: &[c64]| b.iter().zip(u).fold(c64::new(0.0, 0.0), |sum, (b, u)| sum + b * u);
-        let (one, other) = both(&|p, c, b| c.iter().map(|c| c * along(b) / ((z - p) * (z - p))).collect::<Vec<_>>());
-        emit(one, other);
-        for r in 0..self.c.len() {
-            let unit = |p: c64, b: &[c64]| {
-                let mut column = vec![c64::new(0.0, 0.0); self.c.len()];
-                column[r] = along(b) / (z - p);
-                column
-            };
-            let (one, other) = both(&|p, _, b| unit(p, b));
-            emit(one, other);
-        }
-        for s in (0..self.b.len()).filter(|s| *s != self.held) {
-            let (one, other) = both(&|p, c, _| c.iter().map(|c| c * u[s] / (z - p)).collect());
-            emit(one, other);
-        }
-    }
+/// The input of the plant and the samples by which it acts late.
+struct Input<'a> {
+    u: MatRef<'a, f64>,
+    delays: Vec<usize>,
 }
 
 /// I(theta), by Parseval over the padded input.
-fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], u: MatRef<'_, f64>, noise: &[f64]) -> Mat<f64> {
-    let (m, p) = (nominal.inputs(), nominal.outputs());
+fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], input: &Input<'_>, noise: &[f64]) -> Mat<f64> {
+    let (m, p, u) = (nominal.inputs(), nominal.outputs(), input.u);
     let length = u.nrows().next_power_of_two();
     let spectra: Vec<Vec<c64>> = (0..m).map(|j| transform(u, j, length)).collect();
     let count: usize = poles.iter().map(Pole::parameters).sum();
@@ -165,10 +151,11 @@ fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], u: MatRef<'_, f64
         for (i, k) in chunk.iter().enumerate() {
             let twice = if *k == 0 || 2 * k == length { 1.0 } else { 2.0 };
             let weight = (twice / length as f64).sqrt();
-            let at: Vec<c64> = spectra.iter().map(|s| s[*k]).collect();
+            let z = point(*k);
+            let at: Vec<c64> = spectra.iter().zip(&input.delays).map(|(s, d)| s[*k] * z.powi(-(*d as i32))).collect();
             let mut column = 0;
             for pole in poles {
-                pole.columns(point(*k), &at, |values| {
+                pole.columns(z, &at, |values| {
                     for (r, value) in values.iter().enumerate() {
                         rows[(2 * (i * p + r), column)] = weight * value.re / noise[r];
                         rows[(2 * (i * p + r) + 1, column)] = weight * value.im / noise[r];
@@ -182,25 +169,26 @@ fn information(nominal: &StateSpace<Discrete>, poles: &[Pole], u: MatRef<'_, f64
     total
 }
 
-/// Standard deviations of natural frequency and damping ratio of each pole, none where the information is singular.
-fn deviations(poles: &[Pole], information: &Mat<f64>, time: Discrete) -> Vec<(Mode, Option<[f64; 2]>)> {
+/// Standard deviations of natural frequency and damping ratio of each pair, none where the information is singular.
+fn deviations(poles: &[Pole], information: &Mat<f64>, time: Discrete) -> Vec<(c64, [f64; 2])> {
     let n = information.nrows();
     let scale: Vec<f64> = (0..n).map(|i| information[(i, i)].sqrt().max(f64::MIN_POSITIVE)).collect();
     let scaled = Mat::from_fn(n, n, |i, j| information[(i, j)] / (scale[i] * scale[j]));
     let determined = n > 0 && scaled.is_all_finite() && reciprocal_condition(scaled.as_ref()) > 1e-13;
-    let covariance = determined.then(|| scaled.partial_piv_lu().solve(Mat::<f64>::identity(n, n)));
+    if !determined {
+        return Vec::new();
+    }
+    let covariance = scaled.partial_piv_lu().solve(Mat::<f64>::identity(n, n));
     let mut first = 0;
     let mut found = Vec::new();
     for pole in poles {
-        let pair = pole.value.im > 0.0;
-        let deviation = covariance.as_ref().filter(|_| pair).map(|of| {
-            let entry = |i: usize, j: usize| of[(first + i, first + j)] / (scale[first + i] * scale[first + j]);
+        for own in pole.own_parameters().filter(|_| pole.value.im > 0.0).map(|k| first + k) {
+            let entry = |i: usize, j: usize| covariance[(own + i, own + j)] / (scale[own + i] * scale[own + j]);
             let [hz, zeta] = gradients(pole.value, time);
             let variance =
                 |g: [f64; 2]| (0..4).map(|k| g[k / 2] * entry(k / 2, k % 2) * g[k % 2]).sum::<f64>().max(0.0).sqrt();
-            [variance(hz), variance(zeta)]
-        });
-        found.push((pole.mode, deviation));
+            found.push((pole.value, [variance(hz), variance(zeta)]));
+        }
         first += pole.parameters();
     }
     found

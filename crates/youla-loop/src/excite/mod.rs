@@ -16,11 +16,14 @@
 //! | `summary` | the figures |
 //! | `noise` | the noise of the outputs from a record without excitation |
 
+#[cfg(test)]
+mod bound;
 mod energy;
 mod guard;
 mod information;
 mod noise;
 mod options;
+mod pole;
 mod sequence;
 mod summary;
 #[cfg(test)]

@@ -65,13 +65,16 @@ pub(super) fn model_responses(verdict: &Verdict, hz: &[f64]) -> Result<Vec<(Meth
     verdict.models.iter().map(response).collect()
 }
 
+/// Highest frequency of the curves, over the Nyquist frequency: at it some responses are not defined.
+const HIGHEST: f64 = 0.999;
+
 /// Refuses a lowest frequency that leaves no room below Nyquist.
 pub(super) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result<()> {
     let nyquist = 0.5 / time.ts();
     match settings.from_hz {
-        Some(from) if from >= nyquist => {
+        Some(from) if from >= HIGHEST * nyquist => {
             let what = format!("[frequency_response] from_hz, with a Nyquist frequency of {nyquist:.6} Hz,");
-            Err(Error::Method(youla::Error::OutOfRange { what, value: from, must: "below it" }))
+            Err(Error::Method(youla::Error::OutOfRange { what, value: from, must: "below 0.999 of it" }))
         }
         _ => Ok(()),
     }
@@ -97,7 +100,7 @@ const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0,
 /// [`youla::Error::NoConvergence`] of the eigenvalues.
 pub(super) fn grid(settings: &FrequencySettings, models: &[&StateSpace<Discrete>], time: Discrete) -> Result<Vec<f64>> {
     let nyquist = 0.5 / time.ts();
-    let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), 0.999 * nyquist);
+    let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), HIGHEST * nyquist);
     let last = POINTS - 1;
     let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
     for model in models {

@@ -121,6 +121,7 @@ fn numbers_out_of_range() {
         ("time_column = \"t\"", "sample_time = -1.0", "[data] sample_time is -1, but must be a positive"),
         ("window = 256", "window = 256\nfrom_hz = -2.0", "[frequency_response] from_hz is -2"),
         ("window = 256", "window = 256\nfrom_hz = 1e9", "Nyquist frequency of 50"),
+        ("window = 256", "window = 256\nfrom_hz = 49.99", "must be below 0.999 of it"),
         ("window = 256", "window = 2", "[frequency_response] window is 2"),
         (
             "order = 3",

@@ -71,7 +71,7 @@ pub use matrices::{Rows, SystemMatrices};
 pub use model_file::ModelFile;
 pub use npy::{NpyStream, is_npy};
 pub use npz::{npz_from_bytes, read_npz};
-pub use open::open;
+pub use open::{open, read_text};
 pub use parquet::{parquet_from_bytes, read_parquet};
 pub use source::{Format, Source, read, read_parts, sha256};
 pub use survey::{ColumnContent, SurveyedColumn, survey};

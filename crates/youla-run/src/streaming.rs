@@ -109,12 +109,8 @@ pub fn long_model_file(
 /// # Errors
 /// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`], [`youla_io::Error::Settings`] with the place of what is wrong.
 pub fn read_subspace_options(path: impl AsRef<std::path::Path>) -> Result<SubspaceOptions> {
-    use std::io::Read;
     let path = path.as_ref();
-    let mut text = String::new();
-    let read = youla_io::open(path)?.read_to_string(&mut text);
-    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
-    parse_subspace_options(&text, path)
+    parse_subspace_options(&youla_io::read_text(path)?, path)
 }
 
 /// Parses the text of such a file; `path` is named in errors.

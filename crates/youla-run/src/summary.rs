@@ -20,7 +20,6 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-use std::io::Read;
 use std::path::Path;
 use youla::lti::FrequencyResponse;
 
@@ -164,10 +163,7 @@ impl Summary {
     /// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`]; [`Error::NotASummary`] for another layout.
     pub fn read(run: &Path) -> Result<Self> {
         let path = run.join("summary.json");
-        let mut text = String::new();
-        youla_io::open(&path)?
-            .read_to_string(&mut text)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
+        let text = youla_io::read_text(&path)?;
         serde_json::from_str(&text).map_err(|source| Error::NotASummary { path, source })
     }
 }

@@ -3,11 +3,15 @@
 use crate::error::{CorruptAt, Error, Result};
 use crate::open::open;
 use flate2::bufread::MultiGzDecoder;
-use std::io::{BufRead, BufReader, ErrorKind};
+use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];
 const BUFFER: usize = 1 << 17;
+/// Bytes that are unpacked behind an error to see whether the file is damaged: seconds.
+const MOST_UNPACKED: u64 = 1 << 30;
+/// Longest line, bytes: 64 for each of the 65536 columns that a file may have.
+const LONGEST_LINE: u64 = 4 << 20;
 
 /// Reads line by line, so that a file that unpacks to more than the memory is met by its first bad line.
 pub(super) struct Lines {
@@ -49,7 +53,11 @@ impl Lines {
     /// The error of the rest of a gzip file, if it cannot be unpacked to its end or its checksum is wrong.
     pub(super) fn damage(&mut self) -> Option<Error> {
         let line = self.number;
-        let rest = if self.gzip { std::io::copy(&mut self.reader, &mut std::io::sink()) } else { Ok(0) };
+        let rest = if self.gzip {
+            std::io::copy(&mut (&mut self.reader).take(MOST_UNPACKED), &mut std::io::sink())
+        } else {
+            Ok(0)
+        };
         rest.err().map(|source| read_error(&self.path, self.gzip, line, source))
     }
 
@@ -76,9 +84,14 @@ impl Lines {
         }
         loop {
             self.line.clear();
-            let read = self.reader.read_until(b'\n', &mut self.line);
-            if read.map_err(|source| read_error(&self.path, self.gzip, self.number, source))? == 0 {
+            let read = (&mut self.reader).take(LONGEST_LINE + 1).read_until(b'\n', &mut self.line);
+            let read = read.map_err(|source| read_error(&self.path, self.gzip, self.number, source))?;
+            if read == 0 {
                 return Ok(false);
+            }
+            if read as u64 > LONGEST_LINE {
+                let (found, remedy) = ("a line of more than 4 MB", "give text with one row of numbers a line");
+                return Err(Error::FormatNotRead { path: self.path.clone(), found, remedy });
             }
             self.number += 1;
             if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {

@@ -8,6 +8,9 @@ use std::collections::HashSet;
 /// Most columns of a table. Rows are samples; a compressed file of some kilobytes may contain millions of cells on one line.
 const MOST_COLUMNS: usize = 1 << 16;
 
+/// Most numbers of the chosen columns, 400 MB: a compressed file of some megabytes may hold far more. Files of any length are read as streams.
+const MOST_NUMBERS: usize = 50_000_000;
+
 /// The dialect of a text file and its columns.
 pub(super) struct Fields {
     delimiter: Option<u8>,
@@ -88,7 +91,17 @@ impl Selection {
     /// Reads all remaining lines; one vector for each chosen column.
     pub(super) fn read(&self, fields: &Fields, lines: &mut Lines) -> Result<Vec<Vec<f64>>> {
         let mut out = vec![Vec::new(); self.columns];
-        while self.next(fields, lines, |position, value| out[position].push(value))? {}
+        let mut rows = 0;
+        while self.next(fields, lines, |position, value| out[position].push(value))? {
+            rows += 1;
+            if rows * self.columns > MOST_NUMBERS {
+                let (found, remedy) = (
+                    "a table of more than 50 million numbers",
+                    "choose fewer rows or columns, or use `youla subspace`",
+                );
+                return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
+            }
+        }
         if out.iter().all(Vec::is_empty) { Err(no_rows(lines)) } else { Ok(out) }
     }
 

@@ -122,8 +122,7 @@ fn facts(folder: &Path, model: &str) -> Result<Option<ModelFacts>> {
         models: BTreeMap<String, ModelFacts>,
     }
     let path = folder.join("7-validate/verdict.json");
-    let text = std::fs::read_to_string(&path)
-        .map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
+    let text = youla_io::read_text(&path)?;
     let mut verified: Verified =
         serde_json::from_str(&text).map_err(|source| Error::NotASummary { path: path.clone(), source })?;
     Ok(verified.models.remove(model))

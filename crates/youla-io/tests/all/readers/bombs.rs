@@ -19,6 +19,7 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
         "csv" => vec![
             ("gzip of commas", gzip(&[b','; 3 << 20])),
             ("gzip of zeros", gzip(&[b'0'; 3 << 20])),
+            ("gzip of one line", gzip(&vec![b'1'; 6 << 20])),
             ("gzip of lines", gzip(&b"1,2\n".repeat(700_000))),
             ("gzip of gzip", gzip(&gzip(&[b' '; 64 << 20]))),
             ("gzip of columns", gzip(&b"1,".repeat(1_500_000))),

@@ -7,7 +7,7 @@ use crate::run_folder::{OutputFolder, folder_of};
 use crate::{check, compare, excite, export, init, manual, paper, plot, study, subspace, table};
 use clap::CommandFactory;
 use std::path::Path;
-use youla_io::folder::{RunFolder, unused_folder};
+use youla_io::folder::{NumberedFolder, RunFolder};
 use youla_run::{
     RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_reference,
     settings_schema, signal_records, write_run, write_signals,
@@ -55,14 +55,19 @@ fn identify_and_write(
     settings: RunSettings,
     read: impl FnOnce(&RunSettings) -> youla_run::Result<RunRecords>,
 ) -> Result<(), Failure> {
-    let target = output.out.clone().unwrap_or_else(|| unused_folder(Path::new("."), &settings.name));
-    RunFolder::check(&target, output.force)?;
+    // Made before the computation, so that two runs at once have numbers of their own.
+    let numbered = match &output.out {
+        Some(_) => None,
+        None => Some(NumberedFolder::claim(Path::new("."), &settings.name)?),
+    };
+    let target = output.out.as_deref().or(numbered.as_ref().map(NumberedFolder::path)).unwrap_or(Path::new("run"));
+    RunFolder::check(target, output.force)?;
     let progress = Progress::new(form.quiet || form.json);
     let mut announce = |stage: Stage| progress.stage(stage);
     let mut clock = StageClock::new(&mut announce);
     let records = clock.run(Stage::Record, || read(&settings))?;
     let found = identify(settings, records, folder, &mut clock)?;
-    let written = write_run(&found, &target, output.force, &mut clock)?;
+    let written = write_run(&found, target, output.force, &mut clock)?;
     progress.finish();
     if form.json {
         say(&written.summary.to_string())

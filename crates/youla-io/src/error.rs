@@ -37,6 +37,14 @@ pub enum Error {
         /// The folder.
         path: PathBuf,
     },
+    /// The output folder is not a run that may be replaced.
+    #[error("{} is not replaced: {problem}; choose another output folder, or move what is there", path.display())]
+    NotReplaced {
+        /// The folder.
+        path: PathBuf,
+        /// Why it is not, with the file.
+        problem: String,
+    },
     /// The output file exists.
     #[error("{} exists already; choose another file, or replace it with --force", path.display())]
     FileExists {
@@ -193,7 +201,7 @@ impl From<Error> for youla::Error {
 youla::error_context! {
     sources: Method;
     numerical: Json;
-    bad_input: Settings OutputExists FileExists NotAModel Io MissingFile NoData Cell FieldCount Delimiter Corrupt
+    bad_input: Settings OutputExists NotReplaced FileExists NotAModel Io MissingFile NoData Cell FieldCount Delimiter Corrupt
         FormatNotRead UnequalLength WrongVariable NonUniformTime SampleTimeMissing;
 }
 

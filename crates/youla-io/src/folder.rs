@@ -2,8 +2,15 @@
 
 use crate::error::{Error, Result};
 use serde::Serialize;
+use std::collections::HashSet;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
+
+/// The list of all files of a run folder, one a line: what `--force` may replace.
+const FILES: &str = "files.txt";
+/// Held by the writer of an unfinished folder; the system lets go of it when the program ends in any way.
+const LOCK: &str = ".lock";
 
 /// A run folder that is being written. Dropped before [`RunFolder::finish`], it removes what it wrote.
 #[derive(Debug)]
@@ -12,41 +19,48 @@ pub struct RunFolder {
     partial: PathBuf,
     /// Folders above that did not exist before, innermost first.
     parents: Vec<PathBuf>,
-    replace: bool,
+    lock: Option<fs::File>,
     finished: bool,
 }
 
 impl RunFolder {
-    /// Whether `target` can become a run folder: it does not exist, is empty, or is to be replaced and is a run folder
-    /// (contains a summary.json). Nothing is written; call it before a long computation.
+    /// Whether `target` can become a run folder: it does not exist, is empty, or is to be replaced and holds nothing but the files that a
+    /// run wrote (they are listed in its files.txt). Nothing is written; call it before a long computation.
     ///
     /// # Errors
-    /// [`Error::OutputExists`]; [`Error::Io`] where it cannot be read or is a file.
+    /// [`Error::OutputExists`]; [`Error::NotReplaced`] with the first foreign file; [`Error::Io`] where it cannot be read or is a file.
     pub fn check(target: &Path, replace: bool) -> Result<()> {
         let occupied = match fs::read_dir(target) {
             Ok(mut entries) => entries.next().is_some(),
-            Err(e) if e.kind() == std::io::ErrorKind::NotFound => false,
+            Err(e) if e.kind() == ErrorKind::NotFound => false,
             Err(source) => return Err(Error::Io { path: target.to_owned(), source }),
         };
-        if occupied && !(replace && is_run_folder(target)) {
-            return Err(Error::OutputExists { path: target.to_owned() });
+        match (occupied, replace) {
+            (false, _) => Ok(()),
+            (true, false) => Err(Error::OutputExists { path: target.to_owned() }),
+            (true, true) => own_files(target).map(|_| ()),
         }
-        Ok(())
     }
 
-    /// Begins a folder that will be `target`, under the conditions of [`RunFolder::check`].
+    /// Begins a folder that will be `target`, under the conditions of [`RunFolder::check`]. What a killed program left of the same
+    /// folder is removed.
     ///
     /// # Errors
     /// Those of [`RunFolder::check`]; [`Error::Io`] where it cannot be written.
     pub fn create(target: &Path, replace: bool) -> Result<Self> {
         Self::check(target, replace)?;
         let name = target.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned());
-        let partial = target.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+        let prefix = format!(".{name}.partial-");
+        remove_left_over(target.parent().unwrap_or(Path::new("")), &prefix);
+        let partial = target.with_file_name(format!("{prefix}{}", std::process::id()));
         let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
         let parents = target.ancestors().skip(1).take_while(new).map(Path::to_owned).collect();
-        let replace = replace && is_run_folder(target);
-        let folder = RunFolder { target: target.to_owned(), partial, parents, replace, finished: false };
-        fs::create_dir_all(&folder.partial).map_err(|source| Error::Io { path: target.to_owned(), source })?;
+        let io = |source| Error::Io { path: target.to_owned(), source };
+        let mut folder = RunFolder { target: target.to_owned(), partial, parents, lock: None, finished: false };
+        fs::create_dir_all(&folder.partial).map_err(io)?;
+        let lock = fs::File::create(folder.partial.join(LOCK)).map_err(io)?;
+        // A file system without locks: then nothing is ever taken for left over.
+        folder.lock = lock.try_lock().is_ok().then_some(lock);
         Ok(folder)
     }
 
@@ -95,21 +109,31 @@ impl RunFolder {
         self.text(name, &(text + "\n"))
     }
 
-    /// Moves the whole folder to its place and returns it.
+    /// Moves the whole folder to its place and returns it. Of an older run exactly its own files are removed.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`Error::Io`]; those of [`RunFolder::check`] where the place has changed since.
     pub fn finish(mut self) -> Result<PathBuf> {
         let io = |source| Error::Io { path: self.target.clone(), source };
-        // The old run is removed after the new one is in its place.
+        self.lock = None;
+        fs::remove_file(self.partial.join(LOCK)).map_err(io)?;
+        let files = files_below(&self.partial).map_err(io)?;
+        let list: String = files.iter().map(|name| format!("{}\n", name.display())).collect();
+        fs::write(self.partial.join(FILES), list).map_err(io)?;
+        let occupied = fs::read_dir(&self.target).is_ok_and(|mut entries| entries.next().is_some());
         let old = self.partial.with_extension("old");
-        if self.replace {
+        if occupied {
+            // The old run is removed after the new one is in its place.
+            own_files(&self.target)?;
             fs::rename(&self.target, &old).map_err(io)?;
+        } else {
+            // Some systems do not rename to an empty folder.
+            let _ = fs::remove_dir(&self.target);
         }
         fs::rename(&self.partial, &self.target).map_err(io)?;
         self.finished = true;
-        if self.replace {
-            fs::remove_dir_all(&old).map_err(io)?;
+        if occupied {
+            remove_own(&old)?;
         }
         Ok(self.target.clone())
     }
@@ -126,8 +150,59 @@ impl Drop for RunFolder {
     }
 }
 
-fn is_run_folder(folder: &Path) -> bool {
-    folder.join("summary.json").is_file()
+/// All files below a folder, relative to it, in order.
+fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    let (mut found, mut open) = (Vec::new(), vec![PathBuf::new()]);
+    while let Some(inner) = open.pop() {
+        for entry in fs::read_dir(folder.join(&inner))? {
+            let entry = entry?;
+            let path = inner.join(entry.file_name());
+            // A link is a file, wherever it leads.
+            if entry.file_type()?.is_dir() { open.push(path) } else { found.push(path) }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+/// The files of a run folder, if it holds no others.
+fn own_files(folder: &Path) -> Result<Vec<PathBuf>> {
+    let io = |source| Error::Io { path: folder.to_owned(), source };
+    let refused = |problem: String| Error::NotReplaced { path: folder.to_owned(), problem };
+    let Ok(list) = fs::read_to_string(folder.join(FILES)) else {
+        return Err(refused(format!("it has no {FILES}, which every run of this version writes")));
+    };
+    let listed: HashSet<PathBuf> = list.lines().chain([FILES]).map(PathBuf::from).collect();
+    let files = files_below(folder).map_err(io)?;
+    match files.iter().find(|name| !listed.contains(*name)) {
+        Some(foreign) => Err(refused(format!("it holds {}, which no run wrote", foreign.display()))),
+        None => Ok(files),
+    }
+}
+
+/// Removes exactly the files of a run, and the folders that are empty then.
+fn remove_own(folder: &Path) -> Result<()> {
+    let io = |source| Error::Io { path: folder.to_owned(), source };
+    let files = own_files(folder)?;
+    files.iter().try_for_each(|name| fs::remove_file(folder.join(name))).map_err(io)?;
+    let mut folders: Vec<&Path> = files.iter().filter_map(|name| name.parent()).collect();
+    folders.sort_by_key(|name| std::cmp::Reverse(name.components().count()));
+    folders.dedup();
+    folders.iter().for_each(|name| drop(fs::remove_dir(folder.join(name))));
+    Ok(())
+}
+
+/// Removes unfinished folders whose writer has ended without removing them. Best effort: they disturb nothing.
+fn remove_left_over(parent: &Path, prefix: &str) {
+    let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+    for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
+        let name = entry.file_name().to_string_lossy().into_owned();
+        let number = name.strip_prefix(prefix).is_some_and(|rest| rest.parse::<u32>().is_ok());
+        let abandoned = || fs::File::open(entry.path().join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok());
+        if number && abandoned() {
+            let _ = fs::remove_dir_all(entry.path());
+        }
+    }
 }
 
 /// Writes a text beside its final place and moves it there when whole; an older file stays until then.
@@ -184,17 +259,138 @@ pub fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<P
     })
 }
 
-/// The first folder `runs/<name>-<number>` below `parent` that does not exist yet.
-pub fn unused_folder(parent: &Path, name: &str) -> PathBuf {
-    let slug: String = name
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
-        .collect::<String>()
-        .split('-')
-        .filter(|s| !s.is_empty())
-        .collect::<Vec<_>>()
-        .join("-");
-    let slug = if slug.is_empty() { "run".into() } else { slug };
-    let numbered = |k: u32| parent.join("runs").join(format!("{slug}-{k:03}"));
-    (1..).map(numbered).find(|p| !p.exists()).unwrap_or_else(|| numbered(0))
+/// A numbered folder that no other run can take. Dropped while it is empty, it is removed.
+#[derive(Debug)]
+pub struct NumberedFolder {
+    path: PathBuf,
+}
+
+impl NumberedFolder {
+    /// Makes the first folder `runs/<name>-<number>` below `parent` that does not exist yet.
+    ///
+    /// # Errors
+    /// [`Error::Io`] where it cannot be made.
+    pub fn claim(parent: &Path, name: &str) -> Result<Self> {
+        let (runs, slug) = (parent.join("runs"), slug(name));
+        fs::create_dir_all(&runs).map_err(|source| Error::Io { path: runs.clone(), source })?;
+        for k in 1..u32::MAX {
+            let path = runs.join(format!("{slug}-{k:03}"));
+            match fs::create_dir(&path) {
+                Ok(()) => return Ok(NumberedFolder { path }),
+                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
+                Err(source) => return Err(Error::Io { path, source }),
+            }
+        }
+        Err(Error::OutputExists { path: runs })
+    }
+
+    /// Where it is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+impl Drop for NumberedFolder {
+    fn drop(&mut self) {
+        // Only empty folders go.
+        let runs = self.path.parent().map(Path::to_owned);
+        if fs::remove_dir(&self.path).is_ok() {
+            let _ = runs.map(fs::remove_dir);
+        }
+    }
+}
+
+/// The name as part of a file name.
+fn slug(name: &str) -> String {
+    let plain: String =
+        name.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
+    let words: Vec<&str> = plain.split('-').filter(|s| !s.is_empty()).collect();
+    if words.is_empty() { "run".into() } else { words.join("-") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A folder of its own, removed in the end.
+    struct Place(PathBuf);
+
+    impl Place {
+        fn new(name: &str) -> Self {
+            let place = std::env::temp_dir().join(format!("youla-folder-{name}-{}", std::process::id()));
+            fs::create_dir_all(&place).unwrap();
+            Place(place)
+        }
+    }
+
+    impl Drop for Place {
+        fn drop(&mut self) {
+            let _ = fs::remove_dir_all(&self.0);
+        }
+    }
+
+    fn write(target: &Path, replace: bool, names: &[&str]) -> Result<PathBuf> {
+        let folder = RunFolder::create(target, replace)?;
+        names.iter().try_for_each(|name| folder.text(name, name))?;
+        folder.finish()
+    }
+
+    #[test]
+    fn only_files_of_a_run_are_replaced() {
+        let place = Place::new("replace");
+        let run = place.0.join("run");
+        write(&run, false, &["run.toml", "summary.json", "1-record/a.mat", "2-old/b.mat"]).unwrap();
+        assert!(matches!(write(&run, false, &["summary.json"]), Err(Error::OutputExists { .. })));
+        write(&run, true, &["summary.json", "1-record/c.mat"]).unwrap();
+        let expected = ["1-record/c.mat", "files.txt", "summary.json"].map(PathBuf::from);
+        assert_eq!(files_below(&run).unwrap(), expected);
+        for foreign in ["notes.txt", "1-record/mine.mat"] {
+            fs::write(run.join(foreign), "mine").unwrap();
+            let refused = write(&run, true, &["summary.json"]).unwrap_err().to_string();
+            assert!(refused.contains(foreign) && refused.contains("no run wrote"), "{refused}");
+            assert_eq!(fs::read_to_string(run.join(foreign)).unwrap(), "mine");
+            fs::remove_file(run.join(foreign)).unwrap();
+        }
+        assert_eq!(fs::read_dir(&place.0).unwrap().count(), 1, "nothing is left beside it");
+    }
+
+    /// What looks like a run but has no list is not one.
+    #[test]
+    fn a_folder_without_a_list_is_kept() {
+        let place = Place::new("list");
+        for name in ["run.toml", "summary.json", "thesis.tex"] {
+            fs::write(place.0.join(name), name).unwrap();
+        }
+        assert!(matches!(RunFolder::check(&place.0, true), Err(Error::NotReplaced { .. })));
+        assert_eq!(fs::read_dir(&place.0).unwrap().count(), 3);
+    }
+
+    #[test]
+    fn what_a_killed_run_left_is_removed() {
+        let place = Place::new("killed");
+        let left = place.0.join(".run.partial-4000000000");
+        fs::create_dir_all(left.join("1-record")).unwrap();
+        fs::write(left.join(LOCK), "").unwrap();
+        let run = place.0.join("run");
+        let first = RunFolder::create(&run, false).unwrap();
+        assert!(!left.exists() && first.partial.exists());
+        drop(first);
+        assert_eq!(fs::read_dir(&place.0).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn numbers_are_taken_once() {
+        let place = Place::new("numbers");
+        let claimed: Vec<PathBuf> = std::thread::scope(|scope| {
+            let claim = || NumberedFolder::claim(&place.0, "A rig!").unwrap();
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(claim)).collect();
+            let all: Vec<NumberedFolder> = threads.into_iter().map(|t| t.join().unwrap()).collect();
+            write(all[0].path(), false, &["summary.json"]).unwrap();
+            all.iter().map(|f| f.path().to_owned()).collect()
+        });
+        assert_eq!(claimed.iter().collect::<HashSet<_>>().len(), 8);
+        assert!(claimed.iter().all(|p| p.to_string_lossy().contains("a-rig-00")));
+        // Those that stayed empty are gone.
+        assert_eq!(fs::read_dir(place.0.join("runs")).unwrap().count(), 1);
+    }
 }

@@ -37,19 +37,27 @@ fn folders_that_are_not_empty() {
     let folder = loop_folder("not-empty", &[]);
     fs::create_dir(folder.join("mine")).expect("made");
     fs::write(folder.join("mine/thesis.tex"), "years of work").expect("written");
-    for force in [&[][..], &["--force"]] {
+    for (force, reason) in
+        [(&[][..], "exists already and is not empty"), (&["--force"], "is not replaced: it has no files.txt")]
+    {
         let mut command = Command::new(PROGRAM);
         let arguments = [&["identify", "run.toml", "--out", "mine"], force].concat();
-        refused_by(command.args(arguments), &folder, 2, &["mine exists already and is not empty"]);
+        refused_by(command.args(arguments), &folder, 2, &["mine", reason]);
+        assert!(folder.join("mine/thesis.tex").exists());
     }
     let run = ["identify", "run.toml", "--out", "run", "--quiet"];
     assert_eq!(youla(&folder, &run).code, Some(0));
     let first = fs::read(folder.join("run/summary.json")).expect("written");
     refused_by(Command::new(PROGRAM).args(run), &folder, 2, &["run exists already and is not empty"]);
     assert_eq!(fs::read(folder.join("run/summary.json")).expect("still there"), first);
-    fs::write(folder.join("run/stale"), "").expect("written");
-    assert_eq!(youla(&folder, &[&run[..], &["--force"]].concat()).code, Some(0));
-    assert!(!folder.join("run/stale").exists() && folder.join("run/report.html").is_file());
+    // A file that no run wrote is kept, and everything beside it.
+    fs::write(folder.join("run/notes"), "mine").expect("written");
+    let forced = [&run[..], &["--force"]].concat();
+    refused_by(Command::new(PROGRAM).args(&forced), &folder, 2, &["run is not replaced: it holds notes"]);
+    assert_eq!(fs::read(folder.join("run/summary.json")).expect("still there"), first);
+    fs::remove_file(folder.join("run/notes")).expect("removed");
+    assert_eq!(youla(&folder, &forced).code, Some(0));
+    assert!(folder.join("run/report.html").is_file());
 }
 
 #[test]

@@ -23,8 +23,29 @@ fn array(name: &str, m: MatRef<'_, f64>) -> String {
     format!("{name} = np.array([\n{}]).reshape({}, {})\n", rows(m, "[", "],"), m.nrows(), m.ncols())
 }
 
-/// Strings of JSON are strings of Python.
+/// Strings of JSON are strings of Python. python-control refuses names with a point, which is its sign between system and signal; a
+/// name that is there already gets a number.
 fn names(channels: &[Channel]) -> String {
-    let quoted = |c: &Channel| serde_json::Value::from(c.name.as_str()).to_string();
-    channels.iter().map(quoted).collect::<Vec<_>>().join(", ")
+    let mut known: Vec<String> = Vec::new();
+    for c in channels {
+        let plain = c.name.replace('.', "_");
+        let taken =
+            |name: &String| known.contains(name) || (*name != c.name && channels.iter().any(|c| c.name == *name));
+        let numbered = (2..).map(|k| format!("{plain}_{k}"));
+        let name = std::iter::once(plain.clone()).chain(numbered).find(|name| !taken(name));
+        known.push(name.unwrap_or(plain));
+    }
+    let quoted = |name: &String| serde_json::Value::from(name.as_str()).to_string();
+    known.iter().map(quoted).collect::<Vec<_>>().join(", ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_no_point_and_stay_apart() {
+        let channels = ["Data.u", "Data_u", "a.b", "y"].map(|name| Channel::new(name, ""));
+        assert_eq!(names(&channels), r#""Data_u_2", "Data_u", "a_b", "y""#);
+    }
 }

@@ -1,6 +1,6 @@
 //! `youla check`: what is wrong with the data.
 
-use crate::log_flags::LogFlags;
+use crate::log_flags::{LogFlags, places};
 use crate::output::{Failure, Form, say};
 use crate::run_folder::folder_of;
 use clap::Args;
@@ -71,10 +71,10 @@ fn of_files(args: &CheckArgs) -> Result<DataCheck, Failure> {
     let options = args.options.as_ref().map(read_check_options).transpose()?.unwrap_or_default();
     let files = CheckedFiles {
         files: args.files.clone(),
-        inputs: args.log.input.clone(),
-        outputs: args.log.output.clone(),
-        input_excitation: args.log.excitation.clone(),
-        reference: args.log.reference.clone(),
+        inputs: places(&args.log.input),
+        outputs: places(&args.log.output),
+        input_excitation: places(&args.log.excitation),
+        reference: places(&args.log.reference),
         sample_time: args.log.sample_time,
         time_column: args.log.time.clone(),
         csv: args.log.dialect.options(),

@@ -60,18 +60,18 @@ impl IdentifyArgs {
         let data = DataSettings {
             sample_time: log.sample_time,
             time_column: log.time.clone(),
-            input_excitation: ChannelSpec::chosen(&log.excitation),
-            reference: ChannelSpec::chosen(&log.reference),
+            input_excitation: specs(&log.excitation),
+            reference: specs(&log.reference),
             csv: log.dialect.options(),
             ..DataSettings::new(
-                ChannelSpec::chosen(&log.input),
-                ChannelSpec::chosen(&log.output),
+                specs(&log.input),
+                specs(&log.output),
                 self.files.iter().map(file).collect(),
             )
         };
         let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
-        let (m, p) = (log.input.len(), log.output.len());
+        let (m, p) = (data.inputs.len(), data.outputs.len());
         let controller = match &self.controller {
             Some(file) => {
                 let feedback = if self.negative_feedback { Feedback::Negative } else { Feedback::Positive };

@@ -1,6 +1,7 @@
 //! `youla init`: a first run.toml from a log, by questions or flags.
 
 use crate::dialect::Dialect;
+use crate::log_flags::places;
 use crate::output::{Failure, Form, ask_line, say};
 use clap::{Args, ValueEnum};
 use std::io::IsTerminal;
@@ -116,7 +117,7 @@ fn missing(args: &InitArgs) -> Vec<&'static str> {
 fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failure> {
     let list = |given: &[ChannelRef], question: &str| match given {
         [] => ask(question, |text| Ok(names(text))),
-        given => Ok(given.to_vec()),
+        given => Ok(places(given)),
     };
     let inputs = list(&args.input, "Inputs of the plant, as applied, separated by commas")?;
     let outputs = list(&args.output, "Outputs of the plant, separated by commas")?;
@@ -153,8 +154,8 @@ fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failur
         clock,
         inputs,
         outputs,
-        input_excitation: args.excitation.clone(),
-        reference: args.reference.clone(),
+        input_excitation: places(&args.excitation),
+        reference: places(&args.reference),
         feedback,
         estimated: args.estimate.unwrap_or(2 * rows / 3),
     })
@@ -180,7 +181,7 @@ fn ask<T>(question: &str, read: impl Fn(&str) -> Result<T, String>) -> Result<T,
 }
 
 fn names(text: &str) -> Vec<ChannelRef> {
-    text.split(',').map(|name| read_name(name.trim())).collect()
+    places(&text.split(',').map(|name| read_name(name.trim())).collect::<Vec<_>>())
 }
 
 fn read_name(text: &str) -> ChannelRef {

@@ -2,7 +2,7 @@
 
 use crate::dialect::Dialect;
 use clap::Args;
-use youla_io::ChannelRef;
+use youla_io::{ChannelRef, ChannelSpec};
 
 /// Channels and clock of a log.
 #[derive(Debug, Args)]
@@ -27,4 +27,39 @@ pub(crate) struct LogFlags {
     pub(crate) time: Option<ChannelRef>,
     #[command(flatten)]
     pub(crate) dialect: Dialect,
+}
+
+/// The places as they were meant: the comma of `u(:,1)` is none between two places.
+pub(crate) fn places(given: &[ChannelRef]) -> Vec<ChannelRef> {
+    let mut whole: Vec<ChannelRef> = Vec::new();
+    let mut open: Option<String> = None;
+    for part in given.iter().map(ChannelRef::to_string) {
+        let text = open.take().map_or(part.clone(), |before| format!("{before},{part}"));
+        if text.matches('(').count() > text.matches(')').count() {
+            open = Some(text);
+        } else {
+            let Ok(place) = text.parse();
+            whole.push(place);
+        }
+    }
+    whole.extend(open.map(ChannelRef::Name));
+    whole
+}
+
+/// Channels under the names by which they were given.
+pub(crate) fn specs(chosen: &[ChannelRef]) -> Vec<ChannelSpec> {
+    ChannelSpec::chosen(&places(chosen))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_comma_of_a_column_divides_nothing() {
+        let given = |text: &str| text.split(',').map(|t| t.parse().unwrap()).collect::<Vec<ChannelRef>>();
+        let names = |text: &str| places(&given(text)).iter().map(ChannelRef::to_string).collect::<Vec<_>>();
+        assert_eq!(names("u(:,1),u(:,2),#3,y"), ["u(:,1)", "u(:,2)", "#3", "y"]);
+        assert_eq!(names("a(b,c"), ["a(b,c"]);
+    }
 }

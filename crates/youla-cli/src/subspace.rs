@@ -1,6 +1,7 @@
 //! `youla subspace`: a model straight from files of any length.
 
 use crate::dialect::Dialect;
+use crate::log_flags::places;
 use crate::output::{Failure, Form, Reading, say};
 use crate::table;
 use clap::Args;
@@ -50,8 +51,8 @@ pub(crate) fn identify(form: Form, args: &SubspaceArgs) -> Result<(), Failure> {
     }
     let records = LongRecords {
         files: args.files.clone(),
-        inputs: args.input.clone(),
-        outputs: args.output.clone(),
+        inputs: places(&args.input),
+        outputs: places(&args.output),
         time: TimeSource { column: args.time.clone(), ts: args.sample_time, ..TimeSource::default() },
         csv: args.dialect.options(),
     };

@@ -95,6 +95,37 @@ impl Draft {
     /// # Errors
     /// [`youla_io::Error::Settings`] naming the log for what [`Draft::problem`] finds.
     pub fn toml(&self, columns: &[SurveyedColumn]) -> Result<String> {
+        let named = self.with_places(columns);
+        named.as_ref().unwrap_or(self).text(columns)
+    }
+
+    /// Numbers of columns as the places of these columns, where columns of matrices are counted together, which no reader does.
+    fn with_places(&self, columns: &[SurveyedColumn]) -> Option<Draft> {
+        if !columns.iter().any(|c| c.from.contains("(:,")) {
+            return None;
+        }
+        let place = |c: &ChannelRef| match c {
+            ChannelRef::Column(number) => match number.checked_sub(1).and_then(|k| columns.get(k)) {
+                Some(column) => ChannelRef::Name(column.from.clone()),
+                None => c.clone(),
+            },
+            ChannelRef::Name(_) => c.clone(),
+        };
+        let places = |all: &[ChannelRef]| all.iter().map(place).collect::<Vec<_>>();
+        Some(Draft {
+            clock: match &self.clock {
+                DraftClock::Column(column) => DraftClock::Column(place(column)),
+                DraftClock::SampleTime(ts) => DraftClock::SampleTime(*ts),
+            },
+            inputs: places(&self.inputs),
+            outputs: places(&self.outputs),
+            input_excitation: places(&self.input_excitation),
+            reference: places(&self.reference),
+            ..self.clone()
+        })
+    }
+
+    fn text(&self, columns: &[SurveyedColumn]) -> Result<String> {
         let refused =
             |problem: String| Error::File(youla_io::Error::Settings { path: self.file.clone(), at: None, problem });
         if let Some(problem) = self.problem(columns) {
@@ -262,6 +293,24 @@ mod tests {
         assert_eq!(settings.data.inputs[1].source(), ChannelRef::Column(4));
         assert_eq!(settings.data.inputs[1].name, "u2");
         assert_eq!(settings.data.outputs[1].name, "odd \"name\"");
+    }
+
+    /// Columns of the matrices of a MATLAB file, chosen by number.
+    #[test]
+    fn columns_of_matrices_have_places() {
+        let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
+        let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
+        let columns = ["u(:,1)", "u(:,2)", "y"].map(of);
+        let mut numbered = draft(None);
+        numbered.clock = DraftClock::SampleTime(1e-3);
+        numbered.inputs = vec![ChannelRef::Column(1), ChannelRef::Column(2)];
+        numbered.outputs = vec![ChannelRef::Column(3)];
+        numbered.input_excitation.clear();
+        let text = numbered.toml(&columns).unwrap();
+        let settings = RunSettings::parse(&text, Path::new("run.toml")).unwrap();
+        let places: Vec<String> = settings.data.inputs.iter().map(|c| c.source().to_string()).collect();
+        assert_eq!(places, ["u(:,1)", "u(:,2)"]);
+        assert_eq!(settings.data.outputs[0].source(), ChannelRef::Name("y".into()));
     }
 
     #[test]

@@ -199,7 +199,16 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
 }
 
 fn sentence(e: &Evidence) -> String {
-    format!("{} {:.3}, with a limit of {}.", e.question, e.figure, e.limit)
+    format!("{} {}, with a limit of {}.", e.question, figure(e.figure), e.limit)
+}
+
+/// Three decimals, or a power of ten where these are too many digits.
+fn figure(value: f64) -> String {
+    match value {
+        v if !v.is_finite() => "not finite".into(),
+        v if v.abs() >= 1e5 => format!("{v:.1e}"),
+        v => format!("{v:.3}"),
+    }
 }
 
 /// Evidence and candidates as tables of the report.
@@ -207,7 +216,7 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
     let Ok(model) = &found.recommended else { return Vec::new() };
     let evidence = |e: &Evidence| {
         let held = if e.holds() { "yes" } else { "no" };
-        vec![e.question.clone(), format!("{:.3}", e.figure), format!("{}", e.limit), held.to_owned()]
+        vec![e.question.clone(), figure(e.figure), format!("{}", e.limit), held.to_owned()]
     };
     let least = model.candidates.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
     let mut candidates: Vec<_> = model.candidates.iter().collect();

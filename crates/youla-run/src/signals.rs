@@ -23,7 +23,8 @@ pub struct DeviationSignals {
     /// Samples dropped at the start of each record.
     pub settle: usize,
     /// `||alpha - expected|| / ||expected||` over all records: 0 when the declared controller is the one that ran and
-    /// nothing else (saturation, unknown excitation) acted. `None` where no excitation is known.
+    /// nothing else (saturation, unknown excitation) acted. `None` where no excitation is known or all are
+    /// zero.
     pub controller_mismatch: Option<f64>,
 }
 
@@ -75,10 +76,11 @@ pub fn deviation_signals(
             expected_alpha.push(expected.subrows(settle, expected.nrows() - settle).to_owned());
         }
     }
-    let controller_mismatch = (!expected_alpha.is_empty()).then(|| {
-        let pairs = || experiments.iter().zip(&expected_alpha);
+    let pairs = || experiments.iter().zip(&expected_alpha);
+    let size: f64 = pairs().map(|(_, e)| e.squared_norm_l2()).sum();
+    // An excitation that is zero throughout says nothing of the controller.
+    let controller_mismatch = (size > 0.0).then(|| {
         let miss: f64 = pairs().map(|(s, e)| (s.alpha() - e).squared_norm_l2()).sum();
-        let size: f64 = pairs().map(|(_, e)| e.squared_norm_l2()).sum();
         (miss / size).sqrt()
     });
     Ok(DeviationSignals { experiments, expected_alpha, settle, controller_mismatch })

@@ -13,6 +13,52 @@ pub fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, 
     values.serialize(serializer)
 }
 
+/// One number.
+pub(super) mod one {
+    use super::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
+    }
+
+    pub(in super::super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        value.serialize(serializer)
+    }
+}
+
+/// Pairs of numbers.
+pub(super) mod pairs {
+    use super::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+        let values = Vec::<[Option<f64>; 2]>::deserialize(deserializer)?;
+        Ok(values.into_iter().map(|pair| pair.map(|value| value.unwrap_or(f64::NAN))).collect())
+    }
+
+    pub(in super::super) fn serialize<S: Serializer>(values: &[[f64; 2]], serializer: S) -> Result<S::Ok, S::Error> {
+        values.serialize(serializer)
+    }
+}
+
+/// A pair of numbers that may be absent.
+pub(super) mod optional_pair {
+    use super::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
+        deserializer: D,
+    ) -> Result<Option<[f64; 2]>, D::Error> {
+        let values = Option::<[Option<f64>; 2]>::deserialize(deserializer)?;
+        Ok(values.map(|pair| pair.map(|value| value.unwrap_or(f64::NAN))))
+    }
+
+    pub(in super::super) fn serialize<S: Serializer>(
+        value: &Option<[f64; 2]>,
+        serializer: S,
+    ) -> Result<S::Ok, S::Error> {
+        value.serialize(serializer)
+    }
+}
+
 /// Vectors to seven significant digits, more than any figure shows.
 pub(super) mod seven_digits {
     pub(in super::super) use super::deserialize;

@@ -41,8 +41,10 @@ pub struct StabilisationPole {
     /// Order of its model.
     pub order: usize,
     /// Natural frequency, Hz.
+    #[serde(with = "numbers::one")]
     pub hz: f64,
     /// Damping ratio.
+    #[serde(with = "numbers::one")]
     pub zeta: f64,
     /// Standard deviation of the frequency, Hz, where it is known.
     pub hz_deviation: Option<f64>,
@@ -72,12 +74,16 @@ pub enum PoleStability {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StabilisationCluster {
     /// Median of the natural frequencies, Hz.
+    #[serde(with = "numbers::one")]
     pub hz: f64,
     /// Median of the damping ratios.
+    #[serde(with = "numbers::one")]
     pub zeta: f64,
     /// Half the distance of the quartiles of the frequencies, Hz.
+    #[serde(with = "numbers::one")]
     pub hz_spread: f64,
     /// Half the distance of the quartiles of the damping ratios.
+    #[serde(with = "numbers::one")]
     pub zeta_spread: f64,
     /// Median of the standard deviations of the frequencies, Hz, where they are known.
     pub hz_deviation: Option<f64>,
@@ -88,6 +94,7 @@ pub struct StabilisationCluster {
     /// Number of orders at which it is stable: [`PoleStability::Stable`].
     pub stable_orders: usize,
     /// Mode shape: magnitude and phase in degrees of each output.
+    #[serde(with = "numbers::pairs")]
     pub shape: Vec<[f64; 2]>,
 }
 
@@ -97,9 +104,10 @@ pub struct Poles {
     /// Key of the method.
     pub method: String,
     /// Real and imaginary parts.
+    #[serde(with = "numbers::pairs")]
     pub poles: Vec<[f64; 2]>,
     /// Those of the finite invariant zeros, where the model has as many inputs as outputs.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "numbers::pairs")]
     pub zeros: Vec<[f64; 2]>,
 }
 
@@ -109,11 +117,13 @@ pub struct Mode {
     /// Key of the method.
     pub method: String,
     /// Natural frequency, Hz.
+    #[serde(with = "numbers::one")]
     pub hz: f64,
     /// Damping ratio; negative where the mode is unstable.
+    #[serde(with = "numbers::one")]
     pub zeta: f64,
     /// Standard deviations of both, where they are known.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "numbers::optional_pair")]
     pub deviation: Option<[f64; 2]>,
 }
 
@@ -165,4 +175,20 @@ pub struct ReductionOrder {
     pub worst_pole: Option<[f64; 2]>,
     /// Why there is no model of this order.
     pub failure: Option<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A pole at z = 0 has no finite frequency: a report with it is read again.
+    #[test]
+    fn numbers_that_do_not_exist_are_read_again() {
+        let mode = Mode { method: "hansen".into(), hz: f64::INFINITY, zeta: 1.0, deviation: Some([f64::NAN, 0.1]) };
+        let poles = Poles { method: "hansen".into(), poles: vec![[0.0, f64::NAN]], zeros: vec![[f64::INFINITY, 0.0]] };
+        let again: Mode = serde_json::from_str(&serde_json::to_string(&mode).unwrap()).unwrap();
+        assert!(again.hz.is_nan() && again.zeta == 1.0 && again.deviation.unwrap()[1] == 0.1);
+        let again: Poles = serde_json::from_str(&serde_json::to_string(&poles).unwrap()).unwrap();
+        assert!(again.poles[0][1].is_nan() && again.zeros[0][0].is_nan());
+    }
 }

@@ -53,7 +53,7 @@ pub(crate) fn fail(failure: &Failure) -> ExitCode {
         Failure::OutputClosed => ExitCode::SUCCESS,
         Failure::Refused(sentence, kind) => {
             // Without standard error the progress is not shown.
-            let _ = writeln!(std::io::stderr(), "error: {sentence}");
+            let _ = writeln!(std::io::stderr(), "error: {}", shown(sentence));
             match kind {
                 ErrorKind::BadInput => ExitCode::from(2),
                 ErrorKind::Numerical => ExitCode::from(3),
@@ -62,9 +62,24 @@ pub(crate) fn fail(failure: &Failure) -> ExitCode {
     }
 }
 
+/// Names come from files: what would command the terminal or turn the direction of the text is written as `\u001b`, as in JSON.
+fn shown(text: &str) -> String {
+    let commands = |c: char| {
+        let turns =
+            matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+        turns || (c.is_control() && !matches!(c, '\n' | '\t'))
+    };
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        if commands(c) { out.push_str(&format!("\\u{:04x}", u32::from(c))) } else { out.push(c) }
+    }
+    out
+}
+
 /// Prints a line to standard output.
 pub(crate) fn say(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
+    let text = shown(text);
     writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|e| match e.kind() {
         std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
         _ => Failure::io(Path::new("standard output"), e),
@@ -120,5 +135,16 @@ impl Reading {
 
     pub(crate) fn finish(&self) {
         self.0.finish_and_clear();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::shown;
+
+    #[test]
+    fn nothing_commands_the_terminal() {
+        assert_eq!(shown("a\u{1b}[2Jb\r\n\tc \u{202e}d\u{9b}"), "a\\u001b[2Jb\\u000d\n\tc \\u202ed\\u009b");
+        assert_eq!(shown("täglich 5 µm – gut"), "täglich 5 µm – gut");
     }
 }

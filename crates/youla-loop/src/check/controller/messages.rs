@@ -6,6 +6,10 @@ use crate::check::options::CheckOptions;
 use crate::error::Error;
 use youla::signal::Channel;
 
+/// Share of the input below which what the controller does not explain is rounding of a log with six digits.
+/// Chosen, not measured.
+const NO_EXCITATION: f64 = 1e-5;
+
 /// Factors that are known from units: degrees and radians, revolutions, thousands.
 const UNITS: [(f64, &str); 4] = [
     (57.295_779_513_082_32, "180 / pi, degrees against radians"),
@@ -62,6 +66,15 @@ impl ControllerCheck {
         outputs: &[Channel],
         options: &CheckOptions,
     ) -> Option<Finding> {
+        if !self.excited && !self.guided && self.residual < NO_EXCITATION {
+            let what = format!(
+                "the declared controller explains all but {} of the input: nothing but the controller moves the loop",
+                few(self.residual)
+            );
+            let advice = "Excite the loop at the plant input or by a reference, and log it again: no plant can be told from such a log";
+            let finding = Finding::new(Test::Excitation, Severity::Defect, record, what);
+            return Some(finding.number("residual", self.residual).advice(advice));
+        }
         if self.residual <= options.controller_caution {
             return None;
         }

@@ -51,6 +51,8 @@ pub struct ControllerCheck {
     pub residual: f64,
     /// Whether an excitation at the plant input is declared.
     pub excited: bool,
+    /// Whether a declared reference moves.
+    pub guided: bool,
     /// The change that leaves least, and what it leaves, where one would help.
     pub change: Option<(Change, f64)>,
 }
@@ -104,6 +106,8 @@ pub fn controller(
     let log = Log::new(record);
     let residual = log.residual(k, &log.e, &log.w)?;
     let excited = record.input_excitation.is_some();
+    let moves = |r: MatRef<'_, f64>| r.col_iter().any(|c| c.iter().any(|v| *v != c[0]));
+    let guided = record.reference.is_some_and(moves);
     let mut change = None;
     if residual > options.controller_caution {
         for (candidate, left) in log.changes(k)? {
@@ -114,5 +118,5 @@ pub fn controller(
         let least = HELPS * residual;
         change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
     }
-    Ok(ControllerCheck { residual, excited, change })
+    Ok(ControllerCheck { residual, excited, guided, change })
 }

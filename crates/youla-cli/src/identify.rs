@@ -1,11 +1,10 @@
 //! `youla identify`: from a run.toml, or straight from a log with flags.
 
-use crate::log_flags::LogFlags;
+use crate::log_flags::{LogFlags, specs};
 use crate::output::Failure;
 use crate::run_folder::{OutputFolder, folder_of};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use youla_io::ChannelSpec;
 use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings};
 
 pub(crate) const EXAMPLES: &str = "\

@@ -88,15 +88,23 @@ impl RunRecords {
 /// [`youla_io::Error::Settings`] as of [`DataSettings::check`]; the first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
 pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords> {
     settings.check()?;
-    let purposes = [("estimation", &settings.estimation), ("verification", &settings.verification)];
-    let files: Vec<(&str, &DataFile)> =
-        purposes.iter().flat_map(|(purpose, files)| files.iter().map(move |f| (*purpose, f))).collect();
-    let read: Vec<Result<FileRecords>> =
-        files.par_iter().map(|(purpose, file)| read_file(settings, folder, purpose, file)).collect();
+    let purpose = |k: usize| if k < settings.estimation.len() { "estimation" } else { "verification" };
+    let read: Vec<Result<FileRecords>> = settings
+        .labelled()
+        .into_par_iter()
+        .enumerate()
+        .map(|(k, (label, file))| read_file(settings, folder, (purpose(k), &label), file))
+        .collect();
+    let read = read.into_iter().collect::<Result<Vec<_>>>()?;
+    let used = |f: &FileRecords| UsedRows {
+        path: f.source.path.clone(),
+        sha256: f.source.sha256.clone(),
+        rows: f.rows.clone(),
+    };
+    refuse_overlap(&read.iter().map(used).collect::<Vec<_>>(), settings.estimation.len())?;
     let (mut records, mut sources, mut segments) = (Vec::new(), Vec::new(), Vec::new());
     let mut of_estimation = 0;
-    for (k, one) in read.into_iter().enumerate() {
-        let file = one?;
+    for (k, file) in read.into_iter().enumerate() {
         of_estimation += if k < settings.estimation.len() { file.records.len() } else { 0 };
         records.extend(file.records);
         sources.push(file.source);
@@ -125,14 +133,50 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
     })
 }
 
+/// The rows of a file that are used.
+pub(super) struct UsedRows {
+    /// As in run.toml.
+    pub(super) path: String,
+    pub(super) sha256: String,
+    /// First and last row of each stretch, counted from 1.
+    pub(super) rows: Vec<[usize; 2]>,
+}
+
+/// Refuses rows that both identify and verify: of one file under any name, by its bytes. The first files are those to identify from.
+pub(super) fn refuse_overlap(files: &[UsedRows], estimation: usize) -> Result<()> {
+    let (used, fresh) = files.split_at(estimation);
+    for fresh in fresh {
+        for used in used.iter().filter(|f| f.sha256 == fresh.sha256) {
+            let pairs = fresh.rows.iter().flat_map(|a| used.rows.iter().map(move |b| [a[0].max(b[0]), a[1].min(b[1])]));
+            if let Some([from, to]) = pairs.into_iter().find(|[from, to]| from <= to) {
+                let (path, at) = (Path::new("run.toml").to_owned(), None);
+                let problem = format!(
+                    "[[data.verification]] {} uses rows {from} to {to}, from which the models are identified: that would verify \
+                     nothing. Keep them apart with `skip` and `take`, for example skip = {to} here",
+                    fresh.path
+                );
+                return Err(Error::File(youla_io::Error::Settings { path, at, problem }));
+            }
+        }
+    }
+    Ok(())
+}
+
 /// What one file gave.
 struct FileRecords {
     records: Vec<LoopRecord>,
+    /// First and last row of each record in the file, counted from 1.
+    rows: Vec<[usize; 2]>,
     source: SourceFile,
     segments: Vec<RecordSegment>,
 }
 
-fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataFile) -> Result<FileRecords> {
+fn read_file(
+    settings: &DataSettings,
+    folder: &Path,
+    (purpose, label): (&str, &str),
+    file: &DataFile,
+) -> Result<FileRecords> {
     let path = folder.join(&file.file);
     let groups =
         [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
@@ -149,8 +193,9 @@ fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataF
         channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
         csv: settings.csv.clone(),
     };
-    let (mut records, mut segments) = (Vec::new(), Vec::new());
-    for Part { record, name, rows, cut } in parts(file, read_parts(&source)?)? {
+    let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
+    for Part { record, name, rows, cut } in parts(file, label, read_parts(&source)?)? {
+        all_rows.push(rows);
         let disturbance = settings.disturbance.as_ref().map(|d| disturbance_signals(d, &record)).transpose()?;
         let record = record.detrend(settings.detrend)?.record;
         if cut {
@@ -160,7 +205,7 @@ fn read_file(settings: &DataSettings, folder: &Path, purpose: &str, file: &DataF
     }
     let source =
         SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
-    Ok(FileRecords { records, source, segments })
+    Ok(FileRecords { records, rows: all_rows, source, segments })
 }
 
 impl LoopRecord {

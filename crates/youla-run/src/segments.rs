@@ -29,16 +29,16 @@ pub(super) struct Part {
     pub(super) cut: bool,
 }
 
-/// The parts of a file that the settings ask for, from its parts without gaps.
+/// The parts of a file that the settings ask for, from its parts without gaps, named after `label`.
 ///
 /// # Errors
 /// [`youla::Error::OutOfRange`] for rows that the file does not have, and those of [`Record::trim`].
-pub(super) fn parts(file: &DataFile, mut continuous: Vec<Record>) -> Result<Vec<Part>> {
+pub(super) fn parts(file: &DataFile, label: &str, mut continuous: Vec<Record>) -> Result<Vec<Part>> {
     if continuous.len() == 1 && file.segments.is_empty() {
         let whole = continuous.remove(0);
         let record = if file.skip == 0 && file.take.is_none() { whole } else { whole.trim(file.skip, file.take)? };
         let rows = [file.skip + 1, file.skip + record.samples()];
-        return Ok(vec![Part { record, name: file.label(), rows, cut: false }]);
+        return Ok(vec![Part { record, name: label.to_owned(), rows, cut: false }]);
     }
     let samples: usize = continuous.iter().map(Record::samples).sum();
     let wanted = wanted(file, samples)?;
@@ -60,7 +60,7 @@ pub(super) fn parts(file: &DataFile, mut continuous: Vec<Record>) -> Result<Vec<
     }
     let several = found.len() > 1;
     let named = |(k, (record, rows)): (usize, (Record, [usize; 2]))| {
-        let name = if several { format!("{}-{}", file.label(), k + 1) } else { file.label() };
+        let name = if several { format!("{label}-{}", k + 1) } else { label.to_owned() };
         Part { record, name, rows, cut: true }
     };
     Ok(found.into_iter().enumerate().map(named).collect())
@@ -151,6 +151,42 @@ mod tests {
         assert!((model(&cut).a()[(0, 0)] - 0.8).abs() < 1e-9);
         let refused = folder.read("estimation = [{ file = \"whole.csv\" }]").unwrap_err().to_string();
         assert!(refused.contains("row 401"), "{refused}");
+    }
+
+    #[test]
+    fn parts_of_one_file_need_no_names() {
+        let folder = Folder::new("unnamed");
+        folder.write("whole.csv", 0..1000);
+        folder.write("other.csv", 0..500);
+        let found = folder
+            .read(
+                "estimation = [{ file = \"whole.csv\", take = 600 }, { file = \"other.csv\", take = 200 }]\n\
+                 verification = [{ file = \"whole.csv\", skip = 600, take = 100 }, { file = \"whole.csv\", skip = 700, name = \"rest\" }]",
+            )
+            .unwrap();
+        let names: Vec<&str> = found.estimation.iter().chain(&found.verification).map(|r| &r.name[..]).collect();
+        assert_eq!(names, ["whole-1", "other", "whole-2", "rest"]);
+    }
+
+    /// Rows that identify verify nothing, also under another name of the file.
+    #[test]
+    fn rows_of_the_estimation_do_not_verify() {
+        let folder = Folder::new("overlap");
+        folder.write("whole.csv", 0..1000);
+        folder.write("copy.csv", 0..1000);
+        for (estimation, verification) in [
+            ("file = \"whole.csv\", take = 600", "file = \"whole.csv\", name = \"v\""),
+            ("file = \"whole.csv\", take = 600", "file = \"whole.csv\", name = \"v\", skip = 599"),
+            ("file = \"whole.csv\", segments = [[1, 100], [500, 600]]", "file = \"copy.csv\", skip = 599, take = 9"),
+        ] {
+            let refused =
+                folder.read(&format!("estimation = [{{ {estimation} }}]\nverification = [{{ {verification} }}]"));
+            let refused = refused.unwrap_err().to_string();
+            assert!(refused.contains("to 600, from which the models are identified"), "{refused}");
+        }
+        let apart =
+            "estimation = [{ file = \"whole.csv\", take = 600 }]\nverification = [{ file = \"copy.csv\", skip = 600 }]";
+        assert!(folder.read(apart).is_ok());
     }
 
     #[test]

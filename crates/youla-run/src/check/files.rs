@@ -1,7 +1,7 @@
 //! Files as they are read and tested one record at a time.
 
 use super::{CheckedRecord, DataCheck};
-use crate::records::{LoopRecord, channels_of};
+use crate::records::{LoopRecord, UsedRows, channels_of, refuse_overlap};
 use crate::segments::{Part, parts};
 use crate::settings::DataFile;
 use crate::{Error, Result};
@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use std::path::Path;
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-use youla_io::{ChannelSpec, CsvOptions, Format, Source, TimeSource, read};
+use youla_io::{ChannelSpec, CsvOptions, Format, Source, TimeSource, read, sha256};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
 
 /// What all records of a check share.
@@ -19,6 +19,8 @@ pub(super) struct Job {
     pub(super) time: TimeSource,
     pub(super) csv: CsvOptions,
     pub(super) options: CheckOptions,
+    /// How many of the files are to identify from; they come first.
+    pub(super) estimation: usize,
 }
 
 /// A record with its findings.
@@ -31,18 +33,24 @@ const TIME: &str = "(time)";
 
 pub(super) fn check_all(
     job: &Job,
-    files: &[&DataFile],
+    files: &[(String, &DataFile)],
     folder: &Path,
     controller: &DeclaredController<'_>,
 ) -> Result<DataCheck> {
     job.options.check()?;
-    let one = |file: &&DataFile| check_file(job, file, folder, controller);
+    let one = |(label, file): &(String, &DataFile)| check_file(job, (label, file), folder, controller);
     let parts: Vec<Result<Vec<CheckedPart>>> = files.par_iter().map(one).collect();
-    let mut all = Vec::new();
-    for part in parts {
-        all.extend(part?.into_iter().map(Ok));
-    }
-    collected(all)
+    let parts = parts.into_iter().collect::<Result<Vec<_>>>()?;
+    let used: Vec<UsedRows> = files
+        .iter()
+        .zip(&parts)
+        .map(|((_, file), parts)| {
+            let rows = parts.iter().map(|(record, _)| record.rows).collect();
+            Ok(UsedRows { path: file.file.display().to_string(), sha256: sha256(folder.join(&file.file))?, rows })
+        })
+        .collect::<Result<_>>()?;
+    refuse_overlap(&used, job.estimation)?;
+    collected(parts.into_iter().flatten().map(Ok).collect())
 }
 
 pub(super) fn collected(all: Vec<Result<CheckedPart>>) -> Result<DataCheck> {
@@ -57,7 +65,7 @@ pub(super) fn collected(all: Vec<Result<CheckedPart>>) -> Result<DataCheck> {
 
 fn check_file(
     job: &Job,
-    file: &DataFile,
+    (label, file): (&str, &DataFile),
     folder: &Path,
     controller: &DeclaredController<'_>,
 ) -> Result<Vec<CheckedPart>> {
@@ -74,7 +82,7 @@ fn check_file(
         channels: job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect(),
         csv: job.csv.clone(),
     };
-    let found = parts(file, vec![read(&source)?])?;
+    let found = parts(file, label, vec![read(&source)?])?;
     found.iter().map(|part| check_part(job, file, part, controller)).collect()
 }
 

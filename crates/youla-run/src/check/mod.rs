@@ -11,7 +11,7 @@ pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
 use super::factorise::declared_controller;
 use super::records::{LoopRecord, RunRecords};
-use super::settings::{DataFile, RunSettings};
+use super::settings::{DataFile, RunSettings, labelled};
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;
@@ -57,10 +57,10 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
         time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, ..Default::default() },
         csv: d.csv.clone(),
         options: with_order(&settings.check, &settings.hansen),
+        estimation: d.estimation.len(),
     };
-    let files: Vec<&DataFile> = d.estimation.iter().chain(&d.verification).collect();
     let controller = |time: Discrete| Ok(Some(declared_controller(settings, folder, time)?.0));
-    let mut found = check_all(&job, &files, folder, &controller)?;
+    let mut found = check_all(&job, &d.labelled(), folder, &controller)?;
     found.findings.extend(method_finding(settings));
     by_severity(&mut found.findings);
     Ok(found)
@@ -91,10 +91,11 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
         time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
         csv: files.csv.clone(),
         options: options.clone(),
+        estimation: files.files.len(),
     };
     let file = |path: &PathBuf| DataFile { file: path.clone(), skip: 0, take: None, segments: Vec::new(), name: None };
     let all: Vec<DataFile> = files.files.iter().map(file).collect();
-    let mut found = check_all(&job, &all.iter().collect::<Vec<_>>(), Path::new(""), &|_| Ok(None))?;
+    let mut found = check_all(&job, &labelled(&all.iter().collect::<Vec<_>>()), Path::new(""), &|_| Ok(None))?;
     by_severity(&mut found.findings);
     Ok(found)
 }
@@ -132,8 +133,9 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
     if let Some(segment) = records.segments.iter().find(|s| s.record == name) {
         return (segment.file.clone(), segment.rows[0]);
     }
-    let mut files = settings.data.estimation.iter().chain(&settings.data.verification);
-    files.find(|f| f.label() == name).map_or((String::new(), 1), |f| (f.file.display().to_string(), f.skip + 1))
+    let files = settings.data.labelled();
+    let found = files.iter().find(|(label, _)| label == name);
+    found.map_or((String::new(), 1), |(_, f)| (f.file.display().to_string(), f.skip + 1))
 }
 
 fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
@@ -176,10 +178,6 @@ fn finding(severity: Severity, record: &str, what: String, advice: &str) -> Find
 /// # Errors
 /// [`youla_io::Error::MissingFile`], [`youla_io::Error::Io`], [`youla_io::Error::Settings`].
 pub fn read_check_options(path: impl AsRef<Path>) -> Result<CheckOptions> {
-    use std::io::Read;
     let path = path.as_ref();
-    let mut text = String::new();
-    let read = youla_io::open(path)?.read_to_string(&mut text);
-    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
-    Ok(youla_io::toml_file::parse(&text, path)?)
+    Ok(youla_io::toml_file::parse(&youla_io::read_text(path)?, path)?)
 }

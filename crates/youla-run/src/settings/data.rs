@@ -3,7 +3,7 @@
 use super::disturbance::DisturbanceSettings;
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use youla::signal::Detrend;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
@@ -111,17 +111,35 @@ impl DataFile {
         None
     }
 
-    /// Name in reports and in summary.json.
-    pub fn label(&self) -> String {
-        let stem = || {
-            let name = self.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-            name.split('.').next().unwrap_or_default().to_owned()
-        };
-        self.name.clone().unwrap_or_else(stem)
+    fn stem(&self) -> String {
+        let name = self.file.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        name.split('.').next().unwrap_or_default().to_owned()
     }
 }
 
+/// Files with their names in reports.
+pub(crate) fn labelled<'a>(files: &[&'a DataFile]) -> Vec<(String, &'a DataFile)> {
+    let unnamed = |stem: &str| files.iter().filter(|f| f.name.is_none() && f.stem() == stem).count();
+    let mut counted: HashMap<String, usize> = HashMap::new();
+    let mut label = |file: &DataFile| {
+        let stem = match &file.name {
+            Some(name) => return name.clone(),
+            None => file.stem(),
+        };
+        let number = counted.entry(stem.clone()).or_default();
+        *number += 1;
+        if unnamed(&stem) > 1 { format!("{stem}-{number}") } else { stem }
+    };
+    files.iter().map(|file| (label(file), *file)).collect()
+}
+
 impl DataSettings {
+    /// The estimation files, then the verification files, with their names in reports and in summary.json: the declared one, else that
+    /// of the file. Entries of one file without declared names are numbered.
+    pub fn labelled(&self) -> Vec<(String, &DataFile)> {
+        labelled(&self.estimation.iter().chain(&self.verification).collect::<Vec<_>>())
+    }
+
     /// Whether an excitation or a reference is known.
     pub fn excitation_is_known(&self) -> bool {
         !(self.alpha.is_empty() && self.input_excitation.is_empty() && self.reference.is_empty())
@@ -160,7 +178,7 @@ impl DataSettings {
             return Some(problem);
         }
         let mut labels = HashSet::new();
-        for label in d.estimation.iter().chain(&d.verification).map(DataFile::label) {
+        for (label, _) in d.labelled() {
             if label.is_empty() || label.contains(['/', '\\']) || label.contains(char::is_control) {
                 return Some(format!("the record name {label:?} cannot be a file name; give another `name`"));
             }

@@ -12,6 +12,7 @@ mod retired;
 mod shown;
 
 pub use certificate::CertificateSettings;
+pub(crate) use data::labelled;
 pub use data::{DataFile, DataSettings};
 pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};

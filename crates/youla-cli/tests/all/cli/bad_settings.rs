@@ -140,7 +140,7 @@ fn numbers_out_of_range() {
 
 #[test]
 fn names_and_numbers_of_channels() {
-    settings_refused("twice", &settings(", name = \"rest\"", ""), &["two records are named \"log\""]);
+    settings_refused("twice", &settings("\"rest\"", "\"log\""), &["two records are named \"log\""]);
     settings_refused("slash", &settings("\"rest\"", "\"a/b\""), &["\"a/b\" cannot be a file name"]);
     let same = settings("inputs = [{ name = \"u\"", "inputs = [{ name = \"u\" }, { name = \"u\"");
     settings_refused("same-channel", &same, &["more than one channel named \"u\""]);

@@ -8,6 +8,7 @@ mod compare;
 mod excite;
 mod export;
 mod init;
+mod limits;
 mod plot;
 mod subspace;
 mod verbs;

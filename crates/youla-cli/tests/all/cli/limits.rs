@@ -1,0 +1,89 @@
+//! What must end, and must not reach the terminal: pipes and devices, short records, loops that nothing excites, names with commands.
+
+use crate::common::{csv, log, loop_folder, refused, settings, settings_refused, youla};
+#[cfg(unix)]
+use std::process::Command;
+
+/// A pipe without a writer would block for ever, a device has no end.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices() {
+    let what = "a pipe, a socket or a device cannot be read";
+    let zero = settings("\"log.csv\", take", "\"/dev/zero\", take");
+    settings_refused("device", &zero, &["/dev/zero", what]);
+    let pipe = settings("\"log.csv\", take", "\"pipe\", take");
+    let folder = loop_folder("pipe", &[("run.toml", pipe.as_bytes())]);
+    let made = Command::new("mkfifo").arg(folder.join("pipe")).status().expect("mkfifo is there");
+    assert!(made.success());
+    refused(&folder, 2, &["pipe", what]);
+    for arguments in [&["check", "/dev/zero"][..], &["init", "pipe"], &["report", "/dev"], &["export", "pipe", "--to", "npz"]] {
+        let found = youla(&folder, arguments);
+        assert_eq!(found.code, Some(2), "{arguments:?}: {}", found.stderr);
+    }
+    assert!(youla(&folder, &["check", "/dev/zero"]).stderr.contains(what));
+}
+
+#[test]
+fn verification_records_of_few_rows() {
+    for rows in [1, 2, 10, 29, 30, 31, 41, 60] {
+        let short = settings("skip = 1200", &format!("skip = {}", 2000 - rows));
+        let folder = loop_folder(&format!("short-{rows}"), &[("run.toml", short.as_bytes())]);
+        let found = youla(&folder, &["identify", "run.toml", "--out", "run"]);
+        assert!(matches!(found.code, Some(0 | 2)), "{rows}: {}", found.stderr);
+        assert!(!found.stderr.contains("panicked"), "{rows}: {}", found.stderr);
+    }
+}
+
+/// An excitation of zero says nothing of the controller, and is a defect of the data.
+#[test]
+fn an_excitation_of_zero() {
+    let rows: Vec<[f64; 4]> = log().into_iter().map(|[t, u, _, y]| [t, u, 0.0, y]).collect();
+    let folder = loop_folder("zero", &[("log.csv", csv(&rows).as_bytes())]);
+    let found = youla(&folder, &["identify", "run.toml", "--out", "run"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    assert!(!found.stdout.contains("inf"), "{}", found.stdout);
+    let summary = std::fs::read_to_string(folder.join("run/summary.json")).expect("written");
+    let summary: serde_json::Value = serde_json::from_str(&summary).expect("JSON");
+    assert!(summary["controller_mismatch"].is_null() && summary["recommended"]["trusted"] == false, "{summary}");
+    assert_eq!(youla(&folder, &["check", "run.toml"]).code, Some(1));
+}
+
+/// u = K y exactly: noise alone goes round the loop.
+#[test]
+fn a_loop_that_nothing_excites() {
+    let mut state = [0.0; 2];
+    let rows: Vec<[f64; 4]> = log()
+        .into_iter()
+        .map(|[t, _, d, _]| {
+            let y = state[0] + 0.1 * d;
+            let u = -2.0 * y;
+            state = [1.5 * state[0] - 0.56 * state[1] + 0.06 * u, state[0]];
+            [t, u, 0.0, y]
+        })
+        .collect();
+    let unknown = settings("input_excitation = [{ name = \"d\", unit = \"V\" }]\n", "");
+    let files = [("log.csv", csv(&rows).into_bytes()), ("run.toml", unknown.into_bytes())];
+    let folder = loop_folder("quiet", &files.each_ref().map(|(name, bytes)| (*name, bytes.as_slice())));
+    let found = youla(&folder, &["check", "run.toml"]);
+    assert_eq!(found.code, Some(1), "{}", found.stdout);
+    assert!(found.stdout.contains("nothing but the controller moves the loop"), "{}", found.stdout);
+    let identified = youla(&folder, &["identify", "run.toml", "--out", "run", "--json"]);
+    if identified.code == Some(0) {
+        let summary: serde_json::Value = serde_json::from_str(&identified.stdout).expect("JSON");
+        assert_ne!(summary["recommended"]["trusted"], true);
+    }
+}
+
+/// Names come from a file: none of them commands the terminal.
+#[test]
+fn names_with_commands_for_the_terminal() {
+    let named = settings("name = \"loop\"", "name = \"a\\u001b[2Jb\\u202ec\"");
+    let folder = loop_folder("escape", &[("run.toml", named.as_bytes())]);
+    let found = youla(&folder, &["identify", "run.toml", "--out", "run"]);
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
+    let bad = |c: char| c == '\u{202e}' || (c.is_control() && c != '\n');
+    assert!(!found.stdout.contains(bad) && found.stdout.contains("a\\u001b[2Jb\\u202ec"), "{}", found.stdout);
+    let json = youla(&folder, &["identify", "run.toml", "--out", "other", "--json"]).stdout;
+    let summary: serde_json::Value = serde_json::from_str(&json).expect("still JSON");
+    assert_eq!(summary["name"], "a\u{1b}[2Jb\u{202e}c");
+}

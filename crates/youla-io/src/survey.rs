@@ -2,7 +2,7 @@
 
 use crate::choose::{ChannelRef, ChannelSpec};
 use crate::csv::{CsvOptions, column_names, read_csv};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::read_npz;
 use crate::parquet::read_parquet;
@@ -42,7 +42,8 @@ pub struct ColumnContent {
 /// Lists the columns of a file; `csv` says how a text file is to be read.
 ///
 /// # Errors
-/// As [`crate::read`], except for columns with cells that are not finite numbers: [`SurveyedColumn::content`] states those.
+/// As [`crate::read`], except for columns with cells that are not finite numbers: [`SurveyedColumn::content`] states those;
+/// [`Error::NoData`] for text without any column of numbers.
 ///
 /// ```
 /// let file = std::env::temp_dir().join("youla-survey-example.csv");
@@ -85,7 +86,14 @@ fn of_text(path: &Path, csv: &CsvOptions) -> Result<Vec<SurveyedColumn>> {
             Err(error) => Some(SurveyedColumn { from: name.clone(), content: Err(error.to_string()) }),
         }
     };
-    Ok(names.iter().enumerate().filter_map(one).collect())
+    let columns: Vec<SurveyedColumn> = names.iter().enumerate().filter_map(one).collect();
+    // Another kind of file: its text is nobody's business.
+    match columns.iter().any(|c| c.content.is_ok()) {
+        true => Ok(columns),
+        false => {
+            Err(Error::NoData { path: path.to_owned(), problem: "no column of it holds numbers; this is not a log" })
+        }
+    }
 }
 
 /// Vectors, and matrices column by column; single numbers and text are no channels.
@@ -137,6 +145,14 @@ mod tests {
         assert!((clock.step.unwrap() - 0.1).abs() < 1e-15);
         assert!(columns[1].content.as_ref().unwrap_err().contains("line 2"), "{:?}", columns[1]);
         assert_eq!(columns[2].content, Ok(ColumnContent { rows: 3, low: -4.0, high: 5.0, step: None }));
+    }
+
+    #[test]
+    fn a_text_without_numbers_is_not_shown() {
+        let file = scratch("csv");
+        std::fs::write(file.path(), "root:secret\ndaemon:secret\n").unwrap();
+        let refused = survey(file.path(), &CsvOptions::default()).unwrap_err().to_string();
+        assert!(refused.contains("not a log") && !refused.contains("secret"), "{refused}");
     }
 
     #[test]

@@ -16,7 +16,9 @@ fn pipes_and_devices() {
     let made = Command::new("mkfifo").arg(folder.join("pipe")).status().expect("mkfifo is there");
     assert!(made.success());
     refused(&folder, 2, &["pipe", what]);
-    for arguments in [&["check", "/dev/zero"][..], &["init", "pipe"], &["report", "/dev"], &["export", "pipe", "--to", "npz"]] {
+    for arguments in
+        [&["check", "/dev/zero"][..], &["init", "pipe"], &["report", "/dev"], &["export", "pipe", "--to", "npz"]]
+    {
         let found = youla(&folder, arguments);
         assert_eq!(found.code, Some(2), "{arguments:?}: {}", found.stderr);
     }

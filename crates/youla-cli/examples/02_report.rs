@@ -43,7 +43,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut announce = |stage: Stage| println!("{} ...", stage.name());
     let mut clock = StageClock::new(&mut announce);
     let found = identify(settings, records, &folder, &mut clock)?;
-    let written = write_run(&found, &folder.join("result"), true, &mut clock)?;
+    let written = write_run(&found, &folder.join("run"), true, &mut clock)?;
     println!("open {}", written.folder.join("report.html").display());
     Ok(())
 }

@@ -266,7 +266,8 @@ fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
         zeta: m.zeta,
         deviation: bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation]),
     };
-    Ok(v.modes.iter().enumerate().map(mode).collect())
+    // A pole at z = 0 is a sample of delay, and no mode.
+    Ok(v.modes.iter().enumerate().filter(|(_, m)| m.hz.is_finite()).map(mode).collect())
 }
 
 /// The present and the predicted loop.

@@ -41,6 +41,9 @@ impl Plane {
             None => ("s", String::new()),
         };
         let omega = re.hypot(im);
+        if omega.is_infinite() {
+            return format!("{letter} = 0\na sample of delay");
+        }
         let hz = omega / TAU;
         let digits = crate::numbers::decimals(hz, 4).clamp(0, 6) as usize;
         let zeta = if omega == 0.0 { 1.0 } else { -re / omega };

@@ -113,7 +113,8 @@ fn write_records(folder: &Path) -> Result<()> {
             for (name, of) in [("u", u), ("y", y)] {
                 raw(name, (0..of.ncols()).flat_map(|j| (0..kept).map(move |t| of[(t, j)])).collect())?;
             }
-            let omega: Vec<f64> = shares().iter().map(|s| std::f64::consts::TAU * s / system.plant.time().ts()).collect();
+            let omega: Vec<f64> =
+                shares().iter().map(|s| std::f64::consts::TAU * s / system.plant.time().ts()).collect();
             let truth = frequency_response(&system.plant, &omega)?;
             let (p, m) = (system.plant.outputs(), system.plant.inputs());
             let flat = |k: usize| (0..p * m).flat_map(move |x| [(k, x, 0), (k, x, 1)]);
@@ -132,7 +133,8 @@ fn write_records(folder: &Path) -> Result<()> {
 
 fn draw(folder: &Path) -> Result<()> {
     let text = std::fs::read_to_string(folder.join("youla.csv"))? + &std::fs::read_to_string(folder.join("peers.csv"))?;
-    let rows: Vec<Vec<&str>> = text.lines().map(|l| l.split(',').collect::<Vec<_>>()).filter(|r| r[0] != "loop").collect();
+    let rows: Vec<Vec<&str>> =
+        text.lines().map(|l| l.split(',').collect::<Vec<_>>()).filter(|r| r[0] != "loop").collect();
     let methods = [
         Method::new("youla", "youla, no key", Role::Hansen),
         Method::new("expert", "PBSIDopt, true order", Role::Pem),

@@ -69,8 +69,18 @@ fn main() -> Result<()> {
         let trusted = found.iter().filter(|f| f.2).count();
         let mut orders: Vec<usize> = found.iter().map(|f| f.1).collect();
         orders.sort_unstable();
-        println!("{}: {records} records, {trusted} trusted, orders {} to {}", system.name, orders[0], orders[orders.len() - 1]);
-        println!("  frequency {}\n  damping   {}\n  magnitude {}", summary(&all(0)), summary(&all(1)), summary(&all(2)));
+        println!(
+            "{}: {records} records, {trusted} trusted, orders {} to {}",
+            system.name,
+            orders[0],
+            orders[orders.len() - 1]
+        );
+        println!(
+            "  frequency {}\n  damping   {}\n  magnitude {}",
+            summary(&all(0)),
+            summary(&all(1)),
+            summary(&all(2))
+        );
         if let Some(reason) = found.iter().flat_map(|f| f.3.first()).next() {
             println!("  not trusted: {reason}");
         }

@@ -62,11 +62,7 @@ impl IdentifyArgs {
             input_excitation: specs(&log.excitation),
             reference: specs(&log.reference),
             csv: log.dialect.options(),
-            ..DataSettings::new(
-                specs(&log.input),
-                specs(&log.output),
-                self.files.iter().map(file).collect(),
-            )
+            ..DataSettings::new(specs(&log.input), specs(&log.output), self.files.iter().map(file).collect())
         };
         let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];

@@ -5,7 +5,9 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use youla::control::{closed_loop, with_input_port};
-use youla::identify::likelihood::{Experiment, LikelihoodOptions, LoopKnowledge, LoopSignals, Recommendation, recommend};
+use youla::identify::likelihood::{
+    Experiment, LikelihoodOptions, LoopKnowledge, LoopSignals, Recommendation, recommend,
+};
 use youla::linalg::block;
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::{Mat, Result};
@@ -57,8 +59,7 @@ fn delayed(plant: &StateSpace<Discrete>, samples: usize) -> Result<StateSpace<Di
 fn pid(channels: usize, [kp, ki, kd]: [f64; 3], ts: f64) -> Result<StateSpace<Discrete>> {
     let n = 2 * channels;
     let mut a = Mat::zeros(n, n);
-    let (mut b, mut c, mut d) =
-        (Mat::zeros(n, channels), Mat::zeros(channels, n), Mat::zeros(channels, channels));
+    let (mut b, mut c, mut d) = (Mat::zeros(n, channels), Mat::zeros(channels, n), Mat::zeros(channels, channels));
     for k in 0..channels {
         (a[(2 * k, 2 * k)], b[(2 * k, k)], b[(2 * k + 1, k)]) = (1.0, 1.0, 1.0);
         (c[(k, 2 * k)], c[(k, 2 * k + 1)], d[(k, k)]) = (-ki, kd, -kp - kd);

@@ -89,7 +89,8 @@ pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64],
         let z = c64::cis(std::f64::consts::TAU * share);
         let slopes = chart.response_slopes(&found.point.model, z);
         let g = response(&solution.chosen, *share);
-        let along = |i: usize, k: usize| (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]);
+        let along =
+            |i: usize, k: usize| (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]);
         let mut moments = vec![Moments::ZERO; slopes.nrows()];
         for (i, of) in moments.iter_mut().enumerate() {
             (0..root.ncols()).for_each(|k| of.add(along(i, k), more.scatter));

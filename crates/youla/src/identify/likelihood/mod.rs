@@ -209,12 +209,7 @@ fn problem<'a>(
     })
 }
 
-fn response_deviation(
-    sizes: &Sizes,
-    shares: &[f64],
-    deviations: &[Vec<Moments>],
-    time: Discrete,
-) -> ResponseDeviation {
+fn response_deviation(sizes: &Sizes, shares: &[f64], deviations: &[Vec<Moments>], time: Discrete) -> ResponseDeviation {
     let (m, p) = (sizes.u.len(), sizes.y.len());
     let unit = |i: usize, j: usize| sizes.y[i] / sizes.u[j];
     ResponseDeviation {

@@ -55,7 +55,8 @@ impl ResponseDeviation {
     /// constant beyond them.
     pub fn covariance(&self, hz: f64, (output, input): (usize, usize)) -> [f64; 3] {
         let at = |k: usize| {
-            let (variance, pseudo) = (self.absolute[k][(output, input)].powi(2), self.pseudo_variance[k][(output, input)]);
+            let (variance, pseudo) =
+                (self.absolute[k][(output, input)].powi(2), self.pseudo_variance[k][(output, input)]);
             [0.5 * (variance + pseudo.re), 0.5 * pseudo.im, 0.5 * (variance - pseudo.re)]
         };
         let above = self.hz.partition_point(|f| *f < hz);

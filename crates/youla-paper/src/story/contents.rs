@@ -28,6 +28,7 @@ fn drawn(method: Method) -> data::Method {
         Method::Hansen => data::Method::hansen(),
         Method::HansenReduced => data::Method::hansen_reduced(),
         Method::HansenPem => data::Method::hansen_pem(),
+        Method::Auto => data::Method::new(method.key(), method.label(), data::Role::Recommended),
     }
 }
 

@@ -38,7 +38,7 @@ pub(super) fn controllers(paper: &Paper) -> Figure {
 /// Fit over theta for PEM and Hansen.
 pub(super) fn figure_4(paper: &Paper) -> Figure {
     let panels = AXES.iter().enumerate().map(|(i, name)| {
-        let curves = [Method::Pem, Method::Hansen, Method::HansenPem]
+        let curves = [Method::Pem, Method::Hansen, Method::HansenPem, Method::Auto]
             .into_iter()
             .flat_map(|m| [cloud(paper, m, i), medians(paper, m, i)]);
         panel(paper, name, fit_axis(name), curves.filter(|c| !c.x.is_empty()).collect())
@@ -59,7 +59,7 @@ pub(super) fn figure_4(paper: &Paper) -> Figure {
 /// Boxes of the fit, direct identification against Hansen.
 pub(super) fn figure_5(paper: &Paper) -> Figure {
     let values = |m: Method, i: usize| of(paper, m).iter().map(|r| r.fit[i]).collect::<Vec<_>>();
-    let compared = [Method::Direct, Method::Hansen, Method::HansenPem];
+    let compared = [Method::Direct, Method::Hansen, Method::HansenPem, Method::Auto];
     let lowest = compared.iter().flat_map(|m| [0, 1].map(|i| whisker(&values(*m, i)))).fold(90.0, f64::min);
     let view = [((lowest / 10.0).floor() * 10.0).clamp(-20.0, 90.0), 100.0];
     let panels = AXES.iter().enumerate().map(|(i, name)| {

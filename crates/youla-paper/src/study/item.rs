@@ -17,6 +17,7 @@ use youla::control::closed_loop;
 use youla::factor::YoulaSignals;
 use youla::identify::direct::direct;
 use youla::identify::hansen::{HansenModel, hansen};
+use youla::identify::likelihood::{LikelihoodOptions, recommend};
 use youla::identify::subspace;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
@@ -205,6 +206,9 @@ impl LoopData<'_> {
                 Ok(from_s(reduced.model, found))
             }
             Method::HansenPem => self.hansen_pem(settings),
+            Method::Auto => recommend(&self.experiment(), &[], None, self.time(), &LikelihoodOptions::default())
+                .map(|found| black_box(found.plant))
+                .map_err(text),
         }
     }
 

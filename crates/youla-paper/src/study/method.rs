@@ -20,11 +20,13 @@ pub enum Method {
     HansenReduced,
     /// Grey-box prediction error, started at the projection of G(S).
     HansenPem,
+    /// Maximum likelihood from u and y with order and dead time by evidence: what `youla identify` recommends without a key.
+    Auto,
 }
 
 impl Method {
     /// All methods in the order in which they are listed.
-    pub const ALL: [Method; 7] = [
+    pub const ALL: [Method; 8] = [
         Method::Nominal,
         Method::Pem,
         Method::PemMultiStart,
@@ -32,6 +34,7 @@ impl Method {
         Method::Hansen,
         Method::HansenReduced,
         Method::HansenPem,
+        Method::Auto,
     ];
 
     /// Key in files.
@@ -44,6 +47,7 @@ impl Method {
             Method::Hansen => "hansen",
             Method::HansenReduced => "hansen_reduced",
             Method::HansenPem => "hansen_pem",
+            Method::Auto => "auto",
         }
     }
 
@@ -57,6 +61,7 @@ impl Method {
             Method::Hansen => "Hansen G(S)",
             Method::HansenReduced => "Hansen reduced G_red(S)",
             Method::HansenPem => "PEM from Hansen",
+            Method::Auto => "youla auto",
         }
     }
 

@@ -160,6 +160,11 @@ fn draw(folder: &Path) -> Result<()> {
         curves.push(Curve { method: method.key.clone(), x, y, drawn: Drawn::Points, ..Curve::default() });
     }
     println!("{table}");
+    let bounds: Vec<f64> = rows.iter().map(|r| Ok(r[3].parse()?)).collect::<Result<_>>()?;
+    let ends = vec![bounds.iter().copied().fold(f64::INFINITY, f64::min), bounds.iter().copied().fold(0.0, f64::max)];
+    let least = Method::new("bound", "bound", Role::Other);
+    curves.push(Curve { method: least.key.clone(), x: ends.clone(), y: ends, ..Curve::default() });
+    let methods = [&methods[..], &[least]].concat();
     let axis = |label: &str| Axis { label: label.into(), log: true, ..Axis::default() };
     let figure = Figure {
         key: "accuracy".into(),

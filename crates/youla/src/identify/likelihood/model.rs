@@ -112,11 +112,11 @@ impl Model {
         (0..points).map(of).sum::<f64>() / points as f64
     }
 
-    /// The same without the block at a place.
-    pub(crate) fn without(&self, place: usize) -> Self {
-        let mut model = self.clone();
-        model.blocks.remove(place);
-        model
+    /// The same without the blocks at some places.
+    pub(crate) fn without(&self, places: &[usize]) -> Self {
+        let kept = |k: &usize| !places.contains(k);
+        let blocks = (0..self.blocks.len()).filter(kept).map(|k| self.blocks[k].clone()).collect();
+        Model { blocks, ..self.clone() }
     }
 
     /// G(z), p x m row by row.

@@ -6,11 +6,15 @@ use super::problem::{Choice, NOISE_ORDER, Problem, Task};
 use super::search::{deviance, with_best_inputs};
 use super::spectra::Spectra;
 use super::starts::THINNED;
+use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;
 
 /// Largest change of the dead time of a single input in a step, samples.
 const REACH: usize = 12;
+
+/// Pole from which the search of a lag in place of a sample of dead time starts; at zero both are the same.
+const FAST: f64 = 0.1;
 
 /// The lines for other delays.
 struct Around {
@@ -18,11 +22,18 @@ struct Around {
     delays: Vec<usize>,
 }
 
-/// A step: the place of its delays, and the block that is left out.
+/// A step: the place of its delays, and that of the set of blocks that is left out.
 #[derive(Clone, Copy)]
 struct Step {
     around: usize,
     without: Option<usize>,
+}
+
+/// Blocks that may be left out: each alone, and two real poles together, as one of them alone often is needed by the other.
+fn sets(parts: &Model) -> Vec<Vec<usize>> {
+    let real: Vec<usize> = (0..parts.blocks.len()).filter(|k| parts.blocks[*k].states == 1).collect();
+    let pairs = real.iter().enumerate().flat_map(|(k, a)| real[k + 1..].iter().map(move |b| vec![*a, *b]));
+    (0..parts.blocks.len()).map(|k| vec![k]).chain(pairs).collect()
 }
 
 impl Problem<'_> {
@@ -33,17 +44,21 @@ impl Problem<'_> {
         let around: Vec<Vec<usize>> = self.shifted(&best.delays).into_iter().chain([best.delays.clone()]).collect();
         let prepared = |delays: Vec<usize>| Around { spectra: Arc::new(self.spectra(&delays)), delays };
         let around: Vec<Around> = around.into_par_iter().map(prepared).collect();
-        let start_of = |step: Step| step.without.map_or_else(|| model.clone(), |place| parts.without(place));
+        let sets = sets(&parts);
+        let start_of = |step: Step| step.without.map_or_else(|| model.clone(), |set| parts.without(&sets[set]));
+        let per_order = (self.samples().0 as f64).ln() * (self.inputs() + self.outputs()) as f64;
         let judged = |step: Step| {
             let thin = around[step.around].spectra.thinned(THINNED);
-            let point = with_best_inputs(&thin, start_of(step), noise, self.feedthrough);
-            (deviance(&thin, &point, NOISE_ORDER).0, step)
+            let start = start_of(step);
+            let states = start.order() as f64;
+            let point = with_best_inputs(&thin, start, noise, self.feedthrough);
+            (deviance(&thin, &point, NOISE_ORDER).0 * THINNED as f64 + per_order * states, step)
         };
-        let steps = self.steps(best, &around, parts.blocks.len());
+        let steps = self.steps(best, &around, &sets);
         let mut starts: Vec<(f64, Step)> = steps.into_par_iter().map(judged).collect();
         starts.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut tasks = Vec::new();
-        for step in self.promising(best, &around, &starts) {
+        for step in self.promising(best, &around, &starts, &sets) {
             let Around { spectra, delays } = &around[step.around];
             let start = with_best_inputs(spectra, start_of(step), noise, self.feedthrough);
             let origin = if step.without.is_some() { "one mode less" } else { "another dead time" };
@@ -52,11 +67,35 @@ impl Problem<'_> {
         if let Some(here) = around.last() {
             tasks.extend(self.one_more(best, &here.spectra));
         }
+        let sooner = around.iter().find(|a| a.delays.len() == 1 && a.delays[0] + 1 == best.delays[0]);
+        tasks.extend(sooner.and_then(|sooner| self.pole_for_delay(best, sooner)));
         tasks
     }
 
+    /// One sample of the dead time of a single input as a fast pole: an actuator's lag is often taken for it.
+    fn pole_for_delay(&self, best: &Choice, sooner: &Around) -> Option<Task> {
+        let (model, noise) = (&best.found.point.model, &best.found.noise);
+        let n = model.order();
+        if self.order.is_some() || n + 1 > self.largest_order {
+            return None;
+        }
+        let (a, b, c) = model.matrices();
+        let wide = Mat::from_fn(n + 1, n + 1, |i, j| match (i < n, j < n) {
+            (true, true) => a[(i, j)],
+            (true, false) => b[(i, 0)],
+            (false, true) => 0.0,
+            (false, false) => FAST,
+        });
+        let input = Mat::from_fn(n + 1, 1, |i, _| if i == n { 1.0 - FAST } else { 0.0 });
+        let output = Mat::from_fn(c.nrows(), n + 1, |i, j| if j < n { c[(i, j)] } else { model.d[i] });
+        let lagged = Model::of(wide.as_ref(), input.as_ref(), output.as_ref(), vec![0.0; c.nrows()])?;
+        let start = with_best_inputs(&sooner.spectra, lagged, noise, self.feedthrough);
+        let origin = "a pole for a sample of dead time".into();
+        Some(Task { spectra: sooner.spectra.clone(), start, delays: sooner.delays.clone(), origin })
+    }
+
     /// All steps to be judged by their least squares: every dead time around, every block left out with a near one.
-    fn steps(&self, best: &Choice, around: &[Around], blocks: usize) -> Vec<Step> {
+    fn steps(&self, best: &Choice, around: &[Around], sets: &[Vec<usize>]) -> Vec<Step> {
         // A fast mode in excess hides several samples of dead time of a single input.
         let reach = if self.inputs() == 1 { REACH } else { 1 };
         let mut steps = Vec::new();
@@ -66,19 +105,34 @@ impl Problem<'_> {
             }
             let near = delays.iter().zip(&best.delays).map(|(a, b)| a.abs_diff(*b)).sum::<usize>() <= reach;
             if near && self.order.is_none() {
-                steps.extend((0..blocks).map(|place| Step { around: k, without: Some(place) }));
+                // without two poles another dead time looks best as long as the other poles stay where they are
+                let here = |set: &usize| sets[*set].len() == 1 || *delays == best.delays;
+                steps.extend((0..sets.len()).filter(here).map(|set| Step { around: k, without: Some(set) }));
             }
         }
         steps
     }
 
     /// The first of each kind, and for a single input the dead times next to the best.
-    fn promising(&self, best: &Choice, around: &[Around], starts: &[(f64, Step)]) -> Vec<Step> {
+    fn promising(&self, best: &Choice, around: &[Around], starts: &[(f64, Step)], sets: &[Vec<usize>]) -> Vec<Step> {
         let next = |s: &Step| self.inputs() == 1 && around[s.around].delays[0].abs_diff(best.delays[0]) == 1;
         let whole = starts.iter().filter(|s| s.1.without.is_none()).enumerate();
         let whole = whole.filter(|(place, s)| *place < 2 || next(&s.1)).map(|(_, s)| s);
-        let less = starts.iter().filter(|s| s.1.without.is_some()).take(if self.inputs() == 1 { 2 } else { 1 });
-        whole.chain(less).map(|s| s.1).collect()
+        // of each set of blocks the best dead time
+        let less = |blocks: usize, count: usize| {
+            let mut seen = Vec::new();
+            let of = starts.iter().filter(|s| s.1.without.is_some_and(|set| sets[set].len() == blocks));
+            let first: Vec<&(f64, Step)> = of
+                .filter(|s| {
+                    let new = !seen.contains(&s.1.without);
+                    seen.push(s.1.without);
+                    new
+                })
+                .collect();
+            first.into_iter().take(count)
+        };
+        let single = less(1, if self.inputs() == 1 { 2 } else { 1 });
+        whole.chain(single).chain(less(2, 1)).map(|s| s.1).collect()
     }
 
     /// The mode that explains most of what the model leaves, added to it.

@@ -5,7 +5,7 @@ use super::Candidate;
 use super::dead_time::dead_times;
 use super::lag_sums::LagSums;
 use super::problem::{Choice, Problem, Solution, Task};
-use super::search::{search, with_best_ends};
+use super::search::{search, with_best_ends, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
 
@@ -19,7 +19,7 @@ const SHORT: usize = 15000;
 const SHORTEST: usize = 500;
 /// Rounds of models one step away.
 const ROUNDS: usize = 10;
-/// Differences of the criterion that do not tell dead times apart: odds of e^4 to one.
+/// Differences of the criterion that decide neither between dead times nor for a direct path: odds of e^4 to one.
 const INDISTINCT: f64 = 8.0;
 /// Differences of the criterion up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
@@ -46,9 +46,12 @@ impl Problem<'_> {
             let at_once = at_once.min_by(|a, b| a.criterion.total_cmp(&b.criterion));
             let tasks = std::iter::once(&at).chain(at_once).map(|c| wider.same(c)).collect();
             tried.extend(wider.run(tasks, at.criterion, table));
-            if best(&tried)?.found.feedthrough {
+            if best(&tried)?.criterion < at.criterion - INDISTINCT {
                 at = wider.improved(&mut tried, rounds, table)?;
             }
+        }
+        if samples <= LONG {
+            self.with_feedthrough(at.found.feedthrough).along_delays(&mut tried, &at, table);
         }
         let mut chosen = calmest(&tried, &at)?.clone();
         let spectra = self.spectra(&chosen.delays);
@@ -74,6 +77,39 @@ impl Problem<'_> {
             }
         }
         Some(at)
+    }
+
+    /// The dead times of a single input next to the best, one after the other from the model before, until one is distinctly worse.
+    fn along_delays(&self, tried: &mut Vec<Choice>, at: &Choice, table: &mut Vec<Candidate>) {
+        let limit = at.criterion + INDISTINCT;
+        let alike = |c: &Choice| c.order() == at.order() && c.found.feedthrough == at.found.feedthrough;
+        for later in [false, true] {
+            let mut from = at.clone();
+            while let [delay] = from.delays[..] {
+                let next = if later { Some(delay + 1) } else { delay.checked_sub(1) };
+                let Some(next) = next.filter(|next| *next <= self.skip && self.dead_time.is_none()) else { break };
+                let known = tried.iter().find(|c| c.delays == [next] && alike(c) && c.criterion <= limit).cloned();
+                let mut search = || {
+                    let spectra = Arc::new(self.spectra(&[next]));
+                    let model = from.found.point.model.clone();
+                    let start = with_best_inputs(&spectra, model, &from.found.noise, self.feedthrough);
+                    let origin = "another dead time".into();
+                    self.run(vec![Task { spectra, start, delays: vec![next], origin }], limit, table).pop()
+                };
+                let found = match known {
+                    Some(known) => known,
+                    None => {
+                        let Some(found) = search() else { break };
+                        tried.push(found.clone());
+                        found
+                    }
+                };
+                if found.criterion > limit {
+                    break;
+                }
+                from = found;
+            }
+        }
     }
 
     /// The same model as a start, for D to move.

@@ -12,7 +12,9 @@ Example:
   youla identify examples/flexible-drive/run.toml --out drive-run
   youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal nominal.json --controller K.json
 
-A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.";
+A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.
+The controller may also be JSON as [controller] of run.toml:
+  {\"pid\": {\"feedback\": \"negative\", \"discretisation\": \"tustin\", \"kp\": 2.0, \"ki\": 10.0}}";
 
 /// What is to be identified.
 #[derive(Debug, Args)]
@@ -25,7 +27,7 @@ pub(crate) struct IdentifyArgs {
     /// File with the nominal model, in discrete time.
     #[arg(long, value_name = "FILE", requires = "input")]
     nominal: Option<PathBuf>,
-    /// File with the controller that ran, in discrete time.
+    /// File with the controller that ran: a model in discrete time, or JSON with what [controller] of run.toml holds.
     #[arg(long, value_name = "FILE", requires = "input", conflicts_with = "open_loop")]
     controller: Option<PathBuf>,
     /// The controller of the file acts on the reference less the output, u = K (r - y); without this flag u = K y, as `youla`
@@ -68,21 +70,36 @@ impl IdentifyArgs {
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
         let (m, p) = (data.inputs.len(), data.outputs.len());
         let controller = match &self.controller {
-            Some(file) => {
-                let feedback = if self.negative_feedback { Feedback::Negative } else { Feedback::Positive };
-                ControllerSettings::ModelFile { feedback, file: file.clone() }
-            }
+            Some(file) => self.controller_of(file)?,
             None if self.open_loop => ControllerSettings::StateSpace {
                 feedback: Feedback::Positive,
+                domain: None,
+                hold: None,
                 a: Vec::new(),
                 b: Vec::new(),
                 c: zeros(m, 0),
                 d: zeros(m, p),
+                delay: 0,
             },
             None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
         };
         let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
         Ok(RunSettings::new(name, data, NominalModel::ModelFile { file: nominal.clone(), domain: None }, controller))
+    }
+
+    /// A file with what `[controller]` of run.toml holds states its sign itself; a model needs the flag.
+    fn controller_of(&self, file: &Path) -> Result<ControllerSettings, Failure> {
+        match (ControllerSettings::from_json(file)?, self.negative_feedback) {
+            (None, negative) => {
+                let feedback = if negative { Feedback::Negative } else { Feedback::Positive };
+                Ok(ControllerSettings::ModelFile { feedback, file: file.to_owned() })
+            }
+            (Some(controller), false) => Ok(controller),
+            (Some(_), true) => {
+                let problem = "this file states its `feedback` itself; leave --negative-feedback out".into();
+                Err(youla_io::Error::Settings { path: file.to_owned(), at: None, problem }.into())
+            }
+        }
     }
 
     fn missing(&self, flag: &str) -> Failure {

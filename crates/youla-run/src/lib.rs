@@ -85,8 +85,9 @@ pub use schema::{settings_schema, summary_schema};
 pub use segments::RecordSegment;
 pub use settings::{
     AlternativeStructure, CertificateSettings, ControllerSettings, DataFile, DataSettings, DeviationSettings,
-    DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, NominalModel,
-    Polynomials, Prediction, RealisedController, RunSettings, TachoUnit, VerificationSettings,
+    Discretisation, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold,
+    IdealPid, NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
+    VerificationSettings,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stage::{Stage, StageClock, StageTimes};
@@ -94,7 +95,9 @@ pub use streaming::{
     LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
     read_subspace_options,
 };
-pub use summary::{MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary};
+pub use summary::{
+    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary,
+};
 pub use uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
 pub use verdict::{ModelVerdict, RecordVerdict, Verdict};
 pub use write::{WrittenRun, write_run};

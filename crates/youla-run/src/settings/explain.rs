@@ -1,6 +1,7 @@
 //! What is wrong in run.toml, as one sentence: the parser's messages in the words of the documentation.
 
-use super::models::{ControllerSettings, NominalModel};
+use super::controller::ControllerSettings;
+use super::models::NominalModel;
 use crate::Error;
 use serde::de::value::{Error as ProbeError, StrDeserializer};
 use serde::de::{DeserializeOwned, IntoDeserializer};
@@ -158,7 +159,8 @@ fn forms_at(place: &Place<'_>) -> String {
     forms::<NominalModel>()
 }
 
-fn forms<T: DeserializeOwned>() -> String {
+/// The names of the forms of a choice, separated by commas.
+pub(super) fn forms<T: DeserializeOwned>() -> String {
     let probe: StrDeserializer<'_, ProbeError> = "".into_deserializer();
     let refusal = T::deserialize(probe).map_or_else(|e| e.to_string(), |_| String::new());
     refusal.split('`').skip(3).step_by(2).collect::<Vec<_>>().join(", ")
@@ -207,6 +209,9 @@ mod tests {
 
     #[test]
     fn forms_come_from_the_types() {
-        assert_eq!(forms::<ControllerSettings>(), "difference_equation, state_space, model_file, observer");
+        assert_eq!(
+            forms::<ControllerSettings>(),
+            "difference_equation, transfer_function, state_space, pid, ideal_pid, model_file, observer"
+        );
     }
 }

@@ -1,6 +1,7 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
 mod certificate;
+mod controller;
 mod data;
 mod disturbance;
 mod explain;
@@ -8,17 +9,20 @@ mod grey_box;
 mod models;
 mod options;
 mod order;
+mod pid;
 mod retired;
 mod shown;
 
 pub use certificate::CertificateSettings;
+pub use controller::{ControllerSettings, Feedback, Hold, RealisedController};
 pub(crate) use data::labelled;
 pub use data::{DataFile, DataSettings};
 pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
-pub use models::{ControllerSettings, Domain, Feedback, NominalModel, Polynomials, RealisedController};
+pub use models::{Domain, NominalModel, Polynomials};
 pub use options::{DeviationSettings, FactorSettings, FrequencySettings, Prediction, VerificationSettings};
+pub use pid::{Discretisation, IdealPid, ParallelPid};
 
 use crate::{Error, Result};
 use explain::{explain, problem_at};
@@ -125,6 +129,12 @@ impl RunSettings {
         open(path)?
             .read_to_end(&mut bytes)
             .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        if is_log(path, &bytes) {
+            let problem = "this is no run.toml; for a log, say what its columns mean: --input, --output and --sample-time or --time, or \
+                           write a run.toml with `youla init`"
+                .into();
+            return Err(Error::File(youla_io::Error::Settings { path: path.to_owned(), at: None, problem }));
+        }
         let text = std::str::from_utf8(&bytes).map_err(|e| {
             let good = String::from_utf8_lossy(&bytes[..e.valid_up_to()]);
             problem_at(path, &good, good.len(), "this is not text in UTF-8".into())
@@ -171,7 +181,12 @@ impl RunSettings {
 
     fn problem(&self) -> Option<String> {
         let structure = || self.grey_box.as_ref()?.problem(self.data.inputs.len(), self.data.outputs.len());
-        let problem = self.data.problem().or_else(|| self.loop_problem()).or_else(|| self.number_problem());
+        let problem = self
+            .data
+            .problem()
+            .or_else(|| self.controller.problem())
+            .or_else(|| self.loop_problem())
+            .or_else(|| self.number_problem());
         problem.or_else(structure)
     }
 
@@ -218,6 +233,13 @@ pub(crate) fn read_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path
         Some((start, problem)) => Err(problem_at(path, text, start, problem)),
         None => toml::from_str(text).map_err(|e| explain(&e, text, path, at)),
     }
+}
+
+/// Whether a file that should be a run.toml is data: not named so, and no TOML.
+fn is_log(path: &Path, bytes: &[u8]) -> bool {
+    let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));
+    let toml = || std::str::from_utf8(bytes).is_ok_and(|text| toml::from_str::<toml::Table>(text).is_ok());
+    !named && !bytes.is_empty() && !toml()
 }
 
 /// The first problem of settings as an error.

@@ -1,7 +1,6 @@
-//! `[nominal]` and `[controller]` of run.toml: every form in which users have them.
+//! `[nominal]` of run.toml: every form in which users have the nominal model.
 
 use crate::{Error, Result};
-use faer::Scale;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use youla::Mat;
@@ -13,7 +12,7 @@ use youla_io::read_mat;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Domain {
-    /// In s, rad/s; discretised by a zero-order hold at the sample time of the data.
+    /// In s, rad/s; a nominal model is discretised by a zero-order hold at the sample time of the data, a controller as `hold` states.
     Continuous,
     /// In z, at the sample time of the data.
     Discrete,
@@ -31,14 +30,14 @@ pub enum Polynomials {
 
 impl Polynomials {
     /// As a matrix with the given shape; a single polynomial stands for every entry.
-    fn spread(&self, rows: usize, columns: usize) -> PolynomialMatrix {
+    pub(super) fn spread(&self, rows: usize, columns: usize) -> PolynomialMatrix {
         match self {
             Polynomials::Single(c) => vec![vec![c.clone(); columns]; rows],
             Polynomials::Matrix(m) => m.clone(),
         }
     }
 
-    fn shape(&self) -> (usize, usize) {
+    pub(super) fn shape(&self) -> (usize, usize) {
         match self {
             Polynomials::Single(_) => (1, 1),
             Polynomials::Matrix(m) => (m.len(), m.first().map_or(0, Vec::len)),
@@ -115,118 +114,6 @@ impl NominalModel {
     }
 }
 
-/// Which sign the controller was written down with; never guessed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Feedback {
-    /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
-    /// return them.
-    Negative,
-    /// `u = K (y - r)`; for observer gains `u = F x` and `x+ = A x + B u + L (C x + D u - y)`.
-    Positive,
-}
-
-impl Feedback {
-    /// The factor that turns a gain written in this convention into one of positive feedback.
-    fn sign(self) -> f64 {
-        match self {
-            Feedback::Negative => -1.0,
-            Feedback::Positive => 1.0,
-        }
-    }
-}
-
-/// The controller that ran while the data were logged, at the sample time of the data, in one of its usual forms. The
-/// sign convention is mandatory in each.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
-pub enum ControllerSettings {
-    /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single
-    /// denominator is common to all entries.
-    DifferenceEquation {
-        /// Sign in which the controller is written down; never guessed.
-        feedback: Feedback,
-        /// Numerator coefficients.
-        numerator: Polynomials,
-        /// Denominator coefficients.
-        denominator: Polynomials,
-    },
-    /// Discrete-time matrices, row by row.
-    StateSpace {
-        /// Sign in which the controller is written down; never guessed.
-        feedback: Feedback,
-        /// A of the controller, row by row.
-        a: Vec<Vec<f64>>,
-        /// B of the controller.
-        b: Vec<Vec<f64>>,
-        /// C of the controller.
-        c: Vec<Vec<f64>>,
-        /// D of the controller.
-        d: Vec<Vec<f64>>,
-    },
-    /// A discrete-time model from y to u in a file: `a`, `b`, `c`, `d` and the sample time `ts` in JSON, MATLAB (5 or 7.3) or NumPy
-    /// form. A MATLAB file may lack `ts`.
-    ModelFile {
-        /// Sign in which the controller is written down; never guessed.
-        feedback: Feedback,
-        /// Path of the file, relative to run.toml.
-        file: PathBuf,
-    },
-    /// State feedback and observer gain for the discrete-time nominal model in its own states.
-    Observer {
-        /// Sign in which the controller is written down; never guessed.
-        feedback: Feedback,
-        /// State feedback F, m x n, row by row.
-        state_feedback: Vec<Vec<f64>>,
-        /// Observer gain L, n x p, row by row.
-        observer_gain: Vec<Vec<f64>>,
-    },
-}
-
-/// A controller in the library's convention, positive feedback.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RealisedController {
-    /// `u = K y`.
-    System(StateSpace<Discrete>),
-    /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
-    Observer {
-        /// m x n.
-        f: Mat<f64>,
-        /// n x p.
-        l: Mat<f64>,
-    },
-}
-
-impl ControllerSettings {
-    /// The controller with positive feedback.
-    ///
-    /// # Errors
-    /// Whatever is wrong with the matrices, polynomials or file.
-    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
-        self.controller(folder, time).map_err(|e| e.within("[controller]"))
-    }
-
-    fn controller(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
-        let (feedback, system) = match self {
-            Self::DifferenceEquation { feedback, numerator, denominator } => {
-                let (p, m) = numerator.shape();
-                (feedback, StateSpace::difference_equation(&numerator.spread(p, m), &denominator.spread(p, m), time)?)
-            }
-            Self::StateSpace { feedback, a, b, c, d } => {
-                let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
-                (feedback, StateSpace::new(a, b, c, d, time)?)
-            }
-            Self::ModelFile { feedback, file } => (feedback, model_file(&folder.join(file), Domain::Discrete, time)?),
-            Self::Observer { feedback, state_feedback, observer_gain } => {
-                let sign = Scale(feedback.sign());
-                let f = sign * matrix("state_feedback", state_feedback)?;
-                return Ok(RealisedController::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
-            }
-        };
-        Ok(RealisedController::System(if *feedback == Feedback::Negative { system.negated() } else { system }))
-    }
-}
-
 fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
     match domain {
         Domain::Continuous => Ok(StateSpace::new(a, b, c, d, Continuous)?.zoh(time)?),
@@ -236,7 +123,7 @@ fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Resul
 
 /// The model of a file. A discrete-time one that states a sample time must have that of the data; only a MATLAB file may state none,
 /// or hold matrices in s.
-fn model_file(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+pub(super) fn model_file(file: &Path, domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
     let is_mat = file.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat"));
     if !is_mat && domain == Domain::Discrete {
         let system = read_model(file)?.system;
@@ -259,7 +146,7 @@ fn check_sample_time(file: &Path, ts: f64, time: Discrete) -> Result<()> {
     Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: ts, right: time.ts() }))
 }
 
-fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
+pub(super) fn matrix(name: &str, rows: &[Vec<f64>]) -> Result<Mat<f64>> {
     let columns = rows.first().map_or(0, Vec::len);
     match rows.iter().position(|r| r.len() != columns) {
         Some(bad) => Err(Error::Method(youla::Error::Shape {

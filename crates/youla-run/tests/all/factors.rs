@@ -31,10 +31,13 @@ fn forms_and_signs_of_one_controller_agree() {
     for (feedback, sign) in [(Feedback::Positive, 1.0), (Feedback::Negative, -1.0)] {
         let controller = ControllerSettings::StateSpace {
             feedback,
+            domain: None,
+            hold: None,
             a: rows(k.a(), 1.0),
             b: rows(k.b(), 1.0),
             c: rows(k.c(), sign),
             d: rows(k.d(), sign),
+            delay: 0,
         };
         let settings = RunSettings { controller, ..demo.settings.clone() };
         let found = factorise_run(&settings, &demo.records, Path::new(".")).unwrap();

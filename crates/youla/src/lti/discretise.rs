@@ -8,7 +8,7 @@
 
 use super::{Continuous, Discrete, StateSpace, TimeDomain};
 use crate::Result;
-use crate::linalg::{block, expm, eye, logm};
+use crate::linalg::{block, expm, eye, logm, solve_in_any_units};
 use faer::prelude::*;
 use faer::{Mat, MatRef};
 
@@ -37,6 +37,41 @@ impl StateSpace<Continuous> {
         let step = expm("the state matrix times the sample time", (Scale(time.ts()) * generator).as_ref())?;
         let (a, b) = scaled.restore(step.as_ref());
         StateSpace::new(a, b, self.c().to_owned(), self.d().to_owned(), time)
+    }
+
+    /// Discretises by Tustin's rule, `G(2/ts (z - 1)/(z + 1))`: with `W = (I - A ts/2)^-1`,
+    /// ```text
+    /// Ad = W (I + A ts/2),   Bd = W B ts,   Cd = C W,   Dd = D + C W B ts/2.
+    /// ```
+    ///
+    /// # Errors
+    /// [`crate::Error::Singular`] where A has an eigenvalue at `2/ts`, which the rule maps to infinity.
+    ///
+    /// ```
+    /// use youla::{Mat, linalg::eye, lti::{Continuous, Discrete, StateSpace}};
+    /// let integrator = StateSpace::new(Mat::zeros(1, 1), eye(1), eye(1), Mat::zeros(1, 1), Continuous)?;
+    /// let sampled = integrator.tustin(Discrete::new(0.5)?)?;
+    /// assert_eq!((sampled.b()[(0, 0)], sampled.d()[(0, 0)]), (0.5, 0.25));
+    /// # Ok::<(), youla::Error>(())
+    /// ```
+    pub fn tustin(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
+        let (n, m, half) = (self.order(), self.inputs(), 0.5 * time.ts());
+        if n == 0 {
+            return StateSpace::gain(self.d().to_owned(), time);
+        }
+        let step = eye(n) - Scale(half) * self.a();
+        let right = block(&[&[(eye(n) + Scale(half) * self.a()).as_ref(), self.b()]]);
+        let what = "I - A ts/2 of Tustin's rule";
+        let solved = solve_in_any_units(what, step.as_ref(), right.as_ref())?;
+        let (a, wb) = (solved.subcols(0, n).to_owned(), solved.subcols(n, m));
+        let c = solve_in_any_units(what, step.transpose(), self.c().transpose())?;
+        StateSpace::new(
+            a,
+            Scale(time.ts()) * wb,
+            c.transpose().to_owned(),
+            self.d() + Scale(half) * (self.c() * wb),
+            time,
+        )
     }
 }
 

@@ -1,0 +1,263 @@
+//! `[controller]` of run.toml: every form in which users have their controllers.
+
+use super::explain::forms;
+use super::models::{Domain, Polynomials, matrix, model_file};
+use super::pid::{IdealPid, ParallelPid};
+use super::refuse;
+use crate::Result;
+use faer::Scale;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use youla::Mat;
+use youla::linalg::eye;
+use youla::lti::{Continuous, Discrete, StateSpace};
+
+/// Which sign the controller was written down with; never guessed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Feedback {
+    /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
+    /// return them.
+    Negative,
+    /// `u = K (y - r)`; for observer gains `u = F x` and `x+ = A x + B u + L (C x + D u - y)`.
+    Positive,
+}
+
+impl Feedback {
+    /// The factor that turns a gain written in this convention into one of positive feedback.
+    fn sign(self) -> f64 {
+        match self {
+            Feedback::Negative => -1.0,
+            Feedback::Positive => 1.0,
+        }
+    }
+}
+
+/// How a controller in s was brought to the sample time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Hold {
+    /// Zero-order hold: the error is taken as constant between samples.
+    Zoh,
+    /// Tustin's rule, `s = 2/ts (z - 1)/(z + 1)`.
+    Tustin,
+}
+
+/// The controller that ran while the data were logged, in one of its usual forms. The sign convention is mandatory in each.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum ControllerSettings {
+    /// `denominator(z^-1) u = numerator(z^-1) e`, ascending powers of z^-1, entries `[row][column]`; a single
+    /// denominator is common to all entries.
+    DifferenceEquation {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+        /// Dead time in whole samples, beyond what the controller itself delays.
+        #[serde(default)]
+        delay: usize,
+    },
+    /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
+    TransferFunction {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// The domain in which it is given.
+        domain: Domain,
+        /// How a controller in s was discretised; required with `domain = "continuous"`, and only there.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        hold: Option<Hold>,
+        /// Numerator coefficients.
+        numerator: Polynomials,
+        /// Denominator coefficients.
+        denominator: Polynomials,
+        /// Dead time in whole samples, beyond what the controller itself delays.
+        #[serde(default)]
+        delay: usize,
+    },
+    /// Matrices, row by row.
+    StateSpace {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// The domain in which it is given; discrete when absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        domain: Option<Domain>,
+        /// How a controller in s was discretised; required with `domain = "continuous"`, and only there.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        hold: Option<Hold>,
+        /// A of the controller, row by row.
+        a: Vec<Vec<f64>>,
+        /// B of the controller.
+        b: Vec<Vec<f64>>,
+        /// C of the controller.
+        c: Vec<Vec<f64>>,
+        /// D of the controller.
+        d: Vec<Vec<f64>>,
+        /// Dead time in whole samples, beyond what the controller itself delays.
+        #[serde(default)]
+        delay: usize,
+    },
+    /// PID in its parallel form, `kp + ki/s + kd s/(1 + derivative_filter s)`; one input and one output.
+    Pid(ParallelPid),
+    /// PID in its ideal form, `kp (1 + 1/(ti s) + td s/(1 + derivative_filter s))`; one input and one output.
+    IdealPid(IdealPid),
+    /// A discrete-time model from y to u in a file: `a`, `b`, `c`, `d` and the sample time `ts` in JSON, MATLAB (5 or 7.3) or NumPy
+    /// form. A MATLAB file may lack `ts`.
+    ModelFile {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// Path of the file, relative to run.toml.
+        file: PathBuf,
+    },
+    /// State feedback and observer gain for the discrete-time nominal model in its own states.
+    Observer {
+        /// Sign in which the controller is written down; never guessed.
+        feedback: Feedback,
+        /// State feedback F, m x n, row by row.
+        state_feedback: Vec<Vec<f64>>,
+        /// Observer gain L, n x p, row by row.
+        observer_gain: Vec<Vec<f64>>,
+    },
+}
+
+/// A controller in the library's convention, positive feedback.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RealisedController {
+    /// `u = K y`.
+    System(StateSpace<Discrete>),
+    /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
+    Observer {
+        /// m x n.
+        f: Mat<f64>,
+        /// n x p.
+        l: Mat<f64>,
+    },
+}
+
+impl ControllerSettings {
+    /// Reads a JSON file that holds what `[controller]` of run.toml holds, `{"pid": {"feedback": "negative", ..}}`; `None` for a file
+    /// that is no such table, for example a model.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] for a table with one of the names of the forms whose keys are wrong; [`youla_io::Error::Io`].
+    pub fn from_json(path: &Path) -> Result<Option<Self>> {
+        if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
+            return Ok(None);
+        }
+        let mut text = String::new();
+        let read = std::io::Read::read_to_string(&mut youla_io::open(path)?, &mut text);
+        read.map_err(|source| youla_io::Error::Io { path: path.to_owned(), source })?;
+        let table = match serde_json::from_str::<serde_json::Value>(&text) {
+            Ok(serde_json::Value::Object(table)) => table,
+            _ => return Ok(None),
+        };
+        match table.keys().next() {
+            Some(form) if table.len() == 1 && forms::<Self>().split(", ").any(|known| known == form) => {}
+            _ => return Ok(None),
+        }
+        let parsed = serde_json::from_str::<Self>(&text);
+        let problem = |problem| Err(youla_io::Error::Settings { path: path.to_owned(), at: None, problem }.into());
+        match parsed {
+            Err(error) => problem(error.to_string()),
+            Ok(controller) => controller.problem().map_or(Ok(Some(controller)), problem),
+        }
+    }
+
+    /// The controller with positive feedback.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the matrices, polynomials or file.
+    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
+        self.controller(folder, time).map_err(|e| e.within("[controller]"))
+    }
+
+    /// What the types allow and no controller is, in one sentence.
+    pub(super) fn problem(&self) -> Option<String> {
+        match self {
+            Self::TransferFunction { domain, hold, .. } => hold_problem(Some(*domain), *hold),
+            Self::StateSpace { domain, hold, .. } => hold_problem(*domain, *hold),
+            Self::Pid(pid) => pid.parts().problem(),
+            Self::IdealPid(pid) => pid.parts().problem(),
+            Self::DifferenceEquation { .. } | Self::ModelFile { .. } | Self::Observer { .. } => None,
+        }
+    }
+
+    fn controller(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
+        refuse(self.problem(), Path::new("run.toml"))?;
+        let (feedback, delay, system) = match self {
+            Self::DifferenceEquation { feedback, numerator, denominator, delay } => {
+                let (p, m) = numerator.shape();
+                let (numerator, denominator) = (numerator.spread(p, m), denominator.spread(p, m));
+                (feedback, *delay, StateSpace::difference_equation(&numerator, &denominator, time)?)
+            }
+            Self::TransferFunction { feedback, hold, numerator, denominator, delay, .. } => {
+                let (p, m) = numerator.shape();
+                let (numerator, denominator) = (numerator.spread(p, m), denominator.spread(p, m));
+                let system = match hold {
+                    None => StateSpace::transfer_matrix(&numerator, &denominator, time)?,
+                    Some(hold) => {
+                        held(&StateSpace::transfer_matrix(&numerator, &denominator, Continuous)?, *hold, time)?
+                    }
+                };
+                (feedback, *delay, system)
+            }
+            Self::StateSpace { feedback, hold, a, b, c, d, delay, .. } => {
+                let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
+                let system = match hold {
+                    None => StateSpace::new(a, b, c, d, time)?,
+                    Some(hold) => held(&StateSpace::new(a, b, c, d, Continuous)?, *hold, time)?,
+                };
+                (feedback, *delay, system)
+            }
+            Self::Pid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
+            Self::IdealPid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
+            Self::ModelFile { feedback, file } => {
+                (feedback, 0, model_file(&folder.join(file), Domain::Discrete, time)?)
+            }
+            Self::Observer { feedback, state_feedback, observer_gain } => {
+                let sign = Scale(feedback.sign());
+                let f = sign * matrix("state_feedback", state_feedback)?;
+                return Ok(RealisedController::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
+            }
+        };
+        let system = if *feedback == Feedback::Negative { system.negated() } else { system };
+        Ok(RealisedController::System(delayed(system, delay)?))
+    }
+}
+
+fn hold_problem(domain: Option<Domain>, hold: Option<Hold>) -> Option<String> {
+    match (domain, hold) {
+        (Some(Domain::Continuous), None) => Some(
+            "[controller] is in s, but does not say how it was discretised: add hold = \"tustin\" or hold = \"zoh\""
+                .into(),
+        ),
+        (None | Some(Domain::Discrete), Some(_)) => Some(
+            "[controller] has a `hold`, which belongs to domain = \"continuous\"; add that, or leave `hold` out".into(),
+        ),
+        _ => None,
+    }
+}
+
+fn held(system: &StateSpace<Continuous>, hold: Hold, time: Discrete) -> Result<StateSpace<Discrete>> {
+    Ok(match hold {
+        Hold::Zoh => system.zoh(time)?,
+        Hold::Tustin => system.tustin(time)?,
+    })
+}
+
+/// Longest dead time: each sample is a state per input. Chosen, not measured.
+const LONGEST: usize = 1000;
+
+/// `z^-delay K`, with m states for each sample.
+fn delayed(system: StateSpace<Discrete>, delay: usize) -> Result<StateSpace<Discrete>> {
+    let m = system.outputs();
+    let one = StateSpace::new(Mat::zeros(m, m), eye(m), eye(m), Mat::zeros(m, m), system.time())?;
+    if delay > LONGEST {
+        let what = "[controller] delay".into();
+        return Err(youla::Error::OutOfRange { what, value: delay as f64, must: "at most 1000 samples" }.into());
+    }
+    let chain = (0..delay).try_fold(system, |k, _| k.then(&one));
+    Ok(chain?)
+}

@@ -11,3 +11,4 @@ if exist('OCTAVE_VERSION', 'builtin')
     pkg load control
 end
 G = ss(a, b, c, d, ts, 'InputName', {@inputs@}, 'OutputName', {@outputs@});
+@predictor@@predict@

@@ -11,7 +11,7 @@ import numpy as np
 ts = @ts@  # seconds
 @matrices@
 G = control.ss(a, b, c, d, ts, name="@name@", inputs=[@inputs@], outputs=[@outputs@])
-
+@predictor@@predict@
 if __name__ == "__main__":
     print(G)
     control.damp(G)

@@ -12,6 +12,7 @@ mod json;
 mod matlab;
 mod npz;
 mod precision;
+mod predictor;
 mod python;
 mod read;
 mod sequence;
@@ -79,11 +80,11 @@ impl NamedModel {
 /// What a model can be written as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelFormat {
-    /// MATLAB file of version 5: `a`, `b`, `c`, `d`, `ts`, names.
+    /// MATLAB file of version 5: `a`, `b`, `c`, `d`, `ts`, names, predictor.
     Mat,
     /// JSON, as in a run folder.
     Json,
-    /// NumPy archive: `a`, `b`, `c`, `d`, `ts`.
+    /// NumPy archive: `a`, `b`, `c`, `d`, `ts`, predictor.
     Npz,
     /// Script that makes a `control.ss` of python-control.
     Python,
@@ -170,14 +171,14 @@ pub fn write_export(path: &Path, bytes: &[u8], replace: bool) -> Result<()> {
     })
 }
 
-/// `a`, `b`, `c`, `d`, `ts` as in a run folder, and the names and units of the channels as cells of text.
+/// `a`, `b`, `c`, `d`, `ts` as in a run folder, `predictor_a` and so on where the model has a predictor, and the names and units of the channels as cells of text.
 fn mat(model: &NamedModel) -> Result<Vec<u8>> {
     let g = &model.system;
     let cell = |of: fn(&Channel) -> &String, channels: &[Channel]| Value::Cell {
         dims: vec![1, channels.len()],
         items: channels.iter().map(|c| Value::text(of(c))).collect(),
     };
-    let variables = [
+    let own = [
         ("a", Value::matrix(g.a())),
         ("b", Value::matrix(g.b())),
         ("c", Value::matrix(g.c())),
@@ -190,7 +191,12 @@ fn mat(model: &NamedModel) -> Result<Vec<u8>> {
         ("output_units", cell(|c| &c.unit, &model.outputs)),
         ("program", Value::text(text::PROGRAM)),
     ];
-    mat_to_bytes(&variables.map(|(name, value)| Variable { name: name.into(), value }))
+    let mut variables = own.map(|(name, value)| Variable { name: name.into(), value }).to_vec();
+    if let Some(predictor) = predictor::Predictor::of(model) {
+        let matrices = predictor.matrices(model);
+        variables.extend(matrices.map(|(name, m)| Variable { name, value: Value::matrix(m.as_ref()) }));
+    }
+    mat_to_bytes(&variables)
 }
 
 #[cfg(test)]

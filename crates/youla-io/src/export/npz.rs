@@ -1,8 +1,10 @@
-//! A model as a NumPy archive: the arrays `a`, `b`, `c`, `d` and the number `ts`, stored, by columns.
+//! A model as a NumPy archive: the arrays `a`, `b`, `c`, `d` and the number `ts`, stored, by columns; those of its predictor, where it
+//! has one, begin with `predictor_`.
 //!
 //! Source: NumPy, "NEP 1, A simple file format for NumPy arrays", version 1.
 
 use super::NamedModel;
+use super::predictor::Predictor;
 use crate::error::{Error, Result};
 use std::io::{Cursor, Write};
 use youla::MatRef;
@@ -15,12 +17,16 @@ const ALIGNMENT: usize = 64;
 pub(super) fn npz(model: &NamedModel) -> Result<Vec<u8>> {
     let g = &model.system;
     let ts = g.time().ts().to_le_bytes().to_vec();
-    let arrays =
-        [("a", array(g.a())), ("b", array(g.b())), ("c", array(g.c())), ("d", array(g.d())), ("ts", npy("()", ts))];
+    let own = [("a", g.a()), ("b", g.b()), ("c", g.c()), ("d", g.d())].map(|(name, m)| (name.to_owned(), array(m)));
+    let mut arrays = own.to_vec();
+    arrays.push(("ts".into(), npy("()", ts)));
+    if let Some(predictor) = Predictor::of(model) {
+        arrays.extend(predictor.matrices(model).map(|(name, m)| (name, array(m.as_ref()))));
+    }
     archive(&arrays).map_err(|e| Error::Io { path: format!("{}.npz", model.name).into(), source: e.into() })
 }
 
-fn archive(arrays: &[(&str, Vec<u8>)]) -> zip::result::ZipResult<Vec<u8>> {
+fn archive(arrays: &[(String, Vec<u8>)]) -> zip::result::ZipResult<Vec<u8>> {
     // The date of a file would make the same model other bytes.
     let options = SimpleFileOptions::default()
         .compression_method(CompressionMethod::Stored)

@@ -1,14 +1,17 @@
 //! A model as a script for python-control.
 
 use super::NamedModel;
+use super::predictor::script;
 use super::text::{heading, identifier, matrix_of, number, rows};
 use youla::MatRef;
 use youla::signal::Channel;
 
 const TEMPLATE: &str = include_str!("../../assets/export/model.py");
+const PREDICT: &str = include_str!("../../assets/export/predict.py");
 
 pub(super) fn python(model: &NamedModel) -> String {
     let g = &model.system;
+    let (predictor, predict) = script(model, array, PREDICT);
     TEMPLATE
         .replace("@heading@", &heading(model).join("\n"))
         .replace("@matrices@", &["a", "b", "c", "d"].map(|name| array(name, matrix_of(model, name))).concat())
@@ -16,6 +19,8 @@ pub(super) fn python(model: &NamedModel) -> String {
         .replace("@name@", &identifier(&model.name))
         .replace("@inputs@", &names(&model.inputs))
         .replace("@outputs@", &names(&model.outputs))
+        .replace("@predictor@", &predictor)
+        .replace("@predict@", predict)
 }
 
 /// With its shape, which an array without entries would not have.

@@ -1,6 +1,7 @@
 //! A model from a file: JSON as in a run folder, MATLAB version 5 or 7.3, NumPy archive.
 
 use super::NamedModel;
+use super::predictor::Predictor;
 use crate::error::{Error, Result};
 use crate::matfile::mat_from_bytes;
 use crate::model_file::ModelFile;
@@ -40,10 +41,19 @@ pub fn model_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<NamedMod
     let mut model = match bytes.trim_ascii_start().first() {
         Some(b'{' | b'[') | None => of_json(bytes, path),
         Some(b'P') if bytes.starts_with(b"PK\x03\x04") => of_variables(&npz_from_bytes(bytes, path)?, path),
+        _ if is_text(bytes) => Err(Error::NotAModel {
+            path: path.to_owned(),
+            problem: "this is text, but no model; give a run folder, or a model as JSON, MATLAB or NumPy file".into(),
+        }),
         _ => of_variables(&mat_from_bytes(bytes, path)?, path),
     }?;
     model.origin = path.display().to_string();
     Ok(model)
+}
+
+/// Text without a header of MATLAB, which is text as well.
+fn is_text(bytes: &[u8]) -> bool {
+    !bytes.starts_with(b"MATLAB") && std::str::from_utf8(bytes).is_ok_and(|text| !text.contains('\0'))
 }
 
 /// A run folder holds this in place of a model that could not be computed.
@@ -72,7 +82,7 @@ fn of_variables(file: &Variables, path: &Path) -> Result<NamedModel> {
     let (u, y) = (names(file, "inputs", "input_units"), names(file, "outputs", "output_units"));
     let name = text(file.get("name").ok()).unwrap_or_else(|| stem(path));
     let channels = channels(&system, u, y);
-    NamedModel::new(&name, system, channels)
+    Ok(NamedModel { details: Predictor::details(file), ..NamedModel::new(&name, system, channels)? })
 }
 
 /// Names and units from cells of text, where there are such.

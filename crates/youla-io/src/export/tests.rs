@@ -40,6 +40,38 @@ fn models_read_back_bit_by_bit() {
     }
 }
 
+/// A model with a predictor of two more states.
+fn with_predictor() -> NamedModel {
+    let mut model = random(3, 2, 2, 21);
+    let of = |seed, rows: usize, columns: usize| {
+        let m = random(rows.max(columns), 1, 1, seed).system;
+        (0..rows).map(|i| (0..columns).map(|j| m.a()[(i, j)]).collect()).collect::<Vec<Vec<f64>>>()
+    };
+    model.details = serde_json::json!({ "predictor": {
+        "a": of(1, 5, 5), "b": of(2, 5, 2), "c": of(3, 2, 5), "d": of(4, 2, 2), "k": of(5, 5, 2), "covariance": of(6, 2, 2),
+    }});
+    model
+}
+
+#[test]
+fn the_predictor_reads_back_and_is_in_the_scripts() {
+    let mut model = with_predictor();
+    for format in [ModelFormat::Json, ModelFormat::Mat, ModelFormat::Npz] {
+        let back = model_from_bytes(&export_model(&model, format).unwrap(), "x").unwrap();
+        assert_eq!(back.details, model.details, "{format:?}");
+    }
+    let scripts = |model: &NamedModel| {
+        [ModelFormat::Python, ModelFormat::Matlab].map(|f| String::from_utf8(export_model(model, f).unwrap()).unwrap())
+    };
+    let [python, matlab] = scripts(&model);
+    assert!(python.contains("def predict(u, y):") && matlab.contains("lsim(predictor, [u y])"));
+    // Without a gain nothing is promised.
+    model.details["predictor"]["k"] = serde_json::Value::Null;
+    let [python, matlab] = scripts(&model);
+    assert!(!python.contains("predict") && !matlab.contains("predict"), "{python}");
+    assert!(!python.contains('@') && !matlab.contains('@'));
+}
+
 #[test]
 fn a_model_without_ports_reads_back_too() {
     let model = random(2, 0, 1, 3);

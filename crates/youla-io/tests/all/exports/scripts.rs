@@ -88,6 +88,49 @@ fn python_sees_the_same_numbers() {
     }
 }
 
+/// Prints the predictions of the script for the records of `record.json`.
+const PREDICT: &str = r"
+import json
+import recommended
+record = json.load(open('record.json'))
+for row in recommended.predict(record['u'], record['y']):
+    print(*[repr(float(v)) for v in row])
+";
+
+/// The script's one-step predictions are those of the library, `A - K C` driven by `[B - K D, K]`.
+#[test]
+#[ignore = "needs python3 (or PYTHON) with numpy, scipy and control"]
+fn python_predicts_one_step_ahead() {
+    let (rng, time) = (&mut rng(11), Discrete::new(TS).unwrap());
+    let (n, m, p, samples) = (6, 2, 2, 300);
+    let closed = random_stable(rng, (n, m + p, p), time);
+    let (k, d) = (closed.b().subcols(m, p), closed.d().subcols(0, m));
+    let (a, b) = (closed.a() + k * closed.c(), closed.b().subcols(0, m) + k * d);
+    let rows = |x: youla::MatRef<'_, f64>| -> Vec<Vec<f64>> {
+        (0..x.nrows()).map(|i| x.row(i).iter().copied().collect()).collect()
+    };
+    let none = vec![vec![0.0; p]; p];
+    let mut model = named(&random_stable(rng, (4, m, p), time));
+    model.details = serde_json::json!({ "predictor": {
+        "a": rows(a.as_ref()), "b": rows(b.as_ref()), "c": rows(closed.c()), "d": rows(d), "k": rows(k), "covariance": none,
+    }});
+    let folder = folder("predict");
+    std::fs::write(folder.join("recommended.py"), export_model(&model, ModelFormat::Python).unwrap()).unwrap();
+    let record = youla::Mat::from_fn(samples, m + p, |i, j| ((i * (3 * j + 7)) as f64 * 0.37).sin());
+    let text = serde_json::json!({ "u": rows(record.subcols(0, m)), "y": rows(record.subcols(m, p)) }).to_string();
+    std::fs::write(folder.join("record.json"), text).unwrap();
+    let mut seen = closed.d().to_owned();
+    seen.subcols_mut(m, p).fill(0.0);
+    let system =
+        StateSpace::new(closed.a().to_owned(), closed.b().to_owned(), closed.c().to_owned(), seen, time).unwrap();
+    let expected = youla::lti::simulate(&system, record.as_ref(), &vec![0.0; n]).unwrap();
+    let printed = output(python(), &["-c", PREDICT], &folder, "");
+    let numbers: Vec<f64> = printed.split_whitespace().map(|v| v.parse().unwrap()).collect();
+    assert_eq!(numbers.len(), samples * p);
+    let miss = numbers.iter().enumerate().fold(0.0_f64, |e, (k, v)| e.max((v - expected[(k / p, k % p)]).abs()));
+    assert!(miss < 1e-11 * expected.norm_max(), "{miss:.1e}");
+}
+
 #[test]
 #[ignore = "needs octave-cli with the package control"]
 fn octave_sees_the_same_numbers() {

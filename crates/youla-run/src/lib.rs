@@ -96,7 +96,7 @@ pub use streaming::{
     read_subspace_options,
 };
 pub use summary::{
-    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, summary,
+    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, responses, summary,
 };
 pub use uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
 pub use verdict::{ModelVerdict, RecordVerdict, Verdict};

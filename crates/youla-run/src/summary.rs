@@ -24,14 +24,14 @@ use std::path::Path;
 use youla::lti::FrequencyResponse;
 
 /// Version of the layout of summary.json.
-pub const SUMMARY_SCHEMA: u32 = 2;
+pub const SUMMARY_SCHEMA: u32 = 3;
 
 /// summary.json. A number that does not exist is `null`.
 ///
 /// A method or an indirect response that is impossible is listed under `refused` with its reason.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct Summary {
-    /// Version of this layout: 2.
+    /// Version of this layout: 3.
     pub schema: u32,
     /// Name of the machine or experiment.
     pub name: String,
@@ -43,8 +43,6 @@ pub struct Summary {
     pub methods: BTreeMap<String, MethodEntry>,
     /// What was asked for but is impossible, with the reason.
     pub refused: BTreeMap<String, String>,
-    /// Magnitudes of the frequency responses.
-    pub frequency_response: ResponsesEntry,
     /// The check of the data.
     pub data: DataCheckEntry,
     /// Largest relative residual of the Bezout identity (15) up to Nyquist.
@@ -111,7 +109,7 @@ pub struct MethodEntry {
 /// One number per frequency, `[output][input][frequency]`.
 pub type PortCurves = Vec<Vec<Vec<Option<f64>>>>;
 
-/// Magnitudes of the frequency responses of all models on one grid, in dB; `[output][input][frequency]`.
+/// response.json: magnitudes of the frequency responses of all models on one grid, in dB; `[output][input][frequency]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ResponsesEntry {
     /// Frequencies, Hz.
@@ -142,7 +140,6 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         nominal: run.verdict.of(Method::Nominal).map(reference_entry),
         methods: methods.collect::<Result<_>>()?,
         refused: run.refusals().into_iter().map(|r| (r.key.to_owned(), r.error.to_string())).collect(),
-        frequency_response: responses_entry(run)?,
         data: run.data.entry(),
         bezout_residual: run.filtered.as_ref().ok().and_then(|f| finite(f.factorisation.bezout_residual)),
         controller_mismatch: run.controller_mismatch().and_then(finite),
@@ -210,7 +207,11 @@ fn fits(v: &ModelVerdict) -> Fits {
     v.records.iter().map(|r| (r.record.clone(), finite_all(&r.fit))).collect()
 }
 
-fn responses_entry(run: &Identification) -> Result<ResponsesEntry> {
+/// The frequency responses of a run.
+///
+/// # Errors
+/// As [`youla::lti::frequency_response`].
+pub fn responses(run: &Identification) -> Result<ResponsesEntry> {
     let measured = run.indirect.as_ref().and_then(|r| r.as_ref().ok());
     let hz = measured.map_or_else(|| run.hz.clone(), |m| m.response.omega.iter().map(|w| w / TAU).collect());
     let models = model_responses(&run.verdict, &hz)?;

@@ -4,7 +4,7 @@ use super::folder::write_artefacts;
 use super::identification::Identification;
 use super::page::page;
 use super::stage::{Stage, StageClock};
-use super::summary::{Summary, summary};
+use super::summary::{Summary, responses, summary};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla_io::folder::RunFolder;
@@ -19,7 +19,7 @@ pub struct WrittenRun {
     pub summary: Summary,
 }
 
-/// Writes all artefacts, `report.json`, `report.html` and `summary.json` to `target`. Nothing is left behind on failure.
+/// Writes all artefacts, `report.json`, `report.html`, `response.json` and `summary.json` to `target`. Nothing is left behind on failure.
 ///
 /// # Errors
 /// [`youla_io::Error::OutputExists`], [`youla_io::Error::Io`].
@@ -41,6 +41,7 @@ pub fn write_run(
         let page = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
         Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)
     })?;
+    folder.compact_json("response.json", &responses(found)?)?;
     let summary = summary(found, &clock.seconds)?;
     folder.json("summary.json", &summary)?;
     Ok(WrittenRun { folder: folder.finish()?, summary })

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::signal::Detrend;
 use youla_run::{
-    Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, signal_records, summary,
+    Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, responses, signal_records,
 };
 
 /// The settings of an example with its data in place, and its folder.
@@ -36,8 +36,7 @@ fn numbers(value: &serde_json::Value) -> Vec<f64> {
 fn flexible_drive() {
     let found = run(example("flexible-drive"));
     assert_eq!(found.settings.frequency_response.window, 8000);
-    let summary = serde_json::to_value(summary(&found, &Vec::new()).unwrap()).unwrap();
-    let response = &summary["frequency_response"];
+    let response = serde_json::to_value(responses(&found).unwrap()).unwrap();
     let hz = numbers(&response["hz"]);
     let curve = |name: &str| numbers(&response[name][0][0]);
     let (indirect, hansen) = (curve("indirect_db"), curve("hansen_db"));

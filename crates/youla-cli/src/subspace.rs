@@ -7,6 +7,7 @@ use crate::table;
 use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
+use youla_io::folder::require_writable;
 use youla_io::{ChannelRef, TimeSource};
 use youla_run::{LongRecords, identify_long, long_model_file, read_subspace_options};
 
@@ -49,6 +50,8 @@ pub(crate) fn identify(form: Form, args: &SubspaceArgs) -> Result<(), Failure> {
     if let Some(path) = args.out.as_ref().filter(|path| path.exists()) {
         return Err(youla_io::Error::OutputExists { path: path.clone() }.into());
     }
+    args.out.as_ref().map_or(Ok(()), |path| require_writable(path))?;
+    args.files.iter().try_for_each(|file| readable(file))?;
     let records = LongRecords {
         files: args.files.clone(),
         inputs: places(&args.input),
@@ -72,6 +75,19 @@ pub(crate) fn identify(form: Form, args: &SubspaceArgs) -> Result<(), Failure> {
         (_, true) => Ok(()),
         _ => say(&table::subspace(&found, peak_memory())?),
     }
+}
+
+/// Refuses by their names files that are read as a whole, which this verb does not do.
+fn readable(file: &Path) -> Result<(), Failure> {
+    let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
+    let found = match extension.as_str() {
+        "mat" => "a MATLAB file",
+        "npz" => "a NumPy archive",
+        "parquet" => "a Parquet file",
+        _ => return Ok(()),
+    };
+    let remedy = "`youla subspace` reads text and .npy of any length; `youla identify` reads this file";
+    Err(youla_io::Error::FormatNotRead { path: file.to_owned(), found, remedy }.into())
 }
 
 /// The most memory that the program has held, bytes; known on Linux only.

@@ -45,6 +45,14 @@ pub enum Error {
         /// Why it is not, with the file.
         problem: String,
     },
+    /// Results cannot be written to the place that was chosen.
+    #[error("{}: results cannot be written there ({source}); choose another place by --out", path.display())]
+    Unwritable {
+        /// The folder or file.
+        path: PathBuf,
+        /// The error of the operating system.
+        source: std::io::Error,
+    },
     /// The output file exists.
     #[error("{} exists already; choose another file, or replace it with --force", path.display())]
     FileExists {
@@ -88,7 +96,7 @@ pub enum Error {
         problem: &'static str,
     },
     /// A cell of a text file is not a finite number.
-    #[error("{}, line {line}, column {column}: {text:?} is not a finite number{}", path.display(), decimal_remedy(*decimal))]
+    #[error("{}, line {line}, column {column}: {text:?} is not a finite number{}", path.display(), cell_remedy(text, *decimal))]
     Cell {
         /// The file.
         path: PathBuf,
@@ -167,7 +175,7 @@ pub enum Error {
     },
     /// The steps of the time column are not uniform.
     #[error(
-        "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s",
+        "{what}: time is not uniform: row {row} (counted from 1) comes {} s after the one before, the sample time is {} s; gaps = \"split\" in [data] cuts the record there, `segments` of the file choose rows",
         Seconds(*dt), Seconds(*ts)
     )]
     NonUniformTime {
@@ -181,7 +189,9 @@ pub enum Error {
         ts: f64,
     },
     /// Neither a sample time nor a time column is declared.
-    #[error("{what}: the sample time is not known; state it in seconds or name the time column")]
+    #[error(
+        "{what}: the sample time is not known; state it in seconds (--sample-time, or sample_time in [data]) or name the column of the time (--time, or time_column)"
+    )]
     SampleTimeMissing {
         /// The record or file.
         what: String,
@@ -201,7 +211,8 @@ impl From<Error> for youla::Error {
 youla::error_context! {
     sources: Method;
     numerical: Json;
-    bad_input: Settings OutputExists NotReplaced FileExists NotAModel Io MissingFile NoData Cell FieldCount Delimiter Corrupt
+    bad_input: Settings OutputExists NotReplaced Unwritable FileExists NotAModel Io MissingFile NoData Cell FieldCount
+        Delimiter Corrupt
         FormatNotRead UnequalLength WrongVariable NonUniformTime SampleTimeMissing;
 }
 
@@ -248,7 +259,13 @@ fn position(at: Option<TextPosition>) -> String {
 }
 
 /// The setting that makes a cell with the other decimal sign a number.
-fn decimal_remedy(decimal: Option<&str>) -> String {
+fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
+    let missing = ["", "nan", "na", "null", "none", "-"].contains(&text.trim().to_ascii_lowercase().as_str());
+    if missing && decimal.is_none() {
+        return "; leave rows without a value out of the file, and gaps = \"split\" in [data] cuts the record there (with a \
+                time_column)"
+            .into();
+    }
     let remedy =
         |sign| format!(" with the declared decimal sign; set decimal = \"{sign}\" if the whole file uses the {sign}");
     decimal.map_or(String::new(), remedy)

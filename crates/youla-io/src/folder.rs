@@ -25,15 +25,21 @@ pub struct RunFolder {
 
 impl RunFolder {
     /// Whether `target` can become a run folder: it does not exist, is empty, or is to be replaced and holds nothing but the files that a
-    /// run wrote (they are listed in its files.txt). Nothing is written; call it before a long computation.
+    /// run wrote (they are listed in its files.txt). It must be possible to write it: what is made for
+    /// that is removed again. Call it before a long computation.
     ///
     /// # Errors
-    /// [`Error::OutputExists`]; [`Error::NotReplaced`] with the first foreign file; [`Error::Io`] where it cannot be read or is a file.
+    /// [`Error::OutputExists`]; [`Error::NotReplaced`] with the first foreign file; [`Error::Unwritable`] where it
+    /// cannot be read or written, or is a file.
     pub fn check(target: &Path, replace: bool) -> Result<()> {
+        Self::create(target, replace).map(drop)
+    }
+
+    fn check_free(target: &Path, replace: bool) -> Result<()> {
         let occupied = match fs::read_dir(target) {
             Ok(mut entries) => entries.next().is_some(),
             Err(e) if e.kind() == ErrorKind::NotFound => false,
-            Err(source) => return Err(Error::Io { path: target.to_owned(), source }),
+            Err(source) => return Err(Error::Unwritable { path: target.to_owned(), source }),
         };
         match (occupied, replace) {
             (false, _) => Ok(()),
@@ -46,16 +52,16 @@ impl RunFolder {
     /// folder is removed.
     ///
     /// # Errors
-    /// Those of [`RunFolder::check`]; [`Error::Io`] where it cannot be written.
+    /// Those of [`RunFolder::check`].
     pub fn create(target: &Path, replace: bool) -> Result<Self> {
-        Self::check(target, replace)?;
+        Self::check_free(target, replace)?;
         let name = target.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned());
         let prefix = format!(".{name}.partial-");
         remove_left_over(target.parent().unwrap_or(Path::new("")), &prefix);
         let partial = target.with_file_name(format!("{prefix}{}", std::process::id()));
         let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
         let parents = target.ancestors().skip(1).take_while(new).map(Path::to_owned).collect();
-        let io = |source| Error::Io { path: target.to_owned(), source };
+        let io = |source| Error::Unwritable { path: target.to_owned(), source };
         let mut folder = RunFolder { target: target.to_owned(), partial, parents, lock: None, finished: false };
         fs::create_dir_all(&folder.partial).map_err(io)?;
         let lock = fs::File::create(folder.partial.join(LOCK)).map_err(io)?;
@@ -214,6 +220,17 @@ pub fn replace_file(path: &Path, text: &str) -> Result<()> {
         let _ = fs::remove_file(&partial);
         Error::Io { path: path.to_owned(), source }
     })
+}
+
+/// Whether a file can be written, before a long computation; what is made for that is removed again.
+///
+/// # Errors
+/// [`Error::Unwritable`].
+pub fn require_writable(path: &Path) -> Result<()> {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let probe = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let made = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
+    made.map_err(|source| Error::Unwritable { path: path.to_owned(), source })
 }
 
 /// Rejects names of files that exist in a folder.

@@ -49,6 +49,14 @@ pub enum Error {
         /// Its name.
         figure: String,
     },
+    /// The controller does not stabilise the nominal model.
+    #[error("the controller does not stabilise the nominal model: the closed loop has the pole {pole}; {cause}")]
+    NotStabilised {
+        /// The worst closed-loop pole with its magnitude.
+        pole: String,
+        /// The most likely cause, and the key that mends it.
+        cause: String,
+    },
     /// Two records of a run have the same name.
     #[error("two records are named {name:?}; give one of their files another `name`")]
     DuplicateRecord {
@@ -76,7 +84,7 @@ pub enum Error {
 youla::error_context! {
     sources: Method File GreyBox Loop Report;
     numerical:;
-    bad_input: ChoiceOfFigure NothingToDraw DuplicateRecord NotASummary NotAReport;
+    bad_input: NotStabilised ChoiceOfFigure NothingToDraw DuplicateRecord NotASummary NotAReport;
 }
 
 impl Error {
@@ -85,6 +93,7 @@ impl Error {
         match self {
             Error::Method(source) => source.is_of_the_records(),
             Error::Within { source, .. } => source.is_of_the_records(),
+            Error::NotStabilised { .. } => true,
             _ => false,
         }
     }

@@ -5,7 +5,7 @@ use super::settings::{FactorSettings, RealisedController, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::Mat;
-use youla::control::{LqrWeights, lqr, observer_controller};
+use youla::control::{LqrWeights, closed_loop, lqr, observer_controller, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
@@ -110,7 +110,8 @@ pub fn factorise(
         }
         RealisedController::System(k) => {
             let f = state_feedback(&balanced, records, settings.input_weight)?;
-            CoprimeFactors::stacked(&balanced, k, f.as_ref(), controller_feedback(k)?.as_ref())?
+            let made = CoprimeFactors::stacked(&balanced, k, f.as_ref(), controller_feedback(k)?.as_ref());
+            made.map_err(|e| likely_cause(e, &balanced, k))?
         }
     };
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
@@ -124,6 +125,42 @@ fn not_stabilising(error: youla::Error) -> youla::Error {
         other => other,
     }
 }
+
+/// The refusal of a nominal model that the controller does not stabilise, with the change of the controller's gain that would make it
+/// stabilise: the sign, then the size, the nearest first, with either sign.
+fn likely_cause(error: youla::Error, nominal: &StateSpace<Discrete>, k: &StateSpace<Discrete>) -> Error {
+    let youla::Error::NotStabilising { pole, .. } = error else { return error.into() };
+    let stabilises = |factor: f64| {
+        let scaled = k.map_output(&(eye(k.outputs()) * faer::Scale(factor)));
+        with_input_port(&scaled)
+            .and_then(|ports| closed_loop(nominal, &ports))
+            .and_then(|closed| closed.is_stable())
+            .unwrap_or(false)
+    };
+    let sizes = (1..=STEPS).flat_map(|k| {
+        let size = 10f64.powf(0.25 * f64::from(k));
+        [1.0 / size, size, -1.0 / size, -size]
+    });
+    let found = std::iter::once(-1.0).chain(sizes).find(|factor| stabilises(*factor));
+    let cause = match found {
+        Some(-1.0) => "with the opposite sign it would: check the sign, `feedback` in [controller]".to_owned(),
+        Some(factor) if factor < 0.0 => format!(
+            "{factor:.3e} times the controller would stabilise it: check the sign, `feedback` in [controller], the units of the \
+             channels and the gains"
+        ),
+        Some(factor) => format!(
+            "{factor:.3e} times the controller would stabilise it: check the units of the channels, the gains in [controller] and the \
+             gain of [nominal]"
+        ),
+        None => "no other sign or gain of the controller would: check the dynamics in [nominal], its domain, and the sample time"
+            .to_owned(),
+    };
+    let pole = youla::error::Pole(pole).to_string();
+    Error::NotStabilised { pole, cause }
+}
+
+/// Steps of a quarter of a decade in which a gain is tried, up to a million: units differ by no more. Chosen, not measured.
+const STEPS: i32 = 24;
 
 /// Angular frequencies, logarithmic over four decades below Nyquist.
 fn grid_to_nyquist(time: Discrete, count: usize) -> Vec<f64> {

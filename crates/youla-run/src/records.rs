@@ -194,7 +194,11 @@ fn read_file(
         csv: settings.csv.clone(),
     };
     let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
-    for Part { record, name, rows, cut } in parts(file, label, read_parts(&source)?)? {
+    let read = read_parts(&source).map_err(|e| match e {
+        youla_io::Error::MissingFile { .. } => e.within(format!("[data] {purpose}")),
+        other => other,
+    })?;
+    for Part { record, name, rows, cut } in parts(file, label, read)? {
         all_rows.push(rows);
         let disturbance = settings.disturbance.as_ref().map(|d| disturbance_signals(d, &record)).transpose()?;
         let record = record.detrend(settings.detrend)?.record;

@@ -24,6 +24,10 @@ pub fn redraw(run: &Path) -> Result<PathBuf> {
 /// # Errors
 /// [`youla_io::Error::MissingFile`], [`Error::NotAReport`], [`youla_io::Error::Io`].
 pub(super) fn read_report(run: &Path) -> Result<ReportData> {
+    if run.is_file() {
+        let problem = "this is a file; give the folder of a run, which holds report.json".into();
+        return Err(Error::File(youla_io::Error::NotAModel { path: run.to_owned(), problem }));
+    }
     let data = run.join("report.json");
     let mut text = String::new();
     open(&data)?

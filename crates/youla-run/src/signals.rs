@@ -5,6 +5,7 @@ use crate::{Error, Result};
 use faer::Scale;
 use std::path::{Path, PathBuf};
 use youla::Mat;
+use youla::error::Seconds;
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::linalg::block;
 use youla::lti::Discrete;
@@ -57,12 +58,22 @@ pub fn deviation_signals(
     records: &[LoopRecord],
     settle: Option<usize>,
 ) -> Result<DeviationSignals> {
+    let stated = settle.is_some();
     let settle = settle.map_or_else(|| factors.settling_samples(REMAINDER), Ok)?;
     let mut experiments = Vec::new();
     let mut expected_alpha = Vec::new();
     for record in records {
         if record.samples() <= settle {
-            let what = format!("record {}, of which `settle` in [factors] drops the first {settle}", record.name);
+            let what = match stated {
+                true => format!("record {}, of which `settle` in [factors] drops the first {settle}", record.name),
+                false => format!(
+                    "record {} is {} s long, but the slowest pole of model and controller settles in {} s; check sample_time and the \
+                     units of the time in [data], or state `settle` in [factors], which is {settle} samples",
+                    record.name,
+                    Seconds(record.samples() as f64 * record.time.ts()),
+                    Seconds(settle as f64 * record.time.ts()),
+                ),
+            };
             let (found, needed) = (record.samples(), settle + 1);
             return Err(Error::Method(youla::Error::TooFewSamples { what, found, needed }));
         }

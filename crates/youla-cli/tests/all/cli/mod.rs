@@ -9,6 +9,7 @@ mod excite;
 mod export;
 mod init;
 mod limits;
+mod mistakes;
 mod plot;
 mod subspace;
 mod verbs;

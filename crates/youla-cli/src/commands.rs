@@ -2,11 +2,11 @@
 
 use crate::args::{Args, Command};
 use crate::demo::demo;
-use crate::output::{Failure, Form, Progress, say};
+use crate::output::{Failure, Form, Progress, say, tell};
 use crate::run_folder::{OutputFolder, folder_of};
 use crate::{check, compare, excite, export, init, manual, paper, plot, study, subspace, table};
 use clap::CommandFactory;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use youla_io::folder::{NumberedFolder, RunFolder};
 use youla_run::{
     RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_reference,
@@ -74,7 +74,7 @@ fn identify_and_write(
     } else if form.quiet {
         Ok(())
     } else {
-        say(&table::results(&found, &written.folder))
+        tell(&table::results(&found, &written.folder))
     }
 }
 
@@ -84,12 +84,16 @@ fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {
     let records = read_records(&settings.data, &folder)?;
     let factorisation = factorise_run(&settings, &records, &folder)?;
     let signals = signal_records(&factorisation.factors, &records)?;
-    for (record, path) in signals.iter().zip(write_signals(&signals, out)?) {
-        if !form.quiet && !form.json {
-            say(&format!("{} ({} samples)", path.display(), record.samples()))?;
+    let paths = write_signals(&signals, out)?;
+    let written = || signals.iter().map(|record| record.samples()).zip(&paths);
+    match (form.json, form.quiet) {
+        (true, _) => {
+            let about = |(samples, path): (usize, &PathBuf)| serde_json::json!({ "file": path.display().to_string(), "samples": samples });
+            say(&serde_json::Value::from(written().map(about).collect::<Vec<_>>()).to_string())
         }
+        (_, true) => Ok(()),
+        _ => written().try_for_each(|(samples, path)| say(&format!("{} ({samples} samples)", path.display()))),
     }
-    Ok(())
 }
 
 fn schema(markdown: bool) -> Result<(), Failure> {
@@ -101,5 +105,9 @@ fn schema(markdown: bool) -> Result<(), Failure> {
 
 fn report(form: Form, run: &Path) -> Result<(), Failure> {
     let path = redraw(run)?;
-    if form.quiet || form.json { Ok(()) } else { say(&path.display().to_string()) }
+    match (form.json, form.quiet) {
+        (true, _) => say(&serde_json::json!({ "report": path.display().to_string() }).to_string()),
+        (_, true) => Ok(()),
+        _ => say(&path.display().to_string()),
+    }
 }

@@ -1,7 +1,8 @@
 //! `youla compare`: finished runs beside each other.
 
-use crate::output::{Failure, Form, say};
-use crate::table::aligned;
+use crate::output::{Failure, Form, say, tell};
+use crate::table::fitted;
+use crate::terminal;
 use clap::Args;
 use std::path::PathBuf;
 use youla_report::data::EvidenceTable;
@@ -36,7 +37,7 @@ pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
     match (form.json, form.quiet) {
         (true, _) => say(&serde_json::json!(found).to_string()),
         (_, true) => Ok(()),
-        _ => say(&text(&found, args)),
+        _ => tell(&text(&found, args)),
     }
 }
 
@@ -54,6 +55,9 @@ fn text(found: &Comparison, args: &CompareArgs) -> String {
 fn as_text(table: &EvidenceTable) -> String {
     match table.rows.is_empty() {
         true => format!("{}\n", table.text),
-        false => aligned(&[std::slice::from_ref(&table.columns), &table.rows].concat()),
+        false => {
+            let rows = [std::slice::from_ref(&table.columns), &table.rows].concat();
+            fitted(&rows, terminal::width().unwrap_or(terminal::PLAIN))
+        }
     }
 }

@@ -20,6 +20,7 @@ mod run_folder;
 mod study;
 mod subspace;
 mod table;
+mod terminal;
 
 use clap::Parser;
 use std::process::ExitCode;

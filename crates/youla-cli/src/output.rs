@@ -1,5 +1,6 @@
 //! Standard output, progress on the terminal, and how failures end the program.
 
+use crate::terminal;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
@@ -15,7 +16,7 @@ pub(crate) struct Form {
     /// Print nothing but errors.
     #[arg(long, short, global = true)]
     pub(crate) quiet: bool,
-    /// Print the result as JSON (the contents of summary.json) instead of a table.
+    /// Print the result as JSON instead of a table; of a run, the contents of summary.json.
     #[arg(long, global = true, conflicts_with = "quiet")]
     pub(crate) json: bool,
 }
@@ -53,7 +54,7 @@ pub(crate) fn fail(failure: &Failure) -> ExitCode {
         Failure::OutputClosed => ExitCode::SUCCESS,
         Failure::Refused(sentence, kind) => {
             // Without standard error the progress is not shown.
-            let _ = writeln!(std::io::stderr(), "error: {}", shown(sentence));
+            let _ = writeln!(std::io::stderr(), "{} {}", terminal::error_word(), shown(sentence));
             match kind {
                 ErrorKind::BadInput => ExitCode::from(2),
                 ErrorKind::Numerical => ExitCode::from(3),
@@ -76,10 +77,18 @@ fn shown(text: &str) -> String {
     out
 }
 
+/// Prints text for people: words wrapped at the width of the terminal, and colour where there is one.
+pub(crate) fn tell(text: &str) -> Result<(), Failure> {
+    print(&terminal::shown(&shown(text)))
+}
+
 /// Prints a line to standard output.
 pub(crate) fn say(text: &str) -> Result<(), Failure> {
+    print(&shown(text))
+}
+
+fn print(text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
-    let text = shown(text);
     writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|e| match e.kind() {
         std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
         _ => Failure::io(Path::new("standard output"), e),

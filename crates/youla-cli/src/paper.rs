@@ -114,6 +114,10 @@ fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<()
             say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end())
         }
         Some(paper) => say(&table::paper(paper, &written)),
+        None if form.json => {
+            let (folder, shard) = (written.folder.display().to_string(), configuration.shard.to_string());
+            say(&serde_json::json!({ "folder": folder, "shard": shard }).to_string())
+        }
         None => say(&part_of(configuration.shard, &written)),
     }
 }

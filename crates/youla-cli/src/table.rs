@@ -1,5 +1,6 @@
 //! The table at the end of a run.
 
+use crate::terminal;
 use std::fmt::Write;
 use std::path::Path;
 use youla::identify::subspace::{Factorisation, InputFit};
@@ -10,7 +11,7 @@ use youla_run::{Identification, LongModel, cautions};
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, folder: &Path) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
-    text += &aligned(&rows(found));
+    text += &fitted(&rows(found), terminal::width().unwrap_or(usize::MAX));
     text += &modes(found);
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
@@ -113,6 +114,48 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     rows
 }
 
+/// A table within a width: side by side where it fits; else in blocks of columns, each with the first column, where every block fits;
+/// else one line per cell under the row's first cell.
+pub(crate) fn fitted(rows: &[Vec<String>], columns: usize) -> String {
+    let count = rows.first().map_or(0, Vec::len);
+    let wide = |j: usize| rows.iter().map(|r| r[j].chars().count()).max().unwrap_or(0);
+    let mut blocks: Vec<Vec<usize>> = Vec::new();
+    let mut used = usize::MAX;
+    for j in 1..count {
+        let needed = wide(j) + 2;
+        match blocks.last_mut().filter(|_| used.saturating_add(needed) <= columns) {
+            Some(block) => block.push(j),
+            None => {
+                blocks.push(vec![j]);
+                used = wide(0);
+            }
+        }
+        used = used.saturating_add(needed);
+        if used > columns && count > 1 {
+            return listed(rows, columns);
+        }
+    }
+    let block = |block: &Vec<usize>| {
+        let cells =
+            |row: &Vec<String>| std::iter::once(0).chain(block.iter().copied()).map(|j| row[j].clone()).collect();
+        aligned(&rows.iter().map(cells).collect::<Vec<Vec<String>>>())
+    };
+    if blocks.is_empty() { aligned(rows) } else { blocks.iter().map(block).collect::<Vec<_>>().join("\n") }
+}
+
+/// A row as its first cell and one line `heading: cell` for each other one.
+fn listed(rows: &[Vec<String>], columns: usize) -> String {
+    let mut text = String::new();
+    let Some((head, rest)) = rows.split_first() else { return text };
+    for row in rest {
+        let _ = writeln!(text, "{}", terminal::wrapped(&row[0], columns));
+        for (heading, cell) in head.iter().zip(row).skip(1) {
+            let _ = writeln!(text, "{}", terminal::wrapped(&format!("  {heading}: {cell}"), columns));
+        }
+    }
+    text
+}
+
 /// Columns as wide as their widest cell, the first left, the others right.
 pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let columns = rows.first().map_or(0, Vec::len);
@@ -127,4 +170,31 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
         text.push('\n');
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table(cells: &[&[&str]]) -> Vec<Vec<String>> {
+        cells.iter().map(|row| row.iter().map(|cell| (*cell).to_owned()).collect()).collect()
+    }
+
+    #[test]
+    fn tables_keep_the_width_they_are_given() {
+        let rows = table(&[&["fit", "nominal", "direct", "hansen"], &["rest, y", "1.0", "2.0", "3.0"]]);
+        assert_eq!(fitted(&rows, 80), aligned(&rows));
+        let narrow = fitted(&rows, 24);
+        assert!(narrow.lines().all(|line| line.chars().count() <= 24), "{narrow}");
+        assert!(narrow.contains("direct") && narrow.contains("\n\nfit"), "{narrow}");
+        let sentence = table(&[
+            &["Run", "Verdict"],
+            &["a", "It must not be trusted, for the reasons below, of which there are many"],
+        ]);
+        let listed = fitted(&sentence, 40);
+        assert!(
+            listed.starts_with("a\n  Verdict: It must") && listed.lines().all(|l| l.chars().count() <= 40),
+            "{listed}"
+        );
+    }
 }

@@ -88,7 +88,7 @@ pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
     let columns = survey(&args.log, &csv)?;
     let missing = missing(args);
     let silent = form.quiet || form.json;
-    if !silent || !missing.is_empty() {
+    if !silent || (!missing.is_empty() && !form.json) {
         say(&table(&columns))?;
     }
     if !missing.is_empty() && !std::io::stdin().is_terminal() {
@@ -98,7 +98,23 @@ pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
     let draft = answered(args, &columns)?;
     let text = draft.toml(&columns)?;
     std::fs::write(&args.out, text).map_err(|source| Failure::io(&args.out, source))?;
-    if silent { Ok(()) } else { say(&next(args, &draft)) }
+    match (form.json, form.quiet) {
+        (true, _) => say(&about(args, &draft, &columns).to_string()),
+        (_, true) => Ok(()),
+        _ => say(&next(args, &draft)),
+    }
+}
+
+/// What was written, and the columns of the log.
+fn about(args: &InitArgs, draft: &Draft, columns: &[SurveyedColumn]) -> serde_json::Value {
+    let column = |c: &SurveyedColumn| match &c.content {
+        Ok(found) => serde_json::json!({
+            "name": c.from, "rows": found.rows, "lowest": found.low, "highest": found.high, "step": found.step,
+        }),
+        Err(problem) => serde_json::json!({ "name": c.from, "problem": problem.to_string() }),
+    };
+    let columns: Vec<_> = columns.iter().map(column).collect();
+    serde_json::json!({ "file": args.out.display().to_string(), "estimated_rows": draft.estimated, "columns": columns })
 }
 
 /// Flags without which a question is open.
@@ -144,6 +160,18 @@ fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failur
             },
         )?,
     };
+    // Who is asked anything is asked for these too; flags alone are taken as complete.
+    let asked = !missing(args).is_empty();
+    let known = |given: &[ChannelRef], question: &str| match given {
+        [] if asked => ask(question, |text| Ok(if text == "none" { Vec::new() } else { names(text) })),
+        given => Ok(places(given)),
+    };
+    let input_excitation =
+        known(&args.excitation, "Known excitation added at the plant input, one for each input, or none")?;
+    let reference = match feedback {
+        Some(_) => known(&args.reference, "Known reference of the controller, one for each output, or none")?,
+        None => places(&args.reference),
+    };
     let rows = columns.iter().filter_map(|c| c.content.as_ref().ok()).map(|c| c.rows).max().unwrap_or(0);
     let stem = args.log.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let name = args.name.clone().unwrap_or_else(|| stem.split('.').next().unwrap_or_default().to_owned());
@@ -154,8 +182,8 @@ fn answered(args: &InitArgs, columns: &[SurveyedColumn]) -> Result<Draft, Failur
         clock,
         inputs,
         outputs,
-        input_excitation: places(&args.excitation),
-        reference: places(&args.reference),
+        input_excitation,
+        reference,
         feedback,
         estimated: args.estimate.unwrap_or(2 * rows / 3),
     })

@@ -154,7 +154,8 @@ impl Draft {
             rows => self.rows(columns), estimated => self.estimated,
             estimation => format!("{stem}-first"), verification => format!("{stem}-rest"),
             feedback => self.feedback.map(Serde),
-            zero_plant => zeros(p, m), zero_controller => zeros(m, p),
+            zero_plant => entries_of("[0.0]", p, m), zero_controller => entries_of("[0.0]", m, p),
+            plant => entries_of("[2500.0]", p, m), controller => entries_of("[5.5, 0.3, -5.2]", m, p),
         };
         let mut environment = Environment::new();
         environment.add_filter("toml", |text: String| toml::Value::String(text).to_string());
@@ -186,12 +187,28 @@ struct Entry {
     name: String,
     /// Its place, where the name is not the place.
     from: Option<String>,
+    /// The unit that its heading states, else empty.
+    unit: String,
+}
+
+/// `speed [rad/s]` or `speed (rad/s)` as name and unit; the whole heading where it states none, or nothing but one.
+fn heading(text: &str) -> (&str, &str) {
+    let split = |open: char, close: char| {
+        let (name, unit) = text.trim_end().strip_suffix(close)?.rsplit_once(open)?;
+        let (name, unit) = (name.trim_end(), unit.trim());
+        // x(2) and x[2] are elements of an array.
+        let is_unit =
+            !unit.is_empty() && (unit.contains('/') || !unit.starts_with(|c: char| c.is_ascii_digit() || c == ':'));
+        (!name.is_empty() && is_unit).then_some((name, unit))
+    };
+    split('[', ']').or_else(|| split('(', ')')).unwrap_or((text, ""))
 }
 
 /// Names without the path that leads to them, where these differ; `letter` and a number where columns have no names.
 fn entries(channels: &[ChannelRef], letter: &str) -> Vec<Entry> {
     let short = |c: &ChannelRef| {
         let text = c.to_string();
+        let text = heading(&text).0.to_owned();
         let last = text.rsplit('.').next().unwrap_or_default();
         // A path leads to a name; "y.1" and "speed [1/min.]" are names of columns themselves.
         if last.starts_with(char::is_alphabetic) { last.to_owned() } else { text }
@@ -200,22 +217,23 @@ fn entries(channels: &[ChannelRef], letter: &str) -> Vec<Entry> {
         let full = c.to_string();
         if matches!(c, ChannelRef::Column(_)) {
             let number = if channels.len() > 1 { (k + 1).to_string() } else { String::new() };
-            return Entry { name: format!("{letter}{number}"), from: Some(full) };
+            return Entry { name: format!("{letter}{number}"), from: Some(full), unit: String::new() };
         }
+        let unit = heading(&full).1.to_owned();
         let name = short(c);
         let unique = channels.iter().filter(|other| short(other) == name).count() == 1;
         let name = if unique { name } else { full.clone() };
-        Entry { from: (name != full).then_some(full), name }
+        Entry { from: (name != full).then_some(full), name, unit }
     };
     channels.iter().enumerate().map(named).collect()
 }
 
-/// The matrix of zero polynomials as TOML, a plain list for one input and one output.
-fn zeros(rows: usize, columns: usize) -> String {
+/// The matrix of equal polynomials as TOML, a plain list for one input and one output.
+fn entries_of(polynomial: &str, rows: usize, columns: usize) -> String {
     if (rows, columns) == (1, 1) {
-        return "[0.0]".into();
+        return polynomial.into();
     }
-    let row = format!("[{}]", vec!["[0.0]"; columns].join(", "));
+    let row = format!("[{}]", vec![polynomial; columns].join(", "));
     format!("[{}]", vec![row; rows].join(", "))
 }
 
@@ -231,105 +249,4 @@ pub fn path_from(folder: &Path, file: &Path) -> Result<PathBuf> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::RunSettings;
-    use youla_io::ColumnContent;
-
-    fn columns() -> Vec<SurveyedColumn> {
-        let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
-        let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
-        let mut all = ["t", "Data.signals.u", "Data.signals.y", "d", "odd \"name\""].map(of).to_vec();
-        all.push(SurveyedColumn { from: "mode".into(), content: Err("line 2: not a number".into()) });
-        all
-    }
-
-    fn draft(feedback: Option<Feedback>) -> Draft {
-        let name = |text: &str| ChannelRef::Name(text.into());
-        Draft {
-            name: "a \"rig\"".into(),
-            file: "log.csv".into(),
-            csv: CsvOptions::default(),
-            clock: DraftClock::Column(name("t")),
-            inputs: vec![name("Data.signals.u")],
-            outputs: vec![name("Data.signals.y")],
-            input_excitation: vec![name("d")],
-            reference: Vec::new(),
-            feedback,
-            estimated: 600,
-        }
-    }
-
-    #[test]
-    fn without_a_controller_it_is_complete() {
-        let text = draft(None).toml(&columns()).unwrap();
-        let settings = RunSettings::parse(&text, Path::new("run.toml")).unwrap();
-        assert_eq!(settings.name, "a \"rig\"");
-        assert_eq!(settings.data.inputs[0].name, "u");
-        assert_eq!(settings.data.inputs[0].source(), ChannelRef::Name("Data.signals.u".into()));
-        assert_eq!((settings.data.estimation[0].take, settings.data.verification[0].skip), (Some(600), 600));
-    }
-
-    #[test]
-    fn with_a_controller_what_is_missing_is_named_with_its_line() {
-        for feedback in [Feedback::Negative, Feedback::Positive] {
-            let text = draft(Some(feedback)).toml(&columns()).unwrap();
-            let error = RunSettings::parse(&text, Path::new("run.toml")).unwrap_err().to_string();
-            assert!(error.starts_with("run.toml:") && error.ends_with("lacks `numerator`"), "{error}");
-            let filled = text.replace("# numerator", "numerator").replace("# denominator", "denominator");
-            RunSettings::parse(&filled, Path::new("run.toml")).unwrap();
-        }
-    }
-
-    #[test]
-    fn several_channels_and_columns_by_number() {
-        let mut several = draft(None);
-        several.inputs = vec![ChannelRef::Column(2), ChannelRef::Column(4)];
-        several.outputs = vec![ChannelRef::Column(3), ChannelRef::Name("odd \"name\"".into())];
-        several.input_excitation.clear();
-        several.clock = DraftClock::SampleTime(5e-4);
-        let settings = RunSettings::parse(&several.toml(&columns()).unwrap(), Path::new("run.toml")).unwrap();
-        assert_eq!(settings.data.sample_time, Some(5e-4));
-        assert_eq!(settings.data.inputs[1].source(), ChannelRef::Column(4));
-        assert_eq!(settings.data.inputs[1].name, "u2");
-        assert_eq!(settings.data.outputs[1].name, "odd \"name\"");
-    }
-
-    /// Columns of the matrices of a MATLAB file, chosen by number.
-    #[test]
-    fn columns_of_matrices_have_places() {
-        let content = ColumnContent { rows: 900, low: -1.0, high: 1.0, step: None };
-        let of = |from: &str| SurveyedColumn { from: from.into(), content: Ok(content) };
-        let columns = ["u(:,1)", "u(:,2)", "y"].map(of);
-        let mut numbered = draft(None);
-        numbered.clock = DraftClock::SampleTime(1e-3);
-        numbered.inputs = vec![ChannelRef::Column(1), ChannelRef::Column(2)];
-        numbered.outputs = vec![ChannelRef::Column(3)];
-        numbered.input_excitation.clear();
-        let text = numbered.toml(&columns).unwrap();
-        let settings = RunSettings::parse(&text, Path::new("run.toml")).unwrap();
-        let places: Vec<String> = settings.data.inputs.iter().map(|c| c.source().to_string()).collect();
-        assert_eq!(places, ["u(:,1)", "u(:,2)"]);
-        assert_eq!(settings.data.outputs[0].source(), ChannelRef::Name("y".into()));
-    }
-
-    #[test]
-    fn what_does_not_fit_the_log_is_said() {
-        let check = |change: fn(&mut Draft), says: &str| {
-            let mut draft = draft(None);
-            change(&mut draft);
-            let error = draft.toml(&columns()).unwrap_err().to_string();
-            assert!(error.contains(says), "{error}");
-        };
-        check(|d| d.inputs = vec![ChannelRef::Name("v".into())], "no column \"v\"; there are t, Data.signals.u");
-        check(|d| d.outputs = vec![ChannelRef::Name("mode".into())], "cannot be a channel: line 2");
-        check(|d| d.outputs = d.inputs.clone(), "named twice");
-        check(|d| d.outputs.clear(), "at least one input");
-        check(|d| d.reference = vec![ChannelRef::Name("t".into())], "named twice");
-        check(|d| d.reference = vec![ChannelRef::Column(5), ChannelRef::Column(6)], "cannot be a channel");
-        check(|d| d.input_excitation = Vec::from(["d", "t"].map(|c| ChannelRef::Name(c.into()))), "named twice");
-        check(|d| d.inputs.push(ChannelRef::Column(5)), "as many excitations as inputs (2)");
-        check(|d| d.estimated = 900, "the log has 900");
-        check(|d| d.clock = DraftClock::SampleTime(0.0), "positive number of seconds");
-    }
-}
+mod tests;

@@ -6,8 +6,8 @@ use crate::run_folder::folder_of;
 use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
-use youla_loop::check::{Finding, Severity};
-use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, further, read_check_options};
+use youla_loop::check::Severity;
+use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, read_check_options};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -82,14 +82,20 @@ fn of_files(args: &CheckArgs) -> Result<DataCheck, Failure> {
     Ok(check_files(&files, &options)?)
 }
 
-/// Defects first, a blank line between the severities, and the count of each.
+/// Findings of one severity that are printed, at most, and records.
+const MOST: usize = 10;
+
+/// The records and the controller, then defects first, a blank line between the severities, and the count of each.
 fn text(found: &DataCheck) -> String {
-    let mut text = String::new();
+    let mut text = head(found);
+    let controller = found.controller().filter(|f| f.severity == Severity::Note);
     for severity in [Severity::Defect, Severity::Caution, Severity::Note] {
-        let of: Vec<(&Finding, usize)> = found.grouped().into_iter().filter(|(f, _)| f.severity == severity).collect();
+        let most = if severity == Severity::Note { MOST } else { usize::MAX };
+        let of = found.alike(severity, most);
+        let of: Vec<_> = of.iter().filter(|(f, _)| controller.is_none_or(|said| said.test != f.test)).collect();
         for (finding, more) in &of {
             let (word, test) = (severity.word(), finding.test.key());
-            text += &format!("{word} ({test}) {}{}\n", finding.sentence(), further(*more));
+            text += &format!("{word} ({test}) {}{more}\n", finding.sentence());
         }
         if !of.is_empty() {
             text.push('\n');
@@ -106,4 +112,25 @@ fn text(found: &DataCheck) -> String {
     let counts =
         [count(Severity::Defect, "defect"), count(Severity::Caution, "caution"), count(Severity::Note, "note")];
     text + &format!("{records}: {}", counts.join(", "))
+}
+
+/// Rows, sample time and length of each record, and whether the declared controller agrees.
+fn head(found: &DataCheck) -> String {
+    let mut text = String::new();
+    for r in found.records.iter().take(MOST) {
+        let samples = r.rows[1] + 1 - r.rows[0];
+        // The median step of a time column has digits of rounding.
+        let ts = (r.sample_time * 1e12).round() / 1e12;
+        let length = samples as f64 * r.sample_time;
+        let row =
+            format!("rows {} to {}: {samples} samples, sample time {ts} s, length {length:.4} s", r.rows[0], r.rows[1]);
+        text += &format!("{}, {row}\n", r.record);
+    }
+    if found.records.len() > MOST {
+        text += &format!("and {} more records\n", found.records.len() - MOST);
+    }
+    if let Some(f) = found.controller() {
+        text += &format!("{}.\n", f.what);
+    }
+    text + "\n"
 }

@@ -1,12 +1,16 @@
 //! Properties of the excitation: size, crest factor, rank of its Hankel matrix, and the band in which it has power.
 //!
 //! Identification with past and future horizons p and f needs persistency of order p + f ([`youla::signal::persistency`]). Rank is
-//! a question of rounding; the condition number says how much weaker the weakest direction is. The band ends where the
-//! spectrum (Welch) stays 60 dB below its largest value.
+//! a question of rounding; the condition number says how much weaker the weakest direction is. Where the rank is too low, the lines of
+//! the spectrum say whether frequencies are missing or only power at some: a signal with s lines is of order 2 s (L. Ljung, System
+//! Identification, 2nd ed. (1999), section 13.2), however near to each other they are. The band ends where the spectrum (Welch) stays
+//! 60 dB below its largest value.
 
 use super::finding::{Finding, Severity, Test, few};
 use super::options::CheckOptions;
 use crate::error::Result;
+use rustfft::FftPlanner;
+use rustfft::num_complex::Complex;
 use std::f64::consts::TAU;
 use youla::MatRef;
 use youla::lti::Discrete;
@@ -26,6 +30,9 @@ pub struct ExcitationCheck {
     pub reached: usize,
     /// Condition number of the Hankel matrix.
     pub condition: f64,
+    /// The order that the lines of the spectrum give where the rank is lower, which then is one of rounding; 0 where a channel follows from
+    /// others.
+    pub by_lines: usize,
     /// Per channel, the frequency in Hz from which its power stays 60 dB below its largest; absent where it does not.
     pub band_end: Vec<Option<f64>>,
 }
@@ -33,6 +40,8 @@ pub struct ExcitationCheck {
 /// Power below which a band counts as empty, over the largest.
 /// 60 dB. Chosen, not measured.
 const EMPTY: f64 = 1e-6;
+/// Condition numbers beyond this are rounding.
+const ROUNDING: f64 = 1e13;
 /// Samples of a window of the spectrum, at most.
 /// Chosen, not measured.
 const WINDOW: usize = 1024;
@@ -76,6 +85,7 @@ pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Resu
     let found = persistency(centred.as_ref(), order)?;
     let reached =
         if found.rank == found.needed { order } else { persistency_order(centred.as_ref(), order.saturating_sub(1))? };
+    let by_lines = if reached == order { order } else { order_by_lines(centred.as_ref(), order, found.rank)? };
     let window = WINDOW.min(n / 4);
     let mut band_end = vec![None; signal.ncols()];
     for (j, end) in band_end.iter_mut().enumerate().filter(|(j, _)| window >= 16 && deviations[*j] > 0.0) {
@@ -89,7 +99,48 @@ pub fn excitation(signal: MatRef<'_, f64>, time: Discrete, order: usize) -> Resu
             *end = Some(density.omega[last] / TAU);
         }
     }
-    Ok(ExcitationCheck { deviations, crest, order, reached, condition: found.condition, band_end })
+    Ok(ExcitationCheck { deviations, crest, order, reached, condition: found.condition, by_lines, band_end })
+}
+
+/// Share of the sum of the ranks of the channels that the rank of all must have: a channel that repeats another leaves half.
+/// Chosen, not measured.
+const INDEPENDENT: f64 = 0.6;
+/// Bins of a line at 60 dB under the window of Blackman and Harris (F. J. Harris, Proc. IEEE 66 (1978), 51), about.
+const LOBE: usize = 7;
+
+/// Twice the least number of lines of a channel, where the rank of all is that of the channels together.
+fn order_by_lines(signal: MatRef<'_, f64>, order: usize, rank: usize) -> Result<usize> {
+    let (mut sum, mut least) = (0, usize::MAX);
+    for j in 0..signal.ncols() {
+        let column: Vec<f64> = signal.col(j).iter().copied().collect();
+        least = least.min(2 * spectral_lines(&column));
+        sum += if signal.ncols() > 1 { persistency(signal.subcols(j, 1), order)?.rank } else { rank };
+    }
+    Ok(if rank as f64 >= INDEPENDENT * sum as f64 { least } else { 0 })
+}
+
+/// Lines within 60 dB of the largest: the maxima of each stretch of bins or, where it has hardly any, its bins but for a lobe.
+fn spectral_lines(values: &[f64]) -> usize {
+    let n = values.len();
+    let turn = |k: usize, times: f64| (TAU * times * k as f64 / n as f64).cos();
+    let window = |k: usize| 0.358_75 - 0.488_29 * turn(k, 1.0) + 0.141_28 * turn(k, 2.0) - 0.011_68 * turn(k, 3.0);
+    let mut buffer: Vec<Complex<f64>> =
+        values.iter().enumerate().map(|(k, v)| Complex::new(v * window(k), 0.0)).collect();
+    FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
+    let power: Vec<f64> = buffer[..n / 2].iter().map(|z| z.norm_sqr()).collect();
+    let least = EMPTY * power.iter().copied().fold(0.0, f64::max);
+    let (mut lines, mut bins, mut maxima) = (0, 0, 0);
+    for k in 1..power.len() {
+        if power[k] > least {
+            bins += 1;
+            maxima += usize::from(power[k] >= power[k - 1] && power.get(k + 1).is_none_or(|next| power[k] > *next));
+        }
+        if power[k] <= least || k + 1 == power.len() {
+            lines += if maxima * (LOBE + 1) < bins { bins.saturating_sub(LOBE) } else { maxima };
+            (bins, maxima) = (0, 0);
+        }
+    }
+    lines
 }
 
 impl ExcitationCheck {
@@ -124,23 +175,29 @@ impl ExcitationCheck {
         let names: Vec<&str> = channels.iter().map(|c| c.name.as_str()).collect();
         let names = names.join(", ");
         let numbers = |finding: Finding| {
-            let finding = finding.number("order", self.reached as f64).number("needed", self.order as f64);
+            let finding = finding
+                .number("order", self.reached.max(self.by_lines).min(self.order) as f64)
+                .number("needed", self.order as f64);
             finding.number("condition", self.condition)
         };
-        if self.reached < self.order {
+        let reached = self.reached.max(self.by_lines);
+        if reached < self.order {
             let what = format!(
-                "it is persistently exciting of order {}, but past and future horizon require {}",
-                self.reached, self.order
+                "it is persistently exciting of order {reached}, but past and future horizon require {}",
+                self.order
             );
+            // Noise excites a loop too; half of the lines give a model of lower order.
+            let severity = if 2 * reached < self.order { Severity::Defect } else { Severity::Caution };
             let advice = "Use more lines, a longer shift register or noise, or shorter horizons";
-            all.push(
-                numbers(Finding::new(Test::Excitation, Severity::Defect, record, what).channel(&names)).advice(advice),
-            );
+            all.push(numbers(Finding::new(Test::Excitation, severity, record, what).channel(&names)).advice(advice));
         } else if self.condition > options.excitation_condition {
             let what = format!(
                 "the weakest direction of order {} of the excitation has {} times less amplitude than the strongest",
                 self.order,
-                few(self.condition)
+                match self.condition {
+                    c if c < ROUNDING => few(c),
+                    _ => "more than 1e13".to_owned(),
+                }
             );
             let advice = "The model is inaccurate at frequencies without power; use short horizons, or excite there";
             all.push(

@@ -1,7 +1,7 @@
 //! Whether the input depends on the output: then open-loop methods are biased.
 //!
 //! Input j is regressed on the past of all inputs and, where they are known, on past and present of the excitations, once
-//! without and once with the past of the outputs. What the outputs add is tested by F; it is causality in the sense of
+//! without and once with the past of the outputs, and with their present where an excitation is known. What the outputs add is tested by F; it is causality in the sense of
 //! C. W. J. Granger (Econometrica 37 (1969), 424). Without feedback the past of y adds nothing; a small share is not taken for
 //! feedback, because it appears with inputs that their own past predicts nearly exactly.
 
@@ -23,6 +23,10 @@ pub struct FeedbackCheck {
     pub detected: bool,
 }
 
+/// Share of the innovation of an input that present and past outputs explain together, from which they make it.
+/// A controller leaves rounding of its converters; an output that answers in the same sample leaves its noise. Chosen, not measured.
+const WHOLE: f64 = 0.99;
+
 /// Tests all inputs; the signals are m inputs, p outputs, then the excitations. Two per cent of what is new in the input is
 /// the least share, `options.share`.
 pub(super) fn of_record(
@@ -36,11 +40,19 @@ pub(super) fn of_record(
     let without = [lagged.past(0..m, 1), lagged.past(outside, 0), vec![lagged.trend(0)]].concat();
     let with = [without.clone(), lagged.past(m..m + p, 1)].concat();
     let targets: Vec<usize> = (0..m).map(|s| lagged.column(s, 0)).collect();
+    let at_once =
+        (known > 0).then(|| lagged.fit(&targets, [without.clone(), lagged.past(m..m + p, 0)].concat())).transpose()?;
     let (without, with) = (lagged.fit(&targets, without)?, lagged.fit(&targets, with)?);
     let mut strongest = FeedbackCheck { input: 0, share: 0.0, deviations: 0.0, detected: false };
     for input in 0..m {
         let gain = lagged.gain(&without, &with, input);
         let detected = gain.deviations > options.significance && gain.share > options.share;
+        // Present outputs may also answer the input at once; where they leave nothing of it, they make it.
+        let whole = at_once.as_ref().map(|at_once| lagged.gain(&without, at_once, input));
+        let (gain, detected) = match whole {
+            Some(whole) if !detected && whole.deviations > options.significance && whole.share > WHOLE => (whole, true),
+            _ => (gain, detected),
+        };
         if (detected, gain.deviations) > (strongest.detected, strongest.deviations) {
             strongest = FeedbackCheck { input, share: gain.share, deviations: gain.deviations, detected };
         }

@@ -28,6 +28,10 @@ const CHANCE: f64 = 1e-4;
 /// Repeats of 2 and 3 samples are frequent in coarsely quantised records. Chosen, not measured.
 const SHORTEST: usize = 4;
 
+/// Length up to which a constant start of a channel is the rest before the excitation has come through the dead time.
+/// Chosen, not measured.
+const AT_REST: usize = 100;
+
 /// Looks for the longest constant stretch that is out of proportion. `None` also for a channel that is switched between few
 /// values.
 ///
@@ -56,7 +60,9 @@ pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
         first = k;
     }
     let (first, samples) = longest;
-    if samples < SHORTEST || samples == values.len() || samples as f64 <= options.stuck_ratio * next as f64 {
+    // Before it first moves a machine is at rest.
+    let rests = first == 0 && samples < AT_REST;
+    if rests || samples < SHORTEST || samples == values.len() || samples as f64 <= options.stuck_ratio * next as f64 {
         return None;
     }
     // The stretch itself does not count in what is usual.

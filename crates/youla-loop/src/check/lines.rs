@@ -79,6 +79,9 @@ pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOp
         }
         let hz = spectrum.between(k) / (n as f64 * time.ts());
         let amplitude = spectrum.amplitude(k);
+        if !lasts(values, spectrum.between(k) / n as f64) {
+            continue;
+        }
         found.push(SpectralLine { hz, amplitude, ratio: spectrum.ratio(k), threshold, multiple: None });
     }
     let bin = 1.0 / (n as f64 * time.ts());
@@ -89,6 +92,24 @@ pub fn lines(values: &[f64], known: &[&[f64]], time: Discrete, options: &CheckOp
         }
     }
     found
+}
+
+/// Least share of the largest amplitude among the quarters of a record that a line keeps in each.
+/// A resonance that a chirp passes decays to nothing. Chosen, not measured.
+const LASTS: f64 = 0.2;
+
+/// Whether the amplitude at a frequency, in turns per sample, is about the same in all quarters of a record.
+fn lasts(values: &[f64], turns: f64) -> bool {
+    let length = values.len() / 4;
+    let amplitude = |part: &[f64]| {
+        let window = |k: usize| 0.5 - 0.5 * (TAU * k as f64 / length as f64).cos();
+        let mean = part.iter().sum::<f64>() / length as f64;
+        let turn = |k: usize| Complex::from_polar(window(k), TAU * turns * k as f64);
+        part.iter().enumerate().map(|(k, v)| turn(k) * (v - mean)).sum::<Complex<f64>>().norm()
+    };
+    let all: Vec<f64> = values.chunks_exact(length).take(4).map(amplitude).collect();
+    let (least, most) = all.iter().fold((f64::MAX, 0.0f64), |(least, most), a| (least.min(*a), most.max(*a)));
+    least > LASTS * most
 }
 
 struct Spectrum {

@@ -11,7 +11,9 @@
 //! | `flatline` | a constant stretch of a channel |
 //! | `quantisation` | resolution of a channel relative to its innovation |
 //! | `drift` | a trend not explained by the input |
-//! | `outliers` | single-sample outliers |
+//! | `outliers` | wrong samples, bursts, jumps of an offset |
+//! | `patterns` | what wrong samples look like in an innovation |
+//! | `sequence` | rows lost or logged twice |
 //! | `delay` | dead time, channels shifted against each other |
 //! | `excitation` | rank, crest factor and band of the excitation |
 //! | `noise` | signal-to-noise ratio |
@@ -21,6 +23,7 @@
 //! | `record` | [`check_record`]: all tests on one record |
 //! | `outside` | the tests of excitation, noise, trends and lines |
 //! | `regression` | the regressions of all tests, from one triangular factor |
+//! | `robust` | the same without the rows of wrong samples |
 
 mod clipping;
 mod controller;
@@ -35,9 +38,12 @@ mod noise;
 mod options;
 mod outliers;
 mod outside;
+mod patterns;
 mod quantisation;
 mod record;
 mod regression;
+mod robust;
+mod sequence;
 mod timing;
 
 pub use clipping::{Clipping, Limit, clipping};

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 /// Statistical tests use `significance` standard deviations. Residuals of measured records are neither exactly white nor exactly
 /// normal; the threshold is therefore high, and an effect must also exceed a share of the variance.
 ///
-/// Origin of the defaults: chosen so that 200 simulated clean records have no finding above a note, and that 19 defects planted in measured
+/// Origin of the defaults: chosen so that 500 simulated clean records have no defect, and that the defects planted in simulated and measured
 /// records are found (`docs/check.md`); a key that has a source of its own names it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]

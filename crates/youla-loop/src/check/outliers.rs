@@ -1,21 +1,25 @@
-//! Single-sample outliers: bit errors, bouncing contacts, converter glitches.
+//! Wrong samples: bit errors, bouncing contacts, converter glitches, bursts of disturbance, jumps of an offset.
 //!
 //! A wrong sample w at time k enters the innovation of a regression of y on its past as `w a(j)` at k + j, where
-//! `a = (1, -A_1, -A_2, ...)` are the coefficients of y itself. Its estimate and test are
+//! `a = (1, -A_1, -A_2, ...)` are the coefficients of y itself; an offset that jumps by w at k as `w (a(0) + ... + a(j))`. Estimate and
+//! test of a pattern s are
 //! ```text
-//! w = sum_j a(j) e(k+j) / |a|^2,    lambda = w |a| / sigma,   sigma from the median of |lambda| (robust)
+//! w = sum_j s(j) e(k+j) / |s|^2,    lambda = w |s| / sigma,   sigma from the median of |lambda| (robust)
 //! ```
-//! A disturbance that the plant feels has another pattern (`e(k)` alone); a sample counts as wrong only where `w a` makes 80 % of
-//! the energy of the innovation around it, and where lambda is twice as large as the 99.5 % quantile of all.
+//! A disturbance that the plant feels has another pattern (`e(k)` alone); one to three samples in a row, or an offset, count as wrong only
+//! where their patterns make 80 % of the energy of the innovation around them beyond that of noise, and where lambda is twice as large as
+//! the 99.5 % quantile of all. Where no pattern does, many great innovations near to each other are a burst. The regression leaves out
+//! the rows of great innovations, which would change its coefficients.
 //!
 //! Source: I. Chang, G. C. Tiao, C. Chen, Estimation of time series parameters in the presence of outliers, Technometrics 30
-//! (1988), 193.
+//! (1988), 193; R. S. Tsay, Outliers, level shifts, and variance changes in time series, Journal of Forecasting 7 (1988), 1.
 
 use super::finding::{Finding, Severity, Test, few, with_unit};
 use super::options::CheckOptions;
+use super::patterns::Search;
 use super::regression::Lagged;
+use super::sequence::jump;
 use crate::error::Result;
-use youla::linalg::quantile;
 use youla::signal::Channel;
 
 /// The wrong samples of one output.
@@ -27,17 +31,11 @@ pub struct Outliers {
     pub sizes: Vec<f64>,
     /// Share of the energy of the innovation that they make.
     pub share: f64,
+    /// Sample, counted from 0, from which an offset is added, and the offset in the unit of the channel.
+    pub jump: Option<(usize, f64)>,
+    /// First and last sample, counted from 0, of a burst.
+    pub burst: Option<[usize; 2]>,
 }
-
-/// Share of the energy of the innovation around a wrong sample that it must make.
-/// Chosen; no false alarm in 200 simulated clean records (`docs/check.md`).
-const EXPLAINED: f64 = 0.8;
-/// Median of the magnitude of a normal variable.
-/// `Phi^-1(3/4)`.
-const MEDIAN: f64 = 0.674_489_75;
-/// Magnitudes in the tail of an innovation with which a candidate is compared.
-/// Chosen; no false alarm in 200 simulated clean records (`docs/check.md`).
-const TAIL: f64 = 0.995;
 
 /// Wrong samples of a channel by its own past alone; the check of a record uses the inputs too.
 ///
@@ -65,45 +63,25 @@ pub fn outliers(values: &[f64], options: &CheckOptions) -> Result<Outliers> {
 /// unit of its channel. The latter is taken robustly.
 pub(super) fn of_outputs(lagged: &Lagged, m: usize, p: usize, options: &CheckOptions) -> Result<Vec<(Outliers, f64)>> {
     let targets: Vec<usize> = (m..m + p).map(|s| lagged.column(s, 0)).collect();
-    let fit = lagged.fit(&targets, [lagged.past(0..m + p, 1), vec![lagged.trend(0)]].concat())?;
+    let columns = [lagged.past(0..m + p, 1), vec![lagged.trend(0)]].concat();
+    let plain = lagged.fit(&targets, columns.clone())?;
+    let (fit, residuals) = lagged.robust_fit(&targets, columns)?;
     let mut all = Vec::new();
-    for i in 0..p {
-        let e = lagged.residual(&fit, targets[i], i);
+    for (i, e) in residuals.into_iter().enumerate() {
         let own = |lag: isize| {
             let column = lagged.column(m + i, lag);
             fit.columns.iter().position(|c| *c == column).map_or(0.0, |k| -fit.coefficients[(k, i)])
         };
         let a: Vec<f64> = std::iter::once(1.0).chain((1..=lagged.lags as isize).map(own)).collect();
         let unit = lagged.deviations[m + i];
-        let mut found = wrong(&e, &a, options);
+        let mut found = Search::new(e, &a).wrong(options);
         found.samples.iter_mut().for_each(|k| *k += lagged.lags);
         found.sizes.iter_mut().for_each(|w| *w *= unit);
-        all.push((found, unit * (fit.left[i] / lagged.rows as f64).sqrt()));
+        found.jump = found.jump.map(|(k, w)| (k + lagged.lags, w * unit));
+        found.burst = found.burst.map(|span| span.map(|k| k + lagged.lags));
+        all.push((found, unit * (plain.left[i] / lagged.rows as f64).sqrt()));
     }
     Ok(all)
-}
-
-fn wrong(e: &[f64], a: &[f64], options: &CheckOptions) -> Outliers {
-    let length = a.iter().map(|v| v * v).sum::<f64>().sqrt();
-    let at = |k: usize| e.get(k).copied().unwrap_or(0.0);
-    let lambda: Vec<f64> =
-        (0..e.len()).map(|k| a.iter().enumerate().map(|(j, a)| a * at(k + j)).sum::<f64>() / length).collect();
-    let mut sorted: Vec<f64> = lambda.iter().map(|v| v.abs()).collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    let sigma = quantile(&sorted, 0.5) / MEDIAN;
-    let least = (options.outlier * sigma).max(2.0 * quantile(&sorted, TAIL));
-    let total: f64 = e.iter().map(|v| v * v).sum();
-    let (mut found, mut taken) = (Outliers::default(), 0.0);
-    for (k, l) in lambda.iter().enumerate().filter(|(_, l)| l.abs() > least && least > 0.0) {
-        let around: f64 = (k..k + a.len()).map(|i| at(i) * at(i)).sum();
-        if l * l > EXPLAINED * around {
-            found.samples.push(k);
-            found.sizes.push(l / length);
-            taken += l * l;
-        }
-    }
-    found.share = if total > 0.0 { (taken / total).min(1.0) } else { 0.0 };
-    found
 }
 
 /// Sizes that are listed.
@@ -111,13 +89,25 @@ fn wrong(e: &[f64], a: &[f64], options: &CheckOptions) -> Outliers {
 const LISTED: usize = 5;
 
 impl Outliers {
-    pub(super) fn finding(
+    /// The findings on the samples, the offset and the burst.
+    pub(super) fn findings(
         &self,
         record: &str,
         first: usize,
         channel: &Channel,
         options: &CheckOptions,
-    ) -> Option<Finding> {
+    ) -> Vec<Finding> {
+        let jump = self.jump.map(|(at, by)| jump(record, first + at, by, channel));
+        let burst = self.burst.map(|[from, to]| {
+            let what = format!("a burst of disturbance over {} samples", to - from + 1);
+            let finding = Finding::new(Test::Outliers, Severity::Caution, record, what).channel(&channel.name);
+            let advice = "Exclude the rows by `segments`; look for a knock, a contact or interference at that time";
+            finding.rows(first + from, first + to).number("samples", (to - from + 1) as f64).advice(advice)
+        });
+        self.finding(record, first, channel, options).into_iter().chain(jump).chain(burst).collect()
+    }
+
+    fn finding(&self, record: &str, first: usize, channel: &Channel, options: &CheckOptions) -> Option<Finding> {
         let last = *self.samples.last()?;
         let severity = match self.share / options.outlier_share {
             s if s >= 2.5 => Severity::Defect,
@@ -134,7 +124,7 @@ impl Outliers {
         let more = if self.samples.len() > LISTED { ", ..." } else { "" };
         let plural = if self.samples.len() == 1 { "" } else { "s" };
         let what = format!(
-            "{} single-sample outlier{plural} ({}{more}) with {} % of the energy of the innovation",
+            "{} outlier{plural} ({}{more}) with {} % of the energy of the innovation",
             self.samples.len(),
             listed.join(", "),
             few(100.0 * self.share)

@@ -1,10 +1,12 @@
 //! All tests but that of the time column on one record.
 
+use super::finding::with_unit;
 use super::outside::{constant, of_excitation, of_lines, trends};
 use super::regression::Lagged;
+use super::sequence::{self, Break};
 use super::{
-    CheckOptions, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay, feedback, outliers,
-    quantisation, stuck,
+    CheckOptions, ControllerCheck, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay,
+    feedback, outliers, quantisation, stuck,
 };
 use crate::error::{Error, Result};
 use youla::MatRef;
@@ -83,39 +85,79 @@ pub fn check_record(
         None => None,
     };
     of_channels(record, names, wrong.as_deref(), options, &mut all);
+    let of_controller = match declared.filter(|_| record.alpha.is_none()) {
+        Some(k) => of_controller(k, record, names, options, &mut all)?,
+        None => None,
+    };
     let mut fed_back = declared.is_some();
     if let Some(lagged) = &lagged {
         for ((found, _), channel) in wrong.iter().flatten().zip(&names.outputs) {
-            all.extend(found.finding(record.name, record.first_row, channel, options));
+            all.extend(found.findings(record.name, record.first_row, channel, options));
         }
+        all.extend(broken(record, names, lagged, wrong.as_deref().unwrap_or_default(), &groups)?);
         all.extend(trends(record, names, lagged, options)?);
         let feedback = feedback::of_record(lagged, m, p, known, options)?;
         fed_back |= feedback.detected;
         let input = names.inputs.get(feedback.input).map_or("u", |c| c.name.as_str());
         all.extend(feedback.finding(record.name, input, declared.is_some()));
         let added = record.input_excitation.filter(|d| !constant(*d)).map(|_| m + p);
-        let places = delay::Places { inputs: m, outputs: p, added, known: m + p..m + p + known, feedback: fed_back };
+        let aligned = of_controller.is_some_and(|found| found.agrees(options));
+        let places =
+            delay::Places { inputs: m, outputs: p, added, known: m + p..m + p + known, feedback: fed_back, aligned };
         let found = delay::of_record(lagged, &places, options)?;
         all.extend(found.findings(record.name, &names.inputs, &names.outputs, fed_back));
     }
     all.extend(of_excitation(record, names, fed_back, options)?);
     all.extend(of_lines(record, names, fed_back, options));
-    if let Some(k) = declared.filter(|_| record.alpha.is_none()) {
-        match controller(k, of_controller(record), options) {
-            Ok(found) => all.extend(found.finding(record.name, &names.outputs, options)),
-            Err(
-                error @ (Error::Method(youla::Error::Diverged { .. }) | Error::Method(youla::Error::Unstable { .. })),
-            ) => all.push(controller::not_simulated(record.name, &error)),
-            Err(error) => return Err(error),
-        }
-    }
     all.sort_by_key(|finding| finding.test);
     Ok(all)
 }
 
-fn of_controller<'a>(record: &LoggedRecord<'a>) -> ControllerRecord<'a> {
+/// The declared controller against the log; `None` where it cannot be simulated.
+fn of_controller(
+    k: &StateSpace<Discrete>,
+    record: &LoggedRecord<'_>,
+    names: &ChannelNames,
+    options: &CheckOptions,
+    all: &mut Vec<Finding>,
+) -> Result<Option<ControllerCheck>> {
     let LoggedRecord { u, y, input_excitation, reference, .. } = *record;
-    ControllerRecord { u, y, input_excitation, reference }
+    match controller(k, ControllerRecord { u, y, input_excitation, reference }, options) {
+        Ok(found) => {
+            all.extend(found.finding(record.name, &names.inputs, &names.outputs, options));
+            Ok(Some(found))
+        }
+        Err(error @ (Error::Method(youla::Error::Diverged { .. }) | Error::Method(youla::Error::Unstable { .. }))) => {
+            all.push(controller::not_simulated(record.name, &error));
+            Ok(None)
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Rows lost or logged twice, but for those at wrong samples of an output, which break the equation of the input too.
+fn broken(
+    record: &LoggedRecord<'_>,
+    names: &ChannelNames,
+    lagged: &Lagged,
+    wrong: &[(Outliers, f64)],
+    groups: &[MatRef<'_, f64>],
+) -> Result<Vec<Finding>> {
+    let (m, p) = (record.u.ncols(), record.y.ncols());
+    let known = groups[2..].iter().map(|x| x.ncols()).sum();
+    let repeated = sequence::repeated(groups, record.y);
+    let mut all: Vec<Break> = repeated.into_iter().map(Break::Twice).collect();
+    if all.is_empty() {
+        all = sequence::of_record(lagged, m, p, known)?;
+    }
+    let near = |at: usize, k: usize| k.abs_diff(at) <= lagged.lags;
+    let other = |found: &Break| {
+        let (Break::Lost(at) | Break::Twice(at) | Break::Jump(at, ..) | Break::Wrong(at, ..)) = *found;
+        let of = |o: &Outliers| o.samples.iter().any(|k| near(at, *k)) || o.jump.is_some_and(|(k, _)| near(at, k));
+        !matches!(found, Break::Twice(_)) && wrong.iter().any(|(o, _)| of(o))
+    };
+    let rest = all.into_iter().filter(|found| !other(found));
+    Ok(rest.map(|found| found.finding(record.name, record.first_row, &names.outputs)).collect())
 }
 
 /// Tests of one channel at a time: limits, standstill, steps.
@@ -134,6 +176,14 @@ fn of_channels(
             all.extend(found.findings(record.name, record.first_row, channel, output, values.len()));
             // A channel at its limit is constant; that is reported as clipping.
             let held = |value: f64| found.lower.iter().chain(&found.upper).any(|limit| limit.value == value);
+            let external = record.input_excitation.is_some() || record.reference.is_some() || record.alpha.is_some();
+            if values.iter().all(|v| *v == values[0]) && (output || external) {
+                let what = format!("it is constant at {} throughout", with_unit(values[0], &channel.unit));
+                let advice = "Check the sensor, its cable and the column; the plant has to move in all channels";
+                let finding = Finding::new(Test::Stuck, Severity::Defect, record.name, what);
+                all.push(finding.channel(&channel.name).advice(advice));
+                continue;
+            }
             if let Some(standstill) = stuck(&values, options).filter(|s| !held(s.value)) {
                 all.push(standstill.finding(record.name, record.first_row, channel));
             }

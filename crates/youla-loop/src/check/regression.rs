@@ -42,6 +42,8 @@ pub(super) struct Lagged {
     pub(super) lags: usize,
     /// Rows of the regressions; the first belongs to sample `lags`.
     pub(super) rows: usize,
+    /// Rows that do not count; empty for none.
+    left_out: Vec<bool>,
     r: Mat<f64>,
 }
 
@@ -80,9 +82,18 @@ impl Lagged {
             signals.push(column.iter().map(|v| scale * (v - mean)).collect());
             deviations.push(deviation);
         }
-        let mut lagged = Lagged { signals, deviations, lags, rows, r: Mat::zeros(0, 0) };
+        let mut lagged = Lagged { signals, deviations, lags, rows, left_out: Vec::new(), r: Mat::zeros(0, 0) };
         lagged.r = lagged.factor();
         Some(lagged)
+    }
+
+    /// The same without some rows of the regressions: those in which samples are wrong.
+    pub(super) fn without(&self, left_out: Vec<bool>) -> Self {
+        let (signals, deviations) = (self.signals.clone(), self.deviations.clone());
+        let mut lagged =
+            Lagged { signals, deviations, lags: self.lags, rows: self.rows, left_out, r: Mat::zeros(0, 0) };
+        lagged.r = lagged.factor();
+        lagged
     }
 
     fn width(&self) -> usize {
@@ -92,6 +103,22 @@ impl Lagged {
     /// Column of a signal at a lag, negative for the future.
     pub(super) fn column(&self, signal: usize, lag: isize) -> usize {
         signal * self.width() + (lag + AHEAD as isize) as usize
+    }
+
+    /// The lag of a column of a signal.
+    pub(super) fn lag(&self, column: usize) -> Option<isize> {
+        let of_signal = column < self.signals.len() * self.width();
+        of_signal.then(|| (column % self.width()) as isize - AHEAD as isize)
+    }
+
+    /// The signal of a column of a signal.
+    pub(super) fn signal(&self, column: usize) -> usize {
+        column / self.width()
+    }
+
+    /// A sample of a signal, at zero mean and unit variance.
+    pub(super) fn sample(&self, signal: usize, at: usize) -> f64 {
+        self.signals.get(signal).and_then(|s| s.get(at)).copied().unwrap_or(0.0)
     }
 
     /// Columns of some signals at lags from `first` to n.
@@ -125,6 +152,8 @@ impl Lagged {
         let part = |first: &usize| {
             let mut rows = Mat::zeros(CHUNK.min(self.rows - first), columns);
             (0..columns).for_each(|j| self.values(j, *first, rows.col_as_slice_mut(j)));
+            let left_out = self.left_out.iter().skip(*first).take(rows.nrows()).enumerate();
+            left_out.filter(|(_, out)| **out).for_each(|(k, _)| rows.row_mut(k).fill(0.0));
             rows.qr().thin_R().to_owned()
         };
         let factors: Vec<Mat<f64>> = starts.par_iter().map(part).collect();
@@ -143,12 +172,7 @@ impl Lagged {
             .collect();
         let regressors = Mat::from_fn(rows, count, |i, j| scale[j] * self.r[(i, columns[j])]);
         let right = Mat::from_fn(rows, targets.len(), |i, j| self.r[(i, targets[j])]);
-        let svd = regressors.thin_svd().map_err(|_| {
-            Error::Method(youla::Error::NoConvergence {
-                what: "the regressors of the data check".into(),
-                iterations: 0,
-            })
-        })?;
+        let svd = regressors.thin_svd().map_err(|_| no_convergence())?;
         let values: Vec<f64> = svd.S().column_vector().iter().copied().collect();
         let rank = values.iter().filter(|s| **s > DEPENDENT * values[0]).count();
         let u = svd.U().subcols(0, rank);
@@ -157,6 +181,28 @@ impl Lagged {
         let rest = &right - u * &coordinates;
         let left = rest.col_iter().map(|c| c.squared_norm_l2()).collect();
         Ok(Fit { columns, coefficients: &half * &coordinates, left, rank, inverse: &half * half.transpose() })
+    }
+
+    /// Part of the sum of squares of a combination of columns, in units of their signals, that a regression on other such
+    /// combinations leaves.
+    pub(super) fn left_of(&self, target: &[(usize, f64)], on: &[Vec<(usize, f64)>]) -> Result<f64> {
+        let sum = |terms: &[(usize, f64)]| {
+            terms.iter().fold(Mat::zeros(self.r.nrows(), 1), |sum: Mat<f64>, (column, factor)| {
+                let signal = column / self.width();
+                let size = factor * self.deviations.get(signal).copied().unwrap_or(1.0);
+                Mat::from_fn(sum.nrows(), 1, |i, _| sum[(i, 0)] + size * self.r[(i, *column)])
+            })
+        };
+        let columns: Vec<Mat<f64>> = on.iter().map(|terms| sum(terms)).collect();
+        let length: Vec<f64> = columns.iter().map(|c| c.norm_l2()).collect();
+        let of = |i: usize, j: usize| if length[j] > 0.0 { columns[j][(i, 0)] / length[j] } else { 0.0 };
+        let right = sum(target);
+        let svd = Mat::from_fn(right.nrows(), columns.len(), of).thin_svd().map_err(|_| no_convergence())?;
+        let values = svd.S().column_vector();
+        let rank = values.iter().filter(|s| **s > DEPENDENT * values[0]).count();
+        let u = svd.U().subcols(0, rank);
+        let rest = &right - u * (u.transpose() * &right);
+        Ok(rest.squared_norm_l2() / right.squared_norm_l2().max(f64::MIN_POSITIVE))
     }
 
     /// What a regression leaves of a target, row by row.
@@ -185,6 +231,10 @@ impl Lagged {
         let f = (before - after).max(0.0) / added as f64 / (after.max(floor) / freedom as f64);
         Gain { share: (1.0 - after / before).max(0.0), deviations: paulson(f, added as f64, freedom as f64) }
     }
+}
+
+fn no_convergence() -> Error {
+    Error::Method(youla::Error::NoConvergence { what: "the regressors of the data check".into(), iterations: 0 })
 }
 
 /// What some columns add to a regression.

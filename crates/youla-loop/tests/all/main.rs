@@ -2,6 +2,7 @@
 #![allow(missing_docs)]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
 
+mod check_rates;
 #[path = "../../../youla/tests/all/common/systems.rs"]
 mod common;
 mod real_time;

@@ -1,7 +1,7 @@
 //! What a check found.
 
 use serde::{Deserialize, Serialize};
-use youla_loop::check::{Finding, Severity};
+use youla_loop::check::{Finding, Severity, Test};
 
 /// A record that was checked.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -50,6 +50,36 @@ impl DataCheck {
         groups
     }
 
+    /// The findings of a severity, grouped, with what is to be said of those like them: at most `most`. Where there are more, those of
+    /// one test are gathered.
+    pub fn alike(&self, severity: Severity, most: usize) -> Vec<(&Finding, String)> {
+        let of: Vec<(&Finding, usize)> = self.grouped().into_iter().filter(|(f, _)| f.severity == severity).collect();
+        if of.len() <= most {
+            return of.into_iter().map(|(f, more)| (f, further(more))).collect();
+        }
+        let mut gathered: Vec<(&Finding, usize)> = Vec::new();
+        for (finding, more) in of {
+            match gathered.iter_mut().find(|(first, _)| first.test == finding.test) {
+                Some((_, count)) => *count += more + 1,
+                None => gathered.push((finding, more)),
+            }
+        }
+        let words = |count| match count {
+            0 => String::new(),
+            1 => " 1 more like it (--json lists all).".to_owned(),
+            n => format!(" {n} more like it (--json lists all)."),
+        };
+        gathered.into_iter().take(most).map(|(f, count)| (f, words(count))).collect()
+    }
+
+    /// The finding on the declared controller in the record where it explains least; `None` where none was compared.
+    pub fn controller(&self) -> Option<&Finding> {
+        let compared =
+            self.findings.iter().filter(|f| f.test == Test::Controller && f.numbers.contains_key("residual"));
+        let residual = |f: &Finding| f.numbers.get("residual").copied().unwrap_or(0.0);
+        compared.max_by(|a, b| residual(a).total_cmp(&residual(b)))
+    }
+
     /// The findings that are more than notes, grouped, as plain text.
     pub fn sentences(&self) -> Vec<String> {
         let worth = self.grouped().into_iter().filter(|(f, _)| f.severity > Severity::Note);
@@ -89,5 +119,37 @@ pub fn further(records: usize) -> String {
         0 => String::new(),
         1 => " The same in 1 more record.".into(),
         n => format!(" The same in {n} more records."),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::BTreeMap;
+
+    /// 28 outputs with a note each, and the controller: two lines.
+    #[test]
+    fn many_notes_are_gathered() {
+        let note = |test: Test, channel: &str, numbers: &[(&str, f64)]| Finding {
+            test,
+            severity: Severity::Note,
+            record: "log".into(),
+            channel: Some(channel.into()),
+            rows: None,
+            what: "it is so".into(),
+            numbers: numbers.iter().map(|(key, value)| ((*key).to_owned(), *value)).collect::<BTreeMap<_, _>>(),
+            advice: String::new(),
+        };
+        let mut findings: Vec<Finding> = (1..=28).map(|k| note(Test::Noise, &format!("y{k}"), &[])).collect();
+        findings.push(note(Test::Controller, "u", &[("residual", 1e-6)]));
+        let check = DataCheck { records: Vec::new(), findings };
+        let alike = check.alike(Severity::Note, 10);
+        assert_eq!(alike.len(), 2);
+        assert_eq!(
+            (alike[0].0.channel.as_deref(), alike[0].1.as_str()),
+            (Some("y1"), " 27 more like it (--json lists all).")
+        );
+        assert_eq!(check.alike(Severity::Note, 40).len(), 29);
+        assert_eq!(check.controller().map(|f| f.test), Some(Test::Controller));
     }
 }

@@ -28,6 +28,19 @@ impl<'a> Log<'a> {
     pub(super) fn changes(&self, k: &StateSpace<Discrete>) -> Result<Vec<(Change, f64)>> {
         let mut all = vec![(Change::Sign, self.residual(&k.negated(), &self.e, &self.w)?)];
         let d = self.record.input_excitation;
+        let other = d.map_or_else(|| -1.0 * self.record.u, |d| -1.0 * self.record.u - d);
+        all.push((Change::InputSign, self.residual(k, &self.e, &other)?));
+        let m = self.w.ncols();
+        for (i, j) in (0..m).flat_map(|i| (i + 1..m).map(move |j| (i, j))) {
+            let mut u = self.record.u.to_owned();
+            for t in 0..u.nrows() {
+                (u[(t, i)], u[(t, j)]) = (u[(t, j)], u[(t, i)]);
+            }
+            let w = d.map_or_else(|| u.clone(), |d| &u - d);
+            all.push((Change::ExchangedInputs(i, j), self.residual(k, &self.e, &w)?));
+        }
+        let free = simulate_best(&with_trend(k)?, self.e.as_ref(), self.w.as_ref())?;
+        all.push((Change::Trend, relative(&(&self.w - free), &self.w)));
         for rows in [-1isize, 1] {
             let (e, w) = shifted(&self.e, &self.w, rows);
             all.push((Change::Shift(rows), self.residual(k, &e, &w)?));
@@ -60,6 +73,24 @@ impl<'a> Log<'a> {
         }
         all.extend(self.saturation(k)?);
         Ok(all)
+    }
+
+    /// Share of `u - K e` that the excitation explains, a few samples early or late, in the input where it is least.
+    pub(super) fn contained(&self, k: &StateSpace<Discrete>) -> Result<f64> {
+        let Some(d) = self.record.input_excitation else { return Ok(1.0) };
+        let u = self.record.u;
+        let left = centred(&(u - simulate_best(&with_constant(k)?, self.e.as_ref(), u.to_owned().as_ref())?));
+        let d = centred(&d.to_owned());
+        let (reach, mut least) = (3usize, 1.0f64);
+        let rows = d.nrows().saturating_sub(2 * reach);
+        for j in (0..d.ncols()).filter(|j| d.col(*j).norm_max() > 0.0) {
+            let regressors = Mat::from_fn(rows, 2 * reach + 1, |t, lag| d[(t + lag, j)]);
+            let target = left.submatrix(reach, j, rows, 1);
+            let found = least_squares("the excitation in the input", regressors.as_ref(), target)?;
+            let rest = target - regressors * found.x;
+            least = least.min(1.0 - rest.squared_norm_l2() / target.squared_norm_l2().max(f64::MIN_POSITIVE));
+        }
+        Ok(least)
     }
 
     /// One factor for all channels of e, and one for each alone, by least squares.
@@ -127,6 +158,22 @@ fn with_constant(k: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
     let a = block(&[&[k.a(), k.b()], &[zero.as_ref(), eye(p).as_ref()]]);
     let b = block(&[&[k.b()], &[Mat::<f64>::zeros(p, p).as_ref()]]);
     Ok(StateSpace::new(a, b, block(&[&[k.c(), k.d()]]), k.d().to_owned(), k.time())?)
+}
+
+/// The controller with a line of time at each of its inputs as further states.
+fn with_trend(k: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    let (n, p) = (k.order(), k.inputs());
+    let zeros = |rows, columns| Mat::<f64>::zeros(rows, columns);
+    // The line grows by a share of itself that keeps the states of one size.
+    let slope = eye(p) * faer::Scale(1e-3);
+    let a = block(&[
+        &[k.a(), k.b(), zeros(n, p).as_ref()],
+        &[zeros(p, n).as_ref(), eye(p).as_ref(), slope.as_ref()],
+        &[zeros(p, n).as_ref(), zeros(p, p).as_ref(), eye(p).as_ref()],
+    ]);
+    let b = block(&[&[k.b()], &[zeros(2 * p, p).as_ref()]]);
+    let c = block(&[&[k.c(), k.d(), zeros(k.outputs(), p).as_ref()]]);
+    Ok(StateSpace::new(a, b, c, k.d().to_owned(), k.time())?)
 }
 
 /// `e(k - rows)` beside `w(k)`.

@@ -10,6 +10,10 @@ use youla::signal::Channel;
 /// Chosen, not measured.
 const NO_EXCITATION: f64 = 1e-5;
 
+/// Share of what the controller leaves of the input that the excitation in it must explain.
+/// A wrong controller leaves the most of the excitation; another signal explains 7 lags over the samples. Chosen, not measured.
+const CONTAINED: f64 = 0.1;
+
 /// Factors that are known from units: degrees and radians, revolutions, thousands.
 const UNITS: [(f64, &str); 4] = [
     (57.295_779_513_082_32, "180 / pi, degrees against radians"),
@@ -19,7 +23,8 @@ const UNITS: [(f64, &str); 4] = [
 ];
 
 impl Change {
-    fn words(&self, outputs: &[Channel]) -> String {
+    fn words(&self, inputs: &[Channel], outputs: &[Channel]) -> String {
+        let input = |i: usize| inputs.get(i).map_or("an input", |c| c.name.as_str());
         let name = |i: usize| outputs.get(i).map_or("an output", |c| c.name.as_str());
         let rows = |rows: isize| if rows > 0 { "later" } else { "earlier" };
         let unit = |gain: f64| {
@@ -28,8 +33,11 @@ impl Change {
         };
         match self {
             Change::Sign => {
-                "the opposite sign: change `feedback` in [controller] between \"negative\" and \"positive\"".into()
+                "the opposite sign: change `feedback` in [controller] between \"negative\" and \"positive\", or the sign of the outputs".into()
             }
+            Change::InputSign => "the opposite sign of the input".into(),
+            Change::ExchangedInputs(i, j) => format!("{} and {} exchanged", input(*i), input(*j)),
+            Change::Trend => "a linear trend of the outputs added: one of them drifts in the log".into(),
             Change::Shift(by) => format!("the outputs (and references) one sample {} against the input", rows(*by)),
             Change::InputShift(by) => {
                 format!("the input one sample {} against all other channels", rows(-*by))
@@ -47,6 +55,9 @@ impl Change {
     fn number(&self) -> (&'static str, f64) {
         match self {
             Change::Sign => ("sign", -1.0),
+            Change::InputSign => ("input_sign", -1.0),
+            Change::ExchangedInputs(..) => ("exchanged_inputs", 1.0),
+            Change::Trend => ("trend", 1.0),
             Change::Shift(rows) => ("shift", *rows as f64),
             Change::InputShift(rows) => ("input_shift", *rows as f64),
             Change::Gain(gain) => ("gain", *gain),
@@ -63,6 +74,7 @@ impl ControllerCheck {
     pub(in crate::check) fn finding(
         &self,
         record: &str,
+        inputs: &[Channel],
         outputs: &[Channel],
         options: &CheckOptions,
     ) -> Option<Finding> {
@@ -76,7 +88,13 @@ impl ControllerCheck {
             return Some(finding.number("residual", self.residual).advice(advice));
         }
         if self.residual <= options.controller_caution {
-            return None;
+            let what = format!(
+                "the declared controller agrees with the log: it explains all but {} % of the input",
+                few(100.0 * self.residual)
+            );
+            return Some(
+                Finding::new(Test::Controller, Severity::Note, record, what).number("residual", self.residual),
+            );
         }
         let percent = few(100.0 * self.residual);
         let (severity, what) = match (&self.change, self.excited) {
@@ -95,8 +113,13 @@ impl ControllerCheck {
         };
         let advice = match &self.change {
             Some((change, left)) => {
-                format!("The unexplained part falls to {} % with {}", few(100.0 * left), change.words(outputs))
+                format!("The unexplained part falls to {} % with {}", few(100.0 * left), change.words(inputs, outputs))
             }
+            None if self.contained.is_some_and(|share| share < CONTAINED) => format!(
+                "The declared excitation is another signal than the one in the input: it explains {} % of what the controller leaves. \
+                 Choose the column that is added to the input",
+                few(100.0 * self.contained.unwrap_or(0.0))
+            ),
             None if self.excited => {
                 "Check for saturation, a delay, a different sample time or a different controller; no single change of sign, \
                  gain, shift or channel order explains it"

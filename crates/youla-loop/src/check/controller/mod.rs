@@ -24,8 +24,14 @@ use youla::lti::{Discrete, StateSpace};
 /// A change that would make the controller fit the log.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Change {
-    /// The other sign of feedback.
+    /// The other sign of feedback, or of all outputs.
     Sign,
+    /// The other sign of the logged input.
+    InputSign,
+    /// Two inputs exchanged in the log.
+    ExchangedInputs(usize, usize),
+    /// A linear trend in the outputs.
+    Trend,
     /// y (and r) shifted by so many rows, later if positive.
     Shift(isize),
     /// u shifted by so many rows relative to y, r and the excitation, earlier if positive.
@@ -53,6 +59,8 @@ pub struct ControllerCheck {
     pub excited: bool,
     /// Whether a declared reference moves.
     pub guided: bool,
+    /// Share of what the controller leaves of the input that the declared excitation explains, where it matters.
+    pub contained: Option<f64>,
     /// The change that leaves least, and what it leaves, where one would help.
     pub change: Option<(Change, f64)>,
 }
@@ -73,6 +81,9 @@ pub struct ControllerRecord<'a> {
 /// Magnitude of a pole up to which a controller that integrates can be simulated.
 /// A controller typed with six digits has an integrator within it. Chosen, not measured.
 const INTEGRATOR: f64 = 1.0 + 1e-6;
+/// And less than this share of what a change before it leaves.
+/// Chosen, not measured.
+const CLEARER: f64 = 0.8;
 /// A change must leave less than this share of the residual.
 /// Chosen, not measured.
 const HELPS: f64 = 0.1;
@@ -111,12 +122,25 @@ pub fn controller(
     let mut change = None;
     if residual > options.controller_caution {
         for (candidate, left) in log.changes(k)? {
-            if change.as_ref().is_none_or(|(_, best)| left < *best) {
+            // The simpler changes come first.
+            if change.as_ref().is_none_or(|(_, best)| left < CLEARER * best) {
                 change = Some((candidate, left));
             }
         }
         let least = HELPS * residual;
         change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
     }
-    Ok(ControllerCheck { residual, excited, guided, change })
+    let contained = if excited && change.is_none() && residual > options.controller_caution {
+        Some(log.contained(k)?)
+    } else {
+        None
+    };
+    Ok(ControllerCheck { residual, excited, guided, contained, change })
+}
+
+impl ControllerCheck {
+    /// Whether the controller explains an input that something from outside moves: then no channel is shifted.
+    pub(super) fn agrees(&self, options: &CheckOptions) -> bool {
+        self.residual <= options.controller_caution && (self.excited || self.guided)
+    }
 }

@@ -268,7 +268,7 @@ mod tests {
             PaperSettings::parse(&PaperSettings::TOML.replacen(from, to, 1), "p.toml".as_ref()).unwrap_err().to_string()
         };
         let unknown = refused("\"direct\", \"hansen\"", "\"direkt\"");
-        assert!(unknown.contains("did you mean `direct`") && unknown.starts_with("p.toml:9:"), "{unknown}");
+        assert!(unknown.contains("did you mean `direct`") && unknown.starts_with("p.toml:10:"), "{unknown}");
         assert!(refused("models = 500", "models = 0").contains("study.models (from 1 to 1000000) is 0"));
         assert!(refused("theta = [0.0, 1.0]", "theta = [0.0, 1.5]").contains("study.theta is 1.5"));
         assert!(refused("peak_sensitivity = 3.0", "peak_sensitivity = 0.5").contains("peak_sensitivity is 0.5"));

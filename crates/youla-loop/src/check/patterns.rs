@@ -22,6 +22,9 @@ const IN_A_ROW: usize = 3;
 /// A wrong sample that explains this share of what a shock does is taken for one: where the output is nearly white, both look alike.
 /// Chosen; a shock of a second-order process leaves a wrong sample 27 %.
 const ALIKE: f64 = 0.8;
+/// Least size of a wrong sample in a row against the largest: less is what the regression misses of its neighbour.
+/// Chosen, not measured.
+const LEAST_OF_A_ROW: f64 = 0.1;
 /// Places that are looked at.
 /// Chosen, not measured.
 const PLACES: usize = 100;
@@ -144,7 +147,9 @@ impl<'a> Search<'a> {
             if why.jump && (self.at(k) - why.sizes[0]).abs() > 0.5 * why.sizes[0].abs() {
                 return false;
             }
-            why.energy > 0.0 && why.energy > EXPLAINED * around(rows)
+            let largest = why.sizes.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
+            let each = why.sizes.iter().all(|s| s.abs() > LEAST_OF_A_ROW * largest);
+            each && why.energy > 0.0 && why.energy > EXPLAINED * around(rows)
         };
         let mut found: Vec<Explanation> = samples.chain([jump]).filter(enough).collect();
         let single = found.iter().find(|why| !why.jump && why.sizes.len() == 1);

@@ -1,7 +1,7 @@
 //! `youla check`: what is wrong with the data.
 
 use crate::log_flags::{LogFlags, places};
-use crate::output::{Failure, Form, say, tell};
+use crate::output::{Failure, Form, say, say_wrapped};
 use crate::run_folder::folder_of;
 use clap::Args;
 use std::fs;
@@ -50,7 +50,7 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
     match (form.json, form.quiet) {
         (true, _) => say(&json)?,
         (_, true) => {}
-        _ => tell(&text(&found))?,
+        _ => say_wrapped(&text(&found))?,
     }
     Ok(found.count(Severity::Defect) == 0)
 }

@@ -2,7 +2,7 @@
 
 use crate::args::{Args, Command};
 use crate::demo::demo;
-use crate::output::{Failure, Form, Progress, say, tell};
+use crate::output::{Failure, Form, Progress, say, say_wrapped};
 use crate::run_folder::{OutputFolder, folder_of};
 use crate::{check, compare, excite, export, init, manual, paper, plot, study, subspace, table};
 use clap::CommandFactory;
@@ -74,7 +74,7 @@ fn identify_and_write(
     } else if form.quiet {
         Ok(())
     } else {
-        tell(&table::results(&found, &written.folder))
+        say_wrapped(&table::results(&found, &written.folder))
     }
 }
 

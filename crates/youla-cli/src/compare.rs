@@ -1,6 +1,6 @@
 //! `youla compare`: finished runs beside each other.
 
-use crate::output::{Failure, Form, say, tell};
+use crate::output::{Failure, Form, say, say_wrapped};
 use crate::table::fitted;
 use crate::terminal;
 use clap::Args;
@@ -37,7 +37,7 @@ pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
     match (form.json, form.quiet) {
         (true, _) => say(&serde_json::json!(found).to_string()),
         (_, true) => Ok(()),
-        _ => tell(&text(&found, args)),
+        _ => say_wrapped(&text(&found, args)),
     }
 }
 

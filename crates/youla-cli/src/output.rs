@@ -78,7 +78,7 @@ fn shown(text: &str) -> String {
 }
 
 /// Prints text for people: words wrapped at the width of the terminal, and colour where there is one.
-pub(crate) fn tell(text: &str) -> Result<(), Failure> {
+pub(crate) fn say_wrapped(text: &str) -> Result<(), Failure> {
     print(&terminal::shown(&shown(text)))
 }
 

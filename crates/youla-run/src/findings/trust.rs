@@ -137,9 +137,9 @@ fn controller_sentence(found: &Identification) -> (String, Status) {
         return ("No controller ran.".into(), Status::Good);
     }
     let Some(finding) = found.data.controller() else { return of_alpha(found) };
-    let agrees = finding.what.contains("agrees");
     let status = match finding.severity {
-        Severity::Note if agrees => Status::Good,
+        // a note without a remedy: the controller agrees
+        Severity::Note if finding.advice.is_empty() => Status::Good,
         Severity::Note => Status::Info,
         Severity::Caution => Status::Caution,
         Severity::Defect => Status::Bad,

@@ -1,9 +1,10 @@
 //! The recommended model as an innovation form: plant, noise and Kalman gain.
 //!
-//! Each output carries an autoregression, `v(t) = -a_1 v(t-1) - ... + e(t)`, whose innovations are those of the whole where the
-//! plant is stable: K is zero for the states of the plant. Where it is not, the gain comes from the Riccati equation of plant and
-//! noise, which mirrors its poles.
+//! Each output carries an autoregression with a zero, `v(t) = -a_1 v(t-1) - ... + e(t) - b e(t-1)`, whose innovations are those
+//! of the whole where the plant is stable: K is zero for the states of the plant. Where it is not, the gain comes from the Riccati
+//! equation of plant and noise, which mirrors its poles.
 
+use super::autoregression::Regression;
 use super::noise::Noise;
 use super::recommendation::Predictor;
 use crate::linalg::{RiccatiProblem, block, block_diagonal, dare};
@@ -27,25 +28,28 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
     Predictor { a, b, c, d: plant.d().to_owned(), k, covariance }
 }
 
-/// `w+ = A w + G e`, `v = C w + e` of all outputs in companion form.
-fn autoregressions(regression: &[Vec<f64>]) -> [Mat<f64>; 3] {
-    let (p, extra) = (regression.len(), regression.iter().map(Vec::len).sum());
+/// `w+ = A w + G e`, `v = C w + e` of all outputs in observer form: a in the first column of each A, G = c - a.
+fn autoregressions(regression: &[Regression]) -> [Mat<f64>; 3] {
+    let states = |r: &Regression| r.coefficients.len().max(usize::from(r.zero != 0.0));
+    let (p, extra) = (regression.len(), regression.iter().map(states).sum());
     let mut shift = Mat::<f64>::zeros(extra, extra);
     let mut enters = Mat::<f64>::zeros(extra, p);
     let mut seen = Mat::<f64>::zeros(p, extra);
     let mut at = 0;
-    for (i, coefficients) in regression.iter().enumerate() {
-        for (j, value) in coefficients.iter().enumerate() {
-            seen[(i, at + j)] = -value;
-            shift[(at, at + j)] = -value;
-            if j > 0 {
-                shift[(at + j, at + j - 1)] = 1.0;
+    for (i, one) in regression.iter().enumerate() {
+        let count = states(one);
+        for j in 0..count {
+            let a = one.coefficients.get(j).copied().unwrap_or(0.0);
+            shift[(at + j, at)] = -a;
+            enters[(at + j, i)] = -a - if j == 0 { one.zero } else { 0.0 };
+            if j + 1 < count {
+                shift[(at + j, at + j + 1)] = 1.0;
             }
         }
-        if !coefficients.is_empty() {
-            enters[(at, i)] = 1.0;
+        if count > 0 {
+            seen[(i, at)] = 1.0;
         }
-        at += coefficients.len();
+        at += count;
     }
     [shift, enters, seen]
 }

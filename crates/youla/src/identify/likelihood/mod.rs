@@ -18,6 +18,7 @@
 //! | standard deviations: information of the record, and scatter of models that it does not distinguish | `deviation` |
 //! | questions to the records, each with a figure and a limit | `trust` |
 
+mod autoregression;
 mod balancing;
 mod block;
 mod chart;

@@ -1,19 +1,21 @@
-//! The spectrum of the noise at the outputs, as the search weights it: an autoregression per output and the covariance of what
-//! these leave.
+//! The spectrum of the noise at the outputs, as the search weights it: an autoregression per output, where the evidence asks for
+//! it with one zero, and the covariance of what these leave.
 //!
 //! ```text
-//! v_i(t) + a_i1 v_i(t-1) + ... = e_i(t),     E e e' = Lambda
+//! v_i(t) + a_i1 v_i(t-1) + ... = e_i(t) - b_i e_i(t-1),     E e e' = Lambda
 //! ```
-//! Orders by the Bayesian criterion from the autocorrelations of the residuals (Levinson). White noise is order 0.
+//! Orders by the Bayesian criterion from the autocorrelations of the residuals (`autoregression`). White noise is order 0. The
+//! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients.
 
+use super::autoregression::{Correlations, Regression};
 use super::spectra::Spectra;
 use faer::{Mat, c64};
 
 /// Coefficients and covariance.
 #[derive(Debug, Clone)]
 pub(crate) struct Noise {
-    /// a_1 ... per output.
-    pub(crate) regression: Vec<Vec<f64>>,
+    /// a_1 ... and b of each output.
+    pub(crate) regression: Vec<Regression>,
     /// Inverse of the Cholesky factor of Lambda, lower triangular, p x p.
     pub(crate) root: Mat<f64>,
     /// Lambda, p x p, in units of the scaled outputs.
@@ -29,15 +31,14 @@ impl Noise {
     /// White noise of unit size.
     pub(crate) fn white(outputs: usize) -> Self {
         let one = Mat::identity(outputs, outputs);
-        Noise { regression: vec![Vec::new(); outputs], root: one.clone(), covariance: one, log_det: 0.0 }
+        Noise { regression: vec![Regression::default(); outputs], root: one.clone(), covariance: one, log_det: 0.0 }
     }
 
     /// From residuals, lines x p per record.
     pub(crate) fn fit(spectra: &Spectra, residuals: &[Vec<c64>], largest_order: usize) -> Self {
         let p = spectra.outputs;
-        let regression: Vec<Vec<f64>> = (0..p)
-            .map(|i| autoregression(&correlations(spectra, residuals, i, largest_order), spectra.samples()))
-            .collect();
+        let of = |i: usize| Correlations::new(spectra, residuals, i, largest_order).regression(spectra.samples());
+        let regression: Vec<Regression> = (0..p).map(of).collect();
         let mut noise = Noise { regression, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
         let mut weights = vec![c64::ZERO; p];
@@ -84,66 +85,23 @@ impl Noise {
         (self.root, self.covariance) = (root, covariance);
     }
 
-    /// `1 + a_1 / z + ...` of each output.
+    /// `(1 + a_1 / z + ...) / (1 - b / z)` of each output.
     pub(crate) fn filters(&self, z: c64, out: &mut [c64]) {
         let back = z.conj();
-        for (value, coefficients) in out.iter_mut().zip(&self.regression) {
+        for (value, regression) in out.iter_mut().zip(&self.regression) {
             let mut sum = c64::ZERO;
-            for a in coefficients.iter().rev() {
+            for a in regression.coefficients.iter().rev() {
                 sum = (sum + c64::new(*a, 0.0)) * back;
             }
             *value = sum + c64::ONE;
+            if regression.zero != 0.0 {
+                *value /= c64::ONE - back * regression.zero;
+            }
         }
     }
 
     /// Number of its coefficients.
     pub(crate) fn parameters(&self) -> usize {
-        self.regression.iter().map(Vec::len).sum()
+        self.regression.iter().map(Regression::parameters).sum()
     }
-}
-
-fn correlations(spectra: &Spectra, residuals: &[Vec<c64>], output: usize, largest: usize) -> Vec<f64> {
-    let p = spectra.outputs;
-    let mut sums = vec![0.0; largest + 1];
-    for (lines, v) in spectra.records.iter().zip(residuals) {
-        for (k, z) in lines.z.iter().enumerate() {
-            let power = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
-            // cos(l w) by the recursion of Chebyshev
-            let (mut before, mut now) = (z.re, 1.0);
-            for sum in &mut sums {
-                *sum += power * now;
-                (before, now) = (now, 2.0 * z.re * now - before);
-            }
-        }
-    }
-    sums
-}
-
-/// Levinson's recursion, the order by `N log variance + log(N) order`.
-fn autoregression(r: &[f64], samples: usize) -> Vec<f64> {
-    let (count, penalty) = (samples as f64, (samples.max(2) as f64).ln());
-    let mut a: Vec<f64> = Vec::new();
-    let mut variance = r[0];
-    let (mut best, mut chosen) = (0.0, Vec::new());
-    if variance <= 0.0 {
-        return chosen;
-    }
-    for order in 1..r.len() {
-        let sum: f64 = r[order] + a.iter().enumerate().map(|(i, a)| a * r[order - 1 - i]).sum::<f64>();
-        let reflection = -sum / variance;
-        if reflection.abs() >= 0.99999 || !reflection.is_finite() {
-            break;
-        }
-        let before = a.clone();
-        for i in 0..a.len() {
-            a[i] += reflection * before[before.len() - 1 - i];
-        }
-        a.push(reflection);
-        variance *= 1.0 - reflection * reflection;
-        let criterion = count * (variance / r[0]).ln() + penalty * order as f64;
-        if criterion < best {
-            (best, chosen) = (criterion, a.clone());
-        }
-    }
-    chosen
 }

@@ -10,15 +10,20 @@ use faer::c64;
 pub(crate) struct Point {
     /// The model.
     pub(crate) model: Model,
-    /// t of each record, in the states of the model.
+    /// t of each record in the states of the model, then the drift of each output over the record.
     pub(crate) ends: Vec<Vec<f64>>,
 }
 
 impl Point {
     /// With t = 0.
     pub(crate) fn at_rest(model: Model, records: usize) -> Self {
-        let n = model.order();
-        Point { model, ends: vec![vec![0.0; n]; records] }
+        let count = model.order() + model.outputs;
+        Point { model, ends: vec![vec![0.0; count]; records] }
+    }
+
+    /// Numbers that describe both ends of a record.
+    pub(crate) fn end_count(&self) -> usize {
+        self.model.order() + self.model.outputs
     }
 
     /// Residuals `Y - G U - ...`, lines x p for each record.
@@ -55,6 +60,8 @@ impl Point {
                 }
                 at += s;
             }
+            let drift = *z / (*z - c64::ONE);
+            y.iter_mut().zip(&t[at..]).for_each(|(y, t)| *y -= drift * *t);
             if direct {
                 for (o, y) in y.iter_mut().enumerate() {
                     for j in 0..m {

@@ -81,13 +81,14 @@ impl Rows {
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
-        let (mut state, mut column) = (0, model.order());
+        let (mut state, mut column) = (0, model.order() + p);
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
             self.states(block, &z, &u, &place.t[state..state + block.states]);
             self.slopes(block, directions, (&z, &u), [state, column]);
             state += block.states;
             column += directions.ncols();
         }
+        self.drift(&z, &place.t[state..], state);
         self.direct(place, &u, column);
         let (more, count) = place.more;
         for o in 0..p {
@@ -144,6 +145,17 @@ impl Rows {
         }
     }
 
+    /// The columns of the drift of each output from one end of the record to the other, and its share of the residual.
+    #[inline(always)]
+    fn drift(&mut self, z: &Lanes, t: &[f64], column: usize) {
+        let (p, columns) = (self.filters.len(), self.columns);
+        let drift = z.times(&z.shifted(-1.0).inverse());
+        for o in 0..p {
+            self.values[o * columns + columns - 1].add_scaled(&drift, -t[o]);
+            (0..p).for_each(|l| self.values[l * columns + column + o] = if l == o { drift } else { Lanes::ZERO });
+        }
+    }
+
     /// The share of D in the residual, and its columns.
     #[inline(always)]
     fn direct(&mut self, place: &Place<'_>, u: &[Lanes], column: usize) {
@@ -166,10 +178,13 @@ impl Rows {
         let (p, columns) = (self.filters.len(), self.columns);
         let mut back = *z;
         back.im.iter_mut().for_each(|v| *v = -*v);
-        for (filter, coefficients) in self.filters.iter_mut().zip(&noise.regression) {
+        for (filter, regression) in self.filters.iter_mut().zip(&noise.regression) {
             let mut sum = Lanes::ZERO;
-            coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(&back));
+            regression.coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(&back));
             *filter = sum.shifted(1.0);
+            if regression.zero != 0.0 {
+                *filter = filter.times(&back.scaled(-regression.zero).shifted(1.0).inverse());
+            }
         }
         for c in 0..columns {
             for o in (0..p).rev() {

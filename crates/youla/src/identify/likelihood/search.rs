@@ -35,6 +35,8 @@ pub(crate) struct SearchOptions {
     pub(crate) radius: f64,
 }
 
+/// Share of the column of a drift beside those of the states below which the drift is not determined.
+const ALIKE: f64 = 1e-3;
 /// A search is given up where its distance to the aim is this many times what its last step gained.
 const HOPELESS: f64 = 20.0;
 
@@ -157,7 +159,7 @@ pub(crate) fn reblocked(point: &Point) -> Option<Point> {
     }
     let wide = Mat::from_fn(n, m + records, |i, j| if j < m { b[(i, j)] } else { point.ends[j - m][i] });
     let whole = Model::of(a.as_ref(), wide.as_ref(), c.as_ref(), Vec::new())?;
-    let mut ends = vec![Vec::with_capacity(n); records];
+    let mut ends = vec![Vec::with_capacity(point.end_count()); records];
     let mut model = whole.clone();
     model.inputs = m;
     model.d = point.model.d.clone();
@@ -168,12 +170,13 @@ pub(crate) fn reblocked(point: &Point) -> Option<Point> {
             end.extend((0..s).map(|i| wide.b[i * (m + records) + m + r]));
         }
     }
+    ends.iter_mut().zip(&point.ends).for_each(|(end, before)| end.extend_from_slice(&before[n..]));
     Some(Point { model, ends })
 }
 
 /// The point moved by a step of the parameters, t by what is best with it.
 fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) -> Point {
-    let n = point.model.order();
+    let (states, n) = (point.model.order(), point.end_count());
     let mut ends = point.ends.clone();
     for (end, rows) in ends.iter_mut().zip(&linearised.ends) {
         let last = n + step.len();
@@ -183,7 +186,9 @@ fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) ->
             step.iter().enumerate().for_each(|(j, s)| value -= rows[(i, n + j)] * s);
             (i + 1..n).for_each(|j| value -= rows[(i, j)] * change[j]);
             let diagonal = rows[(i, i)];
-            change[i] = if diagonal.abs() > 1e-12 { value / diagonal } else { 0.0 };
+            // An integrator of the plant describes the drift of its output as well.
+            let least = if i < states { 1e-12 } else { ALIKE * rows.col(i).norm_l2() };
+            change[i] = if diagonal.abs() > least { value / diagonal } else { 0.0 };
         }
         end.iter_mut().zip(change).for_each(|(e, c)| *e += c);
     }

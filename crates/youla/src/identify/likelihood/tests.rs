@@ -1,5 +1,6 @@
 //! Identities of the search, and seeded statistics of what it states.
 
+use super::autoregression::Regression;
 use super::chart::Chart;
 use super::deviation::inverse_root;
 use super::linearise::linearise;
@@ -71,7 +72,7 @@ fn the_gradient_is_that_of_differences() {
     let (u, y) = record(&machine(), 400, 0.3, 2);
     let spectra = unscaled(&u, &y, &[0, 0], 0);
     let mut noise = Noise::white(1);
-    noise.regression = vec![vec![-0.6, 0.2]];
+    noise.regression = vec![Regression { coefficients: vec![-0.6, 0.2], zero: 0.0 }];
     let mut model = blocks_of(&machine());
     model.blocks.iter_mut().for_each(|b| b.a.iter_mut().for_each(|a| *a *= 0.99));
     let chart = Chart::new(&model, true);
@@ -103,12 +104,41 @@ fn the_likelihood_of_an_autoregression_is_that_of_its_innovations() {
         y[(t, 0)] = 1.5 * before(1) - 0.8 * before(2) + e[(t, 0)];
     }
     let spectra = unscaled(&normal(rng, samples, 1, 1.0), &y, &[0], 0);
-    let empty = Point { model: Model { inputs: 1, outputs: 1, blocks: Vec::new(), d: vec![0.0] }, ends: vec![vec![]] };
+    let empty =
+        Point { model: Model { inputs: 1, outputs: 1, blocks: Vec::new(), d: vec![0.0] }, ends: vec![vec![0.0]] };
     let (value, noise) = deviance(&spectra, &empty, 12);
     // Schwarz's criterion finds the order, the coefficients have deviations sqrt((1 - 0.8^2) / N) = 0.0042
-    assert_eq!(noise.regression[0].len(), 2);
-    assert!((noise.regression[0][0] + 1.5).abs() < 0.015 && (noise.regression[0][1] - 0.8).abs() < 0.015);
+    assert_eq!(noise.regression[0].coefficients.len(), 2);
+    assert!(
+        (noise.regression[0].coefficients[0] + 1.5).abs() < 0.015
+            && (noise.regression[0].coefficients[1] - 0.8).abs() < 0.015
+    );
     let expected = samples as f64 * 0.25_f64.ln();
+    assert!((value - expected).abs() < 4.0 * (2.0 * samples as f64).sqrt(), "{value} and {expected}");
+}
+
+#[test]
+fn a_random_walk_below_white_noise_takes_a_slow_pole_and_a_zero() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(5);
+    let samples = 20000;
+    let (white, steps) = (normal(rng, samples, 1, 1.0), normal(rng, samples, 1, 0.02));
+    let mut walk = 0.0;
+    let y = Mat::from_fn(samples, 1, |t, _| {
+        walk += steps[(t, 0)];
+        walk + white[(t, 0)]
+    });
+    let spectra = unscaled(&normal(rng, samples, 1, 1.0), &y, &[0], 0);
+    let empty =
+        Point { model: Model { inputs: 1, outputs: 1, blocks: Vec::new(), d: vec![0.0] }, ends: vec![vec![0.0]] };
+    let ended = with_best_ends(&spectra, empty.model, &Noise::white(1));
+    let (value, noise) = deviance(&spectra, &ended, 12);
+    // the sum is (1 - b/z) e / (1 - 1/z) with (1 - b)^2 / b = 0.02^2, so b = 0.98 and the variance of e is 1 / b
+    let Regression { coefficients, zero } = &noise.regression[0];
+    assert!(
+        (zero - 0.98).abs() < 0.011 && (1.0 + coefficients.iter().sum::<f64>()).abs() < 0.01,
+        "{coefficients:?}, {zero}"
+    );
+    let expected = samples as f64 * (1.0 / 0.98_f64).ln();
     assert!((value - expected).abs() < 4.0 * (2.0 * samples as f64).sqrt(), "{value} and {expected}");
 }
 

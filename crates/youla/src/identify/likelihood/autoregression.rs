@@ -1,0 +1,114 @@
+//! The autoregression of the noise at one output, with a zero where slow drift lies below white noise.
+
+use super::spectra::Spectra;
+use faer::c64;
+
+/// Coefficients of `(1 - b/z) / (1 + a_1/z + ...)`.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Regression {
+    /// a_1 ...
+    pub(crate) coefficients: Vec<f64>,
+    /// b, 0 for none.
+    pub(crate) zero: f64,
+}
+
+impl Regression {
+    /// Number of its coefficients.
+    pub(crate) fn parameters(&self) -> usize {
+        self.coefficients.len() + usize::from(self.zero != 0.0)
+    }
+}
+
+/// Zeros b that are tried, from a tenth of the bandwidth down to a five-hundredth, a factor of 2 to 2.5 apart: the
+/// autoregression makes up for what lies between them. The first is none.
+const ZEROS: [f64; 8] = [0.0, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998];
+/// Slow poles that are tried with each zero below them: a random walk, and drift that is bounded.
+const POLES: [f64; 3] = [1.0, 0.999, 0.99];
+
+/// Autocorrelations of the residual at one output, filtered by `1 / (1 - b/z)` for each b of [`ZEROS`].
+pub(crate) struct Correlations(Vec<[f64; ZEROS.len()]>);
+
+impl Correlations {
+    /// For autoregressions up to `largest` coefficients.
+    pub(crate) fn new(spectra: &Spectra, residuals: &[Vec<c64>], output: usize, largest: usize) -> Self {
+        let p = spectra.outputs;
+        let mut sums = vec![[0.0; ZEROS.len()]; largest + 2];
+        for (lines, v) in spectra.records.iter().zip(residuals) {
+            for (k, z) in lines.z.iter().enumerate() {
+                let power = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
+                let filtered = ZEROS.map(|b| power / (1.0 + b * b - 2.0 * b * z.re));
+                // cos(l w) by the recursion of Chebyshev
+                let (mut before, mut now) = (z.re, 1.0);
+                for sum in &mut sums {
+                    sum.iter_mut().zip(&filtered).for_each(|(s, f)| *s += f * now);
+                    (before, now) = (now, 2.0 * z.re * now - before);
+                }
+            }
+        }
+        Correlations(sums)
+    }
+
+    /// The regression with the least `N log variance + log(N) parameters`.
+    pub(crate) fn regression(&self, samples: usize) -> Regression {
+        let plain: Vec<f64> = self.0[..self.0.len() - 1].iter().map(|r| r[0]).collect();
+        let (mut coefficients, mut least) = autoregression(&plain, samples);
+        let mut zero = 0.0;
+        for (f, b) in ZEROS.iter().enumerate().skip(1) {
+            for pole in POLES.iter().filter(|pole| *pole > b) {
+                let (rest, criterion) = autoregression(&self.through(f, *pole), samples);
+                let criterion = criterion + 2.0 * log(samples);
+                if criterion < least {
+                    (coefficients, zero, least) = (with_pole(&rest, *pole), *b, criterion);
+                }
+            }
+        }
+        Regression { coefficients, zero }
+    }
+
+    /// Autocorrelations behind `(1 - c/z) / (1 - b/z)`.
+    fn through(&self, zero: usize, pole: f64) -> Vec<f64> {
+        let r = |l: usize| self.0[l][zero];
+        (0..self.0.len() - 1)
+            .map(|l| (1.0 + pole * pole) * r(l) - pole * (r(l + 1) + r(if l == 0 { 1 } else { l - 1 })))
+            .collect()
+    }
+}
+
+fn log(samples: usize) -> f64 {
+    (samples.max(2) as f64).ln()
+}
+
+/// The coefficients times `1 - c/z`.
+fn with_pole(coefficients: &[f64], pole: f64) -> Vec<f64> {
+    let a = |i: usize| if i == 0 { 1.0 } else { coefficients.get(i - 1).copied().unwrap_or(0.0) };
+    (1..coefficients.len() + 2).map(|i| a(i) - pole * a(i - 1)).collect()
+}
+
+/// Levinson's recursion, the order by `N log variance + log(N) order`, which it returns as well.
+fn autoregression(r: &[f64], samples: usize) -> (Vec<f64>, f64) {
+    let count = samples as f64;
+    let mut a: Vec<f64> = Vec::new();
+    let mut variance = r[0];
+    if variance.is_nan() || variance <= 0.0 {
+        return (a, f64::INFINITY);
+    }
+    let (mut best, mut chosen) = (count * variance.ln(), Vec::new());
+    for order in 1..r.len() {
+        let sum: f64 = r[order] + a.iter().enumerate().map(|(i, a)| a * r[order - 1 - i]).sum::<f64>();
+        let reflection = -sum / variance;
+        if reflection.abs() >= 0.99999 || !reflection.is_finite() {
+            break;
+        }
+        let before = a.clone();
+        for i in 0..a.len() {
+            a[i] += reflection * before[before.len() - 1 - i];
+        }
+        a.push(reflection);
+        variance *= 1.0 - reflection * reflection;
+        let criterion = count * variance.ln() + log(samples) * order as f64;
+        if criterion < best {
+            (best, chosen) = (criterion, a.clone());
+        }
+    }
+    (chosen, best)
+}

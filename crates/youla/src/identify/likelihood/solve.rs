@@ -18,7 +18,7 @@ const SHORT: usize = 15000;
 /// Least part of a record.
 const SHORTEST: usize = 500;
 /// Rounds of models one step away.
-const ROUNDS: usize = 10;
+const ROUNDS: usize = 16;
 /// Differences of the criterion that decide neither between dead times nor for a direct path: odds of e^4 to one.
 const INDISTINCT: f64 = 8.0;
 /// Differences of the criterion up to which a model counts beside the best: weights of e^-6.

@@ -20,40 +20,53 @@ impl Regression {
 }
 
 /// Zeros b that are tried, from a tenth of the bandwidth down to a five-hundredth, a factor of 2 to 2.5 apart: the
-/// autoregression makes up for what lies between them. The first is none.
-const ZEROS: [f64; 8] = [0.0, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998];
+/// autoregression makes up for what lies between them.
+const ZEROS: [f64; 8] = [0.6, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998];
 /// Slow poles that are tried with each zero below them: a random walk, and drift that is bounded.
 const POLES: [f64; 3] = [1.0, 0.999, 0.99];
 
-/// Autocorrelations of the residual at one output, filtered by `1 / (1 - b/z)` for each b of [`ZEROS`].
-pub(crate) struct Correlations(Vec<[f64; ZEROS.len()]>);
+/// Largest order of an autoregression with a zero.
+const WITH_ZERO: usize = 12;
+
+/// Autocorrelations of the residual at one output.
+pub(crate) struct Correlations {
+    plain: Vec<f64>,
+    /// Filtered by `1 / (1 - b/z)` for each b of [`ZEROS`].
+    filtered: Vec<[f64; ZEROS.len()]>,
+}
 
 impl Correlations {
     /// For autoregressions up to `largest` coefficients.
     pub(crate) fn new(spectra: &Spectra, residuals: &[Vec<c64>], output: usize, largest: usize) -> Self {
         let p = spectra.outputs;
-        let mut sums = vec![[0.0; ZEROS.len()]; largest + 2];
+        let mut plain = vec![0.0; largest + 1];
+        let mut filtered = vec![[0.0; ZEROS.len()]; largest.min(WITH_ZERO) + 2];
         for (lines, v) in spectra.records.iter().zip(residuals) {
             for (k, z) in lines.z.iter().enumerate() {
                 let power = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
-                let filtered = ZEROS.map(|b| power / (1.0 + b * b - 2.0 * b * z.re));
+                let powers = ZEROS.map(|b| power / (1.0 + b * b - 2.0 * b * z.re));
                 // cos(l w) by the recursion of Chebyshev
-                let (mut before, mut now) = (z.re, 1.0);
-                for sum in &mut sums {
-                    sum.iter_mut().zip(&filtered).for_each(|(s, f)| *s += f * now);
-                    (before, now) = (now, 2.0 * z.re * now - before);
+                let next = |(before, now): (f64, f64)| (now, 2.0 * z.re * now - before);
+                let mut cosine = (z.re, 1.0);
+                for sum in &mut plain {
+                    *sum += power * cosine.1;
+                    cosine = next(cosine);
+                }
+                let mut cosine = (z.re, 1.0);
+                for sums in &mut filtered {
+                    sums.iter_mut().zip(&powers).for_each(|(s, f)| *s += f * cosine.1);
+                    cosine = next(cosine);
                 }
             }
         }
-        Correlations(sums)
+        Correlations { plain, filtered }
     }
 
     /// The regression with the least `N log variance + log(N) parameters`.
     pub(crate) fn regression(&self, samples: usize) -> Regression {
-        let plain: Vec<f64> = self.0[..self.0.len() - 1].iter().map(|r| r[0]).collect();
-        let (mut coefficients, mut least) = autoregression(&plain, samples);
+        let (mut coefficients, mut least) = autoregression(&self.plain, samples);
         let mut zero = 0.0;
-        for (f, b) in ZEROS.iter().enumerate().skip(1) {
+        for (f, b) in ZEROS.iter().enumerate() {
             for pole in POLES.iter().filter(|pole| *pole > b) {
                 let (rest, criterion) = autoregression(&self.through(f, *pole), samples);
                 let criterion = criterion + 2.0 * log(samples);
@@ -67,8 +80,8 @@ impl Correlations {
 
     /// Autocorrelations behind `(1 - c/z) / (1 - b/z)`.
     fn through(&self, zero: usize, pole: f64) -> Vec<f64> {
-        let r = |l: usize| self.0[l][zero];
-        (0..self.0.len() - 1)
+        let r = |l: usize| self.filtered[l][zero];
+        (0..self.filtered.len() - 1)
             .map(|l| (1.0 + pole * pole) * r(l) - pole * (r(l + 1) + r(if l == 0 { 1 } else { l - 1 })))
             .collect()
     }

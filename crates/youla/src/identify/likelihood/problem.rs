@@ -9,8 +9,8 @@ use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Largest order of the autoregression of the noise.
-pub(crate) const NOISE_ORDER: usize = 12;
+/// Largest order of the autoregression of the noise: noise at the inputs of a plant has zeros near the circle as well as poles.
+pub(crate) const NOISE_ORDER: usize = 40;
 
 /// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less.
 const GROWTH: f64 = 2.0;

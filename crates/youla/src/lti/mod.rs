@@ -14,6 +14,7 @@ mod simulate;
 mod state_space;
 mod time;
 mod transfer;
+mod visible;
 mod zeros;
 
 pub use eigen::Eigen;
@@ -30,3 +31,4 @@ pub use simulate::{SimulationState, Simulator, simulate};
 pub use state_space::StateSpace;
 pub use time::{Continuous, Discrete, TimeDomain};
 pub use transfer::PolynomialMatrix;
+pub use visible::{VisibleMode, VisibleModes};

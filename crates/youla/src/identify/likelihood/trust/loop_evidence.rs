@@ -32,7 +32,7 @@ pub(crate) fn of_loop(
     }
     out.push(match missed {
         Some(missed) => error(spectra, solution, missed),
-        None => Evidence::new("Is no external excitation known in the estimation records (1: none)?", 1.0, 0.0),
+        None => Evidence::new("No external excitation is known in the estimation records (1: none)", 1.0, 0.0),
     });
     out
 }
@@ -47,7 +47,7 @@ fn error(spectra: &Spectra, solution: &Solution, missed: &Missed) -> Evidence {
     };
     let mean = shares.iter().map(relative).sum::<f64>() / shares.len() as f64;
     Evidence::new(
-        "How large is the error of the response that the excitation shows, relative to it, beyond chance?",
+        "Error of the model against the response that the excitation shows, relative, beyond chance (indirect response)",
         mean.sqrt(),
         LARGEST_ERROR,
     )
@@ -67,7 +67,7 @@ fn controller(controller: &StateSpace<Discrete>, records: &[(MatRef<'_, f64>, Ma
     let left = power(&point.residuals(&spectra));
     let all: f64 = spectra.records.iter().map(|r| r.y.iter().map(|x| x.norm_sqr()).sum::<f64>()).sum();
     Some(Evidence::new(
-        "Which share of the inputs does the stated controller not explain?",
+        "Part of the inputs that the stated controller does not explain (controller)",
         (left / all.max(1e-300)).sqrt(),
         LARGEST_REST,
     ))

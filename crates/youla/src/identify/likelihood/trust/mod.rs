@@ -51,5 +51,5 @@ fn accuracy(responses: &[Vec<c64>], deviations: &[Vec<Moments>]) -> Evidence {
         .collect();
     shares.sort_by(f64::total_cmp);
     let figure = shares.get(shares.len() / 2).copied().unwrap_or(f64::INFINITY);
-    Evidence::new("How large is the stated deviation against the response, in the median over frequency?", figure, 1.0)
+    Evidence::new("Stated standard deviation over the response, median over frequency (uncertainty)", figure, 1.0)
 }

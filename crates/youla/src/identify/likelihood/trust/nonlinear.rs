@@ -57,7 +57,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let telling = (0..count).map(single).fold(0.0, f64::max);
     let moved = energy(spectra, &clean, &found.noise).max(1e-300);
     Evidence::new(
-        "How large is what a nonlinear function at the inputs explains, relative to what the model explains, beyond chance?",
+        "Output that a nonlinear function at the inputs explains, over what the model explains, beyond chance (nonlinearity)",
         ((statistic - distinct.len() as f64).max(0.0) / moved).sqrt(),
         LARGEST_SHARE,
     )

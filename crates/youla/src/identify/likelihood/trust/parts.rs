@@ -141,8 +141,8 @@ impl Parts {
         let difference = self.difference(a, b, solution);
         let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(1e-300);
         let question =
-            format!("How far apart are the responses that {which} ask for, relative to them, beyond chance?");
-        let noise = format!("How many times is the power of the noise the smaller between {which}?");
+            format!("Difference of the responses from {which}, relative to them, beyond chance (repeatability)");
+        let noise = format!("Ratio of the noise powers in {which} (stationarity)");
         vec![
             Evidence::new(question, difference, LARGEST_DIFFERENCE).beyond_chance(significance),
             Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_RATIO),

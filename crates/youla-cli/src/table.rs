@@ -27,7 +27,9 @@ pub(crate) fn results(found: &Identification, folder: &Path) -> String {
 fn modes(found: &Identification) -> String {
     let mut text = String::new();
     let Some(plant) = found.uncertainty(youla_run::Method::Hansen) else { return text };
-    for band in plant.modes.iter().filter(|band| band.mode.pole.im > 0.0) {
+    let verdict = found.verdict.of(youla_run::Method::Hansen);
+    let shown = |pole| verdict.is_none_or(|v| v.visible_residue(pole).is_some());
+    for band in plant.modes.iter().filter(|band| band.mode.pole.im > 0.0 && shown(band.mode.pole)) {
         let (mode, hz, zeta) = (band.mode, band.hz_deviation, band.zeta_deviation);
         let _ =
             write!(text, "\nmode of G(S): {:.2} +- {hz:.2} Hz, damping ratio {:.4} +- {zeta:.4}", mode.hz, mode.zeta);

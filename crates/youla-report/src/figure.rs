@@ -129,6 +129,21 @@ pub struct Axis {
     pub range: Option<[f64; 2]>,
     /// Logarithmic.
     pub log: bool,
+    /// The same quantity in another unit, written at the opposite edge; a horizontal axis only.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub also: Option<OtherUnit>,
+}
+
+/// A second unit of an axis.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OtherUnit {
+    /// Quantity.
+    pub label: String,
+    /// Unit.
+    pub unit: String,
+    /// Value in this unit over that in the unit of the axis.
+    pub factor: f64,
 }
 
 /// What a panel draws.

@@ -4,8 +4,9 @@ use std::collections::BTreeMap;
 
 use minijinja::context;
 use minijinja::value::Serde;
+use serde::Serialize;
 
-use super::data::{Method, ReportData};
+use super::data::{LoopMargins, Method, Mode, ReportData, Role};
 use super::drawings::drawings;
 use super::figure::Figure;
 use super::run_figures::{FigureChoice, RunFigure, run_drawings};
@@ -31,12 +32,36 @@ const TEMPLATE: &str = include_str!("../assets/report.html");
 pub fn html(data: &ReportData) -> Result<String> {
     let (figures, methods) = (placed(data)?, methods(data));
     let content = context! {
+        subject => Serde(subject(data)),
         report => Serde(without_curves(data)),
         fits => Serde(tables::fit_rows(data)),
         modes => Serde(tables::mode_rows(data)),
         has => figures.iter().map(|(place, _)| (place.as_str(), true)).collect::<BTreeMap<_, _>>(),
     };
     page::render(TEMPLATE, content, &drawings(&methods, &figures))
+}
+
+/// The model that the result is about: the recommended one, where there is none G(S).
+#[derive(Serialize)]
+struct Subject<'a> {
+    method: &'a Method,
+    modes: Vec<&'a Mode>,
+    margins: Option<&'a LoopMargins>,
+    largest_pole: Option<f64>,
+}
+
+/// Nothing for a comparison of runs, and where nothing is known of the model.
+fn subject(data: &ReportData) -> Option<Subject<'_>> {
+    let of = |role: Role| data.methods.iter().find(|method| method.role == role);
+    let method = of(Role::Recommended).or_else(|| of(Role::Hansen)).filter(|_| data.overview.is_empty())?;
+    let certificate = data.certificates.iter().find(|one| one.method == method.key);
+    let subject = Subject {
+        method,
+        modes: data.modes.iter().filter(|mode| mode.method == method.key).collect(),
+        margins: data.margins.iter().find(|margins| margins.method == method.key),
+        largest_pole: certificate.and_then(|one| one.worst_closed_loop_pole).map(|[re, im]| re.hypot(im)),
+    };
+    (!subject.modes.is_empty() || subject.margins.is_some()).then_some(subject)
 }
 
 /// The figures with the name of their place on the page.

@@ -17,6 +17,7 @@
 //! | `csv` | the numbers behind figures and tables |
 //! | `story` | a page of text, tables and figures as data |
 //! | `tables` | fits by record and output, modes by frequency |
+//! | `same_mode` | which modes of two models are the same one |
 //! | `page` | template, style, code, data and library put into one file |
 //! | `html` | a run as a page |
 //! | `thin` | figures with as many points as a page takes |
@@ -33,6 +34,7 @@ pub mod numbers;
 mod page;
 mod phase;
 mod run_figures;
+mod same_mode;
 pub mod story;
 mod story_html;
 mod svg;
@@ -47,9 +49,9 @@ pub use figure::Figure;
 pub use html::html;
 pub use page::with_minus;
 pub use run_figures::{FigureChoice, RunDrawing, RunFigure, run_drawings, run_figures};
+pub use same_mode::match_modes;
 pub use story::Story;
 pub use story_html::story_html;
 pub use svg::pretty_unit;
 pub use svg::{FIGURE_FONT, Print, svg, svg_for};
-pub use tables::SAME_MODE;
 pub use trace::{Timeline, Trace};

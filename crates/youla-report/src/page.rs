@@ -51,6 +51,7 @@ fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     environment.add_filter("fixed", |value: f64, digits: usize| with_minus(format!("{value:.digits$}")));
     environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
     environment.add_filter("significant", |value: f64| with_minus(significant(value)));
+    environment.add_filter("two_digits", |value: f64| with_minus(digits(value, 2)));
     environment.add_filter("printed", with_minus);
     environment.add_filter("unit", |unit: String| pretty_unit(&unit));
     environment.add_filter("magnitude", |pole: Vec<f64>| pole.iter().fold(0.0_f64, |size, part| size.hypot(*part)));
@@ -63,13 +64,19 @@ fn safe(text: String) -> Value {
     Value::from_safe_string(text)
 }
 
-/// Four significant digits, without an exponent down to 1e-9.
+/// Four significant digits.
 fn significant(value: f64) -> String {
-    if value.abs() < 1e-9 {
-        return if value == 0.0 { "0".into() } else { format!("{value:.1e}") };
+    digits(value, 4)
+}
+
+/// So many significant digits, without an exponent down to 1e-5.
+fn digits(value: f64, count: i32) -> String {
+    match value {
+        v if !v.is_finite() => "not known".into(),
+        0.0 => "0".into(),
+        v if v.abs() < 1e-5 => format!("{v:.1e}"),
+        v => format!("{v:.0$}", super::numbers::decimals(v, count as i32).clamp(0, 12) as usize),
     }
-    let places = super::numbers::decimals(value, 4).clamp(0, 12) as usize;
-    format!("{value:.places$}")
 }
 
 /// Numbers in tables have a minus sign as wide as a digit.

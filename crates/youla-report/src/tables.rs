@@ -3,9 +3,7 @@
 use serde::Serialize;
 
 use super::data::{Mode, ReportData};
-
-/// Modes of different models within this ratio of frequency stand in one row.
-pub const SAME_MODE: f64 = 1.1;
+use super::same_mode::match_modes;
 
 /// One record and output with the fit of each method.
 #[derive(Debug, Serialize, PartialEq)]
@@ -53,33 +51,30 @@ pub(super) fn fit_rows(data: &ReportData) -> Vec<FitRow> {
         .collect()
 }
 
-/// Modes near one frequency, one place per method.
+/// A mode that several models have, one place per method.
 #[derive(Debug, Serialize, PartialEq)]
 pub(super) struct ModeRow {
     pub(super) cells: Vec<Option<Mode>>,
 }
 
-/// Modes by rising frequency.
+/// Modes by rising frequency; those of each method are compared with the first ones in their rows.
 pub(super) fn mode_rows(data: &ReportData) -> Vec<ModeRow> {
-    let mut modes: Vec<(usize, &Mode)> = data
-        .modes
-        .iter()
-        .filter_map(|mode| Some((data.methods.iter().position(|m| m.key == mode.method)?, mode)))
-        .collect();
-    modes.sort_by(|a, b| a.1.hz.total_cmp(&b.1.hz));
-    let mut rows: Vec<(f64, ModeRow)> = Vec::new();
-    for (column, mode) in modes {
-        let row = rows.iter_mut().find(|(lowest, row)| mode.hz <= lowest * SAME_MODE && row.cells[column].is_none());
-        match row {
-            Some((_, row)) => row.cells[column] = Some(mode.clone()),
-            None => {
-                let mut cells = vec![None; data.methods.len()];
-                cells[column] = Some(mode.clone());
-                rows.push((mode.hz, ModeRow { cells }));
-            }
+    let mut rows: Vec<ModeRow> = Vec::new();
+    for (column, method) in data.methods.iter().enumerate() {
+        let own: Vec<&Mode> = data.modes.iter().filter(|mode| mode.method == method.key).collect();
+        let first: Vec<&Mode> = rows.iter().filter_map(|row| row.cells.iter().flatten().next()).collect();
+        let places = match_modes(&own, &first);
+        for (mode, place) in own.into_iter().zip(places) {
+            let place = place.unwrap_or_else(|| {
+                rows.push(ModeRow { cells: vec![None; data.methods.len()] });
+                rows.len() - 1
+            });
+            rows[place].cells[column] = Some(mode.clone());
         }
     }
-    rows.into_iter().map(|(_, row)| row).collect()
+    let hz = |row: &ModeRow| row.cells.iter().flatten().next().map_or(0.0, |mode| mode.hz);
+    rows.sort_by(|a, b| hz(a).total_cmp(&hz(b)));
+    rows
 }
 
 #[cfg(test)]
@@ -90,11 +85,12 @@ mod tests {
     fn data() -> ReportData {
         let fit =
             |record: &str, method: &str, fit| Fit { record: record.into(), output: 0, method: method.into(), fit };
-        let mode = |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1, deviation: None };
+        let mode =
+            |method: &str, hz| Mode { method: method.into(), hz, zeta: 0.1, deviation: None, residue: Vec::new() };
         ReportData {
             methods: vec![Method::nominal(), Method::direct(), Method::hansen()],
             fits: vec![fit("b", "hansen", Some(90.0)), fit("b", "direct", None), fit("a", "hansen", Some(80.0))],
-            modes: vec![mode("hansen", 55.0), mode("direct", 54.0), mode("direct", 56.0), mode("hansen", 120.0)],
+            modes: vec![mode("hansen", 54.9), mode("direct", 54.0), mode("direct", 56.0), mode("hansen", 120.0)],
             ..ReportData::default()
         }
     }
@@ -114,7 +110,7 @@ mod tests {
             .iter()
             .map(|row| row.cells.iter().map(|cell| cell.as_ref().map(|mode| mode.hz)).collect())
             .collect();
-        let expected = [[None, Some(54.0), Some(55.0)], [None, Some(56.0), None], [None, None, Some(120.0)]];
+        let expected = [[None, Some(54.0), Some(54.9)], [None, Some(56.0), None], [None, None, Some(120.0)]];
         assert_eq!(frequencies, expected);
     }
 }

@@ -89,8 +89,13 @@ fn over_frequency(found: &RunExcitation) -> Panel {
     }
     Panel {
         title: "energy density".into(),
-        x: Axis { label: "frequency".into(), unit: "Hz".into(), range: Some(range), log: true },
-        y: Axis { label: "over its mean in the band".into(), unit: "dB".into(), range: Some(DECIBELS), log: false },
+        x: Axis { label: "frequency".into(), unit: "Hz".into(), range: Some(range), log: true, also: None },
+        y: Axis {
+            label: "over its mean in the band".into(),
+            unit: "dB".into(),
+            range: Some(DECIBELS),
+            ..Axis::default()
+        },
         content: Content::Curves(drawn),
         ..Panel::default()
     }

@@ -41,7 +41,7 @@ impl Method {
         match self {
             Method::Likelihood => "recommended",
             Method::Nominal => "nominal G(0)",
-            Method::Direct => "direct N4SID",
+            Method::Direct => "direct subspace",
             Method::Hansen => "Hansen G(S)",
             Method::HansenReduced => "reduced G_red(S)",
             Method::GreyBox => "grey-box PEM",

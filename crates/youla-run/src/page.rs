@@ -18,6 +18,7 @@ use super::stage::StageTimes;
 use super::verdict::ModelVerdict;
 use crate::Result;
 use youla::MatRef;
+use youla::identify::likelihood::ModeEstimate;
 use youla::identify::subspace::SubspaceModel;
 use youla::signal::Channel;
 use youla_loop::check::{Finding, Severity};
@@ -59,7 +60,8 @@ pub fn page(found: &Identification, seconds: &StageTimes, run: &str) -> Result<R
         residuals: drawn_residuals(found),
         frequency: Some(frequency::drawn(found)?),
         poles: found.verdict.models.iter().map(poles).collect::<Result<_>>()?,
-        modes: found.verdict.models.iter().map(|v| modes(found, v)).collect::<Result<Vec<_>>>()?.concat(),
+        modes: found.verdict.models.iter().flat_map(|v| modes(found, v)).collect(),
+        unlisted: found.verdict.models.iter().filter_map(unlisted).collect(),
         parameters: structure(found).map_or_else(|| Ok(Vec::new()), GreyBoxRun::rows)?,
         physical: structure(found).map(GreyBoxRun::shown),
         reduction: reduction(found),
@@ -255,19 +257,35 @@ fn poles(v: &ModelVerdict) -> Result<draw::Poles> {
     Ok(draw::Poles { method: v.method.key().into(), poles: pairs(&v.poles), zeros })
 }
 
-fn modes(found: &Identification, v: &ModelVerdict) -> Result<Vec<draw::Mode>> {
-    if let (Method::Likelihood, Ok(model)) = (v.method, &found.recommended) {
-        return Ok(recommended::modes(model));
-    }
+/// The modes that the response of the model shows.
+fn modes(found: &Identification, v: &ModelVerdict) -> Vec<draw::Mode> {
     let bands = found.uncertainty(v.method).map_or(&[][..], |known| &known.modes);
-    let mode = |(k, m): (usize, &youla::lti::Mode)| draw::Mode {
-        method: v.method.key().into(),
-        hz: m.hz,
-        zeta: m.zeta,
-        deviation: bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation]),
+    let estimates = match (v.method, &found.recommended) {
+        (Method::Likelihood, Ok(model)) => &model.modes[..],
+        _ => &[],
+    };
+    let mode = |(k, m): (usize, &youla::lti::Mode)| {
+        let nearest = |a: &&ModeEstimate, b: &&ModeEstimate| {
+            (a.mode.pole - m.pole).norm().total_cmp(&(b.mode.pole - m.pole).norm())
+        };
+        let estimate = estimates.iter().min_by(nearest).map(|e| [e.hz_deviation, e.zeta_deviation]);
+        Some(draw::Mode {
+            method: v.method.key().into(),
+            hz: m.hz,
+            zeta: m.zeta,
+            deviation: estimate.or(bands.get(k).map(|b| [b.hz_deviation, b.zeta_deviation])),
+            residue: pairs(v.visible_residue(m.pole)?),
+        })
     };
     // A pole at z = 0 is a sample of delay, and no mode.
-    Ok(v.modes.iter().enumerate().filter(|(_, m)| m.hz.is_finite()).map(mode).collect())
+    v.modes.iter().enumerate().filter(|(_, m)| m.hz.is_finite()).filter_map(mode).collect()
+}
+
+/// How many modes of a model are left out, and why.
+fn unlisted(v: &ModelVerdict) -> Option<draw::UnlistedModes> {
+    let visible = v.visible.as_ref().filter(|visible| visible.cancelled + visible.above_nyquist > 0)?;
+    let (cancelled, above_nyquist) = (visible.cancelled, visible.above_nyquist);
+    Some(draw::UnlistedModes { method: v.method.key().into(), cancelled, above_nyquist })
 }
 
 /// The present and the predicted loop.

@@ -4,6 +4,7 @@ use super::entries::{ModeEntry, finite};
 use super::identification::Identification;
 use super::method::Method;
 use super::response::bounds_db;
+use super::verdict::residue_at;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation};
@@ -82,7 +83,7 @@ impl From<&Recommendation> for RecommendedEntry {
             file: FILE.into(),
             order: found.order,
             dead_time: found.dead_time.clone(),
-            modes: found.modes.iter().map(mode).collect(),
+            modes: modes(found),
             response_deviation: DeviationEntry {
                 hz: deviation.hz.clone(),
                 absolute: deviation.absolute.iter().map(|at| rows(at.as_ref())).collect(),
@@ -90,6 +91,13 @@ impl From<&Recommendation> for RecommendedEntry {
             evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
         }
     }
+}
+
+/// The modes that the response shows.
+fn modes(found: &Recommendation) -> Vec<ModeEntry> {
+    let visible = found.plant.visible_modes().ok();
+    let shown = |m: &&ModeEstimate| visible.as_ref().is_none_or(|v| residue_at(v, m.mode.pole).is_some());
+    found.modes.iter().filter(shown).map(mode).collect()
 }
 
 fn mode(m: &ModeEstimate) -> ModeEntry {
@@ -155,7 +163,7 @@ impl<'a> RecommendedDetails<'a> {
             dead_time: &found.dead_time,
             continuous: continuous(found).map(|system| SystemMatrices::new(&system)),
             predictor: PredictorEntry::from(&found.predictor),
-            modes: found.modes.iter().map(mode).collect(),
+            modes: modes(found),
             candidates: &found.candidates,
             evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
         }
@@ -186,20 +194,23 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
         false => String::new(),
     };
     let what = format!("The recommended model has order {}{dead_time}", model.order);
+    let (all, failed) = (model.evidence.len(), model.evidence.iter().filter(|e| !e.holds()).count());
     let mut lines = Vec::new();
     if model.trusted() {
-        let text =
-            format!("{what}. All {} questions to the records are answered within their limits.", model.evidence.len());
+        let text = format!("Trusted: all {all} tests of the recommended model are passed. {what}.");
         lines.push(line(draw::Status::Good, text));
     } else {
-        lines.push(line(draw::Status::Bad, format!("{what}. It must not be trusted, for the reasons below.")));
+        lines.push(line(
+            draw::Status::Bad,
+            format!("Not trusted: {failed} of {all} tests of the recommended model failed. {what}."),
+        ));
     }
     lines.extend(model.evidence.iter().filter(|e| !e.holds()).map(|e| line(draw::Status::Bad, sentence(e))));
     lines
 }
 
 fn sentence(e: &Evidence) -> String {
-    format!("{} {}, with a limit of {}.", e.question, figure(e.figure), e.limit)
+    format!("{}: {}, limit {}.", e.question, figure(e.figure), e.limit)
 }
 
 /// Three decimals, or a power of ten where these are too many digits.
@@ -229,8 +240,8 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
     vec![
         draw::EvidenceTable {
             title: "Evidence on the recommended model".into(),
-            text: "The model is trusted where every figure is within its limit.".into(),
-            columns: ["Question", "Figure", "Limit", "Within"].map(String::from).to_vec(),
+            text: "The model is trusted where it passes every test: each figure is at most its limit.".into(),
+            columns: ["Test", "Figure", "Limit", "Passed"].map(String::from).to_vec(),
             rows: model.evidence.iter().map(evidence).collect(),
             caption: String::new(),
         },
@@ -245,17 +256,6 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
                 .into(),
         },
     ]
-}
-
-/// Modes with their deviations, as the report shows them.
-pub(super) fn modes(found: &Recommendation) -> Vec<draw::Mode> {
-    let drawn = |m: &ModeEstimate| draw::Mode {
-        method: Method::Likelihood.key().into(),
-        hz: m.mode.hz,
-        zeta: m.mode.zeta,
-        deviation: Some([m.hz_deviation, m.zeta_deviation]),
-    };
-    found.modes.iter().map(drawn).collect()
 }
 
 /// Rows of the table of candidates.

@@ -195,7 +195,7 @@ pub(super) fn tables(redesign: &Redesign) -> Vec<draw::EvidenceTable> {
                 .into(),
         },
         draw::EvidenceTable {
-            title: "TriedWeight weights".into(),
+            title: "Weights that were tried".into(),
             text: String::new(),
             columns: ["Weight of u", "Minimum damping", "Peak sensitivity", "Small-gain product", ""].map(String::from).to_vec(),
             rows: redesign.candidates.iter().map(candidate).collect(),
@@ -225,7 +225,7 @@ pub(super) fn figure(redesign: &Redesign) -> Result<Figure> {
         Ok::<_, Error>(Curve { method: method.key.clone(), x: hz.clone(), y, ..Curve::default() })
     };
     let [present, new] = loops();
-    let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), range: None, log };
+    let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), log, ..Axis::default() };
     let panel = Panel {
         title: String::new(),
         x: axis("Frequency", "Hz", true),

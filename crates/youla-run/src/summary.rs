@@ -178,10 +178,11 @@ fn reference_entry(v: &ModelVerdict) -> ReferenceEntry {
 
 fn method_entry(run: &Identification, v: &ModelVerdict) -> Result<MethodEntry> {
     let recommended = run.recommended.as_ref().ok().filter(|_| v.method == Method::Likelihood);
+    let shown = |mode: &youla::lti::Mode| v.visible_residue(mode.pole).is_some();
     let modes = match (recommended, run.uncertainty(v.method)) {
         (Some(found), _) => RecommendedEntry::from(found).modes,
-        (_, Some(known)) => known.modes.iter().map(ModeEntry::from).collect(),
-        _ => v.modes.iter().map(ModeEntry::from).collect(),
+        (_, Some(known)) => known.modes.iter().filter(|m| shown(&m.mode)).map(ModeEntry::from).collect(),
+        _ => v.modes.iter().filter(|m| shown(m)).map(ModeEntry::from).collect(),
     };
     let residuals = v.records.iter().filter_map(|r| Some((r.record.clone(), r.residuals.as_ref()?.into())));
     let s = matches!(v.method, Method::Hansen | Method::HansenReduced)

@@ -16,7 +16,7 @@ use youla::control::{ChannelScales, with_input_port};
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
-use youla::lti::{Discrete, Mode, StateSpace};
+use youla::lti::{Discrete, Mode, StateSpace, VisibleMode, VisibleModes};
 use youla::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
 use youla::{Mat, c64};
 
@@ -46,12 +46,33 @@ pub struct ModelVerdict {
     pub poles: Vec<c64>,
     /// Its modes.
     pub modes: Vec<Mode>,
+    /// Those that its response shows; absent where its eigenvectors were not found.
+    pub visible: Option<VisibleModes>,
     /// Its loop with the controller that ran.
     pub certificate: LoopCertificate,
     /// Margins of that loop, and distances from other models.
     pub robustness: Robustness,
     /// One entry per verification record.
     pub records: Vec<RecordVerdict>,
+}
+
+impl ModelVerdict {
+    /// The mode of a pole and its residue, where the response shows it.
+    pub fn visible_residue(&self, pole: c64) -> Option<&[c64]> {
+        match &self.visible {
+            None => Some(&[]),
+            Some(visible) => residue_at(visible, pole),
+        }
+    }
+}
+
+/// Two computations of one pole differ by less, two poles by more; close to a double pole neither holds.
+const ONE_POLE: f64 = 1e-5;
+
+/// Residue of the visible mode of this pole.
+pub(super) fn residue_at(visible: &VisibleModes, pole: c64) -> Option<&[c64]> {
+    let at = |mode: &&VisibleMode| (mode.mode.pole - pole).norm() < ONE_POLE;
+    visible.modes.iter().find(at).map(|mode| mode.residue.as_slice())
 }
 
 /// The evidence on all models, in the order nominal, direct, Hansen, reduced, grey box.
@@ -155,6 +176,7 @@ fn verify_model(
         model: (*model).clone(),
         poles: model.poles()?,
         modes: model.modes()?,
+        visible: model.visible_modes().ok(),
         certificate: certify(model, &run.declared.controller)?,
         robustness: robustness(run.declared, scales, plant, model),
         records,

@@ -8,7 +8,7 @@ function show(host, figures) {
   const options = new Map();
   for (const figure of figures) for (const [name, value] of figure.choice ?? []) options.set(name, [...new Set([...(options.get(name) ?? []), value])]);
   const wanted = new Map(figures[0].choice), hidden = new Set(), states = new Map(figures.map(figure => [figure, { everything: false, hidden, views: new Map() }]));
-  const controls = element("div", { class: "controls" }), extra = element("span", { class: "controls" }), body = element("div", { onkeydown: pressed });
+  const controls = element("div", { class: "controls" }), extra = element("span", { class: "controls" }), body = element("div");
   const own = host.closest("figure") ? null : element("p", { class: "caption" }), said = own ?? host.parentElement.querySelector("figcaption .counts");
   const choosers = [...options].filter(([, values]) => values.length > 1)
     .map(([name, values]) => ({ name, node: chooser(name, values, k => { wanted.set(name, values[k]); pick(name); }) }));
@@ -37,10 +37,6 @@ function show(host, figures) {
     controls.hidden = !choosers.length && !extra.children.length;
     said.textContent = [own ? now.caption : "", countsInWords(now)].filter(Boolean).join(" ");
     for (const node of document.querySelectorAll("[data-with]")) if (figures.some(f => f.key === node.dataset.with)) node.hidden = node.dataset.with !== now.key;
-  }
-
-  function pressed(event) {
-    if (event.key === "e" && plainKey(event)) extra.querySelectorAll(".choice button")[states.get(now).everything ? 0 : 1]?.click();
   }
 }
 
@@ -72,7 +68,7 @@ function parts(body, figure, state) {
   const least = ({ content: { boxes, cells } }) => boxes ? LEFT + RIGHT + (printing ? 48 : 62) * boxes.length : cells ? 78 + (printing ? 22 : 40) * cells.columns.length : printing ? 290 : 318;
   if (beside) grid.style.setProperty("--least", `${Math.max(...figure.panels.map(least))}px`);
   const units = (beside ? figure.panels.slice(0, 1) : figure.panels).filter(panel => (panel.content.curves ?? []).some(c => c.drawn === "line"));
-  legend.node.style.setProperty("--entry", units.length ? `${Math.max(150, 52 + units.slice(0, 3).reduce((sum, panel) => sum + 6.2 * (prettyUnit(panel.y.unit).length + 8), 0))}px` : "0");
+  legend.node.style.setProperty("--entry", units.length ? `${Math.max(150, 52 + 50 * Math.min(3, units.length))}px` : "0");
   legend.node.classList.toggle("unread", !units.length);
   body.replaceChildren(...(legend.ids.length ? [legend.node] : []), grid);
   const cellsOf = groups.map(() => element("div"));
@@ -96,7 +92,7 @@ function stack(host, panels, { figure, legend, state, beside, place }) {
     "aria-label": [figure.title, figure.caption, panels.map(panel => panel.title).filter(Boolean).join(", ")].filter(Boolean).map(text => text.replace(/\.$/, "")).join(". ") });
   host.replaceChildren(root);
   const width = () => Math.max(240, root.clientWidth), shares = panels.map(panel => panel.height ?? 1), sum = shares.reduce((a, b) => a + b);
-  const heights = shares.map(share => equal ? Math.min(520, Math.max(280, 0.72 * width())) : beside || boxes ? 270 : Math.max(80, Math.min(700, 240 + 95 * panels.length) * share / sum));
+  const printing = document.documentElement.classList.contains("printing"), heights = shares.map(share => (printing ? 0.72 : 1) * (equal ? Math.min(520, Math.max(280, 0.72 * width())) : beside || boxes ? 270 : Math.max(80, Math.min(700, 240 + 95 * panels.length) * share / sum)));
   if (equal) fit(first.x.range ?? all, first.y.range ?? extent(panels, "y"));
   let linking = false, plots = [];
   panels.forEach((panel, k) => {
@@ -151,7 +147,7 @@ function stack(host, panels, { figure, legend, state, beside, place }) {
     const own = new Set(plots.flatMap(({ plain }) => plain.map(idOf)));
     for (const id of own) legend.read(id, at == null || legend.hidden.has(id) ? "" : plots.map((plot, k) => {
       const curve = plot.plain.find(c => idOf(c) === id), row = curve && plot.u.cursor.idxs?.[plot.plain.indexOf(curve) + 1];
-      return row == null ? "" : valued(plot.value(curve, row), panels[k].y.unit);
+      return row == null ? "" : readOut(plot.value(curve, row));
     }).filter(Boolean).join(", "));
   }
 

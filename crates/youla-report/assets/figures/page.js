@@ -12,22 +12,20 @@ for (const link of document.querySelectorAll(".evidence")) if (!document.querySe
 const redrawAll = () => mounted.forEach(drawing => drawing.draw());
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", redrawAll);
 
-// On paper all is unfolded, and figures are drawn for its width.
-let opened = [], away = [];
-addEventListener("beforeprint", () => {
-  opened = [...document.querySelectorAll("details:not([open])")];
-  away = [...document.querySelectorAll("[data-with][hidden]")];
-  for (const part of opened) part.open = true;
-  for (const part of away) part.hidden = false;
-  document.documentElement.classList.add("printing");
+// A table that is wider than its place says so.
+const roomy = new ResizeObserver(changes => changes.forEach(({ target }) => target.classList.toggle("more", target.scrollWidth > target.clientWidth + 1)));
+for (const part of document.querySelectorAll(".scroll")) roomy.observe(part);
+
+// On paper settings are unfolded, and figures are drawn for its width.
+let folded = [];
+const turn = part => part.toggleAttribute(part.matches("details") ? "open" : "hidden"), paper = printing => {
+  if (printing) folded = [...document.querySelectorAll("details:not([open]):has(pre), [data-with][hidden]")];
+  folded.forEach(turn);
+  document.documentElement.classList.toggle("printing", printing);
   redrawAll();
-});
-addEventListener("afterprint", () => {
-  for (const part of opened) part.open = false;
-  for (const part of away) part.hidden = true;
-  document.documentElement.classList.remove("printing");
-  redrawAll();
-});
+};
+addEventListener("beforeprint", () => paper(true));
+addEventListener("afterprint", () => paper(false));
 
 // The part in view is marked in the list of parts.
 const entries = new Map([...document.querySelectorAll("nav a")].map(link => [link.getAttribute("href").slice(1), link])), visible = new Set();

@@ -42,8 +42,10 @@ function makePlot(root, panel, at) {
     const axis = { stroke: colour("--ink"), font, labelFont: font, grid: { stroke: colour("--grid"), width: 1 }, ticks: { stroke: soft, width: 1, size: 4 }, gap: 4 };
     const log = { splits: (u, k, low, high) => logSplits(low, high), filter: (u, splits) => splits, values: (u, splits) => logLabels(splits) };
     const steps = whole => whole ? { incrs: [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 5000, 20000] } : {};
+    const { also } = panel.x, other = also && { ...axis, scale: "x", side: 0, space: 64, size: 26, label: withUnit(also), labelSize: 20, grid: { show: false }, filter: (u, splits) => splits,
+      splits: (u, k, low, high) => logSplits(low * also.factor, high * also.factor).map(v => v / also.factor), values: (u, splits) => logLabels(splits.map(v => v * also.factor)) };
     return {
-      width: at.width, height: height + (at.last ? 46 : 10), padding: [8, RIGHT, at.last ? 0 : 2, 0], legend: { show: false },
+      width: at.width, height: height + (at.last ? 46 : 10) + (also ? 46 : 0), padding: [also ? 0 : 8, RIGHT, at.last ? 0 : 2, 0], legend: { show: false },
       cursor: {
         y: false, points: { size: 6, width: 0, fill: (u, k) => u.series[k].stroke(u, k) }, focus: { prox: -1 },
         drag: { x: !boxes, y: !!panel.equal, dist: 4, setScale: !panel.equal },
@@ -56,6 +58,7 @@ function makePlot(root, panel, at) {
         { ...axis, space: height < 120 ? 18 : 30, size: LEFT - 18, labelSize: 18, labelGap: 0, label: label(y), values: (u, splits) => tickLabels(splits),
           ...steps(curves.length && isWhole(curves.map(c => c.y))), ...(y.unit === "deg" ? { incrs: [5, 15, 30, 45, 90, 180, 360, 720] } : {}), ...(y.log ? log : {}),
           ...(clouds.length ? { filter: inside, grid: { ...axis.grid, filter: inside }, ticks: { ...axis.ticks, filter: inside } } : {}) },
+        ...(other ? [other] : []),
       ],
       series: [{}, ...plain.map(c => ({ show: !legend.hidden.has(idOf(c)), stroke: ink(c), width: 2 * styleOf(c.method).width, dash: (legend.entry(c)?.dash ?? []).map(d => 2 * d), points: { show: false } }))],
       hooks: { drawClear: [shades], drawAxes: [behind], draw: [above], setScale: [(u, scale) => { if (scale === "x") at.moved(u); }], setCursor: [at.read], setSelect: [selected] },

@@ -86,6 +86,9 @@ pub struct ReportData {
     pub poles: Vec<Poles>,
     /// Modes of each model.
     pub modes: Vec<Mode>,
+    /// What is left out of them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub unlisted: Vec<UnlistedModes>,
     /// Parameters of a physical structure, estimated and derived ones; empty without one.
     #[serde(default)]
     pub parameters: Vec<PhysicalParameter>,

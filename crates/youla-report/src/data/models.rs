@@ -125,6 +125,20 @@ pub struct Mode {
     /// Standard deviations of both, where they are known.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "numbers::optional_pair")]
     pub deviation: Option<[f64; 2]>,
+    /// Residue, output by output the values of all inputs, real and imaginary parts; empty where it is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "numbers::pairs")]
+    pub residue: Vec<[f64; 2]>,
+}
+
+/// Poles of one model that are left out of its modes.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct UnlistedModes {
+    /// Key of the method.
+    pub method: String,
+    /// Modes that zeros of the model cancel.
+    pub cancelled: usize,
+    /// Modes at or above the Nyquist frequency.
+    pub above_nyquist: usize,
 }
 
 /// Hankel singular values of a model that was reduced, and the error at each order.
@@ -184,7 +198,13 @@ mod tests {
     /// A pole at z = 0 has no finite frequency: a report with it is read again.
     #[test]
     fn numbers_that_do_not_exist_are_read_again() {
-        let mode = Mode { method: "hansen".into(), hz: f64::INFINITY, zeta: 1.0, deviation: Some([f64::NAN, 0.1]) };
+        let mode = Mode {
+            method: "hansen".into(),
+            hz: f64::INFINITY,
+            zeta: 1.0,
+            deviation: Some([f64::NAN, 0.1]),
+            residue: Vec::new(),
+        };
         let poles = Poles { method: "hansen".into(), poles: vec![[0.0, f64::NAN]], zeros: vec![[f64::INFINITY, 0.0]] };
         let again: Mode = serde_json::from_str(&serde_json::to_string(&mode).unwrap()).unwrap();
         assert!(again.hz.is_nan() && again.zeta == 1.0 && again.deviation.unwrap()[1] == 0.1);

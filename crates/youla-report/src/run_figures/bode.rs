@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::verification::channel;
-use super::{RunFigure, axis, choice, key, logarithmic, span};
+use super::{RunFigure, axis, choice, frequency_in_both_units, key, logarithmic, span};
 use crate::data::{Band, FrequencyResponse, Indirect, ModelResponse};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Panel, Region};
 use crate::pretty_unit;
@@ -67,6 +67,7 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
     let magnitude = Axis { range: seen(pair), ..axis("Magnitude", gain) };
     let mut panels = vec![
         Panel {
+            x: frequency_in_both_units(),
             regions: pair.bands.iter().map(|band| region(pair, band)).collect(),
             ..panel(magnitude, curves(pair, Part::Magnitude), None)
         },

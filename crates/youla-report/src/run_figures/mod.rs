@@ -33,7 +33,7 @@ pub use choice::FigureChoice;
 use choice::Chosen;
 
 use super::data::{Method, ReportData};
-use super::figure::{Axis, Figure};
+use super::figure::{Axis, Figure, OtherUnit};
 use crate::Result;
 
 /// A figure of a run.
@@ -70,19 +70,19 @@ pub enum RunFigure {
 impl RunFigure {
     /// All of them, in the order of the page.
     pub const ALL: [RunFigure; 13] = [
-        RunFigure::Data,
-        RunFigure::Signals,
-        RunFigure::Order,
-        RunFigure::Stabilisation,
-        RunFigure::Verification,
-        RunFigure::Residuals,
         RunFigure::Bode,
         RunFigure::Nyquist,
         RunFigure::SingularValues,
+        RunFigure::Redesign,
+        RunFigure::Verification,
+        RunFigure::Residuals,
         RunFigure::Poles,
+        RunFigure::Stabilisation,
+        RunFigure::Order,
         RunFigure::Hankel,
         RunFigure::Reduction,
-        RunFigure::Redesign,
+        RunFigure::Data,
+        RunFigure::Signals,
     ];
 
     /// Its name.
@@ -228,6 +228,12 @@ fn axis(label: impl Into<String>, unit: impl Into<String>) -> Axis {
 
 fn logarithmic(label: impl Into<String>, unit: impl Into<String>) -> Axis {
     Axis { log: true, ..axis(label, unit) }
+}
+
+/// Frequency in Hz, at the opposite edge in rad/s.
+fn frequency_in_both_units() -> Axis {
+    let also = OtherUnit { label: "Angular frequency".into(), unit: "rad/s".into(), factor: std::f64::consts::TAU };
+    Axis { also: Some(also), ..logarithmic("Frequency", "Hz") }
 }
 
 /// Smallest and largest of the finite values, nothing where there are none.

@@ -6,7 +6,7 @@ use super::{RunFigure, axis, key, span};
 use crate::data::Poles;
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Layout, Panel};
 
-const ZEROS: &str = " Filled: invariant zeros.";
+const ZEROS: &str = " Filled: poles. Outlined: invariant zeros.";
 
 /// One figure of one or two panels.
 pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
@@ -37,7 +37,8 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
 fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> Panel {
     let curve = |set: &Poles| Curve {
         method: set.method.clone(),
-        drawn: Drawn::Marks,
+        note: if sets.iter().any(|set| !set.zeros.is_empty()) { "poles".into() } else { String::new() },
+        drawn: Drawn::Dots,
         x: set.poles.iter().map(|pole| pole[0]).collect(),
         y: set.poles.iter().map(|pole| pole[1]).collect(),
         details: set.poles.iter().map(|pole| plane.details(*pole)).collect(),
@@ -46,7 +47,7 @@ fn panel(plane: &Plane, sets: &[Poles], title: &str, [x, y]: [[f64; 2]; 2]) -> P
     let zeros = |set: &Poles| Curve {
         method: set.method.clone(),
         note: "zeros".into(),
-        drawn: Drawn::Dots,
+        drawn: Drawn::Marks,
         x: set.zeros.iter().map(|zero| zero[0]).collect(),
         y: set.zeros.iter().map(|zero| zero[1]).collect(),
         details: set.zeros.iter().map(|zero| plane.details(*zero)).collect(),

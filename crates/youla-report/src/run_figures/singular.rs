@@ -2,7 +2,7 @@
 
 use super::bode::percent;
 use super::choice::Chosen;
-use super::{RunFigure, axis, choice, key, logarithmic, span};
+use super::{RunFigure, axis, choice, frequency_in_both_units, key, span};
 use crate::data::SingularValue;
 use crate::figure::{Axis, Content, Curve, Figure, Panel, Region};
 
@@ -46,7 +46,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
         ),
         choice: choice(&[("View", "Singular values")]),
         panels: vec![Panel {
-            x: logarithmic("Frequency", "Hz"),
+            x: frequency_in_both_units(),
             y: Axis { range, ..axis("Singular values", "dB") },
             content: Content::Curves(singular.iter().map(curve).collect()),
             regions,

@@ -2,7 +2,7 @@
 
 use super::choice::Chosen;
 use super::{RunFigure, axis, choice, key, logarithmic};
-use crate::data::{PoleStability, Stabilisation, StabilisationPole};
+use crate::data::{PoleStability, Role, Stabilisation, StabilisationPole};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel};
 use crate::with_minus;
 
@@ -11,9 +11,13 @@ const ROOM_FOR_LABELS: f64 = 0.22;
 
 /// One per method.
 pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
-    let diagrams = chosen.data.stabilisation.iter().filter(|d| !d.orders.is_empty() && !d.poles.is_empty());
+    let mut diagrams: Vec<&Stabilisation> =
+        chosen.data.stabilisation.iter().filter(|d| !d.orders.is_empty() && !d.poles.is_empty()).collect();
+    // The poles of S are those of the loop; those of the plant are looked for first.
+    let of_loop = |d: &&Stabilisation| chosen.data.methods.iter().any(|m| m.key == d.method && m.role == Role::Hansen);
+    diagrams.sort_by_key(of_loop);
     let nyquist = chosen.data.sample_time.map(|ts| 0.5 / ts);
-    diagrams.map(|diagram| figure(diagram, nyquist)).collect()
+    diagrams.into_iter().map(|diagram| figure(diagram, nyquist)).collect()
 }
 
 fn figure(diagram: &Stabilisation, nyquist: Option<f64>) -> Figure {

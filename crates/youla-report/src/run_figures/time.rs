@@ -1,7 +1,7 @@
 //! Signals over time.
 
 use super::choice::Chosen;
-use super::{RunFigure, axis, choice, key};
+use super::{RunFigure, axis, choice, key, span};
 use crate::data::{DrawnExperiment, Signal, SignalKind};
 use crate::figure::{Axis, Content, Curve, Figure, Panel};
 use crate::trace::{Timeline, Trace};
@@ -24,6 +24,7 @@ pub(super) fn signals(chosen: &Chosen) -> Vec<Figure> {
 fn figures(chosen: &Chosen, figure: RunFigure, kinds: &[SignalKind], sentence: &str) -> Vec<Figure> {
     let shown = |e: &DrawnExperiment| e.signals.iter().filter(|s| kinds.contains(&s.kind)).cloned().collect::<Vec<_>>();
     let drawn = |(experiment, signals): (&DrawnExperiment, Vec<Signal>)| {
+        let (constant, signals): (Vec<Signal>, Vec<Signal>) = signals.into_iter().partition(is_constant);
         let height = Some((TALLEST / signals.len() as f64).min(1.0)).filter(|height| *height < 1.0);
         let panel = |signal: &Signal| Panel {
             x: Axis { range: detail(&experiment.clock), ..axis("Time", "s") },
@@ -35,14 +36,25 @@ fn figures(chosen: &Chosen, figure: RunFigure, kinds: &[SignalKind], sentence: &
         Figure {
             key: key(figure, &[(&experiment.name, chosen.several_experiments)]),
             title: format!("Signals of {}", experiment.name),
-            caption: format!("{sentence} {}", statement(&experiment.clock)),
+            caption: format!("{sentence} {}{}", statement(&experiment.clock), constants(&constant)),
             panels: signals.iter().map(panel).collect(),
             choice: choice(&[("Record", &experiment.name)]),
             ..Figure::default()
         }
     };
     let experiments = chosen.data.experiments.iter().map(|experiment| (experiment, shown(experiment)));
-    experiments.filter(|(_, signals)| !signals.is_empty()).map(drawn).collect()
+    experiments.filter(|(_, signals)| signals.iter().any(|signal| !is_constant(signal))).map(drawn).collect()
+}
+
+/// A channel with one value only.
+fn is_constant(signal: &Signal) -> bool {
+    span(signal.trace.points().map(|(_, value)| value)).is_none_or(|[low, high]| low == high)
+}
+
+/// The channels that are not drawn, in a sentence.
+fn constants(signals: &[Signal]) -> String {
+    let names: Vec<String> = signals.iter().map(|signal| greek(&signal.channel.name)).collect();
+    if names.is_empty() { String::new() } else { format!(" Not drawn, because constant: {}.", names.join(", ")) }
 }
 
 /// Names of the signals of the scheme with their letters.

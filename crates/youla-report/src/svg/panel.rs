@@ -8,7 +8,7 @@ use super::style::Styles;
 use super::text::{self, LABEL, LEADING, TICK};
 use super::ticks::{Tick, ticks};
 use super::{boxes, cells, ground};
-use crate::figure::{Content, Curve, Drawn, Panel};
+use crate::figure::{Axis, Content, Curve, Drawn, OtherUnit, Panel};
 
 /// Length of a tick, and from it to its label.
 const TICK_LENGTH: f64 = 2.5;
@@ -119,10 +119,16 @@ impl<'a> Prepared<'a> {
 
     /// Height above a frame of this width.
     pub(super) fn height_above(&self, width: f64) -> f64 {
-        match text::wrapped(&self.panel.title, LABEL, width * 0.92).len() {
+        let title = match text::wrapped(&self.panel.title, LABEL, width * 0.92).len() {
             0 => 4.0,
             lines => lines as f64 * LABEL * LEADING + 4.0,
-        }
+        };
+        title + self.height_of_other_unit()
+    }
+
+    /// Height of the labels of a second unit above the frame.
+    fn height_of_other_unit(&self) -> f64 {
+        if self.panel.x.also.is_some() { TICK_LENGTH + TO_LABEL + TICK * LEADING + LABEL * LEADING } else { 0.0 }
     }
 
     /// Height below a frame of this width.
@@ -164,6 +170,9 @@ impl<'a> Prepared<'a> {
                 curves::draw(canvas, curves, (&x, &y), frame, (styles, legend));
                 ground::draw_labels(canvas, &self.panel.guides, (&x, &y), inner);
                 draw_ticks_below(canvas, frame, &x, &below, labels.below);
+                if let Some(other) = &self.panel.x.also {
+                    draw_other_unit(canvas, frame, &x, other);
+                }
             }
             Content::Boxes(samples) => {
                 self.draw_grid(canvas, frame, &ticks_up(&y), &[]);
@@ -195,7 +204,13 @@ impl<'a> Prepared<'a> {
     fn draw_titles(&self, canvas: &mut Canvas, frame: Frame, labels: Labels, styles: &Styles) {
         let title = text::wrapped(&self.panel.title, LABEL, frame.width * 0.92);
         for (k, line) in title.iter().rev().enumerate() {
-            canvas.text(line, frame.left, frame.top - 4.0 - k as f64 * LABEL * LEADING, LABEL, Anchor::Start);
+            canvas.text(
+                line,
+                frame.left,
+                frame.top - 4.0 - self.height_of_other_unit() - k as f64 * LABEL * LEADING,
+                LABEL,
+                Anchor::Start,
+            );
         }
         if labels.below {
             let first = frame.bottom() + self.height_of_marks_below(frame.width, styles) + LABEL;
@@ -247,6 +262,23 @@ fn ticks_along(x: &Scale) -> Vec<Tick> {
         })
     };
     (3..=8).rev().map(|most| ticks(x, most)).find(|found| fits(found)).unwrap_or_else(|| ticks(x, 2))
+}
+
+/// Ticks and label of a second unit above the frame.
+fn draw_other_unit(canvas: &mut Canvas, frame: Frame, x: &Scale, other: &OtherUnit) {
+    let paint = Paint { stroke: SOFT, width: 0.6, ..Paint::default() };
+    let scale = Scale { low: x.low * other.factor, high: x.high * other.factor, ..*x };
+    for Tick { value, label } in ticks_along(&scale) {
+        let at = scale.at(value);
+        let length = if label.is_empty() { TICK_LENGTH * 0.6 } else { TICK_LENGTH };
+        canvas.line((at, frame.top), (at, frame.top - length), &paint);
+        if !label.is_empty() {
+            canvas.text(&label, at, frame.top - TICK_LENGTH - TO_LABEL, TICK, Anchor::Middle);
+        }
+    }
+    let axis = Axis { label: other.label.clone(), unit: other.unit.clone(), ..Axis::default() };
+    let base = frame.top - TICK_LENGTH - TO_LABEL - TICK * LEADING;
+    canvas.text(&text::axis_label(&axis), frame.left + frame.width / 2.0, base, LABEL, Anchor::Middle);
 }
 
 fn draw_ticks_below(canvas: &mut Canvas, frame: Frame, x: &Scale, below: &[Tick], labels: bool) {

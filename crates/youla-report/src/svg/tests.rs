@@ -10,7 +10,7 @@ fn methods() -> Vec<Method> {
 }
 
 fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
-    Axis { label: label.into(), unit: unit.into(), range, log: false }
+    Axis { label: label.into(), unit: unit.into(), range, ..Axis::default() }
 }
 
 fn curve(method: &str, drawn: Drawn, y: &[f64]) -> Curve {

@@ -7,7 +7,7 @@
 mod sample;
 mod story;
 
-use youla_report::data::{FrequencyResponse, Method, ReportData, SignalKind};
+use youla_report::data::{FrequencyResponse, Method, ReportData, SignalKind, UnlistedModes};
 use youla_report::figure::{Content, Curve, Drawn, Figure, MEASURED};
 use youla_report::html;
 
@@ -125,6 +125,26 @@ fn text_of_the_user_cannot_leave_its_place() {
     assert!(!page.contains("alert(1)</script>") && !page.contains("<!--"));
     assert_eq!(page.matches("</script>").count(), 3);
     assert!(embedded(&page).iter().any(|figure| figure.caption.contains(evil)));
+}
+
+/// The result, then the evidence, then the data.
+#[test]
+fn the_result_comes_first_and_the_data_last() {
+    let page = html(&sample::bearing()).unwrap();
+    let sections =
+        ["trust", "frequency", "modes", "fits", "verification", "residuals", "poles", "order", "data", "run"];
+    let place = |key: &&str| page.find(&format!("<section id=\"{key}\"")).unwrap_or_else(|| panic!("no {key}"));
+    assert!(sections.iter().map(place).is_sorted());
+}
+
+#[test]
+fn modes_that_are_left_out_are_counted() {
+    let mut data = sample::bearing();
+    let unlisted = UnlistedModes { method: "hansen".into(), cancelled: 4, above_nyquist: 1 };
+    assert!(!html(&data).unwrap().contains("nearly cancelled"));
+    data.unlisted.push(unlisted);
+    let page = html(&data).unwrap();
+    assert!(page.contains("4 nearly cancelled by zeros, 1 at or above the Nyquist frequency."));
 }
 
 #[test]

@@ -20,7 +20,7 @@ fn page_data(page: &str) -> Value {
 }
 
 fn axis(label: &str, unit: &str, range: Option<[f64; 2]>) -> Axis {
-    Axis { label: label.into(), unit: unit.into(), range, log: false }
+    Axis { label: label.into(), unit: unit.into(), range, ..Axis::default() }
 }
 
 fn panel(title: &str, y: Axis, content: Content) -> Panel {

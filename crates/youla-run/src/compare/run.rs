@@ -1,6 +1,6 @@
 //! What a comparison needs of a finished run.
 
-use crate::entries::ModeEntry;
+use crate::entries::{ModeEntry, pairs};
 use crate::export::model_for_export;
 use crate::folder::ModelFacts;
 use crate::redraw::read_report;
@@ -11,6 +11,7 @@ use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::control::ChannelScales;
+use youla::lti::VisibleMode;
 use youla_io::export::NamedModel;
 use youla_report::data::{Certificate, Fit, LoopMargins, Mode, ReportData};
 
@@ -56,15 +57,20 @@ impl FinishedRun {
         all
     }
 
-    /// Modes of the model, with deviations where they are known.
+    /// Modes that the response of the model shows, with deviations where they are known.
     pub(super) fn modes(&self, model: &str) -> Vec<Mode> {
+        let visible = self.model.system.visible_modes().ok();
+        let residue = |hz: f64, zeta: f64| match &visible {
+            None => Some(Vec::new()),
+            Some(visible) => {
+                let same = |m: &&VisibleMode| (m.mode.hz / hz - 1.0).abs() < 1e-4 && (m.mode.zeta - zeta).abs() < 1e-4;
+                visible.modes.iter().find(same).map(|m| pairs(&m.residue))
+            }
+        };
         let of = |m: &ModeEntry| {
-            Some(Mode {
-                method: self.key.clone(),
-                hz: m.hz?,
-                zeta: m.zeta?,
-                deviation: m.hz_deviation.zip(m.zeta_deviation).map(|(hz, zeta)| [hz, zeta]),
-            })
+            let (hz, zeta) = (m.hz?, m.zeta?);
+            let deviation = m.hz_deviation.zip(m.zeta_deviation).map(|(hz, zeta)| [hz, zeta]);
+            Some(Mode { method: self.key.clone(), hz, zeta, deviation, residue: residue(hz, zeta)? })
         };
         let identified = self.summary.methods.get(model).map(|m| &m.modes);
         let modes = identified.or(self.facts.as_ref().map(|facts| &facts.modes));

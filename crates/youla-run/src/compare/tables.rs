@@ -1,8 +1,8 @@
 //! The runs and their modes as tables, and what makes them hard to compare.
 
 use super::run::FinishedRun;
-use youla_report::SAME_MODE;
 use youla_report::data::{EvidenceTable, Fit, Mode, Note, ReportData, Status, Verdict};
+use youla_report::match_modes;
 
 /// One row per run: verdict, order, fit.
 pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
@@ -45,19 +45,24 @@ fn mean(fits: &[Fit]) -> Option<f64> {
 /// The oscillating modes of the first run, and how far those of the others are from them.
 pub(super) fn modes(runs: &[FinishedRun], model: &str) -> EvidenceTable {
     let all: Vec<Vec<Mode>> = runs.iter().map(|r| oscillating(r, model)).collect();
-    let row = |mode: &Mode| -> Vec<String> {
-        let others = all[1..].iter().map(|modes| match nearest(modes, mode) {
-            Some(other) => difference(mode, other),
-            None => "\u{2013}".into(),
-        });
+    let first: Vec<&Mode> = all[0].iter().collect();
+    let partners: Vec<Vec<Option<&Mode>>> = all[1..]
+        .iter()
+        .map(|modes| {
+            let places = match_modes(&first, &modes.iter().collect::<Vec<_>>());
+            places.into_iter().map(|place| place.and_then(|k| modes.get(k))).collect()
+        })
+        .collect();
+    let row = |(k, mode): (usize, &Mode)| -> Vec<String> {
+        let others = partners.iter().map(|of| of[k].map_or("\u{2013}".into(), |other| difference(mode, other)));
         [format!("{:.2} Hz, \u{3b6} {:.4}", mode.hz, mode.zeta)].into_iter().chain(others).collect()
     };
     EvidenceTable {
         title: "Differences of modes".into(),
         text: format!("Oscillating modes of {}, and how those of the other runs differ.", runs[0].name),
         columns: runs.iter().map(|r| r.name.clone()).collect(),
-        rows: all[0].iter().map(row).collect(),
-        caption: "The nearest mode within 10 % of frequency. In brackets: the difference of frequency and of damping in standard deviations of both runs together, where they are known.".into(),
+        rows: all[0].iter().enumerate().map(row).collect(),
+        caption: "Modes agree by frequency (10 %), damping ratio and residue, each with one of the other run at most. In brackets: the difference of frequency and of damping in standard deviations of both runs together, where they are known.".into(),
     }
 }
 
@@ -65,11 +70,6 @@ fn oscillating(run: &FinishedRun, model: &str) -> Vec<Mode> {
     let mut modes: Vec<Mode> = run.modes(model).into_iter().filter(|m| m.zeta.abs() < 1.0).collect();
     modes.sort_by(|a, b| a.hz.total_cmp(&b.hz));
     modes
-}
-
-fn nearest<'a>(modes: &'a [Mode], to: &Mode) -> Option<&'a Mode> {
-    let ratio = |m: &Mode| (m.hz / to.hz).ln().abs();
-    modes.iter().filter(|m| ratio(m) < SAME_MODE.ln()).min_by(|a, b| ratio(a).total_cmp(&ratio(b)))
 }
 
 fn difference(from: &Mode, to: &Mode) -> String {

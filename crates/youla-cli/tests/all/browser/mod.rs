@@ -1,5 +1,5 @@
-//! The pages in headless Chromium: console, missing parts, zoom, legend, keys, dark, print; at the width of a desktop and of a
-//! laptop. The tests themselves are JavaScript beside this file, run by Node.
+//! The pages in headless Chromium: console, missing parts, zoom, legend, keys, dark, print; at the width of a desktop, of a
+//! laptop and of a phone. The tests themselves are JavaScript beside this file, run by Node.
 //!
 //! Needs `npm`, `node` and Chromium (Debian: `apt-get install npm chromium`). On a continuous integration machine (`CI=true`)
 //! Chromium is installed from Debian's packages if that is possible.

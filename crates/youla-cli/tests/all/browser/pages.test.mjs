@@ -1,11 +1,11 @@
-// What holds for every page, at the width of a desktop and of a laptop, whatever a run has or has not.
+// What holds for every page, at the width of a desktop, of a laptop and of a phone, whatever a run has or has not.
 
 import { after, before, describe, test } from "node:test";
 import assert from "node:assert/strict";
 import { drawn, launch, open, painted } from "./browser.mjs";
 
 const PAGES = JSON.parse(process.env.YOULA_PAGES);
-const SCREENS = { desktop: { width: 1440, height: 900 }, laptop: { width: 1024, height: 720 } };
+const SCREENS = { desktop: { width: 1440, height: 900 }, laptop: { width: 1000, height: 720 }, phone: { width: 390, height: 844 } };
 
 let browser;
 before(async () => { browser = await launch(); });
@@ -22,6 +22,18 @@ for (const [name, file] of Object.entries(PAGES)) for (const [screen, size] of O
     test("no part is wider than the window", async () => {
       const [content, window] = await view.page.evaluate(() => [document.documentElement.scrollWidth, document.documentElement.clientWidth]);
       assert.ok(content <= window, `${content} pixels in ${window}`);
+    });
+
+    test("a table that is wider than its place says so", async () => {
+      const silent = await view.page.evaluate(() => [...document.querySelectorAll(".scroll")].filter(node => node.checkVisibility() && node.scrollWidth > node.clientWidth + 1)
+        .filter(node => !/scroll/.test(getComputedStyle(node, "::before").content)).map(node => node.getAttribute("aria-label") ?? node.getAttribute("aria-labelledby")));
+      assert.deepEqual(silent, []);
+    });
+
+    test("no text of a heading, a legend or a control is cut", async () => {
+      const cut = await view.page.evaluate(() => [...document.querySelectorAll("h1, h2, h3, .legend button, .controls button, .verdict li")]
+        .filter(node => node.checkVisibility() && (node.scrollWidth > node.clientWidth + 1 || node.getBoundingClientRect().right > innerWidth + 1)).map(node => node.textContent.slice(0, 60)));
+      assert.deepEqual(cut, []);
     });
 
     test("every figure is drawn", async () => {

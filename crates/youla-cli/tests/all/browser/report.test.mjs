@@ -23,6 +23,15 @@ describe("the first screen", () => {
     assert.ok(last.y + last.height <= height, `the last line ends at ${last.y + last.height}`);
   });
 
+  test("shows the response of the recommended model before any record", async () => {
+    const top = async part => (await page.locator(`#${part}`).boundingBox()).y;
+    assert.ok(await top("frequency") < 600, `${await top("frequency")}`);
+    assert.ok(await top("modes") < 1600, `${await top("modes")}`);
+    const tops = [];
+    for (const part of ["trust", "frequency", "modes", "recommended", "verification", "residuals", "poles", "stabilisation", "data", "run"]) tops.push(await top(part));
+    assert.deepEqual(tops, [...tops].sort((a, b) => a - b));
+  });
+
   test("leads to the evidence", async () => {
     await page.locator("#trust .evidence", { hasText: "residuals" }).click();
     const top = await page.locator("#residuals").evaluate(node => node.getBoundingClientRect().top);

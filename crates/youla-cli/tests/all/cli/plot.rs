@@ -95,7 +95,7 @@ fn sizes_formats_and_places_are_as_asked_for() {
     let found = youla(&folder, &["plot", run, "poles", "--csv", "--methods", "hansen,direct", "--out", "."]);
     assert_eq!(names(&found.stdout), ["poles.csv"]);
     let csv = fs::read_to_string(folder.join("poles.csv")).expect("written");
-    assert!(csv.contains("Hansen G(S)") && csv.contains("direct N4SID") && !csv.contains("nominal"));
+    assert!(csv.contains("Hansen G(S)") && csv.contains("direct subspace") && !csv.contains("nominal"));
 
     done(&youla(&folder, &["plot", run, "hankel", "--outlines", "--out", "."]));
     let outlined = fs::read_to_string(folder.join("hankel.svg")).expect("written");

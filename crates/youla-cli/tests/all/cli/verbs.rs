@@ -46,7 +46,7 @@ fn piped_output_is_a_plain_table() {
         let found = youla(&folder, &["identify", "run.toml"]);
         assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""), "no progress where nobody looks");
         assert!(!found.stdout.contains('\u{1b}') && !found.stdout.contains('\r'));
-        for text in ["nominal G(0)", "direct N4SID", "Hansen G(S)", "rest, y", "order", "stabilised by K"] {
+        for text in ["nominal G(0)", "direct subspace", "Hansen G(S)", "rest, y", "order", "stabilised by K"] {
             assert!(found.stdout.contains(text), "{text} is not in: {}", found.stdout);
         }
         let run = format!("runs/loop-{number}");

@@ -193,7 +193,13 @@ fn report(plan: &Plan) -> ReportData {
         for (hz, zeta, _) in &model.modes {
             let z = Modal::pole(*hz, *zeta, ts);
             poles.extend([[z.re, z.im], [z.re, -z.im]]);
-            data.modes.push(Mode { method: method.key.clone(), hz: *hz, zeta: *zeta, deviation: None });
+            data.modes.push(Mode {
+                method: method.key.clone(),
+                hz: *hz,
+                zeta: *zeta,
+                deviation: None,
+                residue: Vec::new(),
+            });
         }
         if place == 2 {
             poles.extend([[0.62, 0.31], [0.62, -0.31], [-0.35, 0.0], [0.81, 0.0]]);

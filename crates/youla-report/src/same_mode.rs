@@ -6,6 +6,8 @@ use super::data::Mode;
 const FREQUENCY: f64 = 1.1;
 /// Largest difference of the damping ratios: this much and half of the larger one.
 const DAMPING: f64 = 0.02;
+/// Damping ratio from which a pair is as good as two real poles.
+const REAL: f64 = 0.99;
 /// Least modal assurance of the residues: 0 for orthogonal ones, 1 for equal directions.
 const ASSURANCE: f64 = 0.5;
 /// Largest ratio of the sizes of the residues.
@@ -36,7 +38,7 @@ pub fn match_modes(modes: &[&Mode], others: &[&Mode]) -> Vec<Option<usize>> {
 /// How far two modes are from each other in the limits of all criteria; nothing where they are not the same.
 fn distance(a: &Mode, b: &Mode) -> Option<f64> {
     // An integrator has no frequency, and no damping ratio.
-    let real = |mode: &Mode| mode.hz == 0.0 || mode.zeta.abs() >= 1.0 - 1e-9;
+    let real = |mode: &Mode| mode.hz == 0.0 || mode.zeta.abs() >= REAL;
     let frequency = if a.hz == b.hz { 0.0 } else { (a.hz / b.hz).ln().abs() / FREQUENCY.ln() };
     let damping = (a.zeta - b.zeta).abs() / (DAMPING + 0.5 * a.zeta.abs().max(b.zeta.abs()));
     let [shape, size] = residues(&a.residue, &b.residue);

@@ -208,19 +208,19 @@ fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
         chosen: s.order.order,
     };
     let mut all = Vec::new();
-    all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.hansen.deviation)));
     if let Some(direct) = found.direct() {
         all.push(choice(Method::Direct, "plant from u to y", direct));
     }
+    all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.hansen.deviation)));
     all
 }
 
 fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
     let scheme = found.scheme().and_then(|s| Some((s.diagram.as_ref().ok()?, s.hansen.deviation.order.order)));
     let mut all = Vec::new();
-    all.extend(scheme.map(|(d, order)| drawn(d, Method::Hansen.key(), "S from alpha to beta", order)));
     let direct = found.direct_diagram.as_ref().and_then(|d| d.as_ref().ok()).zip(found.direct().map(|d| d.order.order));
     all.extend(direct.map(|(d, order)| drawn(d, Method::Direct.key(), "plant from u to y", order)));
+    all.extend(scheme.map(|(d, order)| drawn(d, Method::Hansen.key(), "S from alpha to beta", order)));
     all
 }
 

@@ -1,6 +1,7 @@
 //! How often the check of the data is wrong: findings on clean logs, and planted defects that are not found.
 //!
-//! `cargo run --release -p youla-loop --example check_rates [clean logs] [logs of each defect] [list]`; the table is in docs/check.md.
+//! `cargo run --release -p youla-loop --example check_rates [clean logs] [logs of each defect] [first seed] [list]`; the table is in
+//! docs/check.md.
 
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
 
@@ -13,6 +14,7 @@ use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rayon::prelude::*;
 use std::error::Error;
+use std::ops::Range;
 use youla_loop::check::{Finding, Severity, Test};
 
 fn clean(seed: usize) -> Recipe {
@@ -48,15 +50,15 @@ fn holds(finding: &Finding, recipe: &Recipe, log: &Log) -> bool {
 fn main() -> Result<(), Box<dyn Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let number = |k: usize, usual: usize| arguments.get(k).and_then(|a| a.parse().ok()).unwrap_or(usual);
-    let (of_clean, of_defects, list) = (number(0, 500), number(1, 20), arguments.len() > 2);
-    clean_logs(of_clean, list)?;
+    let (of_clean, of_defects, first, list) = (number(0, 500), number(1, 20), number(2, 0), arguments.len() > 3);
+    clean_logs(first..first + of_clean, list)?;
     println!("\n| planted | found and named |\n|---|---|");
     let (mut all, mut named) = (0, 0);
     for (place, defect) in defects::ALL.iter().enumerate() {
         let one = |k: usize| -> Result<bool, String> {
-            let recipe = with_defect(defect.name, 100 * place + k);
+            let recipe = with_defect(defect.name, first + 100 * place + k);
             let mut made = log(&recipe).map_err(|e| e.to_string())?;
-            (defect.plant)(&mut made, &mut ChaCha8Rng::seed_from_u64(k as u64));
+            (defect.plant)(&mut made, &mut ChaCha8Rng::seed_from_u64((first + k) as u64));
             let found = made.check().map_err(|e| e.to_string())?;
             let named = defect.is_named_by(&found);
             if list && !named {
@@ -78,9 +80,9 @@ fn main() -> Result<(), Box<dyn Error>> {
         println!("| {} | {count} of {of_defects} |", defect.name);
     }
     let refused = (0..of_defects).filter(|k| {
-        let made = log(&with_defect("NaN", *k));
+        let made = log(&with_defect("NaN", first + *k));
         made.is_ok_and(|mut made| {
-            defects::not_a_number(&mut made, &mut ChaCha8Rng::seed_from_u64(*k as u64));
+            defects::not_a_number(&mut made, &mut ChaCha8Rng::seed_from_u64((first + *k) as u64));
             defects::refused(&made)
         })
     });
@@ -105,7 +107,7 @@ fn with_defect(name: &str, seed: usize) -> Recipe {
     }
 }
 
-fn clean_logs(count: usize, list: bool) -> Result<(), Box<dyn Error>> {
+fn clean_logs(seeds: Range<usize>, list: bool) -> Result<(), Box<dyn Error>> {
     let one = |seed: usize| -> Result<[usize; 3], String> {
         let recipe = clean(seed);
         let made = log(&recipe).map_err(|e| e.to_string())?;
@@ -124,7 +126,8 @@ fn clean_logs(count: usize, list: bool) -> Result<(), Box<dyn Error>> {
         let has = |severity| usize::from(wrong.iter().any(|f| f.severity == severity));
         Ok([has(Severity::Defect), has(Severity::Caution), has(Severity::Note)])
     };
-    let all: Vec<[usize; 3]> = (0..count).into_par_iter().map(one).collect::<Result<_, _>>()?;
+    let count = seeds.len();
+    let all: Vec<[usize; 3]> = seeds.into_par_iter().map(one).collect::<Result<_, _>>()?;
     let sum = |k: usize| all.iter().map(|a| a[k]).sum::<usize>();
     println!("| {count} clean logs | logs |\n|---|---|");
     println!(

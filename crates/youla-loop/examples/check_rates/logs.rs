@@ -10,7 +10,8 @@ use youla::signal::{Channel, Chirp, Excitation, Multisine, Prbs, SquareWaves};
 use youla::{Mat, Result};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
 
-pub(crate) const SHAPES: [&str; 7] = ["white", "prbs", "square", "multisine", "chirp", "steps", "held noise"];
+pub(crate) const SHAPES: [&str; 8] =
+    ["white", "prbs", "square", "multisine", "chirp", "steps", "held noise", "multisine with a gap"];
 
 /// What a log is made of.
 #[derive(Clone, Copy)]
@@ -26,9 +27,33 @@ pub(crate) struct Recipe {
     pub(crate) limit: Option<f64>,
     pub(crate) excited: bool,
     pub(crate) declared: bool,
+    /// Whether the excitation is logged.
+    pub(crate) known: bool,
+    /// Samples for which controller and excitation hold the input.
+    pub(crate) hold: usize,
+    /// Share of the record in which the excitation grows at its start and falls at its end.
+    pub(crate) ramp: f64,
     pub(crate) samples: usize,
     pub(crate) seed: u64,
 }
+
+/// A log of a loop that is excited at its input, with everything declared.
+pub(crate) const PLAIN: Recipe = Recipe {
+    kind: 0,
+    shape: 0,
+    at_reference: false,
+    noise: 0.03,
+    coloured: false,
+    bits: None,
+    limit: None,
+    excited: true,
+    declared: true,
+    known: true,
+    hold: 1,
+    ramp: 0.0,
+    samples: 4000,
+    seed: 0,
+};
 
 #[derive(Clone)]
 pub(crate) struct Log {
@@ -68,6 +93,16 @@ fn excitation(recipe: &Recipe, channels: usize, time: Discrete, rng: &mut ChaCha
             let period = n / [1, 1, 2, 4][rng.random_range(0..4)];
             Excitation::Multisine(Multisine { period, omega_min: low, omega_max: Some(high), ..Multisine::default() })
         }
+        "multisine with a gap" => {
+            let omitted = vec![[low + 0.3 * (high - low), low + 0.5 * (high - low)]];
+            Excitation::Multisine(Multisine {
+                period: n / 2,
+                omega_min: low,
+                omega_max: Some(high),
+                omitted,
+                ..Multisine::default()
+            })
+        }
         "chirp" => Excitation::Chirp(Chirp { omega_start: low, omega_end: high, amplitude: 1.0 }),
         "steps" => return Ok(held(rng, [60, 300], false)),
         "held noise" => {
@@ -86,27 +121,22 @@ fn excitation(recipe: &Recipe, channels: usize, time: Discrete, rng: &mut ChaCha
 }
 
 /// u and y of the loop, sample by sample.
-fn run(
-    machine: &Machine,
-    d: &Mat<f64>,
-    r: &Mat<f64>,
-    noise: &Mat<f64>,
-    limit: f64,
-    step: f64,
-) -> Result<[Mat<f64>; 2]> {
+fn run(machine: &Machine, [d, r, noise]: [&Mat<f64>; 3], limit: f64, step: f64, hold: usize) -> Result<[Mat<f64>; 2]> {
     let (plant, controller) = (Simulator::new(&machine.plant), Simulator::new(&machine.controller));
     let mut x = plant.start(&vec![0.0; machine.plant.order()])?;
     let mut c = controller.start(&vec![0.0; machine.controller.order()])?;
     let (n, m, p) = (d.nrows(), d.ncols(), noise.ncols());
     let (mut u, mut y) = (Mat::zeros(n, m), Mat::zeros(n, p));
-    let zero = vec![0.0; m];
+    let (zero, mut applied) = (vec![0.0; m], vec![0.0; m]);
     for k in 0..n {
         let clean = plant.output(&mut x, &zero).to_vec();
         let round = |v: f64| if step > 0.0 { (v / step).round() * step } else { v };
         let measured: Vec<f64> = (0..p).map(|i| round(clean[i] + noise[(k, i)])).collect();
-        let error: Vec<f64> = (0..p).map(|i| measured[i] - r[(k, i)]).collect();
-        let command = controller.step(&mut c, &error).to_vec();
-        let applied: Vec<f64> = (0..m).map(|j| (command[j] + d[(k, j)]).clamp(-limit, limit)).collect();
+        if k % hold == 0 {
+            let error: Vec<f64> = (0..p).map(|i| measured[i] - r[(k, i)]).collect();
+            let command = controller.step(&mut c, &error).to_vec();
+            applied = (0..m).map(|j| (command[j] + d[(k, j)]).clamp(-limit, limit)).collect();
+        }
         plant.step(&mut x, &applied);
         (0..m).for_each(|j| u[(k, j)] = applied[j]);
         (0..p).for_each(|i| y[(k, i)] = measured[i]);
@@ -124,14 +154,19 @@ pub(crate) fn size(x: &Mat<f64>) -> f64 {
 
 pub(crate) fn log(recipe: &Recipe) -> Result<Log> {
     let mut rng = ChaCha8Rng::seed_from_u64(recipe.seed);
-    let machine = machine(recipe.kind, &mut rng)?;
+    let machine = machine(recipe.kind, recipe.hold, &mut rng)?;
     let (m, p, n) = (machine.plant.inputs(), machine.plant.outputs(), recipe.samples);
     let time = machine.plant.time();
     let zeros = |channels| Mat::<f64>::zeros(n, channels);
     let signal = excitation(recipe, if recipe.at_reference { p } else { m }, time, &mut rng)?;
     let signal = if recipe.excited { signal } else { 0.0 * signal };
+    let size_at = |k: usize| match recipe.ramp * n as f64 {
+        0.0 => 1.0,
+        ramp => (k.min(n - 1 - k) as f64 / ramp).min(1.0),
+    };
+    let signal = Mat::from_fn(n, signal.ncols(), |k, j| size_at(k) * signal[(k / recipe.hold * recipe.hold, j)]);
     let (d, r) = if recipe.at_reference { (zeros(m), signal) } else { (signal, zeros(p)) };
-    let [u, y] = run(&machine, &d, &r, &zeros(p), f64::INFINITY, 0.0)?;
+    let [u, y] = run(&machine, [&d, &r, &zeros(p)], f64::INFINITY, 0.0, recipe.hold)?;
     let (largest, spread) = (u.norm_max(), if recipe.excited { size(&y) } else { 1.0 });
     let mut noise = Mat::from_fn(n, p, |_, _| recipe.noise * spread * rng.sample::<f64, _>(StandardNormal));
     if recipe.coloured {
@@ -139,13 +174,16 @@ pub(crate) fn log(recipe: &Recipe) -> Result<Log> {
     }
     let bits = |largest: f64| recipe.bits.map_or(0.0, |bits| 2.4 * largest / f64::from(bits).exp2());
     let limit = recipe.limit.map_or(f64::INFINITY, |limit| limit * largest);
-    let [mut u, y] = run(&machine, &d, &r, &noise, limit, bits(y.norm_max()))?;
+    let [mut u, y] = run(&machine, [&d, &r, &noise], limit, bits(y.norm_max()), recipe.hold)?;
     if recipe.bits.is_some() {
         let step = bits(u.norm_max());
         u = Mat::from_fn(n, m, |k, j| (u[(k, j)] / step).round() * step);
     }
     let times = (0..n).map(|k| k as f64 * time.ts()).collect();
-    let (d, r) = if recipe.at_reference { (None, Some(r)) } else { (Some(d), None) };
+    let (d, r) = (
+        Some(d).filter(|_| recipe.known && !recipe.at_reference),
+        Some(r).filter(|_| recipe.known && recipe.at_reference),
+    );
     let controller = recipe.declared.then_some(machine.controller);
     Ok(Log { u, y, d, r, times, time, controller, dead_time: machine.dead_time })
 }

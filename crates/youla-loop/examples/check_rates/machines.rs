@@ -15,32 +15,65 @@ pub(crate) struct Machine {
     pub(crate) dead_time: usize,
 }
 
+/// The first five are those of the clean logs and of the planted defects, all are those of the other logs.
 pub(crate) const KINDS: usize = 5;
-const NAMES: [&str; KINDS] = ["flexible modes", "drive with integrator", "levitation", "2 x 2", "dead time"];
+pub(crate) const ALL_KINDS: usize = 8;
+const NAMES: [&str; ALL_KINDS] = [
+    "flexible modes",
+    "drive with integrator",
+    "levitation",
+    "2 x 2",
+    "dead time",
+    "long dead time",
+    "drive with dead time",
+    "tank",
+];
 
 pub(crate) fn name(kind: usize) -> &'static str {
-    NAMES[kind % KINDS]
+    NAMES[kind % ALL_KINDS]
 }
 
 /// The first stable loop of random parameters.
-pub(crate) fn machine(kind: usize, rng: &mut ChaCha8Rng) -> Result<Machine> {
+pub(crate) fn machine(kind: usize, hold: usize, rng: &mut ChaCha8Rng) -> Result<Machine> {
     loop {
         let ts = 1.0 / [500.0, 1000.0, 2000.0, 5000.0][rng.random_range(0..4)];
-        let machine = match kind % KINDS {
-            0 => flexible(rng, ts, 0)?,
-            1 => drive(rng, ts)?,
+        let dead_time = match kind {
+            4 => rng.random_range(1..7),
+            5 => rng.random_range(8..40),
+            6 => rng.random_range(1..5),
+            7 => rng.random_range(0..20),
+            _ => 0,
+        };
+        let machine = match kind {
+            1 | 6 => drive(rng, ts, dead_time)?,
             2 => levitation(rng, ts)?,
             3 => rotor(rng, ts)?,
-            _ => {
-                let dead_time = rng.random_range(1..7);
-                flexible(rng, ts, dead_time)?
-            }
+            5 => slow(rng, ts, dead_time)?,
+            7 => tank(rng, ts, dead_time)?,
+            _ => flexible(rng, ts, dead_time)?,
         };
-        let rig = closed_loop(&machine.plant, &with_input_port(&machine.controller)?)?;
+        let machine = if hold > 1 { slower(machine, hold) } else { machine };
+        let rig = closed_loop(&every(&machine.plant, hold)?, &with_input_port(&machine.controller)?)?;
         if rig.worst_pole()?.is_some_and(|pole| pole.norm() < 0.998) {
             return Ok(machine);
         }
     }
+}
+
+/// The controller for every few samples: the difference of its error grows with the time between them.
+fn slower(machine: Machine, hold: usize) -> Machine {
+    let outputs = machine.controller.outputs();
+    let less = Mat::from_fn(outputs, outputs, |i, j| if i == j { 1.0 / hold as f64 } else { 0.0 });
+    Machine { controller: machine.controller.map_output(&less), ..machine }
+}
+
+/// A plant whose input is held for so many samples.
+fn every(plant: &StateSpace<Discrete>, hold: usize) -> Result<StateSpace<Discrete>> {
+    let (mut a, mut b) = (plant.a().to_owned(), plant.b().to_owned());
+    for _ in 1..hold {
+        (a, b) = (plant.a() * &a, plant.a() * &b + plant.b());
+    }
+    StateSpace::new(a, b, plant.c().to_owned(), plant.d().to_owned(), plant.time())
 }
 
 fn uniform(rng: &mut ChaCha8Rng, low: f64, high: f64) -> f64 {
@@ -97,7 +130,7 @@ fn flexible(rng: &mut ChaCha8Rng, ts: f64, dead_time: usize) -> Result<Machine> 
     Ok(Machine { plant, controller: pid(1, gains, ts)?, dead_time })
 }
 
-fn drive(rng: &mut ChaCha8Rng, ts: f64) -> Result<Machine> {
+fn drive(rng: &mut ChaCha8Rng, ts: f64, dead_time: usize) -> Result<Machine> {
     let time = Discrete::new(ts)?;
     let w = TAU * spread(rng, 0.015, 0.08) / ts;
     let (gain, friction) = (spread(rng, 10.0, 1e4), w * uniform(rng, 0.001, 0.05));
@@ -109,7 +142,8 @@ fn drive(rng: &mut ChaCha8Rng, ts: f64) -> Result<Machine> {
     let wc = w / uniform(rng, 4.0, 12.0);
     let integral = if rng.random() { wc * ts / 15.0 } else { 0.0 };
     let kp = wc * wc / gain * 0.5;
-    Ok(Machine { plant, controller: pid(1, [kp, kp * integral, 2.0 * kp / (wc * ts)], ts)?, dead_time: 0 })
+    let plant = delayed(&plant, dead_time)?;
+    Ok(Machine { plant, controller: pid(1, [kp, kp * integral, 2.0 * kp / (wc * ts)], ts)?, dead_time })
 }
 
 fn levitation(rng: &mut ChaCha8Rng, ts: f64) -> Result<Machine> {
@@ -132,4 +166,25 @@ fn rotor(rng: &mut ChaCha8Rng, ts: f64) -> Result<Machine> {
     let wt = w * ts;
     let gains = [uniform(rng, 0.05, 0.2), uniform(rng, 0.01, 0.1) * wt, uniform(rng, 0.1, 0.4) / wt];
     Ok(Machine { plant: modal(&[first, second], ts)?, controller: pid(2, gains, ts)?, dead_time: 0 })
+}
+
+/// Two lags and a dead time, under PI.
+fn slow(rng: &mut ChaCha8Rng, ts: f64, dead_time: usize) -> Result<Machine> {
+    let gain = spread(rng, 0.1, 30.0);
+    let (first, second) = (spread(rng, 0.003, 0.03) / ts, spread(rng, 0.03, 0.3) / ts);
+    let a = Mat::from_fn(2, 2, |i, j| [[-first, first], [0.0, -second]][i][j]);
+    let (b, c) = (Mat::from_fn(2, 1, |i, _| [0.0, gain * second][i]), Mat::from_fn(1, 2, |_, j| [1.0, 0.0][j]));
+    let plant = StateSpace::new(a, b, c, Mat::zeros(1, 1), Continuous)?.zoh(Discrete::new(ts)?)?;
+    let kp = uniform(rng, 0.3, 0.8) / (gain * first * ts * (dead_time as f64 + 1.0 / (second * ts) + 1.0));
+    Ok(Machine { plant: delayed(&plant, dead_time)?, controller: pid(1, [kp, kp * first * ts, 0.0], ts)?, dead_time })
+}
+
+/// An integrator and a dead time, under P or PI.
+fn tank(rng: &mut ChaCha8Rng, ts: f64, dead_time: usize) -> Result<Machine> {
+    let gain = spread(rng, 0.01, 1.0);
+    let one = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+    let plant = StateSpace::new(one(1.0), one(gain), one(1.0), one(0.0), Discrete::new(ts)?)?;
+    let kp = uniform(rng, 0.1, 0.4) / (gain * (dead_time as f64 + 2.0));
+    let ki = if rng.random() { 0.05 * kp / (dead_time as f64 + 2.0) } else { 0.0 };
+    Ok(Machine { plant: delayed(&plant, dead_time)?, controller: pid(1, [kp, ki, 0.0], ts)?, dead_time })
 }

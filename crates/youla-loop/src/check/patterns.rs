@@ -13,9 +13,12 @@ const EXPLAINED: f64 = 0.8;
 /// Chosen; no false alarm in 200 simulated clean records (`docs/check.md`).
 const TAIL: f64 = 0.995;
 
-/// Least size of a pattern, in deviations of the output: below is rounding of noise-free logs.
-/// Chosen, not measured.
-const ROUNDING: f64 = 1e-6;
+/// Least size of a wrong sample, in deviations of the output. A converter of 12 bits over a range of 8 deviations has steps of 2e-3, and half
+/// of one is rounding. In a log with less noise the innovation is what the regression cannot follow, which has no distribution to test against.
+const ROUNDING: f64 = 1e-3;
+/// The same in the first samples, where a state from before the record still acts, which a regression of finite length cannot follow: a
+/// tank with a dead time leaves 8e-3.
+const AT_THE_START: f64 = 0.03;
 /// Most wrong samples in a row that are told from a burst.
 /// Chosen, not measured.
 const IN_A_ROW: usize = 3;
@@ -81,10 +84,12 @@ impl<'a> Search<'a> {
         let mut sorted: Vec<f64> = lambda.iter().map(|v| v.abs()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
         let sigma = quantile(&sorted, 0.5) / MEDIAN;
-        let least = (options.outlier * sigma).max(2.0 * quantile(&sorted, TAIL)).max(ROUNDING);
+        let least = (options.outlier * sigma).max(2.0 * quantile(&sorted, TAIL)).max(ROUNDING * self.length);
         let total: f64 = self.e.iter().map(|v| v * v).sum();
         let (mut found, mut taken, mut rest) = (Vec::new(), 0.0, Vec::new());
         let (mut jump, reach) = (None, self.a.len());
+        let start = lambda.iter_mut().take(2 * reach);
+        start.filter(|l| l.abs() < AT_THE_START * self.length).for_each(|l| *l = 0.0);
         for _ in 0..PLACES {
             let Some((k, l)) = lambda.iter().copied().enumerate().max_by(|x, y| x.1.abs().total_cmp(&y.1.abs())) else {
                 break;

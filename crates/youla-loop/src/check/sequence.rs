@@ -47,9 +47,13 @@ const SIZE: f64 = 0.05;
 /// Breaks that are looked for; more are no accident.
 const PLACES: usize = 3;
 
-/// Breaks of a record of m inputs, p outputs and known excitations, in this order.
+/// Breaks of a record of m inputs, p outputs and known excitations, in this order. None without an excitation in the log: where one
+/// begins or changes that is not logged, the equation breaks as at a lost row.
 pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize) -> Result<Vec<Break>> {
     let mut all = Vec::new();
+    if known == 0 {
+        return Ok(all);
+    }
     for input in 0..m {
         let outside = m + p..m + p + known;
         let columns =

@@ -9,26 +9,17 @@ mod logs;
 #[allow(dead_code)]
 #[path = "../../examples/check_rates/machines.rs"]
 mod machines;
+#[allow(dead_code)]
+#[path = "../../examples/check_rates/recipes.rs"]
+mod recipes;
 
-use logs::{Recipe, SHAPES, log};
+use logs::{PLAIN, Recipe, SHAPES, log};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use youla_loop::check::{Severity, Test};
 
 fn recipe(kind: usize, shape: usize, seed: u64) -> Recipe {
-    Recipe {
-        kind,
-        shape,
-        at_reference: false,
-        noise: 0.03,
-        coloured: false,
-        bits: None,
-        limit: None,
-        excited: true,
-        declared: true,
-        samples: 4000,
-        seed,
-    }
+    Recipe { kind, shape, seed, ..PLAIN }
 }
 
 /// Every shape on every plant, with and without the controller declared, noise-free too: a log of a loop whose controller is not
@@ -48,6 +39,18 @@ fn every_shape_of_excitation_is_clean() {
             let dead_time = found.iter().find(|f| f.what.contains("dead time")).map(|f| f.numbers["lag"]);
             assert!(dead_time.is_none_or(|lag| lag == made.dead_time as f64 + 1.0), "{dead_time:?}");
         }
+    }
+}
+
+/// Noise-free logs of tanks and loops with dead time that start from rest, and chirps that are not logged, which begin in one channel where
+/// they end in the other: neither wrong samples nor lost rows.
+#[test]
+fn a_start_from_rest_is_no_wrong_sample() {
+    for seed in [60_267, 60_316, 60_476, 60_859] {
+        let made = log(&recipes::other(seed)).unwrap();
+        let found = made.check().unwrap();
+        let wrong: Vec<_> = found.iter().filter(|f| f.severity == Severity::Defect).map(|f| f.sentence()).collect();
+        assert!(wrong.is_empty(), "{seed}: {wrong:?}");
     }
 }
 

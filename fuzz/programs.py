@@ -94,11 +94,8 @@ order = 4
 [direct]
 horizon = 10
 order = 4
-[stabilisation]
-max_order = 4
 [frequency_response]
 window = 64
-points = 20
 '''
 
 
@@ -120,7 +117,8 @@ def numbers_changed(text, rng):
     """A number or a text of TOML or JSON replaced by one that means something else."""
     import re
     for _ in range(rng.randint(1, 2)):
-        found = list(re.finditer(r'-?\d+(\.\d*)?(e[-+]?\d+)?|"[^"\n]*"|\[\[?[^\[\]]*\]', text))
+        found = [one for one in re.finditer(r'-?\d+(\.\d*)?(e[-+]?\d+)?|"[^"\n]*"|\[\[?[^\[\]]*\]', text)
+                 if text[text.rfind('\n', 0, one.start()) + 1:one.start()].strip() or one.group()[0] not in '["']
         if not found: return text
         one = rng.choice(found)
         new = rng.choice(NUMBERS) if rng.random() < 0.8 else '[' * 300 + ']' * 300

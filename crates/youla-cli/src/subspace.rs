@@ -82,6 +82,7 @@ fn readable(file: &Path) -> Result<(), Failure> {
     let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
     let found = match extension.as_str() {
         "mat" => "a MATLAB file",
+        "h5" | "hdf5" => "an HDF5 file",
         "npz" => "a NumPy archive",
         "parquet" => "a Parquet file",
         _ => return Ok(()),

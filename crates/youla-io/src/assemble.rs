@@ -14,6 +14,9 @@ pub(super) fn only(mut parts: Vec<Record>) -> Result<Record> {
     Ok(parts.remove(0))
 }
 
+/// Largest magnitude of a value; the squares and sums of larger ones overflow.
+const LARGEST: f64 = 1e100;
+
 /// The records, one for each part without gaps, of columns of equal length.
 pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>], clock: Clock) -> Result<Vec<Record>> {
     let samples = columns.first().map_or(0, Vec::len);
@@ -21,6 +24,13 @@ pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>],
         if column.len() != samples {
             let (what, channel, found) = (what.to_owned(), channel.name.clone(), column.len());
             return Err(Error::UnequalLength { what, channel, found, expected: samples });
+        }
+    }
+    for (channel, column) in channels.iter().zip(columns) {
+        if let Some(row) = column.iter().position(|v| v.is_finite() && v.abs() > LARGEST) {
+            let what = format!("{what}: channel {:?} in row {} (counted from 1)", channel.name, row + 1);
+            let must = "at most 1e100 in magnitude; check its unit and the type of the numbers in the file";
+            return Err(Error::Method(youla::Error::OutOfRange { what, value: column[row], must }));
         }
     }
     let ends = clock.parts.iter().skip(1).map(|part| part.0).chain([samples]);

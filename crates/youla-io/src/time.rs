@@ -66,7 +66,9 @@ impl TimeSource {
         match (column, self.ts) {
             (None, None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
             (None, Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, 0.0)),
-            (Some([start]), Some(ts)) => Ok(Clock::whole(Discrete::new(ts)?, *start)),
+            (Some(times @ ([] | [_])), Some(ts)) => {
+                Ok(Clock::whole(Discrete::new(ts)?, times.first().copied().unwrap_or(0.0)))
+            }
             (Some([] | [_]), None) => Err(Error::SampleTimeMissing { what: what.to_owned() }),
             (Some(times), declared) => self.measured(what, times, declared),
         }
@@ -230,5 +232,6 @@ mod tests {
         assert!(TimeSource::default().resolve("t", Some(&[0.0, 0.0, 0.0])).is_err());
         assert!(TimeSource::default().resolve("t", None).is_err());
         assert!(TimeSource::default().resolve("t", Some(&[1.0])).is_err());
+        assert_eq!(TimeSource::ts(0.1).resolve("t", Some(&[])).unwrap().parts, [(0, 0.0)]);
     }
 }

@@ -179,7 +179,7 @@ fn require_rest(record: &ExperimentRecord, settle: usize) -> Result<()> {
 
 /// Persistency up to the block rows that the identification of S needs.
 fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
-    let order = settings.hansen.horizon.future() + settings.hansen.horizon.past();
+    let order = settings.hansen.horizon.future().saturating_add(settings.hansen.horizon.past());
     // At least eight half-overlapping windows, of a record of 20 000 samples those of the default.
     let welch = Welch::default();
     let window = welch.window.min(record.alpha.nrows() / 4).max(2);

@@ -135,11 +135,11 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
     }
     let files = settings.data.labelled();
     let found = files.iter().find(|(label, _)| label == name);
-    found.map_or((String::new(), 1), |(_, f)| (f.file.display().to_string(), f.skip + 1))
+    found.map_or((String::new(), 1), |(_, f)| (f.file.display().to_string(), f.skip.saturating_add(1)))
 }
 
 fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
-    let horizons = (!hansen.horizon.is_auto()).then(|| hansen.horizon.past() + hansen.horizon.future());
+    let horizons = (!hansen.horizon.is_auto()).then(|| hansen.horizon.past().saturating_add(hansen.horizon.future()));
     CheckOptions { excitation_order: options.excitation_order.or(horizons), ..options.clone() }
 }
 

@@ -1,7 +1,7 @@
 //! `[controller]` of run.toml: every form in which users have their controllers.
 
 use super::explain::forms;
-use super::models::{Domain, Polynomials, matrix, model_file};
+use super::models::{Domain, Polynomials, matrix, model_file, sized};
 use super::pid::{IdealPid, ParallelPid};
 use super::refuse;
 use crate::Result;
@@ -204,7 +204,7 @@ impl ControllerSettings {
                 (feedback, *delay, system)
             }
             Self::StateSpace { feedback, hold, a, b, c, d, delay, .. } => {
-                let (a, b, c, d) = (matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?);
+                let [a, b, c, d] = sized([matrix("A", a)?, matrix("B", b)?, matrix("C", c)?, matrix("D", d)?]);
                 let system = match hold {
                     None => StateSpace::new(a, b, c, d, time)?,
                     Some(hold) => held(&StateSpace::new(a, b, c, d, Continuous)?, *hold, time)?,

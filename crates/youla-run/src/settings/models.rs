@@ -114,7 +114,17 @@ impl NominalModel {
     }
 }
 
-fn sampled([a, b, c, d]: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+/// The matrices of a gain without states, whose empty lists say nothing of their other size.
+pub(super) fn sized([a, b, c, d]: [Mat<f64>; 4]) -> [Mat<f64>; 4] {
+    if a.nrows() > 0 || b.nrows() > 0 || c.ncols() > 0 {
+        return [a, b, c, d];
+    }
+    let (b, c) = (Mat::zeros(0, d.ncols()), Mat::zeros(d.nrows(), 0));
+    [Mat::zeros(0, 0), b, c, d]
+}
+
+fn sampled(matrices: [Mat<f64>; 4], domain: Domain, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let [a, b, c, d] = sized(matrices);
     match domain {
         Domain::Continuous => Ok(StateSpace::new(a, b, c, d, Continuous)?.zoh(time)?),
         Domain::Discrete => Ok(StateSpace::new(a, b, c, d, time)?),

@@ -167,3 +167,15 @@ fn what_a_controller_lacks_is_named() {
         assert!(error.contains(says), "{controller}\n{error}");
     }
 }
+
+/// A gain has no states, and empty lists for them.
+#[test]
+fn a_gain_in_state_space_has_empty_lists() {
+    let expected: Vec<f64> = error().iter().map(|e| -0.5 * e).collect();
+    for c in ["[]", "[[]]"] {
+        assert_close(
+            &format!("[state_space]\nfeedback = \"positive\"\na = []\nb = []\nc = {c}\nd = [[-0.5]]\n"),
+            &expected,
+        );
+    }
+}

@@ -9,7 +9,7 @@ mod display;
 mod limits;
 mod names;
 
-pub use display::{Names, Pole, Seconds};
+pub use display::{Names, Pole, Seconds, Value};
 pub use limits::OrderLimit;
 pub use names::{misspelt, nearest_name};
 
@@ -61,7 +61,7 @@ pub enum Error {
         column: usize,
     },
     /// A quantity lies outside of the range in which it has a meaning.
-    #[error("{what} is {value}, but must be {must}")]
+    #[error("{what} is {}, but must be {must}", Value(*value))]
     OutOfRange {
         /// Which quantity.
         what: String,
@@ -269,7 +269,9 @@ pub enum Error {
         name: String,
     },
     /// A value of a record is NaN or infinite.
-    #[error("{what}: channel {channel:?} is not finite in row {row} (counted from 1)")]
+    #[error(
+        "{what}: channel {channel:?} is not finite in row {row} (counted from 1); leave the row out of the file and use the rows before and after it as two records"
+    )]
     NotFiniteSample {
         /// The record or file.
         what: String,

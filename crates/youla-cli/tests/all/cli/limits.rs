@@ -25,6 +25,33 @@ fn pipes_and_devices() {
     assert!(youla(&folder, &["check", "/dev/zero"]).stderr.contains(what));
 }
 
+/// Numbers near the largest one are refused or of no consequence.
+#[test]
+fn horizons_and_rows_near_the_largest_number() {
+    let largest = "18446744073709551615";
+    let horizon = format!("[hansen]\nhorizon = {largest}\n[direct]\nhorizon = {largest}\n");
+    for (place, text) in [("skip = 1200", format!("skip = {largest}")), ("[nominal", format!("{horizon}[nominal"))] {
+        let folder = loop_folder("largest", &[("run.toml", settings(place, &text).as_bytes())]);
+        for verb in [&["check", "run.toml"][..], &["identify", "run.toml", "--out", "run", "--force"]] {
+            let found = youla(&folder, verb);
+            assert!(matches!(found.code, Some(0..=3)), "{text}: {verb:?}: {:?} {}", found.code, found.stderr);
+        }
+    }
+}
+
+/// Values whose squares overflow are refused where they are read, in few digits.
+#[test]
+fn values_of_1e300() {
+    let rows: Vec<[f64; 4]> = log().into_iter().map(|[t, u, d, y]| [t, u, d, 1e300 * y]).collect();
+    let folder = loop_folder("overflow", &[("log.csv", csv(&rows).as_bytes())]);
+    for verb in [&["check", "run.toml"][..], &["identify", "run.toml", "--out", "run"]] {
+        let found = youla(&folder, verb);
+        assert_eq!(found.code, Some(2), "{}", found.stderr);
+        let few = found.stderr.len() < 400;
+        assert!(few && found.stderr.contains("at most 1e100 in magnitude"), "{}", found.stderr);
+    }
+}
+
 #[test]
 fn verification_records_of_few_rows() {
     for rows in [1, 2, 10, 29, 30, 31, 41, 60] {

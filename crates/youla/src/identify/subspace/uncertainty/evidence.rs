@@ -55,7 +55,9 @@ impl SubspaceData<'_> {
         let options = self.options_of_halves(order, options).map_err(failed)?;
         let experiments = self.channels.beyond_disturbances().map_err(failed)?;
         let samples: usize = experiments.iter().map(|s| s.u.nrows() / 2).sum();
-        let count = (samples / (3 * (options.horizon.past() + options.horizon.future()))).clamp(BLOCKS.0, BLOCKS.1);
+        let count = (samples
+            / options.horizon.past().saturating_add(options.horizon.future()).saturating_mul(3).max(1))
+        .clamp(BLOCKS.0, BLOCKS.1);
         let of = |half| self.score(&experiments, &options, half, count);
         let (first, second) = rayon::join(|| of(0), || of(1));
         let (first, second) = (first.map_err(failed)?, second.map_err(failed)?);

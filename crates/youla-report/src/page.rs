@@ -75,7 +75,7 @@ fn digits(value: f64, count: i32) -> String {
         v if !v.is_finite() => "not known".into(),
         0.0 => "0".into(),
         v if v.abs() < 1e-5 => format!("{v:.1e}"),
-        v => format!("{v:.0$}", super::numbers::decimals(v, count as i32).clamp(0, 12) as usize),
+        v => format!("{v:.0$}", super::numbers::decimals(v, count).clamp(0, 12) as usize),
     }
 }
 

@@ -92,7 +92,7 @@ mod tests {
             mode(61.0, 0.01, &[[1.0, 0.0], [0.0, 0.0]]),
         ];
         for other in others {
-            assert_eq!(matched(&[other.clone()], std::slice::from_ref(&light)), [None], "{other:?}");
+            assert_eq!(matched(std::slice::from_ref(&other), std::slice::from_ref(&light)), [None], "{other:?}");
         }
     }
 

@@ -85,7 +85,9 @@ mod whitening;
 pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
 pub use cost::greybox_cost;
-pub use declared::{Declaration, DeclaredStructure, DerivedValue, Entry, Parameter, ParameterDeclaration, Template};
+pub use declared::{
+    Declaration, DeclaredStructure, DerivedValue, Entry, NamedExpression, Parameter, ParameterDeclaration, Template,
+};
 pub use error::{Error, Result};
 pub use identifiability::{Combination, Part, Undetermined};
 pub use intervals::{

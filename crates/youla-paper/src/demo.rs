@@ -165,6 +165,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
             outputs: channels(OUTPUTS, "y", "um"),
             input_excitation: Vec::new(),
             reference: Vec::new(),
+            computed: std::collections::BTreeMap::new(),
             alpha: channels(["alpha_h", "alpha_v"], "alpha", "V"),
             csv: CsvOptions::default(),
             detrend: Detrend::None,

@@ -141,9 +141,20 @@ impl Writer<'_> {
             None => {}
         }
         self.diagram("4-identify/stabilisation_direct", found.direct_diagram.as_ref(), y)?;
+        self.grey_box()?;
         match &found.scheme {
             Some(Ok(scheme)) => self.scheme(scheme),
             Some(Err(e)) => self.refused("4-identify/deviation.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// The physical structure.
+    fn grey_box(&self) -> Result<()> {
+        self.uncertainty("4-identify/grey_box_uncertainty.json", &self.found.grey_box_uncertainty)?;
+        match &self.found.grey_box {
+            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &run.details()?),
+            Some(Err(e)) => self.refused("4-identify/grey_box.json", e),
             None => Ok(()),
         }
     }
@@ -162,12 +173,6 @@ impl Writer<'_> {
         let known = &scheme.uncertainty;
         self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
         self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
-        self.uncertainty("4-identify/grey_box_uncertainty.json", &known.grey_box)?;
-        match &scheme.grey_box {
-            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &run.details()?)?,
-            Some(Err(e)) => self.refused("4-identify/grey_box.json", e)?,
-            None => {}
-        }
         match &scheme.reduction {
             Some(Ok(r)) => {
                 self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &r.details())?;

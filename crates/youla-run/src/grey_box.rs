@@ -1,14 +1,13 @@
 //! A physical structure in a run: the prediction-error method, started from the result of the scheme, with intervals, and
 //! beside other structures.
 
-use super::context::SchemeContext;
+use super::context::RunContext;
 use super::entries::OrRefused;
-use super::grey_box_loop::{Criterion, outputs_without_lines};
+use super::grey_box_loop::{Criterion, SchemeStart, StructureSearch, outputs_without_lines};
 use super::settings::{AlternativeStructure, GreyBoxSettings};
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use youla::identify::hansen::HansenModel;
-use youla_greybox::hansen_pem::{HansenPem, HansenPemOptions, PemRun, PemStart};
+use youla_greybox::hansen_pem::{HansenPemOptions, PemRun, PemStart};
 use youla_greybox::{
     Declaration, DeclaredStructure, GreyBoxIntervals, IntervalOptions, ResidualTest, Stop, Structure, compare,
     likelihood_ratio,
@@ -20,30 +19,29 @@ use youla_report::data::{PhysicalEstimate, PhysicalParameter, PhysicalStructure}
 pub struct GreyBoxRun {
     /// The structure.
     pub structure: DeclaredStructure,
-    /// Projections, searches and the best model.
-    pub found: HansenPem,
+    /// Searches and the best model.
+    pub found: StructureSearch,
     /// Its intervals, or why there are none.
     pub intervals: Result<GreyBoxIntervals>,
     /// This structure and the alternatives; empty without any.
     pub compared: Vec<PhysicalStructure>,
 }
 
-/// Estimates the structure, where one is declared.
-pub(super) fn grey_box(context: SchemeContext<'_>, hansen: &HansenModel) -> Option<Result<GreyBoxRun>> {
-    let asked = context.run.settings.grey_box.as_ref()?;
-    Some(estimate(context, hansen, asked).map_err(|e| e.within("[grey_box]")))
+/// Estimates the structure, where one is declared; from its initial values where the scheme gave no model.
+pub(super) fn grey_box(run: RunContext<'_>, start: Option<SchemeStart<'_>>) -> Option<Result<GreyBoxRun>> {
+    let asked = run.settings.grey_box.as_ref()?;
+    Some(estimate(run, start, asked).map_err(|e| e.within("[grey_box]")))
 }
 
-fn estimate(context: SchemeContext<'_>, hansen: &HansenModel, asked: &GreyBoxSettings) -> Result<GreyBoxRun> {
-    let run = context.run;
+fn estimate(run: RunContext<'_>, start: Option<SchemeStart<'_>>, asked: &GreyBoxSettings) -> Result<GreyBoxRun> {
     let outputs = outputs_without_lines(run.records)?;
     let options =
         HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.search(), ..HansenPemOptions::default() };
-    let criterion = Criterion::new(asked.prediction, context, &outputs, &options)?;
-    let of = |declaration: &Declaration| -> Result<(DeclaredStructure, HansenPem)> {
+    let criterion = Criterion::new(asked.prediction, run, &outputs, &options)?;
+    let of = |declaration: &Declaration| -> Result<(DeclaredStructure, StructureSearch)> {
         let structure = DeclaredStructure::new(declaration)?;
-        let nominal = asked.start_from_initial.then(|| structure.start());
-        let found = criterion.estimate(hansen, &structure, nominal.as_deref())?;
+        let nominal = (asked.start_from_initial || start.is_none()).then(|| structure.start());
+        let found = criterion.estimate(start, &structure, nominal.as_deref())?;
         Ok((structure, found))
     };
     let (structure, found) = of(&asked.structure)?;
@@ -56,8 +54,8 @@ fn estimate(context: SchemeContext<'_>, hansen: &HansenModel, asked: &GreyBoxSet
 
 /// The structures beside each other.
 fn table(
-    declared: &HansenPem,
-    others: &[(&AlternativeStructure, Result<HansenPem>)],
+    declared: &StructureSearch,
+    others: &[(&AlternativeStructure, Result<StructureSearch>)],
 ) -> Result<Vec<PhysicalStructure>> {
     let estimated = others.iter().filter_map(|(other, found)| Some((other.name.as_str(), &found.as_ref().ok()?.model)));
     let models: Vec<_> = [("[grey_box.structure]", &declared.model)].into_iter().chain(estimated).collect();
@@ -174,7 +172,7 @@ impl GreyBoxRun {
     /// What summary.json says of the structure.
     pub(super) fn entry(&self) -> Result<PhysicalEntry> {
         let PhysicalEstimate { level, verdict, correlations, structures, .. } = self.shown();
-        let (parameters, local_minimum_suspected) = (self.rows()?, self.found.local_minimum_suspected());
+        let (parameters, local_minimum_suspected) = (self.rows()?, self.found.local_minimum_suspected);
         Ok(PhysicalEntry { parameters, level, correlations, verdict, structures, local_minimum_suspected })
     }
 }

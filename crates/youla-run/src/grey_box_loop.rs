@@ -7,12 +7,12 @@
 //! ```
 //! The second is for plants that integrate or are unstable, whose simulation drifts with every error of u.
 
-use super::context::SchemeContext;
+use super::context::RunContext;
 use super::disturbance::without_lines;
 use super::records::{LoopRecord, RunRecords};
 use super::settings::Prediction;
 use super::signals::DeviationSignals;
-use crate::Result;
+use crate::{Error, Result};
 use faer::Scale;
 use youla::Mat;
 use youla::control::with_input_port;
@@ -23,7 +23,7 @@ use youla::linalg::block;
 use youla::lti::{Discrete, Partitioned, StateSpace};
 use youla::validate::{LoopExcitation, fit, predict_closed_loop};
 use youla_greybox::hansen_pem::{
-    HansenPem, HansenPemOptions, PemStart, SchemeData, pem_from_hansen, projection_target,
+    HansenPem, HansenPemOptions, PemRun, PemStart, SchemeData, pem_from_hansen, projection_target,
 };
 use youla_greybox::projected_pem::{projected, searched};
 use youla_greybox::{
@@ -37,10 +37,39 @@ pub(super) fn outputs_without_lines(records: &RunRecords) -> Result<Vec<Mat<f64>
     records.estimation.iter().map(measured).collect()
 }
 
+/// The searches for the parameters of a structure.
+#[derive(Debug)]
+pub struct StructureSearch {
+    /// The searches.
+    pub runs: Vec<PemRun>,
+    /// Which of them won.
+    pub won: PemStart,
+    /// Its model, with the covariance of the parameters.
+    pub model: GreyBoxModel,
+    /// Fit of G(S) to the same records, percent per output; `None` where the scheme gave no model.
+    pub fit_of_plant: Option<Vec<f64>>,
+    /// Whether the fit is clearly below that of G(S): a local minimum, or a structure that does not describe the plant.
+    pub local_minimum_suspected: bool,
+}
+
+impl From<HansenPem> for StructureSearch {
+    fn from(found: HansenPem) -> Self {
+        let local_minimum_suspected = found.local_minimum_suspected();
+        let HansenPem { runs, won, model, fit_of_plant, .. } = found;
+        StructureSearch { runs, won, model, fit_of_plant: Some(fit_of_plant), local_minimum_suspected }
+    }
+}
+
+/// The result of the scheme, from which the search may start.
+#[derive(Clone, Copy)]
+pub(super) struct SchemeStart<'a> {
+    pub(super) factors: &'a CoprimeFactors<Discrete>,
+    pub(super) signals: &'a DeviationSignals,
+    pub(super) hansen: &'a HansenModel,
+}
+
 /// Data, loop and choices of the estimation.
 pub(super) struct Criterion<'a> {
-    factors: &'a CoprimeFactors<Discrete>,
-    signals: &'a DeviationSignals,
     records: &'a RunRecords,
     outputs: &'a [Mat<f64>],
     options: &'a HansenPemOptions,
@@ -58,17 +87,16 @@ struct Closed {
 impl<'a> Criterion<'a> {
     pub(super) fn new(
         prediction: Prediction,
-        context: SchemeContext<'a>,
+        run: RunContext<'a>,
         outputs: &'a [Mat<f64>],
         options: &'a HansenPemOptions,
     ) -> Result<Self> {
-        let SchemeContext { run, factorisation, signals } = context;
         let records = run.records;
         let closed = match prediction {
             Prediction::OpenLoop => None,
-            Prediction::ClosedLoop => Some(Closed::new(context)?),
+            Prediction::ClosedLoop => Some(Closed::new(run)?),
         };
-        Ok(Criterion { factors: &factorisation.factors, signals, records, outputs, options, closed })
+        Ok(Criterion { records, outputs, options, closed })
     }
 
     fn experiments(&self) -> Vec<Experiment<'_>> {
@@ -79,21 +107,24 @@ impl<'a> Criterion<'a> {
         self.outputs.iter().enumerate().map(|(k, y)| Experiment::new(input(k), y.as_ref())).collect()
     }
 
-    /// The best of the searches from the projection of G(S) and from the initial values.
+    /// The best of the searches from the projection of G(S), where there is one, and from the initial values.
     pub(super) fn estimate(
         &self,
-        hansen: &HansenModel,
+        start: Option<SchemeStart<'_>>,
         structure: &DeclaredStructure,
         nominal: Option<&[f64]>,
-    ) -> Result<HansenPem> {
-        let (signals, hansen) = (&self.signals.experiments, hansen.clone());
+    ) -> Result<StructureSearch> {
+        let Some(SchemeStart { factors, signals, hansen }) = start else {
+            return self.from_initial_values(structure, nominal);
+        };
+        let (signals, hansen) = (&signals.experiments, hansen.clone());
         let Some(closed) = &self.closed else {
             let experiments = &self.experiments();
-            let data = SchemeData { factors: self.factors, signals };
+            let data = SchemeData { factors, signals };
             let problem = Problem::new(structure, experiments, self.records.time);
-            return Ok(pem_from_hansen(hansen, data, &problem, nominal, self.options)?);
+            return Ok(pem_from_hansen(hansen, data, &problem, nominal, self.options)?.into());
         };
-        let target = projection_target(self.factors, &hansen.deviation.model, signals, self.options)?;
+        let target = projection_target(factors, &hansen.deviation.model, signals, self.options)?;
         let cost = |theta: &[f64]| self.cost(closed, structure, theta);
         let order = projected(structure, &target, nominal, &self.options.projection, cost)?;
         let best = order.first().map(|(cost, p)| (PemStart::Projection, *cost, p.start(structure)));
@@ -109,7 +140,21 @@ impl<'a> Criterion<'a> {
         };
         let fit_of_plant = self.fit_of_plant(closed, &hansen.plant)?;
         let projections = order.into_iter().map(|(_, projection)| projection).collect();
-        Ok(HansenPem { hansen, projections, runs, won, model, fit_of_plant })
+        Ok(HansenPem { hansen, projections, runs, won, model, fit_of_plant }.into())
+    }
+
+    /// The search where the scheme gave no model.
+    fn from_initial_values(&self, structure: &DeclaredStructure, nominal: Option<&[f64]>) -> Result<StructureSearch> {
+        let (theta, options) = (nominal.ok_or(youla_greybox::Error::NoStart)?, &self.options.pem);
+        let (experiments, time) = (&self.experiments(), self.records.time);
+        let search = |options: &GreyBoxOptions| match &self.closed {
+            None => greybox(&Problem::new(structure, experiments, time), theta, options),
+            Some(closed) => self.search(closed, structure, theta, options),
+        };
+        let cost_at_start = search(&GreyBoxOptions { max_iterations: 0, ..options.clone() })?.cost;
+        let (model, start) = (search(options)?, PemStart::Nominal);
+        let runs = vec![PemRun { start, cost_at_start, cost: Ok(model.cost) }];
+        Ok(StructureSearch { runs, won: start, model, fit_of_plant: None, local_minimum_suspected: false })
     }
 
     /// Intervals of an estimate.
@@ -165,10 +210,19 @@ impl<'a> Criterion<'a> {
 }
 
 impl Closed {
-    fn new(context: SchemeContext<'_>) -> Result<Self> {
-        let (records, controller) = (context.run.records, &context.run.declared.controller);
+    fn new(run: RunContext<'_>) -> Result<Self> {
+        let (records, controller) = (run.records, &run.declared.controller);
         let with_alpha = records.estimation.iter().any(|r| r.alpha.is_some());
-        let ports = if with_alpha { context.factorisation.factors.j_k()? } else { with_input_port(controller)? };
+        let ports = match run.factorisation.filter(|_| with_alpha) {
+            Some(factorisation) => factorisation.factors.j_k()?,
+            None if with_alpha => {
+                return Err(Error::Method(youla::Error::Unsupported {
+                    what: "prediction = \"closed-loop\" with an excitation alpha but without coprime factors",
+                    instead: "correct what the run says of the factors, or log the excitation at the plant input",
+                }));
+            }
+            None => with_input_port(controller)?,
+        };
         let (m, p) = (controller.outputs(), controller.inputs());
         let external = records.estimation.iter().map(|r| {
             let (no_input, no_reference) = (Mat::zeros(r.samples(), m), Mat::zeros(r.samples(), p));

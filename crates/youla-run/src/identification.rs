@@ -37,6 +37,10 @@ pub struct Identification {
     pub filtered: Result<Filtered>,
     /// The modified Hansen scheme and what rests on it; `None` where alpha and beta do not exist.
     pub scheme: Option<Result<SchemeRun>>,
+    /// The physical structure where one was declared.
+    pub grey_box: Option<Result<GreyBoxRun>>,
+    /// Its uncertainty, where it can be had.
+    pub grey_box_uncertainty: Option<SystemUncertainty>,
     /// The direct model where it was asked for.
     pub direct: Option<Result<SubspaceModel>>,
     /// The stabilisation diagram of the direct model.
@@ -67,12 +71,10 @@ pub struct SchemeRun {
     pub refinement: Option<Refinement>,
     /// The stabilisation diagram of S.
     pub diagram: Result<StabilisationDiagram>,
-    /// The uncertainty of S, of G(S) and of the physical structure.
+    /// The uncertainty of S and of G(S).
     pub uncertainty: RunUncertainty,
     /// `G_red(S)` in its loop where it was asked for.
     pub reduction: Option<Result<RunReduction>>,
-    /// The physical structure where one was declared.
-    pub grey_box: Option<Result<GreyBoxRun>>,
     /// The loop of G(S): the exact test, the region of S, errors in the description of the controller.
     pub certificate: RunCertificate,
     /// The new controller where it was asked for.
@@ -100,7 +102,7 @@ impl Identification {
             refusal(Method::Hansen.key(), "model by the Hansen scheme", self.scheme.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
             refusal(Method::HansenReduced.key(), "reduced model", scheme.and_then(|s| s.reduction.as_ref())),
-            refusal(Method::GreyBox.key(), "grey-box model", scheme.and_then(|s| s.grey_box.as_ref())),
+            refusal(Method::GreyBox.key(), "grey-box model", self.grey_box.as_ref()),
             refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
@@ -128,7 +130,7 @@ impl Identification {
 
     /// The estimate of the physical structure, where there is one.
     pub(crate) fn structure(&self) -> Option<&GreyBoxRun> {
-        found(self.scheme()?.grey_box.as_ref())
+        found(self.grey_box.as_ref())
     }
 
     /// The new controller, where there is one.
@@ -138,7 +140,11 @@ impl Identification {
 
     /// The uncertainty of the model that a method of the scheme gave.
     pub fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
-        self.scheme()?.uncertainty.of(method)
+        match method {
+            Method::Hansen => self.scheme()?.uncertainty.plant.as_ref(),
+            Method::GreyBox => self.grey_box_uncertainty.as_ref(),
+            _ => None,
+        }
     }
 
     /// Whether and how well the declared controller explains the inputs; see [`DeviationSignals::controller_mismatch`].

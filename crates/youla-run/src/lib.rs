@@ -4,6 +4,7 @@ mod artefacts;
 mod certificate;
 mod check;
 mod compare;
+mod computed;
 mod context;
 mod controller_errors;
 mod direct;
@@ -68,6 +69,7 @@ pub use factorise::{DeclaredLoop, LoopFactors, declared_loop, factorise, factori
 pub use findings::cautions;
 pub use folder::write_artefacts;
 pub use grey_box::{GreyBoxRun, PhysicalEntry};
+pub use grey_box_loop::StructureSearch;
 pub use identification::{Filtered, Identification, Refusal, SchemeRun};
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;

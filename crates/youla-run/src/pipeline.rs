@@ -6,6 +6,7 @@ use super::context::{RunContext, SchemeContext};
 use super::direct::direct;
 use super::factorise::{declared_loop, factorise_run};
 use super::grey_box::{GreyBoxRun, grey_box};
+use super::grey_box_loop::SchemeStart;
 use super::identification::{Filtered, Identification, SchemeRun, found};
 use super::recommend::recommend;
 use super::records::RunRecords;
@@ -16,7 +17,7 @@ use super::scheme::{Scheme, require_length, scheme};
 use super::settings::RunSettings;
 use super::signals::deviation_signals;
 use super::stage::{Stage, StageClock};
-use super::uncertainty::run_uncertainty;
+use super::uncertainty::{run_uncertainty, structure_uncertainty};
 use super::verdict::{Candidates, verify};
 use crate::{Error, Result};
 use std::path::Path;
@@ -45,20 +46,21 @@ pub fn identify(
         filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
     let data = check_records(&settings, &records, &declared.controller)?;
     let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
-        let others = || rayon::join(|| context.map(of_scheme), || direct(&records, &settings)); // (25), (17)
+        let others = || rayon::join(|| structures(run, context), || direct(&records, &settings)); // (25), (17)
         rayon::join(|| recommend(run), others)
     });
+    let (s, grey_box) = s;
     let (recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
     let reduction = clock.run(Stage::Reduce, || {
-        let (hansen, options) = (&found(s.as_ref())?.scheme.hansen, settings.reduction.as_ref()?);
+        let (hansen, options) = (&found(s.as_ref())?.hansen, settings.reduction.as_ref()?);
         Some(run_reduction(&context?.factorisation.factors, hansen, &records, options)) // (29)
     });
     let candidates = Candidates {
         recommended: recommended.as_ref().ok(),
-        hansen: found(s.as_ref()).map(|s| &s.scheme.hansen),
+        hansen: found(s.as_ref()).map(|s| &s.hansen),
         direct: found(direct.as_ref()),
         reduction: found(reduction.as_ref()),
-        grey_box: found(s.as_ref()).and_then(|s| found(s.grey_box.as_ref())),
+        grey_box: found(grey_box.as_ref()),
     };
     let identified = candidates.identified();
     if identified.is_empty()
@@ -72,6 +74,8 @@ pub fn identify(
     let (indirect, verdict) = clock.run(Stage::Validate, || {
         Ok::<_, Error>((indirect(run, context.map(|c| c.signals)), verify(run, &candidates)?))
     })?;
+    let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
+    let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
     let scheme = match (s, context) {
         (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, reduction, &hz, clock)?)),
         (Some(Err(reason)), _) => Some(Err(reason)),
@@ -85,6 +89,8 @@ pub fn identify(
         recommended,
         filtered,
         scheme,
+        grey_box,
+        grey_box_uncertainty,
         direct,
         direct_diagram,
         indirect,
@@ -116,32 +122,38 @@ fn filtered(
     Ok(Filtered { factorisation, signals })
 }
 
-/// The scheme and the physical structure that is started from it.
-struct OfScheme {
-    scheme: Scheme,
-    grey_box: Option<Result<GreyBoxRun>>,
+/// The scheme, and the physical structure that is started from it.
+fn structures(
+    run: RunContext<'_>,
+    context: Option<SchemeContext<'_>>,
+) -> (Option<Result<Scheme>>, Option<Result<GreyBoxRun>>) {
+    let s = context.map(of_scheme);
+    let start = found(s.as_ref()).zip(context).map(|(s, context)| SchemeStart {
+        factors: &context.factorisation.factors,
+        signals: context.signals,
+        hansen: &s.hansen,
+    });
+    let grey_box = grey_box(run, start);
+    (s, grey_box)
 }
 
-fn of_scheme(context: SchemeContext<'_>) -> Result<OfScheme> {
+fn of_scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     let SchemeContext { run, signals, .. } = context;
     require_length(&run.settings.hansen, run.records, signals.settle)?;
-    let scheme = scheme(context).map_err(|e| e.within(signals.context()))?;
-    let grey_box = grey_box(context, &scheme.hansen);
-    Ok(OfScheme { scheme, grey_box })
+    scheme(context).map_err(|e| e.within(signals.context()))
 }
 
 /// Region, certificate and redesign of G(S).
 fn judged(
     context: SchemeContext<'_>,
-    s: OfScheme,
+    s: Scheme,
     reduction: Option<Result<RunReduction>>,
     hz: &[f64],
     clock: &mut StageClock<'_>,
 ) -> Result<SchemeRun> {
-    let OfScheme { scheme: Scheme { hansen, refinement, diagram }, grey_box } = s;
-    let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
-    let uncertainty = run_uncertainty(&hansen, intervals, hz, context.run.settings.hansen.uncertainty.level)?;
+    let Scheme { hansen, refinement, diagram } = s;
+    let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
     let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
     let redesign = clock.run(Stage::Redesign, || redesigned(context, &hansen, found(reduction.as_ref())));
-    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, grey_box, certificate, redesign })
+    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, certificate, redesign })
 }

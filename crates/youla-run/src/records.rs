@@ -1,5 +1,6 @@
 //! The records of a run: read, cut, detrended, and split by the meaning of their channels.
 
+use super::computed::ComputedChannels;
 use super::disturbance::disturbance_signals;
 use super::segments::{Part, RecordSegment, parts};
 use super::settings::{DataFile, DataSettings, DisturbanceSettings};
@@ -181,6 +182,8 @@ fn read_file(
     let groups =
         [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
     let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
+    let computed = ComputedChannels::new(settings)?;
+    let wanted: Vec<ChannelSpec> = groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect();
     let source = Source {
         path: path.clone(),
         format: Format::Detect,
@@ -190,7 +193,7 @@ fn read_file(
             gaps: settings.gaps,
             ..TimeSource::default()
         },
-        channels: groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect(),
+        channels: computed.to_read(&wanted),
         csv: settings.csv.clone(),
     };
     let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
@@ -198,6 +201,13 @@ fn read_file(
         youla_io::Error::MissingFile { .. } => e.within(format!("[data] {purpose}")),
         other => other,
     })?;
+    let mut first = 1;
+    let compute = |record: Record| {
+        let from = first;
+        first += record.samples();
+        computed.apply(&wanted, record, from)
+    };
+    let read = read.into_iter().map(compute).collect::<Result<Vec<_>>>()?;
     for Part { record, name, rows, cut } in parts(file, label, read)? {
         all_rows.push(rows);
         let disturbance = settings.disturbance.as_ref().map(|d| disturbance_signals(d, &record)).transpose()?;

@@ -1,7 +1,6 @@
 //! The uncertainty of the models of a run: regions of their frequency responses and intervals of their modes.
 
 use super::entries::{ModeEntry, OrRefused, finite};
-use super::method::Method;
 use super::response::ports;
 use crate::Result;
 use serde::{Deserialize, Serialize};
@@ -28,45 +27,29 @@ pub struct RunUncertainty {
     pub deviation: Option<SystemUncertainty>,
     /// Of G(S).
     pub plant: Option<SystemUncertainty>,
-    /// Of the physical structure.
-    pub grey_box: Option<SystemUncertainty>,
 }
 
 /// On the frequencies in Hz, that of S and G(S) at `level`.
 ///
 /// # Errors
 /// Those of the frequency responses and eigenvalues.
-pub(super) fn run_uncertainty(
-    hansen: &HansenModel,
-    grey_box: Option<&GreyBoxIntervals>,
-    hz: &[f64],
-    level: f64,
-) -> Result<RunUncertainty> {
+pub(super) fn run_uncertainty(hansen: &HansenModel, hz: &[f64], level: f64) -> Result<RunUncertainty> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
     let of = |uncertainty: &Option<Uncertainty>| -> Result<Option<SystemUncertainty>> {
         let Some(uncertainty) = uncertainty else { return Ok(None) };
         let Some(response) = uncertainty.response(&omega)? else { return Ok(None) };
         Ok(Some(SystemUncertainty { level, response, modes: uncertainty.modes()? }))
     };
-    let physical = |known: &GreyBoxIntervals| -> Result<SystemUncertainty> {
-        Ok(SystemUncertainty { level: known.level, response: known.response(&omega)?, modes: known.modes()? })
-    };
-    Ok(RunUncertainty {
-        deviation: of(&hansen.deviation.uncertainty)?,
-        plant: of(&hansen.uncertainty)?,
-        grey_box: grey_box.map(physical).transpose()?,
-    })
+    Ok(RunUncertainty { deviation: of(&hansen.deviation.uncertainty)?, plant: of(&hansen.uncertainty)? })
 }
 
-impl RunUncertainty {
-    /// That of the model that a method gave.
-    pub(super) fn of(&self, method: Method) -> Option<&SystemUncertainty> {
-        match method {
-            Method::Hansen => self.plant.as_ref(),
-            Method::GreyBox => self.grey_box.as_ref(),
-            _ => None,
-        }
-    }
+/// That of the physical structure.
+///
+/// # Errors
+/// Those of the frequency response and eigenvalues.
+pub(super) fn structure_uncertainty(known: &GreyBoxIntervals, hz: &[f64]) -> Result<SystemUncertainty> {
+    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
+    Ok(SystemUncertainty { level: known.level, response: known.response(&omega)?, modes: known.modes()? })
 }
 
 impl SystemUncertainty {

@@ -96,3 +96,27 @@ fn examples_are_short() {
         }
     }
 }
+
+/// The published parameters of the joint (Janot et al., IFAC-PapersOnLine 52-29 (2019), 100) from the run file alone: mass within 1 %,
+/// viscous friction within 2 %, Coulomb friction and offset within 3 %.
+#[test]
+#[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
+fn the_friction_of_the_joint_needs_no_other_file() {
+    let folder = crate::common::empty_folder("emps");
+    let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/emps/run.toml");
+    let text = std::fs::read_to_string(file).expect("the example");
+    let text = text.replace("../../../shared/data", &crate::common::data().display().to_string());
+    std::fs::write(folder.join("run.toml"), text).expect("written");
+    let run = crate::common::youla(&folder, &["identify", "run.toml", "--out", "run"]);
+    assert_eq!(run.code, Some(0), "{}", run.stderr);
+    assert!(!run.stderr.contains("clipped") && !run.stderr.contains("declared as an excitation"), "{}", run.stderr);
+    let model = std::fs::read_to_string(folder.join("run/4-identify/grey_box.json")).expect("the model");
+    let model: serde_json::Value = serde_json::from_str(&model).expect("JSON");
+    let published =
+        [("mass", 95.1089, 0.01), ("viscous", 203.5034, 0.02), ("coulomb", 20.3935, 0.03), ("offset", -3.1648, 0.03)];
+    for (name, expected, tolerance) in published {
+        let all = model["details"]["parameters"].as_array().expect("parameters");
+        let value = all.iter().find(|p| p["name"] == name).and_then(|p| p["value"].as_f64()).expect("a value");
+        assert!((value / expected - 1.0).abs() < tolerance, "{name} = {value}, published {expected}");
+    }
+}

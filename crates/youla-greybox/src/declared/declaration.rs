@@ -69,7 +69,7 @@ pub struct Declaration {
 pub enum Entry {
     /// A fixed number.
     Number(f64),
-    /// An expression of named quantities: `+ - * / ^`, parentheses, `sqrt exp ln sin cos tan atan` and `pi`.
+    /// An expression of named quantities: `+ - * / ^`, parentheses, `sqrt exp ln sin cos tan atan tanh abs sign` and `pi`.
     Expression(String),
 }
 

@@ -4,7 +4,7 @@
 use super::dual::Dual;
 
 /// Functions of one argument.
-pub(super) const FUNCTIONS: [&str; 7] = ["sqrt", "exp", "ln", "sin", "cos", "tan", "atan"];
+pub(super) const FUNCTIONS: [&str; 10] = ["sqrt", "exp", "ln", "sin", "cos", "tan", "atan", "tanh", "abs", "sign"];
 /// Constants.
 pub(super) const CONSTANTS: [&str; 1] = ["pi"];
 
@@ -80,6 +80,14 @@ fn call(function: &str, x: Dual) -> Dual {
         "sin" => x.chain(v.sin(), v.cos()),
         "cos" => x.chain(v.cos(), -v.sin()),
         "tan" => x.chain(v.tan(), 1.0 + v.tan() * v.tan()),
+        "tanh" => x.chain(v.tanh(), 1.0 - v.tanh() * v.tanh()),
+        "abs" => x.chain(v.abs(), sign(v)),
+        "sign" => x.chain(sign(v), 0.0),
         _ => x.chain(v.atan(), 1.0 / (1.0 + v * v)),
     }
+}
+
+/// -1, 0 or 1.
+fn sign(v: f64) -> f64 {
+    if v == 0.0 { 0.0 } else { v.signum() }
 }

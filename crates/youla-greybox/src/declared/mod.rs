@@ -14,6 +14,7 @@ mod compile;
 mod declaration;
 mod dual;
 mod expression;
+mod named;
 mod names;
 mod parser;
 mod template;
@@ -21,6 +22,7 @@ mod template;
 mod tests;
 
 pub use declaration::{Declaration, Entry, ParameterDeclaration};
+pub use named::NamedExpression;
 pub use template::Template;
 
 use super::checks::check_time;

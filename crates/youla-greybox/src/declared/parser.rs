@@ -5,7 +5,7 @@
 //! product = signed { ("*" | "/") signed }
 //! signed  = { "+" | "-" } power
 //! power   = atom [ "^" signed ]              -x^2 = -(x^2),  2^3^2 = 2^9
-//! atom    = number | name | function "(" sum ")" | "(" sum ")"
+//! atom    = number | name | "'" any name "'" | function "(" sum ")" | "(" sum ")"
 //! ```
 //! The depth of nesting is limited, so that no text exhausts the stack.
 
@@ -102,6 +102,7 @@ impl Parser<'_> {
             Some('(') => self.parentheses(),
             Some(c) if c.is_ascii_digit() || c == '.' => self.number(),
             Some(c) if begins_name(c) => self.name(),
+            Some('\'') => self.quoted_name(),
             Some(c) => Err(self.problem(format!("{c:?} is in the place of a number, a name or ("))),
             None => Err(self.problem("it ends where a number, a name or ( is expected".into())),
         }
@@ -155,6 +156,21 @@ impl Parser<'_> {
                 None if name == CONSTANTS[0] => self.program.push(Step::Number(PI)),
                 None => return Err(Problem::Unknown { name }),
             },
+        }
+        Ok(())
+    }
+
+    /// A name with characters that no other may have, between single quotes.
+    fn quoted_name(&mut self) -> Parsed {
+        let start = self.at + 1;
+        let Some(length) = self.text[start..].iter().position(|c| *c == '\'') else {
+            return Err(self.problem("the closing quote of a name is missing".into()));
+        };
+        self.at = start + length + 1;
+        let name: String = self.text[start..start + length].iter().collect();
+        match (self.number_of)(&name) {
+            Some(number) => self.program.push(Step::Name(number)),
+            None => return Err(Problem::Unknown { name }),
         }
         Ok(())
     }

@@ -1,6 +1,7 @@
 //! Files as they are read and tested one record at a time.
 
 use super::{CheckedRecord, DataCheck};
+use crate::computed::ComputedChannels;
 use crate::records::{LoopRecord, UsedRows, channels_of, refuse_overlap};
 use crate::segments::{Part, parts};
 use crate::settings::DataFile;
@@ -16,6 +17,8 @@ use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check
 pub(super) struct Job {
     /// Inputs, outputs, excitation, reference, alpha.
     pub(super) groups: [Vec<ChannelSpec>; 5],
+    /// Channels that are not in the files.
+    pub(super) computed: ComputedChannels,
     pub(super) time: TimeSource,
     pub(super) csv: CsvOptions,
     pub(super) options: CheckOptions,
@@ -74,15 +77,17 @@ fn check_file(
         return Err(Error::File(youla_io::Error::SampleTimeMissing { what: path.display().to_string() }));
     }
     let clock = job.time.column.iter().map(|place| ChannelSpec::from(TIME, place.clone(), ""));
+    let wanted: Vec<ChannelSpec> = job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect();
     let source = Source {
         path,
         format: Format::Detect,
         // The time column is a channel here; whatever it holds, the rows are read.
         time: TimeSource::ts(job.time.ts.unwrap_or(1.0)),
-        channels: job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect(),
+        channels: job.computed.to_read(&wanted),
         csv: job.csv.clone(),
     };
-    let found = parts(file, label, vec![read(&source)?])?;
+    let record = job.computed.apply(&wanted, read(&source)?, 1)?;
+    let found = parts(file, label, vec![record])?;
     found.iter().map(|part| check_part(job, file, part, controller)).collect()
 }
 
@@ -121,7 +126,9 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
             found,
         }));
     }
-    findings.extend(check_record(&self::logged(&logged, first), &names, controller.as_ref(), &job.options)?);
+    let of_record = check_record(&self::logged(&logged, first), &names, controller.as_ref(), &job.options)?;
+    let channels: Vec<&ChannelSpec> = job.groups.iter().flatten().collect();
+    findings.extend(job.computed.without_expected(&channels, of_record));
     let rows = [first, first + logged.samples() - 1];
     let file = file.file.display().to_string();
     Ok((CheckedRecord { record: part.name.clone(), file, rows, sample_time: time.ts() }, findings))

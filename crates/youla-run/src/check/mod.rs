@@ -12,6 +12,7 @@ pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 use super::factorise::declared_controller;
 use super::records::{LoopRecord, RunRecords};
 use super::settings::{DataFile, RunSettings, labelled};
+use crate::computed::ComputedChannels;
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;
@@ -54,6 +55,7 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     let d = &settings.data;
     let job = Job {
         groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),
+        computed: ComputedChannels::new(d)?,
         time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, ..Default::default() },
         csv: d.csv.clone(),
         options: with_order(&settings.check, &settings.hansen),
@@ -88,6 +90,7 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
             ChannelSpec::chosen(&files.reference),
             Vec::new(),
         ],
+        computed: ComputedChannels::default(),
         time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
         csv: files.csv.clone(),
         options: options.clone(),
@@ -110,6 +113,9 @@ pub(super) fn check_records(
     let names = names([&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha]);
     let options = with_order(&settings.check, &settings.hansen);
     let all: Vec<&LoopRecord> = records.estimation.iter().chain(&records.verification).collect();
+    let computed = ComputedChannels::new(d)?;
+    let channels: Vec<&ChannelSpec> =
+        [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].into_iter().flatten().collect();
     let one = |record: &&LoopRecord| {
         let (file, first) = place(settings, records, &record.name);
         let logged = logged(record, first);
@@ -120,6 +126,7 @@ pub(super) fn check_records(
             }
             found => found?,
         };
+        let findings = computed.without_expected(&channels, findings);
         let rows = [first, first + record.samples() - 1];
         Ok((CheckedRecord { record: record.name.clone(), file, rows, sample_time: record.time.ts() }, findings))
     };

@@ -55,20 +55,24 @@ fn reduction_line(found: &Identification) -> Option<Verdict> {
 fn grey_box_line(found: &Identification) -> Option<Verdict> {
     let run = found.structure()?;
     let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
-    let (model, plant) = (fit(&run.found.model.fit), fit(&run.found.fit_of_plant));
+    let model = fit(&run.found.model.fit);
+    let plant = run.found.fit_of_plant.as_ref().map_or_else(String::new, |plant| format!(", G(S) to {}", fit(plant)));
     let start = match run.found.won {
         PemStart::Projection => "the projection of G(S)",
         PemStart::Nominal => "its initial values",
         PemStart::Direct => "the projection of a model of u and y by PBSIDopt",
     };
     let text = format!(
-        "The physical structure fits the estimation records to {model} per output, G(S) to {plant} (search started from {start})."
+        "The physical structure fits the estimation records to {model} per output{plant} (search started from {start})."
     );
-    let (status, text) = match run.found.local_minimum_suspected() {
+    let (status, text) = match run.found.local_minimum_suspected {
         true => (
             Status::Caution,
             text + " The fit is more than 1 percentage point below that of G(S): the search ended in a local minimum, or the structure does not describe the plant.",
         ),
+        false if run.found.fit_of_plant.is_none() => {
+            (Status::Caution, text + " There is no G(S) to compare it with, so a local minimum could not be noticed.")
+        }
         false => (Status::Good, text),
     };
     let (doubt, residuals) = match &run.intervals {

@@ -3,7 +3,7 @@
 use super::disturbance::DisturbanceSettings;
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use std::collections::{HashMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use youla::signal::Detrend;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
@@ -34,6 +34,9 @@ pub struct DataSettings {
     /// Known excitation alpha of Fig. 3, one channel per input; not together with `input_excitation`.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub alpha: Vec<ChannelSpec>,
+    /// Channels computed row by row, `name = "expression"` of columns and of each other; used by their names wherever a column is.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub computed: BTreeMap<String, String>,
     /// How text files are read.
     #[serde(default)]
     pub csv: CsvOptions,
@@ -62,6 +65,7 @@ impl DataSettings {
             input_excitation: Vec::new(),
             reference: Vec::new(),
             alpha: Vec::new(),
+            computed: BTreeMap::new(),
             csv: CsvOptions::default(),
             detrend: Detrend::default(),
             disturbance: None,
@@ -154,7 +158,10 @@ impl DataSettings {
     }
 
     pub(super) fn problem(&self) -> Option<String> {
-        self.record_problem().or_else(|| self.channel_problem()).or_else(|| self.clock_problem())
+        self.record_problem()
+            .or_else(|| self.channel_problem())
+            .or_else(|| crate::computed::problem(self))
+            .or_else(|| self.clock_problem())
     }
 
     fn clock_problem(&self) -> Option<String> {

@@ -92,8 +92,8 @@ fn what_is_no_expression_is_told_with_its_place() {
         ("1.2.3", "1: 1.2.3 is not a number"),
         ("1e999", "1: 1e999 is not a number"),
         ("y + sqrt x", "5: the function sqrt lacks its ("),
-        ("log(x)", "1: log is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan"),
-        ("x(y)", "1: x is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan"),
+        ("log(x)", "1: log is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan, tanh, abs, sign"),
+        ("x(y)", "1: x is not a function; the functions are sqrt, exp, ln, sin, cos, tan, atan, tanh, abs, sign"),
         ("x = y", "3: '=' is in the place of an operator"),
     ] {
         assert_eq!(problem(text), told, "{text}");

@@ -5,7 +5,6 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use std::io::Write;
 use std::path::Path;
-use std::process::ExitCode;
 use std::time::Duration;
 use youla::ErrorKind;
 use youla_run::{ReadingProgress, Stage};
@@ -23,7 +22,7 @@ pub(crate) struct Form {
 
 /// Why the program ends early.
 #[derive(Debug)]
-pub(crate) enum Failure {
+pub enum Failure {
     /// A crate refused: its sentence and what kind of failure it is.
     Refused(String, ErrorKind),
     /// Nobody reads the output any more.
@@ -49,15 +48,15 @@ macro_rules! refused {
 refused!(youla::Error, youla_io::Error, youla_paper::Error, youla_run::Error);
 
 /// Prints one sentence and gives the exit code: 2 for input that cannot be used, 3 for an impossible computation.
-pub(crate) fn fail(failure: &Failure) -> ExitCode {
+pub(crate) fn fail(failure: &Failure) -> u8 {
     match failure {
-        Failure::OutputClosed => ExitCode::SUCCESS,
+        Failure::OutputClosed => 0,
         Failure::Refused(sentence, kind) => {
             // Without standard error the progress is not shown.
             let _ = writeln!(std::io::stderr(), "{} {}", terminal::error_word(), shown(sentence));
             match kind {
-                ErrorKind::BadInput => ExitCode::from(2),
-                ErrorKind::Numerical => ExitCode::from(3),
+                ErrorKind::BadInput => 2,
+                ErrorKind::Numerical => 3,
             }
         }
     }

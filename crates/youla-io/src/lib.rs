@@ -73,7 +73,7 @@ pub use npy::{NpyStream, is_npy};
 pub use npz::{npz_from_bytes, read_npz};
 pub use open::{open, read_text};
 pub use parquet::{parquet_from_bytes, read_parquet};
-pub use source::{Format, Source, read, read_parts, sha256};
+pub use source::{Format, Source, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource};
 pub use values::{Value, Variable, Variables};

@@ -115,6 +115,15 @@ pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
     }
 }
 
+/// SHA-256 of the values of columns in memory, each as its eight bytes from the lowest, as [`sha256`] names a file.
+pub fn sha256_of<'a>(columns: impl Iterator<Item = &'a [f64]>) -> String {
+    let mut hash = Sha256::new();
+    for piece in columns.flat_map(|column| column.chunks(1 << 10)) {
+        hash.update(piece.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
+    }
+    hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 pub(super) fn resolve(source: &Source) -> Result<Format> {
     if source.format != Format::Detect {
         return Ok(source.format);

@@ -49,6 +49,15 @@ impl TimeSource {
         TimeSource { column: Some(column), ..Self::default() }
     }
 
+    /// The sample time that a time column in memory shows; `what` names it in errors.
+    ///
+    /// # Errors
+    /// [`Error::SampleTimeMissing`] for less than two rows, [`Error::NonUniformTime`] with the first bad row,
+    /// [`youla::Error::SampleTimeMismatch`] where column and declaration disagree.
+    pub fn of_column(&self, what: &str, times: &[f64]) -> Result<Discrete> {
+        Ok(self.resolve(what, Some(times))?.time)
+    }
+
     /// The clock and the parts without gaps from the time column, which is there when `self.column` is set.
     ///
     /// # Errors

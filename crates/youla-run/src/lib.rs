@@ -24,6 +24,7 @@ mod init;
 mod method;
 mod noise_models;
 mod page;
+mod parts;
 mod pipeline;
 mod plot;
 mod recommend;
@@ -55,7 +56,8 @@ mod write;
 pub use artefacts::{ModelFile, Provenance, SCHEMA};
 pub use certificate::{CertificateEntry, RunCertificate};
 pub use check::{
-    CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, check_files, check_run, further, read_check_options,
+    CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, check_files, check_in_memory, check_run, further,
+    read_check_options,
 };
 pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use controller_errors::{
@@ -74,10 +76,11 @@ pub use identification::{Filtered, Identification, Refusal, SchemeRun};
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;
 pub use page::page;
+pub use parts::{recommend_alone, redesign_of};
 pub use pipeline::identify;
 pub use plot::{Plot, plot, plottable, write_plots};
-pub use records::{LoopRecord, RunRecords, SourceFile, read_records};
-pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry};
+pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory};
+pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry, entry as redesign_entry};
 pub use redraw::redraw;
 pub use reduction::{ReductionEntry, RunReduction};
 pub use reference::settings_reference;

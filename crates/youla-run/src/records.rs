@@ -14,7 +14,7 @@ use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::signal::Record;
-use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256};
+use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256, sha256_of};
 
 /// One record of a machine under feedback, samples x channels each.
 #[derive(Debug, Clone)]
@@ -89,14 +89,42 @@ impl RunRecords {
 /// [`youla_io::Error::Settings`] as of [`DataSettings::check`]; the first bad file in the order of the settings, with what is wrong in it; sample times that differ between files.
 pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords> {
     settings.check()?;
-    let purpose = |k: usize| if k < settings.estimation.len() { "estimation" } else { "verification" };
     let read: Vec<Result<FileRecords>> = settings
         .labelled()
         .into_par_iter()
         .enumerate()
-        .map(|(k, (label, file))| read_file(settings, folder, (purpose(k), &label), file))
+        .map(|(k, (label, file))| read_file(settings, folder, (purpose(settings, k), &label), file))
         .collect();
-    let read = read.into_iter().collect::<Result<Vec<_>>>()?;
+    assembled(settings, read.into_iter().collect::<Result<_>>()?)
+}
+
+/// The records of a run from logs in memory, one for each file that the settings name, in their order; the channels of a log have the
+/// names of those of the settings.
+///
+/// # Errors
+/// As [`read_records`]; [`youla::Error::Ports`] unless there is one log for each file.
+pub fn records_in_memory(settings: &DataSettings, logs: Vec<Record>) -> Result<RunRecords> {
+    settings.check()?;
+    let files = settings.labelled();
+    if files.len() != logs.len() {
+        let what = "the number of records in memory".into();
+        return Err(Error::Method(youla::Error::Ports { what, expected: files.len(), found: logs.len() }));
+    }
+    let of = |(k, ((label, file), log)): (usize, ((String, &DataFile), Record))| {
+        let sha256 = sha256_of(log.columns());
+        let named = FileOfRun { purpose: purpose(settings, k), label: &label, file, sha256 };
+        file_records(settings, named, vec![log])
+    };
+    let read = files.into_iter().zip(logs).enumerate().map(of).collect::<Result<_>>()?;
+    assembled(settings, read)
+}
+
+fn purpose(settings: &DataSettings, k: usize) -> &'static str {
+    if k < settings.estimation.len() { "estimation" } else { "verification" }
+}
+
+/// The records of all files, in the order of the settings.
+fn assembled(settings: &DataSettings, read: Vec<FileRecords>) -> Result<RunRecords> {
     let used = |f: &FileRecords| UsedRows {
         path: f.source.path.clone(),
         sha256: f.source.sha256.clone(),
@@ -196,7 +224,6 @@ fn read_file(
         channels: computed.to_read(&wanted),
         csv: settings.csv.clone(),
     };
-    let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
     let read = read_parts(&source).map_err(|e| match e {
         youla_io::Error::MissingFile { .. } => e.within(format!("[data] {purpose}")),
         other => other,
@@ -208,17 +235,34 @@ fn read_file(
         computed.apply(&wanted, record, from)
     };
     let read = read.into_iter().map(compute).collect::<Result<Vec<_>>>()?;
-    for Part { record, name, rows, cut } in parts(file, label, read)? {
+    file_records(settings, FileOfRun { purpose, label, file, sha256: sha256(&path)? }, read)
+}
+
+/// A file with its place in the run.
+struct FileOfRun<'a> {
+    purpose: &'a str,
+    /// Name in reports.
+    label: &'a str,
+    file: &'a DataFile,
+    sha256: String,
+}
+
+/// The records of a file from its parts without gaps: cut, without known lines, detrended.
+fn file_records(settings: &DataSettings, of: FileOfRun<'_>, read: Vec<Record>) -> Result<FileRecords> {
+    let groups =
+        [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
+    let path = of.file.file.display().to_string();
+    let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
+    for Part { record, name, rows, cut } in parts(of.file, of.label, read)? {
         all_rows.push(rows);
         let disturbance = settings.disturbance.as_ref().map(|d| disturbance_signals(d, &record)).transpose()?;
         let record = record.detrend(settings.detrend)?.record;
         if cut {
-            segments.push(RecordSegment { record: name.clone(), file: file.file.display().to_string(), rows });
+            segments.push(RecordSegment { record: name.clone(), file: path.clone(), rows });
         }
         records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, groups)? });
     }
-    let source =
-        SourceFile { path: file.file.display().to_string(), purpose: purpose.to_owned(), sha256: sha256(&path)? };
+    let source = SourceFile { path, purpose: of.purpose.to_owned(), sha256: of.sha256 };
     Ok(FileRecords { records, rows: all_rows, source, segments })
 }
 

@@ -110,7 +110,7 @@ pub struct ExactEntry {
 }
 
 /// As `8-redesign/redesign.json` and summary.json hold it.
-pub(super) fn entry(redesign: &Redesign) -> RedesignEntry {
+pub fn entry(redesign: &Redesign) -> RedesignEntry {
     let exact = |e: &ExactCertificate| ExactEntry { stable: e.stable, identity_residual: finite(e.identity_residual) };
     RedesignEntry {
         method: redesign.method,

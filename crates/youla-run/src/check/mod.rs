@@ -9,7 +9,7 @@ mod result;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
-use super::factorise::declared_controller;
+use super::factorise::{declared_controller, declared_loop};
 use super::records::{LoopRecord, RunRecords};
 use super::settings::{DataFile, RunSettings, labelled};
 use crate::computed::ComputedChannels;
@@ -103,11 +103,30 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
     Ok(found)
 }
 
+/// Checks the records of a run as it uses them, with its controller where `controller` says so; paths are relative to `folder`.
+///
+/// # Errors
+/// As [`check_run`].
+pub fn check_in_memory(
+    settings: &RunSettings,
+    records: &RunRecords,
+    folder: &Path,
+    controller: bool,
+) -> Result<DataCheck> {
+    settings.check()?;
+    settings.check.check()?;
+    let declared = match controller {
+        true => Some(declared_loop(settings, records, folder)?.controller),
+        false => None,
+    };
+    check_records(settings, records, declared.as_ref())
+}
+
 /// The same tests on the records of a run as it uses them, for its report; `controller` with positive feedback.
 pub(super) fn check_records(
     settings: &RunSettings,
     records: &RunRecords,
-    controller: &StateSpace<Discrete>,
+    controller: Option<&StateSpace<Discrete>>,
 ) -> Result<DataCheck> {
     let d = &settings.data;
     let names = names([&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha]);
@@ -120,7 +139,7 @@ pub(super) fn check_records(
         let (file, first) = place(settings, records, &record.name);
         let logged = logged(record, first);
         // A test that cannot be computed does not end a run.
-        let findings = match check_record(&logged, &names, Some(controller), &options) {
+        let findings = match check_record(&logged, &names, controller, &options) {
             Err(error) if error.kind() == ErrorKind::Numerical => {
                 vec![finding(Severity::Note, &record.name, format!("the record could not be checked: {error}"), "")]
             }

@@ -1,0 +1,47 @@
+//! The program `youla`: from a closed-loop log to a trusted model. A library, so that the Python package holds the program too.
+
+mod args;
+mod check;
+mod commands;
+mod compare;
+mod demo;
+mod dialect;
+mod excite;
+mod export;
+mod identify;
+mod init;
+mod log_flags;
+mod manual;
+mod output;
+mod paper;
+mod plot;
+mod raster;
+mod run_folder;
+mod study;
+mod subspace;
+mod table;
+mod terminal;
+
+pub use demo::{Machine, demo};
+pub use output::Failure;
+
+use clap::Parser;
+use std::ffi::OsString;
+
+/// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect;
+/// 2 for input that cannot be used; 3 for an impossible computation.
+pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
+    let args = match args::Args::try_parse_from(args) {
+        Ok(args) => args,
+        Err(refusal) => {
+            // Nobody reads a closed output.
+            let _ = refusal.print();
+            return u8::try_from(refusal.exit_code()).unwrap_or(2);
+        }
+    };
+    match commands::run(&args) {
+        Ok(true) => 0,
+        Ok(false) => 1,
+        Err(failure) => output::fail(&failure),
+    }
+}

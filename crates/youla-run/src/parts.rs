@@ -29,16 +29,17 @@ pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Pa
 /// Those of [`youla_loop::redesign::redesign`]; the reason why the run has no factors or no G(S).
 pub fn redesign_of(run: &Identification, options: &RedesignOptions) -> Result<Redesign> {
     let settings = RunSettings { redesign: Some(options.clone()), ..run.settings.clone() };
-    let missing = |what: &str| {
-        let what = format!("{what}, on which a redesign rests: the run has none (see `refused` of its summary)");
-        Error::Method(youla::Error::Unsupported { what: "a redesign", instead: "a run with the Hansen scheme" })
-            .within(what)
+    let missing = || {
+        Error::Method(youla::Error::Unsupported {
+            what: "a redesign of a run without coprime factors and G(S)",
+            instead: "its summary states under `refused` why there are none",
+        })
     };
-    let filtered = run.filtered.as_ref().map_err(|_| missing("coprime factors"))?;
-    let scheme = run.scheme().ok_or_else(|| missing("G(S)"))?;
+    let filtered = run.filtered.as_ref().map_err(|_| missing())?;
+    let scheme = run.scheme().ok_or_else(missing)?;
     let (records, declared) = (&run.records, &run.declared);
     let factorisation = &filtered.factorisation;
     let of_run = RunContext { settings: &settings, records, declared, factorisation: Some(factorisation) };
     let context = SchemeContext { run: of_run, factorisation, signals: &filtered.signals };
-    redesigned(context, &scheme.hansen, run.reduced()).unwrap_or_else(|| Err(missing("a table [redesign]")))
+    redesigned(context, &scheme.hansen, run.reduced()).unwrap_or_else(|| Err(missing()))
 }

@@ -1,0 +1,73 @@
+"""Identify a machine without opening its control loop.
+
+>>> import youla
+>>> run = youla.demo()                              # simulates a levitated mass and identifies it
+>>> run.verdict.trusted, run.recommended.order
+(True, 3)
+"""
+
+from importlib.metadata import PackageNotFoundError, version
+
+from ._errors import Error, InputError, NumericalError
+from ._identify import Check, SubspaceEstimate, check, demo, greybox, identify, subspace
+from ._loop import (
+    Certificate,
+    Comparison,
+    Excitation,
+    Redesign,
+    Reduction,
+    certify,
+    compare,
+    excite,
+    redesign,
+    reduce,
+    simulate_loop,
+)
+from ._model import FrequencyResponse, Mode, Model
+from ._record import Record
+from ._result import Evidence, Plots, Prediction, Run, Verdict
+from ._study import Bootstrap, bootstrap, identify_many, scan
+from ._tasks import Rows
+
+try:
+    __version__ = version("youla")
+except PackageNotFoundError:  # a source tree that is not installed
+    __version__ = "unknown"
+
+__all__ = [
+    "Bootstrap",
+    "Certificate",
+    "Check",
+    "Comparison",
+    "Error",
+    "Evidence",
+    "Excitation",
+    "FrequencyResponse",
+    "InputError",
+    "Mode",
+    "Model",
+    "NumericalError",
+    "Plots",
+    "Prediction",
+    "Record",
+    "Redesign",
+    "Reduction",
+    "Rows",
+    "Run",
+    "SubspaceEstimate",
+    "Verdict",
+    "bootstrap",
+    "certify",
+    "check",
+    "compare",
+    "demo",
+    "excite",
+    "greybox",
+    "identify",
+    "identify_many",
+    "redesign",
+    "reduce",
+    "scan",
+    "simulate_loop",
+    "subspace",
+]

@@ -1,0 +1,364 @@
+"""From records to models: the whole run, and its stages that need no run."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array, whole
+from ._errors import InputError
+from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._record import Record
+from ._result import Run
+from ._systems import controller_table, nominal_table
+
+Records = Record | Sequence[Record]
+
+#: Tables of run.toml that are keywords.
+OPTIONS = (
+    "recommended", "factors", "hansen", "deviation", "direct", "reduction", "grey_box", "certificate", "redesign",
+    "verification", "check", "frequency_response", "data",
+)  # fmt: skip
+
+
+def identify(
+    record: Records | str | os.PathLike[str],
+    *,
+    nominal: Any = None,
+    controller: Any = None,
+    feedback: str = "negative",
+    hold: str | None = None,
+    verify: Records | None = None,
+    name: str | None = None,
+    **options: Mapping[str, Any],
+) -> Run:
+    """Identify the plant of a loop from its records.
+
+    Parameters
+    ----------
+    record : Record, sequence of Record, or path
+        Records to identify from; several are several experiments. The path of a run.toml does what
+        ``youla identify run.toml`` does, and takes no other argument.
+    nominal : Model, python-control or SciPy system, number, matrix, mapping or path
+        A rough model of the plant. A continuous-time system is discretised by a zero-order hold. A mapping is the table
+        ``[nominal]`` of run.toml.
+    controller : as `nominal`
+        The controller that ran; 0 where none ran. A mapping is the table ``[controller]``, for example
+        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``.
+    feedback : {"negative", "positive"}
+        Sign with which the controller is written: ``u = K (r - y)`` or ``u = K (y - r)``.
+    hold : {"tustin", "zoh"}, optional
+        How a controller in continuous time was discretised; needed there, and only there.
+    verify : Record or sequence of Record, optional
+        Records to verify on; never used to identify.
+    name : str, optional
+        Name of the machine; that of the first record when absent.
+    **options : mapping
+        Tables of run.toml as keywords: ``recommended``, ``hansen``, ``direct``, ``reduction``, ``grey_box``,
+        ``certificate``, ``redesign``, ``verification``, ``check``, ``factors``, ``deviation``, ``frequency_response``, and
+        ``data`` for ``detrend`` and ``disturbance``.
+
+    Returns
+    -------
+    Run
+        Models with their evidence.
+
+    Raises
+    ------
+    InputError
+        For arguments that cannot be used.
+    NumericalError
+        Where no method gives a model.
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> rng = np.random.default_rng(1)
+    >>> d, y, u = rng.standard_normal(4000), np.zeros(4000), np.zeros(4000)
+    >>> for k in range(3999):
+    ...     u[k] = -0.5 * y[k] + d[k]
+    ...     y[k + 1] = 0.9 * y[k] + 0.1 * u[k] + 0.01 * rng.standard_normal()
+    >>> log = youla.Record({"u": u, "y": y, "d": d}, inputs="u", outputs="y", excitation="d", dt=0.01)
+    >>> nominal = youla.Model([[0.8]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    >>> run = youla.identify(log, nominal=nominal, controller=0.5)
+    >>> run.recommended.order, bool(abs(run.recommended.a[0, 0] - 0.9) < 0.01)
+    (1, True)
+    """
+    if isinstance(record, (str, os.PathLike)):
+        if nominal is not None or controller is not None or verify is not None or options:
+            raise InputError("a run.toml states everything; leave the other arguments out, or give a youla.Record")
+        return Run(_native.identify_file(os.fspath(record)))
+    settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
+    return Run(_native.identify(json.dumps(settings), logs))
+
+
+def prepare(
+    record: Records,
+    verify: Records | None,
+    nominal: Any,
+    controller: Any,
+    feedback: str,
+    hold: str | None,
+    name: str | None,
+    options: Mapping[str, Any],
+) -> tuple[dict[str, Any], list[_native.Log]]:
+    """Return run.toml as nested dictionaries, and the records in its order."""
+    estimation, fresh = _records(record, "record"), _records(verify, "verify")
+    if not estimation:
+        raise InputError("record is an empty list, but must hold at least one youla.Record")
+    first = estimation[0]
+    for k, other in enumerate([*estimation, *fresh]):
+        if (other.inputs, other.outputs) != (first.inputs, first.outputs):
+            raise InputError(f"record {k + 1} has other inputs or outputs than the first; give the same names in all")
+    for key, table in options.items():
+        if key not in OPTIONS:
+            raise InputError(f"identify has no argument {key!r}; options are {', '.join(OPTIONS)}")
+        if not isinstance(table, Mapping):
+            raise InputError(f"{key} is {type(table).__name__}, but must be a mapping as the table [{key}] of run.toml")
+    m, p = len(first.inputs), len(first.outputs)
+    tables = {key: dict(table) for key, table in options.items()}
+    labels = _labels([*estimation, *fresh])
+    data = {
+        "sample_time": first.dt,
+        **first._tables(),
+        "estimation": [{"file": label, "name": label} for label in labels[: len(estimation)]],
+        "verification": [{"file": label, "name": label} for label in labels[len(estimation) :]],
+        **tables.pop("data", {}),
+    }
+    settings = {
+        "name": name or first.name,
+        "data": data,
+        "nominal": nominal_table(nominal, first.dt, (p, m)),
+        "controller": controller_table(controller, feedback, hold, first.dt, (m, p)),
+        **tables,
+    }
+    return _plain(settings), [r._log() for r in [*estimation, *fresh]]
+
+
+def _records(given: Records | None, what: str) -> list[Record]:
+    listed = [] if given is None else [given] if isinstance(given, Record) else given
+    if not isinstance(listed, Sequence) or not all(isinstance(r, Record) for r in listed):
+        raise InputError(f"{what} is {type(given).__name__}, but must be a youla.Record or a list of them")
+    return list(listed)
+
+
+def _labels(records: list[Record]) -> list[str]:
+    """Names of records, numbered where one is there twice."""
+    names = [r.name for r in records]
+    return [n if names.count(n) == 1 else f"{n}-{names[: k + 1].count(n)}" for k, n in enumerate(names)]
+
+
+def _plain(value: Any) -> Any:
+    """Settings as JSON has them; what is None is absent."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(v) for key, v in value.items() if v is not None}
+    if isinstance(value, (list, tuple)):
+        return [_plain(v) for v in value]
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if isinstance(value, (str, bool, int, float)):
+        return value
+    raise InputError(f"an option is {value!r}, but options are numbers, text, lists and mappings")
+
+
+def options_json(options: Mapping[str, Any]) -> str:
+    """Options of a stage as JSON."""
+    return json.dumps(_plain(options))
+
+
+def demo(machine: str = "levitation", *, seed: int = 1) -> Run:
+    """Simulate a machine under feedback and identify it, as ``youla demo`` does.
+
+    Parameters
+    ----------
+    machine : {"levitation", "bearing"}
+        A levitated mass, unstable, or the gas bearing of the paper.
+    seed : int
+        Seed of excitation and noise.
+
+    Returns
+    -------
+    Run
+    """
+    return Run(_native.demo(machine, whole(seed, "seed", 0)))
+
+
+@dataclass(frozen=True)
+class Check:
+    """Findings of a check of records.
+
+    Attributes
+    ----------
+    findings : tuple of dict
+        The most serious first: ``severity``, ``test``, ``record``, ``channel``, ``rows``, ``what``, ``numbers``, ``advice``.
+    defects, cautions, notes : int
+        Numbers of findings.
+    """
+
+    findings: tuple[dict[str, Any], ...]
+    defects: int
+    cautions: int
+    notes: int
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is no defect."""
+        return self.defects == 0
+
+    def to_frame(self) -> Any:
+        """Return the findings as a pandas data frame."""
+        import pandas as pd
+
+        return pd.DataFrame(self.findings)
+
+    def __str__(self) -> str:
+        lines = [f"{self.defects} defects, {self.cautions} cautions, {self.notes} notes"]
+        for f in self.findings:
+            where = " ".join(str(f[key]) for key in ("record", "channel") if f.get(key))
+            lines.append(f"{f['severity']}: {where}: {f['what']}. {f['advice']}".rstrip())
+        return "\n".join(lines)
+
+
+def check(
+    record: Records, *, nominal: Any = None, controller: Any = None, feedback: str = "negative", hold: str | None = None,
+    **options: Mapping[str, Any],
+) -> Check:  # fmt: skip
+    """Check records before identifying from them.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        Records.
+    nominal, controller, feedback, hold, **options
+        As for `identify`. Without a controller its tests are left out.
+
+    Returns
+    -------
+    Check
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> rng = np.random.default_rng(1)
+    >>> log = youla.Record(rng.standard_normal((2000, 2)), inputs=0, outputs=1, dt=1e-3)
+    >>> youla.check(log).defects
+    0
+    """
+    first = _first(record)
+    known = controller is not None
+    if known and nominal is None:
+        nominal = np.zeros((len(first.outputs), len(first.inputs)))
+    settings, logs = prepare(
+        record, None, 0 if nominal is None else nominal, 0 if controller is None else controller, feedback, hold, None, options
+    )
+    found = json.loads(_native.check(json.dumps(settings), logs, known))
+    return Check(tuple(found["findings"]), found["defects"], found["cautions"], found["notes"])
+
+
+def _first(record: Records) -> Record:
+    listed = _records(record, "record")
+    if not listed:
+        raise InputError("record is an empty list, but must hold at least one youla.Record")
+    return listed[0]
+
+
+class SubspaceEstimate:
+    """A model by subspace identification.
+
+    Attributes
+    ----------
+    model : Model
+        The model.
+    singular_values : ndarray
+        Values from which the order is chosen, descending.
+    horizon, past : int
+        Block rows of the future and of the past.
+    """
+
+    def __init__(self, found: _native.Subspace, record: Record) -> None:
+        self._found = found
+        a, b, c, d, dt = found.model()
+        self.model = Model(a, b, c, d, dt=dt, inputs=record.inputs, outputs=record.outputs, name="subspace")
+        self.singular_values: Array = np.array(found.singular_values())
+        self.horizon, self.past = found.horizons()
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Return the modes of the model."""
+        return self.model.modes()
+
+    def frequency_response(self, omega: Any) -> FrequencyResponse:
+        """Return the response at angular frequencies, rad/s, with its region where `uncertainty` was asked for."""
+        w = frequencies(omega)
+        values, known = self._found.response(w / (2 * np.pi))
+        return with_region(w, values, known, "subspace")
+
+    def __repr__(self) -> str:
+        return f"<youla.SubspaceEstimate: order {self.model.order}, horizon {self.horizon}, past {self.past}>"
+
+
+def with_region(w: Array, values: Any, known: Any, name: str) -> FrequencyResponse:
+    """A frequency response of the native module."""
+    if known is None:
+        return FrequencyResponse(w, values, name=name)
+    covariance, magnitude, ellipse = known
+    return FrequencyResponse(w, values, magnitude[..., 0], magnitude[..., 1], covariance, ellipse, name)
+
+
+def subspace(record: Records, **options: Any) -> SubspaceEstimate:
+    """Identify from u and y by a subspace method, without regard to nominal model and controller.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        Records.
+    **options
+        Keys of ``[direct]`` of run.toml: ``method``, ``horizon``, ``past``, ``order``, ``feedthrough``, ``delays``,
+        ``stability``, ``uncertainty``.
+
+    Returns
+    -------
+    SubspaceEstimate
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> u = np.random.default_rng(1).standard_normal((500, 1))
+    >>> y = youla.Model([[0.8]], [[1.0]], [[1.0]], [[0.0]], dt=1.0).simulate(u)
+    >>> log = youla.Record(np.hstack([u, y]), inputs=0, outputs=1, dt=1.0)
+    >>> round(float(youla.subspace(log, order=1, horizon=5).model.a[0, 0]), 6)
+    0.8
+    """
+    settings, logs = prepare(record, None, 0, 0, "positive", None, None, {})
+    return SubspaceEstimate(_native.subspace(json.dumps(settings), logs, options_json(options)), _first(record))
+
+
+def greybox(record: Records, *, structure: Mapping[str, Any], grey_box: Mapping[str, Any] | None = None, **arguments: Any) -> Run:
+    """Estimate a physical structure, started from the result of the Hansen scheme.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        Records.
+    structure : mapping
+        The table ``[grey_box.structure]`` of run.toml: parameters and matrices.
+    grey_box : mapping, optional
+        Other keys of ``[grey_box]``.
+    **arguments
+        As for `identify`.
+
+    Returns
+    -------
+    Run
+        Its model ``grey_box`` is the structure, and ``summary["methods"]["grey_box"]`` holds the parameters.
+    """
+    return identify(record, grey_box={**(grey_box or {}), "structure": dict(structure)}, **arguments)

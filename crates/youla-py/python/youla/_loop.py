@@ -1,0 +1,323 @@
+"""What belongs to a loop: certificate, simulation, reduction, a new controller, an excitation, comparison of runs."""
+
+from __future__ import annotations
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array
+from ._errors import InputError
+from ._identify import _plain, options_json
+from ._model import Complex, Model, _signal
+from ._result import Run
+from ._systems import as_model, controller_table, nominal_table
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Whether a controller stabilises a model.
+
+    Attributes
+    ----------
+    stable : bool
+        Whether every pole of the loop is inside of the unit circle.
+    poles : ndarray of complex
+        Poles of the loop in z.
+    peak_sensitivity : float or None
+        Largest singular value of the output sensitivity over all frequencies; None for an unstable loop.
+    """
+
+    stable: bool
+    poles: Complex
+    peak_sensitivity: float | None
+
+    def __bool__(self) -> bool:
+        return self.stable
+
+
+def _sign(feedback: str) -> float:
+    if feedback not in ("negative", "positive"):
+        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
+    return -1.0 if feedback == "negative" else 1.0
+
+
+def _loop(plant: Any, controller: Any, feedback: str) -> tuple[Model, Model]:
+    """Plant and controller of one sample time, the controller with positive feedback."""
+    sign = _sign(feedback)
+    g = as_model(plant, "plant")
+    p, m = g.d.shape
+    k = as_model(controller, "controller", g.dt)
+    if k.d.shape == (1, 1) and (m, p) != (1, 1) and k.order == 0 and k.d[0, 0] == 0:
+        k = Model([], [], [], np.zeros((m, p)), dt=g.dt)
+    if k.d.shape != (m, p):
+        raise InputError(f"controller is {k.d.shape[0]} x {k.d.shape[1]}, but the plant needs {m} x {p}")
+    if abs(k.dt / g.dt - 1) > 1e-6:
+        raise InputError(f"controller has the sample time {k.dt:g} s, but the plant has {g.dt:g} s; resample one of them")
+    return g, Model(k.a, k.b, sign * k.c, sign * k.d, dt=g.dt)
+
+
+def certify(plant: Any, controller: Any, *, feedback: str = "negative") -> Certificate:
+    """Test whether a controller stabilises a model.
+
+    Parameters
+    ----------
+    plant, controller : Model or discrete-time system of python-control or SciPy
+        The controller may also be a gain.
+    feedback : {"negative", "positive"}
+        Sign with which the controller is written.
+
+    Returns
+    -------
+    Certificate
+
+    Examples
+    --------
+    >>> import youla
+    >>> unstable = youla.Model([[1.1]], [[1.0]], [[1.0]], [[0.0]], dt=0.01)
+    >>> bool(youla.certify(unstable, 0.5)), bool(youla.certify(unstable, 0.05))
+    (True, False)
+    """
+    g, k = _loop(plant, controller, feedback)
+    stable, poles, peak = _native.certify(g._native(), k._native())
+    return Certificate(stable, np.array([complex(*p) for p in poles]), peak)
+
+
+def simulate_loop(
+    plant: Any,
+    controller: Any,
+    *,
+    samples: int | None = None,
+    excitation: Any = None,
+    reference: Any = None,
+    noise: Any = None,
+    feedback: str = "negative",
+) -> tuple[Array, Array]:
+    """Simulate a loop ``u = K (r - y) + d`` from rest; y is measured with the noise.
+
+    Parameters
+    ----------
+    plant, controller, feedback
+        As for `certify`.
+    samples : int, optional
+        Number of samples; that of the signals when absent.
+    excitation, reference, noise : array_like, optional
+        d, samples x m, at the plant input; r and the noise of the outputs, samples x p. Zero when absent.
+
+    Returns
+    -------
+    u, y : ndarray
+        Plant inputs, samples x m, and measured outputs, samples x p.
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> plant = youla.Model([[1.1]], [[1.0]], [[1.0]], [[0.0]], dt=0.01)
+    >>> u, y = youla.simulate_loop(plant, 0.6, reference=np.ones(200))
+    >>> round(float(y[-1, 0]), 3)
+    1.2
+    """
+    g, k = _loop(plant, controller, feedback)
+    p, m = g.d.shape
+    given = {"excitation": (excitation, m), "reference": (reference, p), "noise": (noise, p)}
+    signals = {key: _signal(x, key, n) for key, (x, n) in given.items() if x is not None}
+    lengths = {key: len(x) for key, x in signals.items()} | ({} if samples is None else {"samples": samples})
+    if len(set(lengths.values())) != 1:
+        raise InputError(f"the length of the simulation is {lengths or 'not given'}; give signals of one length, or samples=")
+    count = next(iter(lengths.values()))
+    three = [signals.get(key, np.zeros((count, n))) for key, (_, n) in given.items()]
+    return _native.simulate_loop(g._native(), k._native(), three)
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """A reduced model with its Hankel singular values and, where one exists, the bound of its error."""
+
+    model: Model
+    hankel: Array
+    error_bound: float | None
+
+
+def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **options: Any) -> Reduction:
+    """Remove states from a model.
+
+    Parameters
+    ----------
+    system : Model or discrete-time system of python-control or SciPy
+        Model.
+    output_scale : sequence of float, optional
+        Sizes of the outputs that matter equally.
+    **options
+        ``method``, ``order`` (``{"fixed": n}``), ``stability_boundary``, as `ReductionOptions` of the library.
+
+    Returns
+    -------
+    Reduction
+    """
+    g = as_model(system, "system")
+    if isinstance(options.get("order"), int):
+        options["order"] = {"fixed": options["order"]}
+    scale = None if output_scale is None else [float(x) for x in output_scale]
+    found, hankel, bound = _native.reduce(g._native(), options_json(options), scale)
+    a, b, c, d, dt = found
+    model = Model(a, b, c, d, dt=dt, inputs=g.inputs, outputs=g.outputs, name=f"{g.name}, reduced")
+    return Reduction(model, np.array(hankel), bound)
+
+
+@dataclass(frozen=True)
+class Redesign:
+    """A new controller ``u = K y`` (positive feedback), and what it promises as ``[redesign]`` reports it."""
+
+    controller: Model
+    promised: dict[str, Any]
+
+
+def redesign(run: Run, **options: Any) -> Redesign:
+    """Design a new controller on the result of a run.
+
+    Parameters
+    ----------
+    run : Run
+        A run with the Hansen scheme.
+    **options
+        Keys of ``[redesign]`` of run.toml: ``method``, ``input_weights``, ``peak_sensitivity``.
+
+    Returns
+    -------
+    Redesign
+
+    Raises
+    ------
+    InputError
+        Where the run has no coprime factors.
+    NumericalError
+        Where no tried weight keeps the limits.
+    """
+    if not isinstance(run, Run):
+        raise InputError(f"run is {type(run).__name__}, but must be a youla.Run, as youla.identify returns it")
+    promised, (a, b, c, d, dt) = run._native.redesign(options_json(options))
+    u, y = ([name for name, _ in channels] for channels in run._native.ports())
+    return Redesign(Model(a, b, c, d, dt=dt, inputs=y, outputs=u, name="new controller"), json.loads(promised))
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """An excitation: `signal`, samples x inputs, its sample time and what it is predicted to do."""
+
+    signal: Array
+    dt: float
+    promised: dict[str, Any]
+
+
+def excite(
+    nominal: Any,
+    controller: Any,
+    *,
+    dt: float | None = None,
+    amplitude: Any,
+    band: Sequence[float],
+    seconds: float | None = None,
+    samples: int | None = None,
+    feedback: str = "negative",
+    hold: str | None = None,
+    **options: Any,
+) -> Excitation:
+    """Make an excitation for the plant input of a loop.
+
+    Parameters
+    ----------
+    nominal, controller, feedback, hold
+        As for `identify`.
+    dt : float, optional
+        Sample time, seconds; that of `nominal` when absent.
+    amplitude : float or sequence of float
+        Greatest absolute value, one for all inputs or one each, in the unit of the input.
+    band : pair of float
+        Lowest and highest frequency, Hz.
+    seconds, samples : float, int
+        Length; one of the two.
+    **options
+        Further `ExciteOptions` of the library: ``shape`` (``"multisine"``, ``"prbs"``, ``"square"``, ``"chirp"``), ``seed``,
+        ``ramp``, ``periods``, ``limit_input``, ``limit_output``, ``noise``, ``damping_deviation``.
+
+    Returns
+    -------
+    Excitation
+    """
+    if (seconds is None) == (samples is None):
+        raise InputError("the length is given twice or not at all; give either seconds= or samples=")
+    if dt is None:
+        dt = as_model(nominal, "nominal").dt
+    m, p = _ports(nominal)
+    data = {
+        "sample_time": dt,
+        "inputs": [{"name": f"u{k + 1}"} for k in range(m)],
+        "outputs": [{"name": f"y{k + 1}"} for k in range(p)],
+        "input_excitation": [{"name": f"d{k + 1}"} for k in range(m)],
+        "estimation": [{"file": "none"}],
+    }
+    settings = {
+        "name": "loop",
+        "data": data,
+        "nominal": nominal_table(nominal, dt, (p, m)),
+        "controller": controller_table(controller, feedback, hold, dt, (m, p)),
+    }
+    length = {"seconds": float(seconds)} if seconds is not None else {"samples": samples}
+    chosen = {"amplitude": np.ravel(amplitude).tolist(), "band": list(band), "length": length, **options}
+    for key in ("limit_input", "limit_output", "noise"):
+        if key in chosen:
+            chosen[key] = np.ravel(chosen[key]).tolist()
+    signal, time, promised = _native.excite(json.dumps(_plain(settings)), options_json(chosen), "input")
+    return Excitation(signal, time, json.loads(promised))
+
+
+def _ports(system: Any) -> tuple[int, int]:
+    """Numbers of inputs and outputs of a system that states them."""
+    if isinstance(system, Model):
+        return system.d.shape[1], system.d.shape[0]
+    for inputs, outputs in (("ninputs", "noutputs"), ("inputs", "outputs")):
+        m, p = getattr(system, inputs, None), getattr(system, outputs, None)
+        if isinstance(m, (int, np.integer)) and isinstance(p, (int, np.integer)):
+            return int(m), int(p)
+    if isinstance(system, Mapping):
+        raise InputError("nominal is a mapping, of which the ports are not known; give a youla.Model or a system of python-control")
+    return 1, 1
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Names of runs, and the nu-gap of each pair: ``first``, ``second`` and the distance."""
+
+    runs: tuple[str, ...]
+    distances: tuple[dict[str, Any], ...]
+
+
+def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None) -> Comparison:
+    """Compare one model of several runs of one machine.
+
+    Parameters
+    ----------
+    runs : sequence of Run or of paths of run folders
+        At least two.
+    model : str
+        Name of the model.
+    page : path, optional
+        Where to write the page of the comparison, with its data as JSON beside it.
+
+    Returns
+    -------
+    Comparison
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        paths = [
+            run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else os.fspath(run)
+            for k, run in enumerate(runs)
+        ]
+        found = json.loads(_native.compare(paths, model, None if page is None else os.fspath(page)))
+    return Comparison(tuple(found["runs"]), tuple(found["distances"]))

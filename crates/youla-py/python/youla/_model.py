@@ -1,0 +1,280 @@
+"""Discrete-time models and frequency responses."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _native
+from ._arrays import Array, as_floats, as_matrix, positive
+from ._errors import InputError
+
+Complex = npt.NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A mode of a model.
+
+    Attributes
+    ----------
+    hz : float
+        Natural frequency, Hz.
+    zeta : float
+        Damping ratio; negative where the mode is unstable.
+    hz_interval, zeta_interval : tuple of float, optional
+        95 % intervals where they are known.
+    """
+
+    hz: float
+    zeta: float
+    hz_interval: tuple[float, float] | None = None
+    zeta_interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class FrequencyResponse:
+    """A frequency response with its confidence region.
+
+    Attributes
+    ----------
+    omega : ndarray, (n,)
+        Angular frequencies, rad/s.
+    values : ndarray of complex, (n, p, m)
+        Response.
+    low, high : ndarray, (n, p, m), optional
+        Bounds of the magnitude at the level of the uncertainty.
+    covariance : ndarray, (n, p, m, 3), optional
+        Covariance of real and imaginary part: re re, re im, im im.
+    ellipse : float, optional
+        Bound of ``d' V^-1 d`` for the region of a complex value.
+    name : str
+        Name of the model.
+    """
+
+    omega: Array
+    values: Complex
+    low: Array | None = None
+    high: Array | None = None
+    covariance: Array | None = None
+    ellipse: float | None = None
+    name: str = "model"
+
+    @property
+    def hz(self) -> Array:
+        """Frequencies, Hz."""
+        return self.omega / (2 * np.pi)
+
+    @property
+    def magnitude(self) -> Array:
+        """Magnitude, (n, p, m)."""
+        return np.abs(self.values)
+
+    @property
+    def phase(self) -> Array:
+        """Phase, radians, continuous over the frequencies, (n, p, m)."""
+        found: Array = np.unwrap(np.angle(self.values), axis=0)
+        return found
+
+    def to_control(self) -> Any:
+        """Return a `control.FrequencyResponseData`."""
+        import control
+
+        return control.FrequencyResponseData(np.moveaxis(self.values, 0, -1), self.omega)
+
+    def to_frame(self) -> Any:
+        """Return a pandas data frame with a row for each frequency, output and input."""
+        import pandas as pd
+
+        n, p, m = self.values.shape
+        k, i, j = (index.ravel() for index in np.indices((n, p, m)))
+        columns: dict[str, Any] = {"hz": self.hz[k], "output": i, "input": j}
+        columns |= {"magnitude": self.magnitude.ravel(), "phase": self.phase.ravel()}
+        if self.low is not None and self.high is not None:
+            columns |= {"low": self.low.ravel(), "high": self.high.ravel()}
+        return pd.DataFrame(columns)
+
+    def plot(self, ax: Any = None, *, region: bool = True) -> Any:
+        """Draw magnitude and phase; see `youla.Run.plot`."""
+        from ._plot import bode
+
+        return bode([self], ax, region=region)
+
+
+class Model:
+    """A discrete-time state-space model ``x+ = A x + B u, y = C x + D u``.
+
+    Parameters
+    ----------
+    a, b, c, d : array_like
+        Matrices, n x n, n x m, p x n, p x m.
+    dt : float
+        Sample time, seconds.
+    inputs, outputs : sequence of str, optional
+        Names.
+    name : str
+        Name in figures.
+
+    Examples
+    --------
+    >>> import youla
+    >>> model = youla.Model([[0.5]], [[1.0]], [[1.0]], [[0.0]], dt=0.1)
+    >>> model.order, model.poles.tolist()
+    (1, [(0.5+0j)])
+    >>> abs(model.frequency_response([0.0]).values[0, 0, 0])
+    2.0
+    """
+
+    def __init__(
+        self,
+        a: Any,
+        b: Any,
+        c: Any,
+        d: Any,
+        *,
+        dt: float,
+        inputs: Sequence[str] | None = None,
+        outputs: Sequence[str] | None = None,
+        name: str = "model",
+    ) -> None:
+        d = as_matrix(d, "d")
+        p, m = d.shape
+        a, b, c = (as_matrix(x, what) for x, what in ((a, "a"), (b, "b"), (c, "c")))
+        if a.size == 0:
+            a, b, c = np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0))
+        n = a.shape[0]
+        for what, matrix, shape in (("a", a, (n, n)), ("b", b, (n, m)), ("c", c, (p, n))):
+            if matrix.shape != shape:
+                found = " x ".join(map(str, matrix.shape))
+                raise InputError(f"{what} is {found}, but must be {shape[0]} x {shape[1]} (d is {p} x {m})")
+            if not np.isfinite(matrix).all():
+                raise InputError(f"{what} has an entry that is not finite")
+        self._matrices = tuple(_frozen(x) for x in (a, b, c, d))
+        self._dt, self.name = positive(dt, "dt"), name
+        self.inputs = tuple(inputs or _numbered("u", m))
+        self.outputs = tuple(outputs or _numbered("y", p))
+        for what, names, count in (("inputs", self.inputs, m), ("outputs", self.outputs, p)):
+            if len(names) != count:
+                raise InputError(f"{what} has {len(names)} names, but d has {count}")
+
+    @property
+    def a(self) -> Array:
+        """A, n x n; read-only."""
+        return self._matrices[0]
+
+    @property
+    def b(self) -> Array:
+        """B, n x m; read-only."""
+        return self._matrices[1]
+
+    @property
+    def c(self) -> Array:
+        """C, p x n; read-only."""
+        return self._matrices[2]
+
+    @property
+    def d(self) -> Array:
+        """D, p x m; read-only."""
+        return self._matrices[3]
+
+    @property
+    def dt(self) -> float:
+        """Sample time, seconds."""
+        return self._dt
+
+    @property
+    def order(self) -> int:
+        """Number of states."""
+        return int(self.a.shape[0])
+
+    @property
+    def poles(self) -> Complex:
+        """Poles in z, in the order of the modes."""
+        found = [complex(re, im) for _, _, re, im in _native.modes(self._native())]
+        both = [q for p in found for q in ([p, p.conjugate()] if p.imag != 0 else [p])]
+        return np.array(both, dtype=np.complex128)
+
+    def modes(self) -> tuple[Mode, ...]:
+        """Return the modes by natural frequency."""
+        return tuple(Mode(hz, zeta) for hz, zeta, _, _ in _native.modes(self._native()))
+
+    def frequency_response(self, omega: Any) -> FrequencyResponse:
+        """Return the response at angular frequencies, rad/s."""
+        w = frequencies(omega)
+        values = _native.frequency_response(self._native(), w / (2 * np.pi))
+        return FrequencyResponse(w, values, name=self.name)
+
+    def simulate(self, inputs: Any, x0: Any = None) -> Array:
+        """Return the outputs, samples x p, to `inputs`, samples x m, from the state `x0` (zero when absent)."""
+        u = _signal(inputs, "inputs", self.d.shape[1])
+        state = np.zeros(self.order) if x0 is None else as_floats(x0, "x0").ravel()
+        if len(state) != self.order:
+            raise InputError(f"x0 has {len(state)} entries, but the model has {self.order} states")
+        return _native.simulate(self._native(), u, state.tolist())
+
+    def to_control(self) -> Any:
+        """Return a `control.StateSpace` with the same matrices, sample time and names."""
+        import control
+
+        return control.StateSpace(
+            *self._matrices, self._dt, inputs=list(self.inputs), outputs=list(self.outputs), name=_plain(self.name)
+        )
+
+    def to_scipy(self) -> Any:
+        """Return a discrete `scipy.signal.StateSpace` with the same matrices."""
+        import scipy.signal
+
+        return scipy.signal.StateSpace(*self._matrices, dt=self._dt)
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Write the model as JSON, which ``--nominal`` and ``model_file`` of the program read."""
+        matrices = dict(zip("abcd", (m.tolist() for m in self._matrices), strict=True))
+        with open(path, "w", encoding="utf-8") as file:
+            json.dump({"name": self.name, "ts": self._dt, **matrices, "provenance": None}, file)
+
+    def __repr__(self) -> str:
+        p, m = self.d.shape
+        return f"<youla.Model {self.name!r}: order {self.order}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
+
+    def _native(self) -> _native.Matrices:
+        a, b, c, d = self._matrices
+        return (a, b, c, d, self._dt)
+
+
+def frequencies(omega: Any) -> Array:
+    """Angular frequencies of an argument."""
+    w = np.ascontiguousarray(np.atleast_1d(as_floats(omega, "omega")), dtype=np.float64)
+    if w.ndim != 1 or w.size == 0 or not np.isfinite(w).all() or (w < 0).any():
+        raise InputError("omega must be a list of finite angular frequencies in rad/s, none of them negative")
+    return w
+
+
+def _frozen(x: Array) -> Array:
+    copy = np.array(x, dtype=np.float64, order="C")
+    copy.flags.writeable = False
+    return copy
+
+
+def _numbered(letter: str, count: int) -> list[str]:
+    return [letter] if count == 1 else [f"{letter}{k + 1}" for k in range(count)]
+
+
+def _plain(name: str) -> str:
+    """Names of python-control have no dots."""
+    return name.replace(".", "_").replace(" ", "_")
+
+
+def _signal(values: Any, what: str, channels: int) -> Array:
+    """A signal, samples x channels; one channel may be a list."""
+    array = as_floats(values, what)
+    array = array.reshape(-1, 1) if array.ndim == 1 and channels == 1 else array
+    if array.ndim != 2 or array.shape[1] != channels:
+        found = " x ".join(map(str, array.shape))
+        raise InputError(f"{what} is {found}, but must be samples x {channels}")
+    return array

@@ -1,0 +1,249 @@
+"""Records: samples x channels with the meaning of the channels and the sample time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array, positive
+from ._errors import InputError
+from ._sources import Source, source_of
+
+Names = str | int | Sequence[str | int] | None
+
+#: Groups of channels with their keys in run.toml and the names of unnamed channels.
+_GROUPS = (
+    ("inputs", "inputs", "u"),
+    ("outputs", "outputs", "y"),
+    ("excitation", "input_excitation", "d"),
+    ("reference", "reference", "r"),
+    ("alpha", "alpha", "alpha"),
+)
+
+
+class Record:
+    """A log of a machine under feedback.
+
+    Parameters
+    ----------
+    data : array_like, mapping, DataFrame, TimeResponseData, str or path
+        - NumPy array, samples x columns: channels are chosen by column number, counted from 0;
+        - mapping from names to columns, pandas or polars data frame: by name;
+        - `control.TimeResponseData` (which holds channels x time and is recognised by its type, never by its shape): by
+          label; its inputs and outputs are taken where `inputs` and `outputs` are absent;
+        - path of a text, MATLAB, NumPy or Parquet file: by name or column number.
+    inputs, outputs : str, int or list of them
+        Plant inputs u as applied, after saturation, and measured outputs y.
+    excitation : str, int or list of them, optional
+        Known excitation d added at the plant inputs, one channel per input.
+    reference : str, int or list of them, optional
+        Known reference r, one channel per output.
+    alpha : str, int or list of them, optional
+        Known excitation at the port alpha of an observer-based controller, one per input; not with `excitation`.
+    dt : float, optional
+        Sample time, seconds. Needed unless `time` or a `TimeResponseData` states it; it is never guessed.
+    time : str, int or ``"index"``, optional
+        Column with the time in seconds; ``"index"`` takes the index of a pandas data frame (numbers in seconds, dates or
+        durations). The steps must be equal.
+    name : str, optional
+        Name in reports.
+    units : mapping, optional
+        Unit labels by channel name, for example ``{"u": "V"}``.
+
+    Raises
+    ------
+    InputError
+        For what cannot be a record, with the argument and the remedy.
+
+    Notes
+    -----
+    An array of float64 is not copied, and never changed.
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> log = youla.Record(np.zeros((1000, 2)), inputs=0, outputs=1, dt=1e-3)
+    >>> log.samples, log.dt, log.inputs, log.y.shape
+    (1000, 0.001, ('u',), (1000, 1))
+    """
+
+    def __init__(
+        self,
+        data: Any,
+        *,
+        inputs: Names = None,
+        outputs: Names = None,
+        excitation: Names = None,
+        reference: Names = None,
+        alpha: Names = None,
+        dt: float | None = None,
+        time: str | int | None = None,
+        name: str = "record",
+        units: Mapping[str, str] | None = None,
+    ) -> None:
+        if not isinstance(name, str) or not name:
+            raise InputError(f"name is {name!r}, but must be a name that a report can show")
+        dt = None if dt is None else positive(dt, "dt")
+        asked = dict(zip([g[0] for g in _GROUPS], (inputs, outputs, excitation, reference, alpha), strict=True))
+        chosen = {group: _listed(names, group) for group, names in asked.items()}
+        source = source_of(data, chosen, time, dt)
+        self._set(source, chosen, name, dict(units or {}))
+
+    def _set(self, source: Source, chosen: dict[str, list[str | int]], name: str, units: dict[str, str]) -> None:
+        self._name, self._data, self._dt = name, source.data, source.dt
+        self._groups: dict[str, tuple[tuple[str, str, int], ...]] = {}
+        for group, _, letter in _GROUPS:
+            names = source.default.get(group, []) if not chosen[group] else chosen[group]
+            columns = [source.column(place, group) for place in names]
+            unnamed = [letter] if len(names) == 1 else [f"{letter}{k + 1}" for k in range(len(names))]
+            labels = [source.names[c] or unnamed[k] for k, c in enumerate(columns)]
+            entries = zip(labels, columns, strict=True)
+            self._groups[group] = tuple((n, units.pop(n, source.units[c]), c) for n, c in entries)
+        for group in ("inputs", "outputs"):
+            if not self._groups[group]:
+                raise InputError(f"{group} is missing: name at least one channel, for example {group}=[0] or {group}=['u']")
+        if units:
+            raise InputError(f"units names {sorted(units)}, which are no channels; channels are {sorted(self._labels())}")
+        if len(self) < 2:
+            raise InputError(f"data has {len(self)} samples, but a record needs at least 2")
+
+    def _labels(self) -> list[str]:
+        return [name for group in self._groups.values() for name, _, _ in group]
+
+    def _columns(self, group: str) -> Array | None:
+        columns = [column for _, _, column in self._groups[group]]
+        if not columns:
+            return None
+        if columns == list(range(columns[0], columns[0] + len(columns))):
+            found = self._data[:, columns[0] : columns[0] + len(columns)]
+        else:
+            found = self._data[:, columns]
+        found = found.view()
+        found.flags.writeable = False
+        return found
+
+    @property
+    def name(self) -> str:
+        """Name in reports."""
+        return self._name
+
+    @property
+    def dt(self) -> float:
+        """Sample time, seconds."""
+        return self._dt
+
+    @property
+    def samples(self) -> int:
+        """Number of samples."""
+        return len(self)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Names of the plant inputs."""
+        return tuple(name for name, _, _ in self._groups["inputs"])
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the plant outputs."""
+        return tuple(name for name, _, _ in self._groups["outputs"])
+
+    @property
+    def u(self) -> Array:
+        """Plant inputs, samples x m; read-only."""
+        found = self._columns("inputs")
+        assert found is not None
+        return found
+
+    @property
+    def y(self) -> Array:
+        """Measured outputs, samples x p; read-only."""
+        found = self._columns("outputs")
+        assert found is not None
+        return found
+
+    @property
+    def excitation(self) -> Array | None:
+        """Known excitation at the plant inputs, samples x m; read-only."""
+        return self._columns("excitation")
+
+    @property
+    def reference(self) -> Array | None:
+        """Known reference, samples x p; read-only."""
+        return self._columns("reference")
+
+    @property
+    def alpha(self) -> Array | None:
+        """Known excitation at the port alpha, samples x m; read-only."""
+        return self._columns("alpha")
+
+    def __len__(self) -> int:
+        return int(self._data.shape[0])
+
+    def __getitem__(self, rows: slice) -> Record:
+        """Return consecutive rows as a record of the same name, without a copy."""
+        if not isinstance(rows, slice) or rows.step not in (None, 1):
+            raise InputError("a record is cut by record[first:last] with step 1; resample the data before")
+        return self._with(self._data[rows], self._name)
+
+    def _with(self, data: Array, name: str) -> Record:
+        part = object.__new__(Record)
+        part._name, part._data, part._dt, part._groups = name, data, self._dt, self._groups
+        if len(part) < 2:
+            raise InputError(f"the rows that are left are {len(part)}, but a record needs at least 2")
+        return part
+
+    def named(self, name: str) -> Record:
+        """Return the same record under another name."""
+        return self._with(self._data, name)
+
+    def split(self, share: float = 0.7) -> tuple[Record, Record]:
+        """Cut into a part to identify from and a part to verify on.
+
+        Parameters
+        ----------
+        share : float
+            Share of the samples in the first part, between 0 and 1.
+
+        Returns
+        -------
+        tuple of Record
+            Named ``<name>-estimation`` and ``<name>-verification``.
+        """
+        if not 0 < share < 1:
+            raise InputError(f"share is {share}, but must be between 0 and 1")
+        at = round(share * len(self))
+        first, second = self._data[:at], self._data[at:]
+        return self._with(first, f"{self._name}-estimation"), self._with(second, f"{self._name}-verification")
+
+    def to_frame(self) -> Any:
+        """Return the channels as a pandas data frame with the time in seconds as its index."""
+        import pandas as pd
+
+        columns = {name: self._data[:, column] for group in self._groups.values() for name, _, column in group}
+        return pd.DataFrame(columns, index=pd.Index(np.arange(len(self)) * self._dt, name="t"))
+
+    def __repr__(self) -> str:
+        groups = ", ".join(f"{g}={[n for n, _, _ in c]}" for g, c in self._groups.items() if c)
+        return f"<youla.Record {self._name!r}: {len(self)} samples of {self._dt:g} s, {groups}>"
+
+    def _log(self) -> _native.Log:
+        channels = [channel for group in self._groups.values() for channel in group]
+        return (self._name, self._dt, channels, self._data)
+
+    def _tables(self) -> dict[str, list[dict[str, str]]]:
+        """The channels as [data] of run.toml lists them."""
+        groups = ((key, self._groups[group]) for group, key, _ in _GROUPS)
+        return {key: [{"name": n, "unit": unit} for n, unit, _ in of] for key, of in groups if of}
+
+
+def _listed(names: Names, group: str) -> list[str | int]:
+    if names is None:
+        return []
+    listed = [names] if isinstance(names, (str, int, np.integer)) else list(names)
+    for place in listed:
+        if isinstance(place, bool) or not isinstance(place, (str, int, np.integer)):
+            raise InputError(f"{group} has {place!r}; channels are chosen by name or column number")
+    return listed

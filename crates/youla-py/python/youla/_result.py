@@ -1,0 +1,324 @@
+"""The result of a run."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array
+from ._errors import InputError, NumericalError
+from ._model import FrequencyResponse, Mode, Model, frequencies
+
+#: Name of the recommended model among the models of a run.
+RECOMMENDED = "likelihood"
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """A question to the records: its figure, the largest figure that is accepted, and whether it is kept."""
+
+    question: str
+    figure: float | None
+    limit: float
+    holds: bool
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether the recommended model can be trusted.
+
+    Attributes
+    ----------
+    trusted : bool
+        Whether every figure of the evidence is within its limit.
+    reasons : tuple of str
+        Why the model is not trusted; empty where it is.
+    evidence : tuple of Evidence
+        Questions to the records.
+    lines : tuple of str
+        The verdict of the report, in sentences.
+    """
+
+    trusted: bool
+    reasons: tuple[str, ...]
+    evidence: tuple[Evidence, ...]
+    lines: tuple[str, ...]
+
+    def __bool__(self) -> bool:
+        return self.trusted
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines)
+
+
+@dataclass(frozen=True)
+class Prediction:
+    """A verification record: measured outputs, and those predicted by each model, samples x p."""
+
+    record: str
+    measured: Array
+    predicted: dict[str, Array]
+
+
+class Run:
+    """Models of a plant with their evidence; made by `youla.identify` and `youla.demo`.
+
+    Notes
+    -----
+    Models are named ``likelihood`` (the recommended one), ``nominal``, ``hansen``, ``hansen_reduced``, ``direct``,
+    ``grey_box``, ``true_plant`` (simulations), ``controller`` (positive feedback, u = K y), ``deviation`` (S) and
+    ``new_controller``.
+    """
+
+    def __init__(self, native: _native.Run) -> None:
+        self._native = native
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """summary.json: the figures of the run."""
+        found: dict[str, Any] = json.loads(self._native.summary())
+        return found
+
+    @cached_property
+    def _page(self) -> dict[str, Any]:
+        found: dict[str, Any] = json.loads(self._native.page())
+        return found
+
+    @property
+    def name(self) -> str:
+        """Name of the machine."""
+        return str(self.summary["name"])
+
+    @property
+    def settings(self) -> str:
+        """The settings of the run as the text of a run.toml."""
+        return self._native.settings()
+
+    @property
+    def models(self) -> tuple[str, ...]:
+        """Names of the models that exist."""
+        return tuple(self._native.models())
+
+    def model(self, name: str = RECOMMENDED) -> Model:
+        """Return a model by its name.
+
+        Raises
+        ------
+        InputError
+            For a model that does not exist.
+        NumericalError
+            For a model that was asked for and is impossible, with the reason.
+        """
+        found = self._native.model(name)
+        if found is None:
+            key = "recommended" if name == RECOMMENDED else name
+            if key in self.summary["refused"]:
+                raise NumericalError(f"there is no model {name!r}: {self.summary['refused'][key]}")
+            raise InputError(f"this run has no model {name!r}; it has {', '.join(self.models)}")
+        a, b, c, d, dt = found
+        u, y = ([channel for channel, _ in channels] for channels in self._native.ports())
+        if name in ("controller", "new_controller"):
+            u, y = y, u
+        elif name == "deviation":
+            u, y = [f"alpha of {n}" for n in u], [f"beta of {n}" for n in y]
+        label = "recommended" if name == RECOMMENDED else name
+        return Model(a, b, c, d, dt=dt, inputs=u, outputs=y, name=label)
+
+    @property
+    def recommended(self) -> Model:
+        """The recommended model; see `verdict` for whether it can be trusted."""
+        return self.model()
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """Whether the recommended model can be trusted, with the evidence."""
+        lines = tuple(str(line["text"]) for line in self._page["verdict"])
+        found = self.summary["recommended"]
+        if found is None:
+            return Verdict(False, (str(self.summary["refused"].get("recommended", "no model is recommended")),), (), lines)
+        evidence = tuple(Evidence(e["question"], e["figure"], e["limit"], e["holds"]) for e in found["evidence"])
+        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines)
+
+    @property
+    def fits(self) -> dict[str, dict[str, list[float | None]]]:
+        """Fit in percent by model, verification record and output."""
+        found = {key: entry["fit"] for key, entry in self.summary["methods"].items()}
+        nominal = self.summary["nominal"]
+        return found if nominal is None else {"nominal": nominal["fit"], **found}
+
+    @property
+    def predictions(self) -> tuple[Prediction, ...]:
+        """Verification records beside the predictions of the models."""
+        return tuple(Prediction(*found) for found in self._native.predictions())
+
+    def modes(self, model: str = RECOMMENDED) -> tuple[Mode, ...]:
+        """Return the modes of a model, with 95 % intervals where they are known."""
+        entry = self.summary["methods"].get(model)
+        if entry is None:
+            return self.model(model).modes()
+        found = self.summary["recommended"]["modes"] if model == RECOMMENDED else entry["modes"]
+
+        def interval(mode: dict[str, Any], key: str) -> tuple[float, float] | None:
+            bounds = mode.get(key)
+            return None if bounds is None or None in bounds else (bounds[0], bounds[1])
+
+        def number(value: float | None) -> float:
+            return float("nan") if value is None else value
+
+        return tuple(
+            Mode(number(m["hz"]), number(m["zeta"]), interval(m, "hz_interval"), interval(m, "zeta_interval")) for m in found
+        )
+
+    def frequency_response(self, omega: Any = None, *, model: str = RECOMMENDED) -> FrequencyResponse:
+        """Return the response of a model with its confidence region where one is known.
+
+        Parameters
+        ----------
+        omega : array_like, optional
+            Angular frequencies, rad/s; those of the report when absent.
+        model : str
+            Name of the model.
+
+        Returns
+        -------
+        FrequencyResponse
+        """
+        from ._identify import with_region
+
+        w = frequencies(self._native.hz() * (2 * np.pi) if omega is None else omega)
+        values, known = self._native.response(model, w / (2 * np.pi))
+        return with_region(w, values, known, "recommended" if model == RECOMMENDED else model)
+
+    @property
+    def measured_response(self) -> FrequencyResponse | None:
+        """The response that rests on no model, where an excitation is known."""
+        found = self._native.measured_response()
+        if found is None:
+            return None
+        hz, values = found
+        return FrequencyResponse(hz * (2 * np.pi), values, name="measured")
+
+    def to_control(self, model: str = RECOMMENDED) -> Any:
+        """Return a model as `control.StateSpace`, with the names of its channels."""
+        return self.model(model).to_control()
+
+    def to_scipy(self, model: str = RECOMMENDED) -> Any:
+        """Return a model as a discrete `scipy.signal.StateSpace`."""
+        return self.model(model).to_scipy()
+
+    def to_frame(self) -> Any:
+        """Return a pandas data frame with a row for each model, verification record and output."""
+        import pandas as pd
+
+        rows = []
+        outputs = [name for name, _ in self._native.ports()[1]]
+        for key, entry in self.summary["methods"].items():
+            about = {"model": key, "order": entry["order"], "stabilised": entry["stabilised_by_controller"]}
+            fits = [(r, o, f) for r, of in entry["fit"].items() for o, f in zip(outputs, of, strict=True)]
+            rows += [{**about, "record": r, "output": o, "fit": f} for r, o, f in fits] or [about]
+        return pd.DataFrame(rows)
+
+    def report(self, path: str | os.PathLike[str]) -> None:
+        """Write the report, one HTML file that needs nothing else."""
+        with open(path, "w", encoding="utf-8") as file:
+            file.write(self._native.html())
+
+    def save(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
+        """Write the run folder that ``youla identify`` writes, and return its path.
+
+        Raises
+        ------
+        InputError
+            Where `folder` exists, unless `replace` is true and it holds a run.
+        """
+        return self._native.write(os.fspath(folder), replace)
+
+    @property
+    def plot(self) -> Plots:
+        """Figures as matplotlib axes: ``run.plot.bode()``, ``nyquist``, ``poles``, ``fit``."""
+        return Plots(self)
+
+    def __repr__(self) -> str:
+        trusted = "trusted" if self.verdict else "not trusted"
+        found = self.summary["recommended"]
+        order = "no recommended model" if found is None else f"recommended order {found['order']}, {trusted}"
+        return f"<youla.Run {self.name!r}: {order}; models {', '.join(self.models)}>"
+
+    def _repr_html_(self) -> str:
+        from ._html import page
+
+        return page(self)
+
+
+class Plots:
+    """Figures of a run; each returns matplotlib axes."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+
+    def bode(
+        self, models: Any = None, ax: Any = None, *, omega: Any = None, output: int = 0, input: int = 0, region: bool = True
+    ) -> Any:
+        """Draw magnitude and phase of models with their regions, beside the measured response.
+
+        Parameters
+        ----------
+        models : str or list of str, optional
+            Names; the recommended and the nominal model when absent.
+        ax : pair of matplotlib axes, optional
+            Where to draw.
+        omega : array_like, optional
+            Angular frequencies, rad/s.
+        output, input : int
+            Channels, counted from 0.
+        region : bool
+            Whether to draw the 95 % bands.
+
+        Returns
+        -------
+        ndarray of matplotlib axes
+            Magnitude and phase.
+        """
+        from ._plot import bode
+
+        names = [models] if isinstance(models, str) else models
+        if names is None:
+            names = [key for key in (RECOMMENDED, "nominal") if key in self._run.models]
+        responses = [self._run.frequency_response(omega, model=key) for key in names]
+        measured = self._run.measured_response
+        return bode(responses, ax, region=region, output=output, input=input, measured=measured)
+
+    def nyquist(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int = 0, input: int = 0) -> Any:
+        """Draw the response of a model in the complex plane with its 95 % ellipses."""
+        from ._plot import nyquist
+
+        return nyquist(self._run.frequency_response(omega, model=model), ax, output=output, input=input)
+
+    def poles(self, models: Any = None, ax: Any = None) -> Any:
+        """Draw the poles of models in the z plane."""
+        from ._plot import poles
+
+        names = [models] if isinstance(models, str) else models
+        names = [key for key in (RECOMMENDED, "nominal", "hansen") if key in self._run.models] if names is None else names
+        return poles([self._run.model(key) for key in names], ax)
+
+    def fit(self, record: int = 0, ax: Any = None, *, model: str = RECOMMENDED, output: int = 0) -> Any:
+        """Draw a verification record beside its prediction by a model."""
+        from ._plot import fit
+
+        predictions = self._run.predictions
+        if not 0 <= record < len(predictions):
+            raise InputError(f"record is {record}, but the run has {len(predictions)} verification records; give verify=")
+        found = predictions[record]
+        if model not in found.predicted:
+            raise InputError(f"model {model!r} predicts nothing on {found.record!r}; choose of {', '.join(found.predicted)}")
+        dt = self._run.model("controller").dt
+        return fit(found.measured[:, output], found.predicted[model][:, output], dt, found.record, ax)
+
+

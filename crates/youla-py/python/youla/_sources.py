@@ -1,0 +1,188 @@
+"""What a record can be made of: arrays, frames, responses of python-control, files."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array, as_floats
+from ._errors import InputError
+
+
+@dataclass(frozen=True)
+class Source:
+    """Columns with their names, units and sample time."""
+
+    data: Array
+    dt: float
+    names: list[str]
+    units: list[str]
+    default: dict[str, list[str | int]] = field(default_factory=dict)
+
+    def column(self, place: str | int, group: str) -> int:
+        """Return the index of a column by name or number."""
+        if isinstance(place, str):
+            if place in self.names:
+                return self.names.index(place)
+            known = ", ".join(name for name in self.names if name) or "without names; choose by number"
+            raise InputError(f"{group} names {place!r}, which is no channel; the channels are {known}")
+        if not 0 <= place < self.data.shape[1]:
+            raise InputError(f"{group} has column {place}, but data has columns 0 to {self.data.shape[1] - 1}")
+        return int(place)
+
+
+def source_of(data: Any, chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None) -> Source:
+    """Recognise `data` by its type."""
+    if isinstance(data, (str, os.PathLike)):
+        return _of_file(data, chosen, time, dt)
+    if _is(data, "control", "TimeResponseData"):
+        return _of_response(data, time, dt)
+    if _is(data, "pandas", "DataFrame"):
+        return _of_pandas(data, chosen, time, dt)
+    if _is(data, "polars", "LazyFrame"):
+        raise InputError("data is a polars LazyFrame; give data.collect()")
+    if _is(data, "polars", "DataFrame"):
+        return _of_columns({name: data[name].to_numpy() for name in _needed(data.columns, chosen, time)}, time, dt)
+    if isinstance(data, Mapping):
+        return _of_columns({name: data[name] for name in _needed(list(data), chosen, time)}, time, dt)
+    return _of_array(data, time, dt)
+
+
+def _is(data: Any, module: str, name: str) -> bool:
+    """Whether `data` is of a class of a module that may not be installed."""
+    loaded = sys.modules.get(module)
+    kind = getattr(loaded, name, None)
+    return kind is not None and isinstance(data, kind)
+
+
+def _clock(times: Any, dt: float | None, what: str) -> float:
+    if times is None and dt is None:
+        raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
+    if times is None:
+        assert dt is not None
+        return dt
+    seconds = as_floats(times, what)
+    if not np.isfinite(seconds).all():
+        raise InputError(f"{what} has a value that is not finite; cut these rows out")
+    return _native.clock(what, np.ascontiguousarray(seconds), dt)
+
+
+def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
+    array = as_floats(data, "data")
+    if array.ndim != 2:
+        raise InputError(f"data has {array.ndim} dimensions, but must be samples x channels; use numpy.column_stack")
+    if array.shape[0] < array.shape[1]:
+        shape = f"{array.shape[0]} x {array.shape[1]}"
+        raise InputError(f"data is {shape}, but must be samples x channels with more samples than channels; give data.T")
+    if isinstance(time, str):
+        raise InputError(f"time is {time!r}, but an array has no names; give the number of its column")
+    times = None
+    if time is not None:
+        if not 0 <= time < array.shape[1]:
+            raise InputError(f"time is column {time}, but data has columns 0 to {array.shape[1] - 1}")
+        times = array[:, time]
+    empty = [""] * array.shape[1]
+    return Source(array, _clock(times, dt, "time"), empty, list(empty))
+
+
+def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | None) -> Source:
+    arrays = {name: as_floats(values, f"channel {name!r}") for name, values in columns.items()}
+    for name, array in arrays.items():
+        if array.ndim != 1:
+            raise InputError(f"channel {name!r} has {array.ndim} dimensions, but a column has 1; give one entry per channel")
+    lengths = {name: len(array) for name, array in arrays.items()}
+    if len(set(lengths.values())) > 1:
+        raise InputError(f"channels differ in length: {lengths}; cut them to the same samples")
+    times = arrays.pop(str(time)) if time is not None else None
+    if not arrays:
+        raise InputError("inputs and outputs are missing: name the channels of data")
+    names = list(arrays)
+    return Source(np.column_stack(list(arrays.values())), _clock(times, dt, f"time {time!r}"), names, [""] * len(names))
+
+
+def _needed(known: list[Any], chosen: dict[str, list[str | int]], time: str | int | None) -> list[str]:
+    """The columns that are used; others may hold anything."""
+    wanted = [(group, place) for group, places in chosen.items() for place in places]
+    if time is not None:
+        wanted.append(("time", time))
+    for group, place in wanted:
+        if not isinstance(place, str):
+            raise InputError(f"{group} is {place!r}, but the columns of data are chosen by name: {', '.join(map(str, known))}")
+        if place not in known:
+            names = ", ".join(map(str, known))
+            raise InputError(f"{group} names {place!r}, which is no channel; the channels are {names}")
+    return list(dict.fromkeys(place for _, place in wanted if isinstance(place, str)))
+
+
+def _of_pandas(data: Any, chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None) -> Source:
+    if data.columns.has_duplicates:
+        raise InputError(f"data has two columns of one name: {list(data.columns[data.columns.duplicated()])}; rename one")
+    times = None
+    if time == "index" and "index" not in data.columns:
+        times, time = _index_seconds(data.index), None
+    columns = {name: data[name].to_numpy() for name in _needed(list(data.columns), chosen, time)}
+    if times is None:
+        return _of_columns(columns, time, dt)
+    return _of_columns(columns, None, _clock(times, dt, "the index of data"))
+
+
+def _index_seconds(index: Any) -> Any:
+    import pandas as pd
+
+    if isinstance(index, pd.DatetimeIndex):
+        return (index - index[0]).total_seconds().to_numpy()
+    if isinstance(index, pd.TimedeltaIndex):
+        return index.total_seconds().to_numpy()
+    return index.to_numpy()
+
+
+def _of_response(data: Any, time: str | int | None, dt: float | None) -> Source:
+    """Channels x time, with a trace between them where there are several experiments."""
+    if time is not None:
+        raise InputError("time is given, but a TimeResponseData holds its own; leave time out")
+    if data.ntraces > 1:
+        raise InputError(f"data has {data.ntraces} traces; make one Record of each, for example of an input_output_response")
+    count = len(data.time)
+    parts: list[Array] = []
+    names: list[str] = []
+    default: dict[str, list[str | int]] = {"inputs": [], "outputs": []}
+    for group, values, labels in (("outputs", data.y, data.output_labels), ("inputs", data.u, data.input_labels)):
+        if values is None:
+            continue
+        parts.append(as_floats(values, group).reshape(-1, count))
+        names.extend(map(str, labels))
+        default[group] = list(map(str, labels))
+    table = np.ascontiguousarray(np.vstack(parts).T)
+    return Source(table, _clock(data.time, dt, "the time of data"), names, [""] * len(names), default)
+
+
+def _of_file(
+    path: str | os.PathLike[str], chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None
+) -> Source:
+    places = list(dict.fromkeys(place for group in chosen.values() for place in group))
+    channels = [(str(p), p, "") if isinstance(p, str) else (f"column {p}", f"#{p + 1}", "") for p in places]
+    clock = time if time is None or isinstance(time, str) else f"#{time + 1}"
+    if dt is None and clock is None:
+        raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
+    if not channels:
+        raise InputError("inputs and outputs are missing: name the channels of the file")
+    data, found, _ = _native.read_log(os.fspath(path), channels, clock, dt)
+    source = _File(data, found, ["" if isinstance(p, int) else p for p in places], [""] * len(places))
+    source.places.extend(places)
+    return source
+
+
+@dataclass(frozen=True)
+class _File(Source):
+    """The columns of a file that were read, by the places under which they were asked for."""
+
+    places: list[str | int] = field(default_factory=list)
+
+    def column(self, place: str | int, group: str) -> int:
+        return self.places.index(place)

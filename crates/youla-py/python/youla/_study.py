@@ -1,0 +1,243 @@
+"""Bootstrap, scans of options and fleets of machines on any executor."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from . import _native
+from ._arrays import Array, whole
+from ._errors import InputError, NumericalError
+from ._identify import Records, prepare
+from ._model import Model
+from ._record import Record
+from ._result import Run
+from ._tasks import Progress, Row, Rows, key_of, run_tasks
+
+Payload = dict[str, Any]
+Folder = str | os.PathLike[str] | None
+
+
+@dataclass(frozen=True)
+class Bootstrap(Rows):
+    """Replicates of a recommended model; see `bootstrap`."""
+
+    def models(self) -> list[Model]:
+        """Return the models of the replicates that did not fail."""
+        return [Model(*(r["model"][x] for x in "abcd"), dt=r["ts"]) for r in self.succeeded]
+
+    def modes(self) -> Array:
+        """Return frequency in Hz and damping ratio, replicates x modes x 2, of replicates with the usual number of modes."""
+        found = [r["modes"] for r in self.succeeded]
+        usual = max({len(m) for m in found}, key=[len(m) for m in found].count) if found else 0
+        return np.array([m for m in found if len(m) == usual], dtype=np.float64).reshape(-1, usual, 2)
+
+    def intervals(self, level: float = 0.95) -> Array:
+        """Return percentile intervals, modes x 2 (Hz, damping ratio) x 2 (low, high)."""
+        if not 0 < level < 1:
+            raise InputError(f"level is {level}, but must be between 0 and 1")
+        found = self.modes()
+        if len(found) == 0:
+            raise NumericalError("every replicate failed; see .failed for the reasons")
+        bounds: Array = np.moveaxis(np.quantile(found, [(1 - level) / 2, (1 + level) / 2], axis=0), 0, -1)
+        return bounds
+
+
+def bootstrap(
+    run: Run,
+    record: Records,
+    n: int,
+    *,
+    seed: int,
+    executor: Executor | None = None,
+    folder: Folder = None,
+    progress: Progress | None = None,
+    **arguments: Any,
+) -> Bootstrap:
+    """Parametric bootstrap of the recommended model.
+
+    The loop of the recommended model and its noise is simulated with the known excitations of the records, and identified
+    again with order and dead time fixed.
+
+    Parameters
+    ----------
+    run : Run
+        The run.
+    record : Record or sequence of Record
+        The records of the run.
+    n : int
+        Number of replicates.
+    seed : int
+        Seed of the noise; the same seed gives the same bits on every executor.
+    executor : concurrent.futures.Executor, optional
+        Threads, processes, `distributed.Client.get_executor()`, `mpi4py.futures.MPIPoolExecutor`; it is not closed. In this
+        process one after the other when absent.
+    folder : path, optional
+        Where finished replicates are kept; a second call computes only what is missing.
+    progress : callable, optional
+        Called with the number of finished replicates.
+    **arguments
+        `nominal`, `controller`, `feedback`, `hold` and options of `identify`, as the run had them.
+
+    Returns
+    -------
+    Bootstrap
+    """
+    n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
+    predictor = run._native.predictor() if isinstance(run, Run) else None
+    if predictor is None:
+        raise NumericalError("the run has no recommended model with a predictor; its noise cannot be simulated")
+    found = run.summary["recommended"]
+    fixed = {"order": found["order"], "dead_time": found["dead_time"]}
+    recommended = {**arguments.pop("recommended", {}), **fixed}
+    settings, logs = _prepared(record, None, {**arguments, "recommended": recommended})
+    payload = {"settings": settings, "logs": logs, "predictor": predictor, "seed": seed}
+    key = key_of(settings, *_bytes(logs), *predictor, seed)
+    rows = run_tasks(_replicate, payload, range(n), key=key, executor=executor, folder=folder, progress=progress)
+    return Bootstrap(rows.rows, rows.computed)
+
+
+def _replicate(payload: Payload, item: int, index: int) -> Row:
+    draw = (payload["seed"], index)
+    found: Row = json.loads(_native.replicate(payload["settings"], payload["logs"], payload["predictor"], draw))
+    return found
+
+
+def scan(
+    record: Records,
+    grid: Mapping[str, Sequence[Any]],
+    *,
+    executor: Executor | None = None,
+    folder: Folder = None,
+    progress: Progress | None = None,
+    **arguments: Any,
+) -> Rows:
+    """Identify with each combination of some options.
+
+    Parameters
+    ----------
+    record : Record or sequence of Record
+        Records.
+    grid : mapping
+        Values to try by key, for example ``{"hansen.horizon": [20, 40], "hansen.order": [4, 6, 8]}``.
+    executor, folder, progress
+        As for `bootstrap`.
+    **arguments
+        As for `identify`.
+
+    Returns
+    -------
+    Rows
+        In the order of the combinations, the last key fastest: the options, `trusted`, `order`, modes and least fit.
+    """
+    if not isinstance(grid, Mapping) or not grid:
+        raise InputError("grid must map keys such as 'hansen.order' to lists of values")
+    for key, values in grid.items():
+        if key.count(".") != 1 or isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)):
+            raise InputError(f"grid[{key!r}] must be a list of values of a key 'table.key' of run.toml, such as 'hansen.order'")
+    verify = arguments.pop("verify", None)
+    settings, logs = _prepared(record, verify, arguments)
+    points = [dict(zip(grid, values, strict=True)) for values in product(*(list(v) for v in grid.values()))]
+    for point in points:
+        _with(settings, point)
+    payload = {"settings": settings, "logs": logs}
+    key = key_of(settings, *_bytes(logs), points)
+    return run_tasks(_point, payload, points, key=key, executor=executor, folder=folder, progress=progress)
+
+
+def _with(settings: str, point: Mapping[str, Any]) -> str:
+    found = json.loads(settings)
+    for key, value in point.items():
+        table, name = key.split(".")
+        found.setdefault(table, {})[name] = value.item() if isinstance(value, np.generic) else value
+    return json.dumps(found)
+
+
+def _point(payload: Payload, item: Mapping[str, Any], index: int) -> Row:
+    settings = _with(payload["settings"], item)
+    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in item.items()}
+    try:
+        return {**plain, **_row(Run(_native.identify(settings, payload["logs"], True)))}
+    except (InputError, NumericalError) as error:
+        return {**plain, "error": str(error)}
+
+
+def identify_many(
+    records: Iterable[Any],
+    *,
+    read: Mapping[str, Any] | None = None,
+    executor: Executor | None = None,
+    folder: Folder = None,
+    progress: Progress | None = None,
+    **arguments: Any,
+) -> Rows:
+    """Identify many machines with the same settings; a record that cannot be used is a row with its reason.
+
+    Parameters
+    ----------
+    records : iterable of Record or of paths
+        One machine each. Paths are read in the workers.
+    read : mapping, optional
+        Arguments of `Record` for paths: ``inputs``, ``outputs``, ``dt`` and so on.
+    executor, folder, progress
+        As for `bootstrap`.
+    **arguments
+        As for `identify`.
+
+    Returns
+    -------
+    Rows
+        In the order of `records`: `record`, `trusted`, `order`, modes, least fit, or `error`.
+    """
+    payload = {"read": dict(read or {}), "arguments": arguments}
+    key = key_of(sorted(payload["read"].items()), sorted((k, repr(v)) for k, v in arguments.items()))
+    return run_tasks(_machine, payload, records, key=key, executor=executor, folder=folder, progress=progress)
+
+
+def _machine(payload: Payload, item: Any, index: int) -> Row:
+    name = item.name if isinstance(item, Record) else str(item)
+    try:
+        record = item if isinstance(item, Record) else Record(item, **payload["read"])
+        settings, logs = _prepared(record, None, dict(payload["arguments"]))
+        return {"record": name, **_row(Run(_native.identify(settings, logs, True)))}
+    except (InputError, NumericalError) as error:
+        return {"record": name, "error": str(error)}
+
+
+def _row(run: Run) -> Row:
+    found = run.summary["recommended"]
+    if found is None:
+        return {"error": str(run.summary["refused"].get("recommended", "no model is recommended"))}
+    a, b, c, d, dt = run._native.model("likelihood") or ([], [], [], [], 0.0)
+    fits = [f for record in run.fits.get("likelihood", {}).values() for f in record if f is not None]
+    return {
+        "trusted": found["trusted"],
+        "order": found["order"],
+        "dead_time": found["dead_time"],
+        "least_fit": min(fits, default=None),
+        "modes": [[m["hz"], m["zeta"]] for m in found["modes"]],
+        "ts": dt,
+        "model": {key: np.asarray(x).tolist() for key, x in zip("abcd", (a, b, c, d), strict=True)},
+    }
+
+
+def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, Any]) -> tuple[str, list[_native.Log]]:
+    """Settings as JSON and the records, from the arguments of `identify`."""
+    options = dict(arguments)
+    keys = {key: options.pop(key, default) for key, default in _ARGUMENTS.items()}
+    settings, logs = prepare(record, verify, *keys.values(), options)
+    return json.dumps(settings), logs
+
+
+_ARGUMENTS: dict[str, Any] = {"nominal": None, "controller": None, "feedback": "negative", "hold": None, "name": None}
+
+
+def _bytes(logs: list[_native.Log]) -> list[Any]:
+    return [part for name, dt, channels, data in logs for part in (name, dt, channels, np.ascontiguousarray(data))]

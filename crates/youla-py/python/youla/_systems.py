@@ -1,0 +1,155 @@
+"""Nominal models and controllers of users as the tables [nominal] and [controller] of run.toml."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ._arrays import as_matrix
+from ._errors import InputError
+from ._model import Model
+from ._sources import _is
+
+Table = dict[str, Any]
+
+#: Forms of [controller] and [nominal] in run.toml.
+CONTROLLERS = ("difference_equation", "transfer_function", "state_space", "pid", "ideal_pid", "model_file", "observer")
+NOMINALS = ("transfer_function", "state_space", "model_file")
+
+
+def nominal_table(nominal: Any, dt: float, ports: tuple[int, int]) -> Table:
+    """Return [nominal] of a model of any kind; `ports` are the numbers of outputs and inputs."""
+    if isinstance(nominal, Mapping):
+        return _named(nominal, NOMINALS, "nominal")
+    if isinstance(nominal, (str, os.PathLike)):
+        return {"model_file": {"file": os.path.abspath(nominal)}}
+    form, table = _system(nominal, dt, ports, "nominal")
+    return {form: table}
+
+
+def controller_table(controller: Any, feedback: str, hold: str | None, dt: float, ports: tuple[int, int]) -> Table:
+    """Return [controller]; `ports` are the numbers of inputs and outputs of the plant."""
+    if feedback not in ("negative", "positive"):
+        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
+    if hold not in (None, "zoh", "tustin"):
+        raise InputError(f"hold is {hold!r}, but must be 'zoh' or 'tustin'")
+    if isinstance(controller, Mapping):
+        found = _named(controller, CONTROLLERS, "controller")
+        ((form, table),) = found.items()
+        return {form: {"feedback": feedback, **table}}
+    if isinstance(controller, (str, os.PathLike)):
+        return {"model_file": {"feedback": feedback, "file": os.path.abspath(controller)}}
+    form, table = _system(controller, dt, ports, "controller")
+    if table["domain"] == "continuous":
+        if hold is None:
+            raise InputError("controller is in continuous time: give hold='tustin' or hold='zoh', as it was discretised")
+        table["hold"] = hold
+    elif hold is not None:
+        raise InputError("hold is for a controller in continuous time, but this one is in discrete time; leave hold out")
+    return {form: {"feedback": feedback, **table}}
+
+
+def as_model(system: Any, what: str, dt: float | None = None) -> Model:
+    """Return a discrete-time model of a Model, a python-control or SciPy system in discrete time, or a gain."""
+    if isinstance(system, Model):
+        return system
+    if dt is None:
+        dt = getattr(system, "dt", None)
+        if dt is None or isinstance(dt, bool) or dt <= 0:
+            raise InputError(f"{what} states no sample time; give a youla.Model or a discrete-time system with dt")
+    if _is(system, "control", "LTI"):
+        import control
+
+        system = control.ss(system)
+    elif _is(system, "scipy.signal", "dlti"):
+        system = system.to_ss()
+    elif _is(system, "scipy.signal", "lti"):
+        raise InputError(f"{what} is in continuous time; discretise it first, for example with to_discrete(dt)")
+    else:
+        gain = as_matrix(system, what)
+        return Model([], [], [], gain, dt=float(dt))
+    _check_time(_domain(system, what), system, float(dt), what)
+    if _domain(system, what) == "continuous":
+        raise InputError(f"{what} is in continuous time; discretise it first, for example with control.c2d(system, dt)")
+    return Model(system.A, system.B, system.C, system.D, dt=float(dt))
+
+
+def _named(table: Mapping[str, Any], forms: tuple[str, ...], what: str) -> Table:
+    if len(table) != 1 or next(iter(table)) not in forms:
+        raise InputError(f"{what} as a mapping must have exactly one key of {', '.join(forms)}, but has {list(table)}")
+    form, inner = next(iter(table.items()))
+    if not isinstance(inner, Mapping):
+        raise InputError(f"{what}[{form!r}] is {type(inner).__name__}, but must be a mapping as run.toml has it")
+    return {form: dict(inner)}
+
+
+def _system(system: Any, dt: float, ports: tuple[int, int], what: str) -> tuple[str, Table]:
+    """A system as a table with its domain; the form is that in which it is given."""
+    if isinstance(system, Model):
+        _check_time("discrete", system, dt, what)
+        return "state_space", _matrices(system.a, system.b, system.c, system.d, "discrete")
+    known = _is(system, "control", "LTI") or _is(system, "scipy.signal", "lti") or _is(system, "scipy.signal", "dlti")
+    if not known:
+        return "state_space", _gain(system, ports, what)
+    domain = _domain(system, what)
+    _check_time(domain, system, dt, what)
+    if hasattr(system, "A"):
+        return "state_space", _matrices(system.A, system.B, system.C, system.D, domain)
+    if hasattr(system, "zeros") and hasattr(system, "gain"):
+        system = system.to_tf()
+    if not hasattr(system, "num"):
+        raise InputError(f"{what} is a {type(system).__name__}; give a state-space system or a transfer function")
+    numerator, denominator = system.num, system.den
+    if _is(system, "control", "LTI"):
+        numerator, denominator = ([[np.asarray(x).tolist() for x in row] for row in y] for y in (numerator, denominator))
+        single = len(numerator) == len(numerator[0]) == 1
+        if single:
+            numerator, denominator = numerator[0][0], denominator[0][0]
+    else:
+        numerator, denominator = np.atleast_1d(numerator).tolist(), np.atleast_1d(denominator).tolist()
+        if isinstance(numerator[0], list):
+            numerator = [[row] for row in numerator]
+    return "transfer_function", {"domain": domain, "numerator": numerator, "denominator": denominator}
+
+
+def _domain(system: Any, what: str) -> str:
+    dt = getattr(system, "dt", None)
+    if _is(system, "scipy.signal", "lti") or (dt is not None and not isinstance(dt, bool) and dt == 0):
+        return "continuous"
+    if dt is None and _is(system, "control", "LTI"):
+        raise InputError(f"{what} has dt=None; state dt=0 for continuous time or its sample time")
+    return "discrete"
+
+
+def _check_time(domain: str, system: Any, dt: float, what: str) -> None:
+    own = getattr(system, "dt", None)
+    if domain == "continuous" or own is None or isinstance(own, bool):
+        return
+    if abs(own / dt - 1.0) > 1e-6:
+        raise InputError(f"{what} has the sample time {own:g} s, but the record has {dt:g} s; resample one of them")
+
+
+def _matrices(a: Any, b: Any, c: Any, d: Any, domain: str) -> Table:
+    a, b, c, d = (np.asarray(x, dtype=float) for x in (a, b, c, d))
+    if a.size == 0:
+        return {"domain": domain, "a": [], "b": [], "c": [[] for _ in range(d.shape[0])], "d": d.tolist()}
+    return {"domain": domain, "a": a.tolist(), "b": b.tolist(), "c": c.tolist(), "d": d.tolist()}
+
+
+def _gain(system: Any, ports: tuple[int, int], what: str) -> Table:
+    if system is None:
+        raise InputError(f"{what} is missing" + ("; give 0 where no controller ran" if what == "controller" else ""))
+    try:
+        gain = as_matrix(system, what)
+    except InputError:
+        kinds = "a youla.Model, a python-control or SciPy system, a number, a matrix, a mapping as in run.toml, or a file"
+        raise InputError(f"{what} is a {type(system).__name__}, but must be {kinds}") from None
+    if gain.shape == (1, 1):
+        gain = np.full(ports, gain[0, 0]) if ports == (1, 1) or gain[0, 0] == 0 else gain
+    if gain.shape != ports:
+        found = " x ".join(map(str, gain.shape))
+        raise InputError(f"{what} is a gain of {found}, but must be {ports[0]} x {ports[1]}")
+    return _matrices(np.zeros((0, 0)), [], [], gain, "discrete")

@@ -1,0 +1,187 @@
+"""Many independent tasks on an executor, in order of their index, with finished tasks kept in a folder.
+
+A task is a pure function of its payload and index, on one core. Its row is JSON, so that rows from a folder are equal to those
+just computed. The engine decides neither order nor bits.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
+
+from ._errors import Error, InputError
+
+Row = dict[str, Any]
+Task = Callable[[Any, Any, int], Row]
+Progress = Callable[[int], None]
+
+#: Tasks that are handed to an executor at a time: memory does not grow with the number of tasks.
+_WINDOW = 256
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of tasks by index; the row of a failed task has `error` with the reason.
+
+    Attributes
+    ----------
+    rows : tuple of dict
+        One for each task.
+    computed : int
+        Tasks that were computed in this call; the others were in the folder.
+    """
+
+    rows: tuple[Row, ...]
+    computed: int
+
+    @property
+    def failed(self) -> tuple[Row, ...]:
+        """Rows of tasks that failed."""
+        return tuple(row for row in self.rows if "error" in row)
+
+    @property
+    def succeeded(self) -> tuple[Row, ...]:
+        """Rows of tasks that did not fail."""
+        return tuple(row for row in self.rows if "error" not in row)
+
+    def to_frame(self) -> Any:
+        """Return a pandas data frame with a row for each task."""
+        import pandas as pd
+
+        return pd.DataFrame([flat(row) for row in self.rows])
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+
+def flat(row: Row) -> Row:
+    """A row with the modes as columns, and without matrices."""
+    found = {key: value for key, value in row.items() if key not in ("modes", "model")}
+    for k, mode in enumerate(row.get("modes", [])):
+        found |= {f"hz_{k + 1}": mode[0], f"zeta_{k + 1}": mode[1]}
+    return found
+
+
+def run_tasks(
+    task: Task,
+    payload: Any,
+    items: Iterable[Any],
+    *,
+    key: str,
+    executor: Executor | None,
+    folder: str | os.PathLike[str] | None,
+    progress: Progress | None,
+) -> Rows:
+    """Compute the rows of all items; `key` names the payload in the folder."""
+    if executor is not None and not hasattr(executor, "submit"):
+        raise InputError(f"executor is {type(executor).__name__}, but must be a concurrent.futures.Executor, or None")
+    kept = None if folder is None else _prepared(folder, key)
+    rows: dict[int, Row] = {}
+    missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, rows))
+    if executor is None:
+        computed = 0
+        for k, item in missing:
+            rows[k] = call(task, payload, item, k, kept)
+            computed += 1
+            _tell(progress, rows)
+    else:
+        computed = _submit(executor, task, payload, missing, kept, rows, progress)
+    return Rows(tuple(rows[k] for k in sorted(rows)), computed)
+
+
+def _submit(
+    executor: Executor,
+    task: Task,
+    payload: Any,
+    missing: Iterator[tuple[int, Any]],
+    kept: str | None,
+    rows: dict[int, Row],
+    progress: Progress | None,
+) -> int:
+    computed, running = 0, dict[Future[Row], int]()
+    try:
+        while True:
+            for k, item in islice(missing, _WINDOW - len(running)):
+                running[executor.submit(call, task, payload, item, k, kept)] = k
+            if not running:
+                return computed
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                rows[running.pop(future)] = future.result()
+                computed += 1
+            _tell(progress, rows)
+    finally:
+        for future in running:
+            future.cancel()
+
+
+def _tell(progress: Progress | None, rows: dict[int, Row]) -> None:
+    if progress is not None:
+        progress(len(rows))
+
+
+def call(task: Task, payload: Any, item: Any, index: int, folder: str | None) -> Row:
+    """Compute the row of one task and keep it; runs in a worker."""
+    try:
+        row = {"index": index, **task(payload, item, index)}
+    except Error as error:
+        row = {"index": index, "error": str(error)}
+    text = json.dumps(row)
+    if folder is not None:
+        _write(os.path.join(folder, f"{index:06d}.json"), text)
+    kept: Row = json.loads(text)
+    return kept
+
+
+def _known(folder: str | None, index: int, rows: dict[int, Row]) -> bool:
+    """Take the row of a finished task from the folder."""
+    if folder is None:
+        return False
+    try:
+        with open(os.path.join(folder, f"{index:06d}.json"), encoding="utf-8") as file:
+            rows[index] = json.load(file)
+    except FileNotFoundError:
+        return False
+    return True
+
+
+def _prepared(folder: str | os.PathLike[str], key: str) -> str:
+    """Make the folder, or refuse one with tasks of other settings."""
+    path = os.path.abspath(folder)
+    os.makedirs(path, exist_ok=True)
+    name = os.path.join(path, "tasks.json")
+    try:
+        with open(name, encoding="utf-8") as file:
+            found = json.load(file).get("key")
+    except FileNotFoundError:
+        _write(name, json.dumps({"key": key}))
+        return path
+    if found != key:
+        raise InputError(f"folder {path} holds tasks of other settings, records or seed; give another folder, or delete this one")
+    return path
+
+
+def _write(path: str, text: str) -> None:
+    """Write a file whole or not at all."""
+    handle, name = tempfile.mkstemp(dir=os.path.dirname(path), suffix=".part")
+    with os.fdopen(handle, "w", encoding="utf-8") as file:
+        file.write(text)
+    os.replace(name, path)
+
+
+def key_of(*parts: Any) -> str:
+    """A name of settings and arrays: SHA-256 of their bytes."""
+    found = hashlib.sha256()
+    for part in parts:
+        found.update(part.tobytes() if hasattr(part, "tobytes") else repr(part).encode())
+    return found.hexdigest()

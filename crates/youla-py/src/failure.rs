@@ -1,0 +1,86 @@
+//! Errors of the library as Python exceptions with the library's message.
+
+use pyo3::prelude::*;
+use std::path::Path;
+use youla::ErrorKind;
+
+/// Path under which options of Python are parsed: their errors name no file.
+pub(crate) const OPTIONS: &str = "options";
+
+/// Why a call fails.
+#[derive(Debug)]
+pub(crate) struct Failure {
+    kind: ErrorKind,
+    message: String,
+}
+
+pub(crate) type Result<T, E = Failure> = std::result::Result<T, E>;
+
+impl Failure {
+    pub(crate) fn input(message: impl Into<String>) -> Self {
+        Failure { kind: ErrorKind::BadInput, message: message.into() }
+    }
+
+    pub(crate) fn numerical(message: impl Into<String>) -> Self {
+        Failure { kind: ErrorKind::Numerical, message: message.into() }
+    }
+}
+
+macro_rules! refused {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Failure {
+            fn from(error: $error) -> Self {
+                Failure { kind: error.kind(), message: error.to_string() }
+            }
+        }
+    )*};
+}
+
+refused!(youla::Error, youla_greybox::Error, youla_loop::Error, youla_report::Error);
+
+impl From<youla_io::Error> for Failure {
+    fn from(error: youla_io::Error) -> Self {
+        let message = match &error {
+            youla_io::Error::Settings { path, problem, .. } if path == Path::new(OPTIONS) => problem.clone(),
+            other => other.to_string(),
+        };
+        Failure { kind: error.kind(), message }
+    }
+}
+
+impl From<youla_run::Error> for Failure {
+    fn from(error: youla_run::Error) -> Self {
+        match error {
+            youla_run::Error::File(of_file) => of_file.into(),
+            other => Failure { kind: other.kind(), message: other.to_string() },
+        }
+    }
+}
+
+impl From<youla_cli::Failure> for Failure {
+    fn from(failure: youla_cli::Failure) -> Self {
+        match failure {
+            youla_cli::Failure::Refused(message, kind) => Failure { kind, message },
+            youla_cli::Failure::OutputClosed => Failure::input("the output is closed"),
+        }
+    }
+}
+
+impl From<serde_json::Error> for Failure {
+    fn from(error: serde_json::Error) -> Self {
+        Failure::input(format!("this is no JSON that the package wrote: {error}"))
+    }
+}
+
+impl From<Failure> for PyErr {
+    fn from(failure: Failure) -> Self {
+        let class = match failure.kind {
+            ErrorKind::BadInput => "InputError",
+            ErrorKind::Numerical => "NumericalError",
+        };
+        Python::attach(|py| {
+            let raised = py.import("youla._errors").and_then(|m| m.getattr(class)?.call1((failure.message,)));
+            raised.map_or_else(|error| error, PyErr::from_value)
+        })
+    }
+}

@@ -1,0 +1,38 @@
+//! The extension module `youla._native`: what the Python package computes. Settings come as JSON, records and matrices as NumPy
+//! arrays; results go back as JSON and arrays. The package around it gives them their types.
+
+mod failure;
+mod logs;
+mod matrices;
+mod models;
+mod options;
+mod parts;
+mod region;
+mod replicate;
+mod run;
+mod worker;
+
+use pyo3::prelude::*;
+
+/// The extension module.
+#[pymodule]
+mod _native {
+    #[pymodule_export]
+    use super::logs::{clock, read_log};
+    #[pymodule_export]
+    use super::models::{certify, frequency_response, modes, reduce, simulate, simulate_loop};
+    #[pymodule_export]
+    use super::parts::{check, excite, subspace};
+    #[pymodule_export]
+    use super::program;
+    #[pymodule_export]
+    use super::replicate::replicate;
+    #[pymodule_export]
+    use super::run::{Run, compare, demo, identify, identify_file};
+}
+
+/// Runs the program `youla` with these arguments, the first of them its name; returns its exit code.
+#[pyfunction]
+fn program(py: Python<'_>, args: Vec<String>) -> u8 {
+    py.detach(|| youla_cli::run(args.into_iter().map(Into::into)))
+}

@@ -1,0 +1,70 @@
+//! Records between NumPy and the library.
+
+use crate::failure::Failure;
+use crate::worker;
+use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use youla::Mat;
+use youla::lti::Discrete;
+use youla::signal::{Channel, Record};
+use youla_io::{ChannelRef, ChannelSpec, Source, TimeSource};
+
+/// A record as Python holds it: name, sample time, channels with name, unit and column, and an array of samples x columns.
+pub(crate) type Log<'py> = (String, f64, Vec<(String, String, usize)>, PyReadonlyArray2<'py, f64>);
+
+/// Copies records out of their arrays, which are only read.
+pub(crate) fn records(py: Python<'_>, logs: Vec<Log<'_>>) -> PyResult<Vec<Record>> {
+    let one = |(name, ts, channels, data): Log<'_>| -> PyResult<Record> {
+        let view = data.as_array();
+        let record = py.detach(|| {
+            if let Some((channel, _, column)) = channels.iter().find(|(_, _, column)| *column >= view.ncols()) {
+                let columns = view.ncols();
+                let what = format!("channel {channel:?} is column {column}, but the array has {columns} columns");
+                return Err(Failure::input(what));
+            }
+            let matrix = Mat::from_fn(view.nrows(), channels.len(), |i, j| view[[i, channels[j].2]]);
+            let channels = channels.iter().map(|(name, unit, _)| Channel::new(name, unit)).collect();
+            Ok::<_, Failure>(Record::new(name, channels, matrix, Discrete::new(ts)?)?)
+        });
+        Ok(record?)
+    };
+    logs.into_iter().map(one).collect()
+}
+
+/// A record that was read: rows, sample time, names and units.
+type ReadLog<'py> = (Bound<'py, numpy::PyArray2<f64>>, f64, Vec<(String, String)>);
+
+/// Reads a file: text, MATLAB, NumPy or Parquet. Channels are name, place in the file and unit.
+#[pyfunction]
+#[pyo3(signature = (path, channels, time, dt))]
+pub(crate) fn read_log<'py>(
+    py: Python<'py>,
+    path: PathBuf,
+    channels: Vec<(String, String, String)>,
+    time: Option<String>,
+    dt: Option<f64>,
+) -> PyResult<ReadLog<'py>> {
+    let record = worker::run(py, false, move |_| {
+        let time = TimeSource { column: time.as_deref().map(column), ts: dt, ..TimeSource::default() };
+        let spec = |(name, from, unit): &(String, String, String)| ChannelSpec::from(name, column(from), unit);
+        let channels = channels.iter().map(spec).collect();
+        let source = Source { path, format: Default::default(), time, channels, csv: Default::default() };
+        Ok(youla_io::read(&source)?)
+    })?;
+    let channels = record.channels().iter().map(|c| (c.name.clone(), c.unit.clone())).collect();
+    Ok((crate::matrices::array(py, record.data()), record.time().ts(), channels))
+}
+
+fn column(place: &str) -> ChannelRef {
+    place.parse().unwrap_or_else(|never: std::convert::Infallible| match never {})
+}
+
+/// The sample time that a time column shows; `dt` must agree with it where it is given.
+#[pyfunction]
+#[pyo3(signature = (what, times, dt))]
+pub(crate) fn clock(what: &str, times: PyReadonlyArray1<'_, f64>, dt: Option<f64>) -> PyResult<f64> {
+    let times: Vec<f64> = times.as_array().iter().copied().collect();
+    let time = TimeSource { ts: dt, ..TimeSource::default() }.of_column(what, &times);
+    Ok(time.map_err(Failure::from)?.ts())
+}

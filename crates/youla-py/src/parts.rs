@@ -1,0 +1,96 @@
+//! Stages that need no run: the check of records, subspace identification, an excitation.
+
+use crate::failure::{Failure, OPTIONS};
+use crate::logs::{Log, records};
+use crate::matrices::{ModelOut, array, model_out};
+use crate::options::{as_toml, options, settings};
+use crate::region::{Region, RegionOut};
+use crate::worker;
+use numpy::{PyArray2, PyReadonlyArray1};
+use pyo3::prelude::*;
+use std::path::Path;
+use youla::identify::subspace::SubspaceModel;
+use youla_loop::excite::ExciteOptions;
+use youla_run::{ExcitationPort, check_in_memory, excite_run, parse_subspace_options, records_in_memory};
+
+/// Checks records, with their controller where `controller` says so; the findings as JSON.
+#[pyfunction]
+pub(crate) fn check(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, controller: bool) -> PyResult<String> {
+    let chosen = settings(chosen)?;
+    let logs = records(py, logs)?;
+    worker::run(py, false, move |_| {
+        let records = records_in_memory(&chosen.data, logs)?;
+        let found = check_in_memory(&chosen, &records, Path::new("."), controller)?;
+        Ok(serde_json::to_string(&found.entry())?)
+    })
+}
+
+/// A model by subspace identification from u and y.
+#[pyclass(frozen, module = "youla._native")]
+pub(crate) struct Subspace {
+    found: SubspaceModel,
+}
+
+/// Identifies from u and y by a subspace method.
+#[pyfunction]
+pub(crate) fn subspace(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, choices: &str) -> PyResult<Subspace> {
+    let chosen = settings(chosen)?;
+    let choices = parse_subspace_options(&as_toml(choices)?, Path::new(OPTIONS)).map_err(Failure::from)?;
+    let logs = records(py, logs)?;
+    worker::run(py, false, move |_| {
+        let records = records_in_memory(&chosen.data, logs)?;
+        let found = youla::identify::direct::direct(&records.experiments(), records.time, &choices)?;
+        Ok(Subspace { found })
+    })
+}
+
+#[pymethods]
+impl Subspace {
+    /// The matrices.
+    fn model<'py>(&self, py: Python<'py>) -> ModelOut<'py> {
+        model_out(py, &self.found.model)
+    }
+
+    /// Singular values from which the order is chosen, descending.
+    fn singular_values(&self) -> Vec<f64> {
+        self.found.singular_values.clone()
+    }
+
+    /// Block rows of the future and of the past.
+    fn horizons(&self) -> (usize, usize) {
+        (self.found.horizon, self.found.past)
+    }
+
+    /// The response with its region where an uncertainty was asked for.
+    fn response<'py>(&self, py: Python<'py>, hz: PyReadonlyArray1<'py, f64>) -> PyResult<RegionOut<'py>> {
+        let hz: Vec<f64> = hz.as_array().to_vec();
+        let of = || {
+            let band = self.found.uncertainty.as_ref().map(|u| u.response(&crate::region::omega(&hz)));
+            match band.transpose()?.flatten() {
+                Some(band) => Ok::<_, Failure>(Region::band(band)),
+                None => Region::none(&self.found.model, &hz),
+            }
+        };
+        Ok(py.detach(of)?.out(py))
+    }
+}
+
+/// An excitation: samples x inputs, sample time, what it is and promises as JSON.
+type ExcitationOut<'py> = (Bound<'py, PyArray2<f64>>, f64, String);
+
+/// An excitation for the loop of the nominal model; `port` is `input` or `alpha`.
+#[pyfunction]
+pub(crate) fn excite<'py>(py: Python<'py>, chosen: &str, choices: &str, port: &str) -> PyResult<ExcitationOut<'py>> {
+    let (chosen, choices) = (settings(chosen)?, options::<ExciteOptions>(choices)?);
+    let port = match port {
+        "input" => ExcitationPort::Input,
+        "alpha" => ExcitationPort::Alpha,
+        other => {
+            let message = format!("port is {other:?}, but must be \"input\" or \"alpha\"");
+            return Err(Failure::input(message).into());
+        }
+    };
+    let made = worker::run(py, false, move |_| Ok(excite_run(&chosen, Path::new("."), &choices, Some(port), None)?))?;
+    let promised = serde_json::to_string(&made.excited.summary).map_err(Failure::from)?;
+    Ok((array(py, made.excited.alpha.as_ref()), made.excited.time.ts(), promised))
+}

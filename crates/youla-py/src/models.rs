@@ -66,7 +66,8 @@ pub(crate) fn simulate_loop<'py>(
         let x0 = vec![0.0; closed.order()];
         let both = youla::lti::simulate(&closed, outside.as_ref(), &x0)?;
         let u: Mat<f64> = both.as_ref().subcols(0, m).to_owned();
-        let y: Mat<f64> = both.as_ref().subcols(m, p) + &n;
+        // The output of the loop is what the controller sees, y + n - r.
+        let y: Mat<f64> = both.as_ref().subcols(m, p) + &r;
         Ok::<_, youla::Error>((u, y))
     };
     let (u, y) = py.detach(of_loop).map_err(Failure::from)?;

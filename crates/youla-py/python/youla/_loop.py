@@ -16,7 +16,7 @@ from ._arrays import Array
 from ._errors import InputError
 from ._identify import _plain, options_json
 from ._model import Complex, Model, _signal
-from ._result import Run
+from ._result import RECOMMENDED, Run
 from ._systems import as_model, controller_table, nominal_table
 
 
@@ -319,5 +319,7 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
             run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else os.fspath(run)
             for k, run in enumerate(runs)
         ]
+        # Run folders name the recommended model by its file.
+        model = "recommended" if model == RECOMMENDED else model
         found = json.loads(_native.compare(paths, model, None if page is None else os.fspath(page)))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))

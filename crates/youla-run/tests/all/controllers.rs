@@ -65,6 +65,13 @@ fn a_pid_is_the_difference_equation_that_firmware_computes() {
     assert_close(unfiltered, &by_hand([1.0, 0.0, 0.05, 0.0], false, 0));
 }
 
+/// Matrices without states are a gain: B, which has no rows, has the columns of D.
+#[test]
+fn a_gain_needs_no_states() {
+    let expected: Vec<f64> = error().iter().map(|e| 2.0 * e).collect();
+    assert_close("state_space = { feedback = \"positive\", a = [], b = [], c = [[]], d = [[2.0]] }", &expected);
+}
+
 /// The lead `(s + 20)/(s + 300)`: by Tustin's rule with `w = 2/ts`, and held, whose step response is exact at the samples.
 #[test]
 fn a_controller_in_s_is_discretised_as_stated() {

@@ -1,0 +1,196 @@
+"""The same rows with the same bits on every executor; finished tasks are not computed again."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import loop
+
+import youla
+
+N = 12
+ARGUMENTS = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0}
+OPTIONS = {**ARGUMENTS, "hansen": {"order": 1, "horizon": 5}}
+
+
+@pytest.fixture(scope="module")
+def small() -> youla.Record:
+    return youla.Record(loop(102, 1000), inputs=0, outputs=1, excitation=2, dt=0.01, name="small")
+
+
+@pytest.fixture(scope="module")
+def of_small(small: youla.Record) -> youla.Run:
+    return youla.identify(small, **OPTIONS)
+
+
+@pytest.fixture(scope="module")
+def serial(of_small: youla.Run, small: youla.Record) -> youla.Bootstrap:
+    return youla.bootstrap(of_small, small, N, seed=1, **OPTIONS)
+
+
+def processes() -> ProcessPoolExecutor:
+    return ProcessPoolExecutor(2, mp_context=get_context("spawn"))
+
+
+def bits(rows: youla.Rows) -> str:
+    return json.dumps(rows.rows)
+
+
+def test_threads_and_processes_give_the_bits_of_one(
+    serial: youla.Bootstrap, of_small: youla.Run, small: youla.Record
+) -> None:
+    for executor in (ThreadPoolExecutor(2), processes()):
+        with executor:
+            found = youla.bootstrap(of_small, small, N, seed=1, executor=executor, **OPTIONS)
+            assert bits(found) == bits(serial)
+            assert executor.submit(int, "3").result() == 3  # what was handed in is not closed
+    other = youla.bootstrap(of_small, small, 2, seed=2, **OPTIONS)
+    assert bits(other) != bits(serial)[: len(bits(other))]
+
+
+def test_dask_gives_the_same_bits_and_survives_the_death_of_a_worker(
+    serial: youla.Bootstrap, of_small: youla.Run, small: youla.Record, tmp_path: Path
+) -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        executor: Executor = client.get_executor()
+        victim = next(iter(client.run(os.getpid).values()))
+        killed = []
+
+        def kill_once(done: int) -> None:
+            if not killed:
+                os.kill(victim, signal.SIGKILL)
+                killed.append(done)
+
+        found = youla.bootstrap(
+            of_small, small, N, seed=1, executor=executor, folder=tmp_path / "rows", progress=kill_once, **OPTIONS
+        )
+    assert killed
+    assert bits(found) == bits(serial)
+    assert len(list((tmp_path / "rows").glob("0*.json"))) == N
+
+
+def test_mpi_gives_the_same_bits(serial: youla.Bootstrap, tmp_path: Path) -> None:
+    pytest.importorskip("mpi4py")
+    mpiexec = Path(sys.executable).parent / "mpiexec"
+    if not mpiexec.is_file():
+        pytest.skip("mpiexec is absent (pip install mpich)")
+    script = tmp_path / "mpi.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import json, youla\n"
+        "from conftest import loop\n"
+        "from mpi4py.futures import MPIPoolExecutor\n"
+        "if __name__ == '__main__':\n"
+        "    small = youla.Record(loop(102, 1000), inputs=0, outputs=1, excitation=2, dt=0.01, name='small')\n"
+        "    g = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)\n"
+        "    options = dict(nominal=g, controller=2.0, hansen={'order': 1, 'horizon': 5})\n"
+        "    run = youla.identify(small, **options)\n"
+        "    with MPIPoolExecutor() as executor:\n"
+        f"        rows = youla.bootstrap(run, small, {N}, seed=1, executor=executor, **options)\n"
+        f"    open({str(tmp_path / 'rows.json')!r}, 'w').write(json.dumps(rows.rows))\n"
+    )
+    command = [str(mpiexec), "-n", "3", sys.executable, "-m", "mpi4py.futures", str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=120)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "rows.json").read_text() == bits(serial)
+
+
+def test_finished_replicates_are_kept(
+    serial: youla.Bootstrap, of_small: youla.Run, small: youla.Record, tmp_path: Path
+) -> None:
+    folder = tmp_path / "rows"
+    first = youla.bootstrap(of_small, small, 5, seed=1, folder=folder, **OPTIONS)
+    assert first.computed == 5
+    (folder / "000002.json").unlink()
+    again = youla.bootstrap(of_small, small, N, seed=1, folder=folder, **OPTIONS)
+    assert again.computed == N - 4
+    assert bits(again) == bits(serial)
+    with pytest.raises(youla.InputError, match="holds tasks of other settings"):
+        youla.bootstrap(of_small, small, N, seed=2, folder=folder, **OPTIONS)
+
+
+def test_a_killed_client_loses_nothing_that_was_finished(
+    serial: youla.Bootstrap, of_small: youla.Run, small: youla.Record, tmp_path: Path
+) -> None:
+    """SIGKILL of the process in the middle; the next call computes only what is missing."""
+    folder, script = tmp_path / "rows", tmp_path / "long.py"
+    script.write_text(
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r})\n"
+        "import test_executors as t, youla, time\n"
+        "small = youla.Record(t.loop(102, 1000), inputs=0, outputs=1, excitation=2, dt=0.01, name='small')\n"
+        "run = youla.identify(small, **t.OPTIONS)\n"
+        f"youla.bootstrap(run, small, t.N, seed=1, folder={str(folder)!r}, progress=lambda k: time.sleep(0.2), **t.OPTIONS)\n"
+    )
+    with subprocess.Popen([sys.executable, str(script)]) as child:
+        deadline = time.monotonic() + 60
+        while len(list(folder.glob("0*.json"))) < 3 and time.monotonic() < deadline:
+            time.sleep(0.02)
+        child.kill()
+    finished = len(list(folder.glob("0*.json")))
+    assert 3 <= finished < N
+    again = youla.bootstrap(of_small, small, N, seed=1, folder=folder, **OPTIONS)
+    assert again.computed == N - finished
+    assert bits(again) == bits(serial)
+
+
+def test_replicates_scatter_as_the_interval_says(of_small: youla.Run, small: youla.Record) -> None:
+    """60 replicates: their spread of the frequency is that of the interval within a factor of 1.5."""
+    pytest.importorskip("pandas")
+    with ThreadPoolExecutor(2) as executor:
+        found = youla.bootstrap(of_small, small, 60, seed=3, executor=executor, **OPTIONS)
+    assert not found.failed
+    (mode,) = of_small.modes()
+    assert mode.hz_interval is not None
+    deviation = (mode.hz_interval[1] - mode.hz_interval[0]) / 3.92
+    assert 1 / 1.5 < found.modes()[:, 0, 0].std() / deviation < 1.5
+    low, high = found.intervals()[0, 0]
+    assert low < mode.hz < high
+    frame = found.to_frame()
+    assert list(frame["index"]) == list(range(60))
+    assert "hz_1" in frame
+    assert len(found.models()) == 60
+
+
+def test_scan_is_in_order(small: youla.Record) -> None:
+    grid = {"hansen.horizon": [5, 8], "recommended.order": np.array([1, 2])}
+    alone = youla.scan(small, grid, **OPTIONS)
+    with ThreadPoolExecutor(2) as executor:
+        assert bits(youla.scan(small, grid, executor=executor, **OPTIONS)) == bits(alone)
+    assert [(r["hansen.horizon"], r["recommended.order"]) for r in alone] == [(5, 1), (5, 2), (8, 1), (8, 2)]
+    assert [r["order"] for r in alone] == [1, 2, 1, 2]
+    (misspelt,) = youla.scan(small, {"hansen.horizn": [1]}, **OPTIONS).failed
+    assert "horizon" in misspelt["error"]
+
+
+def test_a_fleet_with_broken_files(tmp_path: Path) -> None:
+    """20 files, 4 of them broken in different ways: 16 results and 4 rows with their reason."""
+    for k in range(20):
+        table = loop(200 + k, 400)
+        if k == 3:
+            table[7, 1] = np.nan
+        np.savetxt(tmp_path / f"{k:02}.csv", table, delimiter=",", header="u,y,d", comments="")
+    (tmp_path / "05.csv").write_text("")
+    (tmp_path / "11.csv").write_text("u,y\n1,2\n")
+    (tmp_path / "17.csv").unlink()
+    read = {"inputs": "u", "outputs": "y", "excitation": "d", "dt": 0.01}
+    files = [tmp_path / f"{k:02}.csv" for k in range(20)]
+    with ThreadPoolExecutor(2) as executor:
+        found = youla.identify_many(iter(files), read=read, executor=executor, **OPTIONS)
+    assert [row["index"] for row in found.failed] == [3, 5, 11, 17]
+    assert len(found.succeeded) == 16
+    assert all(row["error"] for row in found.failed)
+    assert found.rows[4]["record"] == str(files[4])

@@ -1,0 +1,106 @@
+"""Records from every source are the same record, without a copy where none is needed, and inputs are never changed."""
+
+from __future__ import annotations
+
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import loop
+
+import youla
+
+NAMES = {"inputs": "u", "outputs": "y", "excitation": "d"}
+
+
+def columns(table: np.ndarray) -> dict[str, np.ndarray]:
+    return dict(zip("uyd", table.T.copy(), strict=True))
+
+
+def same(record: youla.Record, table: np.ndarray) -> None:
+    assert record.u.tolist() == table[:, [0]].tolist()
+    assert record.y.tolist() == table[:, [1]].tolist()
+    assert record.excitation is not None
+    assert record.excitation.tolist() == table[:, [2]].tolist()
+    assert (record.inputs, record.outputs, record.dt) == (("u",), ("y",), 0.01)
+
+
+def test_every_source_gives_the_same_record(table: np.ndarray, tmp_path: Path) -> None:
+    pd, pl = pytest.importorskip("pandas"), pytest.importorskip("polars")
+    frame = pd.DataFrame(columns(table))
+    frame["t"] = np.arange(len(frame)) * 0.01
+    same(youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01), table)
+    same(youla.Record(columns(table), **NAMES, dt=0.01), table)
+    same(youla.Record(frame, **NAMES, dt=0.01), table)
+    same(youla.Record(pl.DataFrame(columns(table)), **NAMES, dt=0.01), table)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    same(youla.Record(tmp_path / "log.csv", **NAMES, dt=0.01), table)
+    by_number = youla.Record(tmp_path / "log.csv", inputs=0, outputs=1, excitation=2, dt=0.01)
+    assert by_number.y.tolist() == table[:, [1]].tolist()
+    np.savez(tmp_path / "log.npz", **columns(table))
+    same(youla.Record(tmp_path / "log.npz", **NAMES, dt=0.01), table)
+
+
+def test_time_is_read_from_column_index_and_dates(table: np.ndarray) -> None:
+    pd = pytest.importorskip("pandas")
+    frame = pd.DataFrame(columns(table[:100]))
+    seconds = np.arange(100) * 0.01
+    for index in (seconds, pd.to_timedelta(seconds, unit="s"), pd.Timestamp("2026-01-01") + pd.to_timedelta(seconds, unit="s")):
+        found = youla.Record(frame.set_index(pd.Index(index)), **NAMES, time="index")
+        assert found.dt == pytest.approx(0.01, rel=1e-9)
+    frame["t"] = seconds
+    assert youla.Record(frame, **NAMES, time="t").dt == pytest.approx(0.01, rel=1e-12)
+
+
+def test_responses_of_python_control_are_channels_by_time() -> None:
+    """Two outputs and two samples more than channels: by its type, never by its shape."""
+    control = pytest.importorskip("control")
+    system = control.ss(np.diag([0.5, 0.6]), np.eye(2), np.eye(2), 0, 0.1, inputs=["a", "b"], outputs=["v", "w"])
+    u = np.arange(8.0).reshape(2, 4)
+    response = control.forced_response(system, np.arange(4) * 0.1, u)
+    found = youla.Record(response)
+    assert (found.inputs, found.outputs, found.samples) == (("a", "b"), ("v", "w"), 4)
+    assert found.u.tolist() == u.T.tolist()
+    assert found.y.tolist() == response.y.T.tolist()
+    chosen = youla.Record(response, inputs="b", outputs="w")
+    assert chosen.u[:, 0].tolist() == u[1].tolist()
+
+
+def test_a_frame_goes_round(record: youla.Record) -> None:
+    pytest.importorskip("pandas")
+    again = youla.Record(record.to_frame(), **NAMES, time="index")
+    assert again.u.tolist() == record.u.tolist()
+    assert again.dt == pytest.approx(record.dt, rel=1e-12)
+
+
+def test_float64_is_not_copied_and_never_changed() -> None:
+    """10^6 x 4: a copy would take 32 MB; a view takes none. The array stays as it was through an identification."""
+    table = np.zeros((1_000_000, 4))
+    tracemalloc.start()
+    record = youla.Record(table, inputs=[0, 1], outputs=[2, 3], dt=1e-3)
+    part = record[1000:]
+    views = (record.u, record.y, part.u)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak < 1_000_000
+    assert all(np.shares_memory(view, table) for view in views)
+    with pytest.raises(ValueError, match="read-only"):
+        record.u[0, 0] = 1.0
+
+
+def test_identification_leaves_its_input_as_it_was(nominal: youla.Model) -> None:
+    table = loop(5, 500)
+    before = table.copy()
+    log = youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01)
+    youla.identify(log, nominal=nominal, controller=2.0, hansen={"order": 1, "horizon": 5})
+    assert np.array_equal(table, before)
+    assert table.flags.writeable
+
+
+def test_cuts_are_records(record: youla.Record) -> None:
+    first, second = record.split(0.25)
+    assert (first.samples, second.samples) == (1000, 3000)
+    assert (first.name, second.name) == ("log-estimation", "log-verification")
+    assert second.y.tolist() == record[1000:].y.tolist()
+    assert record.named("other").name == "other"

@@ -22,7 +22,7 @@ mod _native {
     #[pymodule_export]
     use super::models::{certify, frequency_response, modes, reduce, simulate, simulate_loop};
     #[pymodule_export]
-    use super::parts::{check, excite, subspace};
+    use super::parts::{Subspace, check, excite, subspace};
     #[pymodule_export]
     use super::program;
     #[pymodule_export]

@@ -159,6 +159,13 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
     Returns
     -------
     Reduction
+
+    Examples
+    --------
+    >>> import youla
+    >>> plant = youla.Model([[0.9, 0], [0, 0.1]], [[1.0], [1e-3]], [[1.0, 1.0]], [[0.0]], dt=0.1)
+    >>> youla.reduce(plant, method="balanced-truncation", order=1).model.order
+    1
     """
     g = as_model(system, "system")
     if isinstance(options.get("order"), int):
@@ -198,6 +205,13 @@ def redesign(run: Run, **options: Any) -> Redesign:
         Where the run has no coprime factors.
     NumericalError
         Where no tried weight keeps the limits.
+
+    Examples
+    --------
+    >>> import youla
+    >>> new = youla.redesign(youla.demo("bearing"))
+    >>> new.controller.inputs, new.promised["predicted"]["least_damping"] > new.promised["present"]["least_damping"]
+    (('y_h', 'y_v'), True)
     """
     if not isinstance(run, Run):
         raise InputError(f"run is {type(run).__name__}, but must be a youla.Run, as youla.identify returns it")
@@ -249,6 +263,14 @@ def excite(
     Returns
     -------
     Excitation
+
+    Examples
+    --------
+    >>> import youla
+    >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    >>> made = youla.excite(plant, 2.0, amplitude=0.5, band=[0.5, 20], seconds=10)
+    >>> made.signal.shape, made.dt
+    ((1000, 1), 0.01)
     """
     if (seconds is None) == (samples is None):
         raise InputError("the length is given twice or not at all; give either seconds= or samples=")
@@ -313,6 +335,13 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     Returns
     -------
     Comparison
+
+    Examples
+    --------
+    >>> import youla
+    >>> found = youla.compare([youla.demo(seed=1), youla.demo(seed=2)])
+    >>> len(found.runs), len(found.distances)
+    (2, 1)
     """
     with tempfile.TemporaryDirectory() as folder:
         paths = [

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from . import _native
 from ._arrays import Array, as_floats, as_matrix, positive
 from ._errors import InputError
+from ._types import Matrices
 
 Complex = npt.NDArray[np.complex128]
 
@@ -127,7 +128,7 @@ class Model:
     >>> model = youla.Model([[0.5]], [[1.0]], [[1.0]], [[0.0]], dt=0.1)
     >>> model.order, model.poles.tolist()
     (1, [(0.5+0j)])
-    >>> abs(model.frequency_response([0.0]).values[0, 0, 0])
+    >>> float(abs(model.frequency_response([0.0]).values[0, 0, 0]))
     2.0
     """
 
@@ -242,7 +243,7 @@ class Model:
         p, m = self.d.shape
         return f"<youla.Model {self.name!r}: order {self.order}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
 
-    def _native(self) -> _native.Matrices:
+    def _native(self) -> Matrices:
         a, b, c, d = self._matrices
         return (a, b, c, d, self._dt)
 

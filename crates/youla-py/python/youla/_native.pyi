@@ -6,10 +6,32 @@ from typing import TypeAlias, final
 import numpy as np
 import numpy.typing as npt
 
+from ._types import Log, Matrices
+
+__all__ = [
+    "Run",
+    "Subspace",
+    "certify",
+    "check",
+    "clock",
+    "compare",
+    "demo",
+    "excite",
+    "frequency_response",
+    "identify",
+    "identify_file",
+    "modes",
+    "program",
+    "read_log",
+    "reduce",
+    "replicate",
+    "simulate",
+    "simulate_loop",
+    "subspace",
+]
+
 _Array: TypeAlias = npt.NDArray[np.float64]
 _Complex: TypeAlias = npt.NDArray[np.complex128]
-Log: TypeAlias = tuple[str, float, Sequence[tuple[str, str, int]], _Array]
-Matrices: TypeAlias = tuple[_Array, _Array, _Array, _Array, float]
 _Region: TypeAlias = tuple[_Complex, tuple[_Array, _Array, float] | None]
 
 def program(args: Sequence[str]) -> int: ...

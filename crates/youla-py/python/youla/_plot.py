@@ -42,7 +42,7 @@ def bode(
     if np.size(ax) != 2:
         raise InputError("ax must be a pair of axes, for magnitude and phase, as plt.subplots(2, 1) returns")
     upper, lower = np.ravel(ax)
-    all_of = [(r, {}) for r in responses]
+    all_of: list[tuple[FrequencyResponse, dict[str, Any]]] = [(r, {}) for r in responses]
     if measured is not None:
         all_of.append((measured, {"color": "0.6", "linewidth": 0.8, "zorder": 1}))
     for response, style in all_of:

@@ -11,6 +11,7 @@ from . import _native
 from ._arrays import Array, positive
 from ._errors import InputError
 from ._sources import Source, source_of
+from ._types import Log
 
 Names = str | int | Sequence[str | int] | None
 
@@ -229,7 +230,7 @@ class Record:
         groups = ", ".join(f"{g}={[n for n, _, _ in c]}" for g, c in self._groups.items() if c)
         return f"<youla.Record {self._name!r}: {len(self)} samples of {self._dt:g} s, {groups}>"
 
-    def _log(self) -> _native.Log:
+    def _log(self) -> Log:
         channels = [channel for group in self._groups.values() for channel in group]
         return (self._name, self._dt, channels, self._data)
 

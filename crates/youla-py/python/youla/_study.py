@@ -20,6 +20,7 @@ from ._model import Model
 from ._record import Record
 from ._result import Run
 from ._tasks import Progress, Row, Rows, key_of, run_tasks
+from ._types import Log
 
 Payload = dict[str, Any]
 Folder = str | os.PathLike[str] | None
@@ -89,6 +90,20 @@ def bootstrap(
     Returns
     -------
     Bootstrap
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
+    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
+    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> from concurrent.futures import ThreadPoolExecutor
+    >>> with ThreadPoolExecutor(2) as executor:
+    ...     found = youla.bootstrap(youla.identify(log, **known), log, 8, seed=1, executor=executor, **known)
+    >>> found.modes().shape, len(found.failed)
+    ((8, 1, 2), 0)
     """
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
     predictor = run._native.predictor() if isinstance(run, Run) else None
@@ -136,6 +151,17 @@ def scan(
     -------
     Rows
         In the order of the combinations, the last key fastest: the options, `trusted`, `order`, modes and least fit.
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
+    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
+    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> [row["order"] for row in youla.scan(log, {"recommended.order": [1, 2]}, **known)]
+    [1, 2]
     """
     if not isinstance(grid, Mapping) or not grid:
         raise InputError("grid must map keys such as 'hansen.order' to lists of values")
@@ -195,6 +221,18 @@ def identify_many(
     -------
     Rows
         In the order of `records`: `record`, `trusted`, `order`, modes, least fit, or `error`.
+
+    Examples
+    --------
+    >>> import numpy as np, youla
+    >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
+    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
+    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> rows = youla.identify_many([log, "absent.csv"], read={"inputs": "u", "outputs": "y", "dt": 0.01}, **known)
+    >>> len(rows.succeeded), rows.failed[0]["error"]
+    (1, 'absent.csv: no such file')
     """
     payload = {"read": dict(read or {}), "arguments": arguments}
     key = key_of(sorted(payload["read"].items()), sorted((k, repr(v)) for k, v in arguments.items()))
@@ -215,7 +253,7 @@ def _row(run: Run) -> Row:
     found = run.summary["recommended"]
     if found is None:
         return {"error": str(run.summary["refused"].get("recommended", "no model is recommended"))}
-    a, b, c, d, dt = run._native.model("likelihood") or ([], [], [], [], 0.0)
+    model = run.recommended
     fits = [f for record in run.fits.get("likelihood", {}).values() for f in record if f is not None]
     return {
         "trusted": found["trusted"],
@@ -223,21 +261,19 @@ def _row(run: Run) -> Row:
         "dead_time": found["dead_time"],
         "least_fit": min(fits, default=None),
         "modes": [[m["hz"], m["zeta"]] for m in found["modes"]],
-        "ts": dt,
-        "model": {key: np.asarray(x).tolist() for key, x in zip("abcd", (a, b, c, d), strict=True)},
+        "ts": model.dt,
+        "model": {key: getattr(model, key).tolist() for key in "abcd"},
     }
 
 
-def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, Any]) -> tuple[str, list[_native.Log]]:
+def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, Any]) -> tuple[str, list[Log]]:
     """Settings as JSON and the records, from the arguments of `identify`."""
     options = dict(arguments)
-    keys = {key: options.pop(key, default) for key, default in _ARGUMENTS.items()}
-    settings, logs = prepare(record, verify, *keys.values(), options)
+    nominal, controller, hold, name = (options.pop(key, None) for key in ("nominal", "controller", "hold", "name"))
+    feedback = options.pop("feedback", "negative")
+    settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
     return json.dumps(settings), logs
 
 
-_ARGUMENTS: dict[str, Any] = {"nominal": None, "controller": None, "feedback": "negative", "hold": None, "name": None}
-
-
-def _bytes(logs: list[_native.Log]) -> list[Any]:
+def _bytes(logs: list[Log]) -> list[Any]:
     return [part for name, dt, channels, data in logs for part in (name, dt, channels, np.ascontiguousarray(data))]

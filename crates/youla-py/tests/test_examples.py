@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +12,8 @@ import pytest
 from conftest import ROOT
 
 import youla
+
+tomllib = pytest.importorskip("tomllib")  # Python 3.11 and later
 
 FILES = {
     "likelihood": "4-identify/recommended.json",

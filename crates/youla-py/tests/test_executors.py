@@ -194,3 +194,7 @@ def test_a_fleet_with_broken_files(tmp_path: Path) -> None:
     assert len(found.succeeded) == 16
     assert all(row["error"] for row in found.failed)
     assert found.rows[4]["record"] == str(files[4])
+    kept = youla.identify_many(files[:2], read=read, folder=tmp_path / "rows", **OPTIONS)
+    assert bits(kept) == json.dumps(found.rows[:2])
+    with pytest.raises(youla.InputError, match=r"not of .*01\.csv; give another folder"):
+        youla.identify_many(files[1:3], read=read, folder=tmp_path / "rows", **OPTIONS)

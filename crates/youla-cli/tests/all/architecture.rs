@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 9] = [
+const ARROWS: [(&str, &[&str]); 10] = [
     ("youla-rt", &[]),
     ("youla", &["youla-rt"]),
     ("youla-greybox", &["youla"]),
@@ -15,6 +15,7 @@ const ARROWS: [(&str, &[&str]); 9] = [
     ("youla-run", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report"]),
     ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-rt", "youla-run"]),
     ("youla-cli", &["youla", "youla-io", "youla-loop", "youla-paper", "youla-report", "youla-run"]),
+    ("youla-py", &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run"]),
 ];
 
 fn crates() -> PathBuf {

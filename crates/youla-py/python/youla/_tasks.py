@@ -16,7 +16,10 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
+import numpy as np
+
 from ._errors import Error, InputError
+from ._record import Record
 
 Row = dict[str, Any]
 Task = Callable[[Any, Any, int], Row]
@@ -87,7 +90,7 @@ def run_tasks(
         raise InputError(f"executor is {type(executor).__name__}, but must be a concurrent.futures.Executor, or None")
     kept = None if folder is None else _prepared(folder, key)
     rows: dict[int, Row] = {}
-    missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, rows))
+    missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, item, rows))
     if executor is None:
         computed = 0
         for k, item in missing:
@@ -138,21 +141,33 @@ def call(task: Task, payload: Any, item: Any, index: int, folder: str | None) ->
         row = {"index": index, "error": str(error)}
     text = json.dumps(row)
     if folder is not None:
-        _write(os.path.join(folder, f"{index:06d}.json"), text)
+        _write(os.path.join(folder, f"{index:06d}.json"), json.dumps({"item": name_of(item), "row": row}))
     kept: Row = json.loads(text)
     return kept
 
 
-def _known(folder: str | None, index: int, rows: dict[int, Row]) -> bool:
+def _known(folder: str | None, index: int, item: Any, rows: dict[int, Row]) -> bool:
     """Take the row of a finished task from the folder."""
     if folder is None:
         return False
+    path = os.path.join(folder, f"{index:06d}.json")
     try:
-        with open(os.path.join(folder, f"{index:06d}.json"), encoding="utf-8") as file:
-            rows[index] = json.load(file)
+        with open(path, encoding="utf-8") as file:
+            found = json.load(file)
     except FileNotFoundError:
         return False
+    if found["item"] != name_of(item):
+        raise InputError(f"{path} holds the result of {found['item']}, not of {name_of(item)}; give another folder")
+    rows[index] = found["row"]
     return True
+
+
+def name_of(item: Any) -> str:
+    """Return the name by which a folder knows an item."""
+    if isinstance(item, Record):
+        name, dt, channels, data = item._log()
+        return f"{name}, {key_of(dt, channels, np.ascontiguousarray(data))}"
+    return str(item)
 
 
 def _prepared(folder: str | os.PathLike[str], key: str) -> str:

@@ -7,6 +7,7 @@
 //! - `rust,noplayground file=FILE`: one of the examples, which other tests run;
 //! - `rust,ignore file=FILE`: lines of one of the examples;
 //! - `python`, `matlab`, `c`: run or compiled by ignored tests, which need the language;
+//! - `python,package`: run by the tests of `crates/youla-py`, which have the package `youla`;
 //! - `json keys=FILE`: an extract of a file;
 //! - `sh`: commands for the project;
 //! - `text` alone and `latex` are to be read.
@@ -88,7 +89,7 @@ pub(crate) fn steps(text: &str) -> Vec<Step> {
                 found.push(Step::Keys { file, text: body.to_owned() });
             }
             ("sh", _) => found.extend(body.lines().map(|line| Step::Project { command: line.to_owned() })),
-            ("latex", _) => {}
+            ("latex" | "python,package", _) => {}
             (kind, _) => panic!("a block of the kind {kind:?}"),
         }
     }

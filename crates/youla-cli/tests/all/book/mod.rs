@@ -30,7 +30,7 @@ fn chapters_on_measured_data_do_what_they_say() {
 #[test]
 #[ignore = "needs python3 with scipy"]
 fn python_blocks_run() {
-    run_chapters("python", |text| text.contains("```python") && !needs_data(text), Some(Language::Python));
+    run_chapters("python", |text| text.contains("```python\n") && !needs_data(text), Some(Language::Python));
 }
 
 #[test]

@@ -74,9 +74,12 @@ pub(crate) fn simulate_loop<'py>(
     Ok((array(py, u.as_ref()), array(py, y.as_ref())))
 }
 
+/// Whether the loop is stable, real and imaginary parts of its poles, and the peak of the sensitivity.
+type CertificateOut = (bool, Vec<(f64, f64)>, Option<f64>);
+
 /// Whether a controller (positive feedback) stabilises a model, and the poles of the loop, real and imaginary parts.
 #[pyfunction]
-pub(crate) fn certify(model: ModelIn<'_>, controller: ModelIn<'_>) -> PyResult<(bool, Vec<(f64, f64)>, Option<f64>)> {
+pub(crate) fn certify(model: ModelIn<'_>, controller: ModelIn<'_>) -> PyResult<CertificateOut> {
     let (model, controller) = (model_in(&model)?, model_in(&controller)?);
     let found = youla::validate::certify(&model, &controller).map_err(Failure::from)?;
     let peak = match found.stable {

@@ -178,6 +178,19 @@ def test_ctrl_c_stops_a_run(tmp_path: Path) -> None:
         assert time.monotonic() - start < 1.0
 
 
+def test_a_run_toml_is_the_same_run(tmp_path: Path) -> None:
+    table = loop(9, 600)
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="u,y,d", comments="", fmt="%.17g")
+    log = youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01, name="log")
+    nominal = {"state_space": {"domain": "discrete", "a": [[0.9]], "b": [[0.1]], "c": [[1.0]]}}
+    run = youla.identify(log, nominal=nominal, controller={"pid": {"kp": 2.0, "discretisation": "tustin"}})
+    text = run.settings.replace('file = "log"', 'file = "log.csv"')
+    (tmp_path / "run.toml").write_text(text)
+    again = youla.identify(tmp_path / "run.toml")
+    for name in run.models:
+        assert again.model(name).a.tobytes() == run.model(name).a.tobytes(), name
+
+
 def test_the_program_is_in_the_wheel(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "youla"]
     version = subprocess.run([*command, "--version"], capture_output=True, text=True, check=True)

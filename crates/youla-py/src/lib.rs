@@ -24,11 +24,17 @@ mod _native {
     #[pymodule_export]
     use super::parts::{Subspace, check, excite, subspace};
     #[pymodule_export]
-    use super::program;
-    #[pymodule_export]
     use super::replicate::replicate;
     #[pymodule_export]
     use super::run::{Run, compare, demo, identify, identify_file};
+    #[pymodule_export]
+    use super::{program, version};
+}
+
+/// Version of library and program.
+#[pyfunction]
+fn version() -> &'static str {
+    env!("CARGO_PKG_VERSION")
 }
 
 /// Runs the program `youla` with these arguments, the first of them its name; returns its exit code.

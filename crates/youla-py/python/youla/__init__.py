@@ -6,8 +6,7 @@
 (True, 3)
 """
 
-from importlib.metadata import PackageNotFoundError, version
-
+from . import _native
 from ._errors import Error, InputError, NumericalError
 from ._identify import Check, SubspaceEstimate, check, demo, greybox, identify, subspace
 from ._loop import (
@@ -29,10 +28,7 @@ from ._result import Evidence, Plots, Prediction, Run, Verdict
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
 
-try:
-    __version__ = version("youla")
-except PackageNotFoundError:  # a source tree that is not installed
-    __version__ = "unknown"
+__version__ = _native.version()
 
 __all__ = [
     "Bootstrap",

@@ -131,8 +131,7 @@ fn text_of_the_user_cannot_leave_its_place() {
 #[test]
 fn the_result_comes_first_and_the_data_last() {
     let page = html(&sample::bearing()).unwrap();
-    let sections =
-        ["trust", "frequency", "modes", "fits", "verification", "poles", "order", "data", "run"];
+    let sections = ["trust", "frequency", "modes", "fits", "verification", "poles", "order", "data", "run"];
     let place = |key: &&str| page.find(&format!("<section id=\"{key}\"")).unwrap_or_else(|| panic!("no {key}"));
     assert!(sections.iter().map(place).is_sorted());
 }

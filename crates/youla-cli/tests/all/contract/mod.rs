@@ -75,7 +75,7 @@ fn summary_recommends_one_model() {
     let positive = |row: &Value| numbers(row).len() == 2 && numbers(row).iter().all(|s| *s > 0.0);
     assert!(absolute.iter().all(|at| at.as_array().is_some_and(|rows| rows.len() == 2 && rows.iter().all(positive))));
     for e in recommended["evidence"].as_array().expect("an array") {
-        assert!(e["question"].as_str().is_some_and(|q| q.ends_with('?')) && e["limit"].is_number(), "{e}");
+        assert!(e["question"].as_str().is_some_and(|q| q.ends_with(')')) && e["limit"].is_number(), "{e}");
     }
 }
 

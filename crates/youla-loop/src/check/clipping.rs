@@ -59,7 +59,11 @@ pub fn clipping(values: &[f64], declared: Option<[f64; 2]>, options: &CheckOptio
     if levels <= options.switched_levels {
         return Clipping::default();
     }
-    let held = |value: Option<f64>| limit(values, value?, |v| Some(v) == value).filter(|limit| limit.longest > 1);
+    let once =
+        |limit: &Limit| limit.samples == limit.longest && limit.longest <= 2 * longest_of_others(values, limit.value);
+    let held = |value: Option<f64>| {
+        limit(values, value?, |v| Some(v) == value).filter(|limit| limit.longest > 1 && !once(limit))
+    };
     Clipping { lower: held(lower), upper: held(upper) }
 }
 
@@ -80,6 +84,12 @@ fn piled_up(mut outside_in: impl Iterator<Item = f64>, options: &CheckOptions) -
     let next = counts[1..].iter().copied().max()?;
     let enough = counts[0] >= options.clipped_samples && counts[0] as f64 >= options.clipped_pile_up * next as f64;
     enough.then_some(outermost)
+}
+
+/// Longest stretch at any other value. A signal that is held, or slow against its steps, stays at its extreme as long as elsewhere; an
+/// extreme that is reached once is a limit only where it is kept for longer.
+fn longest_of_others(values: &[f64], extreme: f64) -> usize {
+    values.chunk_by(|a, b| a == b).filter(|run| run[0] != extreme).map(<[f64]>::len).max().unwrap_or(0)
 }
 
 fn limit(values: &[f64], value: f64, at: impl Fn(f64) -> bool) -> Option<Limit> {
@@ -157,6 +167,19 @@ mod tests {
             let low = found.lower.filter(|low| low.value == -1.5 && low.samples > 90);
             assert!(step > 0.1 || (low.is_some() && found.upper.is_some()), "seed {seed}: {found:?}");
         }
+    }
+
+    /// A signal that is held for four samples here and there stays at its extreme once, as long as elsewhere; kept for twelve, it is at a
+    /// limit.
+    #[test]
+    fn a_held_extreme_is_no_limit() {
+        let options = CheckOptions::default();
+        let mut values: Vec<f64> = (0..2000).map(|k| f64::from(k * 7919 % 2003)).collect();
+        values[100..104].fill(1000.5);
+        values[500..504].fill(3000.0);
+        assert_eq!(clipping(&values, None, &options), Clipping::default());
+        values[500..512].fill(3000.0);
+        assert_eq!(clipping(&values, None, &options).upper.unwrap().longest, 12);
     }
 
     #[test]

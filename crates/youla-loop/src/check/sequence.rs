@@ -44,6 +44,8 @@ const ROUNDING: f64 = 1e-6;
 /// Chosen, not measured.
 const IN_A_ROW: usize = 3;
 const SIZE: f64 = 0.05;
+/// Share of the rows that keep the value of the row before, from which an input is held; a controller at every second row keeps half.
+const HELD: f64 = 0.4;
 /// Breaks that are looked for; more are no accident.
 const PLACES: usize = 3;
 
@@ -54,7 +56,7 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize) -> Re
     if known == 0 {
         return Ok(all);
     }
-    for input in 0..m {
+    for input in (0..m).filter(|input| !held(lagged, *input)) {
         let outside = m + p..m + p + known;
         let columns =
             [lagged.past(0..m, 1), lagged.past(m..m + p, 0), lagged.past(outside, 0), vec![lagged.trend(0)]].concat();
@@ -84,6 +86,14 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize) -> Re
         }
     }
     Ok(all)
+}
+
+/// Whether an input keeps its value in so many rows that its controller acts less often than the log has rows: it is no difference equation
+/// in these rows.
+fn held(lagged: &Lagged, input: usize) -> bool {
+    let samples = lagged.rows + lagged.lags;
+    let kept = (1..samples).filter(|k| lagged.sample(input, *k) == lagged.sample(input, k - 1)).count();
+    kept as f64 > HELD * samples as f64
 }
 
 /// Whether a signal that rested for all lags moves at a sample or next to it.

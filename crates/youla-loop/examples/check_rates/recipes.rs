@@ -41,12 +41,18 @@ pub(crate) fn other(seed: usize) -> Recipe {
 }
 
 pub(crate) fn with_defect(name: &str, seed: usize) -> Recipe {
+    let saturates = name == defects::IN_THE_LOOP[0];
     Recipe {
-        kind: if defects::TWO_BY_TWO.contains(&name) { 3 } else { seed % machines::KINDS },
+        // A levitation whose input saturates falls without end.
+        kind: match seed % machines::KINDS {
+            _ if defects::TWO_BY_TWO.contains(&name) => 3,
+            2 if saturates => 0,
+            kind => kind,
+        },
         at_reference: false,
         noise: [0.1, 0.03, 0.01][seed % 3],
         bits: (seed % 4 == 3).then_some(12),
-        limit: (name == defects::IN_THE_LOOP[0]).then_some(0.5),
+        limit: saturates.then_some(0.5),
         excited: name != defects::IN_THE_LOOP[1],
         declared: true,
         seed: 10_000 + seed as u64,

@@ -13,7 +13,7 @@ use youla_report::data::{ReportPart, Status, Verdict};
 
 /// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    let rest = [fit_line, residual_line, data_line, loop_line];
+    let rest = [unnoticed_line, fit_line, residual_line, data_line, loop_line];
     recommended::verdict_lines(found).into_iter().chain(rest.iter().filter_map(|line| line(found))).collect()
 }
 
@@ -51,6 +51,15 @@ fn fit_line(found: &Identification) -> Option<Verdict> {
     // A fit says how much of the output is not noise; a high one is no evidence of a right model.
     let worse = !fit.is_finite() || nominal > fit;
     Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: ReportPart::Fits })
+}
+
+/// Without a known excitation: which errors the run has no means to notice.
+fn unnoticed_line(found: &Identification) -> Option<Verdict> {
+    let unknown = !found.settings.data.excitation_is_known() && !found.declared.controller.is_zero();
+    let text = "No excitation is declared, so these errors could not be noticed: a wrong gain, sign or delay of [controller]; u and y \
+                shifted against each other; exchanged channels; noise taken for excitation. Declare `input_excitation` or `reference` \
+                in [data].";
+    unknown.then(|| Verdict { status: Status::Caution, text: text.into(), evidence: ReportPart::Signals })
 }
 
 /// Whether the residual depends on what excited the loop; nothing without a verification record.

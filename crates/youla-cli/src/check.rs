@@ -6,6 +6,7 @@ use crate::run_folder::folder_of;
 use clap::Args;
 use std::fs;
 use std::path::{Path, PathBuf};
+use youla_io::folder::require_place;
 use youla_loop::check::Severity;
 use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, read_check_options};
 
@@ -39,6 +40,7 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
     if let Some(folder) = args.out.as_ref().filter(|folder| folder.exists()) {
         return Err(youla_io::Error::OutputExists { path: folder.clone() }.into());
     }
+    args.out.as_ref().map_or(Ok(()), |folder| require_place(&folder.join("check.json")))?;
     let found = if args.log.input.is_empty() { of_run(args)? } else { of_files(args)? };
     let json =
         serde_json::to_string_pretty(&found.entry()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;

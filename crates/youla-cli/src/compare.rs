@@ -5,6 +5,7 @@ use crate::table::fitted;
 use crate::terminal;
 use clap::Args;
 use std::path::PathBuf;
+use youla_io::folder::require_place;
 use youla_report::data::EvidenceTable;
 use youla_run::{Comparison, compare, write_comparison};
 
@@ -19,8 +20,8 @@ pub(crate) struct CompareArgs {
     /// Run folders; the others are compared with the first.
     #[arg(value_name = "RUN", required = true, num_args = 2..)]
     runs: Vec<PathBuf>,
-    /// Model of each run: hansen, or likelihood (the recommended one), hansen_reduced, direct, grey_box, nominal.
-    #[arg(long, value_name = "NAME", default_value = "hansen")]
+    /// Model of each run: recommended, hansen, hansen_reduced, direct, grey_box or nominal.
+    #[arg(long, value_name = "NAME", default_value = "recommended")]
     model: String,
     /// Page to write; its data are written next to it as JSON.
     #[arg(long, value_name = "FILE", default_value = "comparison.html")]
@@ -32,6 +33,7 @@ pub(crate) struct CompareArgs {
 
 /// Writes page and data and prints the tables.
 pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
+    require_place(&args.out)?;
     let found = compare(&args.runs, &args.model)?;
     write_comparison(&found, &args.out, args.force)?;
     match (form.json, form.quiet) {

@@ -8,7 +8,7 @@ use youla_run::{controller_for_export, model_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
-  youla export runs/demo-levitated-mass-001 --to python     hansen.py, which makes a control.ss of python-control
+  youla export runs/demo-levitated-mass-001 --to python     recommended.py, which makes a control.ss of python-control
   youla export runs/demo-levitated-mass-001 --to npz --model hansen_reduced --out model.npz
   youla export model.json --to matlab --out g.m
   youla export runs/demo-levitated-mass-001 --to c-controller --out controller.h
@@ -24,7 +24,8 @@ pub(crate) struct ExportArgs {
     /// ports alpha and beta).
     #[arg(long, value_name = "FORMAT", value_parser = format)]
     to: Format,
-    /// Model of the run: hansen by default, or hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller, left, right.
+    /// Model of the run: recommended by default, or hansen, hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller,
+    /// left, right.
     #[arg(long, value_name = "NAME")]
     model: Option<String>,
     /// With c-controller: Q from beta to alpha, as a model or as the controller.json of a redesign; without it the controller that ran.

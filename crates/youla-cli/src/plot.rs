@@ -79,6 +79,7 @@ pub(crate) fn plot(form: Form, args: &PlotArgs) -> Result<(), Failure> {
     let files = plots.iter().map(|plot| files(plot, args)).collect::<Result<Vec<_>, Failure>>()?.concat();
     let folder = args.out.clone().unwrap_or_else(|| args.run.join("figures"));
     let paths = write_plots(&folder, &files)?;
+    youla_io::folder::add_to_list(&args.run, &paths)?;
     match (form.json, form.quiet) {
         (true, _) => {
             let about = |plot: &Plot| {

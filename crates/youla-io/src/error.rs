@@ -263,7 +263,7 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     let missing = ["", "nan", "na", "null", "none", "-"].contains(&text.trim().to_ascii_lowercase().as_str());
     if missing && decimal.is_none() {
         return "; leave rows without a value out of the file, and gaps = \"split\" in [data] cuts the record there (with a \
-                time_column)"
+                time_column); every row is read, also those that `segments`, `skip` and `take` do not use"
             .into();
     }
     let remedy =

@@ -233,6 +233,36 @@ pub fn require_writable(path: &Path) -> Result<()> {
     made.map_err(|source| Error::Unwritable { path: path.to_owned(), source })
 }
 
+/// The same for a file whose folders are made if need be.
+///
+/// # Errors
+/// [`Error::Unwritable`] with the path that is given.
+pub fn require_place(path: &Path) -> Result<()> {
+    let there = path.ancestors().skip(1).find(|p| p.as_os_str().is_empty() || p.exists()).unwrap_or(Path::new(""));
+    require_writable(&there.join(path.file_name().unwrap_or_default())).map_err(|error| match error {
+        Error::Unwritable { source, .. } => Error::Unwritable { path: path.to_owned(), source },
+        other => other,
+    })
+}
+
+/// Adds files that the program wrote into a run folder later to its list, so that they do not keep the folder from being replaced. Files
+/// elsewhere, and folders without a list, are left alone.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn add_to_list(run: &Path, files: &[PathBuf]) -> Result<()> {
+    let path = run.join(FILES);
+    let Ok(list) = fs::read_to_string(&path) else { return Ok(()) };
+    let mut names: Vec<String> = list.lines().map(str::to_owned).collect();
+    let inside = files.iter().filter_map(|file| file.strip_prefix(run).ok());
+    for name in inside.map(|name| name.display().to_string()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    replace_file(&path, &names.iter().map(|name| format!("{name}\n")).collect::<String>())
+}
+
 /// Rejects names of files that exist in a folder.
 ///
 /// # Errors

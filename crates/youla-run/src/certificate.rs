@@ -116,15 +116,20 @@ impl RunCertificate {
         let band = self.band.as_ref()?;
         let level = 100.0 * band.level;
         let [low, high] = band.radius.bounds;
-        let interval = format!("{level:.0} % interval {low:.5} to {high:.5}");
+        // The interval is of one figure, the region of all parameters of S at once: it reaches further.
+        let interval = format!(
+            "G(S) itself has {:.5}, with a {level:.0} % interval of {low:.5} to {high:.5} for this figure alone; the region holds all \
+             parameters at once and is wider",
+            band.radius.value
+        );
         Some(if band.holds() {
             format!(
-                "The controller stabilises all {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5} ({interval}).",
+                "The controller stabilises all {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5}. {interval}.",
                 band.within, band.worst_within
             )
         } else {
             format!(
-                "The controller does not stabilise {} of the {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5} ({interval}).",
+                "The controller does not stabilise {} of the {} models drawn from the {level:.0} % confidence region of S; the largest pole among them has |z| = {:.5}. {interval}.",
                 band.unstable_within, band.within, band.worst_within
             )
         })

@@ -26,7 +26,7 @@ const MODELS: [&str; 11] = [
     "8-redesign/new_controller",
 ];
 
-/// Reads a model for export: a file as [`read_model`] does, or the model `name` of a run folder, G(S) (`hansen`) by default. One that
+/// Reads a model for export: a file as [`read_model`] does, or the model `name` of a run folder, `recommended` by default, else the first that the run holds. One that
 /// does not say where it comes from gets the file and its SHA-256 as provenance.
 ///
 /// # Errors

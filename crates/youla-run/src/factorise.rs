@@ -106,7 +106,8 @@ pub fn factorise(
             check_gains(nominal, f, l)?;
             let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
             let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
-            CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref()).map_err(not_stabilising)?
+            let made = CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref());
+            made.map_err(|e| wrong_gain(e, &balanced, &f, &l))?
         }
         RealisedController::System(k) => {
             let f = state_feedback(&balanced, records, settings.input_weight)?;
@@ -118,12 +119,28 @@ pub fn factorise(
     Ok(LoopFactors { factors, bezout_residual })
 }
 
-/// The closed-loop poles of an observer-based controller are those of A + B F and A + L C.
-fn not_stabilising(error: youla::Error) -> youla::Error {
-    match error {
-        youla::Error::Unstable { pole, .. } => youla::Error::NotStabilising { model: "the nominal model".into(), pole },
-        other => other,
-    }
+/// The closed-loop poles of an observer-based controller are those of A + B F and A + L C: which of the gains is wrong, and whether its
+/// sign is.
+fn wrong_gain(error: youla::Error, nominal: &StateSpace<Discrete>, f: &Mat<f64>, l: &Mat<f64>) -> Error {
+    let youla::Error::Unstable { pole, .. } = error else { return error.into() };
+    let largest = |matrix: Mat<f64>| {
+        let poles = youla::linalg::eigenvalues("A with a gain", matrix.as_ref()).unwrap_or_default();
+        poles.iter().map(|p| p.norm()).fold(0.0, f64::max)
+    };
+    let with_f = |sign: f64| largest(nominal.a() + faer::Scale(sign) * (nominal.b() * f));
+    let with_l = |sign: f64| largest(nominal.a() + faer::Scale(sign) * (l * nominal.c()));
+    let (gain, flipped) = match with_f(1.0) >= 1.0 {
+        true => ("state_feedback", with_f(-1.0)),
+        false => ("observer_gain", with_l(-1.0)),
+    };
+    let remedy = match flipped < 1.0 {
+        true => format!("with the opposite sign it would be {flipped:.4}: check the sign and `feedback`"),
+        false => "the opposite sign does not help: check that the gain is in the states and at the sample time of the discrete-time \
+                  nominal model"
+            .to_owned(),
+    };
+    let cause = format!("it comes from {gain} in [controller.observer]; {remedy}");
+    Error::NotStabilised { pole: youla::error::Pole(pole).to_string(), cause }
 }
 
 /// The refusal of a nominal model that the controller does not stabilise, with the change of the controller's gain that would make it

@@ -148,6 +148,7 @@ pub(crate) fn make(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
         PortName::Alpha => ExcitationPort::Alpha,
         PortName::Input => ExcitationPort::Input,
     });
+    youla_io::folder::require_place(&args.out.join("excite.svg"))?;
     let found = excite_run(&settings, &folder, &options(args)?, port, args.noise_record.as_deref())?;
     let files = write_excitation(&found, &args.to, &args.out, args.force)?;
     if form.json {

@@ -11,6 +11,7 @@ mod tables;
 
 pub use distances::Distance;
 
+use crate::method;
 use crate::{Error, Result};
 use run::FinishedRun;
 use serde::Serialize;
@@ -36,7 +37,7 @@ pub struct Comparison {
     pub report: ReportData,
 }
 
-/// Compares one model (`hansen`, `hansen_reduced`, `direct`, `nominal`, `grey_box`) of several runs of one machine.
+/// Compares one model (`recommended`, `hansen`, `hansen_reduced`, `direct`, `nominal`, `grey_box`) of several runs of one machine.
 ///
 /// Responses are evaluated again from the models on the frequencies of all runs together. Runs must have the same numbers of
 /// inputs and outputs; differing names, units, records and sample times are said on the page.
@@ -56,6 +57,7 @@ pub fn compare(folders: &[PathBuf], model: &str) -> Result<Comparison> {
         let what = "the number of runs to compare".into();
         return Err(Error::Method(youla::Error::OutOfRange { what, value: folders.len() as f64, must: "at least 2" }));
     }
+    let model = if model == "recommended" { method::Method::Likelihood.key() } else { model };
     let runs = run::read(folders, model)?;
     let distances = distances::distances(&runs);
     let report = page(&runs, model, &distances)?;

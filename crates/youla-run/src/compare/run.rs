@@ -3,6 +3,7 @@
 use crate::entries::{ModeEntry, pairs};
 use crate::export::model_for_export;
 use crate::folder::ModelFacts;
+use crate::method::Method;
 use crate::redraw::read_report;
 use crate::robustness::{DiskEntry, RobustnessEntry};
 use crate::summary::Summary;
@@ -33,7 +34,9 @@ pub(super) struct FinishedRun {
 
 impl FinishedRun {
     fn read(folder: &Path, place: usize, name: String, model: &str) -> Result<Self> {
-        let system = model_for_export(folder, Some(model))?;
+        // The file of the recommended model has not the name of its method.
+        let file = if model == Method::Likelihood.key() { "recommended" } else { model };
+        let system = model_for_export(folder, Some(file))?;
         let (report, summary) = (read_report(folder)?, Summary::read(folder)?);
         let scales = summary.channel_scales.value().map(|s| ChannelScales::new(s.inputs.clone(), s.outputs.clone()));
         let scales = scales.transpose()?;

@@ -75,3 +75,31 @@ fn reports_of_no_run() {
     fs::write(folder.join("report.json"), "{\"title\": ").expect("written");
     refuse("EOF");
 }
+
+/// Places are tested before anything is computed: the message names the place, also where the input is bad.
+#[test]
+fn the_place_is_tested_first() {
+    let folder = loop_folder("place-first", &[]);
+    for arguments in [
+        &["check", "nowhere.csv", "--input", "u", "--output", "y", "--sample-time", "1", "--out", "log.csv/check"][..],
+        &["compare", "nowhere", "nowhere-else", "--out", "log.csv/page.html"],
+        &["excite", "run.toml", "--amplitude", "nan", "--band", "1,10", "--duration", "1", "--out", "log.csv/excite"],
+        &["paper", "--models", "2", "--out", "log.csv/paper"],
+    ] {
+        refused_by(Command::new(PROGRAM).args(arguments), &folder, 2, &["log.csv/"]);
+    }
+}
+
+/// Figures that the program drew into a run do not keep it from being replaced; a file of the user beside them does.
+#[test]
+fn a_run_with_figures_is_replaced() {
+    let folder = loop_folder("with-figures", &[]);
+    let run = ["identify", "run.toml", "--out", "run", "--quiet", "--force"];
+    assert_eq!(youla(&folder, &run).code, Some(0));
+    assert_eq!(youla(&folder, &["plot", "run", "bode", "--quiet"]).code, Some(0));
+    fs::write(folder.join("run/figures/mine.txt"), "mine").expect("written");
+    refused_by(Command::new(PROGRAM).args(run), &folder, 2, &["run is not replaced: it holds figures/mine.txt"]);
+    fs::remove_file(folder.join("run/figures/mine.txt")).expect("removed");
+    assert_eq!(youla(&folder, &run).code, Some(0));
+    assert!(!folder.join("run/figures").exists());
+}

@@ -58,7 +58,16 @@ fn controller_that_does_not_stabilise() {
         settings("feedback = \"negative\"\nnumerator = [2.0]", "feedback = \"positive\"\nnumerator = [20.0]");
     scheme_refused("wrong-sign", &wrong_sign, &sentence);
     let gains = "[controller.observer]\nfeedback = \"positive\"\nstate_feedback = [[5.0]]\nobserver_gain = [[-0.1]]\n";
-    scheme_refused("wrong-gain", &settings(CONTROLLER, gains), &["does not stabilise the nominal model", "pole 1.4"]);
+    scheme_refused(
+        "wrong-gain",
+        &settings(CONTROLLER, gains),
+        &[
+            "does not stabilise the nominal model",
+            "pole 1.4",
+            "state_feedback in [controller.observer]",
+            "check the sign",
+        ],
+    );
 }
 
 /// The run ends well without the scheme: its reason is printed, the recommended model is there, but not trusted.

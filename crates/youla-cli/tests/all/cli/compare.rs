@@ -34,7 +34,7 @@ fn two_runs_stand_side_by_side() {
         fits.iter().find(|f| f["method"] == method).expect("a fit")["fit"].as_f64().expect("a number")
     };
     for (key, run) in [("run1", "three"), ("run2", "two")] {
-        assert_eq!(fit(&data["report"], key), fit(&summary(run), "hansen"));
+        assert_eq!(fit(&data["report"], key), fit(&summary(run), "likelihood"));
     }
     let gap = data["distances"][0]["nu_gap"].as_f64().expect("a gap");
     assert!(gap > 0.0 && gap < 1.0, "{gap}");
@@ -77,4 +77,19 @@ fn what_cannot_be_compared_is_said() {
         assert!(!folder.join("comparison.html").exists());
     }
     assert_eq!(youla(&folder, &["compare", "three"]).code, Some(2));
+}
+
+/// The recommended model needs no scheme: a controller of the wrong sign leaves no S.
+#[test]
+fn runs_without_the_scheme_are_compared() {
+    let wrong = settings("feedback = \"negative\"\nnumerator = [2.0]", "feedback = \"positive\"\nnumerator = [20.0]");
+    let folder = loop_folder("compare-no-scheme", &[("run.toml", wrong.as_bytes())]);
+    for out in ["one", "two"] {
+        assert_eq!(youla(&folder, &["identify", "run.toml", "--out", out, "--quiet"]).code, Some(0));
+    }
+    let found = youla(&folder, &["compare", "one", "two"]);
+    assert!(found.code == Some(0), "{}", found.stderr);
+    let refused = youla(&folder, &["compare", "one", "two", "--model", "hansen", "--force"]);
+    assert!(refused.code == Some(2) && refused.stderr.contains("recommended"), "{}", refused.stderr);
+    assert!(youla(&folder, &["export", "--help"]).stdout.contains("recommended by default"));
 }

@@ -135,7 +135,11 @@ const LOGS: [Mistake; 7] = [
         || csv_with_line(11, "0.09,1.0,NaN,2.0"),
         &["line 11", "column d", "gaps = \"split\""],
     ),
-    logged("an empty cell", || csv_with_line(11, "0.09,1.0,1.0,"), &["line 11", "column y", "gaps = \"split\""]),
+    logged(
+        "an empty cell",
+        || csv_with_line(11, "0.09,1.0,1.0,"),
+        &["line 11", "column y", "gaps = \"split\"", "every row is read, also those that `segments`"],
+    ),
     logged("a word", || csv_with_line(11, "0.09,1.0,off,1.0"), &["line 11", "column d", "\"off\""]),
     logged("a short line", || csv_with_line(11, "0.09,1.0,1.0"), &["line 11", "3 fields", "has 4"]),
     logged("a gap", || csv(&[&log()[..900], &log()[950..]].concat()), &["row 901", "gaps = \"split\"", "`segments`"]),

@@ -115,7 +115,7 @@ impl<'a> Criterion<'a> {
         nominal: Option<&[f64]>,
     ) -> Result<StructureSearch> {
         let Some(SchemeStart { factors, signals, hansen }) = start else {
-            return self.from_initial_values(structure, nominal);
+            return self.of_initial_values(structure, nominal);
         };
         let (signals, hansen) = (&signals.experiments, hansen.clone());
         let Some(closed) = &self.closed else {
@@ -144,7 +144,7 @@ impl<'a> Criterion<'a> {
     }
 
     /// The search where the scheme gave no model.
-    fn from_initial_values(&self, structure: &DeclaredStructure, nominal: Option<&[f64]>) -> Result<StructureSearch> {
+    fn of_initial_values(&self, structure: &DeclaredStructure, nominal: Option<&[f64]>) -> Result<StructureSearch> {
         let (theta, options) = (nominal.ok_or(youla_greybox::Error::NoStart)?, &self.options.pem);
         let (experiments, time) = (&self.experiments(), self.records.time);
         let search = |options: &GreyBoxOptions| match &self.closed {

@@ -27,7 +27,7 @@ fn between(all: &[ModeBand], from: f64, to: f64) -> ModeBand {
 #[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn two_inertias_of_the_flexible_drive() {
     let found = run();
-    let grey = found.scheme().unwrap().grey_box.as_ref().unwrap().as_ref().unwrap();
+    let grey = found.grey_box.as_ref().unwrap().as_ref().unwrap();
     let known = grey.intervals.as_ref().unwrap();
     for p in &known.parameters {
         println!("{} {:.5} +- {:.2e}", p.name, p.value, p.deviation);

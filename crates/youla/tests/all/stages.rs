@@ -134,8 +134,8 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     demo.settings.grey_box = Some(GreyBoxSettings { start_from_initial: false, ..GreyBoxSettings::new(structure) });
     let mut silent = |_| ();
     let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap();
-    let run = found.scheme().unwrap().grey_box.as_ref().unwrap().as_ref().unwrap();
-    assert!(run.found.won == PemStart::Projection && !run.found.local_minimum_suspected());
+    let run = found.grey_box.as_ref().unwrap().as_ref().unwrap();
+    assert!(run.found.won == PemStart::Projection && !run.found.local_minimum_suspected);
     let fit = |method: Method| found.verdict.of(method).unwrap().records[0].fit.clone();
     for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
         assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");

@@ -242,10 +242,8 @@ impl Run {
                 scheme.and_then(of).map(|u| u.response(&omega)).transpose()?.flatten()
             }
             "grey_box" => {
-                let of = |s: &youla_run::SchemeRun| -> Option<youla::identify::subspace::ResponseBand> {
-                    s.grey_box.as_ref()?.as_ref().ok()?.intervals.as_ref().ok()?.response(&omega).ok()
-                };
-                scheme.and_then(of)
+                let run = self.found.grey_box.as_ref();
+                run.and_then(|run| run.as_ref().ok()?.intervals.as_ref().ok()?.response(&omega).ok())
             }
             _ => None,
         };

@@ -96,7 +96,7 @@ def identify(
             raise InputError("a run.toml states everything; leave the other arguments out, or give a youla.Record")
         return Run(_native.identify_file(os.fspath(record)))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
-    return Run(_native.identify(json.dumps(settings), logs))
+    return Run(_native.identify(json.dumps(settings), logs), (settings, logs))
 
 
 def prepare(

@@ -14,6 +14,7 @@ from . import _native
 from ._arrays import Array
 from ._errors import InputError, NumericalError
 from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._types import Log
 
 #: Name of the recommended model among the models of a run.
 RECOMMENDED = "likelihood"
@@ -76,8 +77,10 @@ class Run:
     ``new_controller``.
     """
 
-    def __init__(self, native: _native.Run) -> None:
+    def __init__(self, native: _native.Run, made_from: tuple[dict[str, Any], list[Log]] | None = None) -> None:
         self._native = native
+        #: Settings and records, where the run was made from records in memory.
+        self._made_from = made_from
 
     @cached_property
     def summary(self) -> dict[str, Any]:

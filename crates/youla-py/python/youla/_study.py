@@ -53,14 +53,12 @@ class Bootstrap(Rows):
 
 def bootstrap(
     run: Run,
-    record: Records,
     n: int,
     *,
     seed: int,
     executor: Executor | None = None,
     folder: Folder = None,
     progress: Progress | None = None,
-    **arguments: Any,
 ) -> Bootstrap:
     """Parametric bootstrap of the recommended model.
 
@@ -70,9 +68,7 @@ def bootstrap(
     Parameters
     ----------
     run : Run
-        The run.
-    record : Record or sequence of Record
-        The records of the run.
+        A run that `identify` made from records in memory.
     n : int
         Number of replicates.
     seed : int
@@ -84,12 +80,17 @@ def bootstrap(
         Where finished replicates are kept; a second call computes only what is missing.
     progress : callable, optional
         Called with the number of finished replicates.
-    **arguments
-        `nominal`, `controller`, `feedback`, `hold` and options of `identify`, as the run had them.
 
     Returns
     -------
     Bootstrap
+
+    Raises
+    ------
+    InputError
+        For a run of a file or of `demo`, which holds no records in memory.
+    NumericalError
+        For a run without a recommended model, or without a predictor of its noise.
 
     Examples
     --------
@@ -101,18 +102,22 @@ def bootstrap(
     >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
     >>> from concurrent.futures import ThreadPoolExecutor
     >>> with ThreadPoolExecutor(2) as executor:
-    ...     found = youla.bootstrap(youla.identify(log, **known), log, 8, seed=1, executor=executor, **known)
+    ...     found = youla.bootstrap(youla.identify(log, **known), 8, seed=1, executor=executor)
     >>> found.modes().shape, len(found.failed)
     ((8, 1, 2), 0)
     """
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
-    predictor = run._native.predictor() if isinstance(run, Run) else None
+    if not isinstance(run, Run) or run._made_from is None:
+        raise InputError("run must be a youla.Run that youla.identify made from a youla.Record, not from a file or by youla.demo")
+    predictor = run._native.predictor()
     if predictor is None:
         raise NumericalError("the run has no recommended model with a predictor; its noise cannot be simulated")
     found = run.summary["recommended"]
     fixed = {"order": found["order"], "dead_time": found["dead_time"]}
-    recommended = {**arguments.pop("recommended", {}), **fixed}
-    settings, logs = _prepared(record, None, {**arguments, "recommended": recommended})
+    made_from, records = run._made_from
+    logs = records[: len(made_from["data"]["estimation"])]
+    data = {**made_from["data"], "verification": []}
+    settings = json.dumps({**made_from, "data": data, "recommended": {**made_from.get("recommended", {}), **fixed}})
     payload = {"settings": settings, "logs": logs, "predictor": predictor, "seed": seed}
     key = key_of(settings, *_bytes(logs), *predictor, seed)
     rows = run_tasks(_replicate, payload, range(n), key=key, executor=executor, folder=folder, progress=progress)

@@ -25,7 +25,9 @@ pub(crate) fn of_loop(
     missed: Option<&Missed>,
 ) -> Vec<Evidence> {
     let mut out = Vec::new();
-    if let Some((k, known)) = known.and_then(|known| Some((known.controller?, known))) {
+    // Without a known excitation all of it is in what the controller leaves, which says nothing of the controller.
+    let asked = known.filter(|_| missed.is_some());
+    if let Some((k, known)) = asked.and_then(|known| Some((known.controller?, known))) {
         let records: Vec<_> =
             known.estimation.iter().chain(&known.verification).map(|r| (r.seen, r.explained)).collect();
         out.extend(controller(k, &records));

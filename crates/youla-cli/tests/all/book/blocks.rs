@@ -88,7 +88,7 @@ pub(crate) fn targets_are_there(place: &str, command: &str, project: &Path) {
     }
 }
 
-/// A whole run.toml as it is; tables of one in place of those of the flexible drive; the declaration of a structure in a
+/// A whole run.toml as it is; tables of one in place of those of the flexible drive, `[data]` in addition to its own; the declaration of a structure in a
 /// table of its own.
 pub(crate) fn run_settings(place: &str, text: &str, project: &Path) -> String {
     let read = |text: &str| text.parse::<toml::Table>().unwrap_or_else(|e| panic!("{place}: {e}\n{text}"));
@@ -105,6 +105,11 @@ pub(crate) fn run_settings(place: &str, text: &str, project: &Path) -> String {
     }
     let mut with = read(&fs::read_to_string(project.join("examples/flexible-drive/run.toml")).expect("readable"));
     with.remove("reduction");
+    if let (Some(toml::Value::Table(more)), Some(toml::Value::Table(data))) =
+        (block.remove("data"), with.get_mut("data"))
+    {
+        data.extend(more);
+    }
     with.extend(block);
     with.to_string()
 }

@@ -23,7 +23,8 @@ use youla_loop::redesign::RedesignOptions;
 use youla_run::CertificateSettings;
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
-    DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, RunSettings, VerificationSettings,
+    DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
+    VerificationSettings,
 };
 use youla_run::{LoopRecord, RunRecords, SourceFile};
 
@@ -194,7 +195,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         certificate: Some(CertificateSettings { controller_errors: true }),
         redesign: Some(RedesignOptions::default()),
         check: CheckOptions::default(),
-        verification: VerificationSettings::default(),
+        verification: VerificationSettings { prediction: Some(Prediction::OpenLoop), skip: 0 },
         frequency_response: FrequencySettings { from_hz: Some(5.0), ..FrequencySettings::default() },
         seed: Some(seed),
     }

@@ -2,7 +2,7 @@
 
 use super::factorise::{DeclaredLoop, LoopFactors};
 use super::records::RunRecords;
-use super::settings::RunSettings;
+use super::settings::{Prediction, RunSettings};
 use super::signals::DeviationSignals;
 
 /// Settings, records and loop of a run.
@@ -16,6 +16,18 @@ pub(crate) struct RunContext<'a> {
     pub(crate) declared: &'a DeclaredLoop,
     /// The factors of the loop, where they exist.
     pub(crate) factorisation: Option<&'a LoopFactors>,
+}
+
+impl RunContext<'_> {
+    /// What drives the models on verification records: as stated, or what suits the nominal model and what is known.
+    pub(crate) fn prediction(&self) -> Prediction {
+        let data = &self.settings.data;
+        // A known alpha drives the loop through the factors.
+        let driven = if data.alpha.is_empty() { data.excitation_is_known() } else { self.factorisation.is_some() };
+        let bounded = self.declared.nominal.is_stable().unwrap_or(true);
+        let suits = if driven && !bounded { Prediction::ClosedLoop } else { Prediction::OpenLoop };
+        self.settings.verification.prediction.unwrap_or(suits)
+    }
 }
 
 /// The same where the factors and the signals alpha and beta exist.

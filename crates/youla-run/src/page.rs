@@ -226,7 +226,7 @@ fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
 
 fn verification(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
     let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
-    let prediction = match found.settings.verification.prediction {
+    let prediction = match found.verdict.prediction {
         Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
         Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
     };

@@ -33,7 +33,7 @@ pub(super) fn drawn(found: &Identification) -> Option<draw::Residuals> {
             });
         }
     }
-    let of = match found.settings.verification.prediction {
+    let of = match found.verdict.prediction {
         Prediction::OpenLoop => "the simulation from the measured input",
         Prediction::ClosedLoop => "the simulation under the controller from the known excitations",
     };

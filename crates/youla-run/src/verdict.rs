@@ -78,6 +78,8 @@ pub(super) fn residue_at(visible: &VisibleModes, pole: c64) -> Option<&[c64]> {
 /// The evidence on all models, in the order nominal, direct, Hansen, reduced, grey box.
 #[derive(Debug, Clone)]
 pub struct Verdict {
+    /// What drove the models on the verification records.
+    pub prediction: Prediction,
     /// One entry per model that exists.
     pub models: Vec<ModelVerdict>,
     /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none.
@@ -124,7 +126,7 @@ impl<'a> Candidates<'a> {
 
     /// In the order recommended, nominal, direct, Hansen, reduced, grey box, true plant.
     fn all(&self, run: RunContext<'a>) -> Result<Vec<Candidate<'a>>> {
-        let prediction = run.settings.verification.prediction;
+        let prediction = run.prediction();
         let plain = |method, model| Candidate { method, model, noise: None };
         let mut all = Vec::new();
         if let Some(found) = self.recommended {
@@ -160,7 +162,7 @@ pub(super) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result
     let all = candidates.all(run)?;
     let verdicts: Vec<Result<ModelVerdict>> =
         all.par_iter().map(|candidate| verify_model(run, &scales, plant, candidate)).collect();
-    Ok(Verdict { models: verdicts.into_iter().collect::<Result<_>>()?, scales })
+    Ok(Verdict { prediction: run.prediction(), models: verdicts.into_iter().collect::<Result<_>>()?, scales })
 }
 
 fn verify_model(
@@ -192,7 +194,7 @@ pub(super) fn verify_record(
 ) -> Result<RecordVerdict> {
     let lines = record.disturbance.as_ref().map(|w| w.as_ref());
     let measured = without_lines(record.y.as_ref(), lines)?;
-    let predicted = match run.settings.verification.prediction {
+    let predicted = match run.prediction() {
         Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
         Prediction::ClosedLoop => {
             let factors = run.factorisation.filter(|_| record.alpha.is_some()).map(|f| &f.factors);

@@ -192,7 +192,7 @@ impl RunSettings {
 
     fn loop_problem(&self) -> Option<String> {
         let known = self.data.excitation_is_known();
-        if self.verification.prediction == Prediction::ClosedLoop && !known {
+        if self.verification.prediction == Some(Prediction::ClosedLoop) && !known {
             return Some(
                 "[verification] prediction = \"closed-loop\" needs a known excitation: input_excitation, reference or alpha"
                     .into(),

@@ -40,8 +40,10 @@ pub enum Prediction {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct VerificationSettings {
-    /// What drives the models.
-    pub prediction: Prediction,
+    /// What drives the models. When absent, `"closed-loop"` where an excitation is known and the nominal model is unstable or
+    /// integrates, as its simulation from u would leave all bounds; `"open-loop"` otherwise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub prediction: Option<Prediction>,
     /// Samples at the start of each record that do not count in the fit (transient of unknown initial states).
     pub skip: usize,
 }

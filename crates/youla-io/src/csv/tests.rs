@@ -91,7 +91,7 @@ fn time_column_and_declaration() {
 #[test]
 fn written_records_read_back_exactly() {
     let channels = vec![Channel::new("u,1", ""), Channel::new("y \"q\"", "")];
-    let data = Mat::from_fn(50, 2, |i, j| ((i * 7 + j) as f64 * 0.7).sin() * 10f64.powi(i as i32 * 12 - 300));
+    let data = Mat::from_fn(50, 2, |i, j| ((i * 7 + j) as f64 * 0.7).sin() * 10f64.powi(i as i32 * 8 - 300));
     let time = Discrete::new(2e-4).unwrap();
     let record = Record::new("r", channels, data, time).unwrap().starting_at(-0.01).unwrap();
     let file = scratch("csv");

@@ -19,8 +19,8 @@ impl Regression {
     }
 }
 
-/// Zeros b that are tried, from a tenth of the bandwidth down to a five-hundredth, a factor of 2 to 2.5 apart: the
-/// autoregression makes up for what lies between them.
+/// Zeros b that are tried, with corners 1 - b from 0.4 down to 0.002 rad per sample, a factor of 2 to 2.5 apart: the
+/// autoregression describes what lies between them.
 const ZEROS: [f64; 8] = [0.6, 0.8, 0.9, 0.95, 0.98, 0.99, 0.995, 0.998];
 /// Slow poles that are tried with each zero below them: a random walk, and drift that is bounded.
 const POLES: [f64; 3] = [1.0, 0.999, 0.99];

@@ -3,6 +3,7 @@
 mod artefacts;
 mod certificate;
 mod check;
+mod choices;
 mod compare;
 mod computed;
 mod context;

@@ -1,5 +1,6 @@
 //! The recommended model in summary.json, in the run folder and in the report.
 
+use super::choices;
 use super::entries::{ModeEntry, finite};
 use super::identification::Identification;
 use super::method::Method;
@@ -245,6 +246,7 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
             rows: model.evidence.iter().map(evidence).collect(),
             caption: String::new(),
         },
+        choices::table(found, model),
         draw::EvidenceTable {
             title: "Candidates".into(),
             text: "Order and dead time are those with the least criterion; dead times that the criterion does not separate are \

@@ -30,7 +30,8 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
 
 /// `w+ = A w + G e`, `v = C w + e` of all outputs in observer form: a in the first column of each A, G = c - a.
 fn autoregressions(regression: &[Regression]) -> [Mat<f64>; 3] {
-    let states = |r: &Regression| r.coefficients.len().max(usize::from(r.zero != 0.0));
+    // A zero comes with a slow pole, so that there are always coefficients enough for it.
+    let states = |r: &Regression| r.coefficients.len();
     let (p, extra) = (regression.len(), regression.iter().map(states).sum());
     let mut shift = Mat::<f64>::zeros(extra, extra);
     let mut enters = Mat::<f64>::zeros(extra, p);

@@ -55,7 +55,7 @@ pub(crate) fn linearise_with(
     noise: &Noise,
     extra: &Extra<'_>,
 ) -> Linearised {
-    let (n, parameters) = (point.end_count(), chart.parameters() + extra.count);
+    let (n, parameters) = (point.model.end_count(), chart.parameters() + extra.count);
     let width = parameters + 1;
     let mut factor = Mat::<f64>::zeros(0, width);
     let mut ends = Vec::with_capacity(spectra.records.len());
@@ -82,7 +82,7 @@ pub(crate) fn compressed(rows: &Mat<f64>) -> Mat<f64> {
 /// `[t parameters residual]` of one record in triangular form.
 fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
     let Place { lines, model, chart, more, .. } = place;
-    let columns = model.order() + model.outputs + chart.parameters() + more.1 + 1;
+    let columns = model.end_count() + chart.parameters() + more.1 + 1;
     let mut rows = Rows::new(model, columns);
     let group = 2 * model.outputs * LANES;
     let groups = (CHUNK.max(3 * columns) / group).max(1);

@@ -67,6 +67,11 @@ impl Model {
         self.blocks.iter().map(|b| b.states).sum()
     }
 
+    /// Numbers that describe both ends of a record: t, and the drift of each output.
+    pub(crate) fn end_count(&self) -> usize {
+        self.order() + self.outputs
+    }
+
     /// A, B and C.
     pub(crate) fn matrices(&self) -> (Mat<f64>, Mat<f64>, Mat<f64>) {
         let (n, m, p) = (self.order(), self.inputs, self.outputs);

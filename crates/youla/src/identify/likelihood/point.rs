@@ -17,13 +17,8 @@ pub(crate) struct Point {
 impl Point {
     /// With t = 0.
     pub(crate) fn at_rest(model: Model, records: usize) -> Self {
-        let count = model.order() + model.outputs;
-        Point { model, ends: vec![vec![0.0; count]; records] }
-    }
-
-    /// Numbers that describe both ends of a record.
-    pub(crate) fn end_count(&self) -> usize {
-        self.model.order() + self.model.outputs
+        let ends = vec![vec![0.0; model.end_count()]; records];
+        Point { model, ends }
     }
 
     /// Residuals `Y - G U - ...`, lines x p for each record.

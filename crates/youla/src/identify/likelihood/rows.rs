@@ -81,7 +81,7 @@ impl Rows {
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
-        let (mut state, mut column) = (0, model.order() + p);
+        let (mut state, mut column) = (0, model.end_count());
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
             self.states(block, &z, &u, &place.t[state..state + block.states]);
             self.slopes(block, directions, (&z, &u), [state, column]);

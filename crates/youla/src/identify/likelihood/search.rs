@@ -159,7 +159,7 @@ pub(crate) fn reblocked(point: &Point) -> Option<Point> {
     }
     let wide = Mat::from_fn(n, m + records, |i, j| if j < m { b[(i, j)] } else { point.ends[j - m][i] });
     let whole = Model::of(a.as_ref(), wide.as_ref(), c.as_ref(), Vec::new())?;
-    let mut ends = vec![Vec::with_capacity(point.end_count()); records];
+    let mut ends = vec![Vec::with_capacity(point.model.end_count()); records];
     let mut model = whole.clone();
     model.inputs = m;
     model.d = point.model.d.clone();
@@ -176,7 +176,7 @@ pub(crate) fn reblocked(point: &Point) -> Option<Point> {
 
 /// The point moved by a step of the parameters, t by what is best with it.
 fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) -> Point {
-    let (states, n) = (point.model.order(), point.end_count());
+    let (states, n) = (point.model.order(), point.model.end_count());
     let mut ends = point.ends.clone();
     for (end, rows) in ends.iter_mut().zip(&linearised.ends) {
         let last = n + step.len();

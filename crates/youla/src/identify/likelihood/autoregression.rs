@@ -1,7 +1,11 @@
 //! The autoregression of the noise at one output, with a zero where slow drift lies below white noise.
 
-use super::spectra::Spectra;
+use super::lanes::{LANES, Lanes};
+use super::spectra::{Lines, Spectra, parts};
 use faer::c64;
+use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Coefficients of `(1 - b/z) / (1 + a_1/z + ...)`.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -16,6 +20,15 @@ impl Regression {
     /// Number of its coefficients.
     pub(crate) fn parameters(&self) -> usize {
         self.coefficients.len() + usize::from(self.zero != 0.0)
+    }
+
+    /// `(1 + a_1 / z + ...) / (1 - b / z)`, given `1 / z`.
+    #[inline(always)]
+    pub(crate) fn filter(&self, back: &Lanes) -> Lanes {
+        let mut sum = Lanes::ZERO;
+        self.coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(back));
+        let filter = sum.shifted(1.0);
+        if self.zero == 0.0 { filter } else { filter.times(&back.scaled(-self.zero).shifted(1.0).inverse()) }
     }
 }
 
@@ -38,28 +51,25 @@ pub(crate) struct Correlations {
 impl Correlations {
     /// For autoregressions up to `largest` coefficients.
     pub(crate) fn new(spectra: &Spectra, residuals: &[Vec<c64>], output: usize, largest: usize) -> Self {
-        let p = spectra.outputs;
-        let mut plain = vec![0.0; largest + 1];
-        let mut filtered = vec![[0.0; ZEROS.len()]; largest.min(WITH_ZERO) + 2];
+        let channel = (output, spectra.outputs);
+        let mut sum = Correlations::zero(largest);
         for (lines, v) in spectra.records.iter().zip(residuals) {
-            for (k, z) in lines.z.iter().enumerate() {
-                let power = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
-                let powers = ZEROS.map(|b| power / (1.0 + b * b - 2.0 * b * z.re));
-                // cos(l w) by the recursion of Chebyshev
-                let next = |(before, now): (f64, f64)| (now, 2.0 * z.re * now - before);
-                let mut cosine = (z.re, 1.0);
-                for sum in &mut plain {
-                    *sum += power * cosine.1;
-                    cosine = next(cosine);
-                }
-                let mut cosine = (z.re, 1.0);
-                for sums in &mut filtered {
-                    sums.iter_mut().zip(&powers).for_each(|(s, f)| *s += f * cosine.1);
-                    cosine = next(cosine);
-                }
-            }
+            let of = |range| Arch::new().dispatch(PartSum { lines, v, channel, largest, range });
+            parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum.add(part));
         }
-        Correlations { plain, filtered }
+        sum
+    }
+
+    fn zero(largest: usize) -> Self {
+        let filtered = vec![[0.0; ZEROS.len()]; largest.min(WITH_ZERO) + 2];
+        Correlations { plain: vec![0.0; largest + 1], filtered }
+    }
+
+    fn add(&mut self, part: &Correlations) {
+        self.plain.iter_mut().zip(&part.plain).for_each(|(s, p)| *s += p);
+        for (sums, part) in self.filtered.iter_mut().zip(&part.filtered) {
+            sums.iter_mut().zip(part).for_each(|(s, p)| *s += p);
+        }
     }
 
     /// The regression with the least `N log variance + log(N) parameters`.
@@ -84,6 +94,68 @@ impl Correlations {
         (0..self.filtered.len() - 1)
             .map(|l| (1.0 + pole * pole) * r(l) - pole * (r(l + 1) + r(if l == 0 { 1 } else { l - 1 })))
             .collect()
+    }
+}
+
+/// The sums over a part of the lines of a record, with the widest instructions that the processor has.
+struct PartSum<'a> {
+    lines: &'a Lines,
+    v: &'a [c64],
+    /// Output, and number of outputs.
+    channel: (usize, usize),
+    largest: usize,
+    range: Range<usize>,
+}
+
+impl NullaryFnOnce for PartSum<'_> {
+    type Output = Correlations;
+
+    #[inline(always)]
+    fn call(self) -> Correlations {
+        let PartSum { lines, v, channel: (output, p), largest, range } = self;
+        let mut sum = Correlations::zero(largest);
+        let mut plain = vec![[0.0; LANES]; sum.plain.len()];
+        let mut filtered = vec![[[0.0; LANES]; ZEROS.len()]; sum.filtered.len()];
+        for first in range.clone().step_by(LANES) {
+            let (mut power, mut cosine) = ([0.0; LANES], [0.0; LANES]);
+            for (l, k) in (first..range.end.min(first + LANES)).enumerate() {
+                power[l] = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
+                cosine[l] = lines.z[k].re;
+            }
+            let powers = ZEROS.map(|b| {
+                let mut out = power;
+                for l in 0..LANES {
+                    out[l] /= 1.0 + b * b - 2.0 * b * cosine[l];
+                }
+                out
+            });
+            // cos(lag w) by the recursion of Chebyshev
+            let (mut before, mut now) = (cosine, [1.0; LANES]);
+            for lag in 0..plain.len().max(filtered.len()) {
+                if let Some(sums) = plain.get_mut(lag) {
+                    add_product(sums, &power, &now);
+                }
+                if let Some(sums) = filtered.get_mut(lag) {
+                    sums.iter_mut().zip(&powers).for_each(|(sums, powers)| add_product(sums, powers, &now));
+                }
+                let mut next = [0.0; LANES];
+                for l in 0..LANES {
+                    next[l] = 2.0 * cosine[l] * now[l] - before[l];
+                }
+                (before, now) = (now, next);
+            }
+        }
+        let total = |lanes: &[f64; LANES]| lanes.iter().sum::<f64>();
+        sum.plain.iter_mut().zip(&plain).for_each(|(s, lanes)| *s = total(lanes));
+        sum.filtered.iter_mut().zip(&filtered).for_each(|(s, lanes)| *s = lanes.each_ref().map(total));
+        sum
+    }
+}
+
+#[inline(always)]
+fn add_product(sums: &mut [f64; LANES], a: &[f64; LANES], b: &[f64; LANES]) {
+    for l in 0..LANES {
+        sums[l] += a[l] * b[l];
     }
 }
 

@@ -40,6 +40,31 @@ impl Block {
         }
     }
 
+    /// Whether A has blocks of at most two states along its diagonal and zeros below them.
+    pub(crate) fn is_triangular(&self) -> bool {
+        let s = self.states;
+        let below = |i: usize, j: usize| self.a[i * s + j] != 0.0;
+        (2..s).all(|i| (0..i - 1).all(|j| !below(i, j)) && !(below(i, i - 1) && below(i - 1, i - 2)))
+    }
+
+    /// The block and t in the states of the real Schur form of A; as they are where A is triangular already.
+    pub(crate) fn triangular(&self, t: &[f64]) -> Option<(Block, Vec<f64>)> {
+        if self.is_triangular() {
+            return Some((self.clone(), t.to_vec()));
+        }
+        let s = self.states;
+        let (m, p) = (self.b.len() / s, self.c.len() / s);
+        let form = real_schur("A", Mat::from_fn(s, s, |i, j| self.a[i * s + j]).as_ref()).ok()?;
+        let sum = |of: &dyn Fn(usize) -> f64| (0..s).map(of).sum::<f64>();
+        let block = Block {
+            states: s,
+            a: (0..s * s).map(|x| form.t[(x / s, x % s)]).collect(),
+            b: (0..s * m).map(|x| sum(&|i| form.q[(i, x / m)] * self.b[i * m + x % m])).collect(),
+            c: (0..p * s).map(|x| sum(&|i| self.c[x / s * s + i] * form.q[(i, x % s)])).collect(),
+        };
+        Some((block, (0..s).map(|k| sum(&|i| form.q[(i, k)] * t[i])).collect()))
+    }
+
     /// (z I - A)^-1, row by row.
     pub(crate) fn resolvent(&self, z: c64, out: &mut [c64]) {
         match self.states {

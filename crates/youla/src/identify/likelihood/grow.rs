@@ -7,11 +7,13 @@
 //! the best grid points become starts with the dominant pair of directions of R (rank one adds two states).
 
 use super::block::Block;
+use super::lanes::{LANES, Lanes, add_real_product};
 use super::model::Model;
 use super::noise::Noise;
 use super::spectra::Spectra;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side, c64};
+use pulp::{Arch, NullaryFnOnce};
 
 /// Damping ratios of the grid.
 const DAMPINGS: [f64; 3] = [0.02, 0.1, 0.4];
@@ -98,31 +100,7 @@ impl<'a> Fits<'a> {
     fn at(&self, pole: c64) -> Option<(f64, Mat<f64>)> {
         let (m, p) = (self.spectra.inputs, self.spectra.outputs);
         let (mut promised, mut residues) = (0.0, Mat::<f64>::zeros(2 * m, p));
-        let mut gram = vec![Mat::<f64>::zeros(2 * m, 2 * m); p];
-        let mut cross = Mat::<f64>::zeros(2 * m, p);
-        let mut columns = vec![c64::ZERO; 2 * m];
-        for ((lines, e), gains) in self.spectra.records.iter().zip(&self.whitened).zip(&self.gains) {
-            for (k, z) in lines.z.iter().enumerate() {
-                let (one, two) = ((z - pole).inv(), (z - pole.conj()).inv());
-                let (even, odd) = (one + two, c64::new(0.0, 1.0) * (one - two));
-                for j in 0..m {
-                    let u = lines.u[k * m + j];
-                    (columns[j], columns[m + j]) = (even * u, odd * u);
-                }
-                for o in 0..p {
-                    let g = gains[k * p + o];
-                    let power = g.norm_sqr();
-                    let seen = g.conj() * e[k * p + o];
-                    for a in 0..2 * m {
-                        let conj = columns[a].conj();
-                        cross[(a, o)] += (conj * seen).re;
-                        for b in 0..=a {
-                            gram[o][(a, b)] += power * (conj * columns[b]).re;
-                        }
-                    }
-                }
-            }
-        }
+        let (mut gram, cross) = Arch::new().dispatch(Normal { fits: self, pole });
         for o in 0..p {
             (0..2 * m).for_each(|a| gram[o][(a, a)] *= 1.0 + 1e-9);
             let factor = gram[o].llt(Side::Lower).ok()?;
@@ -132,5 +110,56 @@ impl<'a> Fits<'a> {
             residues.subcols_mut(o, 1).copy_from(&solved);
         }
         promised.is_finite().then_some((promised, residues))
+    }
+}
+
+/// The normal equations for a pole, a Gram matrix per output and the products with its residual, with the widest instructions that the
+/// processor has.
+struct Normal<'a> {
+    fits: &'a Fits<'a>,
+    pole: c64,
+}
+
+impl NullaryFnOnce for Normal<'_> {
+    type Output = (Vec<Mat<f64>>, Mat<f64>);
+
+    #[inline(always)]
+    fn call(self) -> Self::Output {
+        let Normal { fits: Fits { spectra, whitened, gains }, pole } = self;
+        let (m, p) = (spectra.inputs, spectra.outputs);
+        let size = 2 * m;
+        let mut gram = vec![[0.0; LANES]; p * size * size];
+        let mut cross = vec![[0.0; LANES]; p * size];
+        let mut columns = vec![Lanes::ZERO; size];
+        for ((lines, e), gains) in spectra.records.iter().zip(whitened).zip(gains) {
+            let total = lines.z.len();
+            for first in (0..total).step_by(LANES) {
+                // Lines beyond the last repeat it with a gain of zero.
+                let line = |l: usize| (first + l).min(total - 1);
+                let z = Lanes::gather(|l| lines.z[line(l)]);
+                let (one, two) = (z.plus(-pole).inverse(), z.plus(-pole.conj()).inverse());
+                let (even, mut odd) = (one.sum(&two), two.scaled(-1.0).sum(&one));
+                (odd.re, odd.im) = (odd.im.map(|v| -v), odd.re);
+                for j in 0..m {
+                    let u = Lanes::gather(|l| lines.u[line(l) * m + j]);
+                    (columns[j], columns[m + j]) = (even.times(&u), odd.times(&u));
+                }
+                for o in 0..p {
+                    let at = |of: &[c64], l: usize| if first + l < total { of[(first + l) * p + o] } else { c64::ZERO };
+                    let gain = Lanes::gather(|l| at(gains, l));
+                    let seen = gain.conj().times(&Lanes::gather(|l| at(e, l)));
+                    for a in 0..size {
+                        let weighed = columns[a].times(&gain);
+                        add_real_product(&mut cross[o * size + a], &columns[a], &seen);
+                        for b in 0..=a {
+                            add_real_product(&mut gram[(o * size + a) * size + b], &weighed, &columns[b].times(&gain));
+                        }
+                    }
+                }
+            }
+        }
+        let total = |lanes: &[f64; LANES]| lanes.iter().sum::<f64>();
+        let of = |o: usize| Mat::from_fn(size, size, |a, b| total(&gram[(o * size + a) * size + b]));
+        ((0..p).map(of).collect(), Mat::from_fn(size, p, |a, o| total(&cross[o * size + a])))
     }
 }

@@ -65,6 +65,27 @@ impl Lanes {
     }
 
     #[inline(always)]
+    pub(crate) fn plus(&self, by: c64) -> Lanes {
+        let mut out = self.shifted(by.re);
+        out.im.iter_mut().for_each(|v| *v += by.im);
+        out
+    }
+
+    #[inline(always)]
+    pub(crate) fn sum(&self, b: &Lanes) -> Lanes {
+        let mut out = *self;
+        out.add_scaled(b, 1.0);
+        out
+    }
+
+    #[inline(always)]
+    pub(crate) fn conj(&self) -> Lanes {
+        let mut out = *self;
+        out.im.iter_mut().for_each(|v| *v = -*v);
+        out
+    }
+
+    #[inline(always)]
     pub(crate) fn inverse(&self) -> Lanes {
         let mut out = Lanes::ZERO;
         for l in 0..LANES {
@@ -72,5 +93,13 @@ impl Lanes {
             (out.re[l], out.im[l]) = (self.re[l] * scale, -self.im[l] * scale);
         }
         out
+    }
+}
+
+/// Adds the real part of `conj a b` of each line.
+#[inline(always)]
+pub(crate) fn add_real_product(sums: &mut [f64; LANES], a: &Lanes, b: &Lanes) {
+    for l in 0..LANES {
+        sums[l] += a.re[l] * b.re[l] + a.im[l] * b.im[l];
     }
 }

@@ -12,9 +12,11 @@ use super::lanes::LANES;
 use super::noise::Noise;
 use super::point::Point;
 use super::rows::{Place, Rows};
-use super::spectra::Spectra;
+use super::spectra::{Spectra, parts};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, Par, c64};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// The triangular factor at a point.
 pub(crate) struct Linearised {
@@ -81,32 +83,51 @@ pub(crate) fn compressed(rows: &Mat<f64>) -> Mat<f64> {
 
 /// `[t parameters residual]` of one record in triangular form.
 fn triangle(place: Place<'_>, quick: bool) -> Mat<f64> {
-    let Place { lines, model, chart, more, .. } = place;
-    let columns = model.end_count() + chart.parameters() + more.1 + 1;
-    let mut rows = Rows::new(model, columns);
-    let group = 2 * model.outputs * LANES;
-    let groups = (CHUNK.max(3 * columns) / group).max(1);
-    let mut work = Mat::<f64>::zeros(columns + groups * group, columns);
-    let (mut held, mut filled) = (0, 0);
-    let mut gram = Mat::<f64>::zeros(columns, columns);
-    for first in (0..lines.z.len()).step_by(LANES) {
-        rows.fill(place, first);
-        filled += rows.write(lines, first, &mut work, held + filled);
-        if filled == groups * group || first + LANES >= lines.z.len() {
-            let all = work.subrows(0, held + filled);
-            if quick {
-                let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
-                triangular::matmul(gram.as_mut(), lower, Accum::Add, all.transpose(), whole, all, whole, 1.0, Par::Seq);
-            } else {
-                let r = all.qr().thin_R().to_owned();
-                held = r.nrows();
-                work.subrows_mut(0, held).copy_from(&r);
-            }
-            filled = 0;
-        }
+    let count = place.lines.z.len();
+    if !quick {
+        return orthogonal(place, count);
     }
-    if quick {
-        return root_of(&gram);
+    let grams: Vec<Mat<f64>> = parts(count).map(|range| gram(place, range)).collect();
+    let columns = columns(&place);
+    root_of(&grams.iter().fold(Mat::zeros(columns, columns), |sum, gram| sum + gram))
+}
+
+fn columns(place: &Place<'_>) -> usize {
+    place.model.end_count() + place.chart.parameters() + place.more.1 + 1
+}
+
+/// Lines whose rows are brought to triangular form together.
+fn chunk(place: &Place<'_>) -> usize {
+    let group = 2 * place.model.outputs * LANES;
+    (CHUNK.max(3 * columns(place)) / group).max(1) * LANES
+}
+
+/// The normal equations of a part of the lines, lower triangle.
+fn gram(place: Place<'_>, range: Range<usize>) -> Mat<f64> {
+    let (columns, chunk) = (columns(&place), chunk(&place));
+    let mut rows = Rows::new(place.model, columns);
+    let mut work = Mat::<f64>::zeros(2 * place.model.outputs * chunk, columns);
+    let mut gram = Mat::<f64>::zeros(columns, columns);
+    let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
+    for first in range.clone().step_by(chunk) {
+        let filled = rows.write(place, first..range.end.min(first + chunk), (&mut work, 0));
+        let all = work.subrows(0, filled);
+        triangular::matmul(gram.as_mut(), lower, Accum::Add, all.transpose(), whole, all, whole, 1.0, Par::Seq);
+    }
+    gram
+}
+
+/// By orthogonal triangles, one chunk of lines after the other.
+fn orthogonal(place: Place<'_>, count: usize) -> Mat<f64> {
+    let (columns, chunk) = (columns(&place), chunk(&place));
+    let mut rows = Rows::new(place.model, columns);
+    let mut work = Mat::<f64>::zeros(columns + 2 * place.model.outputs * chunk, columns);
+    let mut held = 0;
+    for first in (0..count).step_by(chunk) {
+        let filled = rows.write(place, first..count.min(first + chunk), (&mut work, held));
+        let r = work.subrows(0, held + filled).qr().thin_R().to_owned();
+        held = r.nrows();
+        work.subrows_mut(0, held).copy_from(&r);
     }
     let mut r = Mat::zeros(columns, columns);
     r.subrows_mut(0, held).copy_from(work.subrows(0, held));

@@ -42,11 +42,13 @@ mod physical;
 mod point;
 mod problem;
 mod recommendation;
+mod residual;
 mod rows;
 mod search;
 mod solve;
 mod spectra;
 mod starts;
+mod state_lanes;
 mod states;
 #[cfg(test)]
 mod tests;

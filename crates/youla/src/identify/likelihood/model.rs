@@ -52,7 +52,7 @@ impl Model {
         for s in groups.iter().map(Vec::len) {
             let block = Block {
                 states: s,
-                a: row_by_row(at.submatrix(start, start, s, s)),
+                a: row_by_row(cleaned(at.submatrix(start, start, s, s)).as_ref()),
                 b: row_by_row(bt.subrows(start, s)),
                 c: row_by_row(ct.subcols(start, s)),
             };
@@ -146,4 +146,14 @@ impl Model {
         }
         g
     }
+}
+
+/// Share of the norm of a block below which an entry under its diagonal is rounding: the bases of the invariant subspaces come from
+/// Schur forms, which are zero there.
+const ROUNDING: f64 = 1e-12;
+
+fn cleaned(block: MatRef<'_, f64>) -> Mat<f64> {
+    let least = ROUNDING * block.norm_l2();
+    let rounding = |i: usize, j: usize| i > j && block[(i, j)].abs() < least;
+    Mat::from_fn(block.nrows(), block.ncols(), |i, j| if rounding(i, j) { 0.0 } else { block[(i, j)] })
 }

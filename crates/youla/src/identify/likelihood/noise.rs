@@ -8,8 +8,12 @@
 //! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients.
 
 use super::autoregression::{Correlations, Regression};
-use super::spectra::Spectra;
+use super::lanes::{LANES, Lanes, add_real_product};
+use super::spectra::{Lines, Spectra, parts};
 use faer::{Mat, c64};
+use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
+use std::ops::Range;
 
 /// Coefficients and covariance.
 #[derive(Debug, Clone)]
@@ -41,18 +45,9 @@ impl Noise {
         let regression: Vec<Regression> = (0..p).map(of).collect();
         let mut noise = Noise { regression, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
-        let mut weights = vec![c64::ZERO; p];
         for (lines, v) in spectra.records.iter().zip(residuals) {
-            for (k, z) in lines.z.iter().enumerate() {
-                noise.filters(*z, &mut weights);
-                let twice = lines.weight[k] * lines.weight[k];
-                for i in 0..p {
-                    for j in 0..=i {
-                        let (a, b) = (weights[i] * v[k * p + i], weights[j] * v[k * p + j]);
-                        sum[(i, j)] += twice * (a * b.conj()).re;
-                    }
-                }
-            }
+            let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, v, range });
+            parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
         }
         let samples = spectra.samples().max(1) as f64;
         for i in 0..p {
@@ -103,5 +98,42 @@ impl Noise {
     /// Number of its coefficients.
     pub(crate) fn parameters(&self) -> usize {
         self.regression.iter().map(Regression::parameters).sum()
+    }
+}
+
+/// Sums of the products of the whitened outputs over a part of the lines of a record, lower triangle, with the widest
+/// instructions that the processor has.
+struct Products<'a> {
+    noise: &'a Noise,
+    lines: &'a Lines,
+    v: &'a [c64],
+    range: Range<usize>,
+}
+
+impl NullaryFnOnce for Products<'_> {
+    type Output = Mat<f64>;
+
+    #[inline(always)]
+    fn call(self) -> Mat<f64> {
+        let Products { noise, lines, v, range } = self;
+        let p = noise.regression.len();
+        let mut sums = vec![[0.0; LANES]; p * p];
+        let mut white = vec![Lanes::ZERO; p];
+        for first in range.clone().step_by(LANES) {
+            let count = LANES.min(range.end - first);
+            let line = |l: usize| first + l.min(count - 1);
+            let back = Lanes::gather(|l| lines.z[line(l)]).conj();
+            let weighed =
+                |l: usize, i: usize| if l < count { v[line(l) * p + i] * lines.weight[line(l)] } else { c64::ZERO };
+            for (i, white) in white.iter_mut().enumerate() {
+                *white = noise.regression[i].filter(&back).times(&Lanes::gather(|l| weighed(l, i)));
+            }
+            for i in 0..p {
+                for j in 0..=i {
+                    add_real_product(&mut sums[i * p + j], &white[i], &white[j]);
+                }
+            }
+        }
+        Mat::from_fn(p, p, |i, j| sums[i * p + j].iter().sum())
     }
 }

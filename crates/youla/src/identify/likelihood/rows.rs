@@ -6,8 +6,10 @@ use super::lanes::{LANES, Lanes};
 use super::model::Model;
 use super::noise::Noise;
 use super::spectra::Lines;
+use super::state_lanes::states;
 use faer::{Mat, c64};
 use pulp::{Arch, NullaryFnOnce};
+use std::ops::Range;
 
 /// The point at which the rows are taken: a record, its t, and where it is linearised.
 #[derive(Clone, Copy)]
@@ -65,9 +67,15 @@ impl Rows {
         }
     }
 
-    /// The rows of the lines from `first` on; lines beyond the last count nothing.
-    pub(crate) fn fill(&mut self, place: Place<'_>, first: usize) {
-        Arch::new().dispatch(Group { rows: self, place, first });
+    /// Writes the rows of some lines from row `at` on, those of [`LANES`] lines together, real parts above imaginary parts, and says
+    /// how many they are. The lines end with the record or at a multiple of [`LANES`].
+    pub(crate) fn write(&mut self, place: Place<'_>, lines: Range<usize>, (work, at): (&mut Mat<f64>, usize)) -> usize {
+        let mut filled = 0;
+        for first in lines.step_by(LANES) {
+            Arch::new().dispatch(Group { rows: self, place, first });
+            filled += self.put(place.lines, first, work, at + filled);
+        }
+        filled
     }
 
     #[inline(always)]
@@ -103,14 +111,8 @@ impl Rows {
     /// `X = M (B U + z t)` and `L = C M` of one block.
     #[inline(always)]
     fn states(&mut self, block: &Block, z: &Lanes, u: &[Lanes], t: &[f64]) {
-        let (s, m) = (block.states, u.len());
-        resolvent(block, z, &mut self.inverse);
-        self.x[..s].fill(Lanes::ZERO);
-        for j in 0..s {
-            let mut drive = z.scaled(t[j]);
-            (0..m).for_each(|l| drive.add_scaled(&u[l], block.b[j * m + l]));
-            (0..s).for_each(|i| self.x[i].add_product(&self.inverse[i * s + j], &drive));
-        }
+        let s = block.states;
+        states(block, (z, u), t, (&mut self.inverse, &mut self.x));
         for o in 0..block.c.len() / s {
             for j in 0..s {
                 let mut sum = Lanes::ZERO;
@@ -176,16 +178,8 @@ impl Rows {
     #[inline(always)]
     fn whiten(&mut self, noise: &Noise, z: &Lanes) {
         let (p, columns) = (self.filters.len(), self.columns);
-        let mut back = *z;
-        back.im.iter_mut().for_each(|v| *v = -*v);
-        for (filter, regression) in self.filters.iter_mut().zip(&noise.regression) {
-            let mut sum = Lanes::ZERO;
-            regression.coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(&back));
-            *filter = sum.shifted(1.0);
-            if regression.zero != 0.0 {
-                *filter = filter.times(&back.scaled(-regression.zero).shifted(1.0).inverse());
-            }
-        }
+        let back = z.conj();
+        self.filters.iter_mut().zip(&noise.regression).for_each(|(filter, r)| *filter = r.filter(&back));
         for c in 0..columns {
             for o in (0..p).rev() {
                 let mut sum = Lanes::ZERO;
@@ -198,8 +192,8 @@ impl Rows {
         }
     }
 
-    /// Writes the rows of the lines from `first` on, real and imaginary parts below each other, and says how many they are.
-    pub(crate) fn write(&self, lines: &Lines, first: usize, work: &mut Mat<f64>, at: usize) -> usize {
+    /// Writes the rows of the lines from `first` on.
+    fn put(&self, lines: &Lines, first: usize, work: &mut Mat<f64>, at: usize) -> usize {
         let count = LANES.min(lines.z.len() - first);
         let weight = &lines.weight[first..first + count];
         let outputs = self.filters.len();
@@ -214,27 +208,5 @@ impl Rows {
             }
         }
         2 * count * outputs
-    }
-}
-
-/// (z I - A)^-1 of each line, row by row.
-#[inline(always)]
-fn resolvent(block: &Block, z: &Lanes, out: &mut [Lanes]) {
-    let s = block.states;
-    match s {
-        1 => out[0] = z.shifted(-block.a[0]).inverse(),
-        2 => {
-            let (p, q) = (z.shifted(-block.a[0]), z.shifted(-block.a[3]));
-            let scale = p.times(&q).shifted(-block.a[1] * block.a[2]).inverse();
-            (out[0], out[3]) = (q.times(&scale), p.times(&scale));
-            (out[1], out[2]) = (scale.scaled(block.a[1]), scale.scaled(block.a[2]));
-        }
-        _ => {
-            let mut one = vec![c64::ZERO; s * s];
-            for l in 0..LANES {
-                block.resolvent(c64::new(z.re[l], z.im[l]), &mut one);
-                out.iter_mut().zip(&one).for_each(|(out, v)| (out.re[l], out.im[l]) = (v.re, v.im));
-            }
-        }
     }
 }

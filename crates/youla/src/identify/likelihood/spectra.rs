@@ -10,7 +10,17 @@
 
 use crate::identify::subspace::Experiment;
 use faer::{Mat, MatRef, c64};
+use rayon::prelude::*;
 use rustfft::FftPlanner;
+use std::ops::Range;
+
+/// Lines of a record that are summed together: sums over parts in their order do not depend on the number of threads.
+const PART: usize = 8192;
+
+/// The parts of a record of so many lines.
+pub(crate) fn parts(lines: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
+    (0..lines.div_ceil(PART)).into_par_iter().map(move |k| k * PART..((k + 1) * PART).min(lines))
+}
 
 /// The lines of one record, from the first above zero to the Nyquist frequency.
 #[derive(Debug, Clone)]

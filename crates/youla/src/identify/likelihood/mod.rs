@@ -43,6 +43,7 @@ mod point;
 mod problem;
 mod recommendation;
 mod residual;
+mod resize;
 mod rows;
 mod search;
 mod solve;

@@ -17,7 +17,7 @@ pub(crate) fn plant(choice: &Choice, sizes: &Sizes, time: Discrete) -> Result<St
 }
 
 /// The system with delayed inputs.
-fn delayed(system: &StateSpace<Discrete>, delays: &[usize]) -> Result<StateSpace<Discrete>> {
+pub(crate) fn delayed(system: &StateSpace<Discrete>, delays: &[usize]) -> Result<StateSpace<Discrete>> {
     let (n, m, p) = (system.order(), system.inputs(), system.outputs());
     let extra: usize = delays.iter().sum();
     let (mut a, mut b) = (Mat::<f64>::zeros(n + extra, n + extra), Mat::<f64>::zeros(n + extra, m));

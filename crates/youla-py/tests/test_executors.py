@@ -198,3 +198,17 @@ def test_a_fleet_with_broken_files(tmp_path: Path) -> None:
     assert bits(kept) == json.dumps(found.rows[:2])
     with pytest.raises(youla.InputError, match=r"not of .*01\.csv; give another folder"):
         youla.identify_many(files[1:3], read=read, folder=tmp_path / "rows", **OPTIONS)
+
+
+def test_a_folder_knows_the_nominal_model_by_its_matrices(small: youla.Record, tmp_path: Path) -> None:
+    """Another pole of the same order, or a controller of python-control that differs in its last digit, is another folder."""
+    control = pytest.importorskip("control")
+    known = {**OPTIONS, "controller": control.ss([], [], [], 2.0, 0.01)}
+    first = youla.identify_many([small], folder=tmp_path / "rows", **known)
+    assert youla.identify_many([small], folder=tmp_path / "rows", **known).computed == 0
+    assert first.computed == 1
+    other_pole = youla.Model([[0.91]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+    other_gain = control.ss([], [], [], 2.0 + 1e-12, 0.01)
+    for change in ({"nominal": other_pole}, {"controller": other_gain}):
+        with pytest.raises(youla.InputError, match="holds tasks of other settings"):
+            youla.identify_many([small], folder=tmp_path / "rows", **{**known, **change})

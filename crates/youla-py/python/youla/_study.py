@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import product
@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, whole
-from ._errors import InputError, NumericalError
+from ._errors import Error, InputError, NumericalError
 from ._identify import Records, prepare
 from ._model import Model
 from ._record import Record
@@ -192,12 +192,8 @@ def _with(settings: str, point: Mapping[str, Any]) -> str:
 
 
 def _point(payload: Payload, item: Mapping[str, Any], index: int) -> Row:
-    settings = _with(payload["settings"], item)
     plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in item.items()}
-    try:
-        return {**plain, **_row(Run(_native.identify(settings, payload["logs"], True)))}
-    except (InputError, NumericalError) as error:
-        return {**plain, "error": str(error)}
+    return _identified(plain, lambda: (_with(payload["settings"], item), payload["logs"]))
 
 
 def identify_many(
@@ -240,18 +236,25 @@ def identify_many(
     (1, 'absent.csv: no such file')
     """
     payload = {"read": dict(read or {}), "arguments": arguments}
-    key = key_of(sorted(payload["read"].items()), sorted((k, repr(v)) for k, v in arguments.items()))
+    key = key_of(payload["read"], arguments)
     return run_tasks(_machine, payload, records, key=key, executor=executor, folder=folder, progress=progress)
 
 
 def _machine(payload: Payload, item: Any, index: int) -> Row:
-    name = item.name if isinstance(item, Record) else str(item)
-    try:
+    def prepared() -> tuple[str, list[Log]]:
         record = item if isinstance(item, Record) else Record(item, **payload["read"])
-        settings, logs = _prepared(record, None, dict(payload["arguments"]))
-        return {"record": name, **_row(Run(_native.identify(settings, logs, True)))}
-    except (InputError, NumericalError) as error:
-        return {"record": name, "error": str(error)}
+        return _prepared(record, None, payload["arguments"])
+
+    return _identified({"record": item.name if isinstance(item, Record) else str(item)}, prepared)
+
+
+def _identified(labels: Row, prepared: Callable[[], tuple[str, list[Log]]]) -> Row:
+    """The labels of a task with the row of its run on one core, or with the reason why there is none."""
+    try:
+        settings, logs = prepared()
+        return {**labels, **_row(Run(_native.identify(settings, logs, True)))}
+    except Error as error:
+        return {**labels, "error": str(error)}
 
 
 def _row(run: Run) -> Row:

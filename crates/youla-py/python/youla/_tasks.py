@@ -10,7 +10,7 @@ import hashlib
 import json
 import os
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -195,8 +195,36 @@ def _write(path: str, text: str) -> None:
 
 
 def key_of(*parts: Any) -> str:
-    """A name of settings and arrays: SHA-256 of their bytes."""
+    """A name of settings, systems and arrays: SHA-256 of their content."""
     found = hashlib.sha256()
     for part in parts:
-        found.update(part.tobytes() if hasattr(part, "tobytes") else repr(part).encode())
+        for content in _content(part):
+            found.update(content)
     return found.hexdigest()
+
+
+#: Attributes that define a system: of youla and SciPy or python-control, in the order in which they are looked for.
+_SYSTEMS = (("a", "b", "c", "d"), ("A", "B", "C", "D"), ("num", "den"), ("zeros", "poles", "gain"))
+
+
+def _content(value: Any) -> Iterator[bytes]:
+    """The bytes that define a value; a `repr` would round arrays and leave the matrices of models out."""
+    if isinstance(value, Mapping):
+        for key in sorted(value, key=str):
+            yield repr(key).encode()
+            yield from _content(value[key])
+    elif isinstance(value, (list, tuple)):
+        yield f"{len(value)}:".encode()
+        for part in value:
+            yield from _content(part)
+    elif isinstance(value, (np.ndarray, np.generic)):
+        yield f"{value.dtype}{value.shape}".encode()
+        if value.dtype.hasobject:
+            yield from _content(value.tolist())
+        else:
+            yield value.tobytes()
+    else:
+        names = next((n for n in _SYSTEMS if all(hasattr(value, name) for name in n)), None)
+        yield repr(value).encode() if names is None else type(value).__name__.encode()
+        for name in (*names, "dt") if names else ():
+            yield from _content(getattr(value, name, None))

@@ -14,6 +14,7 @@ from . import _native
 from ._arrays import Array, whole
 from ._errors import InputError
 from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._optional import need
 from ._record import Record
 from ._result import Run
 from ._systems import controller_table, nominal_table
@@ -224,8 +225,7 @@ class Check:
 
     def to_frame(self) -> Any:
         """Return the findings as a pandas data frame."""
-        import pandas as pd
-
+        pd = need("pandas")
         return pd.DataFrame(self.findings)
 
     def __str__(self) -> str:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from . import _native
 from ._arrays import Array, as_floats, as_matrix, positive
 from ._errors import InputError
+from ._optional import need
 from ._types import Matrices
 
 Complex = npt.NDArray[np.complex128]
@@ -85,14 +86,12 @@ class FrequencyResponse:
 
     def to_control(self) -> Any:
         """Return a `control.FrequencyResponseData`."""
-        import control
-
+        control = need("control")
         return control.FrequencyResponseData(np.moveaxis(self.values, 0, -1), self.omega)
 
     def to_frame(self) -> Any:
         """Return a pandas data frame with a row for each frequency, output and input."""
-        import pandas as pd
-
+        pd = need("pandas")
         n, p, m = self.values.shape
         k, i, j = (index.ravel() for index in np.indices((n, p, m)))
         columns: dict[str, Any] = {"hz": self.hz[k], "output": i, "input": j}
@@ -221,17 +220,14 @@ class Model:
 
     def to_control(self) -> Any:
         """Return a `control.StateSpace` with the same matrices, sample time and names."""
-        import control
-
+        control = need("control")
         return control.StateSpace(
             *self._matrices, self._dt, inputs=list(self.inputs), outputs=list(self.outputs), name=_plain(self.name)
         )
 
     def to_scipy(self) -> Any:
         """Return a discrete `scipy.signal.StateSpace` with the same matrices."""
-        import scipy.signal
-
-        return scipy.signal.StateSpace(*self._matrices, dt=self._dt)
+        return need("scipy.signal").StateSpace(*self._matrices, dt=self._dt)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the model as JSON, which ``--nominal`` and ``model_file`` of the program read."""

@@ -10,14 +10,7 @@ import numpy as np
 from ._arrays import Array
 from ._errors import InputError
 from ._model import FrequencyResponse, Model
-
-
-def _pyplot() -> Any:
-    try:
-        from matplotlib import pyplot
-    except ImportError:
-        raise InputError("figures need matplotlib: pip install 'youla[plot]'") from None
-    return pyplot
+from ._optional import need
 
 
 def _channels(response: FrequencyResponse, output: int, input: int) -> None:
@@ -38,7 +31,7 @@ def bode(
 ) -> Any:
     """Draw magnitude in dB and phase in degrees over the frequency in Hz; returns both axes."""
     if ax is None:
-        _, ax = _pyplot().subplots(2, 1, sharex=True, layout="constrained")
+        _, ax = need("matplotlib.pyplot").subplots(2, 1, sharex=True, layout="constrained")
     if np.size(ax) != 2:
         raise InputError("ax must be a pair of axes, for magnitude and phase, as plt.subplots(2, 1) returns")
     upper, lower = np.ravel(ax)
@@ -67,8 +60,8 @@ def _but(style: dict[str, Any]) -> dict[str, Any]:
 
 def nyquist(response: FrequencyResponse, ax: Any = None, *, output: int = 0, input: int = 0) -> Any:
     """Draw the response in the complex plane with its ellipses; returns the axes."""
-    from_pyplot = _pyplot()
-    ax = from_pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    pyplot = need("matplotlib.pyplot")
+    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
     _channels(response, output, input)
     values = response.values[:, output, input]
     (line,) = ax.plot(values.real, values.imag, label=response.name)
@@ -90,8 +83,8 @@ def nyquist(response: FrequencyResponse, ax: Any = None, *, output: int = 0, inp
 
 def poles(models: Sequence[Model], ax: Any = None) -> Any:
     """Draw poles in the z plane with the unit circle; returns the axes."""
-    from_pyplot = _pyplot()
-    ax = from_pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    pyplot = need("matplotlib.pyplot")
+    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 361))
     ax.plot(circle.real, circle.imag, color="0.7", linewidth=0.8)
     for model in models:
@@ -105,8 +98,8 @@ def poles(models: Sequence[Model], ax: Any = None) -> Any:
 
 def fit(measured: Array, predicted: Array, dt: float, record: str, ax: Any = None) -> Any:
     """Draw measured and predicted output over time; returns the axes."""
-    from_pyplot = _pyplot()
-    ax = from_pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    pyplot = need("matplotlib.pyplot")
+    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
     t = np.arange(len(measured)) * dt
     ax.plot(t, measured, label=f"measured, {record}", linewidth=0.8)
     ax.plot(t, predicted, label="predicted", linewidth=0.8)

@@ -10,6 +10,7 @@ import numpy as np
 from . import _native
 from ._arrays import Array, positive
 from ._errors import InputError
+from ._optional import need
 from ._sources import Source, source_of
 from ._types import Log
 
@@ -221,8 +222,7 @@ class Record:
 
     def to_frame(self) -> Any:
         """Return the channels as a pandas data frame with the time in seconds as its index."""
-        import pandas as pd
-
+        pd = need("pandas")
         columns = {name: self._data[:, column] for group in self._groups.values() for name, _, column in group}
         return pd.DataFrame(columns, index=pd.Index(np.arange(len(self)) * self._dt, name="t"))
 

@@ -14,6 +14,7 @@ from . import _native
 from ._arrays import Array
 from ._errors import InputError, NumericalError
 from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._optional import need
 from ._types import Log
 
 #: Name of the recommended model among the models of a run.
@@ -217,8 +218,7 @@ class Run:
 
     def to_frame(self) -> Any:
         """Return a pandas data frame with a row for each model, verification record and output."""
-        import pandas as pd
-
+        pd = need("pandas")
         rows = []
         outputs = [name for name, _ in self._native.ports()[1]]
         for key, entry in self.summary["methods"].items():

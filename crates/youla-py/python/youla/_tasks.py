@@ -19,6 +19,8 @@ from typing import Any
 import numpy as np
 
 from ._errors import Error, InputError
+from ._optional import need
+from ._parquet import write
 from ._record import Record
 
 Row = dict[str, Any]
@@ -56,9 +58,42 @@ class Rows:
 
     def to_frame(self) -> Any:
         """Return a pandas data frame with a row for each task."""
-        import pandas as pd
-
+        pd = need("pandas")
         return pd.DataFrame([flat(row) for row in self.rows])
+
+    def to_parquet(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
+        """Write a Parquet data set with a row for each task.
+
+        The columns ``hz`` and ``zeta`` hold the modes as lists, ``a``, ``b``, ``c`` and ``d`` the matrices of the model, and
+        ``error`` the reason of a task that failed. Folders of several calls read as one data set.
+
+        Parameters
+        ----------
+        folder : path
+            Folder of the data set; made where it does not exist.
+        replace : bool
+            Whether to replace a data set that this method wrote before.
+
+        Returns
+        -------
+        str
+            Path of the folder.
+
+        Raises
+        ------
+        InputError
+            Where the folder holds something else, or pyarrow is not installed.
+
+        Examples
+        --------
+        >>> import tempfile, pandas as pd, youla
+        >>> rows = youla.identify_many(["absent.csv"], read={"inputs": "u", "outputs": "y", "dt": 0.01})
+        >>> with tempfile.TemporaryDirectory() as parent:
+        ...     folder = rows.to_parquet(f"{parent}/fleet")
+        ...     pd.read_parquet(folder)["error"].tolist()
+        ['absent.csv: no such file']
+        """
+        return write(self.rows, folder, replace)
 
     def __len__(self) -> int:
         return len(self.rows)

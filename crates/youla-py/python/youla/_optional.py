@@ -1,0 +1,27 @@
+"""Packages that are used where they are installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from ._errors import InputError
+
+#: The extra of this package that installs each of them.
+_EXTRAS = {
+    "control": "control",
+    "matplotlib.pyplot": "plot",
+    "pandas": "frames",
+    "pyarrow": "parquet",
+    "pyarrow.parquet": "parquet",
+    "scipy.signal": "control",
+}
+
+
+def need(module: str) -> Any:
+    """Return a module, or say which extra installs it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        name = module.partition(".")[0]
+        raise InputError(f"{name} is not installed, but this needs it: pip install 'youla[{_EXTRAS[module]}]'") from None

@@ -1,0 +1,85 @@
+"""Rows of tasks as Parquet data sets: read back by pandas and pyarrow with the same figures."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import loop
+
+import youla
+
+pytest.importorskip("pyarrow")
+pd = pytest.importorskip("pandas")
+
+NOMINAL = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
+OPTIONS = {"nominal": NOMINAL, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+READ = {"inputs": "u", "outputs": "y", "dt": 0.01}
+
+
+@pytest.fixture(scope="module")
+def fleet() -> youla.Rows:
+    log = youla.Record(loop(7, 400), inputs=0, outputs=1, excitation=2, dt=0.01, name="good")
+    return youla.identify_many([log, "absent.csv"], read=READ, **OPTIONS)
+
+
+def test_a_fleet_reads_back(fleet: youla.Rows, tmp_path: Path) -> None:
+    """Figures, matrices and modes are equal to those of the rows, bit by bit; an error is a row."""
+    folder = fleet.to_parquet(tmp_path / "fleet" / "today")
+    frame = pd.read_parquet(folder)
+    row = fleet.rows[0]
+    assert frame["record"].tolist() == ["good", "absent.csv"]
+    assert frame["error"][0] is None or pd.isna(frame["error"][0])
+    assert frame["error"][1] == "absent.csv: no such file"
+    assert frame["order"][0] == row["order"]
+    assert frame["least_fit"].isna().tolist() == [True, True]
+    assert list(frame["hz"][0]) == [m[0] for m in row["modes"]]
+    assert np.array_equal(np.vstack(frame["a"][0]), row["model"]["a"])
+
+
+def test_data_sets_of_several_calls_are_one(fleet: youla.Rows, tmp_path: Path) -> None:
+    """The types of the columns do not depend on the rows: one of errors only reads with one of models."""
+    only_errors = youla.identify_many(["other.csv"], read=READ, **OPTIONS)
+    fleet.to_parquet(tmp_path / "all" / "first")
+    only_errors.to_parquet(tmp_path / "all" / "second")
+    assert len(pd.read_parquet(tmp_path / "all")) == 3
+
+
+def test_values_of_several_types_are_text(tmp_path: Path) -> None:
+    rows = youla.Rows(({"index": 0, "recommended.order": 2}, {"index": 1, "recommended.order": "auto"}), 2)
+    frame = pd.read_parquet(rows.to_parquet(tmp_path / "scan"))
+    assert frame["recommended.order"].tolist() == ["2", '"auto"']
+
+
+def test_nothing_is_overwritten(fleet: youla.Rows, tmp_path: Path) -> None:
+    folder = tmp_path / "fleet"
+    fleet.to_parquet(folder)
+    with pytest.raises(youla.InputError, match="give another folder, or replace=True"):
+        fleet.to_parquet(folder)
+    fleet.to_parquet(folder, replace=True)
+    (folder / "notes.txt").write_text("mine")
+    with pytest.raises(youla.InputError, match="holds notes.txt; give another folder"):
+        fleet.to_parquet(folder, replace=True)
+    with pytest.raises(youla.InputError, match="is a file"):
+        fleet.to_parquet(folder / "notes.txt")
+
+
+@pytest.mark.parametrize(
+    ("module", "extra", "call"),
+    [
+        ("pyarrow", "parquet", lambda rows: rows.to_parquet("nowhere")),
+        ("pandas", "frames", lambda rows: rows.to_frame()),
+        ("control", "control", lambda rows: NOMINAL.to_control()),
+        ("scipy.signal", "control", lambda rows: NOMINAL.to_scipy()),
+        ("matplotlib.pyplot", "plot", lambda rows: NOMINAL.frequency_response([1.0]).plot()),
+    ],
+)
+def test_an_absent_package_names_its_extra(
+    module: str, extra: str, call: object, fleet: youla.Rows, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, module, None)
+    with pytest.raises(youla.InputError, match=rf"is not installed.*pip install 'youla\[{extra}\]'"):
+        call(fleet)
+    assert not Path("nowhere").exists()

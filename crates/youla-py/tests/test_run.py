@@ -120,6 +120,8 @@ def test_figures(run: youla.Run) -> None:
     assert run.plot.nyquist().patches
     run.plot.poles()
     run.plot.fit()
+    recommended, _, measured = (line.get_ydata() for line in axes[1].lines)
+    assert np.ptp(measured) < 360 + np.ptp(recommended), "the measured phase stays beside that of the model"
     assert run.plot.bode("hansen", axes)[0] is axes[0]
     with pytest.raises(youla.InputError, match="output is 3"):
         run.plot.bode(output=3)

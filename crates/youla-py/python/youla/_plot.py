@@ -42,7 +42,10 @@ def bode(
         _channels(response, output, input)
         db = 20 * np.log10(response.magnitude[:, output, input])
         (line,) = upper.semilogx(response.hz, db, label=response.name, **style)
-        lower.semilogx(response.hz, np.degrees(response.phase[:, output, input]), color=line.get_color(), **_but(style))
+        phase = response.phase[:, output, input]
+        if response is measured and responses:
+            phase = _beside(response, responses[0], output, input)
+        lower.semilogx(response.hz, np.degrees(phase), color=line.get_color(), **_but(style))
         if region and response.low is not None and response.high is not None:
             bounds = [np.maximum(b[:, output, input], 1e-300) for b in (response.low, response.high)]
             low, high = (20 * np.log10(b) for b in bounds)
@@ -52,6 +55,14 @@ def bode(
     lower.set_xlabel("frequency, Hz")
     upper.legend()
     return np.array([upper, lower])
+
+
+def _beside(measured: FrequencyResponse, model: FrequencyResponse, output: int, input: int) -> Array:
+    """The phase of a measured response within half a turn of that of a model: noise has no continuous phase."""
+    reference = np.interp(measured.omega, model.omega, model.phase[:, output, input])
+    turned = np.angle(measured.values[:, output, input] * np.exp(-1j * reference))
+    found: Array = reference + turned
+    return found
 
 
 def _but(style: dict[str, Any]) -> dict[str, Any]:

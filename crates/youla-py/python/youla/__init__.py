@@ -8,7 +8,8 @@
 
 from . import _native
 from ._errors import Error, InputError, NumericalError
-from ._identify import Check, SubspaceEstimate, check, demo, greybox, identify, subspace
+from ._figures import Plots
+from ._identify import demo, identify
 from ._loop import (
     Certificate,
     Comparison,
@@ -24,7 +25,8 @@ from ._loop import (
 )
 from ._model import FrequencyResponse, Mode, Model
 from ._record import Record
-from ._result import Evidence, Plots, Prediction, Run, Verdict
+from ._result import Evidence, Prediction, Run, Verdict
+from ._stages import Check, SubspaceEstimate, check, greybox, subspace
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
 

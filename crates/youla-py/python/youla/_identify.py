@@ -1,11 +1,10 @@
-"""From records to models: the whole run, and its stages that need no run."""
+"""From records to models: the whole run, and the settings that all stages share."""
 
 from __future__ import annotations
 
 import json
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,7 @@ import numpy as np
 from . import _native
 from ._arrays import Array, whole
 from ._errors import InputError
-from ._model import FrequencyResponse, Mode, Model, frequencies
-from ._optional import need
+from ._model import FrequencyResponse
 from ._record import Record
 from ._result import Run
 from ._systems import controller_table, nominal_table
@@ -111,7 +109,7 @@ def prepare(
     options: Mapping[str, Any],
 ) -> tuple[dict[str, Any], list[Log]]:
     """Return run.toml as nested dictionaries, and the records in its order."""
-    estimation, fresh = _records(record, "record"), _records(verify, "verify")
+    estimation, fresh = records_of(record, "record"), records_of(verify, "verify")
     if not estimation:
         raise InputError("record is an empty list, but must hold at least one youla.Record")
     first = estimation[0]
@@ -143,7 +141,7 @@ def prepare(
     return _plain(settings), [r._log() for r in [*estimation, *fresh]]
 
 
-def _records(given: Records | None, what: str) -> list[Record]:
+def records_of(given: Records | None, what: str) -> list[Record]:
     listed = [] if given is None else [given] if isinstance(given, Record) else given
     if not isinstance(listed, Sequence) or not all(isinstance(r, Record) for r in listed):
         raise InputError(f"{what} is {type(given).__name__}, but must be a youla.Record or a list of them")
@@ -186,11 +184,17 @@ def demo(machine: str = "levitation", *, seed: int = 1) -> Run:
     machine : {"levitation", "bearing"}
         A levitated mass, unstable, or the gas bearing of the paper.
     seed : int
-        Seed of excitation and noise.
+        Seed of excitation and noise, at least 0.
 
     Returns
     -------
     Run
+        As `identify` returns it.
+
+    Raises
+    ------
+    InputError
+        For another machine or a seed that is not a whole number.
 
     Examples
     --------
@@ -201,189 +205,9 @@ def demo(machine: str = "levitation", *, seed: int = 1) -> Run:
     return Run(_native.demo(machine, whole(seed, "seed", 0)))
 
 
-@dataclass(frozen=True)
-class Check:
-    """Findings of a check of records.
-
-    Attributes
-    ----------
-    findings : tuple of dict
-        The most serious first: ``severity``, ``test``, ``record``, ``channel``, ``rows``, ``what``, ``numbers``, ``advice``.
-    defects, cautions, notes : int
-        Numbers of findings.
-    """
-
-    findings: tuple[dict[str, Any], ...]
-    defects: int
-    cautions: int
-    notes: int
-
-    @property
-    def ok(self) -> bool:
-        """Whether there is no defect."""
-        return self.defects == 0
-
-    def to_frame(self) -> Any:
-        """Return the findings as a pandas data frame."""
-        pd = need("pandas")
-        return pd.DataFrame(self.findings)
-
-    def __str__(self) -> str:
-        lines = [f"{self.defects} defects, {self.cautions} cautions, {self.notes} notes"]
-        for f in self.findings:
-            where = " ".join(str(f[key]) for key in ("record", "channel") if f.get(key))
-            lines.append(f"{f['severity']}: {where}: {f['what']}. {f['advice']}".rstrip())
-        return "\n".join(lines)
-
-
-def check(
-    record: Records, *, nominal: Any = None, controller: Any = None, feedback: str = "negative", hold: str | None = None,
-    **options: Mapping[str, Any],
-) -> Check:  # fmt: skip
-    """Check records before identifying from them.
-
-    Parameters
-    ----------
-    record : Record or sequence of Record
-        Records.
-    nominal, controller, feedback, hold, **options
-        As for `identify`. Without a controller its tests are left out.
-
-    Returns
-    -------
-    Check
-
-    Examples
-    --------
-    >>> import numpy as np, youla
-    >>> rng = np.random.default_rng(1)
-    >>> log = youla.Record(rng.standard_normal((2000, 2)), inputs=0, outputs=1, dt=1e-3)
-    >>> youla.check(log).defects
-    0
-    """
-    first = _first(record)
-    known = controller is not None
-    if known and nominal is None:
-        nominal = np.zeros((len(first.outputs), len(first.inputs)))
-    settings, logs = prepare(
-        record, None, 0 if nominal is None else nominal, 0 if controller is None else controller, feedback, hold, None, options
-    )
-    found = json.loads(_native.check(json.dumps(settings), logs, known))
-    return Check(tuple(found["findings"]), found["defects"], found["cautions"], found["notes"])
-
-
-def _first(record: Records) -> Record:
-    listed = _records(record, "record")
-    if not listed:
-        raise InputError("record is an empty list, but must hold at least one youla.Record")
-    return listed[0]
-
-
-class SubspaceEstimate:
-    """A model by subspace identification.
-
-    Attributes
-    ----------
-    model : Model
-        The model.
-    singular_values : ndarray
-        Values from which the order is chosen, descending.
-    horizon, past : int
-        Block rows of the future and of the past.
-    """
-
-    def __init__(self, found: _native.Subspace, record: Record) -> None:
-        self._found = found
-        a, b, c, d, dt = found.model()
-        self.model = Model(a, b, c, d, dt=dt, inputs=record.inputs, outputs=record.outputs, name="subspace")
-        self.singular_values: Array = np.array(found.singular_values())
-        self.horizon, self.past = found.horizons()
-
-    def modes(self) -> tuple[Mode, ...]:
-        """Return the modes of the model."""
-        return self.model.modes()
-
-    def frequency_response(self, omega: Any) -> FrequencyResponse:
-        """Return the response at angular frequencies, rad/s, with its region where `uncertainty` was asked for."""
-        w = frequencies(omega)
-        values, known = self._found.response(w / (2 * np.pi))
-        return with_region(w, values, known, "subspace")
-
-    def __repr__(self) -> str:
-        return f"<youla.SubspaceEstimate: order {self.model.order}, horizon {self.horizon}, past {self.past}>"
-
-
 def with_region(w: Array, values: Any, known: Any, name: str) -> FrequencyResponse:
     """A frequency response of the native module."""
     if known is None:
         return FrequencyResponse(w, values, name=name)
     covariance, magnitude, ellipse = known
     return FrequencyResponse(w, values, magnitude[..., 0], magnitude[..., 1], covariance, ellipse, name)
-
-
-def subspace(record: Records, **options: Any) -> SubspaceEstimate:
-    """Identify from u and y by a subspace method, without regard to nominal model and controller.
-
-    Parameters
-    ----------
-    record : Record or sequence of Record
-        Records.
-    **options
-        Keys of ``[direct]`` of run.toml: ``method``, ``horizon``, ``past``, ``order``, ``feedthrough``, ``delays``,
-        ``stability``, ``uncertainty``.
-
-    Returns
-    -------
-    SubspaceEstimate
-
-    Examples
-    --------
-    >>> import numpy as np, youla
-    >>> u = np.random.default_rng(1).standard_normal((500, 1))
-    >>> y = youla.Model([[0.8]], [[1.0]], [[1.0]], [[0.0]], dt=1.0).simulate(u)
-    >>> log = youla.Record(np.hstack([u, y]), inputs=0, outputs=1, dt=1.0)
-    >>> round(float(youla.subspace(log, order=1, horizon=5).model.a[0, 0]), 3)
-    0.8
-    """
-    settings, logs = prepare(record, None, 0, 0, "positive", None, None, {})
-    return SubspaceEstimate(_native.subspace(json.dumps(settings), logs, options_json(options)), _first(record))
-
-
-def greybox(record: Records, *, structure: Mapping[str, Any], grey_box: Mapping[str, Any] | None = None, **arguments: Any) -> Run:
-    """Estimate a physical structure, started from the result of the Hansen scheme.
-
-    Parameters
-    ----------
-    record : Record or sequence of Record
-        Records.
-    structure : mapping
-        The table ``[grey_box.structure]`` of run.toml: parameters and matrices.
-    grey_box : mapping, optional
-        Other keys of ``[grey_box]``.
-    **arguments
-        As for `identify`.
-
-    Returns
-    -------
-    Run
-        Its model ``grey_box`` is the structure, and ``summary["methods"]["grey_box"]`` holds the parameters.
-
-    Examples
-    --------
-    A first-order lag with unknown gain and pole, in continuous time:
-
-    >>> import numpy as np, youla
-    >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
-    >>> d = np.random.default_rng(1).standard_normal((3000, 1))
-    >>> n = 0.01 * np.random.default_rng(2).standard_normal((3000, 1))
-    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=n)
-    >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
-    >>> structure = {
-    ...     "parameters": {"pole": {"initial": 4.0, "min": 0.1, "max": 50.0}, "gain": {"initial": 8.0}},
-    ...     "a": [["-pole"]], "b": [["gain"]], "c": [[1.0]],
-    ... }
-    >>> run = youla.greybox(log, structure=structure, nominal=plant, controller=2.0, hansen={"order": 1, "horizon": 5})
-    >>> round(float(run.model("grey_box").a[0, 0]), 2)
-    0.95
-    """
-    return identify(record, grey_box={**(grey_box or {}), "structure": dict(structure)}, **arguments)

@@ -14,9 +14,10 @@ import numpy as np
 from . import _native
 from ._arrays import Array
 from ._errors import InputError
+from ._figures import RECOMMENDED
 from ._identify import _plain, options_json
 from ._model import Complex, Model, _signal
-from ._result import RECOMMENDED, Run
+from ._result import Run
 from ._systems import as_model, controller_table, nominal_table
 
 
@@ -76,6 +77,12 @@ def certify(plant: Any, controller: Any, *, feedback: str = "negative") -> Certi
     Returns
     -------
     Certificate
+        Stability, the poles of the loop in z and the peak of its sensitivity.
+
+    Raises
+    ------
+    InputError
+        For systems of other sizes or sample times, or in continuous time.
 
     Examples
     --------
@@ -103,8 +110,10 @@ def simulate_loop(
 
     Parameters
     ----------
-    plant, controller, feedback
-        As for `certify`.
+    plant, controller : Model or discrete-time system of python-control or SciPy
+        The controller may also be a gain, m x p.
+    feedback : {"negative", "positive"}
+        Sign with which the controller is written.
     samples : int, optional
         Number of samples; that of the signals when absent.
     excitation, reference, noise : array_like, optional
@@ -114,6 +123,11 @@ def simulate_loop(
     -------
     u, y : ndarray
         Plant inputs, samples x m, and measured outputs, samples x p.
+
+    Raises
+    ------
+    InputError
+        For signals of different lengths or other numbers of channels, and for systems that `certify` refuses.
 
     Examples
     --------
@@ -151,14 +165,20 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
     ----------
     system : Model or discrete-time system of python-control or SciPy
         Model.
-    output_scale : sequence of float, optional
-        Sizes of the outputs that matter equally.
+    output_scale : sequence of float, (p,), optional
+        Sizes of the outputs that matter equally, in their units.
     **options
-        ``method``, ``order`` (``{"fixed": n}``), ``stability_boundary``, as `ReductionOptions` of the library.
+        ``order`` (number of states), ``method``, ``stability_boundary``, as `ReductionOptions` of the library.
 
     Returns
     -------
     Reduction
+        The reduced model with its Hankel singular values and the bound of its error.
+
+    Raises
+    ------
+    InputError
+        For options that do not exist, or an order above that of the system.
 
     Examples
     --------
@@ -198,6 +218,7 @@ def redesign(run: Run, **options: Any) -> Redesign:
     Returns
     -------
     Redesign
+        The new controller, m x p, with positive feedback, and the figures of both loops.
 
     Raises
     ------
@@ -247,7 +268,7 @@ def excite(
     Parameters
     ----------
     nominal, controller, feedback, hold
-        As for `identify`.
+        Model of the plant, p x m, and controller, m x p; see `identify`.
     dt : float, optional
         Sample time, seconds; that of `nominal` when absent.
     amplitude : float or sequence of float
@@ -263,6 +284,12 @@ def excite(
     Returns
     -------
     Excitation
+        The sequence, samples x m in the unit of the inputs, and its predicted peaks and deviations.
+
+    Raises
+    ------
+    InputError
+        For a band above the Nyquist frequency, and for an excitation beyond a limit, with the amplitude that keeps it.
 
     Examples
     --------
@@ -335,6 +362,12 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     Returns
     -------
     Comparison
+        Names of the runs and the nu-gap, 0 to 1, of each pair.
+
+    Raises
+    ------
+    InputError
+        For fewer than two runs, or a folder without the model.
 
     Examples
     --------

@@ -101,7 +101,20 @@ class FrequencyResponse:
         return pd.DataFrame(columns)
 
     def plot(self, ax: Any = None, *, region: bool = True) -> Any:
-        """Draw magnitude and phase; see `youla.Run.plot`."""
+        """Draw magnitude in dB and phase in degrees over the frequency in Hz.
+
+        Parameters
+        ----------
+        ax : pair of matplotlib axes, optional
+            Where to draw.
+        region : bool
+            Whether to draw the bounds of the magnitude.
+
+        Returns
+        -------
+        ndarray of matplotlib axes
+            Magnitude and phase.
+        """
         from ._plot import bode
 
         return bode([self], ax, region=region)
@@ -205,13 +218,37 @@ class Model:
         return tuple(Mode(hz, zeta) for hz, zeta, _, _ in _native.modes(self._native()))
 
     def frequency_response(self, omega: Any) -> FrequencyResponse:
-        """Return the response at angular frequencies, rad/s."""
+        """Return the frequency response.
+
+        Parameters
+        ----------
+        omega : array_like, (n,)
+            Angular frequencies, rad/s.
+
+        Returns
+        -------
+        FrequencyResponse
+            Values of the shape (n, p, m), without a region.
+        """
         w = frequencies(omega)
         values = _native.frequency_response(self._native(), w / (2 * np.pi))
         return FrequencyResponse(w, values, name=self.name)
 
     def simulate(self, inputs: Any, x0: Any = None) -> Array:
-        """Return the outputs, samples x p, to `inputs`, samples x m, from the state `x0` (zero when absent)."""
+        """Simulate the model.
+
+        Parameters
+        ----------
+        inputs : array_like, samples x m
+            Inputs; one input may be a list of numbers.
+        x0 : array_like, (order,), optional
+            State before the first sample; zero when absent.
+
+        Returns
+        -------
+        ndarray, samples x p
+            Outputs.
+        """
         u = _signal(inputs, "inputs", self.d.shape[1])
         state = np.zeros(self.order) if x0 is None else as_floats(x0, "x0").ravel()
         if len(state) != self.order:
@@ -230,7 +267,13 @@ class Model:
         return need("scipy.signal").StateSpace(*self._matrices, dt=self._dt)
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Write the model as JSON, which ``--nominal`` and ``model_file`` of the program read."""
+        """Write the model as JSON, which ``--nominal`` and ``model_file`` of the program read.
+
+        Parameters
+        ----------
+        path : path
+            File; one of that name is replaced.
+        """
         matrices = dict(zip("abcd", (m.tolist() for m in self._matrices), strict=True))
         with open(path, "w", encoding="utf-8") as file:
             json.dump({"name": self.name, "ts": self._dt, **matrices, "provenance": None}, file)

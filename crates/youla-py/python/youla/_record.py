@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 
-from . import _native
 from ._arrays import Array, positive
 from ._errors import InputError
 from ._optional import need
@@ -198,7 +197,18 @@ class Record:
         return part
 
     def named(self, name: str) -> Record:
-        """Return the same record under another name."""
+        """Give another name.
+
+        Parameters
+        ----------
+        name : str
+            Name in reports.
+
+        Returns
+        -------
+        Record
+            The same channels and samples, without a copy.
+        """
         return self._with(self._data, name)
 
     def split(self, share: float = 0.7) -> tuple[Record, Record]:

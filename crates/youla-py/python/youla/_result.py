@@ -13,12 +13,10 @@ import numpy as np
 from . import _native
 from ._arrays import Array
 from ._errors import InputError, NumericalError
+from ._figures import RECOMMENDED, Plots
 from ._model import FrequencyResponse, Mode, Model, frequencies
 from ._optional import need
 from ._types import Log
-
-#: Name of the recommended model among the models of a run.
-RECOMMENDED = "likelihood"
 
 
 @dataclass(frozen=True)
@@ -76,6 +74,15 @@ class Run:
     Models are named ``likelihood`` (the recommended one), ``nominal``, ``hansen``, ``hansen_reduced``, ``direct``,
     ``grey_box``, ``true_plant`` (simulations), ``controller`` (positive feedback, u = K y), ``deviation`` (S) and
     ``new_controller``.
+
+    Examples
+    --------
+    >>> import youla
+    >>> run = youla.demo()
+    >>> run.verdict.trusted, run.recommended.order
+    (True, 3)
+    >>> run.modes()[0].hz_interval is not None
+    True
     """
 
     def __init__(self, native: _native.Run, made_from: tuple[dict[str, Any], list[Log]] | None = None) -> None:
@@ -111,6 +118,16 @@ class Run:
 
     def model(self, name: str = RECOMMENDED) -> Model:
         """Return a model by its name.
+
+        Parameters
+        ----------
+        name : str
+            One of `models`.
+
+        Returns
+        -------
+        Model
+            With the names of the channels and the sample time in seconds.
 
         Raises
         ------
@@ -162,7 +179,18 @@ class Run:
         return tuple(Prediction(*found) for found in self._native.predictions())
 
     def modes(self, model: str = RECOMMENDED) -> tuple[Mode, ...]:
-        """Return the modes of a model, with 95 % intervals where they are known."""
+        """Return the modes of a model.
+
+        Parameters
+        ----------
+        model : str
+            One of `models`.
+
+        Returns
+        -------
+        tuple of Mode
+            Natural frequencies in Hz and damping ratios, with 95 % intervals where they are known.
+        """
         entry = self.summary["methods"].get(model)
         if entry is None:
             return self.model(model).modes()
@@ -209,11 +237,33 @@ class Run:
         return FrequencyResponse(hz * (2 * np.pi), values, name="measured")
 
     def to_control(self, model: str = RECOMMENDED) -> Any:
-        """Return a model as `control.StateSpace`, with the names of its channels."""
+        """Convert a model to python-control.
+
+        Parameters
+        ----------
+        model : str
+            One of `models`.
+
+        Returns
+        -------
+        control.StateSpace
+            In discrete time, with the names of the channels.
+        """
         return self.model(model).to_control()
 
     def to_scipy(self, model: str = RECOMMENDED) -> Any:
-        """Return a model as a discrete `scipy.signal.StateSpace`."""
+        """Convert a model to SciPy.
+
+        Parameters
+        ----------
+        model : str
+            One of `models`.
+
+        Returns
+        -------
+        scipy.signal.StateSpace
+            In discrete time.
+        """
         return self.model(model).to_scipy()
 
     def to_frame(self) -> Any:
@@ -228,12 +278,30 @@ class Run:
         return pd.DataFrame(rows)
 
     def report(self, path: str | os.PathLike[str]) -> None:
-        """Write the report, one HTML file that needs nothing else."""
+        """Write the report.
+
+        Parameters
+        ----------
+        path : path
+            HTML file that needs nothing else; a file of that name is replaced.
+        """
         with open(path, "w", encoding="utf-8") as file:
             file.write(self._native.html())
 
     def save(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
-        """Write the run folder that ``youla identify`` writes, and return its path.
+        """Write the run folder that ``youla identify`` writes.
+
+        Parameters
+        ----------
+        folder : path
+            A new folder.
+        replace : bool
+            Whether to replace a run that is there.
+
+        Returns
+        -------
+        str
+            Path of the folder.
 
         Raises
         ------
@@ -257,71 +325,3 @@ class Run:
         from ._html import page
 
         return page(self)
-
-
-class Plots:
-    """Figures of a run; each returns matplotlib axes."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-
-    def bode(
-        self, models: Any = None, ax: Any = None, *, omega: Any = None, output: int = 0, input: int = 0, region: bool = True
-    ) -> Any:
-        """Draw magnitude and phase of models with their regions, beside the measured response.
-
-        Parameters
-        ----------
-        models : str or list of str, optional
-            Names; the recommended and the nominal model when absent.
-        ax : pair of matplotlib axes, optional
-            Where to draw.
-        omega : array_like, optional
-            Angular frequencies, rad/s.
-        output, input : int
-            Channels, counted from 0.
-        region : bool
-            Whether to draw the 95 % bands.
-
-        Returns
-        -------
-        ndarray of matplotlib axes
-            Magnitude and phase.
-        """
-        from ._plot import bode
-
-        names = [models] if isinstance(models, str) else models
-        if names is None:
-            names = [key for key in (RECOMMENDED, "nominal") if key in self._run.models]
-        responses = [self._run.frequency_response(omega, model=key) for key in names]
-        measured = self._run.measured_response
-        return bode(responses, ax, region=region, output=output, input=input, measured=measured)
-
-    def nyquist(self, model: str = RECOMMENDED, ax: Any = None, *, omega: Any = None, output: int = 0, input: int = 0) -> Any:
-        """Draw the response of a model in the complex plane with its 95 % ellipses."""
-        from ._plot import nyquist
-
-        return nyquist(self._run.frequency_response(omega, model=model), ax, output=output, input=input)
-
-    def poles(self, models: Any = None, ax: Any = None) -> Any:
-        """Draw the poles of models in the z plane."""
-        from ._plot import poles
-
-        names = [models] if isinstance(models, str) else models
-        names = [key for key in (RECOMMENDED, "nominal", "hansen") if key in self._run.models] if names is None else names
-        return poles([self._run.model(key) for key in names], ax)
-
-    def fit(self, record: int = 0, ax: Any = None, *, model: str = RECOMMENDED, output: int = 0) -> Any:
-        """Draw a verification record beside its prediction by a model."""
-        from ._plot import fit
-
-        predictions = self._run.predictions
-        if not 0 <= record < len(predictions):
-            raise InputError(f"record is {record}, but the run has {len(predictions)} verification records; give verify=")
-        found = predictions[record]
-        if model not in found.predicted:
-            raise InputError(f"model {model!r} predicts nothing on {found.record!r}; choose of {', '.join(found.predicted)}")
-        dt = self._run.model("controller").dt
-        return fit(found.measured[:, output], found.predicted[model][:, output], dt, found.record, ax)
-
-

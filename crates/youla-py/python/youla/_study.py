@@ -28,7 +28,22 @@ Folder = str | os.PathLike[str] | None
 
 @dataclass(frozen=True)
 class Bootstrap(Rows):
-    """Replicates of a recommended model; see `bootstrap`."""
+    """Replicates of a recommended model; see `bootstrap`.
+
+    Attributes
+    ----------
+    rows : tuple of dict
+        One for each replicate.
+    computed : int
+        Replicates that were computed in this call; the others were in the folder.
+
+    Examples
+    --------
+    >>> import youla
+    >>> row = {"index": 0, "modes": [[8.0, 0.05]], "ts": 0.01}
+    >>> youla.Bootstrap((row, {**row, "index": 1, "modes": [[8.2, 0.05]]}), 2).intervals(0.5)[0, 0].round(2).tolist()
+    [8.05, 8.15]
+    """
 
     def models(self) -> list[Model]:
         """Return the models of the replicates that did not fail."""
@@ -41,7 +56,23 @@ class Bootstrap(Rows):
         return np.array([m for m in found if len(m) == usual], dtype=np.float64).reshape(-1, usual, 2)
 
     def intervals(self, level: float = 0.95) -> Array:
-        """Return percentile intervals, modes x 2 (Hz, damping ratio) x 2 (low, high)."""
+        """Compute percentile intervals.
+
+        Parameters
+        ----------
+        level : float
+            Probability, between 0 and 1.
+
+        Returns
+        -------
+        ndarray, modes x 2 x 2
+            Frequency in Hz and damping ratio; low and high.
+
+        Raises
+        ------
+        NumericalError
+            Where every replicate failed.
+        """
         if not 0 < level < 1:
             raise InputError(f"level is {level}, but must be between 0 and 1")
         found = self.modes()
@@ -84,6 +115,7 @@ def bootstrap(
     Returns
     -------
     Bootstrap
+        A row for each replicate, in the order of the index.
 
     Raises
     ------
@@ -150,12 +182,18 @@ def scan(
     executor, folder, progress
         As for `bootstrap`.
     **arguments
-        As for `identify`.
+        As for `identify`: ``nominal``, ``controller``, ``verify`` and further ones.
 
     Returns
     -------
     Rows
-        In the order of the combinations, the last key fastest: the options, `trusted`, `order`, modes and least fit.
+        In the order of the combinations, the last key fastest: the options, `trusted`, `order`, modes (Hz and damping ratio)
+        and the least fit in percent, or `error`.
+
+    Raises
+    ------
+    InputError
+        For a grid that is not a mapping from keys to lists of values, and for arguments that `identify` refuses.
 
     Examples
     --------
@@ -216,12 +254,17 @@ def identify_many(
     executor, folder, progress
         As for `bootstrap`.
     **arguments
-        As for `identify`.
+        As for `identify`: ``nominal``, ``controller`` and further ones.
 
     Returns
     -------
     Rows
-        In the order of `records`: `record`, `trusted`, `order`, modes, least fit, or `error`.
+        In the order of `records`: `record`, `trusted`, `order`, modes (Hz and damping ratio), or `error`.
+
+    Raises
+    ------
+    InputError
+        For arguments that no record could use. What is wrong with one record is in its row.
 
     Examples
     --------

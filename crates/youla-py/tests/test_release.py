@@ -1,0 +1,46 @@
+"""What a release is made of: licence texts, and archives whose names agree."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+import sys
+
+import pytest
+from conftest import ROOT
+
+CRATE = ROOT / "crates/youla-py"
+
+
+def test_every_crate_that_is_used_is_named_with_a_licence() -> None:
+    """faer, PyO3 and the embedded uPlot are there; crates that serve tests only are not."""
+    if shutil.which("cargo") is None:
+        pytest.skip("cargo is absent")
+    subprocess.run([sys.executable, str(CRATE / "licences.py")], check=True, capture_output=True)
+    text = (CRATE / "licenses/THIRD-PARTY.txt").read_text(encoding="utf-8")
+    for name in ("\nfaer 0.", "\npyo3 0.", "\nserde_json 1.", "embedded in reports: uplot", "embedded in reports: font"):
+        assert name in text, name
+    assert "SIL Open Font License" in text or "SIL OPEN FONT LICENSE" in text
+    command = ["cargo", "metadata", "--format-version", "1", "--locked", "--manifest-path", str(ROOT / "Cargo.toml")]
+    packages = json.loads(subprocess.run(command, check=True, capture_output=True, encoding="utf-8").stdout)["packages"]
+    named = [p for p in packages if f"\n{p['name']} {p['version']} (" in text]
+    assert 100 < len(named) < len(packages)
+    assert len(text.encode()) < 1_000_000, "a wheel has at most 15 MB"
+
+
+def test_binstall_takes_what_cargo_dist_makes() -> None:
+    tomllib = pytest.importorskip("tomllib")  # Python 3.11 and later
+    dist = tomllib.loads((ROOT / "dist-workspace.toml").read_text())["dist"]
+    package = tomllib.loads((ROOT / "crates/youla-cli/Cargo.toml").read_text())["package"]
+    binstall = package["metadata"]["binstall"]
+    formats = {".tar.gz": "tgz", ".zip": "zip"}
+    assert binstall["pkg-fmt"] == formats[dist["unix-archive"]]
+    windows = [target for target in dist["targets"] if "windows" in target]
+    assert set(binstall["overrides"]) == set(windows)
+    # Archives of cargo-dist have a folder, zip files have none.
+    assert binstall["bin-dir"].startswith("{ name }-{ target }/")
+    for target in windows:
+        override = binstall["overrides"][target]
+        assert (override["pkg-fmt"], override["bin-dir"]) == (formats[dist["windows-archive"]], "{ bin }{ binary-ext }")
+    assert "{ repo }/" in binstall["pkg-url"]

@@ -103,11 +103,11 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "no record": (lambda: ident([]), "record is an empty list"),
     "records differ": (lambda: ident([rec(), rec(TABLE, inputs=[0, 1], outputs=2, excitation=None)]), "record 2 has other inputs or outputs"),
     "one record twice": (lambda: ident(verify=rec()), "from which the models are identified"),
-    "unknown option": (lambda: ident(hanson={}), "identify has no argument 'hanson'; options are recommended"),
+    "unknown option": (lambda: ident(hanson={}), "identify has no argument 'hanson'; did you mean 'hansen'?"),
     "option is no mapping": (lambda: ident(hansen=8), "hansen is int, but must be a mapping"),
     "unknown key": (lambda: ident(hansen={"horizn": 20}), "horizon"),
     "value of a wrong type": (lambda: ident(hansen={"order": "many"}), "[hansen]"),
-    "option that is no number": (lambda: ident(hansen={"order": object()}), "an option is <object"),
+    "option that is no number": (lambda: ident(hansen={"order": object()}), "hansen.order is <object"),
     "run.toml with arguments": (lambda: youla.identify("run.toml", nominal=1.0), "a run.toml states everything"),
     # models and results
     "matrices do not fit": (lambda: youla.Model(np.eye(2), [[1.0]], [[1.0]], [[0.0]], dt=0.1), "b is 1 x 1, but must be 2 x 1"),

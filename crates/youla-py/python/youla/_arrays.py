@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+from numbers import Real
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from ._checks import kind
 from ._errors import InputError
 
 Array = npt.NDArray[np.float64]
+
+#: Kinds of arrays that hold no real numbers, and what to do.
+_KINDS = {
+    "O": ("Python objects", "convert with .astype(float) first"),
+    "U": ("text", "convert with .astype(float) first"),
+    "S": ("bytes", "convert with .astype(float) first"),
+    "c": ("complex numbers", "give .real, or real and imaginary part as two channels"),
+    "M": ("dates", "name the column with the time by time="),
+    "m": ("durations", "name the column with the time by time="),
+    "V": ("records with fields", "give a mapping: {name: array[name] for name in array.dtype.names}"),
+}
 
 
 def as_floats(values: Any, what: str) -> Array:
@@ -38,10 +52,13 @@ def as_floats(values: Any, what: str) -> Array:
         array = np.asarray(values)
     except ValueError as error:
         raise InputError(f"{what} is not an array: {error}; give rows of equal length") from None
+    except Exception as error:  # what `__array__` of another package raises
+        raise InputError(f"{what} is {kind(values)} that is no NumPy array: {error}") from None
+    if array.ndim == 0 and array.dtype.kind in "OSU":
+        raise InputError(f"{what} is {kind(values)}, but must be an array or a list of real numbers")
     if array.dtype.kind not in "fiub":
-        kinds = {"O": "Python objects", "U": "text", "S": "bytes", "c": "complex numbers", "M": "dates", "m": "durations"}
-        found = kinds.get(array.dtype.kind, str(array.dtype))
-        raise InputError(f"{what} holds {found}, but must hold real numbers; convert with .astype(float) first")
+        found, remedy = _KINDS.get(array.dtype.kind, (str(array.dtype), "convert with .astype(float) first"))
+        raise InputError(f"{what} holds {found}, but must hold real numbers; {remedy}")
     floats: Array = np.asarray(array, dtype=np.float64)
     return floats
 
@@ -55,18 +72,21 @@ def as_matrix(values: Any, what: str) -> Array:
 
 
 def positive(value: Any, what: str) -> float:
-    """Return a positive finite number."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise InputError(f"{what} is {value!r}, but must be a positive number") from None
+    """Return a positive finite number of seconds."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.item()
+    if isinstance(value, (bool, np.bool_)) or not isinstance(value, (Real, Decimal)):
+        raise InputError(f"{what} is {value!r}, but must be a positive number of seconds")
+    number = float(value)
     if not (number > 0 and np.isfinite(number)):
-        raise InputError(f"{what} is {number}, but must be a positive number")
+        raise InputError(f"{what} is {number}, but must be a positive number of seconds")
     return number
 
 
 def whole(value: Any, what: str, least: int) -> int:
-    """Return a whole number of at least `least`."""
+    """Return a whole number from `least` to 2^64 - 1."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{what} is {value!r}, but must be a whole number of at least {least}")
+    if value >= 2**64:
+        raise InputError(f"{what} is {value}, but must be below 2^64")
     return int(value)

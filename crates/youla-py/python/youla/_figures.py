@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from . import _plot
 from ._errors import InputError
 
@@ -108,10 +110,12 @@ class Plots:
             The time in seconds.
         """
         predictions = self._run.predictions
-        if not 0 <= record < len(predictions):
+        if isinstance(record, bool) or not isinstance(record, (int, np.integer)) or not 0 <= record < len(predictions):
             raise InputError(f"record is {record}, but the run has {len(predictions)} verification records; give verify=")
         found = predictions[record]
         if model not in found.predicted:
             raise InputError(f"model {model!r} predicts nothing on {found.record!r}; choose of {', '.join(found.predicted)}")
+        if not 0 <= output < found.measured.shape[1]:
+            raise InputError(f"output is {output}, but the record has {found.measured.shape[1]} outputs, counted from 0")
         dt = self._run.model("controller").dt
         return _plot.fit(found.measured[:, output], found.predicted[model][:, output], dt, found.record, ax)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, whole
+from ._checks import file_of, known, text
 from ._errors import InputError
 from ._model import FrequencyResponse
 from ._record import Record
@@ -25,6 +27,14 @@ OPTIONS = (
     "recommended", "factors", "hansen", "deviation", "direct", "reduction", "grey_box", "certificate", "redesign",
     "verification", "check", "frequency_response", "data",
 )  # fmt: skip
+
+
+#: Other arguments of the functions that take these keywords, for hints.
+_ARGUMENTS = {
+    "identify": ("nominal", "controller", "feedback", "hold", "verify", "name"),
+    "check": ("nominal", "controller", "feedback", "hold"),
+    "identify_many": ("nominal", "controller", "feedback", "hold", "name", "read", "executor", "folder", "progress"),
+}
 
 
 def identify(
@@ -93,7 +103,7 @@ def identify(
     if isinstance(record, (str, os.PathLike)):
         if nominal is not None or controller is not None or verify is not None or options:
             raise InputError("a run.toml states everything; leave the other arguments out, or give a youla.Record")
-        return Run(_native.identify_file(os.fspath(record)))
+        return Run(_native.identify_file(file_of(record, "record")))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
     return Run(_native.identify(json.dumps(settings), logs), (settings, logs))
 
@@ -116,11 +126,9 @@ def prepare(
     for k, other in enumerate([*estimation, *fresh]):
         if (other.inputs, other.outputs) != (first.inputs, first.outputs):
             raise InputError(f"record {k + 1} has other inputs or outputs than the first; give the same names in all")
-    for key, table in options.items():
-        if key not in OPTIONS:
-            raise InputError(f"identify has no argument {key!r}; options are {', '.join(OPTIONS)}")
-        if not isinstance(table, Mapping):
-            raise InputError(f"{key} is {type(table).__name__}, but must be a mapping as the table [{key}] of run.toml")
+        if abs(other.dt / first.dt - 1) > 1e-6:
+            raise InputError(f"record {k + 1} has the sample time {other.dt:g} s, the first has {first.dt:g} s; resample one of them")
+    check_options(options, "identify")
     m, p = len(first.inputs), len(first.outputs)
     tables = {key: dict(table) for key, table in options.items()}
     labels = _labels([*estimation, *fresh])
@@ -132,13 +140,31 @@ def prepare(
         **tables.pop("data", {}),
     }
     settings = {
-        "name": name or first.name,
+        "name": first.name if name is None else text(name, "name"),
         "data": data,
         "nominal": nominal_table(nominal, first.dt, (p, m)),
         "controller": controller_table(controller, feedback, hold, first.dt, (m, p)),
         **tables,
     }
-    return _plain(settings), [r._log() for r in [*estimation, *fresh]]
+    return _plain(settings), [_log_of(r) for r in [*estimation, *fresh]]
+
+
+def check_options(options: Mapping[str, Any], function: str) -> None:
+    """Refuse keywords that are no tables of run.toml."""
+    known(options, [*OPTIONS, *_ARGUMENTS[function]], function)
+    for key, table in options.items():
+        if not isinstance(table, Mapping):
+            raise InputError(f"{key} is {type(table).__name__}, but must be a mapping as the table [{key}] of run.toml")
+
+
+def _log_of(record: Record) -> Log:
+    """A record for the native module; values that would overflow in squares are refused."""
+    log = record._log()
+    columns = [log[3][:, column] for _, _, column in log[2]]
+    largest = max(max(column.max(), -column.min()) for column in columns)
+    if largest > 1e100 and np.isfinite(largest):
+        raise InputError(f"{record.name} holds the value {largest:.3g}, but values above 1e100 cannot be used; check its units")
+    return log
 
 
 def records_of(given: Records | None, what: str) -> list[Record]:
@@ -154,21 +180,22 @@ def _labels(records: list[Record]) -> list[str]:
     return [n if names.count(n) == 1 else f"{n}-{names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
 
-def _plain(value: Any) -> Any:
-    """Settings as JSON has them; what is None is absent."""
+def _plain(value: Any, where: str = "an option") -> Any:
+    """Settings as JSON has them; what is None is absent. `where` is the place of the value, for messages."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(v) for key, v in value.items() if v is not None}
+        inside = "" if where == "an option" else f"{where}."
+        return {str(key): _plain(v, f"{inside}{key}") for key, v in value.items() if v is not None}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
     if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.ndarray):
-        return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
+        return [_plain(v, where) for v in value]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
+    if isinstance(value, float) and not math.isfinite(value):
+        raise InputError(f"{where} is {value}, but must be finite; leave it out where it is not known")
     if isinstance(value, (str, bool, int, float)):
         return value
-    raise InputError(f"an option is {value!r}, but options are numbers, text, lists and mappings")
+    raise InputError(f"{where} is {value!r}, but options are numbers, text, lists and mappings")
 
 
 def options_json(options: Mapping[str, Any]) -> str:
@@ -202,7 +229,7 @@ def demo(machine: str = "levitation", *, seed: int = 1) -> Run:
     >>> [round(float(abs(p)), 2) for p in youla.demo().recommended.poles if abs(p) > 1]
     [1.04]
     """
-    return Run(_native.demo(machine, whole(seed, "seed", 0)))
+    return Run(_native.demo(text(machine, "machine"), whole(seed, "seed", 0)))
 
 
 def with_region(w: Array, values: Any, known: Any, name: str) -> FrequencyResponse:

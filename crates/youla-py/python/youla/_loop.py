@@ -5,20 +5,21 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from . import _native
-from ._arrays import Array
+from ._arrays import Array, as_floats, positive, whole
+from ._checks import kind, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
 from ._identify import _plain, options_json
 from ._model import Complex, Model, _signal
 from ._result import Run
-from ._systems import as_model, controller_table, nominal_table
+from ._systems import as_model, check_signs, controller_table, nominal_table
 
 
 @dataclass(frozen=True)
@@ -43,15 +44,10 @@ class Certificate:
         return self.stable
 
 
-def _sign(feedback: str) -> float:
-    if feedback not in ("negative", "positive"):
-        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
-    return -1.0 if feedback == "negative" else 1.0
-
-
 def _loop(plant: Any, controller: Any, feedback: str) -> tuple[Model, Model]:
     """Plant and controller of one sample time, the controller with positive feedback."""
-    sign = _sign(feedback)
+    check_signs(feedback)
+    sign = -1.0 if feedback == "negative" else 1.0
     g = as_model(plant, "plant")
     p, m = g.d.shape
     k = as_model(controller, "controller", g.dt)
@@ -141,11 +137,14 @@ def simulate_loop(
     p, m = g.d.shape
     given = {"excitation": (excitation, m), "reference": (reference, p), "noise": (noise, p)}
     signals = {key: _signal(x, key, n) for key, (x, n) in given.items() if x is not None}
-    lengths = {key: len(x) for key, x in signals.items()} | ({} if samples is None else {"samples": samples})
+    lengths = {key: len(x) for key, x in signals.items()} | ({} if samples is None else {"samples": whole(samples, "samples", 1)})
     if len(set(lengths.values())) != 1:
         raise InputError(f"the length of the simulation is {lengths or 'not given'}; give signals of one length, or samples=")
     count = next(iter(lengths.values()))
-    three = [signals.get(key, np.zeros((count, n))) for key, (_, n) in given.items()]
+    try:
+        three = [signals.get(key, np.zeros((count, n))) for key, (_, n) in given.items()]
+    except (MemoryError, ValueError):
+        raise InputError(f"samples is {count}, which memory does not hold; simulate parts of it") from None
     return _native.simulate_loop(g._native(), k._native(), three)
 
 
@@ -189,8 +188,8 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
     """
     g = as_model(system, "system")
     if isinstance(options.get("order"), int):
-        options["order"] = {"fixed": options["order"]}
-    scale = None if output_scale is None else [float(x) for x in output_scale]
+        options["order"] = {"fixed": whole(options["order"], "order", 0)}
+    scale = None if output_scale is None else np.ravel(as_floats(output_scale, "output_scale")).tolist()
     found, hankel, bound = _native.reduce(g._native(), options_json(options), scale)
     a, b, c, d, dt = found
     model = Model(a, b, c, d, dt=dt, inputs=g.inputs, outputs=g.outputs, name=f"{g.name}, reduced")
@@ -301,8 +300,10 @@ def excite(
     """
     if (seconds is None) == (samples is None):
         raise InputError("the length is given twice or not at all; give either seconds= or samples=")
-    if dt is None:
-        dt = as_model(nominal, "nominal").dt
+    dt = as_model(nominal, "nominal").dt if dt is None else positive(dt, "dt")
+    edges = np.ravel(as_floats(band, "band"))
+    if edges.size != 2:
+        raise InputError(f"band has {edges.size} entries, but must be the lowest and the highest frequency in Hz")
     m, p = _ports(nominal)
     data = {
         "sample_time": dt,
@@ -317,11 +318,14 @@ def excite(
         "nominal": nominal_table(nominal, dt, (p, m)),
         "controller": controller_table(controller, feedback, hold, dt, (m, p)),
     }
-    length = {"seconds": float(seconds)} if seconds is not None else {"samples": samples}
-    chosen = {"amplitude": np.ravel(amplitude).tolist(), "band": list(band), "length": length, **options}
+    length: dict[str, float] = {"samples": whole(samples, "samples", 2)} if seconds is None else {"seconds": positive(seconds, "seconds")}
+    amplitudes = np.ravel(as_floats(amplitude, "amplitude")).tolist()
+    chosen = {"amplitude": amplitudes, "band": edges.tolist(), "length": length, **options}
     for key in ("limit_input", "limit_output", "noise"):
         if key in chosen:
-            chosen[key] = np.ravel(chosen[key]).tolist()
+            chosen[key] = np.ravel(as_floats(chosen[key], key)).tolist()
+    if "seed" in chosen:
+        whole(chosen["seed"], "seed", 0)
     signal, time, promised = _native.excite(json.dumps(_plain(settings)), options_json(chosen), "input")
     return Excitation(signal, time, json.loads(promised))
 
@@ -376,12 +380,15 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     >>> len(found.runs), len(found.distances)
     (2, 1)
     """
+    if isinstance(runs, (str, os.PathLike, Run)) or not isinstance(runs, Iterable):
+        raise InputError(f"runs is {kind(runs)}, but must be a list of at least two youla.Run or run folders")
+    runs = list(runs)
     with tempfile.TemporaryDirectory() as folder:
         paths = [
-            run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else os.fspath(run)
+            run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
             for k, run in enumerate(runs)
         ]
         # Run folders name the recommended model by its file.
         model = "recommended" if model == RECOMMENDED else model
-        found = json.loads(_native.compare(paths, model, None if page is None else os.fspath(page)))
+        found = json.loads(_native.compare(paths, text(model, "model"), None if page is None else path_of(page, "page")))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._arrays import Array, as_floats, as_matrix, positive
+from ._checks import text, write_file
 from ._errors import InputError
 from ._optional import need
 from ._types import Matrices
@@ -158,23 +159,22 @@ class Model:
     ) -> None:
         d = as_matrix(d, "d")
         p, m = d.shape
+        if d.size == 0:
+            raise InputError("d is empty, but states the numbers of outputs and inputs; give zeros((p, m)) where nothing feeds through")
         a, b, c = (as_matrix(x, what) for x, what in ((a, "a"), (b, "b"), (c, "c")))
         if a.size == 0:
             a, b, c = np.zeros((0, 0)), np.zeros((0, m)), np.zeros((p, 0))
         n = a.shape[0]
-        for what, matrix, shape in (("a", a, (n, n)), ("b", b, (n, m)), ("c", c, (p, n))):
+        for what, matrix, shape in (("a", a, (n, n)), ("b", b, (n, m)), ("c", c, (p, n)), ("d", d, (p, m))):
             if matrix.shape != shape:
                 found = " x ".join(map(str, matrix.shape))
                 raise InputError(f"{what} is {found}, but must be {shape[0]} x {shape[1]} (d is {p} x {m})")
             if not np.isfinite(matrix).all():
                 raise InputError(f"{what} has an entry that is not finite")
         self._matrices = tuple(_frozen(x) for x in (a, b, c, d))
-        self._dt, self.name = positive(dt, "dt"), name
-        self.inputs = tuple(inputs or _numbered("u", m))
-        self.outputs = tuple(outputs or _numbered("y", p))
-        for what, names, count in (("inputs", self.inputs, m), ("outputs", self.outputs, p)):
-            if len(names) != count:
-                raise InputError(f"{what} has {len(names)} names, but d has {count}")
+        self._dt, self.name = positive(dt, "dt"), text(name, "name")
+        self.inputs = _names(inputs, "inputs", "u", m)
+        self.outputs = _names(outputs, "outputs", "y", p)
 
     @property
     def a(self) -> Array:
@@ -275,8 +275,7 @@ class Model:
             File; one of that name is replaced.
         """
         matrices = dict(zip("abcd", (m.tolist() for m in self._matrices), strict=True))
-        with open(path, "w", encoding="utf-8") as file:
-            json.dump({"name": self.name, "ts": self._dt, **matrices, "provenance": None}, file)
+        write_file(path, "path", json.dumps({"name": self.name, "ts": self._dt, **matrices, "provenance": None}))
 
     def __repr__(self) -> str:
         p, m = self.d.shape
@@ -299,6 +298,18 @@ def _frozen(x: Array) -> Array:
     copy = np.array(x, dtype=np.float64, order="C")
     copy.flags.writeable = False
     return copy
+
+
+def _names(given: Any, what: str, letter: str, count: int) -> tuple[str, ...]:
+    """Names of channels; numbered where none are given."""
+    if given is None:
+        return tuple(_numbered(letter, count))
+    names = (given,) if isinstance(given, str) else tuple(given) if isinstance(given, Iterable) else (given,)
+    if not all(isinstance(name, str) for name in names):
+        raise InputError(f"{what} is {given!r}, but must be a list of names")
+    if len(names) != count:
+        raise InputError(f"{what} has {len(names)} names, but d has {count}")
+    return names
 
 
 def _numbered(letter: str, count: int) -> list[str]:

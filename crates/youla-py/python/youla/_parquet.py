@@ -7,6 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
+from ._checks import folder_of, path_of
 from ._errors import InputError
 from ._optional import need
 
@@ -34,7 +35,7 @@ _TYPES = {
 def write(rows: Sequence[Row], folder: str | os.PathLike[str], replace: bool) -> str:
     """Write the rows into a folder and return its path."""
     pa, parquet = need("pyarrow"), need("pyarrow.parquet")
-    path = os.path.abspath(folder)
+    path = os.path.abspath(path_of(folder, "folder"))
     file = os.path.join(path, "part-0.parquet")
     if os.path.exists(path) and not os.path.isdir(path):
         raise InputError(f"folder {path} is a file; give the folder of the data set")
@@ -45,7 +46,7 @@ def write(rows: Sequence[Row], folder: str | os.PathLike[str], replace: bool) ->
     found = [_columns(row) for row in rows]
     names = list(dict.fromkeys([*(n for row in found for n in row if n != "error"), "error"]))
     table = pa.table({name: _array(pa, name, [row.get(name) for row in found]) for name in names})
-    os.makedirs(path, exist_ok=True)
+    folder_of(path, "folder")
     # Readers of a data set pass over names that start with a dot.
     part = os.path.join(path, ".part-0")
     parquet.write_table(table, part)

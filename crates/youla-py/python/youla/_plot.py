@@ -16,8 +16,17 @@ from ._optional import need
 def _channels(response: FrequencyResponse, output: int, input: int) -> None:
     _, p, m = response.values.shape
     for what, value, count in (("output", output, p), ("input", input, m)):
-        if not 0 <= value < count:
+        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= value < count:
             raise InputError(f"{what} is {value}, but the model has {count} {what}s, counted from 0")
+
+
+def _axes(ax: Any) -> Any:
+    """Axes of the caller, or new ones."""
+    if ax is None:
+        return need("matplotlib.pyplot").subplots(layout="constrained")[1]
+    if not hasattr(ax, "plot"):
+        raise InputError(f"ax is {ax!r}, but must be matplotlib axes, as plt.subplots() returns")
+    return ax
 
 
 def bode(
@@ -34,7 +43,7 @@ def bode(
         _, ax = need("matplotlib.pyplot").subplots(2, 1, sharex=True, layout="constrained")
     if np.size(ax) != 2:
         raise InputError("ax must be a pair of axes, for magnitude and phase, as plt.subplots(2, 1) returns")
-    upper, lower = np.ravel(ax)
+    upper, lower = (_axes(one) for one in np.ravel(ax))
     all_of: list[tuple[FrequencyResponse, dict[str, Any]]] = [(r, {}) for r in responses]
     if measured is not None:
         all_of.append((measured, {"color": "0.6", "linewidth": 0.8, "zorder": 1}))
@@ -71,8 +80,7 @@ def _but(style: dict[str, Any]) -> dict[str, Any]:
 
 def nyquist(response: FrequencyResponse, ax: Any = None, *, output: int = 0, input: int = 0) -> Any:
     """Draw the response in the complex plane with its ellipses; returns the axes."""
-    pyplot = need("matplotlib.pyplot")
-    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    ax = _axes(ax)
     _channels(response, output, input)
     values = response.values[:, output, input]
     (line,) = ax.plot(values.real, values.imag, label=response.name)
@@ -94,8 +102,7 @@ def nyquist(response: FrequencyResponse, ax: Any = None, *, output: int = 0, inp
 
 def poles(models: Sequence[Model], ax: Any = None) -> Any:
     """Draw poles in the z plane with the unit circle; returns the axes."""
-    pyplot = need("matplotlib.pyplot")
-    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    ax = _axes(ax)
     circle = np.exp(2j * np.pi * np.linspace(0, 1, 361))
     ax.plot(circle.real, circle.imag, color="0.7", linewidth=0.8)
     for model in models:
@@ -109,8 +116,7 @@ def poles(models: Sequence[Model], ax: Any = None) -> Any:
 
 def fit(measured: Array, predicted: Array, dt: float, record: str, ax: Any = None) -> Any:
     """Draw measured and predicted output over time; returns the axes."""
-    pyplot = need("matplotlib.pyplot")
-    ax = pyplot.subplots(layout="constrained")[1] if ax is None else ax
+    ax = _axes(ax)
     t = np.arange(len(measured)) * dt
     ax.plot(t, measured, label=f"measured, {record}", linewidth=0.8)
     ax.plot(t, predicted, label="predicted", linewidth=0.8)

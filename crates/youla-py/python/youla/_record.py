@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ._arrays import Array, positive
+from ._checks import share as between
+from ._checks import table, text
 from ._errors import InputError
 from ._optional import need
 from ._sources import Source, source_of
@@ -85,13 +87,19 @@ class Record:
         name: str = "record",
         units: Mapping[str, str] | None = None,
     ) -> None:
-        if not isinstance(name, str) or not name:
-            raise InputError(f"name is {name!r}, but must be a name that a report can show")
+        if isinstance(data, Record):
+            raise InputError("data is already a youla.Record; use it as it is, or cut it by record[first:last]")
+        if isinstance(time, (bool, np.bool_)) or not isinstance(time, (str, int, np.integer, type(None))):
+            raise InputError(f"time is {time!r}, but must be the name or number of a column, or 'index'")
+        labels = {} if units is None else table(units, "units", "{'u': 'V'}")
+        for channel, unit in labels.items():
+            if not isinstance(unit, str):
+                raise InputError(f"units[{channel!r}] is {unit!r}, but must be a text such as 'V'")
         dt = None if dt is None else positive(dt, "dt")
         asked = dict(zip([g[0] for g in _GROUPS], (inputs, outputs, excitation, reference, alpha), strict=True))
         chosen = {group: _listed(names, group) for group, names in asked.items()}
         source = source_of(data, chosen, time, dt)
-        self._set(source, chosen, name, dict(units or {}))
+        self._set(source, chosen, text(name, "name"), labels)
 
     def _set(self, source: Source, chosen: dict[str, list[str | int]], name: str, units: dict[str, str]) -> None:
         self._name, self._data, self._dt = name, source.data, source.dt
@@ -106,6 +114,11 @@ class Record:
         for group in ("inputs", "outputs"):
             if not self._groups[group]:
                 raise InputError(f"{group} is missing: name at least one channel, for example {group}=[0] or {group}=['u']")
+        columns = [c for group in ("inputs", "outputs") for _, _, c in self._groups[group]]
+        twice = next((c for c in columns if columns.count(c) > 1), None)
+        if twice is not None:
+            where = source.names[twice] or f"column {twice}"
+            raise InputError(f"{where} is chosen twice as input or output; choose each channel once")
         if units:
             raise InputError(f"units names {sorted(units)}, which are no channels; channels are {sorted(self._labels())}")
         if len(self) < 2:
@@ -187,6 +200,8 @@ class Record:
         """Return consecutive rows as a record of the same name, without a copy."""
         if not isinstance(rows, slice) or rows.step not in (None, 1):
             raise InputError("a record is cut by record[first:last] with step 1; resample the data before")
+        if not all(x is None or isinstance(x, (int, np.integer)) for x in (rows.start, rows.stop)):
+            raise InputError(f"a record is cut by numbers of samples, not by {rows.start!r}:{rows.stop!r}; divide seconds by dt")
         return self._with(self._data[rows], self._name)
 
     def _with(self, data: Array, name: str) -> Record:
@@ -209,7 +224,7 @@ class Record:
         Record
             The same channels and samples, without a copy.
         """
-        return self._with(self._data, name)
+        return self._with(self._data, text(name, "name"))
 
     def split(self, share: float = 0.7) -> tuple[Record, Record]:
         """Cut into a part to identify from and a part to verify on.
@@ -224,9 +239,7 @@ class Record:
         tuple of Record
             Named ``<name>-estimation`` and ``<name>-verification``.
         """
-        if not 0 < share < 1:
-            raise InputError(f"share is {share}, but must be between 0 and 1")
-        at = round(share * len(self))
+        at = round(between(share, "share") * len(self))
         first, second = self._data[:at], self._data[at:]
         return self._with(first, f"{self._name}-estimation"), self._with(second, f"{self._name}-verification")
 
@@ -253,7 +266,12 @@ class Record:
 def _listed(names: Names, group: str) -> list[str | int]:
     if names is None:
         return []
-    listed = [names] if isinstance(names, (str, int, np.integer)) else list(names)
+    if isinstance(names, (str, int, np.integer)):
+        listed = [names]
+    elif isinstance(names, Iterable) and not isinstance(names, Mapping):
+        listed = list(names)
+    else:
+        raise InputError(f"{group} is {names!r}; channels are chosen by name or column number, or a list of them")
     for place in listed:
         if isinstance(place, bool) or not isinstance(place, (str, int, np.integer)):
             raise InputError(f"{group} has {place!r}; channels are chosen by name or column number")

@@ -12,6 +12,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array
+from ._checks import path_of, text, write_file
 from ._errors import InputError, NumericalError
 from ._figures import RECOMMENDED, Plots
 from ._model import FrequencyResponse, Mode, Model, frequencies
@@ -136,7 +137,7 @@ class Run:
         NumericalError
             For a model that was asked for and is impossible, with the reason.
         """
-        found = self._native.model(name)
+        found = self._native.model(text(name, "name"))
         if found is None:
             key = "recommended" if name == RECOMMENDED else name
             if key in self.summary["refused"]:
@@ -285,8 +286,7 @@ class Run:
         path : path
             HTML file that needs nothing else; a file of that name is replaced.
         """
-        with open(path, "w", encoding="utf-8") as file:
-            file.write(self._native.html())
+        write_file(path, "path", self._native.html())
 
     def save(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
         """Write the run folder that ``youla identify`` writes.
@@ -308,7 +308,10 @@ class Run:
         InputError
             Where `folder` exists, unless `replace` is true and it holds a run.
         """
-        return self._native.write(os.fspath(folder), replace)
+        place = path_of(folder, "folder")
+        if os.path.isfile(place):
+            raise InputError(f"folder is the file {place}; give a folder that is not there yet")
+        return self._native.write(place, replace)
 
     @property
     def plot(self) -> Plots:

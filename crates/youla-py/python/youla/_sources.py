@@ -12,6 +12,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, as_floats
+from ._checks import kind
 from ._errors import InputError
 
 
@@ -75,8 +76,12 @@ def _clock(times: Any, dt: float | None, what: str) -> float:
 
 def _of_array(data: Any, time: str | int | None, dt: float | None) -> Source:
     array = as_floats(data, "data")
+    if array.ndim == 0:
+        raise InputError(f"data is {kind(data)}, but must be samples x channels, a mapping, a data frame or the path of a file")
     if array.ndim != 2:
         raise InputError(f"data has {array.ndim} dimensions, but must be samples x channels; use numpy.column_stack")
+    if array.shape[0] == 0:
+        raise InputError("data has no samples, but a record needs at least 2")
     if array.shape[0] < array.shape[1]:
         shape = f"{array.shape[0]} x {array.shape[1]}"
         raise InputError(f"data is {shape}, but must be samples x channels with more samples than channels; give data.T")
@@ -121,6 +126,10 @@ def _needed(known: list[Any], chosen: dict[str, list[str | int]], time: str | in
 
 
 def _of_pandas(data: Any, chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None) -> Source:
+    if data.columns.nlevels > 1:
+        raise InputError("data has columns of several levels; name them by one: data.columns = data.columns.map('_'.join)")
+    if not any(isinstance(name, str) for name in data.columns):
+        raise InputError("data has columns without a text as name; give data.to_numpy() to choose by number, or name them")
     if data.columns.has_duplicates:
         raise InputError(f"data has two columns of one name: {list(data.columns[data.columns.duplicated()])}; rename one")
     times = None
@@ -139,6 +148,8 @@ def _index_seconds(index: Any) -> Any:
         return (index - index[0]).total_seconds().to_numpy()
     if isinstance(index, pd.TimedeltaIndex):
         return index.total_seconds().to_numpy()
+    if index.nlevels > 1 or index.dtype.kind not in "fiu":
+        raise InputError(f"the index of data is a {type(index).__name__}, but must hold seconds as numbers, dates or durations")
     return index.to_numpy()
 
 
@@ -172,6 +183,8 @@ def _of_file(
         raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
     if not channels:
         raise InputError("inputs and outputs are missing: name the channels of the file")
+    if os.path.isdir(path):
+        raise InputError(f"data is the folder {os.fspath(path)}, but a record is one file; give youla.identify_many its files")
     data, found, _ = _native.read_log(os.fspath(path), channels, clock, dt)
     source = _File(data, found, ["" if isinstance(p, int) else p for p in places], [""] * len(places))
     source.places.extend(places)

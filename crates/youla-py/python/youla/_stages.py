@@ -11,8 +11,9 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array
+from ._checks import table
 from ._errors import InputError
-from ._identify import Records, identify, options_json, prepare, records_of, with_region
+from ._identify import Records, check_options, identify, options_json, prepare, records_of, with_region
 from ._model import FrequencyResponse, Mode, Model, frequencies
 from ._optional import need
 from ._record import Record
@@ -94,6 +95,7 @@ def check(
     0
     """
     first = _first(record)
+    check_options(options, "check")
     known = controller is not None
     if known and nominal is None:
         nominal = np.zeros((len(first.outputs), len(first.inputs)))
@@ -236,4 +238,6 @@ def greybox(record: Records, *, structure: Mapping[str, Any], grey_box: Mapping[
     >>> round(float(run.model("grey_box").a[0, 0]), 2)
     0.95
     """
-    return identify(record, grey_box={**(grey_box or {}), "structure": dict(structure)}, **arguments)
+    declared = table(structure, "structure", "{'template': 'mass-spring-damper'}")
+    others = {} if grey_box is None else table(grey_box, "grey_box", "{'noise': 'innovation'}")
+    return identify(record, grey_box={**others, "structure": declared}, **arguments)

@@ -7,6 +7,7 @@ import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from inspect import signature
 from itertools import product
 from typing import Any
 
@@ -14,11 +15,13 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, whole
+from ._checks import known, share, table
 from ._errors import Error, InputError, NumericalError
-from ._identify import Records, prepare
+from ._identify import OPTIONS, Records, check_options, options_json, prepare
 from ._model import Model
 from ._record import Record
 from ._result import Run
+from ._systems import check_signs
 from ._tasks import Progress, Row, Rows, key_of, run_tasks
 from ._types import Log
 
@@ -73,8 +76,7 @@ class Bootstrap(Rows):
         NumericalError
             Where every replicate failed.
         """
-        if not 0 < level < 1:
-            raise InputError(f"level is {level}, but must be between 0 and 1")
+        level = share(level, "level")
         found = self.modes()
         if len(found) == 0:
             raise NumericalError("every replicate failed; see .failed for the reasons")
@@ -209,8 +211,11 @@ def scan(
     if not isinstance(grid, Mapping) or not grid:
         raise InputError("grid must map keys such as 'hansen.order' to lists of values")
     for key, values in grid.items():
-        if key.count(".") != 1 or isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)):
+        if not isinstance(key, str) or key.count(".") != 1 or isinstance(values, str) or not isinstance(values, (Sequence, np.ndarray)):
             raise InputError(f"grid[{key!r}] must be a list of values of a key 'table.key' of run.toml, such as 'hansen.order'")
+        if len(values) == 0:
+            raise InputError(f"grid[{key!r}] is empty; give at least one value")
+        known([key.partition(".")[0]], OPTIONS, "the grid of scan")
     verify = arguments.pop("verify", None)
     settings, logs = _prepared(record, verify, arguments)
     points = [dict(zip(grid, values, strict=True)) for values in product(*(list(v) for v in grid.values()))]
@@ -226,7 +231,7 @@ def _with(settings: str, point: Mapping[str, Any]) -> str:
     for key, value in point.items():
         table, name = key.split(".")
         found.setdefault(table, {})[name] = value.item() if isinstance(value, np.generic) else value
-    return json.dumps(found)
+    return options_json(found)
 
 
 def _point(payload: Payload, item: Mapping[str, Any], index: int) -> Row:
@@ -278,7 +283,12 @@ def identify_many(
     >>> len(rows.succeeded), rows.failed[0]["error"]
     (1, 'absent.csv: no such file')
     """
-    payload = {"read": dict(read or {}), "arguments": arguments}
+    chosen = {} if read is None else table(read, "read", "{'inputs': 'u', 'outputs': 'y', 'dt': 0.01}")
+    known(chosen, list(signature(Record).parameters)[1:], "Record, to which read goes,")
+    others = {key: value for key, value in arguments.items() if key not in ("nominal", "controller", "feedback", "hold", "name")}
+    check_options(others, "identify_many")
+    check_signs(arguments.get("feedback", "negative"), arguments.get("hold"))
+    payload = {"read": chosen, "arguments": arguments}
     key = key_of(payload["read"], arguments)
     return run_tasks(_machine, payload, records, key=key, executor=executor, folder=folder, progress=progress)
 
@@ -288,7 +298,9 @@ def _machine(payload: Payload, item: Any, index: int) -> Row:
         record = item if isinstance(item, Record) else Record(item, **payload["read"])
         return _prepared(record, None, payload["arguments"])
 
-    return _identified({"record": item.name if isinstance(item, Record) else str(item)}, prepared)
+    path = isinstance(item, (str, os.PathLike))
+    name = item.name if isinstance(item, Record) else str(item) if path else f"record {index}"
+    return _identified({"record": name}, prepared)
 
 
 def _identified(labels: Row, prepared: Callable[[], tuple[str, list[Log]]]) -> Row:

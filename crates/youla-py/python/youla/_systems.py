@@ -9,8 +9,10 @@ from typing import Any
 import numpy as np
 
 from ._arrays import as_matrix
+from ._checks import file_of, kind
 from ._errors import InputError
 from ._model import Model
+from ._optional import need
 from ._sources import _is
 
 Table = dict[str, Any]
@@ -25,23 +27,20 @@ def nominal_table(nominal: Any, dt: float, ports: tuple[int, int]) -> Table:
     if isinstance(nominal, Mapping):
         return _named(nominal, NOMINALS, "nominal")
     if isinstance(nominal, (str, os.PathLike)):
-        return {"model_file": {"file": os.path.abspath(nominal)}}
+        return {"model_file": {"file": os.path.abspath(file_of(nominal, "nominal"))}}
     form, table = _system(nominal, dt, ports, "nominal")
     return {form: table}
 
 
 def controller_table(controller: Any, feedback: str, hold: str | None, dt: float, ports: tuple[int, int]) -> Table:
     """Return [controller]; `ports` are the numbers of inputs and outputs of the plant."""
-    if feedback not in ("negative", "positive"):
-        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
-    if hold not in (None, "zoh", "tustin"):
-        raise InputError(f"hold is {hold!r}, but must be 'zoh' or 'tustin'")
+    check_signs(feedback, hold)
     if isinstance(controller, Mapping):
         found = _named(controller, CONTROLLERS, "controller")
         ((form, table),) = found.items()
         return {form: {"feedback": feedback, **table}}
     if isinstance(controller, (str, os.PathLike)):
-        return {"model_file": {"feedback": feedback, "file": os.path.abspath(controller)}}
+        return {"model_file": {"feedback": feedback, "file": os.path.abspath(file_of(controller, "controller"))}}
     form, table = _system(controller, dt, ports, "controller")
     if table["domain"] == "continuous":
         if hold is None:
@@ -52,29 +51,56 @@ def controller_table(controller: Any, feedback: str, hold: str | None, dt: float
     return {form: {"feedback": feedback, **table}}
 
 
+def check_signs(feedback: str, hold: str | None = None) -> None:
+    """Refuse another sign or hold."""
+    if feedback not in ("negative", "positive"):
+        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
+    if hold not in (None, "zoh", "tustin"):
+        raise InputError(f"hold is {hold!r}, but must be 'zoh' or 'tustin'")
+
+
 def as_model(system: Any, what: str, dt: float | None = None) -> Model:
     """Return a discrete-time model of a Model, a python-control or SciPy system in discrete time, or a gain."""
     if isinstance(system, Model):
         return system
+    if _is(system, "scipy.signal", "lti"):
+        raise InputError(f"{what} states no sample time, being in continuous time; discretise it first by to_discrete(dt)")
+    known = _is(system, "control", "LTI") or _is(system, "scipy.signal", "dlti")
+    gain = None if known else _numbers(system, what)
     if dt is None:
         dt = getattr(system, "dt", None)
         if dt is None or isinstance(dt, bool) or dt <= 0:
             raise InputError(f"{what} states no sample time; give a youla.Model or a discrete-time system with dt")
-    if _is(system, "control", "LTI"):
-        import control
-
-        system = control.ss(system)
-    elif _is(system, "scipy.signal", "dlti"):
-        system = system.to_ss()
-    elif _is(system, "scipy.signal", "lti"):
-        raise InputError(f"{what} is in continuous time; discretise it first, for example with to_discrete(dt)")
-    else:
-        gain = as_matrix(system, what)
+    if gain is not None:
         return Model([], [], [], gain, dt=float(dt))
-    _check_time(_domain(system, what), system, float(dt), what)
+    system = _state_space(system, what)
+    _check_time(_domain(system, what), system, float(dt), what, "plant")
     if _domain(system, what) == "continuous":
         raise InputError(f"{what} is in continuous time; discretise it first, for example with control.c2d(system, dt)")
     return Model(system.A, system.B, system.C, system.D, dt=float(dt))
+
+
+def _state_space(system: Any, what: str) -> Any:
+    """A system of python-control or SciPy in state space."""
+    try:
+        return need("control").ss(system) if _is(system, "control", "LTI") else system.to_ss()
+    except (TypeError, ValueError, NotImplementedError) as error:
+        raise InputError(f"{what} is {kind(system)} without a state-space form ({error}); give a proper model") from None
+
+
+def _numbers(system: Any, what: str) -> Any:
+    """A gain as a matrix, or what can be a system."""
+    if system is None:
+        raise InputError(f"{what} is missing" + ("; give 0 where no controller ran" if what == "controller" else ""))
+    try:
+        gain = as_matrix(system, what)
+    except InputError:
+        remedy = "; of a youla.Run give run.recommended or run.model('controller')" if hasattr(system, "recommended") else ""
+        kinds = "a youla.Model, a python-control or SciPy system, a number, a matrix, a mapping as in run.toml, or a file"
+        raise InputError(f"{what} is a {type(system).__name__}, but must be {kinds}{remedy}") from None
+    if not np.isfinite(gain).all():
+        raise InputError(f"{what} has an entry that is not finite")
+    return gain
 
 
 def _named(table: Mapping[str, Any], forms: tuple[str, ...], what: str) -> Table:
@@ -90,6 +116,7 @@ def _system(system: Any, dt: float, ports: tuple[int, int], what: str) -> tuple[
     """A system as a table with its domain; the form is that in which it is given."""
     if isinstance(system, Model):
         _check_time("discrete", system, dt, what)
+        _check_ports(np.shape(system.d), ports, what)
         return "state_space", _matrices(system.a, system.b, system.c, system.d, "discrete")
     known = _is(system, "control", "LTI") or _is(system, "scipy.signal", "lti") or _is(system, "scipy.signal", "dlti")
     if not known:
@@ -97,6 +124,9 @@ def _system(system: Any, dt: float, ports: tuple[int, int], what: str) -> tuple[
     domain = _domain(system, what)
     _check_time(domain, system, dt, what)
     if hasattr(system, "A"):
+        _check_ports(np.shape(system.D), ports, what)
+        if not all(np.isfinite(x).all() for x in (system.A, system.B, system.C, system.D)):
+            raise InputError(f"{what} has an entry that is not finite")
         return "state_space", _matrices(system.A, system.B, system.C, system.D, domain)
     if hasattr(system, "zeros") and hasattr(system, "gain"):
         system = system.to_tf()
@@ -105,6 +135,7 @@ def _system(system: Any, dt: float, ports: tuple[int, int], what: str) -> tuple[
     numerator, denominator = system.num, system.den
     if _is(system, "control", "LTI"):
         numerator, denominator = ([[np.asarray(x).tolist() for x in row] for row in y] for y in (numerator, denominator))
+        _check_ports((len(numerator), len(numerator[0])), ports, what)
         single = len(numerator) == len(numerator[0]) == 1
         if single:
             numerator, denominator = numerator[0][0], denominator[0][0]
@@ -124,12 +155,20 @@ def _domain(system: Any, what: str) -> str:
     return "discrete"
 
 
-def _check_time(domain: str, system: Any, dt: float, what: str) -> None:
+def _check_ports(shape: tuple[int, ...], ports: tuple[int, int], what: str) -> None:
+    """Numbers of outputs and inputs."""
+    if tuple(shape) != ports:
+        whose = "takes the outputs of the plant and gives its inputs" if what == "controller" else "takes u and gives y"
+        found = f"{shape[0]} outputs and {shape[1]} inputs" if len(shape) == 2 else f"the shape {shape}"
+        raise InputError(f"{what} has {found}, but must have {ports[0]} and {ports[1]}: it {whose}")
+
+
+def _check_time(domain: str, system: Any, dt: float, what: str, other: str = "record") -> None:
     own = getattr(system, "dt", None)
     if domain == "continuous" or own is None or isinstance(own, bool):
         return
     if abs(own / dt - 1.0) > 1e-6:
-        raise InputError(f"{what} has the sample time {own:g} s, but the record has {dt:g} s; resample one of them")
+        raise InputError(f"{what} has the sample time {own:g} s, but the {other} has {dt:g} s; resample one of them")
 
 
 def _matrices(a: Any, b: Any, c: Any, d: Any, domain: str) -> Table:
@@ -140,13 +179,7 @@ def _matrices(a: Any, b: Any, c: Any, d: Any, domain: str) -> Table:
 
 
 def _gain(system: Any, ports: tuple[int, int], what: str) -> Table:
-    if system is None:
-        raise InputError(f"{what} is missing" + ("; give 0 where no controller ran" if what == "controller" else ""))
-    try:
-        gain = as_matrix(system, what)
-    except InputError:
-        kinds = "a youla.Model, a python-control or SciPy system, a number, a matrix, a mapping as in run.toml, or a file"
-        raise InputError(f"{what} is a {type(system).__name__}, but must be {kinds}") from None
+    gain = _numbers(system, what)
     if gain.shape == (1, 1):
         gain = np.full(ports, gain[0, 0]) if ports == (1, 1) or gain[0, 0] == 0 else gain
     if gain.shape != ports:

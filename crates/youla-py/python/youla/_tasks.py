@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from ._checks import callback, folder_of, kind
 from ._errors import Error, InputError
 from ._optional import need
 from ._parquet import write
@@ -121,8 +122,10 @@ def run_tasks(
     progress: Progress | None,
 ) -> Rows:
     """Compute the rows of all items; `key` names the payload in the folder."""
-    if executor is not None and not hasattr(executor, "submit"):
-        raise InputError(f"executor is {type(executor).__name__}, but must be a concurrent.futures.Executor, or None")
+    _check_executor(executor)
+    callback(progress, "progress")
+    if isinstance(items, (str, bytes, os.PathLike, Mapping, Record)) or not isinstance(items, Iterable):
+        raise InputError(f"records is {kind(items)}, but must be a list of them or of paths")
     kept = None if folder is None else _prepared(folder, key)
     rows: dict[int, Row] = {}
     missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, item, rows))
@@ -135,6 +138,16 @@ def run_tasks(
     else:
         computed = _submit(executor, task, payload, missing, kept, rows, progress)
     return Rows(tuple(rows[k] for k in sorted(rows)), computed)
+
+
+def _check_executor(executor: Any) -> None:
+    if executor is None:
+        return
+    if hasattr(executor, "get_executor"):
+        raise InputError("executor is a Dask client; give client.get_executor()")
+    if isinstance(executor, type) or not hasattr(executor, "submit"):
+        name = executor.__name__ if isinstance(executor, type) else type(executor).__name__
+        raise InputError(f"executor is {name}, but must be a concurrent.futures.Executor, or None")
 
 
 def _submit(
@@ -150,7 +163,10 @@ def _submit(
     try:
         while True:
             for k, item in islice(missing, _WINDOW - len(running)):
-                running[executor.submit(call, task, payload, item, k, kept)] = k
+                try:
+                    running[executor.submit(call, task, payload, item, k, kept)] = k
+                except RuntimeError as error:
+                    raise InputError(f"executor takes no tasks ({error}); give one that is open and whose workers live") from None
             if not running:
                 return computed
             done, _ = wait(running, return_when=FIRST_COMPLETED)
@@ -189,7 +205,7 @@ def _known(folder: str | None, index: int, item: Any, rows: dict[int, Row]) -> b
     try:
         with open(path, encoding="utf-8") as file:
             found = json.load(file)
-    except FileNotFoundError:
+    except (FileNotFoundError, ValueError):  # absent, or written while the machine failed
         return False
     if found["item"] != name_of(item):
         raise InputError(f"{path} holds the result of {found['item']}, not of {name_of(item)}; give another folder")
@@ -207,12 +223,13 @@ def name_of(item: Any) -> str:
 
 def _prepared(folder: str | os.PathLike[str], key: str) -> str:
     """Make the folder, or refuse one with tasks of other settings."""
-    path = os.path.abspath(folder)
-    os.makedirs(path, exist_ok=True)
+    path = folder_of(folder, "folder")
     name = os.path.join(path, "tasks.json")
     try:
         with open(name, encoding="utf-8") as file:
             found = json.load(file).get("key")
+    except ValueError:
+        raise InputError(f"{name} cannot be read; give another folder, or delete this one") from None
     except FileNotFoundError:
         _write(name, json.dumps({"key": key}))
         return path

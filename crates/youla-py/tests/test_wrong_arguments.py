@@ -95,7 +95,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "open file": (lambda: named(io.StringIO("u,y")), "data is a StringIO"),
     "huge values": (lambda: ident(rec(TABLE * 1e200)), "values above 1e100 cannot be used; check its units"),
     # channels, time, labels
-    "channel as float": (lambda: rec(inputs=1.0), "inputs is 1.0; channels are chosen by name or column number"),
+    "channel as float": (lambda: rec(inputs=1.0), "inputs is 1.0, but must be a list of names or column numbers"),
     "channels as mapping": (lambda: rec(inputs={"u": 0}), "inputs is {'u': 0}; channels are chosen by name"),
     "channel twice": (lambda: rec(inputs=[0, 0]), "column 0 is chosen twice as input or output"),
     "input as output": (lambda: named(FRAME, outputs="u"), "u is chosen twice as input or output; choose each channel once"),
@@ -148,7 +148,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "amplitude as text": (lambda: youla.excite(NOMINAL, 1.0, **{**EXCITE, "amplitude": "big", "seconds": 1}), "amplitude is a str"),
     "seconds as text": (lambda: youla.excite(NOMINAL, 1.0, **EXCITE, seconds="1"), "seconds is '1', but must be a positive number"),
     "negative seed": (lambda: youla.excite(NOMINAL, 1.0, **EXCITE, seconds=1, seed=-1), "seed is -1, but must be a whole number"),
-    "one run to compare": (lambda: youla.compare("run"), "runs is a str, but must be a list of at least two"),
+    "one run to compare": (lambda: youla.compare("run"), "runs is 'run', but must be a list of at least two"),
     "number to compare": (lambda: youla.compare([1, 2]), "runs[0] is 1, but must be a path"),
     "order below 0": (lambda: youla.reduce(NOMINAL, order=-1), "order is -1, but must be a whole number"),
     "place of a model": (lambda: NOMINAL.save("."), "path is ., which cannot be written (Is a directory); give another place"),

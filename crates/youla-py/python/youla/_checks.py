@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from difflib import get_close_matches
 from typing import Any
 
@@ -84,6 +84,36 @@ def share(value: Any, what: str) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float, np.number)) or not 0 < float(value) < 1:
         raise InputError(f"{what} is {value!r}, but must be between 0 and 1")
     return float(value)
+
+
+def choice(value: Any, what: str, choices: Sequence[str]) -> str:
+    """Return one of the texts; `choices` may explain them in parentheses."""
+    if not isinstance(value, str) or value not in [c.partition(" ")[0] for c in choices]:
+        explained = [f"{c.partition(' ')[0]!r}{c[len(c.partition(' ')[0]) :]}" for c in choices]
+        raise InputError(f"{what} is {value!r}, but must be {' or '.join(explained)}")
+    return value
+
+
+def truth(value: Any, what: str) -> bool:
+    """Return True or False."""
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{what} is {kind(value)}, but must be True or False")
+    return bool(value)
+
+
+def place(value: Any, what: str, count: int, of: str) -> int:
+    """Return the number of one of `count` things, counted from 0."""
+    if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= value < count:
+        raise InputError(f"{what} is {value!r}, but {of}, counted from 0")
+    return int(value)
+
+
+def listed(value: Any, what: str, of: str) -> list[Any]:
+    """Return the entries of a list, tuple, array or generator."""
+    try:
+        return [value] if isinstance(value, (str, bytes, Mapping)) else list(value)
+    except TypeError:
+        raise InputError(f"{what} is {value!r}, but must be a list of {of}") from None
 
 
 def kind(value: Any) -> str:

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from . import _plot
+from ._checks import listed, place, text
 from ._errors import InputError
 
 if TYPE_CHECKING:
@@ -45,9 +44,9 @@ class Plots:
         ndarray of matplotlib axes
             Magnitude and phase.
         """
-        names = [models] if isinstance(models, str) else models
-        if names is None:
-            names = [key for key in (RECOMMENDED, "nominal") if key in self._run.models]
+        names = [key for key in (RECOMMENDED, "nominal") if key in self._run.models]
+        if models is not None:
+            names = listed(models, "models", "names of models")
         responses = [self._run.frequency_response(omega, model=key) for key in names]
         measured = self._run.measured_response
         return _plot.bode(responses, ax, region=region, output=output, input=input, measured=measured)
@@ -86,8 +85,9 @@ class Plots:
         -------
         matplotlib axes
         """
-        names = [models] if isinstance(models, str) else models
-        names = [key for key in (RECOMMENDED, "nominal", "hansen") if key in self._run.models] if names is None else names
+        names = [key for key in (RECOMMENDED, "nominal", "hansen") if key in self._run.models]
+        if models is not None:
+            names = listed(models, "models", "names of models")
         return _plot.poles([self._run.model(key) for key in names], ax)
 
     def fit(self, record: int = 0, ax: Any = None, *, model: str = RECOMMENDED, output: int = 0) -> Any:
@@ -110,12 +110,11 @@ class Plots:
             The time in seconds.
         """
         predictions = self._run.predictions
-        if isinstance(record, bool) or not isinstance(record, (int, np.integer)) or not 0 <= record < len(predictions):
-            raise InputError(f"record is {record}, but the run has {len(predictions)} verification records; give verify=")
-        found = predictions[record]
-        if model not in found.predicted:
+        held = f"the run has {len(predictions)} verification records (verify= of identify)"
+        found = predictions[place(record, "record", len(predictions), held)]
+        if text(model, "model") not in found.predicted:
             raise InputError(f"model {model!r} predicts nothing on {found.record!r}; choose of {', '.join(found.predicted)}")
-        if not 0 <= output < found.measured.shape[1]:
-            raise InputError(f"output is {output}, but the record has {found.measured.shape[1]} outputs, counted from 0")
+        count = found.measured.shape[1]
+        place(output, "output", count, f"the record has {count} outputs")
         dt = self._run.model("controller").dt
         return _plot.fit(found.measured[:, output], found.predicted[model][:, output], dt, found.record, ax)

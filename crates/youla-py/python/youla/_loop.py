@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, as_floats, positive, whole
-from ._checks import kind, path_of, text
+from ._checks import listed, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
 from ._identify import _plain, options_json
@@ -380,9 +380,10 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
     >>> len(found.runs), len(found.distances)
     (2, 1)
     """
-    if isinstance(runs, (str, os.PathLike, Run)) or not isinstance(runs, Iterable):
-        raise InputError(f"runs is {kind(runs)}, but must be a list of at least two youla.Run or run folders")
-    runs = list(runs)
+    if isinstance(runs, str):
+        raise InputError(f"runs is {runs!r}, but must be a list of at least two youla.Run or run folders")
+    runs = listed(runs, "runs", "at least two youla.Run or run folders")
+    model = text(model, "model")
     with tempfile.TemporaryDirectory() as folder:
         paths = [
             run.save(os.path.join(folder, f"run-{k + 1}")) if isinstance(run, Run) else path_of(run, f"runs[{k}]")
@@ -390,5 +391,5 @@ def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likel
         ]
         # Run folders name the recommended model by its file.
         model = "recommended" if model == RECOMMENDED else model
-        found = json.loads(_native.compare(paths, text(model, "model"), None if page is None else path_of(page, "page")))
+        found = json.loads(_native.compare(paths, model, None if page is None else path_of(page, "page")))
     return Comparison(tuple(found["runs"]), tuple(found["distances"]))

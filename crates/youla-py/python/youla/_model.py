@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._arrays import Array, as_floats, as_matrix, positive
-from ._checks import text, write_file
+from ._checks import listed, text, write_file
 from ._errors import InputError
 from ._optional import need
 from ._types import Matrices
@@ -304,7 +304,7 @@ def _names(given: Any, what: str, letter: str, count: int) -> tuple[str, ...]:
     """Names of channels; numbered where none are given."""
     if given is None:
         return tuple(_numbered(letter, count))
-    names = (given,) if isinstance(given, str) else tuple(given) if isinstance(given, Iterable) else (given,)
+    names = tuple(listed(given, what, "names"))
     if not all(isinstance(name, str) for name in names):
         raise InputError(f"{what} is {given!r}, but must be a list of names")
     if len(names) != count:

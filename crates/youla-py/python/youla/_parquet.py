@@ -7,7 +7,7 @@ import os
 from collections.abc import Sequence
 from typing import Any
 
-from ._checks import folder_of, path_of
+from ._checks import folder_of, path_of, truth
 from ._errors import InputError
 from ._optional import need
 
@@ -40,7 +40,7 @@ def write(rows: Sequence[Row], folder: str | os.PathLike[str], replace: bool) ->
     if os.path.exists(path) and not os.path.isdir(path):
         raise InputError(f"folder {path} is a file; give the folder of the data set")
     there = os.listdir(path) if os.path.isdir(path) else []
-    if there and not (replace and there == ["part-0.parquet"]):
+    if there and not (truth(replace, "replace") and there == ["part-0.parquet"]):
         remedy = "give another folder" if replace else "give another folder, or replace=True"
         raise InputError(f"folder {path} holds {sorted(there)[0]}; {remedy}")
     found = [_columns(row) for row in rows]

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ._arrays import Array
+from ._checks import place, truth
 from ._errors import InputError
 from ._model import FrequencyResponse, Model
 from ._optional import need
@@ -16,15 +17,14 @@ from ._optional import need
 def _channels(response: FrequencyResponse, output: int, input: int) -> None:
     _, p, m = response.values.shape
     for what, value, count in (("output", output, p), ("input", input, m)):
-        if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or not 0 <= value < count:
-            raise InputError(f"{what} is {value}, but the model has {count} {what}s, counted from 0")
+        place(value, what, count, f"the model has {count} {what}s")
 
 
 def _axes(ax: Any) -> Any:
     """Axes of the caller, or new ones."""
     if ax is None:
         return need("matplotlib.pyplot").subplots(layout="constrained")[1]
-    if not hasattr(ax, "plot"):
+    if not hasattr(ax, "semilogx"):
         raise InputError(f"ax is {ax!r}, but must be matplotlib axes, as plt.subplots() returns")
     return ax
 
@@ -41,9 +41,11 @@ def bode(
     """Draw magnitude in dB and phase in degrees over the frequency in Hz; returns both axes."""
     if ax is None:
         _, ax = need("matplotlib.pyplot").subplots(2, 1, sharex=True, layout="constrained")
-    if np.size(ax) != 2:
+    pair = ax.ravel().tolist() if isinstance(ax, np.ndarray) else list(ax) if isinstance(ax, (list, tuple)) else []
+    if len(pair) != 2:
         raise InputError("ax must be a pair of axes, for magnitude and phase, as plt.subplots(2, 1) returns")
-    upper, lower = (_axes(one) for one in np.ravel(ax))
+    upper, lower = (_axes(one) for one in pair)
+    region = truth(region, "region")
     all_of: list[tuple[FrequencyResponse, dict[str, Any]]] = [(r, {}) for r in responses]
     if measured is not None:
         all_of.append((measured, {"color": "0.6", "linewidth": 0.8, "zorder": 1}))

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from ._arrays import Array, positive
+from ._checks import listed, table, text
 from ._checks import share as between
-from ._checks import table, text
 from ._errors import InputError
 from ._optional import need
 from ._sources import Source, source_of
@@ -266,13 +266,10 @@ class Record:
 def _listed(names: Names, group: str) -> list[str | int]:
     if names is None:
         return []
-    if isinstance(names, (str, int, np.integer)):
-        listed = [names]
-    elif isinstance(names, Iterable) and not isinstance(names, Mapping):
-        listed = list(names)
-    else:
+    if isinstance(names, Mapping):
         raise InputError(f"{group} is {names!r}; channels are chosen by name or column number, or a list of them")
-    for place in listed:
+    places = [names] if isinstance(names, (int, np.integer)) else listed(names, group, "names or column numbers")
+    for place in places:
         if isinstance(place, bool) or not isinstance(place, (str, int, np.integer)):
             raise InputError(f"{group} has {place!r}; channels are chosen by name or column number")
-    return listed
+    return places

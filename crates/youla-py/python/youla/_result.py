@@ -12,7 +12,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array
-from ._checks import path_of, text, write_file
+from ._checks import path_of, text, truth, write_file
 from ._errors import InputError, NumericalError
 from ._figures import RECOMMENDED, Plots
 from ._model import FrequencyResponse, Mode, Model, frequencies
@@ -192,7 +192,7 @@ class Run:
         tuple of Mode
             Natural frequencies in Hz and damping ratios, with 95 % intervals where they are known.
         """
-        entry = self.summary["methods"].get(model)
+        entry = self.summary["methods"].get(text(model, "model"))
         if entry is None:
             return self.model(model).modes()
         found = self.summary["recommended"]["modes"] if model == RECOMMENDED else entry["modes"]
@@ -225,7 +225,7 @@ class Run:
         from ._identify import with_region
 
         w = frequencies(self._native.hz() * (2 * np.pi) if omega is None else omega)
-        values, known = self._native.response(model, w / (2 * np.pi))
+        values, known = self._native.response(text(model, "model"), w / (2 * np.pi))
         return with_region(w, values, known, "recommended" if model == RECOMMENDED else model)
 
     @property
@@ -311,7 +311,7 @@ class Run:
         place = path_of(folder, "folder")
         if os.path.isfile(place):
             raise InputError(f"folder is the file {place}; give a folder that is not there yet")
-        return self._native.write(place, replace)
+        return self._native.write(place, truth(replace, "replace"))
 
     @property
     def plot(self) -> Plots:

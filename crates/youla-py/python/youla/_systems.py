@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ._arrays import as_matrix
-from ._checks import file_of, kind
+from ._checks import choice, file_of, kind
 from ._errors import InputError
 from ._model import Model
 from ._optional import need
@@ -53,10 +53,9 @@ def controller_table(controller: Any, feedback: str, hold: str | None, dt: float
 
 def check_signs(feedback: str, hold: str | None = None) -> None:
     """Refuse another sign or hold."""
-    if feedback not in ("negative", "positive"):
-        raise InputError(f"feedback is {feedback!r}, but must be 'negative' (u = K (r - y)) or 'positive' (u = K (y - r))")
-    if hold not in (None, "zoh", "tustin"):
-        raise InputError(f"hold is {hold!r}, but must be 'zoh' or 'tustin'")
+    choice(feedback, "feedback", ("negative (u = K (r - y))", "positive (u = K (y - r))"))
+    if hold is not None:
+        choice(hold, "hold", ("zoh", "tustin"))
 
 
 def as_model(system: Any, what: str, dt: float | None = None) -> Model:

@@ -124,7 +124,8 @@ def run_tasks(
     """Compute the rows of all items; `key` names the payload in the folder."""
     _check_executor(executor)
     callback(progress, "progress")
-    if isinstance(items, (str, bytes, os.PathLike, Mapping, Record)) or not isinstance(items, Iterable):
+    single = isinstance(items, (str, bytes, os.PathLike, Mapping, Record)) or getattr(items, "shape", None) == ()
+    if single or not isinstance(items, Iterable):
         raise InputError(f"records is {kind(items)}, but must be a list of them or of paths")
     kept = None if folder is None else _prepared(folder, key)
     rows: dict[int, Row] = {}

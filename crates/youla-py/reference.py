@@ -1,6 +1,6 @@
 """The API reference of the package as a static site: ``python crates/youla-py/reference.py target/api``.
 
-Functions come before classes. A warning is an error: a name that cannot be resolved would be a hole of the page.
+Functions come before classes. A warning is an error: a name that cannot be resolved would be missing on the page.
 """
 
 from __future__ import annotations

@@ -131,15 +131,19 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_names_argument_and_remedy(case: str) -> None:
-    call, sentence = CASES[case]
+def refuses(call: Callable[[], Any], sentence: str) -> None:
+    """The call ends in an exception of the package with this sentence in it."""
     with pytest.raises(youla.InputError) as raised:
         call()
     assert sentence in str(raised.value)
     assert "panicked" not in str(raised.value)
     assert isinstance(raised.value, ValueError)
     assert isinstance(raised.value, youla.Error)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_names_argument_and_remedy(case: str) -> None:
+    refuses(*CASES[case])
 
 
 def test_there_are_forty() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 from conftest import loop
+from test_bad_input import FRAME, NOMINAL, TABLE, U, Y, ident, rec, refuses
 
 import youla
 
@@ -19,10 +20,6 @@ control = pytest.importorskip("control")
 pd = pytest.importorskip("pandas")
 pl = pytest.importorskip("polars")
 
-TABLE = loop(3, 400)
-U, Y, D = TABLE.T
-FRAME = pd.DataFrame({"u": U, "y": Y, "d": D})
-NOMINAL = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
 KNOWN: dict[str, Any] = {"nominal": NOMINAL, "controller": 2.0}
 READ = {"inputs": "u", "outputs": "y", "dt": 0.01}
 EXCITE: dict[str, Any] = {"amplitude": 1.0, "band": [1, 10]}
@@ -39,16 +36,8 @@ class Tensor:
         raise RuntimeError("use tensor.detach().numpy() instead")
 
 
-def rec(data: Any = TABLE, **changes: Any) -> youla.Record:
-    return youla.Record(data, **{"inputs": 0, "outputs": 1, "excitation": 2, "dt": 0.01, **changes})
-
-
 def named(data: Any, **changes: Any) -> youla.Record:
     return youla.Record(data, **{**READ, **changes})
-
-
-def ident(record: Any = None, **changes: Any) -> youla.Run:
-    return youla.identify(rec() if record is None else record, **{**KNOWN, **changes})
 
 
 def indexed(index: Any) -> youla.Record:
@@ -171,11 +160,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_names_argument_and_remedy(case: str) -> None:
-    call, sentence = CASES[case]
-    with pytest.raises(youla.InputError) as raised:
-        call()
-    assert sentence in str(raised.value)
-    assert "panicked" not in str(raised.value)
+    refuses(*CASES[case])
 
 
 def test_a_damaged_folder_is_no_obstacle(tmp_path: Path) -> None:

@@ -230,7 +230,10 @@ class Run:
 
     @property
     def measured_response(self) -> FrequencyResponse | None:
-        """The response that rests on no model, where an excitation is known."""
+        """The response that rests on no model, where an excitation is known and the record is longer than its window.
+
+        The window, in samples, is ``frequency_response={"window": ...}`` of `identify`.
+        """
         found = self._native.measured_response()
         if found is None:
             return None

@@ -30,6 +30,10 @@ TASKS: dict[str, Any] = {"executor": None, "folder": None}
 STRUCTURE = {"parameters": {"p": {"initial": 4.0}}, "a": [["-p"]], "b": [["2"]], "c": [[1]]}
 EXCITATION = {"amplitude": 1, "band": [1, 10], "seconds": 1.0, "seed": 1, "shape": "prbs", "noise": 0.1}
 
+CONDITION = {"amplitude": 1.0, "band": [1, 10], "samples": 200}
+TURN = 0.9 * np.array([[np.cos(0.3), np.sin(0.3)], [-np.sin(0.3), np.cos(0.3)]])
+STUDY = youla.study(youla.Model(TURN, [[0], [1]], [[1, 0]], [[0]], dt=0.01), 0.0, [CONDITION], n=2, seed=1, noise=0.1)
+
 VALUES = [
     None, -1, 1.5, float("nan"), True, 10**40, 1j, "x", "", b"x", [], [None], [[1, 2], [3]], {1: 2}, {"x": {}}, object(), int,
     np.array(1.0), np.array([]), np.array([None, 1], dtype=object), np.ones((2, 3)), np.zeros((2, 2, 2)), FRAME, FRAME["u"], pd.NA,
@@ -61,6 +65,9 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "bootstrap": (youla.bootstrap, {"run": RUN, "n": 1, "seed": 1, **TASKS}),
     "scan": (youla.scan, {"record": RECORD, "grid": {"hansen.order": [1]}, "verify": None, **TASKS, **KNOWN}),
     "identify_many": (youla.identify_many, {"records": [RECORD], "read": None, **TASKS, **KNOWN, **LOOP}),
+    "study": (youla.study, {"plant": NOMINAL, "controller": 2.0, "conditions": [CONDITION], "n": 1, "seed": 1, "noise": 0.1, **TASKS}),
+    "Study.cheapest": (STUDY.cheapest, {"zeta": 0.1, "mode": 0}),
+    "Study.plot": (STUDY.plot, {"ax": None, "mode": 0, "wanted": 0.1}),
     "Run.model": (RUN.model, {"name": "likelihood"}),
     "Run.modes": (RUN.modes, {"model": "likelihood"}),
     "Run.frequency_response": (RUN.frequency_response, {"omega": [1.0], "model": "likelihood"}),

@@ -24,6 +24,7 @@ from ._loop import (
     simulate_loop,
 )
 from ._model import FrequencyResponse, Mode, Model
+from ._plan import Study, study
 from ._record import Record
 from ._result import Evidence, Prediction, Run, Verdict
 from ._stages import Check, SubspaceEstimate, check, greybox, subspace
@@ -52,6 +53,7 @@ __all__ = [
     "Reduction",
     "Rows",
     "Run",
+    "Study",
     "SubspaceEstimate",
     "Verdict",
     "bootstrap",
@@ -67,5 +69,6 @@ __all__ = [
     "reduce",
     "scan",
     "simulate_loop",
+    "study",
     "subspace",
 ]

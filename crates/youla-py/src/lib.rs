@@ -29,6 +29,12 @@ mod _native {
     use super::run::{Run, compare, demo, identify, identify_file};
     #[pymodule_export]
     use super::{program, version};
+
+    #[pymodule_init]
+    fn loaded(_module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
+        super::worker::loaded();
+        Ok(())
+    }
 }
 
 /// Version of library and program.

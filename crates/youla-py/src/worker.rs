@@ -6,9 +6,9 @@
 use crate::failure::{Failure, Result};
 use pyo3::prelude::*;
 use std::panic::resume_unwind;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{RecvTimeoutError, sync_channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::Builder;
 use std::time::Duration;
 
@@ -16,6 +16,19 @@ use std::time::Duration;
 const POLL: Duration = Duration::from_millis(50);
 /// Stack of the thread, as the main thread of a program has it.
 const STACK: usize = 8 << 20;
+
+/// The process that loaded the module.
+static LOADED: OnceLock<u32> = OnceLock::new();
+
+/// Called when the module is loaded.
+pub(crate) fn loaded() {
+    LOADED.get_or_init(std::process::id);
+}
+
+/// Whether this process was forked from the one that loaded the module: the threads of its pool did not follow.
+fn forked() -> bool {
+    LOADED.get().is_some_and(|id| *id != std::process::id())
+}
 
 /// Whether the caller has been interrupted.
 #[derive(Clone, Default)]
@@ -33,7 +46,7 @@ impl Stop {
 /// What unwinds an interrupted thread; no panic, so that no message is printed.
 struct Interrupted;
 
-/// Runs `work` on a thread, on one core only where `single` says so, and waits for it.
+/// Runs `work` on a thread, on one core only where `single` says so, and waits for it. A forked process gets threads of its own.
 pub(crate) fn run<T: Send + 'static>(
     py: Python<'_>,
     single: bool,
@@ -43,7 +56,11 @@ pub(crate) fn run<T: Send + 'static>(
     let (sender, mut receiver) = sync_channel(1);
     let of_thread = stop.clone();
     let body = move || {
-        let result = if single { on_one_core(|| work(&of_thread)) } else { work(&of_thread) };
+        let result = match (single, forked()) {
+            (true, _) => on_threads(1, || work(&of_thread)),
+            (false, true) => on_threads(0, || work(&of_thread)),
+            (false, false) => work(&of_thread),
+        };
         // Nobody waits after an interrupt.
         let _ = sender.send(result);
     };
@@ -69,7 +86,8 @@ pub(crate) fn run<T: Send + 'static>(
     }
 }
 
-fn on_one_core<T: Send>(work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
-    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).stack_size(STACK).build();
+/// On a pool of so many threads; 0 for one per core.
+fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(count).stack_size(STACK).build();
     pool.map_err(|e| Failure::numerical(format!("no thread can be started: {e}")))?.install(work)
 }

@@ -212,3 +212,14 @@ def test_a_folder_knows_the_nominal_model_by_its_matrices(small: youla.Record, t
     for change in ({"nominal": other_pole}, {"controller": other_gain}):
         with pytest.raises(youla.InputError, match="holds tasks of other settings"):
             youla.identify_many([small], folder=tmp_path / "rows", **{**known, **change})
+
+
+def _order(record: youla.Record) -> int:
+    return youla.identify(record, **OPTIONS).recommended.order
+
+
+@pytest.mark.skipif(sys.platform in ("win32", "darwin"), reason="processes are forked on Linux only")
+def test_a_forked_process_computes(small: youla.Record, of_small: youla.Run) -> None:
+    """The parent has computed on its threads (the fixture), which do not follow a fork."""
+    with get_context("fork").Pool(1) as pool:
+        assert pool.apply_async(_order, (small,)).get(timeout=60) == of_small.recommended.order

@@ -89,11 +89,24 @@ impl<T: Real, const N: usize, const M: usize, const P: usize> Controller<T, N, M
     /// saturation left of it; returns `beta = y - C xh - D u` and advances to `xh+ = A xh + B u - L beta`.
     #[inline]
     pub fn observe(&self, state: &mut State<T, N>, y: &[T; P], u: &[T; M]) -> [T; P] {
-        let Matrices { a, b, c, d, l, .. } = &self.matrices;
-        let beta = minus(minus(*y, c, &state.xh), d, u);
-        let predicted = plus(plus([T::ZERO; N], a, &state.xh), b, u);
-        state.xh = minus(predicted, l, &beta);
+        let beta = self.residual(state, y, u);
+        self.advance(state, u, &beta);
         beta
+    }
+
+    /// The first half of [`Controller::observe`]: `beta = y - C xh - D u`.
+    #[inline]
+    #[must_use]
+    pub fn residual(&self, state: &State<T, N>, y: &[T; P], u: &[T; M]) -> [T; P] {
+        minus(minus(*y, &self.matrices.c, &state.xh), &self.matrices.d, u)
+    }
+
+    /// The second half of [`Controller::observe`]: `xh+ = A xh + B u - L beta`. A residual of 0 makes it predict without the
+    /// measurement.
+    #[inline]
+    pub fn advance(&self, state: &mut State<T, N>, u: &[T; M], beta: &[T; P]) {
+        let predicted = plus(plus([T::ZERO; N], &self.matrices.a, &state.xh), &self.matrices.b, u);
+        state.xh = minus(predicted, &self.matrices.l, beta);
     }
 
     /// Both phases, for actuators that apply every command as it is: `J_K: (y, alpha) -> (u, beta)`.

@@ -22,6 +22,10 @@
 //! converters. The observer takes u as an input. It may therefore differ from the command, by saturation, quantisation or
 //! a safety stop: `beta = Mt y - Nt u` (28) remains true, the observer does not wind up, and identification sees no error.
 //!
+//! [`ExcitedLoop`] is the whole loop of a firmware around it, `command -> limit -> apply -> observe`: excitation with ramps
+//! ([`Excitation`]), a guard that ends it ([`Limits`], [`Cause`]), and a parameter Q that is exchanged while the loop runs
+//! ([`QCoefficients`]).
+//!
 //! # Example
 //!
 //! ```
@@ -47,12 +51,26 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod checksum;
 mod controller;
+mod excitation;
+mod excited_loop;
 mod filter;
+mod guard;
 mod matrices;
+mod parameter;
+mod ramp;
 mod real;
+mod status;
 
+pub use checksum::Checksum;
 pub use controller::{Controller, Output, State};
+pub use excitation::{Excitation, Multisine, Prbs, Table, Tone};
+pub use excited_loop::{ExcitedLoop, LoopRefusal, Row};
 pub use filter::Filter;
+pub use guard::{Cause, Limits, Trip};
 pub use matrices::{Matrices, NotFinite};
+pub use parameter::{QCoefficients, QRefusal};
+pub use ramp::OUT_WITHIN;
 pub use real::Real;
+pub use status::{Phase, Status};

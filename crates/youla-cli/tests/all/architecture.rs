@@ -5,8 +5,9 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 10] = [
+const ARROWS: [(&str, &[&str]); 11] = [
     ("youla-rt", &[]),
+    ("youla-link", &["youla-rt"]),
     ("youla", &["youla-rt"]),
     ("youla-greybox", &["youla"]),
     ("youla-io", &["youla"]),

@@ -1,0 +1,137 @@
+//! One frame: header, body, checksum.
+
+use crate::bytes::{Reader, Writer};
+use core::fmt;
+use youla_rt::Checksum;
+
+/// Version of the wire format.
+pub const VERSION: u8 = 1;
+
+/// Bytes of the longest frame: it passes an Ethernet of 1500 bytes whole.
+pub const LARGEST_FRAME: usize = 1400;
+
+/// Bytes of the longest body.
+pub const LARGEST_BODY: usize = LARGEST_FRAME - HEADER - CHECKSUM;
+
+const MAGIC: [u8; 2] = *b"YL";
+const HEADER: usize = 12;
+const CHECKSUM: usize = 4;
+
+/// What the body is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u8)]
+pub enum Kind {
+    /// [`crate::RowBlock`], from the machine.
+    Rows = 1,
+    /// [`crate::Request`], from the host.
+    Request = 2,
+    /// [`crate::Reply`], from the machine.
+    Reply = 3,
+}
+
+/// A frame whose checksum is right.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frame<'a> {
+    /// What the body is.
+    pub kind: Kind,
+    /// CRC-32 of the machine's description; 0 in requests of a host that does not know it yet.
+    pub schema: u32,
+    /// Counts the frames of a sender and kind.
+    pub sequence: u32,
+    /// At most [`LARGEST_BODY`] bytes.
+    pub body: &'a [u8],
+}
+
+/// Why bytes are no frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameError {
+    /// Shorter than header and checksum, or longer than [`LARGEST_FRAME`].
+    Length(usize),
+    /// Another protocol.
+    Foreign,
+    /// The checksum is wrong: damaged on the way.
+    Checksum,
+    /// Another version of this format.
+    Version(u8),
+    /// A kind that this version does not know.
+    Kind(u8),
+    /// Not a whole COBS packet.
+    Packet,
+}
+
+impl fmt::Display for FrameError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            FrameError::Length(bytes) => write!(f, "a frame has 16 to {LARGEST_FRAME} bytes, not {bytes}"),
+            FrameError::Foreign => f.write_str("the bytes do not begin with \"YL\": not a frame of youla"),
+            FrameError::Checksum => f.write_str("the checksum of the frame is wrong: it was damaged on the way"),
+            FrameError::Version(version) => {
+                write!(f, "the frame has version {version} of the format; this program knows version {VERSION}")
+            }
+            FrameError::Kind(kind) => write!(f, "frames of kind {kind} are not known"),
+            FrameError::Packet => f.write_str("the bytes between two zeros are not a COBS packet"),
+        }
+    }
+}
+
+impl core::error::Error for FrameError {}
+
+impl<'a> Frame<'a> {
+    /// Into the front of a buffer; returns the number of bytes.
+    ///
+    /// # Errors
+    /// [`FrameError::Length`] for a body that is too long, or longer than the buffer.
+    pub fn write(&self, buffer: &mut [u8]) -> Result<usize, FrameError> {
+        let length = HEADER + self.body.len() + CHECKSUM;
+        if length > LARGEST_FRAME || length > buffer.len() {
+            return Err(FrameError::Length(length));
+        }
+        let mut writer = Writer::new(buffer);
+        let mut checksum = Checksum::new();
+        let version_and_kind = [VERSION, self.kind as u8];
+        let pieces: [&[u8]; 5] =
+            [&MAGIC, &version_and_kind, &self.schema.to_le_bytes(), &self.sequence.to_le_bytes(), self.body];
+        for piece in pieces {
+            checksum.append(piece);
+            writer.put(piece).ok_or(FrameError::Length(length))?;
+        }
+        writer.put(&checksum.value().to_le_bytes()).ok_or(FrameError::Length(length))?;
+        Ok(length)
+    }
+
+    /// From the bytes of one datagram or packet.
+    ///
+    /// # Errors
+    /// [`FrameError`]; the checksum is tested before version and kind.
+    pub fn read(bytes: &'a [u8]) -> Result<Self, FrameError> {
+        let length = FrameError::Length(bytes.len());
+        if bytes.len() > LARGEST_FRAME {
+            return Err(length);
+        }
+        let (content, sent) = bytes.split_last_chunk::<CHECKSUM>().ok_or(length)?;
+        let mut reader = Reader(content);
+        let magic = reader.array::<2>().ok_or(length)?;
+        let version = reader.u8().ok_or(length)?;
+        let kind = reader.u8().ok_or(length)?;
+        let schema = reader.u32().ok_or(length)?;
+        let sequence = reader.u32().ok_or(length)?;
+        if magic != MAGIC {
+            return Err(FrameError::Foreign);
+        }
+        let mut checksum = Checksum::new();
+        checksum.append(content);
+        if checksum.value() != u32::from_le_bytes(*sent) {
+            return Err(FrameError::Checksum);
+        }
+        if version != VERSION {
+            return Err(FrameError::Version(version));
+        }
+        let kind = match kind {
+            1 => Kind::Rows,
+            2 => Kind::Request,
+            3 => Kind::Reply,
+            other => return Err(FrameError::Kind(other)),
+        };
+        Ok(Frame { kind, schema, sequence, body: reader.rest() })
+    }
+}

@@ -1,0 +1,41 @@
+//! The wire format between a controller with the ports alpha and beta and its host. No standard library, no allocation, no panic.
+//!
+//! A [`Frame`] is a datagram on UDP, or a packet between zero bytes on a serial line ([`write_packet`], [`PacketReader`]):
+//!
+//! | bytes | content |
+//! |---|---|
+//! | 0, 1 | `YL` |
+//! | 2 | version, [`VERSION`] |
+//! | 3 | [`Kind`] |
+//! | 4 to 7 | schema: CRC-32 of the machine's description |
+//! | 8 to 11 | sequence number of the sender |
+//! | 12 .. n - 4 | body |
+//! | last 4 | CRC-32 (ISO-HDLC) of all bytes before |
+//!
+//! All numbers are little-endian. The bodies are [`RowBlock`]s from the machine, [`Request`]s from the host, and a [`Reply`] to each
+//! request. [`Tracker`] finds what was lost, doubled or reordered on the way. [`Station`] is the machine's end: a
+//! [`youla_rt::ExcitedLoop`] in `f32` with its frames.
+
+#![no_std]
+#![forbid(unsafe_code)]
+
+#[cfg(test)]
+extern crate std;
+
+mod bytes;
+mod frame;
+mod request;
+mod rows;
+mod serial;
+mod station;
+mod tracker;
+
+pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, VERSION};
+pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, Source};
+pub use rows::{RowBatch, RowBlock, RowShape, RowView};
+pub use serial::{LARGEST_PACKET, PacketReader, write_packet};
+pub use station::{Machine, Station};
+pub use tracker::{Arrival, Tracker};
+
+#[cfg(test)]
+mod tests;

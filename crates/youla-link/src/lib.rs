@@ -19,6 +19,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+// The machine of the firmware names this crate.
+#[cfg(test)]
+extern crate self as youla_link;
 #[cfg(test)]
 extern crate std;
 

@@ -1,5 +1,7 @@
 //! Frames through a way that loses, doubles, swaps and damages them; readers against any bytes.
 
+mod firmware;
+
 use crate::*;
 use proptest::prelude::*;
 use std::collections::BTreeMap;

@@ -5,9 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 11] = [
+const ARROWS: [(&str, &[&str]); 12] = [
     ("youla-rt", &[]),
     ("youla-link", &["youla-rt"]),
+    ("youla-rig", &["youla-link", "youla-rt"]),
     ("youla", &["youla-rt"]),
     ("youla-greybox", &["youla"]),
     ("youla-io", &["youla"]),
@@ -15,7 +16,7 @@ const ARROWS: [(&str, &[&str]); 11] = [
     ("youla-report", &["youla"]),
     ("youla-run", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report"]),
     ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-rt", "youla-run"]),
-    ("youla-cli", &["youla", "youla-io", "youla-loop", "youla-paper", "youla-report", "youla-run"]),
+    ("youla-cli", &["youla", "youla-io", "youla-loop", "youla-paper", "youla-report", "youla-rig", "youla-run"]),
     ("youla-py", &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run"]),
 ];
 

@@ -1,0 +1,68 @@
+//! The errors of a rig.
+
+use std::path::PathBuf;
+use youla_link::Outcome;
+
+/// Result of every fallible function of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// An error of the connection, the machine or the log.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The address cannot be used.
+    #[error("{address}: {source}; give an address as udp://127.0.0.1:4000")]
+    Address {
+        /// As given.
+        address: String,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+    /// The connection failed.
+    #[error("the connection to the rig failed: {0}")]
+    Connection(#[from] std::io::Error),
+    /// No reply.
+    #[error("the rig at {address} does not answer; check that it runs and that no firewall keeps its datagrams")]
+    Silent {
+        /// Where it was asked.
+        address: String,
+    },
+    /// The machine refused a request.
+    #[error("the rig refused \"{request}\": {}", of_outcome(*outcome))]
+    Refused {
+        /// The request.
+        request: &'static str,
+        /// Its outcome.
+        outcome: Outcome,
+    },
+    /// The description of the machine cannot be used.
+    #[error("the description of the rig: {0}")]
+    Description(String),
+    /// A file cannot be written.
+    #[error("{}: {source}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// What the operating system says.
+        source: std::io::Error,
+    },
+}
+
+fn of_outcome(outcome: Outcome) -> &'static str {
+    match outcome {
+        Outcome::Done => "done",
+        Outcome::NotUnderstood => "the request is not known to its version",
+        Outcome::OtherSchema => "its description has changed; connect again",
+        Outcome::NotArmed => "it is not armed",
+        Outcome::Exciting => "an excitation runs; stop it first",
+        Outcome::Sensor => "an output is not finite or does not change",
+        Outcome::Tripped => "its guard has tripped; arm it again",
+        Outcome::Fading => "the last Q still fades out; ask again later",
+        Outcome::NotFinite => "a coefficient is not finite",
+        Outcome::Count => "the number of coefficients is not that of its bank",
+        Outcome::Checksum => "the checksum of Q is wrong",
+        Outcome::NoQ => "no Q is loaded",
+        Outcome::Source => "it cannot make this excitation",
+        Outcome::Stale => "the request came too late",
+    }
+}

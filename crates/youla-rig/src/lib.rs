@@ -1,0 +1,22 @@
+//! The host's end of a rig that speaks `youla-link`: [`Rig`] asks and receives, [`Recorder`] writes a log in which every row is there or
+//! reported missing, and [`settings`] the run.toml beside it. [`serve`] plays a machine over UDP: the loop of the firmware with a
+//! [`LinearPlant`], in real time or in lock-step.
+
+mod description;
+mod error;
+mod plant;
+mod recorder;
+mod rig;
+mod settings;
+mod twin;
+
+pub use description::{Description, RigChannel};
+pub use error::{Error, Result};
+pub use plant::{LinearPlant, PlantFault};
+pub use recorder::{LogReport, Recorder};
+pub use rig::{Answer, Rig};
+pub use settings::settings;
+pub use twin::{Pace, RotorStation, Twin, rotor, serve};
+
+#[cfg(test)]
+mod tests;

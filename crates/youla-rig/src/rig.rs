@@ -1,0 +1,172 @@
+//! Requests to a machine over UDP, and its rows.
+
+use crate::{Description, Error, Recorder, Result};
+use std::collections::VecDeque;
+use std::net::UdpSocket;
+use std::time::{Duration, Instant};
+use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request};
+use youla_rt::{Checksum, Status};
+
+/// The reply to a request.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Answer {
+    /// What became of it.
+    pub outcome: Outcome,
+    /// Status of the loop after it.
+    pub status: Status,
+    /// Number of the sample that came next.
+    pub sample: u64,
+    /// The description, or coefficients of Q.
+    pub data: Vec<u8>,
+}
+
+/// A connection to a machine.
+pub struct Rig {
+    socket: UdpSocket,
+    address: String,
+    description: Description,
+    schema: u32,
+    sequence: u32,
+    /// Datagrams that came while a reply was awaited.
+    inbox: VecDeque<Vec<u8>>,
+}
+
+const PATIENCE: Duration = Duration::from_millis(200);
+const ATTEMPTS: usize = 10;
+
+impl Rig {
+    /// Connects to `udp://HOST:PORT` and asks for the description.
+    ///
+    /// # Errors
+    /// [`Error::Address`], [`Error::Silent`], [`Error::Description`].
+    pub fn connect(address: &str) -> Result<Self> {
+        let wrong = |source| Error::Address { address: address.to_owned(), source };
+        let place = address.strip_prefix("udp://").unwrap_or(address);
+        let socket = UdpSocket::bind(("0.0.0.0", 0)).map_err(wrong)?;
+        socket.connect(place).map_err(wrong)?;
+        let further = toml::Table::new();
+        let description =
+            Description { name: String::new(), sample_time: 1.0, inputs: Vec::new(), outputs: Vec::new(), further };
+        let mut rig =
+            Rig { socket, address: address.to_owned(), description, schema: 0, sequence: 0, inbox: VecDeque::new() };
+        let answer = rig.ask(&Request::Describe)?;
+        let mut schema = Checksum::new();
+        schema.append(&answer.data);
+        rig.schema = schema.value();
+        rig.description = Description::parse(&answer.data)?;
+        Ok(rig)
+    }
+
+    /// What the machine says of itself.
+    pub fn description(&self) -> &Description {
+        &self.description
+    }
+
+    /// CRC-32 of the description, which all frames carry.
+    pub fn schema(&self) -> u32 {
+        self.schema
+    }
+
+    /// Asks until there is a reply; rows that come in between are kept.
+    ///
+    /// # Errors
+    /// [`Error::Silent`], [`Error::Refused`], [`Error::Connection`].
+    pub fn ask(&mut self, request: &Request<'_>) -> Result<Answer> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let mut body = [0; 4 * LARGEST_CHUNK + 8];
+        let too_long = || Error::Description("a request is longer than a frame".into());
+        let length = request.write(&mut body).ok_or_else(too_long)?;
+        let mut bytes = [0; LARGEST_FRAME];
+        let body = body.get(..length).unwrap_or_default();
+        let frame = Frame { kind: Kind::Request, schema: self.schema, sequence: self.sequence, body };
+        let length = frame.write(&mut bytes).map_err(|_| too_long())?;
+        for _ in 0..ATTEMPTS {
+            // A machine that is not there yet refuses; the next attempt may reach it.
+            let _ = self.socket.send(bytes.get(..length).unwrap_or_default());
+            if let Some(answer) = self.await_answer()? {
+                return match answer.outcome {
+                    Outcome::Done => Ok(answer),
+                    outcome => Err(Error::Refused { request: name(request), outcome }),
+                };
+            }
+        }
+        Err(Error::Silent { address: self.address.clone() })
+    }
+
+    fn await_answer(&mut self) -> Result<Option<Answer>> {
+        let until = Instant::now() + PATIENCE;
+        while let Some(left) = until.checked_duration_since(Instant::now()) {
+            let Some(bytes) = self.datagram(left)? else { continue };
+            match answer_to(self.sequence, &bytes) {
+                Some(answer) => return Ok(Some(answer)),
+                None => self.inbox.push_back(bytes),
+            }
+        }
+        Ok(None)
+    }
+
+    /// The next datagram within a time.
+    fn datagram(&self, within: Duration) -> Result<Option<Vec<u8>>> {
+        use std::io::ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
+        self.socket.set_read_timeout(Some(within.max(Duration::from_millis(1))))?;
+        let mut bytes = [0; 2048];
+        match self.socket.recv(&mut bytes) {
+            Ok(length) => Ok(bytes.get(..length).map(<[u8]>::to_vec)),
+            Err(e) if matches!(e.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused) => Ok(None),
+            Err(e) => Err(e.into()),
+        }
+    }
+
+    /// Hands the rows that come within a time to a recorder, at least those that have come already.
+    ///
+    /// # Errors
+    /// [`Error::Connection`], [`Error::File`].
+    pub fn record(&mut self, recorder: &mut Recorder, within: Duration) -> Result<()> {
+        let until = Instant::now() + within;
+        loop {
+            while let Some(bytes) = self.inbox.pop_front() {
+                recorder.take(&bytes)?;
+            }
+            let Some(left) = until.checked_duration_since(Instant::now()) else { return Ok(()) };
+            self.inbox.extend(self.datagram(left)?);
+        }
+    }
+
+    /// Loads Q, coefficients A, B, C by rows, without switching to it.
+    ///
+    /// # Errors
+    /// As [`Rig::ask`].
+    pub fn load_q(&mut self, coefficients: &[f32]) -> Result<Answer> {
+        self.ask(&Request::BeginQ)?;
+        let bytes: Vec<u8> = coefficients.iter().flat_map(|value| value.to_le_bytes()).collect();
+        for (number, values) in bytes.chunks(4 * LARGEST_CHUNK).enumerate() {
+            let place = u16::try_from(number * LARGEST_CHUNK).unwrap_or(u16::MAX);
+            self.ask(&Request::WriteQ { place, values })?;
+        }
+        let mut checksum = Checksum::new();
+        checksum.append(&bytes);
+        self.ask(&Request::CommitQ(checksum.value()))
+    }
+}
+
+fn answer_to(sequence: u32, bytes: &[u8]) -> Option<Answer> {
+    let frame = Frame::read(bytes).ok().filter(|frame| frame.kind == Kind::Reply)?;
+    let reply = Reply::read(frame.body).filter(|reply| reply.request == sequence)?;
+    let Reply { outcome, status, sample, data, .. } = reply;
+    Some(Answer { outcome, status, sample, data: data.to_vec() })
+}
+
+fn name(request: &Request<'_>) -> &'static str {
+    match request {
+        Request::Describe => "describe",
+        Request::Alive => "alive",
+        Request::Arm => "arm",
+        Request::Start { .. } => "start the excitation",
+        Request::Stop => "stop the excitation",
+        Request::BeginQ | Request::WriteQ { .. } => "load Q",
+        Request::CommitQ(_) => "complete Q",
+        Request::SwitchQ => "switch to Q",
+        Request::ReleaseQ => "release Q",
+        Request::ReadQ { .. } => "read Q back",
+    }
+}

@@ -3,7 +3,7 @@
 use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, compare, excite, export, identify, init, paper, plot, study, subspace};
+use crate::{check, compare, excite, export, identify, init, paper, plot, rig, study, subspace};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -144,4 +144,7 @@ pub(crate) enum Command {
     /// inputs and outputs are checked, and the accuracy of the modes is predicted.
     #[command(after_help = excite::EXAMPLES)]
     Excite(Box<excite::ExciteArgs>),
+    /// Record a machine that speaks youla-link, read its status, load Q, or play such a machine.
+    #[command(subcommand)]
+    Rig(rig::RigCommand),
 }

@@ -4,7 +4,7 @@ use crate::args::{Args, Command};
 use crate::demo::demo;
 use crate::output::{Failure, Form, Progress, say, say_wrapped};
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, compare, excite, export, init, manual, paper, plot, study, subspace, table};
+use crate::{check, compare, excite, export, init, manual, paper, plot, rig, study, subspace, table};
 use clap::CommandFactory;
 use std::path::{Path, PathBuf};
 use youla_io::folder::{NumberedFolder, RunFolder};
@@ -44,6 +44,7 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
         Command::Export(args) => export::export(form, args),
         Command::Plot(args) => plot::plot(form, args),
         Command::Paper(args) => paper::reproduce(form, args),
+        Command::Rig(command) => rig::run(form, command),
         Command::Study(args) => study::study(form, args),
     }
 }

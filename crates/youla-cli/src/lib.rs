@@ -16,6 +16,7 @@ mod output;
 mod paper;
 mod plot;
 mod raster;
+mod rig;
 mod run_folder;
 mod study;
 mod subspace;

@@ -17,7 +17,7 @@ pub struct RigChannel {
 
 /// The description of a machine: TOML. Tables with other names than these, `[nominal.state_space]` and `[controller.observer]` for example,
 /// go into the run.toml of its logs.
-#[derive(Debug, Clone, PartialEq, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 pub struct Description {
     /// Its name.
     pub name: String,
@@ -27,6 +27,9 @@ pub struct Description {
     pub inputs: Vec<RigChannel>,
     /// Plant outputs y.
     pub outputs: Vec<RigChannel>,
+    /// Order of its banks of Q; absent where it takes none.
+    #[serde(default)]
+    pub q_order: Option<usize>,
     /// Whatever else it states.
     #[serde(flatten)]
     pub further: toml::Table,

@@ -17,6 +17,8 @@ pub use recorder::{LogReport, Recorder};
 pub use rig::{Answer, Rig};
 pub use settings::settings;
 pub use twin::{Pace, RotorStation, Twin, rotor, serve};
+pub use youla_link::{Outcome, Request, Source};
+pub use youla_rt::{Cause, Phase, Status, Trip};
 
 #[cfg(test)]
 mod tests;

@@ -47,6 +47,8 @@ pub struct Recorder {
     sample_time: f64,
     waiting: BTreeMap<u64, Block>,
     next: Option<u64>,
+    /// Rows of the longest frame.
+    of_frame: u64,
     trip: Option<Trip>,
     report: LogReport,
 }
@@ -68,6 +70,7 @@ impl Recorder {
             sample_time: machine.sample_time,
             waiting: BTreeMap::new(),
             next: None,
+            of_frame: 0,
             trip: None,
             report: LogReport::default(),
         })
@@ -94,7 +97,9 @@ impl Recorder {
             return Ok(());
         }
         let text = self.text(&block);
-        self.waiting.insert(block.first, text);
+        self.of_frame = self.of_frame.max(text.rows);
+        // Two frames of the same samples: the machine has started again.
+        self.report.foreign += u64::from(self.waiting.insert(block.first, text).is_some());
         self.write_in_order()
     }
 
@@ -158,10 +163,13 @@ impl Recorder {
         self.report.rows
     }
 
-    /// The sample after the last one that has come.
-    pub fn reached(&self) -> u64 {
+    /// The sample after the last one that should have come when the machine was at `sample`: rows are sent in whole frames, and the
+    /// last one is still in its hands.
+    pub fn end(&self, sample: u64) -> u64 {
         let waiting = self.waiting.last_key_value().map_or(0, |(first, block)| first + block.rows);
-        waiting.max(self.next.unwrap_or(0))
+        let reached = waiting.max(self.next.unwrap_or(0));
+        let frames = sample.saturating_sub(reached) / self.of_frame.max(1);
+        reached + frames * self.of_frame
     }
 
     /// Writes what still waits. Samples before `end` that have not come are missing.

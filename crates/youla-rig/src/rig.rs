@@ -44,9 +44,7 @@ impl Rig {
         let place = address.strip_prefix("udp://").unwrap_or(address);
         let socket = UdpSocket::bind(("0.0.0.0", 0)).map_err(wrong)?;
         socket.connect(place).map_err(wrong)?;
-        let further = toml::Table::new();
-        let description =
-            Description { name: String::new(), sample_time: 1.0, inputs: Vec::new(), outputs: Vec::new(), further };
+        let description = Description::default();
         let mut rig =
             Rig { socket, address: address.to_owned(), description, schema: 0, sequence: 0, inbox: VecDeque::new() };
         let answer = rig.ask(&Request::Describe)?;

@@ -114,6 +114,7 @@ pub type RotorStation = Station<'static, 4, 2, 2, 4>;
 
 const ROTOR: &str = r#"name = "rotor"
 sample_time = 5e-5
+q_order = 4
 inputs = [{ name = "u_h", unit = "V" }, { name = "u_v", unit = "V" }]
 outputs = [{ name = "y_h", unit = "um" }, { name = "y_v", unit = "um" }]
 

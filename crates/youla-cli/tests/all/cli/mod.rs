@@ -13,5 +13,6 @@ mod limits;
 mod mistakes;
 mod notes;
 mod plot;
+mod rig;
 mod subspace;
 mod verbs;

@@ -87,11 +87,12 @@ fn wanted(file: &DataFile, samples: usize) -> Result<Vec<[usize; 2]>> {
 
 #[cfg(test)]
 mod tests {
-    use crate::{RunRecords, RunSettings, read_records};
+    use crate::{DataCheck, RunRecords, RunSettings, check_run, read_records};
     use std::fmt::Write;
     use std::path::{Path, PathBuf};
     use youla::identify::direct::direct;
     use youla::identify::subspace::{Order, SubspaceOptions};
+    use youla_loop::check::Test;
 
     /// A folder of its own with files, removed in the end.
     struct Folder(PathBuf);
@@ -120,13 +121,17 @@ mod tests {
         }
 
         fn read(&self, data: &str) -> crate::Result<RunRecords> {
+            read_records(&Folder::settings(data)?.data, &self.0)
+        }
+
+        fn settings(data: &str) -> crate::Result<RunSettings> {
             let text = format!(
                 "name = \"test\"\n[data]\ntime_column = \"t\"\ninputs = [{{ name = \"u\" }}]\noutputs = [{{ name = \"y\" }}]\n\
                  detrend = \"none\"\n{data}\n[nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [1.0]\n\
                  denominator = [1.0, -0.5]\n[controller.state_space]\nfeedback = \"positive\"\na = []\nb = []\nc = [[]]\n\
                  d = [[0.0]]\n"
             );
-            read_records(&RunSettings::parse(&text, Path::new("run.toml"))?.data, &self.0)
+            RunSettings::parse(&text, Path::new("run.toml"))
         }
     }
 
@@ -151,6 +156,19 @@ mod tests {
         assert!((model(&cut).a()[(0, 0)] - 0.8).abs() < 1e-9);
         let refused = folder.read("estimation = [{ file = \"whole.csv\" }]").unwrap_err().to_string();
         assert!(refused.contains("row 401"), "{refused}");
+    }
+
+    /// The check sees the records of the run, and no gap where the run has none.
+    #[test]
+    fn the_check_splits_where_the_run_does() {
+        let folder = Folder::new("checked");
+        folder.write("whole.csv", hole());
+        let checked = |data: &str| check_run(&Folder::settings(data).unwrap(), &folder.0).unwrap();
+        let split = checked("gaps = \"split\"\nestimation = [{ file = \"whole.csv\" }]");
+        let rows: Vec<_> = split.records.iter().map(|r| (&r.record[..], r.rows)).collect();
+        assert_eq!(rows, [("whole-1", [1, 400]), ("whole-2", [401, 963])]);
+        let timing = |found: &DataCheck| found.findings.iter().filter(|f| f.test == Test::Timing).count();
+        assert_eq!((timing(&split), timing(&checked("estimation = [{ file = \"whole.csv\" }]"))), (0, 1));
     }
 
     #[test]

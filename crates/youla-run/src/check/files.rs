@@ -10,7 +10,8 @@ use rayon::prelude::*;
 use std::path::Path;
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-use youla_io::{ChannelSpec, CsvOptions, Format, Source, TimeSource, read, sha256};
+use youla::signal::Record;
+use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, read, sha256};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
 
 /// What all records of a check share.
@@ -87,8 +88,17 @@ fn check_file(
         csv: job.csv.clone(),
     };
     let record = job.computed.apply(&wanted, read(&source)?, 1)?;
-    let found = parts(file, label, vec![record])?;
+    let continuous = if job.time.gaps == Gaps::Split { between_gaps(job, record)? } else { vec![record] };
+    let found = parts(file, label, continuous)?;
     found.iter().map(|part| check_part(job, file, part, controller)).collect()
+}
+
+/// The stretches between the gaps of the time column, as a run uses them.
+fn between_gaps(job: &Job, record: Record) -> Result<Vec<Record>> {
+    let Some(found) = timing(record.column(TIME)?, job.time.ts, job.time.tolerance) else { return Ok(vec![record]) };
+    let starts = std::iter::once(0).chain(found.gaps.iter().map(|gap| gap.row - 1));
+    let ends = found.gaps.iter().map(|gap| gap.row - 1).chain([record.samples()]);
+    starts.zip(ends).map(|(from, to)| Ok(record.clone().trim(from, Some(to - from))?)).collect()
 }
 
 fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredController<'_>) -> Result<CheckedPart> {

@@ -56,7 +56,7 @@ pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     let job = Job {
         groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),
         computed: ComputedChannels::new(d)?,
-        time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, ..Default::default() },
+        time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, gaps: d.gaps, ..Default::default() },
         csv: d.csv.clone(),
         options: with_order(&settings.check, &settings.hansen),
         estimation: d.estimation.len(),

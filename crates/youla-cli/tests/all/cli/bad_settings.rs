@@ -69,7 +69,7 @@ fn missing_keys_and_tables() {
         (
             "[nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [0.1]\ndenominator = [1.0, -0.9]\n",
             "run.toml:1:1:",
-            "the top level lacks `nominal`",
+            "the top level lacks `nominal`, a model of the plant, which may be rough; `youla init LOG --open-loop --estimate ROWS` writes",
         ),
     ];
     for (passage, place, sentence) in cases {

@@ -88,10 +88,12 @@ impl ControllerCheck {
             return Some(finding.number("residual", self.residual).advice(advice));
         }
         if self.residual <= options.controller_caution {
-            let what = format!(
-                "the declared controller agrees with the log: it explains all but {} % of the input",
-                few(100.0 * self.residual)
-            );
+            let what = if self.residual < NO_EXCITATION {
+                "the declared controller agrees with the log to rounding".to_owned()
+            } else {
+                let left = few(100.0 * self.residual);
+                format!("the declared controller agrees with the log: it explains all but {left} % of the input")
+            };
             return Some(
                 Finding::new(Test::Controller, Severity::Note, record, what).number("residual", self.residual),
             );

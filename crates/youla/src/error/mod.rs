@@ -305,6 +305,30 @@ pub enum Error {
         /// Number of samples needed.
         needed: usize,
     },
+    /// An excitation does not repeat itself.
+    #[error(
+        "{what} is not periodic: no shift of up to {longest} samples repeats it and excites a line below the Nyquist frequency; \
+         record at least two whole periods of a whole number of samples, or estimate the response by Welch's method"
+    )]
+    NotPeriodic {
+        /// The signal.
+        what: String,
+        /// The longest period of which the record holds two.
+        longest: usize,
+    },
+    /// Experiments have different periods.
+    #[error(
+        "the excitation of experiment {experiment} has a period of {found} samples, but that of experiment 1 has {first}; \
+         use one period in all experiments, or one estimate for each"
+    )]
+    UnequalPeriods {
+        /// The experiment, counted from 1.
+        experiment: usize,
+        /// Its period in samples.
+        found: usize,
+        /// The period of experiment 1.
+        first: usize,
+    },
     /// A channel never changes, so that nothing can be learnt from it.
     #[error("{what} is constant ({value}) in every experiment")]
     ConstantChannel {
@@ -329,7 +353,7 @@ crate::error_context! {
         Diverged PoleOnBoundary NoReducedOrder NoCandidate;
     bad_input: Shape NotFinite OutOfRange SampleTimeMismatch NotSymmetric NotPositive Ports Polynomial NotStabilising
         Order Unsupported UnknownChannel DuplicateChannel NotFiniteSample InsufficientExcitation TooFewSamples
-        ConstantChannel RecordChanged Stream;
+        NotPeriodic UnequalPeriods ConstantChannel RecordChanged Stream;
 }
 
 impl Error {

@@ -1,0 +1,53 @@
+//! Noise, total variance and distortion as curves over the lines.
+
+use super::LineResponse;
+use faer::{Mat, MatRef, c64};
+
+impl LineResponse {
+    /// Variance `E |dT_ij|^2` by the noise, at each line.
+    ///
+    /// # Panics
+    /// If there is no such input or output.
+    pub fn noise_variance(&self, i: usize, j: usize) -> Vec<f64> {
+        self.variance(&self.noise, i, j)
+    }
+
+    /// Variance by noise and nonlinear distortion over experiments of random phases, at each line; `None` unless there are
+    /// more experiments than inputs.
+    ///
+    /// # Panics
+    /// If there is no such input or output.
+    pub fn total_variance(&self, i: usize, j: usize) -> Option<Vec<f64>> {
+        (!self.total.is_empty()).then(|| self.variance(&self.total, i, j))
+    }
+
+    /// Distortion level: variance by nonlinear distortion of the response from m experiments (one realisation), zero where
+    /// the total variance is not above that of the noise. Average over neighbouring lines before reading single decibels.
+    ///
+    /// # Panics
+    /// If there is no such input or output.
+    pub fn distortion_variance(&self, i: usize, j: usize) -> Option<Vec<f64>> {
+        let realisations = self.periods.len() as f64 / self.response.at(0).ncols() as f64;
+        let total = self.total_variance(i, j)?;
+        let both = total.iter().zip(self.noise_variance(i, j));
+        Some(both.map(|(total, noise)| realisations * (total - noise).max(0.0)).collect())
+    }
+
+    /// Covariance of `vec T` (column-major) by the noise at line number `k`, q m x q m.
+    ///
+    /// # Panics
+    /// If there is no line `k`.
+    pub fn noise_covariance(&self, k: usize) -> Mat<c64> {
+        kronecker(self.excitation[k].as_ref(), self.noise[k].as_ref())
+    }
+
+    fn variance(&self, period: &[Mat<c64>], i: usize, j: usize) -> Vec<f64> {
+        self.excitation.iter().zip(period).map(|(m, c)| m[(j, j)].re * c[(i, i)].re).collect()
+    }
+}
+
+/// `M^T (x) C`.
+fn kronecker(m: MatRef<c64>, c: MatRef<c64>) -> Mat<c64> {
+    let (q, inputs) = (c.nrows(), m.nrows());
+    Mat::from_fn(q * inputs, q * inputs, |a, b| m[(b / q, a / q)] * c[(a % q, b % q)])
+}

@@ -17,6 +17,7 @@ import pytest
 from conftest import loop
 
 import youla
+from youla import _tasks
 
 N = 12
 ARGUMENTS = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0}
@@ -121,6 +122,19 @@ def test_finished_replicates_are_kept(
     assert bits(again) == bits(serial)
     with pytest.raises(youla.InputError, match="holds tasks of other settings"):
         youla.bootstrap(of_small, N, seed=2, folder=folder)
+
+
+def test_a_task_whose_row_is_kept_is_not_computed_again_by_its_worker(tmp_path: Path) -> None:
+    """An engine that hands out a finished task once more, as Dask does with those of a worker that died."""
+    computed = []
+
+    def task(payload: None, item: int, index: int) -> dict[str, int]:
+        computed.append(index)
+        return {"square": item**2}
+
+    again = [_tasks.call(task, None, 3, 7, str(tmp_path)) for _ in range(2)]
+    assert again == [{"index": 7, "square": 9}] * 2
+    assert computed == [7]
 
 
 def test_a_killed_client_loses_nothing_that_was_finished(

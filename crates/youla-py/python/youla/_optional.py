@@ -14,6 +14,7 @@ _EXTRAS = {
     "pandas": "frames",
     "pyarrow": "parquet",
     "pyarrow.parquet": "parquet",
+    "scipy.linalg": "rotor",
     "scipy.signal": "control",
 }
 

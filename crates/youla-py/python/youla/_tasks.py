@@ -186,7 +186,13 @@ def _tell(progress: Progress | None, rows: dict[int, Row]) -> None:
 
 
 def call(task: Task, payload: Any, item: Any, index: int, folder: str | None) -> Row:
-    """Compute the row of one task and keep it; runs in a worker."""
+    """Compute the row of one task and keep it; runs in a worker.
+
+    Dask computes the tasks of a worker that died again, also those that had finished; their rows are in the folder.
+    """
+    finished: dict[int, Row] = {}
+    if _known(folder, index, item, finished):
+        return finished[index]
     try:
         row = {"index": index, **task(payload, item, index)}
     except Error as error:

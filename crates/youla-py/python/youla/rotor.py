@@ -1,8 +1,10 @@
-"""The trade's figures for rotors on controlled bearings.
+"""Rotors on controlled bearings: stability margins after ISO 14839-3, and models of the package ROSS.
 
 The zones of ISO 14839-3:2006, Mechanical vibration, Vibration of rotating machinery equipped with active magnetic bearings, Part 3,
 Evaluation of stability margin, Table 1: the largest magnitude of the sensitivity of each controlled axis, with all loops closed, is at
 most 3 (9.5 dB) in zone A, 4 (12 dB) in zone B, 5 (14 dB) in zone C, and above in zone D.
+
+`magnetic_loop` takes a rotor of ``ross-rotordynamics``, which ``pip install 'youla[rotor]'`` installs; the rest needs no further package.
 """
 
 from __future__ import annotations
@@ -13,8 +15,11 @@ import numpy as np
 
 from ._arrays import Array
 from ._errors import InputError, NumericalError
+from ._magnetic import MagneticLoop, magnetic_loop
 from ._model import Complex, Model
 from ._result import Run
+
+__all__ = ["LIMITS", "MagneticLoop", "Zone", "magnetic_loop", "sensitivity_zones"]
 
 #: Upper limits of the zones A, B and C.
 LIMITS = {"A": 3.0, "B": 4.0, "C": 5.0}

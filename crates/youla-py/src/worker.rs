@@ -17,6 +17,8 @@ const POLL: Duration = Duration::from_millis(50);
 /// Stack of the thread, as the main thread of a program has it.
 const STACK: usize = 8 << 20;
 
+const WITHOUT_RESULT: &str = "the computation ended without a result; please report the input as a defect of youla";
+
 /// The process that loaded the module.
 static LOADED: OnceLock<u32> = OnceLock::new();
 
@@ -79,11 +81,44 @@ pub(crate) fn run<T: Send + 'static>(
                 py.check_signals().inspect_err(|_| stop.0.store(true, Ordering::Relaxed))?
             }
             Err(RecvTimeoutError::Disconnected) => {
-                let what = "the computation ended without a result; please report the input as a defect of youla";
-                return Err(Failure::numerical(what).into());
+                return Err(Failure::numerical(WITHOUT_RESULT).into());
             }
         }
     }
+}
+
+/// Runs `work` on what the caller has lent, on a thread as [`run`] does; after an interrupt the caller waits until the thread ends.
+pub(crate) fn run_borrowed<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
+    py.detach(|| {
+        let stop = Stop::default();
+        let of_thread = &stop;
+        let (sender, receiver) = sync_channel(1);
+        let body = move || {
+            let result = if forked() { on_threads(0, || work(of_thread)) } else { work(of_thread) };
+            // Nobody waits after an interrupt.
+            let _ = sender.send(result);
+        };
+        std::thread::scope(|scope| {
+            let spawned = Builder::new().name("youla".into()).stack_size(STACK).spawn_scoped(scope, body);
+            let thread = spawned.map_err(|e| Failure::numerical(format!("no thread can be started: {e}")))?;
+            let mut interrupted = Ok(());
+            let outcome = loop {
+                match receiver.recv_timeout(POLL) {
+                    Err(RecvTimeoutError::Timeout) if interrupted.is_ok() => {
+                        interrupted = Python::attach(|py| py.check_signals());
+                        stop.0.store(interrupted.is_err(), Ordering::Relaxed);
+                    }
+                    Err(RecvTimeoutError::Timeout) => {}
+                    outcome => break outcome,
+                }
+            };
+            // A thread that ended by an interrupt has unwound.
+            let _ = thread.join();
+            interrupted?;
+            let without = |_| Failure::numerical(WITHOUT_RESULT);
+            Ok(outcome.map_err(without)??)
+        })
+    })
 }
 
 /// On a pool of so many threads; 0 for one per core.

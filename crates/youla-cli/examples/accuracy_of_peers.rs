@@ -63,7 +63,8 @@ fn bound(system: &Loop, record: &[youla::Mat<f64>; 3]) -> Result<Vec<f64>> {
     let stated = system.recommended(record, &options)?.response_deviation;
     let (p, m) = (system.plant.outputs(), system.plant.inputs());
     let variance = |hz: f64| {
-        let of = |x: usize| stated.covariance(hz, (x / m, x % m));
+        let error = stated.at(hz);
+        let of = |x: usize| error.covariance((x / m, x % m));
         (0..p * m).map(|x| of(x)[0] + of(x)[2]).sum::<f64>()
     };
     let all = shares().iter().map(|s| variance(s / system.plant.time().ts()).sqrt()).collect::<Vec<_>>();

@@ -44,12 +44,12 @@ impl Region {
     pub(crate) fn recommended(found: &Recommendation, hz: &[f64]) -> Result<Self> {
         let response = frequency_response(&found.plant, &omega(hz))?;
         let (p, m) = (found.plant.outputs(), found.plant.inputs());
-        let deviation = &found.response_deviation;
+        let errors: Vec<_> = hz.iter().map(|f| found.response_deviation.at(*f)).collect();
         let covariance =
-            Array4::from_shape_fn((hz.len(), p, m, 3), |(k, i, j, part)| deviation.covariance(hz[k], (i, j))[part]);
+            Array4::from_shape_fn((hz.len(), p, m, 3), |(k, i, j, part)| errors[k].covariance((i, j))[part]);
         let magnitude = Array4::from_shape_fn((hz.len(), p, m, 2), |(k, i, j, side)| {
             let g = response.at(k)[(i, j)];
-            let half = NORMAL * deviation.of_magnitude(g, hz[k], (i, j));
+            let half = NORMAL * errors[k].of_magnitude(g, (i, j));
             if side == 0 { (g.norm() - half).max(0.0) } else { g.norm() + half }
         });
         Ok(Region { response, known: Some(Known { covariance, magnitude, ellipse: ELLIPSE }) })

@@ -6,13 +6,14 @@ use crate::matrices::{ModelOut, array, model_out};
 use crate::options::{options, settings};
 use crate::region::{Region, RegionOut, response_array};
 use crate::worker::{self, Stop};
-use numpy::{Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1};
+use numpy::{Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
+use youla::{Mat, c64};
 use youla_run::{
     Identification, Method, RunRecords, RunSettings, Stage, StageClock, StageTimes, page, read_records,
     records_in_memory, redesign_entry, redesign_of, summary, write_run,
@@ -137,6 +138,18 @@ impl Run {
     fn response<'py>(&self, py: Python<'py>, key: &str, hz: PyReadonlyArray1<'py, f64>) -> PyResult<RegionOut<'py>> {
         let hz: Vec<f64> = hz.as_array().to_vec();
         Ok(py.detach(|| self.region(key, &hz))?.out(py))
+    }
+
+    /// Standard deviation of a figure of the recommended model whose slopes in the entries of its response at a frequency are given.
+    fn deviation_along(&self, hz: f64, slopes: PyReadonlyArray2<'_, Complex64>) -> Option<f64> {
+        let found = self.found.recommended.as_ref().ok()?;
+        let view = slopes.as_array();
+        let (p, m) = (found.plant.outputs(), found.plant.inputs());
+        if view.dim() != (p, m) {
+            return None;
+        }
+        let slopes = Mat::from_fn(p, m, |i, j| c64::new(view[[i, j]].re, view[[i, j]].im));
+        Some(found.response_deviation.at(hz).along(slopes.as_ref()))
     }
 
     /// The non-parametric response of the plant where an excitation is known.

@@ -8,7 +8,7 @@ use super::response::bounds_db;
 use super::verdict::residue_at;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, ResponseError};
 use youla::lti::{Continuous, FrequencyResponse, StateSpace};
 use youla::{Mat, MatRef, c64};
 use youla_io::SystemMatrices;
@@ -263,17 +263,19 @@ pub(super) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
 /// Rows of the table of candidates.
 const MOST_CANDIDATES: usize = 12;
 
-/// The 95 % region of the response from an input to an output on the frequencies of the report.
+/// The 95 % region of the response from an input to an output, with the errors at its frequencies.
 pub(super) fn band(
-    found: &Recommendation,
+    errors: &[ResponseError],
     response: &FrequencyResponse,
-    hz: &[f64],
     (output, input): (usize, usize),
 ) -> draw::Band {
-    let (values, known) = (response.entry(output, input), &found.response_deviation);
-    let half = |g: &c64, f: &f64| LEVEL.1 * known.of_magnitude(*g, *f, (output, input));
-    let (low_db, high_db) =
-        bounds_db(values.iter().zip(hz).map(|(g, f)| [g.norm() - half(g, f), g.norm() + half(g, f)]));
+    let half = |g: &c64, error: &ResponseError| LEVEL.1 * error.of_magnitude(*g, (output, input));
+    let bounds = response
+        .entry(output, input)
+        .into_iter()
+        .zip(errors)
+        .map(|(g, e)| [g.norm() - half(&g, e), g.norm() + half(&g, e)]);
+    let (low_db, high_db) = bounds_db(bounds);
     draw::Band {
         method: Method::Likelihood.key().into(),
         output,
@@ -281,6 +283,6 @@ pub(super) fn band(
         level: LEVEL.0,
         low_db,
         high_db,
-        region: hz.iter().flat_map(|f| known.covariance(*f, (output, input)).map(|v| ELLIPSE * v)).collect(),
+        region: errors.iter().flat_map(|e| e.covariance((output, input)).map(|v| ELLIPSE * v)).collect(),
     }
 }

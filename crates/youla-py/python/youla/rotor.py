@@ -63,9 +63,8 @@ def sensitivity_zones(run: Run) -> tuple[Zone, ...]:
     """Evaluate the stability margin of each axis of the identified loop.
 
     The sensitivity is that at the sensors, ``S = (I + G K)^-1``, with the recommended model G and the controller K of the run.
-    Its diagonal entry i is what an analyser measures at axis i with all loops closed. The interval comes from the standard
-    deviations of G: to first order ``d(1 / S_ii) = sum over a, b of (S_ia / S_ii) dG_ab (K S)_bi / S_ii``, entries of G taken as
-    independent of each other; for one axis the expression is exact.
+    Its diagonal entry i is what an analyser measures at axis i with all loops closed. The interval comes from the covariance
+    of all entries of G at the peak: to first order ``d(1 / S_ii) = sum over a, b of (S_ia / S_ii) dG_ab (K S)_bi / S_ii``.
 
     Parameters
     ----------
@@ -142,13 +141,10 @@ def _sensitivity(plant: Model, controller: Model, omega: Array) -> tuple[Complex
 
 def _deviation(run: Run, plant: Model, controller: Model, omega: float, i: int) -> float:
     """Standard deviation of 1 / |S_ii|."""
-    known = run.frequency_response([omega]).covariance
-    if known is None:
-        raise NumericalError("the recommended model states no deviations of its response")
     s, ks = (x[0] for x in _sensitivity(plant, controller, np.array([omega])))
-    weights = np.outer(s[i, :], ks[:, i]) / s[i, i] ** 2
+    slopes = np.outer(s[i, :], ks[:, i]) / s[i, i] ** 2
     # Along 1 / S_ii, whose magnitude is wanted.
-    weights = weights * s[i, i] / abs(s[i, i])
-    rr, ri, ii = np.moveaxis(known[0], -1, 0)
-    variance = weights.real**2 * rr - 2 * weights.real * weights.imag * ri + weights.imag**2 * ii
-    return float(np.sqrt(max(variance.sum(), 0.0)))
+    found = run._native.deviation_along(omega / (2 * np.pi), slopes * (s[i, i] / abs(s[i, i])))
+    if found is None:
+        raise NumericalError("the recommended model states no deviations of its response")
+    return found

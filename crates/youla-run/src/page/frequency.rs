@@ -41,7 +41,8 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
 fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<draw::Band> {
     let Ok(model) = &found.recommended else { return Vec::new() };
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
-    own.flat_map(|(_, r)| ports(found).map(move |port| recommended::band(model, r, &found.hz, port))).collect()
+    let errors: Vec<_> = found.hz.iter().map(|f| model.response_deviation.at(*f)).collect();
+    own.flat_map(|(_, r)| ports(found).map(|port| recommended::band(&errors, r, port)).collect::<Vec<_>>()).collect()
 }
 
 fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> draw::Band {

@@ -6,6 +6,7 @@ use super::model::Model;
 use faer::{Mat, c64};
 
 /// The local coordinates of a model.
+#[derive(Debug, Clone)]
 pub(crate) struct Chart {
     /// Per block: entries of A, B and C by directions, column by column.
     pub(crate) directions: Vec<Mat<f64>>,

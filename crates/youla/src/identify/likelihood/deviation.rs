@@ -9,9 +9,13 @@
 use super::chart::Chart;
 use super::linearise::linearise;
 use super::missed::Missed;
+use super::model::Model;
 use super::problem::{Choice, Solution};
 use super::spectra::Spectra;
 use faer::{Mat, c64};
+
+/// Rivals of less weight are left out.
+const LEAST_WEIGHT: f64 = 1e-12;
 
 /// Inverse of the leading triangle of `[R r; 0 *]` with columns of unit length, and these lengths; directions that the record
 /// does not determine are left large.
@@ -43,67 +47,84 @@ fn geometric(from: f64, to: f64, points: usize) -> Vec<f64> {
 
 /// Response of a choice with its dead times, scaled channels.
 pub(crate) fn response(choice: &Choice, share: f64) -> Vec<c64> {
+    delayed(&choice.found.point.model, &choice.delays, share)
+}
+
+fn delayed(model: &Model, delays: &[usize], share: f64) -> Vec<c64> {
     let z = c64::cis(std::f64::consts::TAU * share);
-    let mut g = choice.found.point.model.response(z);
-    let m = choice.delays.len();
-    for (k, g) in g.iter_mut().enumerate() {
-        *g *= z.conj().powu(choice.delays[k % m] as u32);
-    }
-    g
+    let phases = phases(delays, z);
+    model.response(z).into_iter().enumerate().map(|(k, g)| g * phases[k % delays.len()]).collect()
 }
 
-/// What the records say beyond their information.
-pub(crate) struct More<'a> {
-    /// Factor of the variance of the parameters: their scatter over pieces of the records.
-    pub(crate) scatter: f64,
+/// Factor of each input by its dead time.
+fn phases(delays: &[usize], z: c64) -> Vec<c64> {
+    delays.iter().map(|delay| z.conj().powu(*delay as u32)).collect()
+}
+
+/// The error of the response in independent directions, scaled channels.
+#[derive(Debug, Clone)]
+pub(crate) struct Directions {
+    model: Model,
+    delays: Vec<usize>,
+    chart: Chart,
+    /// Columns are independent errors of the parameters.
+    root: Mat<f64>,
+    /// Models that the record does not distinguish, with the roots of their weights.
+    rivals: Vec<(Model, Vec<usize>, f64)>,
     /// The error that the excitation shows.
-    pub(crate) missed: Option<&'a Missed>,
+    missed: Option<Missed>,
 }
 
-/// Second moments of the error e of an entry of G: `E |e|^2` and `E e^2`.
-#[derive(Clone, Copy)]
-pub(crate) struct Moments {
-    pub(crate) variance: f64,
-    pub(crate) pseudo_variance: c64,
-}
-
-impl Moments {
-    const ZERO: Self = Moments { variance: 0.0, pseudo_variance: c64::ZERO };
-
-    fn add(&mut self, error: c64, weight: f64) {
-        self.variance += weight * error.norm_sqr();
-        self.pseudo_variance += error * error * weight;
+impl Directions {
+    /// `scatter` is the factor of the variance of the parameters by their scatter over pieces of the records.
+    pub(crate) fn new(spectra: &Spectra, solution: &Solution, scatter: f64, missed: Option<Missed>) -> Self {
+        let found = &solution.chosen.found;
+        let chart = Chart::new(&found.point.model, found.feedthrough);
+        let linearised = linearise(spectra, &found.point, &chart, &found.noise);
+        let root = inverse_root(&linearised.factor, chart.parameters()) * faer::Scale(scatter.sqrt());
+        let least = solution.rivals.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
+        let weights: Vec<f64> = solution.rivals.iter().map(|c| (-0.5 * (c.criterion - least)).exp()).collect();
+        let total: f64 = weights.iter().sum::<f64>().max(1e-300);
+        let weighed = solution.rivals.iter().zip(weights).filter(|(_, weight)| *weight > LEAST_WEIGHT * total);
+        let rival =
+            |(c, weight): (&Choice, f64)| (c.found.point.model.clone(), c.delays.clone(), (weight / total).sqrt());
+        let (model, delays) = (found.point.model.clone(), solution.chosen.delays.clone());
+        Directions { model, delays, chart, root, rivals: weighed.map(rival).collect(), missed }
     }
-}
 
-/// Moments of the error of each entry of G (row by row) at each frequency, scaled channels.
-pub(crate) fn deviations(spectra: &Spectra, solution: &Solution, shares: &[f64], more: &More<'_>) -> Vec<Vec<Moments>> {
-    let found = &solution.chosen.found;
-    let chart = Chart::new(&found.point.model, found.feedthrough);
-    let linearised = linearise(spectra, &found.point, &chart, &found.noise);
-    let root = inverse_root(&linearised.factor, chart.parameters());
-    let least = solution.rivals.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
-    let weights: Vec<f64> = solution.rivals.iter().map(|c| (-0.5 * (c.criterion - least)).exp()).collect();
-    let total: f64 = weights.iter().sum::<f64>().max(1e-300);
-    let at = |share: &f64| {
+    /// The error that the excitation shows.
+    pub(crate) fn missed(&self) -> Option<&Missed> {
+        self.missed.as_ref()
+    }
+
+    /// Errors of the entries of G, row by row, in independent directions of unit variance, column by column.
+    pub(crate) fn at(&self, share: f64) -> Mat<c64> {
         let z = c64::cis(std::f64::consts::TAU * share);
-        let slopes = chart.response_slopes(&found.point.model, z);
-        let g = response(&solution.chosen, *share);
-        let along =
-            |i: usize, k: usize| (0..root.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * root[(j, k)]);
-        let mut moments = vec![Moments::ZERO; slopes.nrows()];
-        for (i, of) in moments.iter_mut().enumerate() {
-            (0..root.ncols()).for_each(|k| of.add(along(i, k), more.scatter));
-        }
-        for (rival, weight) in solution.rivals.iter().zip(&weights) {
-            for ((of, other), g) in moments.iter_mut().zip(response(rival, *share)).zip(&g) {
-                of.add(other - g, weight / total);
+        let (entries, m) = (self.model.inputs * self.model.outputs, self.model.inputs);
+        let (slopes, phases) = (self.chart.response_slopes(&self.model, z), phases(&self.delays, z));
+        let g = delayed(&self.model, &self.delays, share);
+        let parameters = self.root.ncols();
+        let others: Vec<_> = self.rivals.iter().map(|(model, delays, _)| delayed(model, delays, share)).collect();
+        let missed = self.missed.as_ref().map_or_else(Vec::new, |missed| missed.at_most(share, entries));
+        let of_rivals = parameters + others.len();
+        Mat::from_fn(entries, of_rivals + 2 * missed.len(), |i, k| match k {
+            k if k < parameters => {
+                let along = |sum: c64, j: usize| sum + slopes[(i, j)] * self.root[(j, k)];
+                (0..self.root.nrows()).fold(c64::ZERO, along) * phases[i % m]
             }
-        }
-        // What the excitation shows of the error is its size, not its phase.
-        let missed = more.missed.map_or_else(Vec::new, |missed| missed.at_most(*share, moments.len()));
-        moments.iter_mut().zip(missed).for_each(|(of, m)| of.variance += m);
-        moments
-    };
-    shares.iter().map(at).collect()
+            k if k < of_rivals => (others[k - parameters][i] - g[i]) * self.rivals[k - parameters].2,
+            // What the excitation shows of the error is its size, not its phase.
+            k if (k - of_rivals) / 2 == i => {
+                let size = (0.5 * missed[i]).max(0.0).sqrt();
+                if (k - of_rivals) % 2 == 0 { c64::new(size, 0.0) } else { c64::new(0.0, size) }
+            }
+            _ => c64::ZERO,
+        })
+    }
+
+    /// Mean square of the error of each entry.
+    pub(crate) fn variances(&self, share: f64) -> Vec<f64> {
+        let errors = self.at(share);
+        (0..errors.nrows()).map(|i| (0..errors.ncols()).map(|k| errors[(i, k)].norm_sqr()).sum()).collect()
+    }
 }

@@ -33,6 +33,7 @@ struct Sums {
 }
 
 /// The error of a band.
+#[derive(Debug, Clone)]
 struct Band {
     share: f64,
     /// `|Delta G|^2` less its variance, entry by entry.
@@ -42,6 +43,7 @@ struct Band {
 }
 
 /// The error of the model beyond what noise explains.
+#[derive(Debug, Clone)]
 pub(crate) struct Missed {
     bands: Vec<Band>,
     /// By how many standard deviations the errors of all bands exceed chance.

@@ -44,6 +44,7 @@ mod problem;
 mod recommendation;
 mod residual;
 mod resize;
+mod response_deviation;
 mod rows;
 mod search;
 mod solve;
@@ -59,12 +60,13 @@ pub use super::subspace::Experiment;
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use mode_estimates::ModeEstimate;
 pub use options::LikelihoodOptions;
-pub use recommendation::{Candidate, Evidence, Predictor, Recommendation, ResponseDeviation};
+pub use recommendation::{Candidate, Evidence, Predictor, Recommendation};
+pub use response_deviation::{ResponseDeviation, ResponseError};
 
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
-use crate::{Error, Mat, MatRef, Result};
-use deviation::{Moments, More};
+use crate::{Error, MatRef, Result};
+use deviation::Directions;
 use problem::Problem;
 use spectra::Sizes;
 use trust::Parts;
@@ -123,18 +125,18 @@ pub fn recommend(
     let parts = Parts::new(&problem, &solution, verification);
     let excitation = known.and_then(LoopKnowledge::excitation);
     let missed = excitation.map(|x| missed::missed(&spectra, choice, &x, problem.skip));
-    let more = More { scatter: parts.scatter, missed: missed.as_ref() };
-    let deviations = deviation::deviations(&spectra, &solution, &shares, &more);
-    let mut evidence = trust::of_model(&spectra, &solution, &shares[slow.len()..], &deviations[slow.len()..]);
+    let directions = Directions::new(&spectra, &solution, parts.scatter, missed);
+    let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
+    let mut evidence = trust::of_model(&spectra, &solution, &shares[slow.len()..], &variances[slow.len()..]);
     evidence.extend(parts.evidence(&solution));
-    evidence.extend(trust::of_loop(&spectra, &solution, known, missed.as_ref()));
+    evidence.extend(trust::of_loop(&spectra, &solution, known, directions.missed()));
     let plant = physical::plant(choice, &problem.sizes, time)?;
     Ok(Recommendation {
         predictor: innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
         plant,
         dead_time: choice.delays.clone(),
         order: choice.order(),
-        response_deviation: response_deviation(&problem.sizes, &shares, &deviations, time),
+        response_deviation: ResponseDeviation::new(problem.sizes.clone(), time, (&shares, &variances), directions),
         modes: mode_estimates::modes(&spectra, choice, time),
         candidates,
         evidence,
@@ -211,20 +213,4 @@ fn problem<'a>(
         dead_time: options.dead_time.clone(),
         largest_order: options.largest_order,
     })
-}
-
-fn response_deviation(sizes: &Sizes, shares: &[f64], deviations: &[Vec<Moments>], time: Discrete) -> ResponseDeviation {
-    let (m, p) = (sizes.u.len(), sizes.y.len());
-    let unit = |i: usize, j: usize| sizes.y[i] / sizes.u[j];
-    ResponseDeviation {
-        hz: shares.iter().map(|share| share / time.ts()).collect(),
-        absolute: deviations
-            .iter()
-            .map(|of| Mat::from_fn(p, m, |i, j| of[i * m + j].variance.sqrt() * unit(i, j)))
-            .collect(),
-        pseudo_variance: deviations
-            .iter()
-            .map(|of| Mat::from_fn(p, m, |i, j| of[i * m + j].pseudo_variance * unit(i, j).powi(2)))
-            .collect(),
-    }
 }

@@ -1,9 +1,9 @@
 //! The recommended model with what it rests on.
 
 use super::mode_estimates::ModeEstimate;
+use super::response_deviation::ResponseDeviation;
 use crate::Mat;
 use crate::lti::{Discrete, StateSpace};
-use faer::c64;
 
 /// The model that the records support, with its evidence.
 #[derive(Debug, Clone)]
@@ -35,48 +35,6 @@ impl Recommendation {
     /// The questions whose figures are beyond their limits.
     pub fn reasons(&self) -> Vec<String> {
         self.evidence.iter().filter(|e| !e.holds()).map(Evidence::to_string).collect()
-    }
-}
-
-/// Standard deviations of the frequency response.
-#[derive(Debug, Clone)]
-pub struct ResponseDeviation {
-    /// Frequencies, Hz.
-    pub hz: Vec<f64>,
-    /// Root mean square of the complex error of each entry, p x m, one matrix per frequency, physical units.
-    pub absolute: Vec<Mat<f64>>,
-    /// Mean of the square of the complex error, p x m, physical units squared: zero where the error has no preferred phase. Half of the
-    /// sum and half of the difference of `absolute^2` and its real part are the variances of real and imaginary part.
-    pub pseudo_variance: Vec<Mat<c64>>,
-}
-
-impl ResponseDeviation {
-    /// Covariance `[re re, re im, im im]` of the error of an entry at the frequency `hz`: between the frequencies linear in log f,
-    /// constant beyond them.
-    pub fn covariance(&self, hz: f64, (output, input): (usize, usize)) -> [f64; 3] {
-        let at = |k: usize| {
-            let (variance, pseudo) =
-                (self.absolute[k][(output, input)].powi(2), self.pseudo_variance[k][(output, input)]);
-            [0.5 * (variance + pseudo.re), 0.5 * pseudo.im, 0.5 * (variance - pseudo.re)]
-        };
-        let above = self.hz.partition_point(|f| *f < hz);
-        match (above, self.hz.len()) {
-            (_, 0) => [f64::NAN; 3],
-            (0, _) => at(0),
-            (k, count) if k == count => at(count - 1),
-            (k, _) => {
-                let share = (hz / self.hz[k - 1]).ln() / (self.hz[k] / self.hz[k - 1]).ln();
-                let (low, high) = (at(k - 1), at(k));
-                std::array::from_fn(|c| low[c] + share * (high[c] - low[c]))
-            }
-        }
-    }
-
-    /// Standard deviation of the magnitude of an entry with the response `g` at the frequency `hz`, to first order.
-    pub fn of_magnitude(&self, g: c64, hz: f64, entry: (usize, usize)) -> f64 {
-        let [rr, ri, ii] = self.covariance(hz, entry);
-        let (re, im) = if g.norm() > 0.0 { (g.re / g.norm(), g.im / g.norm()) } else { (1.0, 0.0) };
-        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
     }
 }
 

@@ -16,7 +16,7 @@ pub(crate) use loop_evidence::of_loop;
 pub(crate) use parts::Parts;
 
 use super::Evidence;
-use super::deviation::{Moments, response};
+use super::deviation::response;
 use super::problem::Solution;
 use super::spectra::Spectra;
 use faer::c64;
@@ -33,20 +33,20 @@ pub(crate) fn of_model(
     spectra: &Spectra,
     solution: &Solution,
     shares: &[f64],
-    deviations: &[Vec<Moments>],
+    variances: &[Vec<f64>],
 ) -> Vec<Evidence> {
     let responses: Vec<_> = shares.iter().map(|s| response(&solution.chosen, *s)).collect();
-    vec![accuracy(&responses, deviations), nonlinear::nonlinear(spectra, solution)]
+    vec![accuracy(&responses, variances), nonlinear::nonlinear(spectra, solution)]
 }
 
 /// Stated deviation against the response, median over the frequencies.
-fn accuracy(responses: &[Vec<c64>], deviations: &[Vec<Moments>]) -> Evidence {
+fn accuracy(responses: &[Vec<c64>], variances: &[Vec<f64>]) -> Evidence {
     let mut shares: Vec<f64> = responses
         .iter()
-        .zip(deviations)
+        .zip(variances)
         .map(|(g, s)| {
             let size = g.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
-            s.iter().map(|of| of.variance).sum::<f64>().sqrt() / size.max(1e-300)
+            s.iter().sum::<f64>().sqrt() / size.max(1e-300)
         })
         .collect();
     shares.sort_by(f64::total_cmp);

@@ -123,9 +123,9 @@ fn head(found: &DataCheck) -> String {
         let samples = r.rows[1] + 1 - r.rows[0];
         // The median step of a time column has digits of rounding.
         let ts = (r.sample_time * 1e12).round() / 1e12;
-        let length = samples as f64 * r.sample_time;
+        let length = (samples as f64 * r.sample_time * 1e4).round() / 1e4;
         let row =
-            format!("rows {} to {}: {samples} samples, sample time {ts} s, length {length:.4} s", r.rows[0], r.rows[1]);
+            format!("rows {} to {}: {samples} samples, sample time {ts} s, length {length} s", r.rows[0], r.rows[1]);
         text += &format!("{}, {row}\n", r.record);
     }
     if found.records.len() > MOST {

@@ -14,8 +14,10 @@ pub(super) fn only(mut parts: Vec<Record>) -> Result<Record> {
     Ok(parts.remove(0))
 }
 
-/// Largest magnitude of a value; the squares and sums of larger ones overflow.
+/// Largest magnitude of a value, and the least one of the largest value of a channel; sums and products of squares of larger ones
+/// overflow, of smaller ones vanish.
 const LARGEST: f64 = 1e100;
+const LEAST: f64 = 1e-100;
 
 /// The records, one for each part without gaps, of columns of equal length.
 pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>], clock: Clock) -> Result<Vec<Record>> {
@@ -32,6 +34,12 @@ pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>],
             let must = "at most 1e100 in magnitude; check its unit and the type of the numbers in the file";
             return Err(Error::Method(youla::Error::OutOfRange { what, value: column[row], must }));
         }
+        let largest = column.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        if largest > 0.0 && largest < LEAST {
+            let what = format!("{what}: the largest value of channel {:?}", channel.name);
+            let must = "at least 1e-100 in magnitude, or zero; check its unit and the type of the numbers in the file";
+            return Err(Error::Method(youla::Error::OutOfRange { what, value: largest, must }));
+        }
     }
     let ends = clock.parts.iter().skip(1).map(|part| part.0).chain([samples]);
     let part = |(&(from, start), to): (&(usize, f64), usize)| {
@@ -42,4 +50,23 @@ pub(super) fn assemble(what: &str, channels: Vec<Channel>, columns: &[Vec<f64>],
         Ok(Record::new(what, channels.clone(), data, clock.time)?.starting_at(start)?)
     };
     clock.parts.iter().zip(ends).map(part).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::time::TimeSource;
+
+    /// Such values come from a wrong type of numbers; a search on them did not converge "after 0 iterations".
+    #[test]
+    fn channels_of_denormal_numbers_are_refused() {
+        let clock = || TimeSource::ts(1.0).resolve("log", None).unwrap();
+        let of = |v: f64| assemble("log", vec![Channel::new("y", "")], &[vec![v, -v, 0.0]], clock());
+        let error = of(1e-310).unwrap_err().to_string();
+        assert!(
+            error.starts_with("log: the largest value of channel \"y\" is 1e-310, but must be at least 1e-100"),
+            "{error}"
+        );
+        assert!(of(0.0).is_ok() && of(1e-99).is_ok());
+    }
 }

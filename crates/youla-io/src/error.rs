@@ -188,6 +188,18 @@ pub enum Error {
         /// The sample time in seconds.
         ts: f64,
     },
+    /// The name of the time column states another unit than the second.
+    #[error(
+        "the time column {column:?} is in {unit} by its name, but times are read in seconds; leave it out and state the sample time in seconds (sample_time in [data], --sample-time), or make seconds of it: time_column = \"seconds\" and, in [data.computed], seconds = \"'{column}' / {per_second:e}\""
+    )]
+    TimeUnit {
+        /// The name of the column.
+        column: String,
+        /// The unit.
+        unit: &'static str,
+        /// How many of them are a second.
+        per_second: f64,
+    },
     /// Neither a sample time nor a time column is declared.
     #[error(
         "{what}: the sample time is not known; state it in seconds (--sample-time, or sample_time in [data]) or name the column of the time (--time, or time_column)"
@@ -213,7 +225,7 @@ youla::error_context! {
     numerical: Json;
     bad_input: Settings OutputExists NotReplaced Unwritable FileExists NotAModel Io MissingFile NoData Cell FieldCount
         Delimiter Corrupt
-        FormatNotRead UnequalLength WrongVariable NonUniformTime SampleTimeMissing;
+        FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit SampleTimeMissing;
 }
 
 /// Where a damaged file was found to be damaged.

@@ -21,6 +21,13 @@ pub struct TimeSource {
     pub gaps: Gaps,
 }
 
+/// Words of a name that state a unit of time, and how many of it are a second.
+const UNITS: [(&[&str], &str, f64); 3] = [
+    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], "milliseconds", 1e3),
+    (&["us", "\u{b5}s", "\u{3bc}s", "usec", "usecs", "micros", "microsecond", "microseconds"], "microseconds", 1e6),
+    (&["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"], "nanoseconds", 1e9),
+];
+
 /// What to do where samples are missing, by the time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -58,12 +65,26 @@ impl TimeSource {
         Ok(self.resolve(what, Some(times))?.time)
     }
 
+    /// Refuses a time column whose name states another unit than the second, as `t_ms`, `time [ms]` and `Time(us)` do: a sample time
+    /// that is a thousand times too long would be taken in silence.
+    ///
+    /// # Errors
+    /// [`Error::TimeUnit`].
+    pub fn check_unit(&self) -> Result<()> {
+        let Some(ChannelRef::Name(column)) = &self.column else { return Ok(()) };
+        let lower = column.to_lowercase();
+        let words = || lower.split(|c: char| !c.is_alphanumeric());
+        let found = UNITS.iter().find(|(names, ..)| words().any(|word| names.contains(&word)));
+        found.map_or(Ok(()), |&(_, unit, per_second)| Err(Error::TimeUnit { column: column.clone(), unit, per_second }))
+    }
+
     /// The clock and the parts without gaps from the time column, which is there when `self.column` is set.
     ///
     /// # Errors
     /// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`] with the first bad row, [`youla::Error::SampleTimeMismatch`]
     /// where column and declaration disagree, [`youla::Error::OutOfRange`] for a bad `ts` or `tolerance`.
     pub(super) fn resolve(&self, what: &str, column: Option<&[f64]>) -> Result<Clock> {
+        self.check_unit()?;
         if !(self.tolerance >= 0.0 && self.tolerance < 1.0) {
             let what = format!("{what}: the tolerance of the time column");
             return Err(Error::Method(youla::Error::OutOfRange {
@@ -196,6 +217,21 @@ mod tests {
         }
         let third = TimeSource::default().resolve("t", Some(&times(1000, 1.0 / 3.0))).unwrap().time.ts();
         assert!((third - 1.0 / 3.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_column_that_is_named_in_milliseconds_is_refused() {
+        let of = |name: &str| TimeSource::column(ChannelRef::Name(name.into())).resolve("log", Some(&times(100, 0.5)));
+        for (name, unit) in [
+            ("t_ms", "milliseconds"),
+            ("Time [ms]", "milliseconds"),
+            ("time(\u{b5}s)", "microseconds"),
+            ("t/ns", "nanoseconds"),
+        ] {
+            let error = of(name).unwrap_err().to_string();
+            assert!(error.contains(unit) && error.contains("sample_time in [data]"), "{error}");
+        }
+        assert!(["t", "time", "t_s", "systems", "Time [s]"].iter().all(|name| of(name).is_ok()));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::failure::Failure;
 use crate::logs::Log;
 use crate::worker::{self, Stop};
 use faer::MatMut;
-use numpy::ndarray::{ArrayView2, s};
+use numpy::ndarray::{ArrayView2, Axis, Slice};
 use pyo3::prelude::*;
 use youla::Error;
 use youla::identify::subspace::{SubspaceModel, SubspaceOptions, subspace_stream};
@@ -58,7 +58,8 @@ impl SampleStream for ArrayStream<'_> {
     fn read(&mut self, mut rows: MatMut<'_, f64>) -> youla::Result<usize> {
         self.stop.announce();
         let count = rows.nrows().min(self.rows.nrows() - self.next);
-        for (k, row) in self.rows.slice(s![self.next..self.next + count, ..]).rows().into_iter().enumerate() {
+        let piece = self.rows.slice_axis(Axis(0), Slice::from(self.next..self.next + count));
+        for (k, row) in piece.rows().into_iter().enumerate() {
             for (j, &(channel, column, mean)) in self.channels.iter().enumerate() {
                 let value = row[column];
                 if !value.is_finite() {

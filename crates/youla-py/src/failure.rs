@@ -42,6 +42,9 @@ impl From<youla_io::Error> for Failure {
     fn from(error: youla_io::Error) -> Self {
         let message = match &error {
             youla_io::Error::Settings { path, problem, .. } if path == Path::new(OPTIONS) => problem.clone(),
+            youla_io::Error::Unwritable { path, source } => {
+                format!("{}: results cannot be written there ({source}); choose another place", path.display())
+            }
             other => other.to_string(),
         };
         Failure { kind: error.kind(), message }

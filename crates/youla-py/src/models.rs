@@ -103,7 +103,7 @@ pub(crate) fn reduce<'py>(
 ) -> PyResult<Reduced<'py>> {
     let model = model_in(&model)?;
     let found = worker::run(py, false, move |_| {
-        let chosen = ReductionOptions { output_scale, ..options(&chosen)? };
+        let chosen = ReductionOptions { output_scale, ..options(&chosen, "reduction")? };
         Ok(reduced(&model, &chosen)?)
     })?;
     Ok((model_out(py, &found.model), found.hankel.clone(), found.error_bound))

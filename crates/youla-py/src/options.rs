@@ -16,7 +16,7 @@ pub(crate) fn settings(json: &str) -> Result<RunSettings> {
     Ok(RunSettings::parse(&as_toml(json)?, Path::new(OPTIONS))?)
 }
 
-/// A struct of options.
-pub(crate) fn options<T: DeserializeOwned>(json: &str) -> Result<T> {
-    Ok(youla_io::toml_file::parse(&as_toml(json)?, Path::new(OPTIONS))?)
+/// A struct of options, as the table `table` of run.toml would hold them.
+pub(crate) fn options<T: DeserializeOwned>(json: &str, table: &str) -> Result<T> {
+    Ok(youla_run::parse_table(&as_toml(json)?, Path::new(OPTIONS), table)?)
 }

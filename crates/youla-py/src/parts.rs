@@ -84,7 +84,7 @@ type ExcitationOut<'py> = (Bound<'py, PyArray2<f64>>, f64, String);
 /// An excitation for the loop of the nominal model; `port` is `input` or `alpha`.
 #[pyfunction]
 pub(crate) fn excite<'py>(py: Python<'py>, chosen: &str, choices: &str, port: &str) -> PyResult<ExcitationOut<'py>> {
-    let (chosen, choices) = (settings(chosen)?, options::<ExciteOptions>(choices)?);
+    let (chosen, choices) = (settings(chosen)?, options::<ExciteOptions>(choices, "excite")?);
     let port = match port {
         "input" => ExcitationPort::Input,
         "alpha" => ExcitationPort::Alpha,

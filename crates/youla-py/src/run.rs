@@ -209,7 +209,7 @@ impl Run {
     /// A new controller: what it promises as JSON, and its matrices (positive feedback).
     fn redesign<'py>(&self, py: Python<'py>, chosen: String) -> PyResult<(String, ModelOut<'py>)> {
         let found = self.found.clone();
-        let new = worker::run(py, false, move |_| Ok(redesign_of(&found, &options(&chosen)?)?))?;
+        let new = worker::run(py, false, move |_| Ok(redesign_of(&found, &options(&chosen, "redesign")?)?))?;
         let promised = serde_json::to_string(&redesign_entry(&new)).map_err(Failure::from)?;
         Ok((promised, model_out(py, &new.controller.system)))
     }

@@ -53,6 +53,7 @@ fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     environment.add_filter("significant", |value: f64| with_minus(significant(value)));
     environment.add_filter("two_digits", |value: f64| with_minus(digits(value, 2)));
     environment.add_filter("printed", with_minus);
+    environment.add_filter("sentence", with_minus_signs);
     environment.add_filter("unit", |unit: String| pretty_unit(&unit));
     environment.add_filter("magnitude", |pole: Vec<f64>| pole.iter().fold(0.0_f64, |size, part| size.hypot(*part)));
     environment.add_template("page.html", FRAME)?;
@@ -79,7 +80,32 @@ fn digits(value: f64, count: i32) -> String {
     }
 }
 
+/// A text with minus signs before its numbers; hyphens of words and ranges stay.
+fn with_minus_signs(text: String) -> String {
+    let chars: Vec<char> = text.chars().collect();
+    let negative = |k: usize| {
+        let number = chars.get(k + 1).is_some_and(char::is_ascii_digit);
+        let exponent = k > 1 && chars[k - 1] == 'e' && chars[k - 2].is_ascii_digit();
+        number && (exponent || k == 0 || !(chars[k - 1].is_alphanumeric() || "-_/.)]".contains(chars[k - 1])))
+    };
+    chars.iter().enumerate().map(|(k, c)| if *c == '-' && negative(k) { '\u{2212}' } else { *c }).collect()
+}
+
 /// Numbers in tables have a minus sign as wide as a digit.
 pub fn with_minus(number: String) -> String {
     number.replace('-', "\u{2212}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_minus_signs;
+
+    #[test]
+    fn numbers_have_minus_signs_and_words_keep_their_hyphens() {
+        let text = with_minus_signs("fit -3.5 % (-1 dB), 2e-5, closed-loop run-001, 10-20 Hz, [-1, -2]".into());
+        assert_eq!(
+            text,
+            "fit \u{2212}3.5 % (\u{2212}1 dB), 2e\u{2212}5, closed-loop run-001, 10-20 Hz, [\u{2212}1, \u{2212}2]"
+        );
+    }
 }

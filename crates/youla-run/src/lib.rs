@@ -93,7 +93,7 @@ pub use settings::{
     AlternativeStructure, CertificateSettings, ControllerSettings, DataFile, DataSettings, DeviationSettings,
     Discretisation, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold,
     IdealPid, NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
-    VerificationSettings,
+    VerificationSettings, parse_table,
 };
 pub use signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stage::{Stage, StageClock, StageTimes};

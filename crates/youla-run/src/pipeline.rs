@@ -29,7 +29,7 @@ use youla::ErrorKind;
 /// A method that is impossible on these records does not end the run: its field of the result holds the reason.
 ///
 /// # Errors
-/// Bad input; where no method gives a model, the reason why the scheme gives none.
+/// Bad input; where no method gives a model, the reasons of the scheme and of the recommended model.
 pub fn identify(
     settings: RunSettings,
     records: RunRecords,
@@ -66,7 +66,12 @@ pub fn identify(
     if identified.is_empty()
         && let Err(reason) = recommended
     {
-        return Err(filtered.err().or_else(|| s?.err()).unwrap_or(reason));
+        return Err(match filtered.err().or_else(|| s?.err()) {
+            Some(of_scheme) => {
+                reason.within(format!("no method gives a model; the Hansen scheme: {of_scheme}; the recommended model"))
+            }
+            None => reason,
+        });
     }
     let models = [&[&declared.nominal], &identified[..]].concat();
     let hz = grid(&settings.frequency_response, &models, records.time)?;

@@ -3,7 +3,7 @@
 use super::artefacts::{ModelFile, Provenance, SCHEMA};
 use super::folder::to_value;
 use super::records::SourceFile;
-use super::settings::{SubspaceTable, read_table};
+use super::settings::{SubspaceTable, parse_table};
 use super::subspace_details::{LongDetails, SubspaceDetails};
 use crate::{Error, Result};
 use faer::MatMut;
@@ -122,7 +122,7 @@ pub fn parse_subspace_options(text: &str, path: &std::path::Path) -> Result<Subs
         let (path, problem) = (path.to_owned(), problem.to_owned());
         Error::File(youla_io::Error::Settings { path, at: None, problem })
     };
-    read_table::<SubspaceTable>(text, path, "direct")?.try_into().map_err(refused)
+    parse_table::<SubspaceTable>(text, path, "direct")?.try_into().map_err(refused)
 }
 
 fn open(records: &LongRecords, file: &PathBuf) -> Result<(Box<dyn SampleStream>, Discrete)> {

@@ -77,6 +77,7 @@ fn check_file(
     if job.time.column.is_none() && job.time.ts.is_none() {
         return Err(Error::File(youla_io::Error::SampleTimeMissing { what: path.display().to_string() }));
     }
+    job.time.check_unit()?;
     let clock = job.time.column.iter().map(|place| ChannelSpec::from(TIME, place.clone(), ""));
     let wanted: Vec<ChannelSpec> = job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect();
     let source = Source {

@@ -178,6 +178,8 @@ fn expected(must: &str) -> String {
         "f64" => "a number".into(),
         "a string" | "a borrowed string" | "path string" => "a text in quotes".into(),
         "a sequence" => "a list".into(),
+        "struct ChannelSpec" => "a table such as { name = \"u\" }".into(),
+        "struct DataFile" => "a table such as { file = \"log.csv\" }".into(),
         "string or table" => "a text in quotes or a table".into(),
         _ if must.starts_with("struct ") || must == "a map" => "a table".into(),
         _ => must.to_owned(),

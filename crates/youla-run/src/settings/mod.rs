@@ -147,7 +147,7 @@ impl RunSettings {
     /// # Errors
     /// [`youla_io::Error::Settings`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
-        let settings: Self = read_table(text, path, "")?;
+        let settings: Self = parse_table(text, path, "")?;
         refuse(settings.problem(), path)?;
         Ok(settings)
     }
@@ -228,7 +228,7 @@ impl RunSettings {
 /// # Errors
 /// [`youla_io::Error::Settings`] with line and column: keys of earlier versions with what to write instead, misspelt ones with the
 /// nearest known key.
-pub(crate) fn read_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: &str) -> Result<T> {
+pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: &str) -> Result<T> {
     match retired(text, at) {
         Some((start, problem)) => Err(problem_at(path, text, start, problem)),
         None => toml::from_str(text).map_err(|e| explain(&e, text, path, at)),

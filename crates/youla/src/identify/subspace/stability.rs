@@ -13,6 +13,9 @@ use faer::{Mat, c64};
 /// Largest magnitude of a reflected pole, for poles on the unit circle itself.
 const LARGEST_REFLECTED: f64 = 1.0 - 1e-6;
 
+/// What is refused, and what keeps it.
+const KEPT: &str = "the estimated model (stability = \"allow\" keeps an unstable one)";
+
 /// A pole that was changed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MovedPole {
@@ -40,7 +43,7 @@ pub(super) fn apply(choice: Stability, pair: OutputPair, time: Discrete) -> Resu
     let report = inspect(&pair, time)?;
     match choice {
         _ if report.stable => Ok((pair, report)),
-        Stability::Require => Err(Error::Unstable { what: "the estimated model".into(), pole: report.worst }),
+        Stability::Require => Err(Error::Unstable { what: KEPT.into(), pole: report.worst }),
         Stability::Allow => Ok((pair, report)),
         Stability::Constrain => constrain(pair, &report, time),
     }

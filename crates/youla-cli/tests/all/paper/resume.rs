@@ -3,7 +3,7 @@
 use super::small::{LOOPS, assert_same, command, copy_of_whole, paper, whole};
 use crate::common::empty_folder;
 use std::fs;
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 use std::time::Duration;
 
 /// Runs the small paper again on a copy whose study.csv was changed, and reads what it says of it.
@@ -52,6 +52,27 @@ fn a_killed_process_leaves_what_the_next_one_completes() {
     let done = paper(&folder, &["--out", "killed", "--quiet"]);
     assert_eq!((done.code, done.stderr.as_str()), (Some(0), ""));
     LOOPS.iter().for_each(|file| assert_same(file, &folder.join("killed")));
+}
+
+/// A run that ends before the signal would exit with 0; the loops of this one take longer than its first row.
+#[cfg(unix)]
+#[test]
+fn an_interrupt_says_how_to_continue_and_exits_with_130() {
+    let folder = empty_folder("paper-interrupted");
+    let rows = || fs::read_to_string(folder.join("cut/study.csv")).map_or(0, |text| text.lines().count());
+    let many = ["--models", "2000", "--out", "cut"];
+    let mut running = Command::new(env!("CARGO_BIN_EXE_youla"));
+    running.arg("paper").args(many).current_dir(&folder).stdout(Stdio::null()).stderr(Stdio::piped());
+    let mut running = running.spawn().expect("started");
+    while rows() < 6 && running.try_wait().expect("known").is_none() {
+        std::thread::sleep(Duration::from_millis(2));
+    }
+    let signal = Command::new("kill").args(["-INT", &running.id().to_string()]).status().expect("kill");
+    assert!(signal.success());
+    let found = running.wait_with_output().expect("reaped");
+    let text = String::from_utf8_lossy(&found.stderr);
+    assert_eq!(found.status.code(), Some(130), "{text}");
+    assert!(text.contains("interrupted; finished loops are in cut"), "{text}");
 }
 
 #[test]

@@ -44,7 +44,7 @@ pub fn identify(
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
     let context =
         filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
-    let data = check_records(&settings, &records, Some(&declared.controller))?;
+    let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(&declared.controller)))?;
     let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
         let others = || rayon::join(|| structures(run, context), || direct(&records, &settings)); // (25), (17)
         rayon::join(|| recommend(run), others)

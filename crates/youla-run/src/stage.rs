@@ -13,6 +13,8 @@ pub enum Stage {
     Factor,
     /// alpha and beta (28).
     Signals,
+    /// The check of the data.
+    Check,
     /// S and the direct model.
     Identify,
     /// `G_red(S)` (29).
@@ -31,10 +33,11 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in order.
-    pub const ALL: [Stage; 10] = [
+    pub const ALL: [Stage; 11] = [
         Stage::Record,
         Stage::Factor,
         Stage::Signals,
+        Stage::Check,
         Stage::Identify,
         Stage::Reduce,
         Stage::Validate,
@@ -49,6 +52,7 @@ impl Stage {
         match self {
             Stage::Record => "record",
             Stage::Factor => "factor",
+            Stage::Check => "check",
             Stage::Signals => "signals",
             Stage::Identify => "identify",
             Stage::Reduce => "reduce",

@@ -50,8 +50,10 @@ fn summary_has_the_documented_structure() {
     assert!(summary["controller_mismatch"].as_f64().expect("a number") < 1e-9);
     assert_eq!(keys(&summary["uncertainty"]), ["blocks", "evidence", "level", "method"]);
     assert_eq!(summary["uncertainty"]["evidence"]["against_nominal"], true);
-    let stages =
-        ["certify", "factor", "identify", "record", "redesign", "reduce", "report", "signals", "validate", "write"];
+    let stages = [
+        "certify", "check", "factor", "identify", "record", "redesign", "reduce", "report", "signals", "validate",
+        "write",
+    ];
     assert_eq!(keys(&summary["seconds"]), stages);
     assert!(stages.iter().all(|s| summary["seconds"][s].as_f64().is_some_and(|t| t >= 0.0)));
 }

@@ -70,7 +70,7 @@ fn placed(data: &ReportData) -> Result<Vec<(String, Figure)>> {
     let mut placed = Vec::new();
     for kind in RunFigure::ALL {
         let place = match kind {
-            RunFigure::Bode | RunFigure::Nyquist | RunFigure::SingularValues => "frequency",
+            RunFigure::Bode | RunFigure::Nyquist | RunFigure::Levels | RunFigure::SingularValues => "frequency",
             other => other.key(),
         };
         let drawings = run_drawings(data, kind, &everything)?;

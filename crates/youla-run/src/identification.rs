@@ -16,7 +16,7 @@ use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
-use youla::signal::IndirectResponse;
+use youla::signal::{IndirectResponse, LineResponse};
 use youla_greybox::hansen_refine::Refinement;
 use youla_loop::redesign::Redesign;
 
@@ -47,6 +47,8 @@ pub struct Identification {
     pub direct_diagram: Option<Result<StabilisationDiagram>>,
     /// The non-parametric response of the plant where an excitation is known.
     pub indirect: Option<Result<IndirectResponse>>,
+    /// The plant at the lines of a periodic excitation, where it is known.
+    pub lines: Option<Result<LineResponse>>,
     /// Frequencies of the responses of all models, Hz.
     pub hz: Vec<f64>,
     /// Evidence on every model.
@@ -106,6 +108,7 @@ impl Identification {
             refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
+            refusal("lines", "response at the lines of the excitation", self.lines.as_ref()),
             refusal("redesign", "new controller", scheme.and_then(|s| s.redesign.as_ref())),
         ]
         .into_iter()

@@ -22,6 +22,7 @@ mod grey_box;
 mod grey_box_loop;
 mod identification;
 mod init;
+mod lines;
 mod method;
 mod noise_models;
 mod page;

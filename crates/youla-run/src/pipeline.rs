@@ -8,6 +8,7 @@ use super::factorise::{declared_loop, factorise_run};
 use super::grey_box::{GreyBoxRun, grey_box};
 use super::grey_box_loop::SchemeStart;
 use super::identification::{Filtered, Identification, SchemeRun, found};
+use super::lines::lines;
 use super::recommend::recommend;
 use super::records::RunRecords;
 use super::redesign::redesigned;
@@ -76,8 +77,9 @@ pub fn identify(
     let models = [&[&declared.nominal], &identified[..]].concat();
     let hz = grid(&settings.frequency_response, &models, records.time)?;
     // (26), the loop certificate and the response that rests on no model.
-    let (indirect, verdict) = clock.run(Stage::Validate, || {
-        Ok::<_, Error>((indirect(run, context.map(|c| c.signals)), verify(run, &candidates)?))
+    let ((indirect, lines), verdict) = clock.run(Stage::Validate, || {
+        let indirect = indirect(run, context.map(|c| c.signals));
+        Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))
     })?;
     let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
     let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
@@ -99,6 +101,7 @@ pub fn identify(
         direct,
         direct_diagram,
         indirect,
+        lines,
         hz,
         verdict,
     })

@@ -51,7 +51,7 @@ pub(super) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) 
     Some(indirect_response(&experiments, run.records.time, &options).map_err(Error::from))
 }
 
-fn is_constant(signals: &Mat<f64>) -> bool {
+pub(super) fn is_constant(signals: &Mat<f64>) -> bool {
     signals.col_iter().all(|c| c.iter().all(|v| *v == c[0]))
 }
 

@@ -4,7 +4,8 @@ use super::certificate::CertificateEntry;
 use super::check::DataCheckEntry;
 use super::entries::{Fits, ModeEntry, OrRefused, finite, finite_all, pairs};
 use super::grey_box::PhysicalEntry;
-use super::identification::Identification;
+use super::identification::{Identification, found};
+use super::lines::LinesEntry;
 use super::method::Method;
 use super::recommended::RecommendedEntry;
 use super::redesign::{self, RedesignEntry};
@@ -120,6 +121,9 @@ pub struct ResponsesEntry {
     /// Its coherence, `[output][frequency]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coherence: Option<Vec<Vec<Option<f64>>>>,
+    /// The plant at the lines of a periodic excitation, where one is known.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub lines: Option<LinesEntry>,
     /// `<method>_db` of each model.
     #[serde(flatten)]
     pub models: BTreeMap<String, PortCurves>,
@@ -219,6 +223,7 @@ pub fn responses(run: &Identification) -> Result<ResponsesEntry> {
     let outputs = 0..run.records.outputs.len();
     Ok(ResponsesEntry {
         indirect_db: measured.map(|m| curves(&m.response)),
+        lines: found(run.lines.as_ref()).map(LinesEntry::from),
         coherence: measured.map(|m| outputs.map(|i| finite_all(m.coherence_y.col_as_slice(i))).collect()),
         models: models.iter().map(|(method, r)| (format!("{}_db", method.key()), curves(r))).collect(),
         hz,

@@ -15,11 +15,39 @@ pub struct FrequencyResponse {
     pub models: Vec<ModelResponse>,
     /// Non-parametric responses where the external excitation is known, per output and input.
     pub indirect: Vec<Indirect>,
+    /// The plant at the lines of a periodic excitation, per output and input.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<LineLevels>,
     /// Bounds of magnitudes on the grid of the models.
     pub bands: Vec<Band>,
     /// Singular values of models with several inputs and outputs, on the grid of the models.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub singular: Vec<SingularValue>,
+}
+
+/// The plant at the lines of a periodic excitation, with the levels of noise and distortion: standard deviations in dB.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct LineLevels {
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Frequencies, Hz.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// Magnitude of the response, dB.
+    #[serde(with = "numbers::seven_digits")]
+    pub response_db: Vec<f64>,
+    /// By noise.
+    #[serde(with = "numbers::seven_digits")]
+    pub noise_db: Vec<f64>,
+    /// By noise and distortion; empty with one realisation.
+    #[serde(with = "numbers::seven_digits")]
+    pub total_db: Vec<f64>,
+    /// By distortion, NaN where the noise hides it; empty with one realisation.
+    #[serde(with = "numbers::seven_digits")]
+    pub distortion_db: Vec<f64>,
 }
 
 /// One singular value of the response of one model.

@@ -3,7 +3,7 @@
 use super::choice::Chosen;
 use super::verification::channel;
 use super::{RunFigure, axis, choice, frequency_in_both_units, key, logarithmic, span};
-use crate::data::{Band, FrequencyResponse, Indirect, ModelResponse};
+use crate::data::{Band, FrequencyResponse, Indirect, LineLevels, ModelResponse};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Panel, Region};
 use crate::pretty_unit;
 
@@ -21,12 +21,13 @@ pub(super) struct Pair<'a> {
     pub(super) models: Vec<&'a ModelResponse>,
     pub(super) indirect: Vec<&'a Indirect>,
     pub(super) bands: Vec<&'a Band>,
+    pub(super) lines: Option<&'a LineLevels>,
 }
 
 /// All pairs of a run that have a response, by output, then by input.
 pub(super) fn pairs(chosen: &Chosen, figure: RunFigure) -> Vec<Pair<'_>> {
     let Some(response) = &chosen.data.frequency else { return Vec::new() };
-    let FrequencyResponse { hz, models, indirect, bands, .. } = response;
+    let FrequencyResponse { hz, models, indirect, bands, lines, .. } = response;
     let mut places: Vec<(usize, usize)> = models.iter().map(|m| (m.output, m.input)).collect();
     places.extend(indirect.iter().map(|m| (m.output, m.input)));
     places.sort_unstable();
@@ -46,6 +47,7 @@ pub(super) fn pairs(chosen: &Chosen, figure: RunFigure) -> Vec<Pair<'_>> {
             models: models.iter().filter(|m| (m.output, m.input) == place).collect(),
             indirect: indirect.iter().filter(|m| (m.output, m.input) == place).collect(),
             bands: bands.iter().filter(|b| (b.output, b.input) == place).collect(),
+            lines: lines.iter().find(|l| (l.output, l.input) == place),
         }
     };
     places.into_iter().map(pair).collect()

@@ -8,6 +8,7 @@
 //! | `verification` | measured, predicted, residual |
 //! | `residuals` | correlations with the band of noise |
 //! | `bode`, `nyquist` | frequency responses |
+//! | `levels` | response at the lines of a periodic excitation, noise, distortion |
 //! | `singular` | singular values over frequency |
 //! | `poles`, `pole_grid` | pole map and its grid |
 //! | `reduction` | error over order |
@@ -15,6 +16,7 @@
 
 mod bode;
 mod choice;
+mod levels;
 mod nyquist;
 mod order;
 mod pole_grid;
@@ -55,6 +57,8 @@ pub enum RunFigure {
     Bode,
     /// The same as loci.
     Nyquist,
+    /// The response at the lines of a periodic excitation, with noise and distortion.
+    Levels,
     /// Singular values over frequency.
     SingularValues,
     /// Poles and zeros.
@@ -69,9 +73,10 @@ pub enum RunFigure {
 
 impl RunFigure {
     /// All of them, in the order of the page.
-    pub const ALL: [RunFigure; 13] = [
+    pub const ALL: [RunFigure; 14] = [
         RunFigure::Bode,
         RunFigure::Nyquist,
+        RunFigure::Levels,
         RunFigure::SingularValues,
         RunFigure::Redesign,
         RunFigure::Verification,
@@ -96,6 +101,7 @@ impl RunFigure {
             RunFigure::Residuals => "residuals",
             RunFigure::Bode => "bode",
             RunFigure::Nyquist => "nyquist",
+            RunFigure::Levels => "levels",
             RunFigure::SingularValues => "singular-values",
             RunFigure::Poles => "poles",
             RunFigure::Hankel => "hankel",
@@ -110,7 +116,7 @@ impl RunFigure {
             RunFigure::Data | RunFigure::Signals => &["record"],
             RunFigure::Order | RunFigure::Stabilisation | RunFigure::SingularValues | RunFigure::Poles => &["methods"],
             RunFigure::Verification | RunFigure::Residuals => &["record", "output", "methods"],
-            RunFigure::Bode | RunFigure::Nyquist => &["output", "input", "methods"],
+            RunFigure::Bode | RunFigure::Nyquist | RunFigure::Levels => &["output", "input", "methods"],
             RunFigure::Hankel | RunFigure::Reduction | RunFigure::Redesign => &[],
         }
     }
@@ -126,6 +132,9 @@ impl RunFigure {
             RunFigure::Residuals => "correlations of the residuals with the 99 % band of noise",
             RunFigure::Bode => "magnitude with bands, phase, and the coherence of the indirect response",
             RunFigure::Nyquist => "the same responses as loci, with their regions",
+            RunFigure::Levels => {
+                "response at the lines of a periodic excitation, with the levels of noise and distortion"
+            }
             RunFigure::SingularValues => "singular values of the whole response over frequency",
             RunFigure::Poles => "poles and zeros with lines of constant frequency and damping ratio",
             RunFigure::Hankel => "Hankel singular values of the model that was reduced",
@@ -181,6 +190,7 @@ fn drawings(chosen: &Chosen, kind: RunFigure) -> Vec<RunDrawing> {
         RunFigure::Residuals => residuals::figures(chosen),
         RunFigure::Bode => bode::figures(chosen),
         RunFigure::Nyquist => nyquist::figures(chosen),
+        RunFigure::Levels => levels::figures(chosen),
         RunFigure::SingularValues => singular::figure(chosen),
         RunFigure::Poles => poles::figure(chosen),
         RunFigure::Hankel => order::hankel(chosen),

@@ -142,6 +142,7 @@ fn report() -> ReportData {
             models: vec![model("nominal", 0), model("hansen", 0), model("hansen", 1)],
             indirect: vec![indirect(0), indirect(1)],
             bands: vec![band(0), band(1)],
+            lines: vec![LineLevels { hz: vec![1.0, 2.0], noise_db: vec![-40.0, -41.0], ..LineLevels::default() }],
             singular: vec![SingularValue {
                 method: "hansen".into(),
                 value_db: vec![3.0; hz.len()],
@@ -245,6 +246,8 @@ fn responses_are_those_of_the_report() {
     let singular = &drawn(RunFigure::SingularValues, &FigureChoice::default())[0].figure;
     assert_eq!(curves(singular, 0)[0].y, frequency.singular[0].value_db);
     assert_eq!(singular.panels[0].regions[0].low, frequency.singular[0].low_db);
+    let levels = drawn(RunFigure::Levels, &FigureChoice::default());
+    assert_eq!((levels.len(), &curves(&levels[0].figure, 0).last().unwrap().y), (1, &frequency.lines[0].noise_db));
 }
 
 #[test]

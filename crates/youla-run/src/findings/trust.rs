@@ -3,6 +3,7 @@
 
 use crate::check::OF_SETTINGS;
 use crate::identification::Identification;
+use crate::lines;
 use crate::method::Method;
 use crate::recommended;
 use crate::residual_tests::RecordResiduals;
@@ -14,7 +15,8 @@ use youla_report::data::{ReportPart, Status, Verdict};
 /// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     let rest = [unnoticed_line, fit_line, residual_line, data_line, loop_line];
-    recommended::verdict_lines(found).into_iter().chain(rest.iter().filter_map(|line| line(found))).collect()
+    let of_model = recommended::verdict_lines(found).into_iter().chain(lines::verdict_lines(found));
+    of_model.chain(rest.iter().filter_map(|line| line(found))).collect()
 }
 
 /// The model that the lines are about: the recommended one, G(S) where there is none.

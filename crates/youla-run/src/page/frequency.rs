@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::identification::Identification;
+use crate::lines;
 use crate::method::Method;
 use crate::recommended;
 use crate::response::{self, bounds_db, decibel, magnitude, model_responses, phase};
@@ -17,7 +18,8 @@ pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let of_scheme = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port)));
     let bands = recommended(found, &responses).into_iter().chain(of_scheme).collect();
     let singular = singular(found, &responses)?;
-    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect: indirect(found), bands, singular })
+    let (indirect, lines) = (indirect(found), lines::drawn(found));
+    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect, lines, bands, singular })
 }
 
 fn indirect(found: &Identification) -> Vec<draw::Indirect> {

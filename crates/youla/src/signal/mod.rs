@@ -15,7 +15,7 @@ mod stream;
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
-pub use periodic::{ExcitationPeriod, LineResponse, PeriodicExperiment, detect_period, line_response};
+pub use periodic::{ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};

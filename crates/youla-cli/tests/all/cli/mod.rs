@@ -10,6 +10,7 @@ mod excite;
 mod export;
 mod init;
 mod limits;
+mod lines;
 mod mistakes;
 mod notes;
 mod plot;

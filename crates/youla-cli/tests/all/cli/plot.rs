@@ -37,6 +37,7 @@ fn every_figure_of_a_run_is_written_in_every_format() {
         "residuals",
         "bode",
         "nyquist",
+        "levels",
         "singular-values",
         "poles",
         "hankel",

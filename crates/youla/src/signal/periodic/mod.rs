@@ -13,11 +13,13 @@
 //! Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. (2012), sections 2.7 and 4.3;
 //! J. Schoukens, K. Godfrey, M. Schoukens, IEEE Control Syst. Mag. 38(4) (2018), 49.
 
+mod agreement;
 mod gather;
 mod levels;
 mod period;
 mod settling;
 
+pub use agreement::LineGroup;
 pub use period::{ExcitationPeriod, detect_period};
 
 use crate::lti::{Discrete, FrequencyResponse};

@@ -9,7 +9,7 @@
 use faer::c64;
 
 /// Lines of a group.
-const GROUP: usize = 8;
+pub(super) const GROUP: usize = 8;
 /// Standard normal number that counts as evidence.
 const EVIDENCE: f64 = 4.5;
 /// Variance of rounding, relative to the power of the line.
@@ -44,8 +44,12 @@ fn evident(distance: &[f64], scatter: &[f64], count: f64) -> bool {
     if scatter <= 0.0 {
         return distance > 0.0;
     }
-    let root = (distance / scatter).cbrt();
-    let (first, second) = (2.0 / (9.0 * degrees), 2.0 / (9.0 * degrees * (count - 1.0)));
-    let normal = ((1.0 - second) * root - (1.0 - first)) / (second * root * root + first).sqrt();
-    normal > EVIDENCE
+    standard_normal(distance / scatter, degrees, degrees * (count - 1.0)) > EVIDENCE
+}
+
+/// Paulson's standard normal number of a ratio of mean squares with these degrees of freedom.
+pub(super) fn standard_normal(ratio: f64, degrees: f64, of_scatter: f64) -> f64 {
+    let root = ratio.cbrt();
+    let (first, second) = (2.0 / (9.0 * degrees), 2.0 / (9.0 * of_scatter));
+    ((1.0 - second) * root - (1.0 - first)) / (second * root * root + first).sqrt()
 }

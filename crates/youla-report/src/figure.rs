@@ -78,10 +78,10 @@ pub struct Region {
     pub note: String,
     /// Where; ascending.
     pub x: Vec<f64>,
-    /// Lower edge, NaN where there is none.
+    /// Lower edge, NaN where the area is open below.
     #[serde(with = "super::numbers")]
     pub low: Vec<f64>,
-    /// Upper edge, NaN where there is none.
+    /// Upper edge, NaN where there is no area.
     #[serde(with = "super::numbers")]
     pub high: Vec<f64>,
 }

@@ -145,11 +145,24 @@ pub(super) fn decibel(magnitude: f64) -> f64 {
     20.0 * magnitude.log10()
 }
 
-/// Lowest bound that is drawn, over the upper one: a bound of zero is drawn far below the curve.
+/// Lowest bound that is stated, over the upper one: below it a region counts as reaching magnitude zero.
 /// 60 dB, below the axis of every figure. Chosen, not measured.
 const LEAST_BOUND: f64 = 1e-3;
 
-/// Lower and upper bounds in dB.
+/// Lower and upper bounds in dB, NaN (`null` in JSON) for one at magnitude zero.
 pub(super) fn bounds_db(bounds: impl Iterator<Item = [f64; 2]>) -> (Vec<f64>, Vec<f64>) {
-    bounds.map(|[low, high]| (decibel(low.max(LEAST_BOUND * high)), decibel(high))).unzip()
+    let stated = |bound: f64| if bound > 0.0 { decibel(bound) } else { f64::NAN };
+    bounds.map(|[low, high]| (stated(if low > LEAST_BOUND * high { low } else { 0.0 }), stated(high))).unzip()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bounds_db;
+
+    #[test]
+    fn a_bound_at_magnitude_zero_has_no_decibels() {
+        let (low, high) = bounds_db([[1.0, 10.0], [0.0, 1.0], [-2.0, 1.0], [1e-9, 1.0], [0.0, 0.0]].into_iter());
+        assert_eq!((low[0], &high[..4]), (0.0, &[20.0, 0.0, 0.0, 0.0][..]));
+        assert!(low[1..].iter().chain(&high[4..]).all(|bound| bound.is_nan()), "{low:?} {high:?}");
+    }
 }

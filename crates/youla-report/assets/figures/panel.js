@@ -115,11 +115,12 @@ function makePlot(root, panel, at) {
   function behind() {
     clipped(ctx => {
       for (const region of shown(panel.regions ?? [])) {
-        const known = region.x.map((_, k) => k).filter(k => region.low[k] != null && region.high[k] != null);
+        const known = region.x.map((_, k) => k).filter(k => region.high[k] != null);
         Object.assign(ctx, { fillStyle: ink(region), globalAlpha: styleOf(region.method).order ? 0.24 : 0.12 });
         ctx.beginPath();
         known.forEach(k => ctx.lineTo(X(region.x[k]), Y(region.high[k])));
-        known.reverse().forEach(k => ctx.lineTo(X(region.x[k]), Y(region.low[k])));
+        // An area without a lower edge is open: it ends at the frame.
+        known.reverse().forEach(k => ctx.lineTo(X(region.x[k]), region.low[k] == null ? ctx.canvas.height : Y(region.low[k])));
         ctx.fill();
       }
       ctx.globalAlpha = 1;

@@ -63,7 +63,7 @@ pub struct SingularValue {
     pub value_db: Vec<f64>,
     /// Probability with which the bounds should hold the truth, at each frequency; absent without bounds.
     pub level: Option<f64>,
-    /// Lower bound, dB; empty without bounds.
+    /// Lower bound, dB, NaN where it is magnitude zero; empty without bounds.
     #[serde(with = "numbers::seven_digits")]
     pub low_db: Vec<f64>,
     /// Upper bound, dB.
@@ -82,7 +82,7 @@ pub struct Band {
     pub input: usize,
     /// Probability with which the bounds should hold the truth, at each frequency.
     pub level: f64,
-    /// Lower bound, dB.
+    /// Lower bound, dB; NaN where it is magnitude zero.
     #[serde(with = "numbers::seven_digits")]
     pub low_db: Vec<f64>,
     /// Upper bound, dB.

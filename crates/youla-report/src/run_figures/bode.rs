@@ -109,6 +109,9 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
             names.join(" and of "),
             percent(band.level)
         );
+        if pair.bands.iter().any(open_below) {
+            text += " Down to the axis: the bounds include magnitude zero.";
+        }
     }
     text
 }
@@ -117,6 +120,11 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
 pub(super) fn percent(level: f64) -> String {
     let text = format!("{:.2}", 100.0 * level);
     format!("{} %", text.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// Whether the lower bound is magnitude zero somewhere.
+fn open_below(band: &&Band) -> bool {
+    band.low_db.iter().zip(&band.high_db).any(|(low, high)| low.is_nan() && high.is_finite())
 }
 
 fn region(pair: &Pair, band: &Band) -> Region {

@@ -87,20 +87,21 @@ pub(super) fn draw_labels(canvas: &mut Canvas, guides: &[Guide], (x, y): (&Scale
     }
 }
 
-/// The area within the frame, one polygon per piece without gaps.
+/// The area within the frame, one polygon per piece without gaps; down to the frame where it is open below.
 fn area(region: &Region, x: &Scale, y: &Scale, frame: Frame) -> Path {
     let inside = |across: f64, up: f64| {
         (x.at(across).clamp(frame.left, frame.right()), y.at(up).clamp(frame.top, frame.bottom()))
     };
     let edges: Vec<(f64, [f64; 2])> =
         region.x.iter().zip(region.low.iter().zip(&region.high)).map(|(x, (low, high))| (*x, [*low, *high])).collect();
-    let known = |(across, edges): &(f64, [f64; 2])| {
-        x.at(*across).is_finite() && edges.iter().all(|edge| y.at(*edge).is_finite())
-    };
+    let known = |(across, [_, high]): &(f64, [f64; 2])| x.at(*across).is_finite() && y.at(*high).is_finite();
     let mut path = Path::default();
     for piece in edges.split(|edge| !known(edge)).filter(|piece| piece.len() > 1) {
         let upper = piece.iter().map(|(across, [_, high])| inside(*across, *high));
-        let lower = piece.iter().rev().map(|(across, [low, _])| inside(*across, *low));
+        let lower = piece.iter().rev().map(|(across, [low, high])| match y.at(*low).is_finite() {
+            true => inside(*across, *low),
+            false => (inside(*across, *high).0, frame.bottom()),
+        });
         path.polygon(upper.chain(lower));
     }
     path

@@ -297,8 +297,8 @@ fn areas_shades_and_lines_stand_behind_the_curves() {
         method: "hansen".into(),
         note: "95 %".into(),
         x: vec![0.0, 1.0, 2.0, 3.0, 4.0],
-        low: vec![0.0, 0.5, f64::NAN, 0.0, f64::NEG_INFINITY],
-        high: vec![1.0, 1.5, 2.0, 3.0, 4.0],
+        low: vec![0.0, f64::NAN, 0.5, 0.0, f64::NAN],
+        high: vec![1.0, 1.5, f64::NAN, 3.0, 4.0],
     };
     let guide = Guide { x: vec![1.0; 2], y: vec![0.0, 3.0], label: "level".into(), at: [1.0, 2.0], ..Guide::default() };
     let curves = Content::Curves(vec![curve("hansen", Drawn::Line, &[0.5, 1.0, 1.5, 2.0, 2.5])]);

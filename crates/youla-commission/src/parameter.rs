@@ -1,0 +1,55 @@
+//! A new controller as a Q around the running one: each controller that stabilises the nominal model is K(Q) of a stable Q.
+
+use crate::running::{RunningLoop, padded};
+use crate::station::Q_STATES;
+use crate::{Error, Result};
+use youla::Mat;
+use youla::lti::{Discrete, StateSpace};
+
+/// Q as the firmware runs it.
+#[derive(Debug, Clone)]
+pub(crate) struct LoadedQ {
+    /// Its coefficients, rounded to single precision: A, B, C by rows.
+    pub(crate) coefficients: Vec<f32>,
+    /// The same numbers as a system.
+    pub(crate) system: StateSpace<Discrete>,
+}
+
+/// Q from beta to alpha with K(Q) = `controller`, `J_G` closed with it; its order is the sum of both.
+///
+/// # Errors
+/// [`Error::Controller`] where the firmware cannot run it: too many states, a feedthrough, or unstable, as it is where the controller does
+/// not stabilise the nominal model.
+pub(crate) fn parameter_of(running: &RunningLoop, controller: &StateSpace<Discrete>) -> Result<LoadedQ> {
+    let q = running.factors.j_g()?.lower_lft(controller)?.balanced()?;
+    let refuse = |problem: String| Err(Error::Controller { problem });
+    if q.order() > Q_STATES {
+        return refuse(format!("takes a Q of at most {Q_STATES} states; this one has {}", q.order()));
+    }
+    if q.d().norm_max() > 1e-9 {
+        return refuse("takes no Q with a feedthrough, which needs the measurement before the command".into());
+    }
+    let coefficients =
+        [padded(q.a(), Q_STATES, Q_STATES), padded(q.b(), Q_STATES, 2), padded(q.c(), 2, Q_STATES)].concat();
+    let single = |m: youla::MatRef<'_, f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| f64::from(m[(i, j)] as f32));
+    let system = StateSpace::new(single(q.a()), single(q.b()), single(q.c()), Mat::zeros(2, 2), q.time())?;
+    if !system.is_stable()? {
+        return refuse("takes no unstable Q; the new controller does not stabilise the nominal model".into());
+    }
+    Ok(LoadedQ { coefficients, system })
+}
+
+/// What an excitation of K(Q) is at the plant input: the inputs that it causes while the outputs are zero.
+pub(crate) fn at_plant_input(running: &RunningLoop, q: Option<&LoadedQ>, alpha: &Mat<f64>) -> Result<Mat<f64>> {
+    use youla::control::{closed_loop, with_input_port};
+    let ports = running.factors.j_k()?;
+    let excited = match q {
+        None => alpha.clone(),
+        Some(q) => {
+            let of_alpha = closed_loop(&ports.part(1, 1), &with_input_port(&q.system)?)?.part(0..2, 0..2);
+            youla::lti::simulate(&of_alpha, alpha.as_ref(), &vec![0.0; of_alpha.order()])?
+        }
+    };
+    let to_input = ports.part(0, 1);
+    Ok(youla::lti::simulate(&to_input, excited.as_ref(), &vec![0.0; to_input.order()])?)
+}

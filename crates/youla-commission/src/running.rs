@@ -1,0 +1,91 @@
+//! The loop as it is described: nominal model, gains, factors, and the numbers that the firmware takes.
+
+use crate::station::{NUMBERS, STATES};
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use youla::factor::CoprimeFactors;
+use youla::lti::{Discrete, StateSpace};
+use youla::{Mat, MatRef};
+use youla_io::toml_file;
+use youla_run::{ControllerSettings, NominalModel, RealisedController};
+
+/// The file of a loop: `[nominal]` and `[controller]` as in run.toml.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LoopDescription {
+    /// The nominal model.
+    pub nominal: NominalModel,
+    /// The controller that runs: an observer with its gains.
+    pub controller: ControllerSettings,
+}
+
+/// The same as systems.
+pub(crate) struct RunningLoop {
+    pub(crate) description: LoopDescription,
+    pub(crate) nominal: StateSpace<Discrete>,
+    pub(crate) f: Mat<f64>,
+    pub(crate) l: Mat<f64>,
+    pub(crate) factors: CoprimeFactors<Discrete>,
+}
+
+impl RunningLoop {
+    /// Reads a file.
+    ///
+    /// # Errors
+    /// [`Error::Campaign`] where the firmware cannot run this loop.
+    pub(crate) fn read(path: &Path, time: Discrete) -> Result<Self> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let description: LoopDescription = toml_file::parse(&text, path)?;
+        Self::new(description, path, time)
+    }
+
+    pub(crate) fn new(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let refuse = |problem: String| Err(Error::Campaign { path: path.to_owned(), problem });
+        let nominal = description.nominal.realise(folder, time)?;
+        let RealisedController::Observer { f, l } = description.controller.realise(folder, time)? else {
+            return refuse("the controller of a campaign is an observer; give [controller.observer]".into());
+        };
+        if nominal.order() > STATES || (nominal.inputs(), nominal.outputs()) != (2, 2) {
+            return refuse(format!(
+                "the nominal model has {} states, {} inputs and {} outputs; the firmware takes at most {STATES} states, 2 inputs and 2 \
+                 outputs",
+                nominal.order(),
+                nominal.inputs(),
+                nominal.outputs()
+            ));
+        }
+        let scale = nominal.state_scales()?;
+        let balanced = nominal.with_scaled_states(&scale);
+        let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
+        let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
+        let factors = CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?;
+        Ok(RunningLoop { description, nominal: balanced, f, l, factors })
+    }
+
+    /// What [`crate::station::station`] takes.
+    pub(crate) fn numbers(&self, limits: &[f64; 8], counts: [u16; 3]) -> Vec<f32> {
+        let g = &self.nominal;
+        let mut numbers = Vec::with_capacity(NUMBERS);
+        let parts = [
+            (g.a(), STATES, STATES),
+            (g.b(), STATES, 2),
+            (g.c(), 2, STATES),
+            (g.d(), 2, 2),
+            (self.f.as_ref(), 2, STATES),
+            (self.l.as_ref(), STATES, 2),
+        ];
+        parts.iter().for_each(|(matrix, rows, columns)| numbers.extend(padded(*matrix, *rows, *columns)));
+        numbers.extend(limits.iter().map(|limit| *limit as f32));
+        numbers.extend(counts.iter().map(|count| f32::from(*count)));
+        numbers
+    }
+}
+
+/// A matrix by rows, filled up with zeros.
+pub(crate) fn padded(m: MatRef<'_, f64>, rows: usize, columns: usize) -> Vec<f32> {
+    let entry = |i: usize, j: usize| if i < m.nrows() && j < m.ncols() { m[(i, j)] as f32 } else { 0.0 };
+    (0..rows * columns).map(|k| entry(k / columns, k % columns)).collect()
+}

@@ -1,0 +1,58 @@
+//! The controller of a campaign: the loop of the firmware, one sample at a time.
+
+use crate::station::{CampaignStation, station};
+use crate::{Error, Result};
+use youla_link::LARGEST_FRAME;
+
+/// Where the loop of the firmware runs.
+pub(crate) enum Target {
+    /// In this process.
+    Host { station: Box<CampaignStation>, u: [f32; 2], frame: Vec<u8> },
+}
+
+impl Target {
+    /// The host's build of the loop.
+    ///
+    /// # Errors
+    /// [`Error::Controller`] for numbers that are not valid.
+    pub(crate) fn host(numbers: &[f32]) -> Result<Self> {
+        let station = station(numbers).ok_or_else(|| failed("does not accept its matrices and limits"))?;
+        Ok(Target::Host { station: Box::new(station), u: [0.0; 2], frame: Vec::new() })
+    }
+
+    /// The input of this sample, and the frame that was complete before it, empty for none.
+    pub(crate) fn receive(&mut self, frame: &mut Vec<u8>) -> Result<[f32; 2]> {
+        match self {
+            Target::Host { station, u, frame: ready } => {
+                *u = station.command();
+                std::mem::swap(frame, ready);
+                ready.clear();
+                Ok(*u)
+            }
+        }
+    }
+
+    /// The outputs of this sample, and a request, empty for none. A reply replaces the rows that are complete in the same sample.
+    pub(crate) fn send(&mut self, y: &[f32; 2], request: &[u8]) -> Result<()> {
+        match self {
+            Target::Host { station, u, frame } => {
+                let u = *u;
+                let _ = station.observe(y, &u);
+                let mut bytes = [0; LARGEST_FRAME];
+                let too_long = |_| failed("has a frame that is too long");
+                let mut length = station.frame(&mut bytes).transpose().map_err(too_long)?.unwrap_or(0);
+                if !request.is_empty() {
+                    let refused = |_| failed("does not understand a request");
+                    length = station.receive(request, &mut bytes).map_err(refused)?.unwrap_or(0);
+                }
+                frame.clear();
+                frame.extend_from_slice(bytes.get(..length).unwrap_or_default());
+                Ok(())
+            }
+        }
+    }
+}
+
+pub(crate) fn failed(problem: &str) -> Error {
+    Error::Controller { problem: problem.into() }
+}

@@ -3,7 +3,7 @@
 use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, compare, excite, export, identify, init, paper, plot, rig, study, subspace};
+use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, study, subspace};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -147,4 +147,10 @@ pub(crate) enum Command {
     /// Record a machine that speaks youla-link, read its status, load Q, or play such a machine.
     #[command(subcommand)]
     Rig(rig::RigCommand),
+    /// Commission a controller on the twin of the gas bearing: excite, record, identify, redesign, switch and verify at each operating point.
+    ///
+    /// An interrupted campaign goes on where it was. It ends at the first point whose model is not trusted, whose new controller is not
+    /// certified or confirmed, or whose verification is worse than predicted; alpha and Q are then zero, and the exit code is 1.
+    #[command(after_help = commission::EXAMPLES)]
+    Commission(commission::CommissionArgs),
 }

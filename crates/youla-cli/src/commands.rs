@@ -4,7 +4,7 @@ use crate::args::{Args, Command};
 use crate::demo::demo;
 use crate::output::{Failure, Form, Progress, say, say_wrapped};
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, compare, excite, export, init, manual, paper, plot, rig, study, subspace, table};
+use crate::{check, commission, compare, excite, export, init, manual, paper, plot, rig, study, subspace, table};
 use clap::CommandFactory;
 use std::path::{Path, PathBuf};
 use youla_io::folder::{NumberedFolder, RunFolder};
@@ -13,17 +13,18 @@ use youla_run::{
     settings_schema, signal_records, write_run, write_signals,
 };
 
-/// Runs the verb that was asked for; false where a check found a defect.
+/// Runs the verb that was asked for; false where a check found a defect or a campaign stopped.
 pub(crate) fn run(args: &Args) -> Result<bool, Failure> {
     match &args.command {
         Command::Check(of_check) => check::check(args.form, of_check),
+        Command::Commission(of_campaign) => commission::run(args.form, of_campaign),
         command => other(args.form, command).map(|()| true),
     }
 }
 
 fn other(form: Form, command: &Command) -> Result<(), Failure> {
     match command {
-        Command::Check(_) => Ok(()),
+        Command::Check(_) | Command::Commission(_) => Ok(()),
         Command::Demo { seed, machine, output } => {
             let (settings, records) = demo(*machine, *seed)?;
             identify_and_write(form, output, Path::new("."), settings, |_| Ok(records))

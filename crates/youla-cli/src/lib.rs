@@ -3,6 +3,7 @@
 mod args;
 mod check;
 mod commands;
+mod commission;
 mod compare;
 mod demo;
 mod dialect;
@@ -29,7 +30,7 @@ pub use output::Failure;
 use clap::Parser;
 use std::ffi::OsString;
 
-/// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect;
+/// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect or a campaign stopped;
 /// 2 for input that cannot be used; 3 for an impossible computation.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args = match args::Args::try_parse_from(args) {

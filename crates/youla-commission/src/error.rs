@@ -46,10 +46,16 @@ pub enum Error {
         /// What it did.
         problem: String,
     },
+    /// There is no new controller to switch to.
+    #[error("{reason}")]
+    Refused {
+        /// Why.
+        reason: String,
+    },
 }
 
 youla::error_context! {
     sources: Method File Loop Run Twin;
-    numerical: Controller;
+    numerical: Controller Refused;
     bad_input: Campaign;
 }

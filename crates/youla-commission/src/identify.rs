@@ -5,11 +5,11 @@ use crate::bench::LogRow;
 use crate::parameter::{LoadedQ, at_plant_input};
 use crate::running::RunningLoop;
 use std::path::Path;
-use youla::Mat;
+use youla::{Mat, MatRef};
 use youla::identify::subspace::{
-    Experiment, InitialState, SubspaceMethod, SubspaceModel, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
+    Experiment, InitialState, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
 };
-use youla::lti::Discrete;
+use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::{ChannelRef, ChannelSpec};
 use youla_paper::study::without_harmonics;
@@ -76,15 +76,19 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
     Ok(identify(settings, records, Path::new(""), &mut StageClock::new(&mut silent))?)
 }
 
-/// The loop from a disturbance at the plant input to the outputs, identified in open loop from the excitation.
-pub(crate) fn loop_response(running: &RunningLoop, q: Option<&LoadedQ>, rows: &CleanRows) -> Result<SubspaceModel> {
+/// The loop from a disturbance at the plant input to the outputs, identified in open loop from the excitation of a record.
+pub(crate) fn loop_response(running: &RunningLoop, q: Option<&LoadedQ>, rows: &CleanRows) -> Result<StateSpace<Discrete>> {
     let v = at_plant_input(running, q, &rows.alpha)?;
+    response_to(v.as_ref(), rows.y.as_ref(), running.nominal.time())
+}
+
+/// The same from the disturbance v itself.
+pub(crate) fn response_to(v: MatRef<'_, f64>, y: MatRef<'_, f64>, time: Discrete) -> Result<StateSpace<Discrete>> {
     let options = SubspaceOptions {
         method: SubspaceMethod::Cva,
         horizon: 30.into(),
         initial_state: InitialState::Estimated,
-        uncertainty: UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() },
         ..Default::default()
     };
-    Ok(subspace(&[Experiment::new(v.as_ref(), rows.y.as_ref())], running.nominal.time(), &options)?)
+    Ok(subspace(&[Experiment::new(v, y)], time, &options)?.model)
 }

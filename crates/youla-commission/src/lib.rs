@@ -1,14 +1,32 @@
 //! The circle of commissioning on a machine: excite, record, identify, redesign, switch and verify, under stated limits.
+//!
+//! [`commission`] runs a campaign on the digital twin of the gas bearing, whose controller is the loop of the firmware. The new controller is
+//! designed on the recommended model, certified over the region of S and loaded as Q; the verification is predicted by rehearsals on the
+//! model. Anything short of a trusted model stops with alpha and Q at zero.
 
 mod bench;
+mod campaign;
+mod commission;
 mod error;
+mod figures;
 mod identify;
 mod parameter;
+mod point;
+mod proposal;
+mod record;
+mod rehearse;
+mod report;
 mod running;
 mod station;
 mod target;
 
+pub use campaign::{Campaign, CampaignLimits, Goal, OperatingPoint};
+pub use commission::commission;
 pub use error::{Error, Result};
+pub use figures::LoopState;
+pub use point::Operator;
+pub use record::{CampaignSummary, DampingFigures, PointRecord, PointStatus};
+pub use rehearse::{LEVEL, Prediction};
 pub use running::LoopDescription;
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::station::{CampaignStation, station};
 use crate::{Error, Result};
+use std::path::Path;
 use youla_link::LARGEST_FRAME;
 
 /// Where the loop of the firmware runs.
@@ -11,6 +12,19 @@ pub(crate) enum Target {
 }
 
 impl Target {
+    /// Where the loop will run, in words: `image` is that of the firmware for QEMU.
+    pub(crate) fn place(_image: Option<&Path>) -> &'static str {
+        "host"
+    }
+
+    /// The loop of these numbers.
+    ///
+    /// # Errors
+    /// [`Error::Controller`] for numbers that are not valid.
+    pub(crate) fn start(_image: Option<&Path>, numbers: &[f32]) -> Result<Self> {
+        Self::host(numbers)
+    }
+
     /// The host's build of the loop.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 12] = [
+const ARROWS: [(&str, &[&str]); 13] = [
     ("youla-rt", &[]),
     ("youla-link", &["youla-rt"]),
     ("youla-rig", &["youla-link", "youla-rt"]),
@@ -16,7 +16,11 @@ const ARROWS: [(&str, &[&str]); 12] = [
     ("youla-report", &["youla"]),
     ("youla-run", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report"]),
     ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-rt", "youla-run"]),
-    ("youla-cli", &["youla", "youla-io", "youla-loop", "youla-paper", "youla-report", "youla-rig", "youla-run"]),
+    (
+        "youla-commission",
+        &["youla", "youla-io", "youla-link", "youla-loop", "youla-paper", "youla-rt", "youla-run"],
+    ),
+    ("youla-cli", &["youla", "youla-commission", "youla-io", "youla-loop", "youla-paper", "youla-report", "youla-rig", "youla-run"]),
     ("youla-py", &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run"]),
 ];
 

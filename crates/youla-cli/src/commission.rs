@@ -1,0 +1,81 @@
+//! `youla commission`: the circle of commissioning on the twin of the gas bearing.
+
+use crate::output::{Failure, Form, ask_line, say, say_wrapped};
+use clap::Args;
+use std::path::PathBuf;
+use youla_commission::{CampaignSummary, Operator, PointStatus, commission};
+
+pub(crate) const EXAMPLES: &str = "\
+Example:
+  youla commission examples/commission/campaign.toml --yes --out bearing";
+
+/// Arguments of `youla commission`.
+#[derive(Debug, Args)]
+pub(crate) struct CommissionArgs {
+    /// The campaign: machine, limits, goal, operating points.
+    campaign: PathBuf,
+    /// Folder of the results; one that holds a part of the same campaign is completed.
+    #[arg(long)]
+    out: PathBuf,
+    /// Switch without asking a person.
+    #[arg(long)]
+    yes: bool,
+}
+
+/// The person at the terminal.
+struct Terminal {
+    form: Form,
+    yes: bool,
+}
+
+impl Operator for Terminal {
+    fn confirms(&mut self, text: &str) -> bool {
+        if self.yes {
+            self.notes(text);
+            return true;
+        }
+        let mut answer = String::new();
+        // Without a terminal nobody confirms.
+        ask_line(&format!("{text} [y/N]")).is_ok()
+            && std::io::stdin().read_line(&mut answer).is_ok()
+            && matches!(answer.trim(), "y" | "Y" | "yes")
+    }
+
+    fn notes(&mut self, text: &str) {
+        if !(self.form.quiet || self.form.json) {
+            // Without an output the campaign goes on.
+            let _ = say_wrapped(text);
+        }
+    }
+}
+
+/// Whether every point is done.
+pub(crate) fn run(form: Form, args: &CommissionArgs) -> Result<bool, Failure> {
+    let mut terminal = Terminal { form, yes: args.yes };
+    let summary = commission(&args.campaign, &args.out, &mut terminal)?;
+    if form.json {
+        let text = serde_json::to_string(&summary)
+            .map_err(|e| Failure::io(&args.out.join("summary.json"), std::io::Error::from(e)))?;
+        say(&text)?;
+    } else if !form.quiet {
+        say_wrapped(&sentences(&summary, args))?;
+    }
+    Ok(summary.done)
+}
+
+fn sentences(summary: &CampaignSummary, args: &CommissionArgs) -> String {
+    let mut text = format!("Controller: {}.", summary.controller);
+    for point in &summary.points {
+        text += &match (point.status, point.before, point.predicted, point.reached) {
+            (PointStatus::Done, Some(before), Some(predicted), Some(reached)) => format!(
+                "\n{}: least damping {:.3} before, {:.3} to {:.3} predicted, {:.3} reached.",
+                point.name, before.damping, predicted.bounds[0], predicted.bounds[1], reached.damping
+            ),
+            (status, ..) => {
+                let what = if status == PointStatus::Fallback { "Q was taken back" } else { "stopped" };
+                format!("\n{}: {what}: {}.", point.name, point.reason.as_deref().unwrap_or("no reason is known"))
+            }
+        };
+    }
+    format!("{text}\nReport: {}", args.out.join("report.md").display())
+}

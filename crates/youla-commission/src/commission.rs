@@ -1,0 +1,167 @@
+//! The campaign: its points in their order, what is kept of each, and the summary.
+
+use crate::bench::{Bench, LogRow};
+use crate::campaign::{Campaign, OperatingPoint};
+use crate::point::{Operator, Point, PointFiles, RAMP};
+use crate::record::{CampaignSummary, PointRecord, PointStatus, io, read_json, write_json, write_text};
+use crate::report::report;
+use crate::running::{LoopDescription, RunningLoop};
+use crate::target::Target;
+use crate::{Error, Result};
+use std::fmt::Write as _;
+use std::fs;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use youla::lti::Discrete;
+use youla_io::SystemMatrices;
+use youla_io::export::ExportedController;
+use youla_paper::rig::{BearingRig, Fidelity, RigParameters};
+use youla_run::{StageClock, write_run};
+
+/// Sample time of the twin, seconds.
+const TS: f64 = 2e-4;
+/// Consecutive samples for which an input may be clipped, and equal values after which an output counts as stuck.
+const CLIPPED: u16 = 50;
+const STUCK: u16 = 50;
+
+/// Runs a campaign, or what is left of it, and writes `out`: a folder for each point, report.md and summary.json. Points that are done
+/// are kept. The campaign ends at the first point that is not done.
+///
+/// # Errors
+/// Bad input, as a folder of another campaign; a controller that does not answer.
+pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Result<CampaignSummary> {
+    let campaign = Campaign::read(path)?;
+    let folder = path.parent().unwrap_or(Path::new(""));
+    let time = Discrete::new(TS)?;
+    let loops = campaign.points.iter().map(|point| RunningLoop::read(&folder.join(&point.running), time));
+    let loops: Vec<RunningLoop> = loops.collect::<Result<_>>()?;
+    let image = campaign.image.as_ref().map(|image| folder.join(image));
+    let controller = Target::place(image.as_deref());
+    claim(&campaign, &loops, controller, out)?;
+    let mut points = Vec::new();
+    for (at, running) in campaign.points.iter().zip(&loops) {
+        let place = out.join(&at.name);
+        let kept: Option<PointRecord> = read_json(&place.join("point.json"))?;
+        let record = match kept.filter(|kept| kept.status == PointStatus::Done) {
+            Some(kept) => {
+                operator.notes(&format!("{}: done before", at.name));
+                kept
+            }
+            None => one_point(&campaign, at, running, (&place, image.as_deref()), operator)
+                .map_err(|e| e.within(at.name.clone()))?,
+        };
+        let done = record.status == PointStatus::Done;
+        points.push(record);
+        let summary = CampaignSummary::new(&campaign.name, controller, campaign.points.len(), points.clone());
+        write_text(&out.join("report.md"), &report(&summary))?;
+        write_json(&out.join("summary.json"), &summary)?;
+        if !done {
+            break;
+        }
+    }
+    Ok(CampaignSummary::new(&campaign.name, controller, campaign.points.len(), points))
+}
+
+/// What a folder belongs to.
+#[derive(Debug, PartialEq, Serialize, Deserialize)]
+struct Claim {
+    campaign: Campaign,
+    loops: Vec<LoopDescription>,
+    controller: String,
+}
+
+/// Makes the folder, or finds that it holds a part of the same campaign.
+fn claim(campaign: &Campaign, loops: &[RunningLoop], controller: &str, out: &Path) -> Result<()> {
+    let loops = loops.iter().map(|running| running.description.clone()).collect();
+    let claim = Claim { campaign: campaign.clone(), loops, controller: controller.into() };
+    fs::create_dir_all(out).map_err(|source| io(out, source))?;
+    let path = out.join("campaign.json");
+    match read_json::<Claim>(&path)? {
+        Some(before) if before == claim => Ok(()),
+        Some(_) => Err(Error::Campaign {
+            path: out.to_owned(),
+            problem: "this folder holds another campaign, or the same one with another controller; choose another --out".into(),
+        }),
+        None => {
+            let mut entries = fs::read_dir(out).map_err(|source| io(out, source))?;
+            if entries.next().is_some() {
+                let problem = "this folder is not empty and holds no campaign; choose another --out".into();
+                return Err(Error::Campaign { path: out.to_owned(), problem });
+            }
+            write_json(&path, &claim)
+        }
+    }
+}
+
+fn one_point(
+    campaign: &Campaign,
+    at: &OperatingPoint,
+    running: &RunningLoop,
+    (place, image): (&Path, Option<&Path>),
+    operator: &mut dyn Operator,
+) -> Result<PointRecord> {
+    operator.notes(&at.name);
+    let mut parameters = RigParameters::shipped();
+    parameters.rotation.cross_coupling.value = at.cross_coupling;
+    let plant = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, campaign.seed)?;
+    let limits = &campaign.limits;
+    let [y, beta, u, rate] = [limits.output, limits.residual, limits.input, 2.0 * limits.input];
+    let of_guard = [y, y, beta, beta, u, u, rate, rate];
+    let bench = Bench::new(Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?, plant)?;
+    let (record, files) = Point::new(campaign, at, running, bench).run(operator)?;
+    write_point(place, running, &record, files)?;
+    Ok(record)
+}
+
+/// The record last: a point without it is run again.
+fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files: PointFiles) -> Result<()> {
+    fs::create_dir_all(place).map_err(|source| io(place, source))?;
+    let names = ["point.json", "q.json", "log.csv", "verification.csv"];
+    for name in names {
+        let path = place.join(name);
+        match fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(io(&path, e)),
+            _ => {}
+        }
+    }
+    let ts = running.nominal.time().ts();
+    for (name, rows) in [("log.csv", &files.log), ("verification.csv", &files.verification)] {
+        if !rows.is_empty() {
+            write_text(&place.join(name), &csv(rows, ts))?;
+        }
+    }
+    let found = match files.proposal {
+        Some(proposal) => {
+            let q = ExportedController {
+                method: "youla".into(),
+                ts,
+                measured: proposal.found.records.outputs.clone(),
+                commanded: proposal.found.records.inputs.clone(),
+                controller: SystemMatrices::new(&proposal.new.controller),
+                observer: None,
+                q: Some(SystemMatrices::new(&proposal.new.q.system)),
+            };
+            write_json(&place.join("q.json"), &q)?;
+            Some(proposal.found)
+        }
+        None => files.found.map(|found| *found),
+    };
+    if let Some(found) = found {
+        let mut silent = |_| ();
+        write_run(&found, &place.join("identification"), true, &mut StageClock::new(&mut silent))?;
+    }
+    write_json(&place.join("point.json"), record)
+}
+
+fn csv(rows: &[LogRow], ts: f64) -> String {
+    let mut text = String::from("t,y_h,y_v,u_h,u_v,alpha_1,alpha_2,beta_1,beta_2\n");
+    for (k, row) in rows.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{:?}", k as f64 * ts);
+        for value in row {
+            let _ = write!(text, ",{:?}", *value as f32);
+        }
+        text.push('\n');
+    }
+    text
+}

@@ -1,0 +1,299 @@
+//! One operating point: check, small excitation, record, proposal, switch, verification.
+
+use crate::bench::{Bench, LogRow};
+use crate::campaign::{Campaign, OperatingPoint};
+use crate::figures::{LoopState, Sizes};
+use crate::identify::{CleanRows, loop_response};
+use crate::proposal::{Outcome, Proposal, propose};
+use crate::record::{PointRecord, PointStatus};
+use crate::running::RunningLoop;
+use crate::{Error, Result};
+use youla_link::{Request, Source};
+use youla_run::Identification;
+
+/// Samples without excitation before and after each step: transients of the loop decay.
+const REST: usize = 5_000;
+/// Samples of the small excitation, and of the first recording.
+const SMALL: usize = 5_000;
+const FIRST: usize = 30_000;
+/// Amplitude of the small excitation as a share of the largest.
+const SMALL_SHARE: f64 = 0.1;
+/// Share of a limit that the recording may use, by the response to the small excitation.
+const USED: f64 = 0.8;
+/// Samples of the ramp.
+pub(crate) const RAMP: u16 = 500;
+/// Order of the register of the excitation, and samples of each of its values: power up to 625 Hz at 5 kHz.
+const PRBS: Source = Source::Prbs { order: 18, hold: 8 };
+
+/// What is asked of a person before a switch, and said meanwhile.
+pub trait Operator {
+    /// Whether the switch is allowed; the text says what is known of it.
+    fn confirms(&mut self, text: &str) -> bool;
+    /// What happens now.
+    fn notes(&mut self, text: &str);
+}
+
+/// A point as it runs.
+pub(crate) struct Point<'a> {
+    pub(crate) campaign: &'a Campaign,
+    pub(crate) at: &'a OperatingPoint,
+    pub(crate) running: &'a RunningLoop,
+    pub(crate) bench: Bench,
+    pub(crate) record: PointRecord,
+}
+
+/// What a point leaves besides its record.
+#[derive(Default)]
+pub(crate) struct PointFiles {
+    pub(crate) found: Option<Box<Identification>>,
+    pub(crate) proposal: Option<Box<Proposal>>,
+    pub(crate) log: Vec<LogRow>,
+    pub(crate) verification: Vec<LogRow>,
+}
+
+impl<'a> Point<'a> {
+    pub(crate) fn new(
+        campaign: &'a Campaign,
+        at: &'a OperatingPoint,
+        running: &'a RunningLoop,
+        bench: Bench,
+    ) -> Self {
+        let record = PointRecord {
+            name: at.name.clone(),
+            status: PointStatus::Stopped,
+            reason: None,
+            amplitude: 0.0,
+            seconds: 0.0,
+            before: None,
+            predicted: None,
+            reached: None,
+            q_order: None,
+            certified_models: None,
+            switches: 0,
+            unstable_switches: 0,
+        };
+        Point { campaign, at, running, bench, record }
+    }
+
+    /// The whole circle. However it ends, alpha is zero, and Q is zero unless the point is done.
+    ///
+    /// # Errors
+    /// Bad input, and a controller that does not answer.
+    pub(crate) fn run(mut self, operator: &mut dyn Operator) -> Result<(PointRecord, PointFiles)> {
+        let mut files = PointFiles::default();
+        let ended = self.circle(operator, &mut files);
+        if let Err(Error::Refused { reason }) = ended {
+            self.record.reason = Some(reason);
+            self.silence()?;
+        } else {
+            ended?;
+        }
+        Ok((self.record, files))
+    }
+
+    /// Alpha and Q to zero.
+    fn silence(&mut self) -> Result<()> {
+        self.bench.ask(&Request::Stop)?;
+        self.bench.ask(&Request::ReleaseQ)?;
+        self.bench.run(REST)
+    }
+
+    fn circle(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<()> {
+        operator.notes("check of the loop");
+        let still = self.at_rest()?;
+        operator.notes("small excitation");
+        self.record.amplitude = self.amplitude(&still)?;
+        let proposal = self.recorded(operator, files)?;
+        self.record.before = Some(proposal.before);
+        self.record.predicted = Some(proposal.prediction);
+        self.record.q_order = Some(proposal.new.q.system.order());
+        self.record.certified_models = Some(proposal.new.models);
+        let proposal: &Proposal = files.proposal.insert(proposal);
+        if !operator.confirms(&question(&self.at.name, proposal)) {
+            return refuse("the switch was not confirmed".into());
+        }
+        operator.notes("switch and verification");
+        let verification = self.switched(proposal);
+        let rows = match verification {
+            Ok(rows) => rows,
+            Err(Error::Refused { reason }) => return self.fall_back(reason, true),
+            Err(e) => return Err(e),
+        };
+        let reached = self.measured(proposal, &rows);
+        files.verification = rows;
+        let reached = match reached {
+            Ok(reached) => reached,
+            Err(e) => return self.fall_back(format!("the loop could not be measured: {e}"), true),
+        };
+        self.record.reached = Some(reached);
+        let least = self.record.predicted.map_or(f64::INFINITY, |predicted| predicted.bounds[0]);
+        if reached.damping < least {
+            return self.fall_back(format!("the damping {:.3} is below the prediction {least:.3}", reached.damping), false);
+        }
+        self.record.status = PointStatus::Done;
+        Ok(())
+    }
+
+    fn fall_back(&mut self, reason: String, unstable: bool) -> Result<()> {
+        self.record.status = PointStatus::Fallback;
+        self.record.unstable_switches += usize::from(unstable);
+        refuse(reason)
+    }
+
+    /// Largest magnitudes of the signals without excitation.
+    fn at_rest(&mut self) -> Result<[f64; 8]> {
+        self.bench.run(REST)?;
+        self.bench.take_rows();
+        self.bench.run(REST)?;
+        let largest = largest(&self.bench.take_rows());
+        if let Some(trip) = self.bench.trip() {
+            return refuse(format!("without an excitation the guard has tripped: {}", trip.cause));
+        }
+        match self.beyond(&largest, 0.5) {
+            Some(signal) => refuse(format!("without an excitation {signal} is beyond half of its limit")),
+            None => Ok(largest),
+        }
+    }
+
+    fn limits(&self) -> [(usize, &'static str, f64); 6] {
+        let limits = &self.campaign.limits;
+        let of = |at: usize, name: &'static str, limit: f64| (at, name, limit);
+        [
+            of(0, "y_1", limits.output),
+            of(1, "y_2", limits.output),
+            of(2, "u_1", limits.input),
+            of(3, "u_2", limits.input),
+            of(6, "beta_1", limits.residual),
+            of(7, "beta_2", limits.residual),
+        ]
+    }
+
+    fn beyond(&self, largest: &[f64; 8], share: f64) -> Option<&'static str> {
+        self.limits().into_iter().find(|(at, _, limit)| largest[*at] > share * limit).map(|(_, name, _)| name)
+    }
+
+    /// The amplitude with which no signal exceeds its share of the limit, by the response to a small one.
+    fn amplitude(&mut self, still: &[f64; 8]) -> Result<f64> {
+        let most = self.campaign.limits.excitation;
+        let small = SMALL_SHARE * most;
+        let rows = self.excited(small, SMALL)?;
+        self.stopped()?;
+        let excited = largest(&rows);
+        let mut amplitude = most;
+        for (at, name, limit) in self.limits() {
+            let response = (excited[at] - still[at]).max(1e-3 * limit);
+            let room = USED * limit - still[at];
+            if room < response {
+                return refuse(format!(
+                    "{name} reaches {:.3} under the small excitation and {:.3} without; its limit of {limit} leaves no room for more",
+                    excited[at], still[at]
+                ));
+            }
+            amplitude = amplitude.min(small * room / response);
+        }
+        Ok(amplitude)
+    }
+
+    /// Arms, starts and runs over the ramp, then records.
+    fn excited(&mut self, amplitude: f64, samples: usize) -> Result<Vec<LogRow>> {
+        self.bench.ask(&Request::Arm)?;
+        self.bench.ask(&Request::Start { source: PRBS, amplitude: amplitude as f32 })?;
+        self.bench.excite(RAMP.into())?;
+        self.bench.take_rows();
+        self.recorded_rows(samples)
+    }
+
+    fn recorded_rows(&mut self, samples: usize) -> Result<Vec<LogRow>> {
+        self.bench.excite(samples)?;
+        match self.bench.trip() {
+            None => Ok(self.bench.take_rows()),
+            Some(trip) => refuse(format!("the guard ended the excitation: {} (channel {})", trip.cause, trip.channel)),
+        }
+    }
+
+    fn stopped(&mut self) -> Result<()> {
+        self.bench.ask(&Request::Stop)?;
+        self.bench.run(REST)?;
+        self.bench.take_rows();
+        Ok(())
+    }
+
+    /// Records until there is a proposal within the goal, twice as long each time.
+    fn recorded(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<Box<Proposal>> {
+        let ts = self.running.nominal.time().ts();
+        let most = (self.campaign.limits.duration / ts) as usize;
+        files.log = self.excited(self.record.amplitude, FIRST.min(most))?;
+        loop {
+            self.record.seconds = files.log.len() as f64 * ts;
+            operator.notes(&format!("identification from {:.1} s", self.record.seconds));
+            let rows = CleanRows::new(&files.log, self.at.rpm, self.running.nominal.time())?;
+            match propose(self.running, &rows, &self.at.name, &self.campaign.goal)? {
+                Outcome::Proposed(proposal) => {
+                    self.stopped()?;
+                    return Ok(proposal);
+                }
+                Outcome::Refused { reason, found } => {
+                    files.found = found;
+                    let more = files.log.len().min(most.saturating_sub(files.log.len()));
+                    if more == 0 {
+                        return refuse(format!("after {:.1} s, {reason}", self.record.seconds));
+                    }
+                    let rows = self.recorded_rows(more)?;
+                    files.log.extend(rows);
+                }
+            }
+        }
+    }
+
+    /// Loads and switches, rests, and records the verification.
+    fn switched(&mut self, proposal: &Proposal) -> Result<Vec<LogRow>> {
+        self.bench.load(&proposal.new.q.coefficients)?;
+        self.bench.ask(&Request::Arm)?;
+        self.bench.ask(&Request::SwitchQ)?;
+        self.record.switches += 1;
+        self.bench.excite(REST)?;
+        if let Some(trip) = self.bench.trip() {
+            return refuse(format!("after the switch the guard has tripped: {}", trip.cause));
+        }
+        let samples = (self.record.seconds / self.running.nominal.time().ts()).round() as usize;
+        let rows = self.excited(self.record.amplitude, samples)?;
+        self.stopped()?;
+        Ok(rows)
+    }
+
+    fn measured(&self, proposal: &Proposal, rows: &[LogRow]) -> Result<LoopState> {
+        let rows = CleanRows::new(rows, self.at.rpm, self.running.nominal.time())?;
+        let response = loop_response(self.running, Some(&proposal.new.q), &rows)?;
+        let sizes = Sizes { input: &proposal.sizes.0, output: &proposal.sizes.1 };
+        LoopState::new(&response, &proposal.new.controller, sizes)
+    }
+}
+
+fn refuse<T>(reason: String) -> Result<T> {
+    Err(Error::Refused { reason })
+}
+
+fn largest(rows: &[LogRow]) -> [f64; 8] {
+    let mut largest = [0.0_f64; 8];
+    for row in rows {
+        largest.iter_mut().zip(row).for_each(|(most, value)| *most = most.max(value.abs()));
+    }
+    largest
+}
+
+fn question(name: &str, proposal: &Proposal) -> String {
+    let Proposal { before, prediction, new, .. } = proposal;
+    format!(
+        "{name}: switch to the new Q of order {}? Least damping {:.3} now, predicted {:.3} to {:.3}; peak sensitivity {:.2} now, predicted \
+         {:.2}. It stabilises all {} models within the region of S, at worst with a pole of magnitude {:.4}. If the guard trips or the \
+         damping is below the prediction, Q goes back to zero.",
+        new.q.system.order(),
+        before.damping,
+        prediction.bounds[0],
+        prediction.bounds[1],
+        before.sensitivity,
+        prediction.sensitivity,
+        new.models,
+        new.worst_pole
+    )
+}

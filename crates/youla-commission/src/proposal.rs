@@ -1,0 +1,152 @@
+//! From a record to a switch that can be answered for: model, verdict, new controller, certificate, prediction.
+
+use crate::campaign::Goal;
+use crate::figures::{LoopState, Sizes, least_damping};
+use crate::identify::{CleanRows, identified, loop_response};
+use crate::parameter::{LoadedQ, parameter_of};
+use crate::rehearse::{Prediction, on_model, predict};
+use crate::running::RunningLoop;
+use crate::{Error, Result};
+use youla::ErrorKind;
+use youla::identify::hansen::HansenModel;
+use youla::identify::likelihood::Recommendation;
+use youla::lti::{Discrete, StateSpace};
+use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign};
+use youla_run::Identification;
+
+/// A new controller with its Q.
+pub(crate) struct NewLoop {
+    /// `u = K y`, positive feedback.
+    pub(crate) controller: StateSpace<Discrete>,
+    pub(crate) q: LoadedQ,
+    /// Models within the region of S that it stabilises, all of them.
+    pub(crate) models: usize,
+    /// Largest magnitude of a closed-loop pole over them.
+    pub(crate) worst_pole: f64,
+}
+
+/// What a record gives.
+pub(crate) struct Proposal {
+    pub(crate) found: Identification,
+    pub(crate) before: LoopState,
+    pub(crate) sizes: (Vec<f64>, Vec<f64>),
+    pub(crate) new: NewLoop,
+    pub(crate) prediction: Prediction,
+}
+
+/// A proposal, or the reason why there is none.
+pub(crate) enum Outcome {
+    Proposed(Box<Proposal>),
+    Refused { reason: String, found: Option<Box<Identification>> },
+}
+
+/// Identifies and designs.
+///
+/// # Errors
+/// Bad input; a numerical condition is a reason to refuse.
+pub(crate) fn propose(running: &RunningLoop, rows: &CleanRows, name: &str, goal: &Goal) -> Result<Outcome> {
+    let found = match refusable(identified(running, rows, name))? {
+        Ok(found) => found,
+        Err(reason) => return Ok(Outcome::Refused { reason, found: None }),
+    };
+    match refusable(designed(running, rows, &found, goal))? {
+        Ok(parts) => {
+            let sizes = found.records.sizes();
+            let (before, new, prediction) = parts;
+            Ok(Outcome::Proposed(Box::new(Proposal { found, before, sizes, new, prediction })))
+        }
+        Err(reason) => Ok(Outcome::Refused { reason, found: Some(Box::new(found)) }),
+    }
+}
+
+/// Numerical conditions as their sentence.
+fn refusable<T>(outcome: Result<T>) -> Result<Result<T, String>> {
+    match outcome {
+        Err(e) if e.kind() == ErrorKind::Numerical => Ok(Err(e.to_string())),
+        Err(e) => Err(e),
+        Ok(value) => Ok(Ok(value)),
+    }
+}
+
+fn refuse<T>(reason: String) -> Result<T> {
+    Err(Error::Refused { reason })
+}
+
+fn designed(
+    running: &RunningLoop,
+    rows: &CleanRows,
+    found: &Identification,
+    goal: &Goal,
+) -> Result<(LoopState, NewLoop, Prediction)> {
+    let model = match &found.recommended {
+        Ok(model) if model.trusted() => model,
+        Ok(model) => return refuse(format!("the model is not trusted: {}", model.reasons().join("; "))),
+        Err(e) => return refuse(format!("there is no recommended model: {e}")),
+    };
+    let Some(scheme) = found.scheme() else { return refuse("there is no region of S to certify the switch".into()) };
+    let (input, output) = found.records.sizes();
+    let sizes = Sizes { input: &input, output: &output };
+    let measured = loop_response(running, None, rows)?;
+    let before = LoopState::new(&measured, &running.factors.controller()?, sizes)?;
+    let new = new_loop(running, model, &scheme.hansen, sizes, goal.damping * before.damping)?;
+    let prediction = predict(running, model, &new, rows, sizes)?;
+    let relative = prediction.deviation / prediction.damping;
+    if relative.is_nan() || relative > goal.deviation {
+        return refuse(format!(
+            "the relative standard deviation of the predicted damping is {relative:.3}, above the goal of {}",
+            goal.deviation
+        ));
+    }
+    Ok((before, new, prediction))
+}
+
+/// The controller of the smallest input weight, and so of the most damping, that keeps every limit, stabilises every model within the
+/// region of S and can be loaded as Q.
+fn new_loop(
+    running: &RunningLoop,
+    model: &Recommendation,
+    hansen: &HansenModel,
+    sizes: Sizes<'_>,
+    wanted: f64,
+) -> Result<NewLoop> {
+    let problem = RedesignProblem {
+        model: &model.plant,
+        factors: &running.factors,
+        deviation: &hansen.deviation.model,
+        uncertainty: hansen.deviation.uncertainty.as_ref(),
+        input_size: sizes.input,
+        output_size: sizes.output,
+    };
+    let mut weights = RedesignOptions::default().input_weights;
+    weights.sort_by(f64::total_cmp);
+    let mut reasons = Vec::new();
+    for weight in weights {
+        let options = RedesignOptions { input_weights: vec![weight], ..RedesignOptions::default() };
+        let candidate = redesign(&problem, &options).map_err(Error::from).and_then(|new| loaded(running, new));
+        let reason = match refusable(candidate)? {
+            Ok(new) => {
+                let response = on_model(&model.plant, &new.controller)?.in_units(sizes.input, sizes.output);
+                let damping = least_damping(&response)?;
+                if damping >= wanted {
+                    return Ok(new);
+                }
+                format!("the predicted damping {damping:.3} is below {wanted:.3}")
+            }
+            Err(reason) => reason,
+        };
+        reasons.push(format!("weight {weight}: {reason}"));
+    }
+    refuse(format!("no new controller meets the goal ({})", reasons.join("; ")))
+}
+
+fn loaded(running: &RunningLoop, new: Redesign) -> Result<NewLoop> {
+    let Some(band) = new.band.filter(|band| band.holds()) else {
+        return refuse("there is no certificate over the region of S".into());
+    };
+    let controller = new.controller.system;
+    if !controller.is_stable()? {
+        return refuse("the new controller is unstable itself".into());
+    }
+    let q = parameter_of(running, &controller)?;
+    Ok(NewLoop { controller, q, models: band.within, worst_pole: band.worst_within })
+}

@@ -1,0 +1,132 @@
+//! What a campaign leaves: one record for each point, kept for an interrupted campaign, and summary.json.
+
+use crate::figures::LoopState;
+use crate::rehearse::Prediction;
+use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::Path;
+
+/// How a point ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum PointStatus {
+    /// The new Q runs, and the verification is as predicted or better.
+    Done,
+    /// The new Q ran, but the guard or the verification was against it; Q is zero again.
+    Fallback,
+    /// Nothing was switched; alpha and Q are zero.
+    Stopped,
+}
+
+/// A point of a campaign.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct PointRecord {
+    /// Its name.
+    pub name: String,
+    /// How it ended.
+    pub status: PointStatus,
+    /// Why it was stopped or taken back.
+    pub reason: Option<String>,
+    /// Amplitude of the excitation.
+    pub amplitude: f64,
+    /// Length of the record from which the model comes, seconds.
+    pub seconds: f64,
+    /// The loop with the controller that ran, measured.
+    pub before: Option<LoopState>,
+    /// What was predicted of the verification.
+    pub predicted: Option<Prediction>,
+    /// The loop with the new Q, measured.
+    pub reached: Option<LoopState>,
+    /// States of the new Q.
+    pub q_order: Option<usize>,
+    /// Models within the region of S that the new controller stabilises, all of them.
+    pub certified_models: Option<usize>,
+    /// Switches of Q.
+    pub switches: usize,
+    /// Switches after which the guard ended the excitation or the loop was not measured as stable.
+    pub unstable_switches: usize,
+}
+
+/// Least damping at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct DampingFigures {
+    /// Measured with the controller that ran.
+    pub before: Option<f64>,
+    /// Bounds of the prediction.
+    pub predicted: Option<[f64; 2]>,
+    /// Measured with the new Q.
+    pub reached: Option<f64>,
+}
+
+/// The contents of summary.json.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct CampaignSummary {
+    /// Name of the machine.
+    pub name: String,
+    /// Of the first point.
+    pub damping: DampingFigures,
+    /// Over all points.
+    pub unstable_switches: usize,
+    /// Where the loop of the firmware ran: `qemu cortex-m4` or `host`.
+    pub controller: String,
+    /// Whether every point is done.
+    pub done: bool,
+    /// All points that were begun.
+    pub points: Vec<PointRecord>,
+}
+
+impl CampaignSummary {
+    pub(crate) fn new(name: &str, controller: &str, expected: usize, points: Vec<PointRecord>) -> Self {
+        let first = points.first();
+        CampaignSummary {
+            name: name.into(),
+            damping: DampingFigures {
+                before: first.and_then(|p| p.before).map(|state| state.damping),
+                predicted: first.and_then(|p| p.predicted).map(|predicted| predicted.bounds),
+                reached: first.and_then(|p| p.reached).map(|state| state.damping),
+            },
+            unstable_switches: points.iter().map(|p| p.unstable_switches).sum(),
+            controller: controller.into(),
+            done: points.len() == expected && points.iter().all(|p| p.status == PointStatus::Done),
+            points,
+        }
+    }
+}
+
+/// Reads JSON; `None` where the file does not exist.
+///
+/// # Errors
+/// [`youla_io::Error::Io`]; [`Error::Campaign`] for a file that does not hold it.
+pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>> {
+    let text = match fs::read_to_string(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
+        other => other.map_err(|source| io(path, source))?,
+    };
+    serde_json::from_str(&text).map(Some).map_err(|e| Error::Campaign {
+        path: path.to_owned(),
+        problem: format!("{e}; choose another --out, or remove this file to repeat its part"),
+    })
+}
+
+/// Writes a file whole: beside its place first.
+///
+/// # Errors
+/// [`youla_io::Error::Io`].
+pub(crate) fn write_text(path: &Path, text: &str) -> Result<()> {
+    let partial = path.with_extension("partial");
+    fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|source| io(path, source))
+}
+
+/// As [`write_text`], JSON for people.
+///
+/// # Errors
+/// [`youla_io::Error::Io`].
+pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
+    let text = serde_json::to_string_pretty(value).map_err(|e| io(path, e.into()))?;
+    write_text(path, &(text + "\n"))
+}
+
+pub(crate) fn io(path: &Path, source: std::io::Error) -> Error {
+    Error::File(youla_io::Error::Io { path: path.to_owned(), source })
+}

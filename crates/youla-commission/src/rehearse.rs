@@ -1,0 +1,132 @@
+//! What the verification will measure: it is rehearsed on the model, with its noise, and evaluated as the record will be.
+
+use crate::figures::{LoopState, Sizes, least_damping};
+use crate::identify::{CleanRows, response_to};
+use crate::parameter::at_plant_input;
+use crate::proposal::NewLoop;
+use crate::running::RunningLoop;
+use crate::{Error, Result};
+use faer::Side;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use youla::identify::likelihood::{Experiment, LikelihoodOptions, Predictor, Recommendation, recommend};
+use youla::linalg::block;
+use youla::lti::{Discrete, StateSpace, simulate};
+use youla::{Mat, MatRef};
+
+/// Rehearsals, and stretches of the record that are identified each for itself.
+const REHEARSALS: usize = 12;
+const STRETCHES: usize = 6;
+/// Probability with which the interval holds the measurement.
+pub const LEVEL: f64 = 0.99;
+/// Quantile of Student's distribution with 11 degrees of freedom at 0.995.
+const STUDENT: f64 = 3.106;
+
+/// What is predicted of a verification.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Prediction {
+    /// Least damping of the loop on the model.
+    pub damping: f64,
+    /// Standard deviation of its measurement.
+    pub deviation: f64,
+    /// Bounds of its measurement, at the level [`LEVEL`].
+    pub bounds: [f64; 2],
+    /// Peak of the sensitivity on the model.
+    pub sensitivity: f64,
+}
+
+/// Predicts a verification with the excitation of a record.
+///
+/// # Errors
+/// Those of the identification of a rehearsal.
+pub(crate) fn predict(
+    running: &RunningLoop,
+    model: &Recommendation,
+    new: &NewLoop,
+    rows: &CleanRows,
+    sizes: Sizes<'_>,
+) -> Result<Prediction> {
+    let state = LoopState::new(&on_model(&model.plant, &new.controller)?, &new.controller, sizes)?;
+    let v = at_plant_input(running, Some(&new.q), &rows.alpha)?;
+    let noisy = with_noise(&model.predictor, &new.controller)?;
+    let measured: Vec<Result<f64>> = (0..REHEARSALS as u64)
+        .into_par_iter()
+        .map(|seed| {
+            let y = rehearsed(&noisy, v.as_ref(), &model.predictor.covariance, seed)?;
+            least_damping(&response_to(v.as_ref(), y.as_ref(), noisy.time())?.in_units(sizes.input, sizes.output))
+        })
+        .collect();
+    let measured: Vec<f64> = measured.into_iter().collect::<Result<_>>()?;
+    let (mean, spread) = moments(&measured);
+    let of_model = model_deviation(model, new, rows, sizes);
+    // A further measurement beside the mean of the rehearsals, and the error of the model.
+    let deviation = (spread * spread * (1.0 + 1.0 / REHEARSALS as f64) + of_model * of_model).sqrt();
+    let half = STUDENT * deviation;
+    // The estimate of the loop has a bias that the rehearsals show; it depends on their noise, so both means count.
+    let bounds = [mean.min(state.damping) - half, mean.max(state.damping) + half];
+    Ok(Prediction { damping: state.damping, deviation, bounds, sensitivity: state.sensitivity })
+}
+
+/// From a disturbance at the plant input to the outputs.
+pub(crate) fn on_model(plant: &StateSpace<Discrete>, controller: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    let ports = youla::control::with_input_port(controller)?;
+    let closed = youla::control::closed_loop(plant, &ports)?;
+    let (m, p) = (plant.inputs(), plant.outputs());
+    Ok(closed.part(m..m + p, 0..m))
+}
+
+/// The loop from the disturbance at the plant input and the innovations to the outputs.
+fn with_noise(model: &Predictor, controller: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+    let (n, m, p) = (model.a.nrows(), model.b.ncols(), model.c.nrows());
+    let gain = model.k.clone().unwrap_or_else(|| Mat::zeros(n, p));
+    let order = controller.order();
+    let a = block(&[
+        &[model.a.as_ref(), (&model.b * controller.c()).as_ref()],
+        &[(controller.b() * &model.c).as_ref(), controller.a()],
+    ]);
+    let b = block(&[&[model.b.as_ref(), gain.as_ref()], &[Mat::zeros(order, m).as_ref(), controller.b()]]);
+    let c = block(&[&[model.c.as_ref(), Mat::zeros(p, order).as_ref()]]);
+    let d = block(&[&[Mat::zeros(p, m).as_ref(), youla::linalg::eye(p).as_ref()]]);
+    Ok(StateSpace::new(a, b, c, d, controller.time())?)
+}
+
+fn rehearsed(noisy: &StateSpace<Discrete>, v: MatRef<'_, f64>, covariance: &Mat<f64>, seed: u64) -> Result<Mat<f64>> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let white = Mat::from_fn(v.nrows(), covariance.nrows(), |_, _| rng.sample::<f64, _>(StandardNormal));
+    let root = covariance.llt(Side::Lower).map_err(|_| Error::Controller {
+        problem: "cannot be rehearsed: the covariance of the noise is not positive".into(),
+    })?;
+    let e = white * root.L().transpose();
+    let signals = block(&[&[v, e.as_ref()]]);
+    Ok(simulate(noisy, signals.as_ref(), &vec![0.0; noisy.order()])?)
+}
+
+/// Standard deviation of the predicted damping by the error of the model: stretches of the record identified each for itself, with the
+/// order of the whole. Infinite where a stretch gives no stable loop.
+fn model_deviation(model: &Recommendation, new: &NewLoop, rows: &CleanRows, sizes: Sizes<'_>) -> f64 {
+    let options = LikelihoodOptions {
+        order: Some(model.order),
+        dead_time: Some(model.dead_time.clone()),
+        ..LikelihoodOptions::default()
+    };
+    let length = rows.y.nrows() / STRETCHES;
+    let damping = |stretch: usize| -> Result<f64> {
+        let part = |m: &Mat<f64>| m.subrows(stretch * length, length).to_owned();
+        let (u, y) = (part(&rows.u), part(&rows.y));
+        let time = new.controller.time();
+        let found = recommend(&[Experiment::new(u.as_ref(), y.as_ref())], &[], None, time, &options)?;
+        least_damping(&on_model(&found.plant, &new.controller)?.in_units(sizes.input, sizes.output))
+    };
+    let found: Result<Vec<f64>> = (0..STRETCHES).into_par_iter().map(damping).collect();
+    found.map_or(f64::INFINITY, |all| moments(&all).1 / (STRETCHES as f64).sqrt())
+}
+
+/// Mean and standard deviation.
+fn moments(values: &[f64]) -> (f64, f64) {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    (mean, (values.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / (count - 1.0)).sqrt())
+}

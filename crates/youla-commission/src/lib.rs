@@ -13,6 +13,7 @@ mod identify;
 mod parameter;
 mod point;
 mod proposal;
+mod qemu;
 mod record;
 mod rehearse;
 mod report;

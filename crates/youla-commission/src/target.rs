@@ -1,5 +1,6 @@
 //! The controller of a campaign: the loop of the firmware, one sample at a time.
 
+use crate::qemu::Qemu;
 use crate::station::{CampaignStation, station};
 use crate::{Error, Result};
 use std::path::Path;
@@ -9,27 +10,35 @@ use youla_link::LARGEST_FRAME;
 pub(crate) enum Target {
     /// In this process.
     Host { station: Box<CampaignStation>, u: [f32; 2], frame: Vec<u8> },
+    /// On a Cortex-M4 in QEMU.
+    Qemu(Qemu),
 }
 
 impl Target {
     /// Where the loop will run, in words: `image` is that of the firmware for QEMU.
-    pub(crate) fn place(_image: Option<&Path>) -> &'static str {
-        "host"
+    pub(crate) fn place(image: Option<&Path>) -> &'static str {
+        match image {
+            Some(image) if image.is_file() && Qemu::is_there() => "qemu cortex-m4",
+            _ => "host",
+        }
     }
 
-    /// The loop of these numbers.
+    /// The loop of these numbers, there.
     ///
     /// # Errors
-    /// [`Error::Controller`] for numbers that are not valid.
-    pub(crate) fn start(_image: Option<&Path>, numbers: &[f32]) -> Result<Self> {
-        Self::host(numbers)
+    /// [`Error::Controller`] for numbers that are not valid, or an image that does not start.
+    pub(crate) fn start(image: Option<&Path>, numbers: &[f32]) -> Result<Self> {
+        match image {
+            Some(path) if Self::place(image) != "host" => Ok(Target::Qemu(Qemu::start(path, numbers)?)),
+            _ => Self::host(numbers),
+        }
     }
 
     /// The host's build of the loop.
     ///
     /// # Errors
     /// [`Error::Controller`] for numbers that are not valid.
-    pub(crate) fn host(numbers: &[f32]) -> Result<Self> {
+    fn host(numbers: &[f32]) -> Result<Self> {
         let station = station(numbers).ok_or_else(|| failed("does not accept its matrices and limits"))?;
         Ok(Target::Host { station: Box::new(station), u: [0.0; 2], frame: Vec::new() })
     }
@@ -43,6 +52,7 @@ impl Target {
                 ready.clear();
                 Ok(*u)
             }
+            Target::Qemu(qemu) => qemu.receive(frame),
         }
     }
 
@@ -63,6 +73,7 @@ impl Target {
                 frame.extend_from_slice(bytes.get(..length).unwrap_or_default());
                 Ok(())
             }
+            Target::Qemu(qemu) => qemu.send(y, request),
         }
     }
 }

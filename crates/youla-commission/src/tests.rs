@@ -74,13 +74,13 @@ fn seeds() {
     let last: u64 = std::env::var("SEEDS").map_or(3, |s| s.parse().unwrap());
     for seed in 1..=last {
         for point in &campaign.points {
-            let one = crate::Campaign { seed, image: None, points: vec![point.clone()], ..campaign.clone() };
+            let one = crate::Campaign { seed, image: std::env::var_os("HOST").map_or_else(|| Some(folder.join(campaign.image.clone().unwrap())), |_| None), points: vec![point.clone()], ..campaign.clone() };
             let file = base.join("campaign.toml");
             std::fs::write(&file, toml::to_string(&one).unwrap()).unwrap();
             let out = base.join(format!("{seed}-{}", point.name));
             let summary = crate::commission(&file, &out, &mut Yes).unwrap();
             let p = &summary.points[0];
-            println!("LINE {seed} {} {:?} {:.1}s a {:.3} before {:?} pred {:?} {:?} reached {:?} {:?} {}", p.name, p.status, p.seconds, p.amplitude,
+            println!("LINE {seed} {} {} {:?} {:.1}s a {:.3} before {:?} pred {:?} {:?} reached {:?} {:?} {}", summary.controller, p.name, p.status, p.seconds, p.amplitude,
                 p.before.map(|x| x.damping), p.predicted.map(|x| x.damping), p.predicted.map(|x| x.bounds), p.reached.map(|x| x.damping), p.reason, p.unstable_switches);
         }
     }

@@ -8,9 +8,9 @@ use crate::report::report;
 use crate::running::{LoopDescription, RunningLoop};
 use crate::target::Target;
 use crate::{Error, Result};
+use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
-use serde::{Deserialize, Serialize};
 use std::path::Path;
 use youla::lti::Discrete;
 use youla_io::SystemMatrices;
@@ -80,7 +80,9 @@ fn claim(campaign: &Campaign, loops: &[RunningLoop], controller: &str, out: &Pat
         Some(before) if before == claim => Ok(()),
         Some(_) => Err(Error::Campaign {
             path: out.to_owned(),
-            problem: "this folder holds another campaign, or the same one with another controller; choose another --out".into(),
+            problem:
+                "this folder holds another campaign, or the same one with another controller; choose another --out"
+                    .into(),
         }),
         None => {
             let mut entries = fs::read_dir(out).map_err(|source| io(out, source))?;

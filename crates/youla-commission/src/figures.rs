@@ -30,7 +30,11 @@ impl LoopState {
     ///
     /// # Errors
     /// [`youla::Error::Unstable`] for an unstable response.
-    pub(crate) fn new(response: &StateSpace<Discrete>, controller: &StateSpace<Discrete>, sizes: Sizes<'_>) -> Result<Self> {
+    pub(crate) fn new(
+        response: &StateSpace<Discrete>,
+        controller: &StateSpace<Discrete>,
+        sizes: Sizes<'_>,
+    ) -> Result<Self> {
         let scaled = response.in_units(sizes.input, sizes.output);
         // With positive feedback the sensitivity is I + T K.
         let rest = controller.in_units(sizes.output, sizes.input).then(&scaled)?;

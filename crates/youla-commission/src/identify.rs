@@ -5,15 +5,17 @@ use crate::bench::LogRow;
 use crate::parameter::{LoadedQ, at_plant_input};
 use crate::running::RunningLoop;
 use std::path::Path;
-use youla::{Mat, MatRef};
 use youla::identify::subspace::{
     Experiment, InitialState, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
 };
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
+use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec};
 use youla_paper::study::without_harmonics;
-use youla_run::{DataFile, DataSettings, Identification, LoopRecord, RunRecords, RunSettings, SourceFile, StageClock, identify};
+use youla_run::{
+    DataFile, DataSettings, Identification, LoopRecord, RunRecords, RunSettings, SourceFile, StageClock, identify,
+};
 
 /// Rows of one experiment without the harmonics of the speed.
 pub(crate) struct CleanRows {
@@ -77,7 +79,11 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
 }
 
 /// The loop from a disturbance at the plant input to the outputs, identified in open loop from the excitation of a record.
-pub(crate) fn loop_response(running: &RunningLoop, q: Option<&LoadedQ>, rows: &CleanRows) -> Result<StateSpace<Discrete>> {
+pub(crate) fn loop_response(
+    running: &RunningLoop,
+    q: Option<&LoadedQ>,
+    rows: &CleanRows,
+) -> Result<StateSpace<Discrete>> {
     let v = at_plant_input(running, q, &rows.alpha)?;
     response_to(v.as_ref(), rows.y.as_ref(), running.nominal.time())
 }

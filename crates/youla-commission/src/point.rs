@@ -52,12 +52,7 @@ pub(crate) struct PointFiles {
 }
 
 impl<'a> Point<'a> {
-    pub(crate) fn new(
-        campaign: &'a Campaign,
-        at: &'a OperatingPoint,
-        running: &'a RunningLoop,
-        bench: Bench,
-    ) -> Self {
+    pub(crate) fn new(campaign: &'a Campaign, at: &'a OperatingPoint, running: &'a RunningLoop, bench: Bench) -> Self {
         let record = PointRecord {
             name: at.name.clone(),
             status: PointStatus::Stopped,
@@ -82,17 +77,17 @@ impl<'a> Point<'a> {
     pub(crate) fn run(mut self, operator: &mut dyn Operator) -> Result<(PointRecord, PointFiles)> {
         let mut files = PointFiles::default();
         let ended = self.circle(operator, &mut files);
-        if let Err(Error::Refused { reason }) = ended {
-            self.record.reason = Some(reason);
-            self.silence()?;
-        } else {
-            ended?;
+        let silent = if ended.is_ok() { Ok(()) } else { self.silence() };
+        match ended {
+            Err(Error::Refused { reason }) => self.record.reason = Some(reason),
+            other => other?,
         }
+        silent?;
         Ok((self.record, files))
     }
 
     /// Alpha and Q to zero.
-    fn silence(&mut self) -> Result<()> {
+    pub(crate) fn silence(&mut self) -> Result<()> {
         self.bench.ask(&Request::Stop)?;
         self.bench.ask(&Request::ReleaseQ)?;
         self.bench.run(REST)
@@ -113,22 +108,24 @@ impl<'a> Point<'a> {
             return refuse("the switch was not confirmed".into());
         }
         operator.notes("switch and verification");
-        let verification = self.switched(proposal);
-        let rows = match verification {
-            Ok(rows) => rows,
+        self.verified(proposal, &mut files.verification)
+    }
+
+    /// Switches and compares the verification with its prediction.
+    pub(crate) fn verified(&mut self, proposal: &Proposal, verification: &mut Vec<LogRow>) -> Result<()> {
+        *verification = match self.switched(proposal) {
             Err(Error::Refused { reason }) => return self.fall_back(reason, true),
-            Err(e) => return Err(e),
+            other => other?,
         };
-        let reached = self.measured(proposal, &rows);
-        files.verification = rows;
-        let reached = match reached {
-            Ok(reached) => reached,
+        let reached = match self.measured(proposal, verification) {
             Err(e) => return self.fall_back(format!("the loop could not be measured: {e}"), true),
+            Ok(reached) => reached,
         };
         self.record.reached = Some(reached);
-        let least = self.record.predicted.map_or(f64::INFINITY, |predicted| predicted.bounds[0]);
-        if reached.damping < least {
-            return self.fall_back(format!("the damping {:.3} is below the prediction {least:.3}", reached.damping), false);
+        let least = proposal.prediction.bounds[0];
+        if reached.damping.is_nan() || reached.damping < least {
+            let reason = format!("the damping {:.3} is below the prediction of at least {least:.3}", reached.damping);
+            return self.fall_back(reason, false);
         }
         self.record.status = PointStatus::Done;
         Ok(())
@@ -219,7 +216,7 @@ impl<'a> Point<'a> {
     }
 
     /// Records until there is a proposal within the goal, twice as long each time.
-    fn recorded(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<Box<Proposal>> {
+    pub(crate) fn recorded(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<Box<Proposal>> {
         let ts = self.running.nominal.time().ts();
         let most = (self.campaign.limits.duration / ts) as usize;
         files.log = self.excited(self.record.amplitude, FIRST.min(most))?;

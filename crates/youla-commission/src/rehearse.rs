@@ -71,7 +71,10 @@ pub(crate) fn predict(
 }
 
 /// From a disturbance at the plant input to the outputs.
-pub(crate) fn on_model(plant: &StateSpace<Discrete>, controller: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+pub(crate) fn on_model(
+    plant: &StateSpace<Discrete>,
+    controller: &StateSpace<Discrete>,
+) -> Result<StateSpace<Discrete>> {
     let ports = youla::control::with_input_port(controller)?;
     let closed = youla::control::closed_loop(plant, &ports)?;
     let (m, p) = (plant.inputs(), plant.outputs());

@@ -21,6 +21,11 @@ pub(crate) fn report(summary: &CampaignSummary) -> String {
          identified from the excitation. The prediction holds the measurement with a probability of {:.0} %.\n",
         100.0 * LEVEL
     );
+    for PointRecord { name, seconds, .. } in &summary.points {
+        if *seconds > 0.0 {
+            text += &format!("\n[Identification at {name}](<{name}/identification/report.html>)\n");
+        }
+    }
     for point in &summary.points {
         if let Some(reason) = &point.reason {
             text += &format!("\n{}: {reason}.\n", point.name);

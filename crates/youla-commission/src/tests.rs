@@ -1,13 +1,25 @@
-//! Tests.
+//! The circle on the twin: on the host in every run, over seeds in QEMU on request.
 
-use crate::running::LoopDescription;
-use std::path::Path;
-use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
+use crate::bench::Bench;
+use crate::parameter::parameter_of;
+use crate::point::{Operator, Point, PointFiles, RAMP};
+use crate::running::{LoopDescription, RunningLoop};
+use crate::station::Q_STATES;
+use crate::target::Target;
+use crate::{Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, commission};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, observer_controller, with_input_port};
 use youla::linalg::eye;
-use youla::lti::Discrete;
-use youla::{Mat, MatRef};
-use youla_paper::rig::{RigParameters, bearing_at_speed, degraded};
+use youla::lti::{Discrete, frequency_response};
+use youla::{ErrorKind, Mat, MatRef};
+use youla_io::export::ExportedController;
+use youla_paper::rig::{BearingRig, Fidelity, RigParameters, bearing_at_speed, degraded};
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
+
+fn example() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/commission")
+}
 
 fn rows(m: MatRef<'_, f64>) -> Vec<Vec<f64>> {
     (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect()
@@ -44,45 +56,226 @@ fn designed(cross_coupling: f64, input_weight: f64) -> LoopDescription {
 #[test]
 #[ignore = "writes the files of examples/commission"]
 fn example_files() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/commission");
-    std::fs::create_dir_all(&folder).unwrap();
+    std::fs::create_dir_all(example()).unwrap();
     for (name, cross_coupling, weight) in [("weak.toml", 0.0, 1000.0), ("coupled.toml", 0.25, 10.0)] {
         let text = toml::to_string(&designed(cross_coupling, weight)).unwrap();
-        std::fs::write(folder.join(name), text).unwrap();
+        std::fs::write(example().join(name), text).unwrap();
     }
 }
 
-struct Yes;
+/// A person who always gives the same answer, with what was said.
+#[derive(Default)]
+struct Person {
+    agrees: bool,
+    notes: Vec<String>,
+}
 
-impl crate::Operator for Yes {
+impl Operator for Person {
     fn confirms(&mut self, _text: &str) -> bool {
-        true
+        self.agrees
     }
-    fn notes(&mut self, _text: &str) {}
+    fn notes(&mut self, text: &str) {
+        self.notes.push(text.into());
+    }
+}
+
+/// A new folder with the loops of the example.
+struct Place(PathBuf);
+
+impl Place {
+    fn new(name: &str) -> Self {
+        let folder = std::env::temp_dir().join(format!("youla-commission-test-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        for name in ["weak.toml", "coupled.toml"] {
+            std::fs::copy(example().join(name), folder.join(name)).unwrap();
+        }
+        Place(folder)
+    }
+
+    fn run(&self, campaign: &Campaign, out: &str, agrees: bool) -> (crate::Result<CampaignSummary>, Person) {
+        let file = self.0.join("campaign.toml");
+        std::fs::write(&file, toml::to_string(campaign).unwrap()).unwrap();
+        let mut person = Person { agrees, ..Person::default() };
+        (commission(&file, &self.0.join(out), &mut person), person)
+    }
+}
+
+impl Drop for Place {
+    fn drop(&mut self) {
+        let _ = std::fs::remove_dir_all(&self.0);
+    }
+}
+
+/// The first point of the example on the host, with a record of 3 s.
+fn short() -> Campaign {
+    let mut campaign = Campaign::read(&example().join("campaign.toml")).unwrap();
+    campaign.limits.duration = 3.0;
+    campaign.points.truncate(1);
+    Campaign { image: None, ..campaign }
 }
 
 #[test]
-#[ignore = "measurement"]
-fn seeds() {
-    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/commission");
-    let base = std::env::temp_dir().join(format!("youla-seeds-{}", std::process::id()));
-    std::fs::create_dir_all(&base).unwrap();
-    for name in ["weak.toml", "coupled.toml"] {
-        std::fs::copy(folder.join(name), base.join(name)).unwrap();
+fn a_campaign_that_was_stopped_goes_on_and_keeps_what_is_done() {
+    let place = Place::new("circle");
+    let campaign = short();
+    let refused = place.run(&campaign, "out", false).0.unwrap();
+    let point = &refused.points[0];
+    assert_eq!((point.status, point.switches, refused.done), (PointStatus::Stopped, 0, false));
+    assert_eq!(point.reason.as_deref(), Some("the switch was not confirmed"));
+    assert!(refused.damping.predicted.is_some() && refused.damping.reached.is_none());
+
+    let summary = place.run(&campaign, "out", true).0.unwrap();
+    let DampingFigures { before, predicted, reached } = summary.damping;
+    let (before, predicted, reached) = (before.unwrap(), predicted.unwrap(), reached.unwrap());
+    assert!(summary.done && summary.unstable_switches == 0 && summary.controller == "host");
+    // The truth is 0.0863, and 0.2075 with the new controller and without hysteresis.
+    assert!((before / 0.0863 - 1.0).abs() < 0.05, "{before}");
+    assert!(reached > 2.0 * before && reached > predicted[0] && reached < 0.22, "{before} {predicted:?} {reached}");
+    let out = place.0.join("out");
+    for file in
+        ["report.md", "0 rpm/log.csv", "0 rpm/verification.csv", "0 rpm/q.json", "0 rpm/identification/report.html"]
+    {
+        assert!(out.join(file).is_file(), "{file}");
     }
-    let campaign = crate::Campaign::read(&folder.join("campaign.toml")).unwrap();
-    let last: u64 = std::env::var("SEEDS").map_or(3, |s| s.parse().unwrap());
-    for seed in 1..=last {
-        for point in &campaign.points {
-            let one = crate::Campaign { seed, image: std::env::var_os("HOST").map_or_else(|| Some(folder.join(campaign.image.clone().unwrap())), |_| None), points: vec![point.clone()], ..campaign.clone() };
-            let file = base.join("campaign.toml");
-            std::fs::write(&file, toml::to_string(&one).unwrap()).unwrap();
-            let out = base.join(format!("{seed}-{}", point.name));
-            let summary = crate::commission(&file, &out, &mut Yes).unwrap();
-            let p = &summary.points[0];
-            println!("LINE {seed} {} {} {:?} {:.1}s a {:.3} before {:?} pred {:?} {:?} reached {:?} {:?} {}", summary.controller, p.name, p.status, p.seconds, p.amplitude,
-                p.before.map(|x| x.damping), p.predicted.map(|x| x.damping), p.predicted.map(|x| x.bounds), p.reached.map(|x| x.damping), p.reason, p.unstable_switches);
+    let written: CampaignSummary =
+        serde_json::from_str(&std::fs::read_to_string(out.join("summary.json")).unwrap()).unwrap();
+    assert_eq!(written, summary);
+
+    let (again, person) = place.run(&campaign, "out", false);
+    assert_eq!((again.unwrap(), person.notes), (summary, vec!["0 rpm: done before".to_owned()]));
+    let other = place.run(&Campaign { seed: 2, ..campaign }, "out", true).0.unwrap_err();
+    assert_eq!(other.kind(), ErrorKind::BadInput);
+    assert!(other.to_string().contains("holds another campaign"), "{other}");
+}
+
+/// A Q that destabilises, in place of the one that was designed: the guard ends it, and the loop is that of K again.
+#[test]
+fn a_switch_that_goes_wrong_is_taken_back() {
+    let campaign = short();
+    let running = RunningLoop::read(&example().join("weak.toml"), Discrete::new(2e-4).unwrap()).unwrap();
+    let plant = BearingRig::new(&RigParameters::shipped(), Fidelity::Rotating { rpm: 0.0 }, 1).unwrap();
+    let numbers = running.numbers(&[12.0, 12.0, 12.0, 12.0, 5.0, 5.0, 10.0, 10.0], [50, 50, RAMP]);
+    let bench = Bench::new(Target::start(None, &numbers).unwrap(), plant).unwrap();
+    let mut point = Point::new(&campaign, &campaign.points[0], &running, bench);
+    point.record.amplitude = 0.5;
+    let mut proposal = point.recorded(&mut Person::default(), &mut PointFiles::default()).unwrap();
+    let of_c = proposal.new.q.coefficients.len() - 2 * Q_STATES;
+    proposal.new.q.coefficients[of_c..].iter_mut().for_each(|value| *value *= -20.0);
+    let ended = point.verified(&proposal, &mut Vec::new());
+    let Err(Error::Refused { reason }) = ended else { panic!("{ended:?}") };
+    assert!(reason.contains("guard"), "{reason}");
+    assert_eq!((point.record.status, point.record.unstable_switches), (PointStatus::Fallback, 1));
+    point.silence().unwrap();
+    point.bench.take_rows();
+    point.bench.run(1000).unwrap();
+    let rows = point.bench.take_rows();
+    assert!(rows.iter().all(|row| row[4] == 0.0 && row[5] == 0.0), "alpha is not zero");
+    assert!(rows.iter().all(|row| row[0].abs() < 2.0 && row[1].abs() < 2.0), "the loop is not that of K");
+}
+
+/// K(Q) is the controller, to single precision; where it does not stabilise the nominal model there is no Q.
+#[test]
+fn a_new_controller_is_a_q_around_the_running_one() {
+    let time = Discrete::new(2e-4).unwrap();
+    let running = RunningLoop::read(&example().join("weak.toml"), time).unwrap();
+    let g = &running.nominal;
+    let weights = LqrWeights::on_outputs(g, eye(2).as_ref(), (faer::Scale(10.0) * eye(2)).as_ref()).unwrap();
+    let f = lqr(g, &weights).unwrap().f;
+    let new = observer_controller(g, f.as_ref(), running.l.as_ref()).unwrap();
+    let q = parameter_of(&running, &new).unwrap();
+    assert_eq!((q.system.order(), q.coefficients.len()), (12, Q_STATES * (Q_STATES + 4)));
+    let with_q = running.factors.controller_of(&q.system).unwrap();
+    let omega: Vec<f64> = (1..60).map(|k| 250.0 * f64::from(k)).collect();
+    let (found, expected) = (frequency_response(&with_q, &omega).unwrap(), frequency_response(&new, &omega).unwrap());
+    let size = expected.iter().map(|g| g.norm_max()).fold(0.0, f64::max);
+    let worst = found.iter().zip(expected.iter()).map(|(a, b)| (a - b).norm_max()).fold(0.0, f64::max);
+    assert!(worst < 1e-4 * size, "{worst:.1e} of {size:.1e}");
+    let wrong = observer_controller(g, (faer::Scale(-30.0) * f).as_ref(), running.l.as_ref()).unwrap();
+    assert!(parameter_of(&running, &wrong).unwrap_err().to_string().contains("unstable Q"));
+}
+
+#[test]
+fn a_campaign_that_cannot_be_run_is_refused_with_the_key() {
+    let text = std::fs::read_to_string(example().join("campaign.toml")).unwrap();
+    let place = Place::new("refused");
+    let file = place.0.join("campaign.toml");
+    for (from, to, words) in [
+        ("input = 5.0", "input = -5.0", "[limits] input is -5, but must be a number above 0"),
+        ("\"1250 rpm\"", "\"0 rpm\"", "two [[points]] have the same name"),
+        ("\"1250 rpm\"", "\"../x\"", "cannot be the name of a folder"),
+        ("residual", "residuum", "did you mean `residual`?"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        std::fs::write(&file, text.replacen(from, to, 1)).unwrap();
+        let error = Campaign::read(&file).unwrap_err();
+        assert!(error.to_string().contains(words) && error.kind() == ErrorKind::BadInput, "{error}");
+    }
+}
+
+/// The same figures, to the last digit, on host and target.
+#[test]
+#[ignore = "needs qemu-system-arm and the image `commission` of firmware/mps2-an386"]
+fn the_target_gives_what_the_host_gives() {
+    let place = Place::new("target");
+    let host = place.run(&short(), "host", true).0.unwrap();
+    let image = Campaign::read(&example().join("campaign.toml")).unwrap().image.map(|image| example().join(image));
+    let target = place.run(&Campaign { image, ..short() }, "target", true).0.unwrap();
+    assert_eq!((host.controller.as_str(), target.controller.as_str()), ("host", "qemu cortex-m4"));
+    assert_eq!(host.points, target.points);
+}
+
+/// The table of docs/commission.md: `SEEDS=20 cargo test --workspace --lib seeds -- --ignored --nocapture`.
+#[test]
+#[ignore = "takes ten minutes"]
+fn seeds() {
+    let seeds: u64 = std::env::var("SEEDS").map_or(20, |text| text.parse().unwrap());
+    let place = Place::new("seeds");
+    let mut campaign = Campaign::read(&example().join("campaign.toml")).unwrap();
+    campaign.image = campaign.image.map(|image| example().join(image));
+    let mut points: Vec<Vec<PointRecord>> = vec![Vec::new(); campaign.points.len()];
+    for seed in 1..=seeds {
+        campaign.seed = seed;
+        let begin = Instant::now();
+        let summary = place.run(&campaign, &format!("{seed}"), true).0.unwrap();
+        println!("seed {seed}: {}, {:.0} s", summary.controller, begin.elapsed().as_secs_f64());
+        for (at, (all, point)) in campaign.points.iter().zip(points.iter_mut().zip(summary.points)) {
+            assert_eq!(point.status, PointStatus::Done, "{seed} {}: {:?}", point.name, point.reason);
+            assert!(true_loop_is_stable(&place.0.join(format!("{seed}/{}/q.json", at.name)), at));
+            all.push(point);
         }
     }
-    std::fs::remove_dir_all(&base).unwrap();
+    for all in points.iter().filter(|all| !all.is_empty()) {
+        let figures = |p: &PointRecord| (p.before.unwrap().damping, p.predicted.unwrap(), p.reached.unwrap().damping);
+        let gain = |p: &PointRecord| figures(p).2 / figures(p).0;
+        let least = all.iter().map(gain).fold(f64::INFINITY, f64::min);
+        let within = |p: &&PointRecord| (figures(p).1.bounds[0]..=figures(p).1.bounds[1]).contains(&figures(p).2);
+        let count = all.iter().filter(within).count();
+        let range = |of: &dyn Fn(&PointRecord) -> f64| {
+            let values = || all.iter().map(of);
+            format!("{:.3} to {:.3}", values().fold(f64::INFINITY, f64::min), values().fold(0.0, f64::max))
+        };
+        let width = all.iter().map(|p| 0.5 * (figures(p).1.bounds[1] - figures(p).1.bounds[0]) / figures(p).1.damping);
+        println!(
+            "| {} | {} | {} | {} | {:.1} % | {least:.2} | {count} of {} | {} |",
+            all[0].name,
+            range(&|p| figures(p).0),
+            range(&|p| figures(p).1.damping),
+            range(&|p| figures(p).2),
+            100.0 * width.sum::<f64>() / all.len() as f64,
+            all.len(),
+            all.iter().map(|p| p.unstable_switches).sum::<usize>()
+        );
+        assert!(least >= 2.0 && all.iter().all(|p| p.unstable_switches == 0));
+        assert!(10 * count >= 9 * all.len(), "{count}");
+    }
+}
+
+/// Of the linear part of the twin with the new controller, which the campaign does not know.
+fn true_loop_is_stable(q: &Path, at: &OperatingPoint) -> bool {
+    let exported: ExportedController = serde_json::from_str(&std::fs::read_to_string(q).unwrap()).unwrap();
+    let mut parameters = RigParameters::shipped();
+    parameters.rotation.cross_coupling.value = at.cross_coupling;
+    let truth = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, 1).unwrap().true_plant().unwrap();
+    let controller = exported.controller.system(truth.time()).unwrap();
+    closed_loop(&truth, &with_input_port(&controller).unwrap()).unwrap().is_stable().unwrap()
 }

@@ -4,6 +4,7 @@ mod bad_output;
 mod bad_problem;
 mod bad_records;
 mod bad_settings;
+mod commission;
 mod compare;
 mod computed;
 mod excite;

@@ -4,10 +4,7 @@ use crate::Result;
 use serde::{Deserialize, Serialize};
 use youla::linalg::eye;
 use youla::lti::{Discrete, PeakOptions, StateSpace, linf_norm};
-
-/// Modes with less of the oscillating response than this are left out, as in the redesign.
-/// Chosen, not measured.
-const LEAST_SHARE: f64 = 0.05;
+use youla_loop::redesign;
 
 /// Sizes of inputs and outputs, their rms.
 #[derive(Debug, Clone, Copy)]
@@ -44,15 +41,10 @@ impl LoopState {
     }
 }
 
-/// Least damping ratio of the modes with 5 % or more of the oscillating response; 1 where there is none. Real poles do not count: two near
-/// each other have large responses that cancel, beside which no mode would have a share.
+/// Least damping ratio of the modes that matter, as in the redesign.
 ///
 /// # Errors
 /// [`youla::Error::Unstable`].
 pub(crate) fn least_damping(response: &StateSpace<Discrete>) -> Result<f64> {
-    let mut modes = response.shared_modes()?;
-    modes.retain(|mode| mode.mode.pole.im > 0.0);
-    let all: f64 = modes.iter().map(|mode| mode.share).sum();
-    let visible = modes.iter().filter(|mode| mode.share >= LEAST_SHARE * all);
-    Ok(visible.map(|mode| mode.mode.zeta).fold(1.0, f64::min))
+    Ok(redesign::least_damping(&redesign::loop_modes(response)?))
 }

@@ -40,15 +40,51 @@ impl LoopFigures {
         let peak_sensitivity = peak_sensitivity(&plant, &controller)?;
         let (m, p) = (plant.inputs(), plant.outputs());
         let response = closed_loop(&plant, &with_input_port(&controller)?)?.part(m..m + p, 0..m);
-        let modes = response.shared_modes()?;
+        let modes = loop_modes(&response)?;
         let least_damping = least_damping(&modes);
         let peak_response = hinf_norm(&response, &PeakOptions { tolerance: 1e-6 })?.value;
         Ok(LoopFigures { response, modes, least_damping, peak_response, peak_sensitivity })
     }
 }
 
-/// Of the oscillating modes that matter.
-fn least_damping(modes: &[SharedMode]) -> f64 {
+/// The modes below the Nyquist frequency with their shares in the response of all of them, largest first.
+///
+/// Poles at zero, of dead time, are left out: they have nearly one direction, so that their responses are huge and cancel, and no other
+/// mode would have a share beside them.
+///
+/// # Errors
+/// As [`StateSpace::shared_modes`].
+pub fn loop_modes(response: &StateSpace<Discrete>) -> Result<Vec<SharedMode>> {
+    let nyquist = 0.5 / response.time().ts();
+    let mut modes = response.shared_modes()?;
+    modes.retain(|m| m.mode.hz <= nyquist);
+    let all: f64 = modes.iter().map(|m| m.share).sum();
+    modes.iter_mut().for_each(|m| m.share /= if all > 0.0 { all } else { 1.0 });
+    Ok(modes)
+}
+
+/// Least damping ratio of the oscillating modes with a share of [`LoopFigures::LEAST_SHARE`] or more; 1 where there is none.
+pub fn least_damping(modes: &[SharedMode]) -> f64 {
     let matter = modes.iter().filter(|m| m.share >= LoopFigures::LEAST_SHARE && m.mode.pole.im > 0.0);
     matter.map(|m| m.mode.zeta).fold(1.0, f64::min)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use youla::Mat;
+
+    /// A mode beside a pole near zero with a huge residue, as those of dead time have by rounding.
+    #[test]
+    fn a_pole_near_zero_hides_no_mode() {
+        let time = Discrete::new(1.0).unwrap();
+        let a = Mat::from_fn(3, 3, |i, j| [[0.9, 0.3, 0.0], [-0.3, 0.9, 0.0], [0.0, 0.0, 1e-6]][i][j]);
+        let (b, c) = (Mat::from_fn(3, 1, |_, _| 1.0), Mat::from_fn(1, 3, |_, j| [1.0, 1.0, 1e6][j]));
+        let response = StateSpace::new(a, b, c, Mat::zeros(1, 1), time).unwrap();
+        let all = response.shared_modes().unwrap();
+        assert_eq!(least_damping(&all), 1.0);
+        let modes = loop_modes(&response).unwrap();
+        let zeta = all.iter().find(|m| m.mode.pole.im > 0.0).unwrap().mode.zeta;
+        assert_eq!((least_damping(&modes), modes.len(), modes[0].share), (zeta, 1, 1.0));
+    }
 }

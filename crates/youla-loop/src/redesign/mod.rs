@@ -15,7 +15,7 @@ mod lqg;
 mod robust;
 mod youla_parameter;
 
-pub use figures::LoopFigures;
+pub use figures::{LoopFigures, least_damping, loop_modes};
 pub use lqg::Gains;
 pub use robust::small_gain;
 

@@ -17,7 +17,7 @@ pub(crate) struct CommissionArgs {
     /// Folder of the results; one that holds a part of the same campaign is completed.
     #[arg(long)]
     out: PathBuf,
-    /// Switch without asking a person.
+    /// Switch without asking a person; with --json nobody is asked, and nothing is switched without it.
     #[arg(long)]
     yes: bool,
 }
@@ -33,6 +33,9 @@ impl Operator for Terminal {
         if self.yes {
             self.notes(text);
             return true;
+        }
+        if self.form.json {
+            return false;
         }
         let mut answer = String::new();
         // Without a terminal nobody confirms.

@@ -7,7 +7,6 @@ use crate::parameter::{LoadedQ, parameter_of};
 use crate::rehearse::{Prediction, on_model, predict};
 use crate::running::RunningLoop;
 use crate::{Error, Result};
-use youla::ErrorKind;
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::lti::{Discrete, StateSpace};
@@ -43,7 +42,7 @@ pub(crate) enum Outcome {
 /// Identifies and designs.
 ///
 /// # Errors
-/// Bad input; a numerical condition is a reason to refuse.
+/// Files; all else is a reason to refuse.
 pub(crate) fn propose(running: &RunningLoop, rows: &CleanRows, name: &str, goal: &Goal) -> Result<Outcome> {
     let found = match refusable(identified(running, rows, name))? {
         Ok(found) => found,
@@ -59,11 +58,11 @@ pub(crate) fn propose(running: &RunningLoop, rows: &CleanRows, name: &str, goal:
     }
 }
 
-/// Numerical conditions as their sentence.
+/// What makes a proposal impossible, as a sentence: all but files.
 fn refusable<T>(outcome: Result<T>) -> Result<Result<T, String>> {
     match outcome {
-        Err(e) if e.kind() == ErrorKind::Numerical => Ok(Err(e.to_string())),
-        Err(e) => Err(e),
+        Err(e @ (Error::File(_) | Error::Campaign { .. })) => Err(e),
+        Err(e) => Ok(Err(e.to_string())),
         Ok(value) => Ok(Ok(value)),
     }
 }

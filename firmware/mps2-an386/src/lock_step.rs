@@ -44,7 +44,10 @@ impl Pipes {
 }
 
 /// Until the host ends.
-pub(crate) fn serve<const N: usize, const K: usize>(station: &mut Station<'_, N, 2, 2, K>, pipes: &Pipes) -> Option<()> {
+pub(crate) fn serve<const N: usize, const K: usize>(
+    station: &mut Station<'_, N, 2, 2, K>,
+    pipes: &Pipes,
+) -> Option<()> {
     let mut output = [0; 8 + 2 + LARGEST_FRAME];
     let mut request = [0; LARGEST_FRAME];
     // A reply, or the rows that are complete.

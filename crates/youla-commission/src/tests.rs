@@ -240,6 +240,8 @@ fn seeds() {
         println!("seed {seed}: {}, {:.0} s", summary.controller, begin.elapsed().as_secs_f64());
         for (at, (all, point)) in campaign.points.iter().zip(points.iter_mut().zip(summary.points)) {
             assert_eq!(point.status, PointStatus::Done, "{seed} {}: {:?}", point.name, point.reason);
+            let (predicted, reached) = (point.predicted.unwrap(), point.reached.unwrap());
+            println!("  {}: {:.4} {:?} {:.4}", point.name, predicted.damping, predicted.bounds, reached.damping);
             assert!(true_loop_is_stable(&place.0.join(format!("{seed}/{}/q.json", at.name)), at));
             all.push(point);
         }

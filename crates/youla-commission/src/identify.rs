@@ -43,7 +43,7 @@ impl CleanRows {
 pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) -> Result<Identification> {
     let spec = |name: &str, unit: &str| ChannelSpec::from(name, ChannelRef::Name(name.into()), unit);
     let specs = |names: [&str; 2], unit: &str| names.map(|name| spec(name, unit)).to_vec();
-    let file = DataFile { file: "log.csv".into(), skip: 0, take: None, segments: Vec::new(), name: None };
+    let file = DataFile { file: "../log.csv".into(), skip: 0, take: None, segments: Vec::new(), name: None };
     let data = DataSettings {
         sample_time: Some(running.nominal.time().ts()),
         alpha: specs(["alpha_1", "alpha_2"], "V"),
@@ -70,7 +70,7 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
         outputs: channels(["y_h", "y_v"], "um"),
         estimation: vec![record],
         verification: Vec::new(),
-        sources: vec![SourceFile { path: "log.csv".into(), purpose: "estimation".into(), sha256: String::new() }],
+        sources: vec![SourceFile { path: "../log.csv".into(), purpose: "estimation".into(), sha256: String::new() }],
         segments: Vec::new(),
         true_plant: None,
     };

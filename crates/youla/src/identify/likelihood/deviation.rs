@@ -116,7 +116,7 @@ impl Directions {
             // What the excitation shows of the error is its size, not its phase.
             k if (k - of_rivals) / 2 == i => {
                 let size = (0.5 * missed[i]).max(0.0).sqrt();
-                if (k - of_rivals) % 2 == 0 { c64::new(size, 0.0) } else { c64::new(0.0, size) }
+                if (k - of_rivals).is_multiple_of(2) { c64::new(size, 0.0) } else { c64::new(0.0, size) }
             }
             _ => c64::ZERO,
         })

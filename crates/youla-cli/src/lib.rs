@@ -11,6 +11,7 @@ mod excite;
 mod export;
 mod identify;
 mod init;
+mod interrupt;
 mod log_flags;
 mod manual;
 mod output;
@@ -31,7 +32,7 @@ use clap::Parser;
 use std::ffi::OsString;
 
 /// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect or a campaign stopped;
-/// 2 for input that cannot be used; 3 for an impossible computation.
+/// 2 for input that cannot be used; 3 for an impossible computation. Ctrl-C in `paper` and `study` ends the process with 130.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args = match args::Args::try_parse_from(args) {
         Ok(args) => args,

@@ -63,7 +63,7 @@ pub(crate) fn fail(failure: &Failure) -> u8 {
 }
 
 /// Names come from files: what would command the terminal or turn the direction of the text is written as `\u001b`, as in JSON.
-fn shown(text: &str) -> String {
+pub(crate) fn shown(text: &str) -> String {
     let commands = |c: char| {
         let turns =
             matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');

@@ -1,5 +1,6 @@
 //! `youla paper` and `youla study merge`: settings from the arguments, progress with the remaining time, Table 1 at the end.
 
+use crate::interrupt;
 use crate::output::{Failure, Form, say};
 use crate::table;
 use clap::Args;
@@ -105,7 +106,7 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
 
 fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
     let bar = Bar::new(form.quiet || form.json);
-    announce_resumption(target);
+    interrupt::resumable("loops", target, &bar.bar);
     let written = paper(configuration, target, &|progress| bar.show(progress))?;
     bar.bar.finish_and_clear();
     match &written.paper {
@@ -121,22 +122,6 @@ fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<()
         }
         None => say(&part_of(configuration.shard, &written)),
     }
-}
-
-/// Exit code after an interrupt: 128 and the number of SIGINT.
-const INTERRUPTED: i32 = 130;
-
-/// On an interrupt the program says where the finished loops are and ends; a row that was being written is computed again.
-fn announce_resumption(target: &Path) {
-    let folder = target.display().to_string();
-    // Without a handler the interrupt ends the program without a sentence.
-    let _ = ctrlc::set_handler(move || {
-        let _ = writeln!(
-            std::io::stderr(),
-            "\ninterrupted; finished loops are in {folder}, and the same call continues from them"
-        );
-        std::process::exit(INTERRUPTED);
-    });
 }
 
 fn part_of(shard: Shard, written: &WrittenPaper) -> String {

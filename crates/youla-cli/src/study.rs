@@ -1,5 +1,6 @@
 //! `youla study`: the study of starts, and parts of the study of the paper.
 
+use crate::interrupt;
 use crate::output::{Failure, Form, say};
 use crate::paper::{self, Bar};
 use clap::{Args, Subcommand};
@@ -71,6 +72,7 @@ fn count(form: Form, args: &StartsArgs) -> Result<(), Failure> {
     let default = || Path::new("runs").join(format!("starts-seed-{}", args.seed));
     let target = args.out.clone().unwrap_or_else(default);
     let bar = Bar::new(form.quiet || form.json);
+    interrupt::resumable("items", &target, &bar.bar);
     let written = starts(&settings, &target, &|progress| match progress {
         StartsProgress::Begins(case, items) => bar.begin(case.key(), items),
         StartsProgress::Done(items) => bar.bar.set_position(items as u64),

@@ -1,5 +1,6 @@
 //! Everything that can go wrong with a run, with the evidence.
 
+use crate::no_model::NoModel;
 use std::path::PathBuf;
 use youla::error::Names;
 
@@ -49,6 +50,9 @@ pub enum Error {
         /// Its name.
         figure: String,
     },
+    /// No method gives a model.
+    #[error("{0}")]
+    NoModel(NoModel),
     /// The controller does not stabilise the nominal model.
     #[error("the controller does not stabilise the nominal model: the closed loop has the pole {pole}; {cause}")]
     NotStabilised {
@@ -82,12 +86,21 @@ pub enum Error {
 }
 
 youla::error_context! {
-    sources: Method File GreyBox Loop Report;
+    sources: Method File GreyBox Loop Report NoModel;
     numerical:;
     bad_input: NotStabilised ChoiceOfFigure NothingToDraw DuplicateRecord NotASummary NotAReport;
 }
 
 impl Error {
+    /// The error of the method below all parts, where it is one.
+    pub(crate) fn root(&self) -> Option<&youla::Error> {
+        match self {
+            Error::Method(source) => Some(source.root()),
+            Error::Within { source, .. } => source.root(),
+            _ => None,
+        }
+    }
+
     /// Whether the records and the nominal model, although well formed, do not suffice for a method that another may replace.
     pub(crate) fn is_of_the_records(&self) -> bool {
         match self {

@@ -9,6 +9,7 @@ use super::grey_box::{GreyBoxRun, grey_box};
 use super::grey_box_loop::SchemeStart;
 use super::identification::{Filtered, Identification, SchemeRun, found};
 use super::lines::lines;
+use super::no_model::NoModel;
 use super::recommend::recommend;
 use super::records::RunRecords;
 use super::redesign::redesigned;
@@ -30,7 +31,7 @@ use youla::ErrorKind;
 /// A method that is impossible on these records does not end the run: its field of the result holds the reason.
 ///
 /// # Errors
-/// Bad input; where no method gives a model, the reasons of the scheme and of the recommended model.
+/// Bad input; [`Error::NoModel`] with the reason of every candidate where no method gives a model.
 pub fn identify(
     settings: RunSettings,
     records: RunRecords,
@@ -64,15 +65,16 @@ pub fn identify(
         grey_box: found(grey_box.as_ref()),
     };
     let identified = candidates.identified();
-    if identified.is_empty()
-        && let Err(reason) = recommended
-    {
-        return Err(match filtered.err().or_else(|| s?.err()) {
-            Some(of_scheme) => {
-                reason.within(format!("no method gives a model; the Hansen scheme: {of_scheme}; the recommended model"))
-            }
-            None => reason,
-        });
+    if identified.is_empty() {
+        let asked = direct.is_some();
+        let outcomes = [
+            ("the recommended model", recommended.err()),
+            ("the modified Hansen scheme", filtered.err().or_else(|| s?.err())),
+            ("direct identification", direct.and_then(Result::err)),
+            ("the physical structure", grey_box.and_then(Result::err)),
+        ];
+        let reasons = outcomes.into_iter().filter_map(|(name, reason)| Some((name, reason?))).collect();
+        return Err(Error::NoModel(NoModel::new(reasons, asked, records.time)));
     }
     let models = [&[&declared.nominal], &identified[..]].concat();
     let hz = grid(&settings.frequency_response, &models, records.time)?;

@@ -357,6 +357,14 @@ crate::error_context! {
 }
 
 impl Error {
+    /// The error without the parts in which it occurred.
+    pub fn root(&self) -> &Error {
+        match self {
+            Error::Within { source, .. } => source.root(),
+            other => other,
+        }
+    }
+
     /// Whether the records and the nominal model, although well formed, do not suffice for one method: a record that is too short
     /// or excites too little, a controller that does not stabilise the nominal model.
     pub fn is_of_the_records(&self) -> bool {

@@ -72,7 +72,7 @@ fn an_interrupt_says_how_to_continue_and_exits_with_130() {
     let found = running.wait_with_output().expect("reaped");
     let text = String::from_utf8_lossy(&found.stderr);
     assert_eq!(found.status.code(), Some(130), "{text}");
-    assert!(text.contains("interrupted; finished loops are in cut"), "{text}");
+    assert!(text.contains("interrupted: the finished loops are kept in cut"), "{text}");
 }
 
 #[test]

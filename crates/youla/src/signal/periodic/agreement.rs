@@ -92,7 +92,7 @@ mod tests {
     use std::f64::consts::TAU;
 
     /// u and y of `y = G u + 0.3 u^3 share + noise` under multisines of random phases, six periods of 200 samples.
-    fn plant(share: f64, seed: u64) -> (StateSpace<Discrete>, Vec<(Mat<f64>, Mat<f64>)>) {
+    fn plant(share: f64, seed: u64) -> (StateSpace<Discrete>, Vec<[Mat<f64>; 2]>) {
         let one = |v: f64| Mat::from_fn(1, 1, |_, _| v);
         let g = StateSpace::new(one(0.8), one(1.0), one(0.5), one(0.0), Discrete::new(1.0).unwrap()).unwrap();
         let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(seed);
@@ -105,7 +105,7 @@ mod tests {
                 y[(t, 0)] = 0.5 * x + 0.05 * rng.sample::<f64, _>(StandardNormal);
                 x = 0.8 * x + u[(t, 0)] + share * u[(t, 0)].powi(3);
             }
-            (u, y)
+            [u, y]
         };
         let records = (0..4).map(record).collect();
         (g, records)
@@ -115,7 +115,7 @@ mod tests {
     fn worst(share: f64, wrong: f64, seed: u64) -> [[f64; 2]; 2] {
         let (g, records) = plant(share, seed);
         let experiments: Vec<_> =
-            records.iter().map(|(u, y)| PeriodicExperiment { d: u.as_ref(), z: y.as_ref() }).collect();
+            records.iter().map(|[u, y]| PeriodicExperiment { d: u.as_ref(), z: y.as_ref() }).collect();
         let found = line_response(&experiments, g.time()).unwrap();
         let mut model = frequency_response(&g, &found.response.omega).unwrap();
         let values: Vec<c64> = model.entry(0, 0).iter().map(|v| v * (1.0 + wrong)).collect();

@@ -108,9 +108,10 @@ fn run_files_validate() {
     assert_eq!(youla(&folder, &init).code, Some(0));
     let mut files = vec![folder.join("run.toml"), demo().join("run.toml")];
     files.push(project().join("crates/youla-io/tests/seeds/run_toml/drive.toml"));
-    for example in fs::read_dir(project().join("examples")).expect("readable") {
-        files.push(example.expect("readable").path().join("run.toml"));
-    }
+    let examples = fs::read_dir(project().join("examples")).expect("readable");
+    let runs = examples.map(|e| e.expect("readable").path().join("run.toml")).filter(|path| path.is_file());
+    files.extend(runs);
+    assert!(files.len() >= 5, "{files:?}");
     let read = |path: &PathBuf| fs::read_to_string(path).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
     let mut texts: Vec<(String, String)> = files.iter().map(|f| (f.display().to_string(), read(f))).collect();
     texts.push(("the small loop".into(), SETTINGS.into()));

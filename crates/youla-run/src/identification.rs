@@ -4,6 +4,7 @@ use super::certificate::RunCertificate;
 use super::check::DataCheck;
 use super::factorise::{DeclaredLoop, LoopFactors};
 use super::grey_box::GreyBoxRun;
+use super::lines::LinesOfRun;
 use super::method::Method;
 use super::records::RunRecords;
 use super::reduction::RunReduction;
@@ -16,7 +17,7 @@ use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
-use youla::signal::{IndirectResponse, LineResponse};
+use youla::signal::IndirectResponse;
 use youla_greybox::hansen_refine::Refinement;
 use youla_loop::redesign::Redesign;
 
@@ -48,7 +49,7 @@ pub struct Identification {
     /// The non-parametric response of the plant where an excitation is known.
     pub indirect: Option<Result<IndirectResponse>>,
     /// The plant at the lines of a periodic excitation, where it is known.
-    pub lines: Option<Result<LineResponse>>,
+    pub lines: Option<Result<LinesOfRun>>,
     /// Frequencies of the responses of all models, Hz.
     pub hz: Vec<f64>,
     /// Evidence on every model.

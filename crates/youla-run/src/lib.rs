@@ -77,6 +77,7 @@ pub use grey_box::{GreyBoxRun, PhysicalEntry};
 pub use grey_box_loop::StructureSearch;
 pub use identification::{Filtered, Identification, Refusal, SchemeRun};
 pub use init::{Draft, DraftClock, path_from};
+pub use lines::{LinesEntry, LinesOfRun};
 pub use method::Method;
 pub use no_model::NoModel;
 pub use page::page;

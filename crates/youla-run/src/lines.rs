@@ -21,10 +21,19 @@ const LIMIT: f64 = 5.0;
 /// measured.
 const SLIGHT: f64 = 0.05;
 
-/// G at the lines that a periodic excitation shows; `None` where no excitation is known to be periodic.
+/// The loop and its plant at the lines of a periodic excitation.
+#[derive(Debug, Clone)]
+pub struct LinesOfRun {
+    /// From the excitation to u and y.
+    pub closed: LineResponse,
+    /// G.
+    pub plant: LineResponse,
+}
+
+/// What the lines of a periodic excitation show; `None` where no excitation is known to be periodic.
 ///
-/// The error is the reason why there is none, for example inputs that are not excited independently.
-pub(super) fn lines(run: RunContext<'_>) -> Option<Result<LineResponse>> {
+/// The error is the reason why there is nothing, for example inputs that are not excited independently.
+pub(super) fn lines(run: RunContext<'_>) -> Option<Result<LinesOfRun>> {
     let records = &run.records.estimation;
     let excitations: Vec<&Mat<f64>> = records.iter().map(excitation).collect::<Option<_>>()?;
     if matches!(detect_period(excitations.first()?.as_ref()), Err(Method::NotPeriodic { .. })) {
@@ -33,7 +42,8 @@ pub(super) fn lines(run: RunContext<'_>) -> Option<Result<LineResponse>> {
     let signals: Vec<Mat<f64>> = records.iter().map(inputs_and_outputs).collect();
     let both = excitations.iter().zip(&signals);
     let experiments: Vec<_> = both.map(|(d, z)| PeriodicExperiment { d: d.as_ref(), z: z.as_ref() }).collect();
-    let found = line_response(&experiments, run.records.time).and_then(|closed| closed.plant());
+    let closed = line_response(&experiments, run.records.time);
+    let found = closed.and_then(|closed| Ok(LinesOfRun { plant: closed.plant()?, closed }));
     Some(found.map_err(Error::from))
 }
 
@@ -107,7 +117,7 @@ fn level(variance: &[f64]) -> Vec<f64> {
 
 /// For the figure.
 pub(super) fn drawn(found: &Identification) -> Vec<LineLevels> {
-    let Some(Ok(lines)) = &found.lines else { return Vec::new() };
+    let Some(Ok(LinesOfRun { plant: lines, .. })) = &found.lines else { return Vec::new() };
     let one = |(output, input): (usize, usize)| LineLevels {
         output,
         input,
@@ -122,7 +132,7 @@ pub(super) fn drawn(found: &Identification) -> Vec<LineLevels> {
 
 /// The recommended model against the lines, and what no linear model explains.
 pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    let Some(Ok(lines)) = &found.lines else { return Vec::new() };
+    let Some(Ok(LinesOfRun { closed, plant: lines })) = &found.lines else { return Vec::new() };
     let named = |g: &LineGroup| {
         let ((i, j), [from, to]) = (g.entry, g.hz);
         let (output, input) = (&found.records.outputs[i].name, &found.records.inputs[j].name);
@@ -130,7 +140,7 @@ pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
     };
     let line = |(status, text)| Verdict { status, text, evidence: ReportPart::Frequency };
     let model = found.recommended.as_ref().ok().and_then(|r| frequency_response(&r.plant, &lines.response.omega).ok());
-    let agreement = model.and_then(|model| largest(lines.against(&model))).map(|worst| match worst {
+    let agreement = model.and_then(|model| largest(closed.against(&model))).map(|worst| match worst {
         g if g.deviations <= LIMIT => {
             let text = format!(
                 "At {} lines of the periodic excitation the recommended model agrees with the response that they show: at most {:.1} \

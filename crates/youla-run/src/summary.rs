@@ -223,7 +223,7 @@ pub fn responses(run: &Identification) -> Result<ResponsesEntry> {
     let outputs = 0..run.records.outputs.len();
     Ok(ResponsesEntry {
         indirect_db: measured.map(|m| curves(&m.response)),
-        lines: found(run.lines.as_ref()).map(LinesEntry::from),
+        lines: found(run.lines.as_ref()).map(|lines| LinesEntry::from(&lines.plant)),
         coherence: measured.map(|m| outputs.map(|i| finite_all(m.coherence_y.col_as_slice(i))).collect()),
         models: models.iter().map(|(method, r)| (format!("{}_db", method.key()), curves(r))).collect(),
         hz,

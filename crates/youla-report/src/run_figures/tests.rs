@@ -142,7 +142,12 @@ fn report() -> ReportData {
             models: vec![model("nominal", 0), model("hansen", 0), model("hansen", 1)],
             indirect: vec![indirect(0), indirect(1)],
             bands: vec![band(0), band(1)],
-            lines: vec![LineLevels { hz: vec![1.0, 2.0], noise_db: vec![-40.0, -41.0], ..LineLevels::default() }],
+            lines: vec![LineLevels {
+                hz: vec![1.0, 2.0],
+                response_db: vec![3.0, 2.0],
+                noise_db: vec![-40.0, -41.0],
+                ..LineLevels::default()
+            }],
             singular: vec![SingularValue {
                 method: "hansen".into(),
                 value_db: vec![3.0; hz.len()],

@@ -7,6 +7,7 @@
 use super::LineResponse;
 use super::settling::{GROUP, standard_normal};
 use crate::lti::FrequencyResponse;
+use faer::{Mat, c64};
 use std::f64::consts::TAU;
 
 /// What a group of neighbouring lines says.
@@ -23,19 +24,31 @@ pub struct LineGroup {
 }
 
 impl LineResponse {
-    /// The response of a model at `self.response.omega` against this one, group by group.
+    /// A model of the plant at `self.response.omega` against a response to `z = [u, y]`, group by group: the rest `T_y - G T_u`, which is
+    /// linear in the noise however small the part of u is that the excitation moves. `relative` is the rest over `T_y`.
     ///
     /// # Panics
-    /// If the model has fewer outputs, inputs or frequencies.
+    /// If z has not as many signals as the model has inputs and outputs, or the model has fewer frequencies.
     pub fn against(&self, model: &FrequencyResponse) -> Vec<LineGroup> {
-        let degrees = self.degrees();
-        self.entries()
-            .flat_map(|(i, j)| {
-                let (own, other) = (self.response.entry(i, j), model.entry(i, j));
-                let excess: Vec<f64> = own.iter().zip(&other).map(|(g, m)| (g - m).norm_sqr()).collect();
-                self.groups((i, j), &excess, &self.noise_variance(i, j), (2.0, degrees))
-            })
-            .collect()
+        let (p, m) = self.response.omega.first().map_or((0, 0), |_| (model.at(0).nrows(), model.at(0).ncols()));
+        let rest = |k: usize| {
+            let (t, g) = (self.response.at(k), model.at(k));
+            let difference = t.subrows(m, p) - g * t.subrows(0, m);
+            let of = Mat::from_fn(p, m + p, |i, j| match j < m {
+                true => -g[(i, j)],
+                false => c64::new(f64::from(u8::from(j == m + i)), 0.0),
+            });
+            (difference, &of * &self.noise[k] * of.adjoint())
+        };
+        let rests: Vec<_> = (0..self.response.omega.len()).map(rest).collect();
+        let of_entry = |(i, j): (usize, usize)| {
+            let found: Vec<f64> = rests.iter().map(|(difference, _)| difference[(i, j)].norm_sqr()).collect();
+            let noise = rests.iter().zip(&self.excitation);
+            let noise: Vec<f64> = noise.map(|((_, c), excitation)| excitation[(j, j)].re * c[(i, i)].re).collect();
+            let size: Vec<f64> = self.response.entry(m + i, j).iter().map(|t| t.norm_sqr()).collect();
+            self.groups((i, j), [&found, &noise, &size], (2.0, self.degrees()))
+        };
+        (0..p).flat_map(|i| (0..m).map(move |j| (i, j))).flat_map(of_entry).collect()
     }
 
     /// What nonlinear distortion adds to the noise, group by group, for the response from one realisation of the phases; empty unless
@@ -46,7 +59,8 @@ impl LineResponse {
         let of = |(i, j): (usize, usize)| {
             let total = self.total_variance(i, j)?;
             let degrees = (2.0 * (experiments - inputs) as f64, self.degrees());
-            let mut groups = self.groups((i, j), &total, &self.noise_variance(i, j), degrees);
+            let size: Vec<f64> = self.response.entry(i, j).iter().map(|g| g.norm_sqr()).collect();
+            let mut groups = self.groups((i, j), [&total, &self.noise_variance(i, j), &size], degrees);
             groups.iter_mut().for_each(|group| group.relative *= realisations.sqrt());
             Some(groups)
         };
@@ -65,8 +79,7 @@ impl LineResponse {
     }
 
     /// `degrees` are those of `found` and of `noise` at one line.
-    fn groups(&self, entry: (usize, usize), found: &[f64], noise: &[f64], degrees: (f64, f64)) -> Vec<LineGroup> {
-        let size: Vec<f64> = self.response.entry(entry.0, entry.1).iter().map(|g| g.norm_sqr()).collect();
+    fn groups(&self, entry: (usize, usize), [found, noise, size]: [&[f64]; 3], degrees: (f64, f64)) -> Vec<LineGroup> {
         let group = |first: usize| {
             let lines = first..(first + GROUP).min(found.len());
             let sum = |of: &[f64]| of[lines.clone()].iter().sum::<f64>();
@@ -75,7 +88,7 @@ impl LineResponse {
                 entry,
                 hz: [lines.start, lines.end - 1].map(|k| self.response.omega[k] / TAU),
                 deviations: standard_normal(found / noise.max(f64::MIN_POSITIVE), count * degrees.0, count * degrees.1),
-                relative: ((found - noise).max(0.0) / sum(&size).max(f64::MIN_POSITIVE)).sqrt(),
+                relative: ((found - noise).max(0.0) / sum(size).max(f64::MIN_POSITIVE)).sqrt(),
             }
         };
         (0..found.len()).step_by(GROUP).map(group).collect()
@@ -114,8 +127,13 @@ mod tests {
     /// Largest standard normal numbers of the model's error and of the distortion, with the errors relative to the response.
     fn worst(share: f64, wrong: f64, seed: u64) -> [[f64; 2]; 2] {
         let (g, records) = plant(share, seed);
+        let both: Vec<Mat<f64>> = records
+            .iter()
+            .map(|[u, y]| Mat::from_fn(1400, 2, |t, k| if k == 0 { u[(t, 0)] } else { y[(t, 0)] }))
+            .collect();
+        let pairs = records.iter().zip(&both);
         let experiments: Vec<_> =
-            records.iter().map(|[u, y]| PeriodicExperiment { d: u.as_ref(), z: y.as_ref() }).collect();
+            pairs.map(|([u, _], z)| PeriodicExperiment { d: u.as_ref(), z: z.as_ref() }).collect();
         let found = line_response(&experiments, g.time()).unwrap();
         let mut model = frequency_response(&g, &found.response.omega).unwrap();
         let values: Vec<c64> = model.entry(0, 0).iter().map(|v| v * (1.0 + wrong)).collect();
@@ -124,7 +142,7 @@ mod tests {
             let by = groups.into_iter().max_by(|a, b| a.deviations.total_cmp(&b.deviations)).unwrap();
             [by.deviations, by.relative]
         };
-        [largest(found.against(&model)), largest(found.distortion())]
+        [largest(found.against(&model)), largest(found.plant().unwrap().distortion())]
     }
 
     /// 40 records with 8 groups each: a standard normal number above 4.5 has a probability of 1e-3 over all.

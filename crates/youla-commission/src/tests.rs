@@ -214,7 +214,7 @@ fn a_campaign_that_cannot_be_run_is_refused_with_the_key() {
 
 /// The same figures, to the last digit, on host and target.
 #[test]
-#[ignore = "needs qemu-system-arm and the image `commission` of firmware/mps2-an386"]
+#[ignore = "needs the image `commission` of firmware/mps2-an386, and qemu-system-arm"]
 fn the_target_gives_what_the_host_gives() {
     let place = Place::new("target");
     let host = place.run(&short(), "host", true).0.unwrap();

@@ -329,6 +329,20 @@ pub enum Error {
         /// The period of experiment 1.
         first: usize,
     },
+    /// Periodic experiments do not excite every input independently of the others.
+    #[error(
+        "the excitations of input {} {how} around {hz:.6} Hz in all experiments together; record one experiment for each input, or \
+         orthogonal realisations with all inputs",
+        inputs.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+    )]
+    NotExcited {
+        /// The inputs, counted from 1.
+        inputs: Vec<usize>,
+        /// What is missing.
+        how: &'static str,
+        /// The first frequency, Hz.
+        hz: f64,
+    },
     /// A channel never changes, so that nothing can be learnt from it.
     #[error("{what} is constant ({value}) in every experiment")]
     ConstantChannel {
@@ -353,7 +367,7 @@ crate::error_context! {
         Diverged PoleOnBoundary NoReducedOrder NoCandidate;
     bad_input: Shape NotFinite OutOfRange SampleTimeMismatch NotSymmetric NotPositive Ports Polynomial NotStabilising
         Order Unsupported UnknownChannel DuplicateChannel NotFiniteSample InsufficientExcitation TooFewSamples
-        NotPeriodic UnequalPeriods ConstantChannel RecordChanged Stream;
+        NotPeriodic UnequalPeriods NotExcited ConstantChannel RecordChanged Stream;
 }
 
 impl Error {
@@ -375,6 +389,7 @@ impl Error {
                 Error::TooFewSamples { .. }
                     | Error::InsufficientExcitation { .. }
                     | Error::ConstantChannel { .. }
+                    | Error::NotExcited { .. }
                     | Error::NotStabilising { .. }
             ),
         }

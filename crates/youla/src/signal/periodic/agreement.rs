@@ -7,7 +7,7 @@
 use super::LineResponse;
 use super::settling::{GROUP, standard_normal};
 use crate::lti::FrequencyResponse;
-use faer::{Mat, c64};
+use faer::{Mat, MatRef, RowRef, c64};
 use std::f64::consts::TAU;
 
 /// What a group of neighbouring lines says.
@@ -31,24 +31,44 @@ impl LineResponse {
     /// If z has not as many signals as the model has inputs and outputs, or the model has fewer frequencies.
     pub fn against(&self, model: &FrequencyResponse) -> Vec<LineGroup> {
         let (p, m) = self.response.omega.first().map_or((0, 0), |_| (model.at(0).nrows(), model.at(0).ncols()));
-        let rest = |k: usize| {
-            let (t, g) = (self.response.at(k), model.at(k));
-            let difference = t.subrows(m, p) - g * t.subrows(0, m);
-            let of = Mat::from_fn(p, m + p, |i, j| match j < m {
+        let of = |g: MatRef<c64>| {
+            Mat::from_fn(p, m + p, |i, j| match j < m {
                 true => -g[(i, j)],
                 false => c64::new(f64::from(u8::from(j == m + i)), 0.0),
-            });
-            (difference, &of * &self.noise[k] * of.adjoint())
+            })
         };
-        let rests: Vec<_> = (0..self.response.omega.len()).map(rest).collect();
-        let of_entry = |(i, j): (usize, usize)| {
-            let found: Vec<f64> = rests.iter().map(|(difference, _)| difference[(i, j)].norm_sqr()).collect();
-            let noise = rests.iter().zip(&self.excitation);
-            let noise: Vec<f64> = noise.map(|((_, c), excitation)| excitation[(j, j)].re * c[(i, i)].re).collect();
-            let size: Vec<f64> = self.response.entry(m + i, j).iter().map(|t| t.norm_sqr()).collect();
-            self.groups((i, j), [&found, &noise, &size], (2.0, self.degrees()))
+        let rests: Vec<[Mat<c64>; 2]> = (0..self.response.omega.len())
+            .map(|k| {
+                let (of, signals) =
+                    (of(model.at(k)), self.own.get(k).map_or(self.response.at(k), |o| o.means.as_ref()));
+                [&of * signals, &of * &self.noise[k] * of.adjoint()]
+            })
+            .collect();
+        let of_entry = |(i, j): (usize, usize)| match self.own.is_empty() {
+            true => self.of_response((i, j), m, &rests),
+            false => self.of_own_lines((i, j), m, &rests),
         };
         (0..p).flat_map(|i| (0..m).map(move |j| (i, j))).flat_map(of_entry).collect()
+    }
+
+    fn of_response(&self, (i, j): (usize, usize), m: usize, rests: &[[Mat<c64>; 2]]) -> Vec<LineGroup> {
+        let found: Vec<f64> = rests.iter().map(|[rest, _]| rest[(i, j)].norm_sqr()).collect();
+        let noise = rests.iter().zip(&self.excitation);
+        let noise: Vec<f64> = noise.map(|([_, c], excitation)| excitation[(j, j)].re * c[(i, i)].re).collect();
+        let size: Vec<f64> = self.response.entry(m + i, j).iter().map(|t| t.norm_sqr()).collect();
+        let lines: Vec<usize> = (0..rests.len()).collect();
+        self.groups((i, j), &lines, [&found, &noise, &size], (2.0, self.degrees()))
+    }
+
+    /// `y - G u` at the lines that the input excites alone.
+    fn of_own_lines(&self, (i, j): (usize, usize), m: usize, rests: &[[Mat<c64>; 2]]) -> Vec<LineGroup> {
+        let lines: Vec<usize> = (0..rests.len()).filter(|k| self.own[*k].input == j).collect();
+        let count = self.periods.len() as f64;
+        let power = |row: RowRef<'_, c64>| row.squared_norm_l2() / count;
+        let found: Vec<f64> = lines.iter().map(|k| power(rests[*k][0].row(i))).collect();
+        let noise: Vec<f64> = lines.iter().map(|k| rests[*k][1][(i, i)].re).collect();
+        let size: Vec<f64> = lines.iter().map(|k| power(self.own[*k].means.row(m + i))).collect();
+        self.groups((i, j), &lines, [&found, &noise, &size], (2.0 * count, self.degrees()))
     }
 
     /// What nonlinear distortion adds to the noise, group by group, for the response from one realisation of the phases; empty unless
@@ -60,7 +80,8 @@ impl LineResponse {
             let total = self.total_variance(i, j)?;
             let degrees = (2.0 * (experiments - inputs) as f64, self.degrees());
             let size: Vec<f64> = self.response.entry(i, j).iter().map(|g| g.norm_sqr()).collect();
-            let mut groups = self.groups((i, j), [&total, &self.noise_variance(i, j), &size], degrees);
+            let lines: Vec<usize> = (0..size.len()).collect();
+            let mut groups = self.groups((i, j), &lines, [&total, &self.noise_variance(i, j), &size], degrees);
             groups.iter_mut().for_each(|group| group.relative *= realisations.sqrt());
             Some(groups)
         };
@@ -78,15 +99,21 @@ impl LineResponse {
         (0..p).flat_map(move |i| (0..m).map(move |j| (i, j)))
     }
 
-    /// `degrees` are those of `found` and of `noise` at one line.
-    fn groups(&self, entry: (usize, usize), [found, noise, size]: [&[f64]; 3], degrees: (f64, f64)) -> Vec<LineGroup> {
+    /// `found`, `noise` and `size` at `lines`; `degrees` are those of `found` and of `noise` at one line.
+    fn groups(
+        &self,
+        entry: (usize, usize),
+        lines: &[usize],
+        [found, noise, size]: [&[f64]; 3],
+        degrees: (f64, f64),
+    ) -> Vec<LineGroup> {
         let group = |first: usize| {
-            let lines = first..(first + GROUP).min(found.len());
-            let sum = |of: &[f64]| of[lines.clone()].iter().sum::<f64>();
-            let (found, noise, count) = (sum(found), sum(noise), lines.len() as f64);
+            let range = first..(first + GROUP).min(found.len());
+            let sum = |of: &[f64]| of[range.clone()].iter().sum::<f64>();
+            let (found, noise, count) = (sum(found), sum(noise), range.len() as f64);
             LineGroup {
                 entry,
-                hz: [lines.start, lines.end - 1].map(|k| self.response.omega[k] / TAU),
+                hz: [range.start, range.end - 1].map(|k| self.response.omega[lines[k]] / TAU),
                 deviations: standard_normal(found / noise.max(f64::MIN_POSITIVE), count * degrees.0, count * degrees.1),
                 relative: ((found - noise).max(0.0) / sum(size).max(f64::MIN_POSITIVE)).sqrt(),
             }

@@ -88,12 +88,10 @@ struct Common {
 }
 
 fn common_period(experiments: &[PeriodicExperiment]) -> Result<Common> {
-    let m = experiments.first().map_or(1, |e| e.d.ncols());
-    if experiments.len() < m.max(1) {
-        let what = "the number of experiments with independent excitation of all inputs".into();
-        return Err(Error::Ports { what, expected: m.max(1), found: experiments.len() });
-    }
-    let q = experiments[0].z.ncols();
+    let Some(first) = experiments.first() else {
+        return Err(Error::Ports { what: "the number of experiments".into(), expected: 1, found: 0 });
+    };
+    let (m, q) = (first.d.ncols(), first.z.ncols());
     let mut common: Option<Common> = None;
     for (e, experiment) in experiments.iter().enumerate() {
         let within = |error| Error::Within { part: format!("experiment {}", e + 1), source: Box::new(error) };
@@ -105,7 +103,7 @@ fn common_period(experiments: &[PeriodicExperiment]) -> Result<Common> {
         if found.samples != common.samples {
             return Err(Error::UnequalPeriods { experiment: e + 1, found: found.samples, first: common.samples });
         }
-        common.lines.retain(|line| found.lines.contains(line));
+        common.lines.retain(|line| found.lines.binary_search(line).is_ok());
         common.first.push(found.rows.start);
         common.end.push(found.rows.end);
     }

@@ -15,6 +15,7 @@
 
 mod agreement;
 mod gather;
+mod interpolate;
 mod levels;
 mod period;
 mod settling;
@@ -26,7 +27,8 @@ use crate::lti::{Discrete, FrequencyResponse};
 use crate::{Error, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, Scale, c64};
-use gather::{Lines, gather};
+use gather::{Line, Lines, gather};
+use interpolate::{Estimate, at_line, interpolated};
 use std::f64::consts::TAU;
 
 /// One record under periodic excitation; row k is time k.
@@ -57,18 +59,30 @@ pub struct LineResponse {
     pub(super) noise: Vec<Mat<c64>>,
     /// C of noise and distortion, q x q at each line; empty unless there are more experiments than inputs.
     pub(super) total: Vec<Mat<c64>>,
+    /// Where the response is interpolated, each line's own values; else empty.
+    pub(super) own: Vec<OwnLine>,
+}
+
+/// The signals at a line that one input excites alone.
+#[derive(Debug, Clone)]
+pub(super) struct OwnLine {
+    /// The input.
+    pub(super) input: usize,
+    /// Means of z over the periods times the root of their number, q x E.
+    pub(super) means: Mat<c64>,
 }
 
 /// Estimates the response from `d` to `z` at the lines that `d` excites; the period is detected, settling periods are left out.
 ///
-/// All experiments have the same period. With m excitations, at least m experiments excite them in independent ways; more
-/// of them, with other phases, give the total variance and the distortion. The stated variance equals the observed one (held by
-/// `variance_is_calibrated`).
+/// All experiments have the same period. With m excitations, either at least m experiments excite them in independent ways, and more
+/// of them, with other phases, give the total variance and the distortion; or each input has lines of its own (a multisine on all
+/// inputs at a time): between its lines the response is then a local polynomial of degree 2 over 5 m lines, without total
+/// variance. The stated variance equals the observed one (held by `variance_is_calibrated`).
 ///
 /// # Errors
 /// [`Error::NotPeriodic`] unless every record holds two whole periods, [`Error::UnequalPeriods`], [`Error::TooFewSamples`],
-/// [`Error::Shape`], [`Error::NotFinite`]; [`Error::Ports`] for fewer experiments than excitations; [`Error::Singular`] with
-/// the first line at which the experiments do not excite the inputs independently.
+/// [`Error::Shape`], [`Error::NotFinite`]; [`Error::Ports`] without an experiment; [`Error::NotExcited`] with the inputs that are not
+/// excited, or not independently of each other.
 ///
 /// ```
 /// use youla::{Mat, lti::Discrete, signal::{PeriodicExperiment, line_response}};
@@ -86,22 +100,45 @@ pub fn line_response(experiments: &[PeriodicExperiment], time: Discrete) -> Resu
     let (q, m) = (experiments[0].z.ncols(), experiments[0].d.ncols());
     let mut values = Vec::new();
     let (mut excitation, mut noise, mut total) = (Vec::new(), Vec::new(), Vec::new());
-    for (k, frequency) in omega.iter().enumerate() {
-        let line = gathered.at(k);
-        let what = || format!("the excitation of all experiments at {:.6} Hz", frequency / TAU);
-        let m_k = inverse(line.d.as_ref() * line.d.adjoint(), what)?;
-        let t = &line.z * line.d.adjoint() * &m_k;
+    let all: Vec<Line> = (0..gathered.lines.len()).map(|k| gathered.at(k)).collect();
+    let apart = all.iter().all(|line| invertible(line.d.as_ref() * line.d.adjoint()).is_some());
+    for (k, line) in all.iter().enumerate() {
+        let estimate = if apart { at_line(line) } else { interpolated(&gathered.lines, &all, k) };
+        let Some(Estimate { t, m: m_k, c }) = estimate else { return Err(not_excited(&all, k, omega[k] / TAU)) };
         values.extend((0..m).flat_map(|j| (0..q).map(move |i| (i, j))).map(|at| t[at]));
-        if experiments.len() > m {
+        if apart && experiments.len() > m {
             let rest = &line.z - &t * &line.d;
             total.push(&rest * rest.adjoint() * Scale(c64::new(1.0 / (experiments.len() - m) as f64, 0.0)));
         }
         excitation.push(m_k);
-        noise.push(line.noise);
+        noise.push(c);
     }
     let response = FrequencyResponse::new(omega, values, q, m);
     let Lines { lines, period, periods, settling, .. } = gathered;
-    Ok(LineResponse { response, lines, period, periods, settling, excitation, noise, total })
+    let own = if apart { Vec::new() } else { all.into_iter().map(OwnLine::new).collect() };
+    Ok(LineResponse { response, lines, period, periods, settling, excitation, noise, total, own })
+}
+
+impl OwnLine {
+    fn new(line: Line) -> Self {
+        let power = |j: &usize| line.d.row(*j).squared_norm_l2();
+        let input = (0..line.d.nrows()).max_by(|a, b| power(a).total_cmp(&power(b))).unwrap_or(0);
+        OwnLine { input, means: line.z }
+    }
+}
+
+/// The inputs that lack excitation: those without power around the line, all where their excitations depend on each other.
+fn not_excited(all: &[Line], k: usize, hz: f64) -> Error {
+    let near = &all[k.saturating_sub(2)..(k + 3).min(all.len())];
+    let power = |j: usize| near.iter().map(|line| line.d.row(j).squared_norm_l2()).sum::<f64>();
+    let inputs = 0..all[k].d.nrows();
+    let strongest = inputs.clone().map(power).fold(0.0, f64::max);
+    let without: Vec<usize> = inputs.clone().filter(|&j| power(j) <= SINGULAR * strongest).collect();
+    let (inputs, how) = match without.is_empty() {
+        true => (inputs.collect(), "depend on each other"),
+        false => (without, "have no power"),
+    };
+    Error::NotExcited { inputs: inputs.into_iter().map(|j: usize| j + 1).collect(), how, hz }
 }
 
 impl LineResponse {
@@ -142,14 +179,20 @@ impl LineResponse {
 
 /// The inverse, which the formulas hold as a factor of the covariance; refused where it does not exist.
 fn inverse(a: Mat<c64>, what: impl Fn() -> String) -> Result<Mat<c64>> {
-    let rcond = match a.singular_values() {
+    let rcond = reciprocal_condition(a.as_ref());
+    invertible(a).ok_or_else(|| Error::Singular { what: what(), rcond })
+}
+
+fn invertible(a: Mat<c64>) -> Option<Mat<c64>> {
+    let works = reciprocal_condition(a.as_ref()) >= SINGULAR;
+    works.then(|| a.partial_piv_lu().solve(Mat::<c64>::identity(a.nrows(), a.nrows())))
+}
+
+fn reciprocal_condition(a: MatRef<c64>) -> f64 {
+    match a.singular_values() {
         Ok(s) if s.first().is_some_and(|largest| *largest > 0.0) => s[s.len() - 1] / s[0],
         _ => 0.0,
-    };
-    if rcond < SINGULAR {
-        return Err(Error::Singular { what: what(), rcond });
     }
-    Ok(a.partial_piv_lu().solve(Mat::<c64>::identity(a.nrows(), a.nrows())))
 }
 
 /// Reciprocal condition number below which experiments count as dependent.

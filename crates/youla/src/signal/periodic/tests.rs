@@ -203,15 +203,43 @@ fn bad_input_has_its_sentence() {
     // Exactly two periods are enough.
     assert_eq!(detect_period(tile(128, 64).as_ref()).unwrap().rows, 0..128);
     let both = Mat::from_fn(256, 2, |k, j| one[k % 64] * (j + 1) as f64);
-    says(from_ref(&both), from_ref(&both), "independent excitation of all inputs is 1, but must be 2");
-    let (d, z) = ([both.clone(), both.clone()], [both.clone(), both]);
-    says(&d, &z, "the excitation of all experiments at 4.687500 Hz is singular");
-    // Line 3 excites the first input alone, line 5 the second alone.
-    let own = Mat::from_fn(256, 2, |k, j| (TAU * ((3 + 2 * j) * (k % 64)) as f64 / 64.0).cos());
-    says(
-        &[own.clone(), own.clone()],
-        &[own.clone(), own],
-        "the excitation of all experiments at 4.687500 Hz is singular",
-    );
+    let dependent =
+        "the excitations of input 1, 2 depend on each other around 4.687500 Hz in all experiments together; record one";
+    says(from_ref(&both), from_ref(&both), dependent);
+    says(&[both.clone(), both.clone()], &[both.clone(), both], dependent);
+    let first = Mat::from_fn(256, 2, |k, j| if j == 0 { one[k % 64] } else { 0.0 });
+    says(from_ref(&first), from_ref(&first), "the excitations of input 2 have no power around 4.687500 Hz");
     says(&[tile(256, 64)], &[tile(250, 64)], "experiment 1: the excitation is 256 x 1, but must be 250 x 1");
+}
+
+/// Each input has lines of its own, as `youla excite` writes them; the plant has a pole at 0.8.
+#[test]
+fn one_experiment_suffices_where_each_input_has_lines_of_its_own() {
+    let machine = Loop::new(2, 0.0);
+    let (mut worst, mut ratio, mut alarms) = ([0.0f64; 2], 0.0, 0);
+    for seed in 0..20 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let phases: Vec<f64> = (0..30).map(|_| rng.random_range(0.0..TAU)).collect();
+        let angle = |k: usize, l: usize| TAU * ((l + 1) * (k % PERIOD)) as f64 / PERIOD as f64 + phases[l];
+        let d = Mat::from_fn(40 * PERIOD, 2, |k, j| (0..30).skip(j).step_by(2).map(|l| angle(k, l).cos()).sum::<f64>());
+        let found = estimate(from_ref(&d), &[machine.run(&d, &mut rng)]).unwrap();
+        let plant = found.plant().unwrap();
+        for (k, g) in plant.response.iter().enumerate() {
+            let exact = machine.exact(plant.response.omega[k] * time().ts());
+            worst[0] = worst[0].max((g - &exact).norm_l2() / exact.norm_l2());
+            let stated: f64 = (0..4).map(|e| plant.noise_variance(e / 2, e % 2)[k]).sum();
+            ratio += (g - &exact).squared_norm_l2() / stated / plant.lines.len() as f64 / 20.0;
+        }
+        let values = |gain: f64| {
+            let at = |w: &f64| machine.exact(w * time().ts());
+            let all = found.response.omega.iter().map(at);
+            let columns = |g: Mat<c64>| (0..4).map(move |e| g[(e % 2, e / 2)] * gain).collect::<Vec<_>>();
+            FrequencyResponse::new(found.response.omega.clone(), all.flat_map(columns).collect(), 2, 2)
+        };
+        let largest = |gain: f64| found.against(&values(gain)).iter().map(|g| g.deviations).fold(0.0, f64::max);
+        alarms += usize::from(largest(1.0) > 4.0);
+        worst[1] = worst[1].max(largest(1.0));
+        assert!(largest(1.3) > 4.5, "{}", largest(1.3));
+    }
+    assert!(worst[0] < 0.2 && (0.5..2.0).contains(&ratio) && alarms == 0, "{worst:?} {ratio} {alarms}");
 }

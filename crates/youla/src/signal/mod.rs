@@ -15,6 +15,7 @@ mod stream;
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
+pub(crate) use periodic::standard_normal;
 pub use periodic::{ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};

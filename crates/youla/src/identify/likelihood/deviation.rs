@@ -50,7 +50,8 @@ pub(crate) fn response(choice: &Choice, share: f64) -> Vec<c64> {
     delayed(&choice.found.point.model, &choice.delays, share)
 }
 
-fn delayed(model: &Model, delays: &[usize], share: f64) -> Vec<c64> {
+/// Response of a model with its dead times, scaled channels.
+pub(crate) fn delayed(model: &Model, delays: &[usize], share: f64) -> Vec<c64> {
     let z = c64::cis(std::f64::consts::TAU * share);
     let phases = phases(delays, z);
     model.response(z).into_iter().enumerate().map(|(k, g)| g * phases[k % delays.len()]).collect()
@@ -82,14 +83,26 @@ impl Directions {
         let chart = Chart::new(&found.point.model, found.feedthrough);
         let linearised = linearise(spectra, &found.point, &chart, &found.noise);
         let root = inverse_root(&linearised.factor, chart.parameters()) * faer::Scale(scatter.sqrt());
-        let least = solution.rivals.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
-        let weights: Vec<f64> = solution.rivals.iter().map(|c| (-0.5 * (c.criterion - least)).exp()).collect();
-        let total: f64 = weights.iter().sum::<f64>().max(1e-300);
-        let weighed = solution.rivals.iter().zip(weights).filter(|(_, weight)| *weight > LEAST_WEIGHT * total);
-        let rival =
-            |(c, weight): (&Choice, f64)| (c.found.point.model.clone(), c.delays.clone(), (weight / total).sqrt());
-        let (model, delays) = (found.point.model.clone(), solution.chosen.delays.clone());
-        Directions { model, delays, chart, root, rivals: weighed.map(rival).collect(), missed }
+        let model = (found.point.model.clone(), solution.chosen.delays.clone());
+        let rivals = solution.rivals.iter().map(|c| (c.found.point.model.clone(), c.delays.clone(), c.criterion));
+        Directions { missed, ..Directions::of_parts(model, chart, root, rivals.collect()) }
+    }
+
+    /// A model with its delays, the roots of the covariance of its parameters, and rivals with their criteria.
+    pub(crate) fn of_parts(
+        (model, delays): (Model, Vec<usize>),
+        chart: Chart,
+        root: Mat<f64>,
+        rivals: Vec<(Model, Vec<usize>, f64)>,
+    ) -> Self {
+        let least = rivals.iter().map(|(.., criterion)| *criterion).fold(f64::INFINITY, f64::min);
+        let weighed =
+            |(model, delays, criterion): (Model, Vec<usize>, f64)| (model, delays, (-0.5 * (criterion - least)).exp());
+        let rivals: Vec<(Model, Vec<usize>, f64)> = rivals.into_iter().map(weighed).collect();
+        let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(1e-300);
+        let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
+        let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
+        Directions { model, delays, chart, root, rivals, missed: None }
     }
 
     /// The error that the excitation shows.

@@ -32,6 +32,7 @@ mod known_loop;
 mod lag_sums;
 mod lanes;
 mod linearise;
+mod measured;
 mod missed;
 mod mode_estimates;
 mod model;
@@ -58,6 +59,7 @@ mod trust;
 
 pub use super::subspace::Experiment;
 pub use known_loop::{LoopKnowledge, LoopSignals};
+pub use measured::{MeasuredResponse, ResponseTable, recommend_from_response};
 pub use mode_estimates::ModeEstimate;
 pub use options::LikelihoodOptions;
 pub use recommendation::{Candidate, Evidence, Predictor, Recommendation};

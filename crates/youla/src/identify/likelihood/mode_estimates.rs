@@ -8,6 +8,7 @@ use super::block::Block;
 use super::chart::Chart;
 use super::deviation::inverse_root;
 use super::linearise::linearise;
+use super::model::Model;
 use super::problem::Choice;
 use super::spectra::Spectra;
 use crate::lti::Discrete;
@@ -36,9 +37,14 @@ pub(crate) fn modes(spectra: &Spectra, choice: &Choice, time: Discrete) -> Vec<M
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let linearised = linearise(spectra, &found.point, &chart, &found.noise);
     let root = inverse_root(&linearised.factor, chart.parameters());
+    of_blocks(&found.point.model, &chart, &root, time)
+}
+
+/// Modes of a model whose parameters have the covariance `root root'`, by natural frequency.
+pub(crate) fn of_blocks(model: &Model, chart: &Chart, root: &Mat<f64>, time: Discrete) -> Vec<ModeEstimate> {
     let mut out = Vec::new();
     let mut at = 0;
-    for (block, directions) in found.point.model.blocks.iter().zip(&chart.directions) {
+    for (block, directions) in model.blocks.iter().zip(&chart.directions) {
         for pole in block.poles().into_iter().filter(|p| p.im >= 0.0) {
             let slopes = slopes(block, directions, pole, time);
             let deviation = |figure: usize| {

@@ -28,6 +28,12 @@ impl Model {
         Model::formed([a, b, c], d, true)
     }
 
+    /// A and C with a block for each pole or pair, as far as they can be distinguished; B and D are zero.
+    pub(crate) fn without_inputs(a: MatRef<'_, f64>, c: MatRef<'_, f64>, inputs: usize) -> Option<Self> {
+        let b = Mat::zeros(a.nrows(), inputs);
+        Model::formed([a, b.as_ref(), c], vec![0.0; c.nrows() * inputs], false)
+    }
+
     /// The same with a block for each pole or pair, as far as they can be distinguished: what may be left out of a model.
     pub(crate) fn separated(&self) -> Option<Self> {
         let (a, b, c) = self.matrices();

@@ -30,7 +30,7 @@ struct Step {
 }
 
 /// Blocks that may be left out: each alone, and two real poles together, as one of them alone often is needed by the other.
-fn sets(parts: &Model) -> Vec<Vec<usize>> {
+pub(crate) fn sets(parts: &Model) -> Vec<Vec<usize>> {
     let real: Vec<usize> = (0..parts.blocks.len()).filter(|k| parts.blocks[*k].states == 1).collect();
     let pairs = real.iter().enumerate().flat_map(|(k, a)| real[k + 1..].iter().map(move |b| vec![*a, *b]));
     (0..parts.blocks.len()).map(|k| vec![k]).chain(pairs).collect()

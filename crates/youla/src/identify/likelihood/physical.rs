@@ -1,5 +1,6 @@
 //! The found model in physical units, with its dead time as states.
 
+use super::model::Model;
 use super::problem::Choice;
 use super::spectra::Sizes;
 use crate::Result;
@@ -8,12 +9,17 @@ use faer::Mat;
 
 /// `G(z) z^-d`: input j passes `d_j` states with poles at zero before it reaches B.
 pub(crate) fn plant(choice: &Choice, sizes: &Sizes, time: Discrete) -> Result<StateSpace<Discrete>> {
-    let (a, b, c) = choice.found.point.model.matrices();
+    realised(&choice.found.point.model, &choice.delays, sizes, time)
+}
+
+/// The same of a model with its delays.
+pub(crate) fn realised(model: &Model, delays: &[usize], sizes: &Sizes, time: Discrete) -> Result<StateSpace<Discrete>> {
+    let (a, b, c) = model.matrices();
     let m = b.ncols();
-    let d = Mat::from_fn(c.nrows(), m, |i, j| choice.found.point.model.d[i * m + j]);
+    let d = Mat::from_fn(c.nrows(), m, |i, j| model.d[i * m + j]);
     let inverse = |sizes: &[f64]| sizes.iter().map(|s| 1.0 / s).collect::<Vec<f64>>();
     let found = StateSpace::new(a, b, c, d, time)?;
-    delayed(&found.in_units(&inverse(&sizes.u), &inverse(&sizes.y)), &choice.delays)
+    delayed(&found.in_units(&inverse(&sizes.u), &inverse(&sizes.y)), delays)
 }
 
 /// The system with delayed inputs.

@@ -196,7 +196,7 @@ fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) ->
 }
 
 /// The damped step of `1/2 |r - J s|^2 + pull' s` and the decrease that it promises, columns in units of their lengths.
-fn damped(factor: &Mat<f64>, pull: &[f64], damping: f64) -> (Vec<f64>, f64) {
+pub(crate) fn damped(factor: &Mat<f64>, pull: &[f64], damping: f64) -> (Vec<f64>, f64) {
     let parameters = pull.len();
     if parameters == 0 || factor.nrows() < parameters {
         return (vec![0.0; parameters], 0.0);

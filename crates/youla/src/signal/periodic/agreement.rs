@@ -89,7 +89,7 @@ impl LineResponse {
     }
 
     /// Degrees of freedom of the noise variance at a line.
-    fn degrees(&self) -> f64 {
+    pub(crate) fn degrees(&self) -> f64 {
         2.0 * self.periods.iter().map(|count| count - 1).sum::<usize>() as f64
     }
 

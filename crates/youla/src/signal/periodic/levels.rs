@@ -1,7 +1,7 @@
 //! Noise, total variance and distortion as curves over the lines.
 
 use super::LineResponse;
-use faer::{Mat, MatRef, c64};
+use faer::{Mat, MatRef, Side, c64};
 
 impl LineResponse {
     /// Variance `E |dT_ij|^2` by the noise, at each line.
@@ -39,6 +39,26 @@ impl LineResponse {
     /// If there is no line `k`.
     pub fn noise_covariance(&self, k: usize) -> Mat<c64> {
         kronecker(self.excitation[k].as_ref(), self.noise[k].as_ref())
+    }
+
+    /// Signals at line number `k` as columns whose errors are independent of each other, with the covariance C of each.
+    ///
+    /// `T R` has the covariance `(R^H M R)^T (x) C`, and `R = L^-H` with `M = L L^H` makes the first factor one.
+    pub(crate) fn uncorrelated(&self, k: usize) -> (Mat<c64>, Mat<c64>) {
+        if let Some(own) = self.own.get(k) {
+            return (own.means.clone(), self.noise[k].clone());
+        }
+        let t = self.response.at(k);
+        let signals = match self.excitation[k].llt(Side::Lower) {
+            // T L^-H = (L^-1 T^H)^H
+            Ok(factor) => {
+                let mut columns = t.adjoint().to_owned();
+                factor.L().solve_lower_triangular_in_place(&mut columns);
+                columns.adjoint().to_owned()
+            }
+            Err(_) => t.to_owned(),
+        };
+        (signals, self.noise[k].clone())
     }
 
     fn variance(&self, period: &[Mat<c64>], i: usize, j: usize) -> Vec<f64> {

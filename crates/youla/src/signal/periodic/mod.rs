@@ -22,6 +22,7 @@ mod settling;
 
 pub use agreement::LineGroup;
 pub use period::{ExcitationPeriod, detect_period};
+pub(crate) use settling::standard_normal;
 
 use crate::lti::{Discrete, FrequencyResponse};
 use crate::{Error, Result};

@@ -48,7 +48,7 @@ fn evident(distance: &[f64], scatter: &[f64], count: f64) -> bool {
 }
 
 /// Paulson's standard normal number of a ratio of mean squares with these degrees of freedom.
-pub(super) fn standard_normal(ratio: f64, degrees: f64, of_scatter: f64) -> f64 {
+pub(crate) fn standard_normal(ratio: f64, degrees: f64, of_scatter: f64) -> f64 {
     let root = ratio.cbrt();
     let (first, second) = (2.0 / (9.0 * degrees), 2.0 / (9.0 * of_scatter));
     ((1.0 - second) * root - (1.0 - first)) / (second * root * root + first).sqrt()

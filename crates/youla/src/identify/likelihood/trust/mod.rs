@@ -40,7 +40,7 @@ pub(crate) fn of_model(
 }
 
 /// Stated deviation against the response, median over the frequencies.
-fn accuracy(responses: &[Vec<c64>], variances: &[Vec<f64>]) -> Evidence {
+pub(crate) fn accuracy(responses: &[Vec<c64>], variances: &[Vec<f64>]) -> Evidence {
     let mut shares: Vec<f64> = responses
         .iter()
         .zip(variances)

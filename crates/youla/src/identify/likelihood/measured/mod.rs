@@ -1,0 +1,108 @@
+//! The model that a measured response supports: maximum likelihood on its lines, weighted by their covariance; starts from a
+//! frequency-domain subspace method, order and dead time by evidence.
+//!
+//! Every experiment e of a line k gives `Y = G U + V`, where `[U; Y]` has the known covariance C, so that
+//! ```text
+//! -2 log likelihood = 2 sum over k, e of |W (Y - G U)|^2,     W^H W = ([-G I] C [-G I]^H)^-1
+//! ```
+//! For a response from the excitation d to `[u, y]` the input is in error as well, and G needs no quotient of responses; for the
+//! response of a plant U is the identity.
+//!
+//! Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. (2012), chapters 9 and 12.
+//!
+//! | step | module |
+//! |---|---|
+//! | lines with their covariance | `data` |
+//! | scaled channels, dead time, whitening | `lines` |
+//! | starts of all orders from one decomposition | `subspace` |
+//! | search in local coordinates | `search` |
+//! | order, dead time and direct path by Schwarz's criterion | `choose` |
+//! | questions to the lines | `evidence` |
+
+mod choose;
+mod data;
+mod evidence;
+mod lines;
+mod search;
+mod subspace;
+#[cfg(test)]
+mod tests;
+
+pub use data::{MeasuredResponse, ResponseTable};
+
+use super::deviation::{Directions, inverse_root};
+use super::recommendation::{Predictor, Recommendation};
+use super::response_deviation::ResponseDeviation;
+use super::{LikelihoodOptions, mode_estimates, physical};
+use crate::{Error, Mat, Result};
+use choose::Problem;
+use std::f64::consts::TAU;
+
+/// The model that a measured response supports, with its evidence.
+///
+/// Order, dead time and direct path are chosen by Schwarz's criterion where the options leave them open. Without a stated variance
+/// the lines state it by their distance from the model; a model that misses dynamics is then noticed only by errors of neighbouring
+/// lines that agree. The predictor has no gain: lines do not tell how noise and initial state share the outputs.
+///
+/// The result does not depend on the number of threads.
+///
+/// # Errors
+/// [`Error::TooFewSamples`] says how many lines are needed, [`Error::Ports`] and [`Error::OutOfRange`] name an option that cannot
+/// be met; [`Error::NoCandidate`] where no search ends.
+///
+/// ```
+/// use youla::identify::likelihood::{LikelihoodOptions, MeasuredResponse, ResponseTable, recommend_from_response};
+/// use youla::{Mat, c64, lti::Discrete};
+/// let omega: Vec<f64> = (1..60).map(|k| 0.05 * f64::from(k)).collect();
+/// let exact = |w: &f64| 0.5 / (c64::cis(*w) - 0.9);
+/// let values = omega.iter().map(|w| Mat::from_fn(1, 1, |_, _| exact(w) * (1.0 + 1e-3 * (w * 1e4).sin()))).collect();
+/// let table = ResponseTable { omega, values, variance: None };
+/// let response = MeasuredResponse::of_plant(&table, Discrete::new(1.0)?)?;
+/// let found = recommend_from_response(&response, &LikelihoodOptions::default())?;
+/// assert!(found.order == 1 && (found.plant.a()[(0, 0)] - 0.9).abs() < 1e-3);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn recommend_from_response(response: &MeasuredResponse, options: &LikelihoodOptions) -> Result<Recommendation> {
+    let problem = Problem::new(response, options)?.refined();
+    let mut candidates = Vec::new();
+    let (chosen, rivals) =
+        problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: response.omega.len() })?;
+    let lines = problem.weighed(&chosen);
+    let chart = chosen.chart();
+    let factor = search::linearise(&lines, &chosen.model, &chart);
+    let scale = if response.known() { 1.0 } else { (chosen.energy / lines.rows() as f64).sqrt() };
+    let root = inverse_root(&factor, chart.parameters()) * faer::Scale(scale);
+    let shares: Vec<f64> = response.omega.iter().map(|w| w * response.time.ts() / TAU).collect();
+    let others = rivals.iter().map(|c| (c.model.clone(), c.delays.clone(), c.criterion)).collect();
+    let modes = mode_estimates::of_blocks(&chosen.model, &chart, &root, response.time);
+    let directions = Directions::of_parts((chosen.model.clone(), chosen.delays.clone()), chart, root, others);
+    let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
+    let evidence = evidence::of_lines(&problem, &chosen, &variances);
+    let plant = physical::realised(&chosen.model, &chosen.delays, problem.sizes(), response.time)?;
+    Ok(Recommendation {
+        predictor: without_noise(&plant),
+        plant,
+        dead_time: chosen.delays.clone(),
+        order: chosen.model.order(),
+        response_deviation: ResponseDeviation::new(
+            problem.sizes().clone(),
+            response.time,
+            (&shares, &variances),
+            directions,
+        ),
+        modes,
+        candidates,
+        evidence,
+    })
+}
+
+fn without_noise(plant: &crate::lti::StateSpace<crate::lti::Discrete>) -> Predictor {
+    Predictor {
+        a: plant.a().to_owned(),
+        b: plant.b().to_owned(),
+        c: plant.c().to_owned(),
+        d: plant.d().to_owned(),
+        k: None,
+        covariance: Mat::zeros(plant.outputs(), plant.outputs()),
+    }
+}

@@ -72,6 +72,7 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
         verification: Vec::new(),
         sources: vec![SourceFile { path: "../log.csv".into(), purpose: "estimation".into(), sha256: String::new() }],
         segments: Vec::new(),
+        measured: None,
         true_plant: None,
     };
     let mut silent = |_| ();

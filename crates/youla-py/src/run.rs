@@ -232,7 +232,7 @@ impl Run {
         match key {
             "controller" => Some(&self.found.declared.controller),
             "deviation" => Some(&scheme?.hansen.deviation.model),
-            "new_controller" => Some(&scheme?.redesign.as_ref()?.as_ref().ok()?.controller.system),
+            "new_controller" => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
             key => Some(&self.found.verdict.of(*METHODS.iter().find(|m| m.key() == key)?)?.model),
         }
     }

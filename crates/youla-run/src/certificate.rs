@@ -55,7 +55,7 @@ fn margins(context: SchemeContext<'_>, hansen: &HansenModel) -> Result<Vec<(Stri
     let Some(uncertainty) = &hansen.deviation.uncertainty else { return Ok(Vec::new()) };
     let SchemeContext { run, factorisation, .. } = context;
     let (factors, controller) = (&factorisation.factors, &run.declared.controller);
-    let scales = channel_scales(&run.records.estimation).ok();
+    let scales = channel_scales(run.records).ok();
     let intervals = match uncertainty {
         Uncertainty::Delta(delta) => {
             let linear = LinearMargins::new(&factors.plant_of(&delta.model)?, controller, scales.as_ref())?;

@@ -175,6 +175,7 @@ fn altered(records: &RunRecords, error: ControllerError, settle: usize) -> Cow<'
         verification: Vec::new(),
         sources: Vec::new(),
         segments: Vec::new(),
+        measured: None,
         true_plant: None,
     })
 }

@@ -145,6 +145,7 @@ fn without_data(settings: &RunSettings, time: Discrete) -> RunRecords {
         verification: Vec::new(),
         sources: Vec::new(),
         segments: Vec::new(),
+        measured: None,
         true_plant: None,
     }
 }

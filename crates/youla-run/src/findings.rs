@@ -119,7 +119,7 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         add(Status::Info, text);
     }
     let settle = found.filtered.as_ref().map_or(0, |f| f.signals.settle);
-    if settle > 0 {
+    if settle > 0 && found.records.measured.is_none() {
         let text = format!(
             "The first {settle} samples of alpha and beta of each record were discarded (transient of the signal filter)."
         );

@@ -204,7 +204,7 @@ impl Writer<'_> {
 
     /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.
     fn redesign(&self) -> Result<()> {
-        match self.found.scheme().and_then(|s| s.redesign.as_ref()) {
+        match &self.found.redesign {
             Some(Ok(new)) => {
                 let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
                 self.model_with("8-redesign/new_controller", &new.controller.system, (y, u), &())?;
@@ -225,7 +225,7 @@ impl Writer<'_> {
     fn verdict(&self) -> Result<()> {
         let verdict = &self.found.verdict;
         let models = verdict.models.iter().map(|v| (v.method.key().to_owned(), VerdictEntry::from(v))).collect();
-        self.json("7-validate/verdict.json", VerdictFile { models, channel_scales: scales_entry(&verdict.scales) })?;
+        self.json("7-validate/verdict.json", VerdictFile { models, channel_scales: scales_entry(self.found) })?;
         self.json("7-validate/residuals.json", ResidualsFile::from(&verdict.models[..]))?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];

@@ -42,6 +42,8 @@ pub struct Identification {
     pub grey_box: Option<Result<GreyBoxRun>>,
     /// Its uncertainty, where it can be had.
     pub grey_box_uncertainty: Option<SystemUncertainty>,
+    /// The new controller where it was asked for.
+    pub redesign: Option<Result<Redesign>>,
     /// The direct model where it was asked for.
     pub direct: Option<Result<SubspaceModel>>,
     /// The stabilisation diagram of the direct model.
@@ -80,8 +82,6 @@ pub struct SchemeRun {
     pub reduction: Option<Result<RunReduction>>,
     /// The loop of G(S): the exact test, the region of S, errors in the description of the controller.
     pub certificate: RunCertificate,
-    /// The new controller where it was asked for.
-    pub redesign: Option<Result<Redesign>>,
 }
 
 /// Something that was asked for but is impossible; the run goes on without it.
@@ -110,7 +110,7 @@ impl Identification {
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
             refusal("lines", "response at the lines of the excitation", self.lines.as_ref()),
-            refusal("redesign", "new controller", scheme.and_then(|s| s.redesign.as_ref())),
+            refusal("redesign", "new controller", self.redesign.as_ref()),
         ]
         .into_iter()
         .flatten()
@@ -139,7 +139,7 @@ impl Identification {
 
     /// The new controller, where there is one.
     pub(crate) fn new_controller(&self) -> Option<&Redesign> {
-        found(self.scheme()?.redesign.as_ref())
+        found(self.redesign.as_ref())
     }
 
     /// The uncertainty of the model that a method of the scheme gave.

@@ -23,6 +23,7 @@ mod grey_box_loop;
 mod identification;
 mod init;
 mod lines;
+mod measured;
 mod method;
 mod no_model;
 mod noise_models;

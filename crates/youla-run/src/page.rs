@@ -83,6 +83,17 @@ fn summary_sentence(found: &Identification) -> String {
         true => "in open loop",
         false => "in closed loop",
     };
+    if let Some(measured) = &records.measured {
+        let (of, lines) = (if measured.of_loop { "loop" } else { "plant" }, measured.table.omega.len());
+        return format!(
+            "Identified {how} from the response of the {of} at {lines} frequencies (sample time {} s, {} input{}, {} output{}).",
+            records.time.ts(),
+            records.inputs.len(),
+            plural(records.inputs.len()),
+            records.outputs.len(),
+            plural(records.outputs.len()),
+        );
+    }
     format!(
         "Identified {how} from {} record{} ({samples} samples at {} s, {} input{}, {} output{}).",
         records.estimation.len(),

@@ -12,7 +12,7 @@ use super::lines::lines;
 use super::no_model::NoModel;
 use super::recommend::recommend;
 use super::records::RunRecords;
-use super::redesign::redesigned;
+use super::redesign::{redesigned, redesigned_on};
 use super::reduction::{RunReduction, run_reduction};
 use super::response::{check_grid, grid, indirect};
 use super::scheme::{Scheme, require_length, scheme};
@@ -48,7 +48,10 @@ pub fn identify(
         filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
     let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(&declared.controller)))?;
     let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
-        let others = || rayon::join(|| structures(run, context), || direct(&records, &settings)); // (25), (17)
+        let others = || match records.measured {
+            None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
+            Some(_) => Default::default(),
+        };
         rayon::join(|| recommend(run), others)
     });
     let (s, grey_box) = s;
@@ -80,7 +83,10 @@ pub fn identify(
     let hz = grid(&settings.frequency_response, &models, records.time)?;
     // (26), the loop certificate and the response that rests on no model.
     let ((indirect, lines), verdict) = clock.run(Stage::Validate, || {
-        let indirect = indirect(run, context.map(|c| c.signals));
+        let indirect = match &records.measured {
+            None => indirect(run, context.map(|c| c.signals)),
+            Some(measured) => Some(measured.shown()),
+        };
         Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))
     })?;
     let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
@@ -90,6 +96,14 @@ pub fn identify(
         (Some(Err(reason)), _) => Some(Err(reason)),
         _ => None,
     };
+    let redesign = clock.run(Stage::Redesign, || {
+        let context = context?;
+        match (&scheme, &recommended, &records.measured) {
+            (Some(Ok(s)), ..) => redesigned(context, &s.hansen, found(s.reduction.as_ref())),
+            (_, Ok(model), Some(_)) => redesigned_on(context, &model.plant),
+            _ => None,
+        }
+    });
     Ok(Identification {
         settings,
         records,
@@ -100,6 +114,7 @@ pub fn identify(
         scheme,
         grey_box,
         grey_box_uncertainty,
+        redesign,
         direct,
         direct_diagram,
         indirect,
@@ -153,7 +168,7 @@ fn of_scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     scheme(context).map_err(|e| e.within(signals.context()))
 }
 
-/// Region, certificate and redesign of G(S).
+/// Region and certificate of G(S).
 fn judged(
     context: SchemeContext<'_>,
     s: Scheme,
@@ -164,6 +179,5 @@ fn judged(
     let Scheme { hansen, refinement, diagram } = s;
     let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
     let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
-    let redesign = clock.run(Stage::Redesign, || redesigned(context, &hansen, found(reduction.as_ref())));
-    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, certificate, redesign })
+    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, certificate })
 }

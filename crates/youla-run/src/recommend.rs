@@ -15,6 +15,16 @@ use youla::lti::{Discrete, StateSpace};
 /// Those of [`likelihood::recommend`].
 pub(super) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
     let records = run.records;
+    if let Some(measured) = &records.measured {
+        let (response, k) = (measured.response(records.time)?, &run.declared.controller);
+        let controller = (!k.is_zero()).then_some(k);
+        let found = likelihood::recommend_from_response(&response, controller, &run.settings.recommended);
+        let mut found = found.map_err(|e| Error::from(e).within("[recommended]"))?;
+        if !run.settings.data.input_excitation.is_empty() {
+            found.evidence.extend(controller.map(|k| measured.controller(k)).transpose()?.flatten());
+        }
+        return Ok(found);
+    }
     let law = Law::of(run)?;
     let signals = |group: &[LoopRecord]| -> Vec<Signals> { group.iter().map(|r| law.signals(r)).collect() };
     let (estimation, verification) = (signals(&records.estimation), signals(&records.verification));

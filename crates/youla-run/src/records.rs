@@ -2,6 +2,7 @@
 
 use super::computed::ComputedChannels;
 use super::disturbance::disturbance_signals;
+use super::measured::{MeasuredTable, read_measured};
 use super::segments::{Part, RecordSegment, parts};
 use super::settings::{DataFile, DataSettings, DisturbanceSettings};
 use crate::{Error, Result};
@@ -65,13 +66,19 @@ pub struct RunRecords {
     pub sources: Vec<SourceFile>,
     /// The records that are parts of a file, cut at gaps or as the settings say.
     pub segments: Vec<RecordSegment>,
+    /// The response that was measured instead of estimation records.
+    pub measured: Option<MeasuredTable>,
     /// The plant itself, known in simulations only.
     pub true_plant: Option<StateSpace<Discrete>>,
 }
 
 impl RunRecords {
-    /// Root mean square of each input and of each output over the estimation records, 1 for a channel that is zero throughout.
+    /// Root mean square of each input and of each output over the estimation records, 1 for a channel that is zero throughout; of a
+    /// measured response over its frequencies.
     pub fn sizes(&self) -> (Vec<f64>, Vec<f64>) {
+        if let Some(measured) = &self.measured {
+            return measured.sizes(self.inputs.len());
+        }
         let estimation = self.estimation.iter();
         let u = rms(estimation.clone().map(|r| &r.u), self.inputs.len());
         (u, rms(estimation.map(|r| &r.y), self.outputs.len()))
@@ -95,7 +102,8 @@ pub fn read_records(settings: &DataSettings, folder: &Path) -> Result<RunRecords
         .enumerate()
         .map(|(k, (label, file))| read_file(settings, folder, (purpose(settings, k), &label), file))
         .collect();
-    assembled(settings, read.into_iter().collect::<Result<_>>()?)
+    let measured = settings.response.first().map(|file| read_measured(settings, folder, file)).transpose()?;
+    assembled(settings, read.into_iter().collect::<Result<_>>()?, measured)
 }
 
 /// The records of a run from logs in memory, one for each file that the settings name, in their order; the channels of a log have the
@@ -116,7 +124,7 @@ pub fn records_in_memory(settings: &DataSettings, logs: Vec<Record>) -> Result<R
         file_records(settings, named, vec![log])
     };
     let read = files.into_iter().zip(logs).enumerate().map(of).collect::<Result<_>>()?;
-    assembled(settings, read)
+    assembled(settings, read, None)
 }
 
 fn purpose(settings: &DataSettings, k: usize) -> &'static str {
@@ -124,14 +132,15 @@ fn purpose(settings: &DataSettings, k: usize) -> &'static str {
 }
 
 /// The records of all files, in the order of the settings.
-fn assembled(settings: &DataSettings, read: Vec<FileRecords>) -> Result<RunRecords> {
+fn assembled(settings: &DataSettings, read: Vec<FileRecords>, measured: Option<MeasuredTable>) -> Result<RunRecords> {
     let used = |f: &FileRecords| UsedRows {
         path: f.source.path.clone(),
         sha256: f.source.sha256.clone(),
         rows: f.rows.clone(),
     };
     refuse_overlap(&read.iter().map(used).collect::<Vec<_>>(), settings.estimation.len())?;
-    let (mut records, mut sources, mut segments) = (Vec::new(), Vec::new(), Vec::new());
+    let (mut records, mut segments): (Vec<LoopRecord>, _) = (Vec::new(), Vec::new());
+    let mut sources: Vec<SourceFile> = measured.iter().map(|m| m.source.clone()).collect();
     let mut of_estimation = 0;
     for (k, file) in read.into_iter().enumerate() {
         of_estimation += if k < settings.estimation.len() { file.records.len() } else { 0 };
@@ -140,7 +149,7 @@ fn assembled(settings: &DataSettings, read: Vec<FileRecords>) -> Result<RunRecor
         segments.extend(file.segments);
         let (time, last): (Discrete, Discrete) = (records[0].time, records[records.len() - 1].time);
         if (last.ts() / time.ts() - 1.0).abs() > TimeSource::default().tolerance {
-            let what = format!("{} and {}", sources[0].path, sources[k].path);
+            let what = format!("{} and {}", sources[0].path, sources[sources.len() - 1].path);
             return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: time.ts(), right: last.ts() }));
         }
     }
@@ -148,7 +157,10 @@ fn assembled(settings: &DataSettings, read: Vec<FileRecords>) -> Result<RunRecor
     if let Some(twice) = records.iter().find(|r| !names.insert(r.name.clone())) {
         return Err(Error::DuplicateRecord { name: twice.name.clone() });
     }
-    let time = records[0].time;
+    let time = match (records.first(), settings.sample_time) {
+        (Some(record), _) => record.time,
+        (None, ts) => Discrete::new(ts.unwrap_or(f64::NAN))?,
+    };
     let verification = records.split_off(of_estimation);
     Ok(RunRecords {
         time,
@@ -158,6 +170,7 @@ fn assembled(settings: &DataSettings, read: Vec<FileRecords>) -> Result<RunRecor
         verification,
         sources,
         segments,
+        measured,
         true_plant: None,
     })
 }

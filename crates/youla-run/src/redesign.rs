@@ -9,7 +9,8 @@ use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use youla::identify::hansen::HansenModel;
-use youla::lti::{SharedMode, frequency_response};
+use youla::identify::subspace::Uncertainty;
+use youla::lti::{Discrete, SharedMode, StateSpace, frequency_response};
 use youla::validate::ExactCertificate;
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
@@ -26,14 +27,35 @@ pub(super) fn redesigned(
     hansen: &HansenModel,
     reduced: Option<&RunReduction>,
 ) -> Option<Result<Redesign>> {
+    let model = reduced.map_or(&hansen.plant, |r| &r.found.reduction.model);
+    designed(context, model, (&hansen.deviation.model, hansen.deviation.uncertainty.as_ref()))
+}
+
+/// Designs on the recommended model, with the S that belongs to it.
+///
+/// # Errors
+/// As [`redesign`].
+pub(super) fn redesigned_on(context: SchemeContext<'_>, model: &StateSpace<Discrete>) -> Option<Result<Redesign>> {
+    context.run.settings.redesign.as_ref()?;
+    match context.factorisation.factors.deviation_of(model) {
+        Ok(deviation) => designed(context, model, (&deviation, None)),
+        Err(e) => Some(Err(Error::from(e).within("[redesign]"))),
+    }
+}
+
+fn designed(
+    context: SchemeContext<'_>,
+    model: &StateSpace<Discrete>,
+    (deviation, uncertainty): (&StateSpace<Discrete>, Option<&Uncertainty>),
+) -> Option<Result<Redesign>> {
     let run = context.run;
     let options = run.settings.redesign.as_ref()?;
     let (input, output) = run.records.sizes();
     let problem = RedesignProblem {
-        model: reduced.map_or(&hansen.plant, |r| &r.found.reduction.model),
+        model,
         factors: &context.factorisation.factors,
-        deviation: &hansen.deviation.model,
-        uncertainty: hansen.deviation.uncertainty.as_ref(),
+        deviation,
+        uncertainty,
         input_size: &input,
         output_size: &output,
     };

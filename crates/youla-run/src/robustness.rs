@@ -6,7 +6,8 @@
 
 use super::entries::{OrRefused, finite};
 use super::factorise::DeclaredLoop;
-use super::records::LoopRecord;
+use super::identification::Identification;
+use super::records::{LoopRecord, RunRecords};
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use youla::Mat;
@@ -42,7 +43,12 @@ impl Robustness {
 ///
 /// # Errors
 /// [`youla::Error::OutOfRange`] for a channel that is constant in all estimation records.
-pub(super) fn channel_scales(records: &[LoopRecord]) -> Result<ChannelScales> {
+pub(super) fn channel_scales(records: &RunRecords) -> Result<ChannelScales> {
+    if records.measured.is_some() {
+        let (u, y) = records.sizes();
+        return Ok(ChannelScales::new(u, y)?);
+    }
+    let records = &records.estimation;
     Ok(ChannelScales::new(rms(records, |r| &r.u), rms(records, |r| &r.y))?)
 }
 
@@ -210,13 +216,21 @@ pub struct ScalesEntry {
 }
 
 /// The scales of summary.json and of the artefact.
-pub(super) fn scales_entry(scales: &Result<ChannelScales, String>) -> OrRefused<ScalesEntry> {
-    OrRefused::new(scales.as_ref().map(|scales| ScalesEntry {
+pub(super) fn scales_entry(found: &Identification) -> OrRefused<ScalesEntry> {
+    OrRefused::new(found.verdict.scales.as_ref().map(|scales| ScalesEntry {
         inputs: scales.inputs().to_vec(),
         outputs: scales.outputs().to_vec(),
-        basis: BASIS.to_owned(),
+        basis: basis(&found.records).to_owned(),
     }))
 }
 
 /// What the scales are.
-pub(super) const BASIS: &str = "root mean square over the estimation records, about the mean of each";
+const BASIS: &str = "root mean square over the estimation records, about the mean of each";
+
+/// The same for a measured response.
+const BASIS_OF_RESPONSE: &str = "root mean square over the frequencies of the response";
+
+/// What the scales of the channels are.
+pub(super) fn basis(records: &RunRecords) -> &'static str {
+    if records.measured.is_some() { BASIS_OF_RESPONSE } else { BASIS }
+}

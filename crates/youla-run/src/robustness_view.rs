@@ -1,7 +1,7 @@
 //! Robustness in the report: a row for each model, and the scales of the channels.
 
 use super::identification::Identification;
-use super::robustness::BASIS;
+use super::robustness::basis;
 use super::verdict::ModelVerdict;
 use youla::control::{GainLimit, Margins, PhaseLimit};
 use youla_report::{data as draw, pretty_unit};
@@ -42,7 +42,11 @@ pub(super) fn caption(found: &Identification) -> String {
                 .zip(sizes)
                 .map(|(c, s)| format!("{} {s:.3} {}", c.name, pretty_unit(&c.unit)).trim_end().into())
                 .collect();
-            format!("For b(G, K) and the nu-gap, channels are scaled by their {BASIS}: {}.", each.join(", "))
+            format!(
+                "For b(G, K) and the nu-gap, channels are scaled by their {}: {}.",
+                basis(&found.records),
+                each.join(", ")
+            )
         }
         Err(reason) => format!("b(G, K) and the nu-gap need scaled channels and are not available: {reason}."),
     }

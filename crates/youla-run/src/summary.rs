@@ -149,7 +149,7 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         controller_mismatch: run.controller_mismatch().and_then(finite),
         seconds: seconds.iter().map(|(stage, seconds)| (stage.name().to_owned(), *seconds)).collect(),
         true_plant: run.verdict.of(Method::TruePlant).map(reference_entry),
-        channel_scales: scales_entry(&run.verdict.scales),
+        channel_scales: scales_entry(run),
         certificate: run.scheme().map(|s| s.certificate.entry()),
         redesign: run.new_controller().map(redesign::entry),
         reduction: run.reduced().map(|reduction| reduction.entry()),

@@ -157,7 +157,7 @@ impl<'a> Candidates<'a> {
 /// # Errors
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
 pub(super) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Verdict> {
-    let scales = channel_scales(&run.records.estimation).map_err(|e| e.to_string());
+    let scales = channel_scales(run.records).map_err(|e| e.to_string());
     let plant = candidates.hansen.map(|h| &h.plant);
     let all = candidates.all(run)?;
     let verdicts: Vec<Result<ModelVerdict>> =

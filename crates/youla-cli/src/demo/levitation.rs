@@ -65,6 +65,7 @@ pub(super) fn levitation(seed: u64) -> Result<(RunSettings, RunRecords), Failure
         verification,
         sources: vec![source],
         segments: Vec::new(),
+        measured: None,
         true_plant: Some(plant),
     };
     Ok((settings, records))

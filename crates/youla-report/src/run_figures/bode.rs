@@ -75,7 +75,7 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         },
         panel(axis("Phase", "deg"), curves(pair, Part::Phase), Some(0.75)),
     ];
-    if !pair.indirect.is_empty() {
+    if coherent(pair) {
         let y = Axis { range: Some([0.0, 1.04]), ..axis("Coherence", "") };
         let line = |measured: &&Indirect| Curve { drawn: Drawn::Line, ..points(measured, Part::Coherence, |_| true) };
         panels.push(panel(y, pair.indirect.iter().map(line).collect(), Some(0.4)));
@@ -90,13 +90,20 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
     }
 }
 
+/// Whether a coherence is known.
+fn coherent(pair: &Pair) -> bool {
+    pair.indirect.iter().any(|measured| measured.coherence.iter().any(|c| !c.is_nan()))
+}
+
 fn caption(chosen: &Chosen, pair: &Pair) -> String {
     let mut text = format!("Frequency response, {}.", pair.title);
-    if !pair.indirect.is_empty() {
+    if coherent(pair) {
         text += &format!(
             " Points: indirect non-parametric response, estimated with the external excitation and without any model. Outlined \
              and in shaded parts: coherence below {FADED}, where the points say little."
         );
+    } else if !pair.indirect.is_empty() {
+        text += " Points: the response that was measured.";
     }
     if let Some(band) = pair.bands.first() {
         let name = |band: &&Band| {
@@ -162,9 +169,9 @@ fn curves(pair: &Pair, part: Part) -> Vec<Curve> {
     clear.chain(faded).filter(|curve| !curve.x.is_empty()).chain(pair.models.iter().map(model)).collect()
 }
 
-/// Whether a point of this coherence says something.
+/// Whether a point of this coherence says something; a response without coherence is taken as it is.
 pub(super) fn is_clear(coherence: f64) -> bool {
-    coherence >= FADED
+    coherence.is_nan() || coherence >= FADED
 }
 
 fn points(measured: &Indirect, part: Part, wanted: impl Fn(f64) -> bool) -> Curve {

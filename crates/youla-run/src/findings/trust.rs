@@ -57,7 +57,8 @@ fn fit_line(found: &Identification) -> Option<Verdict> {
 
 /// Without a known excitation: which errors the run has no means to notice.
 fn unnoticed_line(found: &Identification) -> Option<Verdict> {
-    let unknown = !found.settings.data.excitation_is_known() && !found.declared.controller.is_zero();
+    let of_plant = found.records.measured.as_ref().is_some_and(|m| !m.of_loop);
+    let unknown = !found.settings.data.excitation_is_known() && !of_plant && !found.declared.controller.is_zero();
     let text = "No excitation is declared, so these errors could not be noticed: a wrong gain, sign or delay of [controller]; u and y \
                 shifted against each other; exchanged channels; noise taken for excitation. Declare `input_excitation` or `reference` \
                 in [data].";
@@ -128,6 +129,9 @@ fn size(residuals: &RecordResiduals) -> f64 {
 
 /// The result of the check of the data, and whether the declared controller explains the logged input.
 fn data_line(found: &Identification) -> Option<Verdict> {
+    if found.records.measured.is_some() && found.records.verification.is_empty() {
+        return None;
+    }
     let (controller, of_controller) = controller_sentence(found);
     let of_data = |f: &Finding, severity: Severity| f.severity == severity && f.record != OF_SETTINGS;
     let count = |severity: Severity| found.data.grouped().iter().filter(|(f, _)| of_data(f, severity)).count();

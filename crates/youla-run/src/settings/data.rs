@@ -47,7 +47,12 @@ pub struct DataSettings {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub disturbance: Option<DisturbanceSettings>,
     /// Records to identify from; several files are several experiments.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub estimation: Vec<DataFile>,
+    /// A measured response instead of estimation records: a table with the columns `hz` and, for each output y and excitation d,
+    /// `y/d re` and `y/d im` (or `abs` or `dB` with `deg`).
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub response: Vec<DataFile>,
     /// Records to verify on; never used for identification.
     #[serde(default)]
     pub verification: Vec<DataFile>,
@@ -70,6 +75,7 @@ impl DataSettings {
             detrend: Detrend::default(),
             disturbance: None,
             estimation,
+            response: Vec::new(),
             verification: Vec::new(),
         }
     }
@@ -175,8 +181,12 @@ impl DataSettings {
         if d.sample_time.is_none() && d.time_column.is_none() {
             return Some("[data] has neither sample_time nor time_column; the sample time is never guessed".into());
         }
-        if d.estimation.is_empty() {
-            return Some("[data] names no estimation record; add [[data.estimation]] with a file".into());
+        if let Some(problem) = self.response_problem() {
+            return Some(problem);
+        }
+        if d.estimation.is_empty() && d.response.is_empty() {
+            let text = "[data] names no estimation record; add [[data.estimation]] with a file, or [[data.response]] with a table";
+            return Some(text.into());
         }
         if d.gaps == Gaps::Split && d.time_column.is_none() {
             return Some("[data] gaps = \"split\" needs a time_column, which shows the gaps".into());
@@ -192,6 +202,27 @@ impl DataSettings {
             if !labels.insert(label.clone()) {
                 return Some(format!("two records are named {label:?}; give one of them another `name`"));
             }
+        }
+        None
+    }
+
+    fn response_problem(&self) -> Option<String> {
+        let file = self.response.first()?;
+        if !self.estimation.is_empty() {
+            return Some("[data] has both estimation records and a response; give one of them".into());
+        }
+        if self.response.len() > 1 {
+            return Some("[data] has more than one response; join their columns or rows in one table".into());
+        }
+        if self.sample_time.is_none() {
+            let text = "[data] has no sample_time, which a response does not show: that of the controller that samples the plant";
+            return Some(text.into());
+        }
+        if file.skip > 0 || file.take.is_some() || !file.segments.is_empty() {
+            let file = file.file.display();
+            return Some(format!(
+                "[[data.response]] {file} has skip, take or segments, which count samples; leave out rows of the table"
+            ));
         }
         None
     }

@@ -184,10 +184,23 @@ impl RunSettings {
         let problem = self
             .data
             .problem()
+            .or_else(|| self.response_problem())
             .or_else(|| self.controller.problem())
             .or_else(|| self.loop_problem())
             .or_else(|| self.number_problem());
         problem.or_else(structure)
+    }
+
+    fn response_problem(&self) -> Option<String> {
+        self.data.response.first()?;
+        let asked = [
+            ("direct", self.direct.is_some()),
+            ("reduction", self.reduction.is_some()),
+            ("grey_box", self.grey_box.is_some()),
+            ("certificate", self.certificate.is_some()),
+        ];
+        let (table, _) = asked.into_iter().find(|(_, asked)| *asked)?;
+        Some(format!("[{table}] needs estimation records, but [data] has a response; leave the table out"))
     }
 
     fn loop_problem(&self) -> Option<String> {

@@ -15,6 +15,7 @@ mod lines;
 mod mistakes;
 mod notes;
 mod plot;
+mod response;
 mod rig;
 mod subspace;
 mod verbs;

@@ -59,7 +59,7 @@ mod trust;
 
 pub use super::subspace::Experiment;
 pub use known_loop::{LoopKnowledge, LoopSignals};
-pub use measured::{MeasuredResponse, ResponseTable, recommend_from_response};
+pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
 pub use mode_estimates::ModeEstimate;
 pub use options::LikelihoodOptions;
 pub use recommendation::{Candidate, Evidence, Predictor, Recommendation};

@@ -93,7 +93,8 @@ pub struct Evidence {
 const BEYOND_CHANCE: f64 = 5.0;
 
 impl Evidence {
-    pub(super) fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
+    /// A figure with the largest that is accepted.
+    pub fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
         Evidence { question: question.into(), figure, limit, significance: None }
     }
 

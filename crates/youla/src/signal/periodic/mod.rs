@@ -179,7 +179,7 @@ impl LineResponse {
 }
 
 /// The inverse, which the formulas hold as a factor of the covariance; refused where it does not exist.
-fn inverse(a: Mat<c64>, what: impl Fn() -> String) -> Result<Mat<c64>> {
+pub(crate) fn inverse(a: Mat<c64>, what: impl Fn() -> String) -> Result<Mat<c64>> {
     let rcond = reciprocal_condition(a.as_ref());
     invertible(a).ok_or_else(|| Error::Singular { what: what(), rcond })
 }

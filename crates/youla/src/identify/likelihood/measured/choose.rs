@@ -1,13 +1,12 @@
 //! Order, dead time and direct path by Schwarz's criterion: starts of all orders, then models one step away as long as it falls.
 
 use super::data::{Column, MeasuredResponse};
-use super::lines::{VarianceShape, WeighedLines, sizes, weighed};
+use super::lines::{VarianceShape, WeighedLines, rest, sizes, unknown, weighed};
 use super::search::{Found, search, with_best_inputs};
 use super::subspace::Subspace;
 use crate::identify::likelihood::chart::Chart;
 use crate::identify::likelihood::deviation::delayed;
 use crate::identify::likelihood::model::Model;
-use crate::identify::likelihood::neighbours::sets;
 use crate::identify::likelihood::spectra::Sizes;
 use crate::identify::likelihood::{Candidate, LikelihoodOptions};
 use crate::{Error, Result};
@@ -27,6 +26,8 @@ const FIRST: usize = 4;
 const STEPS: [usize; 2] = [30, 100];
 /// Rounds of models one step away.
 const ROUNDS: usize = 16;
+/// Differences of the criterion that do not decide for the larger order: odds of e^2 to one.
+const INDISTINCT: f64 = 4.0;
 /// Differences of the criterion up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 /// Real numbers of the lines for each parameter of the largest model.
@@ -68,11 +69,11 @@ impl Fitted {
 }
 
 /// A search to be done.
-struct Task {
-    start: Model,
-    delays: Vec<usize>,
-    feedthrough: bool,
-    origin: &'static str,
+pub(super) struct Task {
+    pub(super) start: Model,
+    pub(super) delays: Vec<usize>,
+    pub(super) feedthrough: bool,
+    pub(super) origin: &'static str,
 }
 
 impl<'a> Problem<'a> {
@@ -106,6 +107,16 @@ impl<'a> Problem<'a> {
         &self.sizes
     }
 
+    /// What is fixed about the model.
+    pub(super) fn options(&self) -> &LikelihoodOptions {
+        self.options
+    }
+
+    /// Largest order that is tried.
+    pub(super) fn largest_order(&self) -> usize {
+        self.largest_order
+    }
+
     /// The response that was measured.
     pub(super) fn response(&self) -> &MeasuredResponse {
         self.response
@@ -122,19 +133,24 @@ impl<'a> Problem<'a> {
             Mat::from_fn(self.response.outputs, self.response.inputs, |i, j| g[i * self.response.inputs + j])
         };
         let plant = self.response.omega.iter().map(of).collect();
-        let shape = if self.response.known() { self.shape } else { self.shape_of(&first) };
+        let shape =
+            if self.response.known() || self.response.proportional { self.shape } else { self.shape_of(&first) };
         Problem { plant, shape, delays: Some(first.delays), ..self }
     }
 
     /// Shares of the variance by least squares of the squared residuals, relative to what they are now; neither below zero.
     fn shape_of(&self, first: &Fitted) -> VarianceShape {
         let (mut normal, mut right) = ([0.0; 3], [0.0; 2]);
-        for line in &self.weighed(first).lines {
+        let (m, p) = (self.response.inputs, self.response.outputs);
+        for (line, measured) in self.weighed(first).lines.iter().zip(&self.response.lines) {
             let g = first.model.response(line.z);
-            for column in &line.columns {
-                for (rest, y) in column.rest(&g, self.response.inputs).iter().zip(&column.y) {
-                    let now = self.shape.absolute + self.shape.relative * y.norm_sqr();
-                    let (one, square, found) = (1.0 / now, y.norm_sqr() / now, rest.norm_sqr() / now);
+            let of_plant = rest(&Mat::from_fn(p, m, |i, j| g[i * m + j]));
+            for (column, measured) in line.columns.iter().zip(measured) {
+                let [absolute, relative] = unknown(self.response, &self.sizes, measured, &of_plant);
+                for (i, rest) in column.rest(&g, m).iter().enumerate() {
+                    let (one, square) = (absolute[(i, i)].re, relative[(i, i)].re);
+                    let now = self.shape.absolute * one + self.shape.relative * square;
+                    let (one, square, found) = (one / now, square / now, rest.norm_sqr() / now);
                     normal = [normal[0] + one * one, normal[1] + one * square, normal[2] + square * square];
                     right = [right[0] + one * found, right[1] + square * found];
                 }
@@ -158,7 +174,7 @@ impl<'a> Problem<'a> {
         self.lines(&of.delays)
     }
 
-    fn lines(&self, delays: &[usize]) -> WeighedLines {
+    pub(super) fn lines(&self, delays: &[usize]) -> WeighedLines {
         weighed(self.response, &self.sizes, delays, &self.plant, self.shape)
     }
 
@@ -174,6 +190,13 @@ impl<'a> Problem<'a> {
                 at = self.improved(&mut tried, table)?;
             }
         }
+        // of many orders that were tried, one beats a smaller one by this much through chance alone
+        let enough = |c: &&Fitted| c.criterion <= at.criterion + INDISTINCT;
+        let simplest = tried
+            .iter()
+            .filter(enough)
+            .min_by(|a, b| a.model.order().cmp(&b.model.order()).then(a.criterion.total_cmp(&b.criterion)));
+        let at = simplest.cloned().unwrap_or(at);
         let last = Task::same(&at, at.origin);
         let chosen = self.searched(last, STEPS[1]).filter(|c| c.criterion <= at.criterion).unwrap_or(at);
         let rivals = tried.into_iter().filter(|c| c.criterion <= chosen.criterion + BESIDE).collect();
@@ -245,7 +268,7 @@ impl<'a> Problem<'a> {
         found.into_iter().map(task).collect()
     }
 
-    fn criterion(&self, energy: f64, model: &Model, feedthrough: bool, rows: usize) -> f64 {
+    pub(super) fn criterion(&self, energy: f64, model: &Model, feedthrough: bool, rows: usize) -> f64 {
         let (n, m, p) = (rows.max(2) as f64, model.inputs, model.outputs);
         let parameters = model.order() * (m + p) + if feedthrough { m * p } else { 0 };
         let deviance = if self.response.known() { energy } else { n * (energy / n).max(ROUNDING).ln() };
@@ -266,81 +289,10 @@ impl<'a> Problem<'a> {
         let Task { delays, feedthrough, origin, .. } = task;
         Some(Fitted { model, delays, feedthrough, energy, criterion, steps, origin })
     }
-
-    /// One sample of dead time more or less, one pole or pair less, one more.
-    fn neighbours(&self, at: &Fitted) -> Vec<Task> {
-        let mut tasks = self.other_delays(at);
-        if self.options.order.is_none() {
-            tasks.extend(self.smaller(at));
-            tasks.extend(self.larger(at));
-        }
-        tasks
-    }
-
-    fn other_delays(&self, at: &Fitted) -> Vec<Task> {
-        if self.options.dead_time.is_some() {
-            return Vec::new();
-        }
-        let mut tasks = Vec::new();
-        for j in 0..at.delays.len() {
-            for delay in [at.delays[j].checked_sub(1), Some(at.delays[j] + 1)].into_iter().flatten() {
-                let mut delays = at.delays.clone();
-                delays[j] = delay;
-                let lines = self.lines(&delays);
-                let without = fastest(&at.model).filter(|_| delay > at.delays[j] && self.options.order.is_none());
-                let starts = [Some(at.model.clone()), without.map(|k| at.model.without(&[k]))];
-                for start in starts.into_iter().flatten() {
-                    let start = with_best_inputs(&lines, &start, at.feedthrough);
-                    let delays = delays.clone();
-                    let task = |start| Task { start, delays, feedthrough: at.feedthrough, origin: "another dead time" };
-                    tasks.extend(start.map(task));
-                }
-            }
-        }
-        tasks
-    }
-
-    fn smaller(&self, at: &Fitted) -> Vec<Task> {
-        let parts = at.model.separated().unwrap_or_else(|| at.model.clone());
-        let lines = self.lines(&at.delays);
-        let left = |set: Vec<usize>| {
-            let model = parts.without(&set);
-            (model.order() > 0).then(|| with_best_inputs(&lines, &model, at.feedthrough)).flatten()
-        };
-        let mut found: Vec<(f64, Model)> = sets(&parts)
-            .into_par_iter()
-            .filter_map(left)
-            .map(|model| (self.criterion(lines.energy(&model), &model, at.feedthrough, lines.rows()), model))
-            .collect();
-        found.sort_by(|a, b| a.0.total_cmp(&b.0));
-        found.truncate(3);
-        found.into_iter().map(|(_, start)| Task { start, ..Task::same(at, "one mode less") }).collect()
-    }
-
-    /// One pole or pair that the residual asks for.
-    fn larger(&self, at: &Fitted) -> Vec<Task> {
-        let mut left = self.lines(&at.delays);
-        for line in &mut left.lines {
-            let g = at.model.response(line.z);
-            line.columns.iter_mut().for_each(|column| column.y = column.rest(&g, self.response.inputs));
-        }
-        let lines = self.lines(&at.delays);
-        let Some(subspace) = Subspace::new(&left, 4) else { return Vec::new() };
-        let wider = |more: usize| {
-            if at.model.order() + more > self.largest_order || more > subspace.orders() {
-                return None;
-            }
-            let mut model = at.model.clone();
-            model.blocks.extend(with_best_inputs(&left, &subspace.model(more)?, false)?.blocks);
-            let start = with_best_inputs(&lines, &model, at.feedthrough)?;
-            Some(Task { start, ..Task::same(at, "one mode more") })
-        };
-        [1, 2, 4].into_iter().filter_map(wider).collect()
-    }
 }
 
 impl Task {
-    fn same(at: &Fitted, origin: &'static str) -> Self {
+    pub(super) fn same(at: &Fitted, origin: &'static str) -> Self {
         Task { start: at.model.clone(), delays: at.delays.clone(), feedthrough: at.feedthrough, origin }
     }
 }
@@ -360,12 +312,6 @@ impl Fitted {
 
 fn best(tried: &[Fitted]) -> Option<&Fitted> {
     tried.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
-}
-
-/// The block whose poles are nearest to zero.
-fn fastest(model: &Model) -> Option<usize> {
-    let size = |k: &usize| model.blocks[*k].poles().iter().map(|p| p.norm()).fold(0.0, f64::max);
-    (0..model.blocks.len()).min_by(|a, b| size(a).total_cmp(&size(b))).filter(|_| model.blocks.len() > 1)
 }
 
 /// `Y U^H (U U^H)^-1` over as few neighbouring lines as excite all inputs, scaled; zero where none do.

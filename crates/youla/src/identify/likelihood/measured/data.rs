@@ -1,7 +1,7 @@
 //! Measured responses with their covariance.
 
-use crate::lti::Discrete;
-use crate::signal::LineResponse;
+use crate::lti::{Discrete, FrequencyResponse};
+use crate::signal::{LineResponse, inverse};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use std::f64::consts::{PI, TAU};
@@ -13,8 +13,28 @@ pub struct ResponseTable {
     pub omega: Vec<f64>,
     /// The response at each of them.
     pub values: Vec<Mat<c64>>,
-    /// Variance `E |error|^2` of each entry at each frequency, where it is known.
-    pub variance: Option<Vec<Mat<f64>>>,
+    /// What is known of the errors.
+    pub variance: ResponseVariance,
+}
+
+/// Variance `E |error|^2` of each entry of a response, a matrix for each frequency.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ResponseVariance {
+    /// Nothing is known: the distance of the lines from the model says it.
+    Unknown,
+    /// Up to a common factor, as of a coherence from an unknown number of averages.
+    Proportional(Vec<Mat<f64>>),
+    /// In full.
+    Known(Vec<Mat<f64>>),
+}
+
+impl ResponseVariance {
+    fn stated(&self) -> Option<&[Mat<f64>]> {
+        match self {
+            ResponseVariance::Unknown => None,
+            ResponseVariance::Proportional(all) | ResponseVariance::Known(all) => Some(all),
+        }
+    }
 }
 
 /// A measured response as lines `Y = G U + V` of which `[U; Y]` has a known covariance.
@@ -26,8 +46,12 @@ pub struct MeasuredResponse {
     pub(super) outputs: usize,
     /// The experiments of each line.
     pub(super) lines: Vec<Vec<Column>>,
-    /// Degrees of freedom of the covariances at a line; infinite where they are stated; `None` where nothing is known of them.
+    /// Degrees of freedom of the covariances at a line; infinite where they are stated; `None` where their size is not known.
     pub(super) degrees: Option<f64>,
+    /// Whether covariances of unknown size are stated.
+    pub(super) proportional: bool,
+    /// Whether U is known without error.
+    pub(super) exact_inputs: bool,
 }
 
 /// One experiment of a line.
@@ -64,7 +88,16 @@ impl MeasuredResponse {
         };
         let lines = (0..found.lines.len()).map(columns).collect();
         let (omega, degrees) = (found.response.omega.clone(), Some(found.degrees()));
-        Ok(MeasuredResponse { time, omega, inputs: m, outputs: q - m, lines, degrees })
+        Ok(MeasuredResponse {
+            time,
+            omega,
+            inputs: m,
+            outputs: q - m,
+            lines,
+            degrees,
+            proportional: false,
+            exact_inputs: false,
+        })
     }
 
     /// The response of a plant from u to y, p x m.
@@ -81,7 +114,7 @@ impl MeasuredResponse {
             let variance = |i: usize| if i < m { 0.0 } else { table.variance(k, i - m, j) };
             Column::new(&signals, m, diagonal(m + p, variance))
         };
-        Ok(table.lines(time, (p, m), column))
+        Ok(table.lines(time, (p, m, true), column))
     }
 
     /// The response of a loop from its excitation to `[u; y]`, (m + p) x m.
@@ -98,13 +131,12 @@ impl MeasuredResponse {
             let signals: Vec<c64> = table.values[k].col(j).iter().copied().collect();
             Column::new(&signals, m, diagonal(q, |i| table.variance(k, i, j)))
         };
-        Ok(table.lines(time, (q - m, m), column))
+        Ok(table.lines(time, (q - m, m, false), column))
     }
 
     /// Whether the covariance of `Y - G U` depends on G, or on shares that residuals show.
     pub(super) fn depends_on_plant(&self) -> bool {
-        let exact = |c: &Column| (0..self.inputs).all(|j| c.covariance[(j, j)] == c64::ZERO);
-        !self.known() || !self.lines.iter().flatten().all(exact)
+        !(self.known() || self.proportional) || !self.exact_inputs
     }
 
     /// Whether the covariance is known.
@@ -118,10 +150,35 @@ fn diagonal(size: usize, entry: impl Fn(usize) -> f64) -> Mat<c64> {
 }
 
 impl ResponseTable {
+    /// The response of the plant: that of the table, or `T_y T_u^-1` of a loop whose first rows are the inputs.
+    ///
+    /// # Errors
+    /// [`Error::Ports`] for a loop without outputs, or a table without frequencies; [`Error::Singular`] with the first frequency at which
+    /// the excitation does not reach all inputs.
+    pub fn plant(&self, of_loop: bool) -> Result<FrequencyResponse> {
+        let (rows, m) = self.values.first().map_or((0, 0), |v| (v.nrows(), v.ncols()));
+        let p = if of_loop { rows.saturating_sub(m) } else { rows };
+        if p == 0 || m == 0 {
+            return Err(Error::Ports { what: "the number of outputs of the response".into(), expected: 1, found: p });
+        }
+        let mut values = Vec::new();
+        for (t, omega) in self.values.iter().zip(&self.omega) {
+            let g = match of_loop {
+                false => t.clone(),
+                true => {
+                    let what = || format!("the response from the excitation to the inputs at {} Hz", omega / TAU);
+                    t.subrows(m, p) * inverse(t.subrows(0, m).to_owned(), what)?
+                }
+            };
+            values.extend(g.col_iter().flat_map(|column| column.iter().copied().collect::<Vec<_>>()));
+        }
+        Ok(FrequencyResponse::new(self.omega.clone(), values, p, m))
+    }
+
     fn lines(
         &self,
         time: Discrete,
-        (outputs, inputs): (usize, usize),
+        (outputs, inputs, exact_inputs): (usize, usize, bool),
         column: impl Fn(usize, usize) -> Column,
     ) -> MeasuredResponse {
         let line = |k: usize| (0..inputs).map(|j| column(k, j)).collect();
@@ -131,12 +188,14 @@ impl ResponseTable {
             inputs,
             outputs,
             lines: (0..self.omega.len()).map(line).collect(),
-            degrees: self.variance.as_ref().map(|_| f64::INFINITY),
+            degrees: matches!(self.variance, ResponseVariance::Known(_)).then_some(f64::INFINITY),
+            exact_inputs,
+            proportional: matches!(self.variance, ResponseVariance::Proportional(_)),
         }
     }
 
     fn variance(&self, k: usize, i: usize, j: usize) -> f64 {
-        self.variance.as_ref().map_or(0.0, |v| v[k][(i, j)])
+        self.variance.stated().map_or(0.0, |v| v[k][(i, j)])
     }
 
     /// Shapes and values; the size of the response.
@@ -165,7 +224,7 @@ impl ResponseTable {
     }
 
     fn check_variance(&self, shape: (usize, usize)) -> Result<()> {
-        for (k, variance) in self.variance.iter().flatten().enumerate() {
+        for (k, variance) in self.variance.stated().into_iter().flatten().enumerate() {
             let hz = self.omega.get(k).map_or(f64::NAN, |w| w / TAU);
             let at = |e: Error| e.within(format!("the response at {hz} Hz"));
             check_shape("its variance", (variance.nrows(), variance.ncols()), shape).map_err(at)?;
@@ -175,7 +234,7 @@ impl ResponseTable {
                 return Err(at(Error::OutOfRange { what: "its variance".into(), value: *bad, must }));
             }
         }
-        match &self.variance {
+        match self.variance.stated() {
             Some(variance) if variance.len() != self.omega.len() => Err(Error::Ports {
                 what: "the number of variances of the response".into(),
                 expected: self.omega.len(),

@@ -2,9 +2,12 @@
 
 use super::choose::{Fitted, Problem};
 use super::lines::WeighedLines;
+use crate::Result;
+use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::deviation::delayed;
 use crate::identify::likelihood::trust::accuracy;
+use crate::lti::{Discrete, StateSpace};
 use crate::signal::standard_normal;
 use std::f64::consts::TAU;
 
@@ -27,6 +30,13 @@ pub(super) fn of_lines(problem: &Problem<'_>, chosen: &Fitted, variances: &[Vec<
         None => correlation(&lines, chosen),
     };
     vec![accuracy(&responses, variances), second]
+}
+
+/// Whether the controller that ran stabilises the model, as it did the plant.
+pub(super) fn of_loop(plant: &StateSpace<Discrete>, controller: &StateSpace<Discrete>) -> Result<Evidence> {
+    let closed = closed_loop(plant, &with_input_port(controller)?)?;
+    let largest = closed.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    Ok(Evidence::new("Largest magnitude of a pole of the loop with the stated controller (stability)", largest, 1.0))
 }
 
 /// The group of neighbouring lines in which the model leaves most beyond the stated variance.

@@ -93,14 +93,18 @@ fn covariances(
     let (m, p) = (response.inputs, response.outputs);
     let of = |k: usize, column: &Column| {
         let floor = |i: usize| (ROUNDING * column.y[i].norm() / sizes.y[i]).powi(2).max(1e-30);
-        let Some(_) = response.degrees else {
-            let entry = |i: usize| shape.absolute + shape.relative * (column.y[i].norm() / sizes.y[i]).powi(2);
-            return Mat::from_fn(p, p, |i, j| c64::new(if i == j { entry(i) + floor(i) } else { 0.0 }, 0.0));
-        };
-        let scale = |i: usize| if i < m { sizes.u[i] } else { sizes.y[i - m] };
-        let c = Mat::from_fn(m + p, m + p, |i, j| column.covariance[(i, j)] / (scale(i) * scale(j)));
         let rest = rest(&plant[k]);
-        let mut out = &rest * &c * rest.adjoint();
+        let mut out = match response.degrees.is_none() && !response.proportional {
+            true => {
+                let [absolute, relative] = unknown(response, sizes, column, &rest);
+                absolute * Scale(c64::new(shape.absolute, 0.0)) + relative * Scale(c64::new(shape.relative, 0.0))
+            }
+            false => {
+                let scale = |i: usize| if i < m { sizes.u[i] } else { sizes.y[i - m] };
+                let c = Mat::from_fn(m + p, m + p, |i, j| column.covariance[(i, j)] / (scale(i) * scale(j)));
+                &rest * &c * rest.adjoint()
+            }
+        };
         (0..p).for_each(|i| out[(i, i)] += floor(i));
         out
     };
@@ -110,6 +114,19 @@ fn covariances(
         Some(degrees) if degrees.is_finite() => smoothed(&all, 0.5 * degrees),
         _ => all,
     }
+}
+
+/// Covariance of `Y - G U` for errors of every signal as large as its size, and as large as its value.
+pub(super) fn unknown(response: &MeasuredResponse, sizes: &Sizes, column: &Column, rest: &Mat<c64>) -> [Mat<c64>; 2] {
+    let m = response.inputs;
+    let through = |of: &dyn Fn(usize) -> f64| {
+        let weighed = Mat::from_fn(rest.nrows(), rest.ncols(), |i, j| rest[(i, j)] * of(j));
+        &weighed * rest.adjoint()
+    };
+    let exact = |j: usize| j < m && response.exact_inputs;
+    let value =
+        |j: usize| if j < m { column.u[j].norm() / sizes.u[j] } else { column.y[j - m].norm() / sizes.y[j - m] };
+    [through(&|j| if exact(j) { 0.0 } else { 1.0 }), through(&|j| if exact(j) { 0.0 } else { value(j).powi(2) })]
 }
 
 /// Means over experiments and neighbouring lines, so that the inverse has the mean of the inverse of the true covariance.
@@ -129,7 +146,7 @@ fn smoothed(all: &[Vec<Mat<c64>>], degrees: f64) -> Vec<Vec<Mat<c64>>> {
 }
 
 /// `[-G I]`
-fn rest(g: &Mat<c64>) -> Mat<c64> {
+pub(super) fn rest(g: &Mat<c64>) -> Mat<c64> {
     let (p, m) = (g.nrows(), g.ncols());
     Mat::from_fn(p, m + p, |i, j| if j < m { -g[(i, j)] } else { c64::new(f64::from(u8::from(j == m + i)), 0.0) })
 }

@@ -16,24 +16,26 @@
 //! | scaled channels, dead time, whitening | `lines` |
 //! | starts of all orders from one decomposition | `subspace` |
 //! | search in local coordinates | `search` |
-//! | order, dead time and direct path by Schwarz's criterion | `choose` |
+//! | order, dead time and direct path by Schwarz's criterion | `choose`, `neighbours` |
 //! | questions to the lines | `evidence` |
 
 mod choose;
 mod data;
 mod evidence;
 mod lines;
+mod neighbours;
 mod search;
 mod subspace;
 #[cfg(test)]
 mod tests;
 
-pub use data::{MeasuredResponse, ResponseTable};
+pub use data::{MeasuredResponse, ResponseTable, ResponseVariance};
 
 use super::deviation::{Directions, inverse_root};
 use super::recommendation::{Predictor, Recommendation};
 use super::response_deviation::ResponseDeviation;
 use super::{LikelihoodOptions, mode_estimates, physical};
+use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, Result};
 use choose::Problem;
 use std::f64::consts::TAU;
@@ -44,25 +46,32 @@ use std::f64::consts::TAU;
 /// the lines state it by their distance from the model; a model that misses dynamics is then noticed only by errors of neighbouring
 /// lines that agree. The predictor has no gain: lines do not tell how noise and initial state share the outputs.
 ///
+/// A controller `u = K y` that ran during the measurement must stabilise the model; without one nothing is asked of the loop.
+///
 /// The result does not depend on the number of threads.
 ///
 /// # Errors
 /// [`Error::TooFewSamples`] says how many lines are needed, [`Error::Ports`] and [`Error::OutOfRange`] name an option that cannot
-/// be met; [`Error::NoCandidate`] where no search ends.
+/// be met; [`Error::NoCandidate`] where no search ends; ports of the controller.
 ///
 /// ```
-/// use youla::identify::likelihood::{LikelihoodOptions, MeasuredResponse, ResponseTable, recommend_from_response};
+/// use youla::identify::likelihood::{LikelihoodOptions, MeasuredResponse, ResponseTable, ResponseVariance};
+/// use youla::identify::likelihood::recommend_from_response;
 /// use youla::{Mat, c64, lti::Discrete};
 /// let omega: Vec<f64> = (1..60).map(|k| 0.05 * f64::from(k)).collect();
 /// let exact = |w: &f64| 0.5 / (c64::cis(*w) - 0.9);
 /// let values = omega.iter().map(|w| Mat::from_fn(1, 1, |_, _| exact(w) * (1.0 + 1e-3 * (w * 1e4).sin()))).collect();
-/// let table = ResponseTable { omega, values, variance: None };
+/// let table = ResponseTable { omega, values, variance: ResponseVariance::Unknown };
 /// let response = MeasuredResponse::of_plant(&table, Discrete::new(1.0)?)?;
-/// let found = recommend_from_response(&response, &LikelihoodOptions::default())?;
+/// let found = recommend_from_response(&response, None, &LikelihoodOptions::default())?;
 /// assert!(found.order == 1 && (found.plant.a()[(0, 0)] - 0.9).abs() < 1e-3);
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn recommend_from_response(response: &MeasuredResponse, options: &LikelihoodOptions) -> Result<Recommendation> {
+pub fn recommend_from_response(
+    response: &MeasuredResponse,
+    controller: Option<&StateSpace<Discrete>>,
+    options: &LikelihoodOptions,
+) -> Result<Recommendation> {
     let problem = Problem::new(response, options)?.refined();
     let mut candidates = Vec::new();
     let (chosen, rivals) =
@@ -77,8 +86,9 @@ pub fn recommend_from_response(response: &MeasuredResponse, options: &Likelihood
     let modes = mode_estimates::of_blocks(&chosen.model, &chart, &root, response.time);
     let directions = Directions::of_parts((chosen.model.clone(), chosen.delays.clone()), chart, root, others);
     let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
-    let evidence = evidence::of_lines(&problem, &chosen, &variances);
+    let mut evidence = evidence::of_lines(&problem, &chosen, &variances);
     let plant = physical::realised(&chosen.model, &chosen.delays, problem.sizes(), response.time)?;
+    evidence.extend(controller.map(|k| evidence::of_loop(&plant, k)).transpose()?);
     Ok(Recommendation {
         predictor: without_noise(&plant),
         plant,
@@ -96,7 +106,7 @@ pub fn recommend_from_response(response: &MeasuredResponse, options: &Likelihood
     })
 }
 
-fn without_noise(plant: &crate::lti::StateSpace<crate::lti::Discrete>) -> Predictor {
+fn without_noise(plant: &StateSpace<Discrete>) -> Predictor {
     Predictor {
         a: plant.a().to_owned(),
         b: plant.b().to_owned(),

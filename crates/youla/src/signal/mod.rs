@@ -15,7 +15,10 @@ mod stream;
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
-pub use periodic::{ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response};
+pub use periodic::{
+    ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period, line_response,
+    local_response,
+};
 pub(crate) use periodic::{inverse, standard_normal};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};

@@ -90,7 +90,7 @@ impl LineResponse {
 
     /// Degrees of freedom of the noise variance at a line.
     pub(crate) fn degrees(&self) -> f64 {
-        2.0 * self.periods.iter().map(|count| count - 1).sum::<usize>() as f64
+        self.degrees
     }
 
     fn entries(&self) -> impl Iterator<Item = (usize, usize)> + use<> {

@@ -79,6 +79,15 @@ pub(super) fn gather(experiments: &[PeriodicExperiment]) -> Result<Lines> {
     Ok(out)
 }
 
+/// Shapes and finite numbers of experiment number e.
+pub(super) fn check_experiment(experiment: &PeriodicExperiment, (m, q): (usize, usize), e: usize) -> Result<()> {
+    let within = |error| Error::Within { part: format!("experiment {}", e + 1), source: Box::new(error) };
+    check_shape("the excitation", experiment.d, (experiment.z.nrows(), m)).map_err(within)?;
+    check_shape("the measured signals", experiment.z, (experiment.d.nrows(), q)).map_err(within)?;
+    check_finite("the excitation", experiment.d).map_err(within)?;
+    check_finite("the measured signals", experiment.z).map_err(within)
+}
+
 /// The period of all experiments, and the rows of each.
 struct Common {
     samples: usize,
@@ -94,10 +103,8 @@ fn common_period(experiments: &[PeriodicExperiment]) -> Result<Common> {
     let (m, q) = (first.d.ncols(), first.z.ncols());
     let mut common: Option<Common> = None;
     for (e, experiment) in experiments.iter().enumerate() {
+        check_experiment(experiment, (m, q), e)?;
         let within = |error| Error::Within { part: format!("experiment {}", e + 1), source: Box::new(error) };
-        check_shape("the excitation", experiment.d, (experiment.z.nrows(), m)).map_err(within)?;
-        check_shape("the measured signals", experiment.z, (experiment.d.nrows(), q)).map_err(within)?;
-        check_finite("the measured signals", experiment.z).map_err(within)?;
         let found = detect_period(experiment.d).map_err(within)?;
         let common = common.get_or_insert_with(|| Common::new(&found));
         if found.samples != common.samples {

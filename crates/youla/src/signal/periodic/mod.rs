@@ -17,10 +17,12 @@ mod agreement;
 mod gather;
 mod interpolate;
 mod levels;
+mod local;
 mod period;
 mod settling;
 
 pub use agreement::LineGroup;
+pub use local::{LocalModel, local_response};
 pub use period::{ExcitationPeriod, detect_period};
 pub(crate) use settling::standard_normal;
 
@@ -54,6 +56,8 @@ pub struct LineResponse {
     pub periods: Vec<usize>,
     /// Settling periods at the beginning that were left out, for each experiment.
     pub settling: Vec<usize>,
+    /// Degrees of freedom of the noise variance at a line.
+    pub(super) degrees: f64,
     /// M, m x m at each line.
     pub(super) excitation: Vec<Mat<c64>>,
     /// C of the noise, q x q at each line.
@@ -116,8 +120,9 @@ pub fn line_response(experiments: &[PeriodicExperiment], time: Discrete) -> Resu
     }
     let response = FrequencyResponse::new(omega, values, q, m);
     let Lines { lines, period, periods, settling, .. } = gathered;
+    let degrees = 2.0 * periods.iter().map(|count| count - 1).sum::<usize>() as f64;
     let own = if apart { Vec::new() } else { all.into_iter().map(OwnLine::new).collect() };
-    Ok(LineResponse { response, lines, period, periods, settling, excitation, noise, total, own })
+    Ok(LineResponse { response, lines, period, periods, settling, degrees, excitation, noise, total, own })
 }
 
 impl OwnLine {

@@ -168,6 +168,17 @@ fn inverse_root(c: &Mat<c64>) -> Mat<c64> {
 }
 
 impl WeighedLines {
+    /// Every k-th line, weighed for those between, so that at most so many are left.
+    pub(super) fn thinned(mut self, most: usize) -> Self {
+        let every = self.lines.len().div_ceil(most.max(1));
+        if every > 1 {
+            self.lines = self.lines.into_iter().step_by(every).collect();
+            let weight = Scale(c64::new((every as f64).sqrt(), 0.0));
+            self.lines.iter_mut().flat_map(|l| &mut l.columns).for_each(|c| c.w = &c.w * weight);
+        }
+        self
+    }
+
     /// Real numbers that the lines hold.
     pub(super) fn rows(&self) -> usize {
         self.lines.iter().map(|l| l.columns.len() * self.outputs * if l.real { 1 } else { 2 }).sum()

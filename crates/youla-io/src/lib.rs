@@ -10,6 +10,7 @@
 //! | [`read_csv`], [`CsvStream`], [`write_csv`] | text: comma, semicolon, tab or blanks, plain or gzip |
 //! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
 //! | [`read_npz`], [`NpyStream`] | NumPy archives and arrays |
+//! | [`read_uff58`] | universal files, dataset 58: measured responses |
 //! | [`read_parquet`] | Parquet, with the feature `parquet` |
 //! | [`Variables`] | the contents of a MATLAB, NumPy or Parquet file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
@@ -57,6 +58,7 @@ mod source;
 mod survey;
 mod time;
 pub mod toml_file;
+mod uff;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
@@ -76,4 +78,5 @@ pub use parquet::{parquet_from_bytes, read_parquet};
 pub use source::{Format, Source, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource};
+pub use uff::{UffFunction, UffKind, is_uff, read_uff58};
 pub use values::{Value, Variable, Variables};

@@ -10,9 +10,9 @@ use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::{Evidence, MeasuredResponse, ResponseTable, ResponseVariance};
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
-use youla::signal::IndirectResponse;
+use youla::signal::{Channel, IndirectResponse, Record};
 use youla::{Mat, c64};
-use youla_io::{ChannelSpec, Source, TimeSource, read, sha256, survey};
+use youla_io::{ChannelSpec, CsvOptions, Source, TimeSource, UffKind, is_uff, read, read_uff58, sha256, survey};
 
 /// Largest part of the inputs that the stated controller may leave, errors of the response included.
 const LARGEST_REST: f64 = 0.1;
@@ -130,17 +130,15 @@ pub(super) fn read_measured(settings: &DataSettings, folder: &Path, file: &DataF
         youla_io::Error::MissingFile { .. } => e.within("[[data.response]]".to_owned()),
         other => other,
     };
-    let columns: Vec<String> = survey(&path, &settings.csv).map_err(within)?.into_iter().map(|c| c.from).collect();
-    let layout = Layout::of(settings, &columns).map_err(|problem| {
+    let read = match is_uff(&path).map_err(within)? {
+        true => Columns::of_uff(&path)?,
+        false => Columns::Named(survey(&path, &settings.csv)?.into_iter().map(|c| c.from).collect()),
+    };
+    let layout = Layout::of(settings, read.names()).map_err(|problem| {
         let problem = format!("[[data.response]] {}: {problem}", file.file.display());
         Error::File(youla_io::Error::Settings { path: PathBuf::from("run.toml"), at: None, problem })
     })?;
-    let wanted: Vec<ChannelSpec> = layout.columns().into_iter().map(ChannelSpec::named).collect();
-    // Rows are frequencies; the reader needs a clock.
-    let time = TimeSource { ts: Some(1.0), ..TimeSource::default() };
-    let source =
-        Source { path: path.clone(), format: Default::default(), time, channels: wanted, csv: settings.csv.clone() };
-    let record = read(&source)?;
+    let record = read.record(&path, &settings.csv, &layout.columns())?;
     let column = |name: &str| record.column(name).map(<[f64]>::to_vec);
     let scale = if layout.frequency == "hz" { TAU } else { 1.0 };
     let omega = column(&layout.frequency)?.iter().map(|f| f * scale).collect();
@@ -155,6 +153,67 @@ pub(super) fn read_measured(settings: &DataSettings, folder: &Path, file: &DataF
             sha256: sha256(&path)?,
         },
     })
+}
+
+/// The columns of a file.
+enum Columns {
+    /// Of a table, to be read where they are chosen.
+    Named(Vec<String>),
+    /// Of a universal file.
+    Read(Vec<String>, Mat<f64>),
+}
+
+impl Columns {
+    /// Responses and coherences of a universal file, with the frequencies of the first.
+    fn of_uff(path: &Path) -> Result<Self> {
+        let functions = read_uff58(path)?;
+        let first = &functions[0];
+        let (mut names, mut columns) = (vec!["hz".to_owned()], vec![first.abscissa.clone()]);
+        for function in &functions {
+            let entry = format!("{}/{}", function.response, function.reference);
+            if function.abscissa != first.abscissa {
+                let (path, found) = (path.to_owned(), "a universal file whose functions have different frequencies");
+                let remedy = "export functions with the same frequencies";
+                return Err(youla_io::Error::FormatNotRead { path, found, remedy }.into());
+            }
+            let part = |of: &dyn Fn(&c64) -> f64| function.values.iter().map(of).collect::<Vec<_>>();
+            match function.kind {
+                UffKind::Response => {
+                    names.extend([format!("{entry} re"), format!("{entry} im")]);
+                    columns.extend([part(&|v| v.re), part(&|v| v.im)]);
+                }
+                UffKind::Coherence => {
+                    names.push(format!("{entry} coherence"));
+                    columns.push(part(&|v| v.re));
+                }
+                UffKind::Other(_) => {}
+            }
+        }
+        let values = Mat::from_fn(first.abscissa.len(), columns.len(), |k, j| columns[j][k]);
+        Ok(Columns::Read(names, values))
+    }
+
+    fn names(&self) -> &[String] {
+        match self {
+            Columns::Named(names) | Columns::Read(names, _) => names,
+        }
+    }
+
+    /// The chosen columns; rows are frequencies, but a record needs a clock.
+    fn record(self, path: &Path, csv: &CsvOptions, chosen: &[String]) -> Result<Record> {
+        match self {
+            Columns::Named(_) => {
+                let time = TimeSource { ts: Some(1.0), ..TimeSource::default() };
+                let channels = chosen.iter().map(ChannelSpec::named).collect();
+                let format = Default::default();
+                Ok(read(&Source { path: path.to_owned(), format, time, channels, csv: csv.clone() })?)
+            }
+            Columns::Read(names, values) => {
+                let channels = names.iter().map(|name| Channel::new(name, "")).collect();
+                Ok(Record::new("response", channels, values, Discrete::new(1.0)?)?)
+            }
+        }
+    }
 }
 
 /// The columns of a table.
@@ -174,7 +233,8 @@ struct Layout {
 impl Layout {
     /// From the names of the columns; the error says which are missing.
     fn of(settings: &DataSettings, columns: &[String]) -> Result<Self, String> {
-        let names = |channels: &[ChannelSpec]| -> Vec<String> { channels.iter().map(|c| c.name.clone()).collect() };
+        let names =
+            |channels: &[ChannelSpec]| -> Vec<String> { channels.iter().map(|c| c.source().to_string()).collect() };
         let (u, y) = (names(&settings.inputs), names(&settings.outputs));
         let has = |name: &str| columns.iter().any(|c| c == name);
         let frequency = ["hz", "rad/s"].into_iter().find(|name| has(name));
@@ -208,8 +268,12 @@ impl Layout {
                 return Ok(Layout { errors, ..layout });
             }
         }
-        let (output, input) = (&y[0], &settings.inputs[0].name);
-        let d = [&settings.input_excitation, &settings.alpha].into_iter().flatten().next().map_or("d", |c| &c.name);
+        let (output, input) = (&y[0], settings.inputs[0].source().to_string());
+        let d = [&settings.input_excitation, &settings.alpha]
+            .into_iter()
+            .flatten()
+            .next()
+            .map_or_else(|| "d".into(), |c| c.source().to_string());
         Err(format!(
             "the columns hold no response; the plant has \"{output}/{input} re\" and \"{output}/{input} im\" for every output and input, the \
              loop \"{input}/{d} re\", \"{output}/{d} re\" and so on with the excitation that [data] names; abs or dB with deg instead of re \

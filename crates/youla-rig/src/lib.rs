@@ -1,6 +1,6 @@
 //! The host's end of a rig that speaks `youla-link`: [`Rig`] asks and receives, [`Recorder`] writes a log in which every row is there or
-//! reported missing, and [`settings`] the run.toml beside it. [`serve`] plays a machine over UDP: the loop of the firmware with a
-//! [`LinearPlant`], in real time or in lock-step.
+//! reported missing, and [`settings`] the run.toml beside it. [`serve`] plays a machine over UDP: the loop of the firmware with any
+//! [`Plant`], a [`LinearPlant`] for example, in real time or in lock-step.
 
 mod description;
 mod error;
@@ -12,7 +12,7 @@ mod twin;
 
 pub use description::{Description, RigChannel};
 pub use error::{Error, Result};
-pub use plant::{LinearPlant, PlantFault};
+pub use plant::{LinearPlant, Plant, PlantFault};
 pub use recorder::{LogReport, Recorder};
 pub use rig::{Answer, Rig};
 pub use settings::settings;

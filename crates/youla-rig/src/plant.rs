@@ -1,6 +1,15 @@
-//! A plant with noise, and what may happen to it.
+//! What a twin controls: any plant, and a linear one with noise and what may happen to it.
 
 use youla_rt::State;
+
+/// A plant of M inputs and P outputs, one sample at a time: [`Plant::measure`], then [`Plant::apply`].
+pub trait Plant<const M: usize, const P: usize> {
+    /// The measurement of this sample.
+    fn measure(&mut self) -> [f32; P];
+
+    /// Moves on to the next sample under an input.
+    fn apply(&mut self, u: &[f32; M]);
+}
 
 /// What may happen to a plant while it runs.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -47,8 +56,20 @@ impl<const N: usize, const M: usize, const P: usize> LinearPlant<N, M, P> {
         (z ^ z >> 31) as i64 as f64 / 2_f64.powi(63)
     }
 
-    /// The measurement of this sample.
-    pub fn measure(&mut self) -> [f32; P] {
+    /// Pushes the state.
+    pub fn push(&mut self, by: [f64; N]) {
+        let moved = std::array::from_fn(|i| self.state.xh()[i] + by[i]);
+        self.state = State::new(moved);
+    }
+
+    /// The state.
+    pub fn state(&self) -> &[f64; N] {
+        self.state.xh()
+    }
+}
+
+impl<const N: usize, const M: usize, const P: usize> Plant<M, P> for LinearPlant<N, M, P> {
+    fn measure(&mut self) -> [f32; P] {
         for i in 0..P {
             let stuck = self.fault == Some(PlantFault::SensorStuck(i));
             let noise = self.noise[1] * self.random();
@@ -62,8 +83,7 @@ impl<const N: usize, const M: usize, const P: usize> LinearPlant<N, M, P> {
         self.last
     }
 
-    /// Moves on under an input.
-    pub fn apply(&mut self, u: &[f32; M]) {
+    fn apply(&mut self, u: &[f32; M]) {
         let gain = match self.fault {
             Some(PlantFault::ActuatorGain(gain)) => gain,
             _ => 1.0,
@@ -75,16 +95,5 @@ impl<const N: usize, const M: usize, const P: usize> LinearPlant<N, M, P> {
             next[i] = of_x + of_u + self.noise[0] * self.random();
         }
         self.state = State::new(next);
-    }
-
-    /// Pushes the state.
-    pub fn push(&mut self, by: [f64; N]) {
-        let moved = std::array::from_fn(|i| self.state.xh()[i] + by[i]);
-        self.state = State::new(moved);
-    }
-
-    /// The state.
-    pub fn state(&self) -> &[f64; N] {
-        self.state.xh()
     }
 }

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
-use youla_link::{LARGEST_FRAME, Outcome, Request, Source};
-use youla_rt::{Cause, OUT_WITHIN, Phase, QCoefficients};
+use youla_link::{LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
+use youla_rt::{Cause, Controller, ExcitedLoop, Limits, Matrices, OUT_WITHIN, Phase, QCoefficients};
 
 /// A rotor that is served on a thread.
 struct Served {
@@ -19,12 +19,19 @@ struct Served {
 
 impl Served {
     fn start(pace: Pace) -> Self {
+        Self::of(|| rotor(1).unwrap(), pace)
+    }
+
+    fn of<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P> + 'static>(
+        make: fn() -> Twin<'static, N, M, P, K, G>,
+        pace: Pace,
+    ) -> Self {
         let socket = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
         let address = format!("udp://{}", socket.local_addr().unwrap());
         let over = Arc::new(AtomicBool::new(false));
         let end = over.clone();
         let thread = std::thread::spawn(move || {
-            let mut twin = rotor(1).unwrap();
+            let mut twin = make();
             serve(&socket, &mut twin, pace, || end.load(Ordering::Relaxed)).unwrap();
         });
         Served { address, over, thread }
@@ -198,6 +205,67 @@ fn lock_step_and_q_over_udp() {
     std::fs::remove_file(path).unwrap();
     assert!(matches!(Rig::connect("udp://127.0.0.1:1"), Err(Error::Silent { .. })));
     assert!(matches!(Rig::connect("udp://nowhere"), Err(Error::Address { .. })));
+}
+
+/// An unstable mass on a spring that hardens: one channel, not linear.
+struct Hardening([f64; 2]);
+
+impl Plant<1, 1> for Hardening {
+    fn measure(&mut self) -> [f32; 1] {
+        [self.0[0] as f32]
+    }
+
+    fn apply(&mut self, u: &[f32; 1]) {
+        let [x, v] = self.0;
+        let force = x - 0.2 * x.powi(3) + f64::from(u[0]);
+        self.0 = [x + 0.01 * v, v + 0.01 * force];
+    }
+}
+
+fn hardening() -> Twin<'static, 2, 1, 1, 1, Hardening> {
+    let nominal = Matrices {
+        a: [[1.0, 0.01], [0.01, 1.0]],
+        b: [[0.0], [0.01]],
+        c: [[1.0, 0.0]],
+        d: [[0.0]],
+        f: [[-3.0, -2.0]],
+        l: [[-0.2], [-1.0]],
+    };
+    let controller = Controller::new(nominal).unwrap();
+    let (clipped, stuck, host, duration) = (0, 0, 0, 0);
+    let limits = Limits { y: [10.0], beta: [10.0], u: [50.0], rate: [50.0], clipped, stuck, host, duration };
+    let description = "name = \"mass\"\nsample_time = 0.01\ninputs = [{ name = \"u\" }]\noutputs = [{ name = \"y\" }]";
+    let running = ExcitedLoop::new(controller, limits, 0).unwrap();
+    Twin { station: Station::new(running, Machine { description, table: &[], rows: 10 }), plant: Hardening([0.5, 0.0]) }
+}
+
+/// A plant that is not linear, of another size: the log over UDP has the bits of the loop without a way in between.
+#[test]
+fn any_plant_over_udp() {
+    let served = Served::of(hardening, Pace::LockStep);
+    let mut rig = Rig::connect(&served.address).unwrap();
+    let path = file("hardening");
+    let mut recorder = Recorder::create(&path, rig.description(), rig.schema()).unwrap();
+    for _ in 0..100 {
+        rig.ask(&Request::Alive).unwrap();
+    }
+    rig.record(&mut recorder, Duration::from_millis(50)).unwrap();
+    let report = recorder.finish(0).unwrap();
+    served.end();
+    assert_eq!((report.missing, report.damaged, report.foreign), (0, 0, 0));
+    let text = std::fs::read_to_string(&path).unwrap();
+    std::fs::remove_file(path).unwrap();
+    let mut direct = hardening();
+    let rows: Vec<_> = (0..2000).map(|_| direct.sample()).collect();
+    let mut compared = 0;
+    for line in text.lines().skip(1) {
+        let values: Vec<f64> = line.split(',').map(|value| value.parse().unwrap()).collect();
+        let row = &rows[(values[0] / 0.01).round() as usize];
+        assert_eq!((values[1] as f32, values[2] as f32), (row.y[0], row.u[0]), "{line}");
+        compared += 1;
+    }
+    assert!(compared >= 1000, "{compared} rows");
+    assert!(rows[0].y[0] == 0.5 && rows[999].y[0].abs() < 1e-3, "the controller does not hold it: {:?}", rows[999]);
 }
 
 #[test]

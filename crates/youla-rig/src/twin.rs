@@ -1,6 +1,6 @@
 //! A machine over UDP: the loop of the firmware around a plant on the host.
 
-use crate::plant::LinearPlant;
+use crate::plant::{LinearPlant, Plant};
 use crate::{Error, Result};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -16,16 +16,16 @@ pub enum Pace {
     LockStep,
 }
 
-/// A station with its plant.
+/// A station with its plant, any [`Plant`].
 #[derive(Debug, Clone)]
-pub struct Twin<'a, const N: usize, const M: usize, const P: usize, const K: usize> {
+pub struct Twin<'a, const N: usize, const M: usize, const P: usize, const K: usize, G = LinearPlant<N, M, P>> {
     /// The loop of the firmware.
     pub station: Station<'a, N, M, P, K>,
     /// What it controls.
-    pub plant: LinearPlant<N, M, P>,
+    pub plant: G,
 }
 
-impl<const N: usize, const M: usize, const P: usize, const K: usize> Twin<'_, N, M, P, K> {
+impl<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>> Twin<'_, N, M, P, K, G> {
     /// One sample.
     pub fn sample(&mut self) -> Row<f32, M, P> {
         let u = self.station.command();
@@ -40,9 +40,9 @@ impl<const N: usize, const M: usize, const P: usize, const K: usize> Twin<'_, N,
 ///
 /// # Errors
 /// [`Error::Connection`].
-pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize>(
+pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
     socket: &UdpSocket,
-    twin: &mut Twin<'_, N, M, P, K>,
+    twin: &mut Twin<'_, N, M, P, K, G>,
     pace: Pace,
     end: impl Fn() -> bool,
 ) -> Result<()> {
@@ -68,9 +68,9 @@ pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize>(
 }
 
 /// Whether there was a request.
-fn take_request<const N: usize, const M: usize, const P: usize, const K: usize>(
+fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
     socket: &UdpSocket,
-    twin: &mut Twin<'_, N, M, P, K>,
+    twin: &mut Twin<'_, N, M, P, K, G>,
     host: &mut Option<SocketAddr>,
 ) -> Result<bool> {
     use std::io::ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
@@ -90,9 +90,9 @@ fn take_request<const N: usize, const M: usize, const P: usize, const K: usize>(
 }
 
 /// One sample; whether a frame was complete.
-fn step<const N: usize, const M: usize, const P: usize, const K: usize>(
+fn step<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
     socket: &UdpSocket,
-    twin: &mut Twin<'_, N, M, P, K>,
+    twin: &mut Twin<'_, N, M, P, K, G>,
     host: Option<SocketAddr>,
 ) -> Result<bool> {
     twin.sample();

@@ -50,7 +50,7 @@ pub struct Identification {
     pub direct_diagram: Option<Result<StabilisationDiagram>>,
     /// The non-parametric response of the plant where an excitation is known.
     pub indirect: Option<Result<IndirectResponse>>,
-    /// The plant at the lines of a periodic excitation, where it is known.
+    /// The plant without a model, where an excitation is known: at its lines, or in windows.
     pub lines: Option<Result<LinesOfRun>>,
     /// Frequencies of the responses of all models, Hz.
     pub hz: Vec<f64>,

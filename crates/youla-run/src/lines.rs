@@ -1,4 +1,4 @@
-//! The plant at the lines of a periodic excitation: a witness that knows no model, with noise and distortion told apart.
+//! The plant without a model, at the lines of a periodic excitation with noise and distortion told apart, or in windows of other ones.
 
 use super::context::RunContext;
 use super::entries::finite;
@@ -11,9 +11,11 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 use youla::lti::frequency_response;
-use youla::signal::{LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response};
+use youla::signal::{
+    LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period, line_response, local_response,
+};
 use youla::{Error as Method, Mat};
-use youla_report::data::{LineLevels, ReportPart, Status, Verdict};
+use youla_report::data::{LevelBasis, LineLevels, ReportPart, Status, Verdict};
 
 /// Standard normal number beyond which a group of lines differs: 3e-7 for one group, below 1e-4 for 300 of them.
 const LIMIT: f64 = 5.0;
@@ -21,30 +23,41 @@ const LIMIT: f64 = 5.0;
 /// measured.
 const SLIGHT: f64 = 0.05;
 
-/// The loop and its plant at the lines of a periodic excitation.
+/// The loop and its plant without a model.
 #[derive(Debug, Clone)]
 pub struct LinesOfRun {
     /// From the excitation to u and y.
     pub closed: LineResponse,
     /// G.
     pub plant: LineResponse,
+    /// Whether the excitation is periodic; else the lines are the middles of windows of local polynomials.
+    pub periodic: bool,
 }
 
-/// What the lines of a periodic excitation show; `None` where no excitation is known to be periodic.
+/// Most windows of a response by local polynomials: more of them are closer than the points of a figure.
+const WINDOWS: usize = 400;
+
+/// What a known excitation shows without a model: at its lines where it is periodic, else by local polynomials. `None` where no
+/// excitation is known, or none that reaches all inputs.
 ///
-/// The error is the reason why there is nothing, for example inputs that are not excited independently.
+/// The error is the reason why a periodic excitation shows nothing, for example inputs that are not excited independently.
 pub(super) fn lines(run: RunContext<'_>) -> Option<Result<LinesOfRun>> {
     let records = &run.records.estimation;
     let excitations: Vec<&Mat<f64>> = records.iter().map(excitation).collect::<Option<_>>()?;
-    if matches!(detect_period(excitations.first()?.as_ref()), Err(Method::NotPeriodic { .. })) {
-        return None;
-    }
     let signals: Vec<Mat<f64>> = records.iter().map(inputs_and_outputs).collect();
     let both = excitations.iter().zip(&signals);
     let experiments: Vec<_> = both.map(|(d, z)| PeriodicExperiment { d: d.as_ref(), z: z.as_ref() }).collect();
-    let closed = line_response(&experiments, run.records.time);
-    let found = closed.and_then(|closed| Ok(LinesOfRun { plant: closed.plant()?, closed }));
-    Some(found.map_err(Error::from))
+    let periodic = !matches!(detect_period(excitations.first()?.as_ref()), Err(Method::NotPeriodic { .. }));
+    let time = run.records.time;
+    let closed = match periodic {
+        true => line_response(&experiments, time),
+        false => {
+            let longest = records.iter().map(LoopRecord::samples).max()?;
+            local_response(&experiments, time, LocalModel::Polynomial, longest.div_ceil(2 * WINDOWS))
+        }
+    };
+    let found = closed.and_then(|closed| Ok(LinesOfRun { plant: closed.plant()?, closed, periodic }));
+    (periodic || found.is_ok()).then(|| found.map_err(Error::from))
 }
 
 /// The one signal that moves the loop, with a channel for each input.
@@ -63,12 +76,12 @@ fn inputs_and_outputs(record: &LoopRecord) -> Mat<f64> {
     Mat::from_fn(record.samples(), m + record.y.ncols(), value)
 }
 
-/// The plant at the lines of a periodic excitation; magnitudes and levels in dB, `[output][input][line]`.
+/// The plant at the lines of a periodic excitation, of others in windows of local polynomials; magnitudes and levels in dB, `[output][input][line]`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct LinesEntry {
     /// Frequencies of the lines, Hz.
     pub hz: Vec<f64>,
-    /// Samples of a period.
+    /// Samples of a period; of the longest record where the excitation is not periodic.
     pub period: usize,
     /// Periods that were averaged, for each estimation record.
     pub periods: Vec<usize>,
@@ -117,10 +130,15 @@ fn level(variance: &[f64]) -> Vec<f64> {
 
 /// For the figure.
 pub(super) fn drawn(found: &Identification) -> Vec<LineLevels> {
-    let Some(Ok(LinesOfRun { plant: lines, .. })) = &found.lines else { return Vec::new() };
+    if let Some(measured) = &found.records.measured {
+        return measured.levels();
+    }
+    let Some(Ok(LinesOfRun { plant: lines, periodic, .. })) = &found.lines else { return Vec::new() };
+    let basis = if *periodic { LevelBasis::Periods } else { LevelBasis::Windows };
     let one = |(output, input): (usize, usize)| LineLevels {
         output,
         input,
+        basis,
         hz: hz(lines),
         response_db: magnitude(&lines.response.entry(output, input)),
         noise_db: level(&lines.noise_variance(output, input)),
@@ -132,7 +150,7 @@ pub(super) fn drawn(found: &Identification) -> Vec<LineLevels> {
 
 /// The recommended model against the lines, and what no linear model explains.
 pub(super) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    let Some(Ok(LinesOfRun { closed, plant: lines })) = &found.lines else { return Vec::new() };
+    let Some(Ok(LinesOfRun { closed, plant: lines, periodic: true })) = &found.lines else { return Vec::new() };
     let named = |g: &LineGroup| {
         let ((i, j), [from, to]) = (g.entry, g.hz);
         let (output, input) = (&found.records.outputs[i].name, &found.records.inputs[j].name);

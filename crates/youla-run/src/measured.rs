@@ -4,6 +4,7 @@
 //! `y/d re` and so on, d the excitation that [data] names, are that of the loop, from which the plant is identified without a quotient.
 
 use super::records::SourceFile;
+use super::response::{decibel, ports};
 use super::settings::{DataFile, DataSettings};
 use crate::{Error, Result};
 use std::f64::consts::TAU;
@@ -13,6 +14,7 @@ use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
 use youla::signal::{Channel, IndirectResponse, Record};
 use youla::{Mat, c64};
 use youla_io::{ChannelSpec, CsvOptions, Source, TimeSource, UffKind, is_uff, read, read_uff58, sha256, survey};
+use youla_report::data::{LevelBasis, LineLevels};
 
 /// Largest part of the inputs that the stated controller may leave, errors of the response included.
 const LARGEST_REST: f64 = 0.1;
@@ -76,6 +78,27 @@ impl MeasuredTable {
         }
         let question = "Part of the inputs that the stated controller does not explain (controller)";
         Ok(Some(Evidence::new(question, (rest / all.max(f64::MIN_POSITIVE)).sqrt(), LARGEST_REST)))
+    }
+
+    /// Of the plant the values with their stated deviations, for the figure.
+    pub(super) fn levels(&self) -> Vec<LineLevels> {
+        let ResponseVariance::Known(variance) = &self.table.variance else { return Vec::new() };
+        if self.of_loop {
+            return Vec::new();
+        }
+        let hz: Vec<f64> = self.table.omega.iter().map(|w| w / TAU).collect();
+        let (outputs, inputs) = self.table.values.first().map_or((0, 0), |v| (v.nrows(), v.ncols()));
+        let one = |(output, input): (usize, usize)| LineLevels {
+            output,
+            input,
+            basis: LevelBasis::Stated,
+            hz: hz.clone(),
+            response_db: self.table.values.iter().map(|v| decibel(v[(output, input)].norm())).collect(),
+            noise_db: variance.iter().map(|v| decibel(v[(output, input)].sqrt())).collect(),
+            total_db: Vec::new(),
+            distortion_db: Vec::new(),
+        };
+        ports(outputs, inputs).map(one).collect()
     }
 
     /// The plant at its frequencies, as the figures show it; there is no coherence.

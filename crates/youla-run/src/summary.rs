@@ -121,7 +121,7 @@ pub struct ResponsesEntry {
     /// Its coherence, `[output][frequency]`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub coherence: Option<Vec<Vec<Option<f64>>>>,
-    /// The plant at the lines of a periodic excitation, where one is known.
+    /// The plant without a model, where an excitation is known: at its lines, or in windows.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub lines: Option<LinesEntry>,
     /// `<method>_db` of each model.

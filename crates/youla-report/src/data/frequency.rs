@@ -15,7 +15,7 @@ pub struct FrequencyResponse {
     pub models: Vec<ModelResponse>,
     /// Non-parametric responses where the external excitation is known, per output and input.
     pub indirect: Vec<Indirect>,
-    /// The plant at the lines of a periodic excitation, per output and input.
+    /// The plant without a model, per output and input.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub lines: Vec<LineLevels>,
     /// Bounds of magnitudes on the grid of the models.
@@ -25,7 +25,20 @@ pub struct FrequencyResponse {
     pub singular: Vec<SingularValue>,
 }
 
-/// The plant at the lines of a periodic excitation, with the levels of noise and distortion: standard deviations in dB.
+/// Where the values of [`LineLevels`] come from.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LevelBasis {
+    /// The periods of a periodic excitation.
+    #[default]
+    Periods,
+    /// Local polynomials over windows of neighbouring frequencies.
+    Windows,
+    /// A table that states them.
+    Stated,
+}
+
+/// The plant without a model, with the levels of noise and distortion: standard deviations in dB.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct LineLevels {
@@ -33,6 +46,8 @@ pub struct LineLevels {
     pub output: usize,
     /// Input, by its place.
     pub input: usize,
+    /// Where the values come from.
+    pub basis: LevelBasis,
     /// Frequencies, Hz.
     #[serde(with = "numbers::seven_digits")]
     pub hz: Vec<f64>,

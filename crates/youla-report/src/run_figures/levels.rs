@@ -1,12 +1,12 @@
-//! The plant at the lines of a periodic excitation with the levels of noise and distortion.
+//! The plant without a model, at lines or in windows, with the levels of noise and distortion.
 
 use super::bode::{Pair, pairs};
 use super::choice::Chosen;
 use super::{RunFigure, axis, choice, frequency_in_both_units};
-use crate::data::LineLevels;
+use crate::data::{LevelBasis, LineLevels};
 use crate::figure::{Content, Curve, Drawn, Figure, MEASURED, Panel};
 
-/// One figure per pair of output and input whose excitation is periodic.
+/// One figure per pair of output and input with a known excitation.
 pub(super) fn figures(chosen: &Chosen) -> Vec<Figure> {
     pairs(chosen, RunFigure::Levels).iter().filter_map(|pair| Some(figure(pair, pair.lines?))).collect()
 }
@@ -28,7 +28,7 @@ fn figure(pair: &Pair, lines: &LineLevels) -> Figure {
         ..Curve::default()
     });
     let mut curves: Vec<Curve> = model.collect();
-    curves.push(measured("response at the lines", Drawn::Points, &lines.response_db));
+    curves.push(measured("response", Drawn::Points, &lines.response_db));
     let levels = [
         ("noise", Drawn::Line, &lines.noise_db),
         ("noise and distortion", Drawn::Dots, &lines.total_db),
@@ -37,18 +37,25 @@ fn figure(pair: &Pair, lines: &LineLevels) -> Figure {
     let known = levels.into_iter().filter(|(.., level)| !level.is_empty());
     curves.extend(known.map(|(note, drawn, level)| measured(note, drawn, level)));
     let gain = if pair.unit.is_empty() { "dB".into() } else { format!("dB re {}", pair.unit) };
-    let more = match lines.total_db.is_empty() {
-        true => "More records than inputs, with other phases, would tell distortion from noise.",
-        false => "Distortion: what repeats with the period and changes with the phases.",
+    let what = match (lines.basis, lines.total_db.is_empty()) {
+        (LevelBasis::Periods, true) => {
+            "at the lines of the periodic excitation, with the standard deviation of its mean over the periods. More records than \
+             inputs, with other phases, would tell distortion from noise."
+        }
+        (LevelBasis::Periods, false) => {
+            "at the lines of the periodic excitation, with the standard deviation of its mean over the periods. Distortion: what \
+             repeats with the period and changes with the phases."
+        }
+        (LevelBasis::Windows, _) => {
+            "by polynomials over windows of neighbouring frequencies, with its standard deviation by noise. A periodic excitation \
+             would tell distortion from noise."
+        }
+        (LevelBasis::Stated, _) => "as measured, with the standard deviation that is stated.",
     };
     Figure {
         key: pair.key.clone(),
         title: format!("Noise and distortion, {}", pair.title),
-        caption: format!(
-            "Response at the lines of the periodic excitation, {}, without any model, and the standard deviation of its mean over \
-             the periods. {more}",
-            pair.title
-        ),
+        caption: format!("Response of {} without any model, {what}", pair.title),
         choice: choice(&[("View", "Noise and distortion"), ("Response of", &pair.title)]),
         panels: vec![Panel {
             x: frequency_in_both_units(),

@@ -8,7 +8,7 @@
 //! | `verification` | measured, predicted, residual |
 //! | `residuals` | correlations with the band of noise |
 //! | `bode`, `nyquist` | frequency responses |
-//! | `levels` | response at the lines of a periodic excitation, noise, distortion |
+//! | `levels` | response without a model, noise, distortion |
 //! | `singular` | singular values over frequency |
 //! | `poles`, `pole_grid` | pole map and its grid |
 //! | `reduction` | error over order |
@@ -57,7 +57,7 @@ pub enum RunFigure {
     Bode,
     /// The same as loci.
     Nyquist,
-    /// The response at the lines of a periodic excitation, with noise and distortion.
+    /// The response to a known excitation without a model, with noise and distortion.
     Levels,
     /// Singular values over frequency.
     SingularValues,
@@ -132,9 +132,7 @@ impl RunFigure {
             RunFigure::Residuals => "correlations of the residuals with the 99 % band of noise",
             RunFigure::Bode => "magnitude with bands, phase, and the coherence of the indirect response",
             RunFigure::Nyquist => "the same responses as loci, with their regions",
-            RunFigure::Levels => {
-                "response at the lines of a periodic excitation, with the levels of noise and distortion"
-            }
+            RunFigure::Levels => "response without a model, with the levels of noise and distortion",
             RunFigure::SingularValues => "singular values of the whole response over frequency",
             RunFigure::Poles => "poles and zeros with lines of constant frequency and damping ratio",
             RunFigure::Hankel => "Hankel singular values of the model that was reduced",

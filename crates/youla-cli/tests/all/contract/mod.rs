@@ -144,6 +144,7 @@ fn frequency_responses_share_one_grid() {
         "hz",
         "indirect_db",
         "likelihood_db",
+        "lines",
         "nominal_db",
         "true_plant_db",
     ];

@@ -16,10 +16,10 @@ pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
 pub use periodic::{
-    ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period, line_response,
-    local_response,
+    DetectionLines, ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period,
+    detection_lines, line_response, local_response,
 };
-pub(crate) use periodic::{inverse, standard_normal};
+pub(crate) use periodic::{Excited, inverse, standard_normal};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};

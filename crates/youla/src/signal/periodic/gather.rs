@@ -89,14 +89,14 @@ pub(super) fn check_experiment(experiment: &PeriodicExperiment, (m, q): (usize, 
 }
 
 /// The period of all experiments, and the rows of each.
-struct Common {
-    samples: usize,
-    lines: Vec<usize>,
-    first: Vec<usize>,
-    end: Vec<usize>,
+pub(super) struct Common {
+    pub(super) samples: usize,
+    pub(super) lines: Vec<usize>,
+    pub(super) first: Vec<usize>,
+    pub(super) end: Vec<usize>,
 }
 
-fn common_period(experiments: &[PeriodicExperiment]) -> Result<Common> {
+pub(super) fn common_period(experiments: &[PeriodicExperiment]) -> Result<Common> {
     let Some(first) = experiments.first() else {
         return Err(Error::Ports { what: "the number of experiments".into(), expected: 1, found: 0 });
     };
@@ -124,7 +124,12 @@ impl Common {
 }
 
 /// Values at the lines of all channels of d and then z; two real channels share one complex transform.
-fn transform_period(e: &PeriodicExperiment, first: usize, lines: &[usize], fft: &Arc<dyn Fft<f64>>) -> Vec<c64> {
+pub(super) fn transform_period(
+    e: &PeriodicExperiment,
+    first: usize,
+    lines: &[usize],
+    fft: &Arc<dyn Fft<f64>>,
+) -> Vec<c64> {
     let period = fft.len();
     let columns: Vec<_> = e.d.col_iter().chain(e.z.col_iter()).map(|c| c.subrows(first, period)).collect();
     let mut out = Vec::with_capacity(columns.len() * lines.len());
@@ -142,7 +147,7 @@ fn transform_period(e: &PeriodicExperiment, first: usize, lines: &[usize], fft: 
 }
 
 /// Mean times the root of the number of periods, so that products of means weight each experiment by its periods.
-fn weighted_mean(periods: &[Vec<c64>]) -> Vec<c64> {
+pub(super) fn weighted_mean(periods: &[Vec<c64>]) -> Vec<c64> {
     let scale = 1.0 / (periods.len() as f64).sqrt();
     (0..periods[0].len()).map(|k| periods.iter().map(|p| p[k]).sum::<c64>() * scale).collect()
 }

@@ -42,28 +42,43 @@ impl LineResponse {
     }
 
     /// Signals at line number `k` as columns whose errors are independent of each other, with the covariance C of each.
+    pub(crate) fn uncorrelated(&self, k: usize) -> (Mat<c64>, Mat<c64>) {
+        let excited = self.excited(k);
+        (excited.outputs, excited.covariance)
+    }
+
+    /// The same with the excitation that belongs to them.
     ///
     /// `T R` has the covariance `(R^H M R)^T (x) C`, and `R = L^-H` with `M = L L^H` makes the first factor one.
-    pub(crate) fn uncorrelated(&self, k: usize) -> (Mat<c64>, Mat<c64>) {
-        if let Some(own) = self.own.get(k) {
-            return (own.means.clone(), self.noise[k].clone());
-        }
+    pub(crate) fn excited(&self, k: usize) -> Excited {
+        let covariance = self.noise[k].clone();
         let t = self.response.at(k);
-        let signals = match self.excitation[k].llt(Side::Lower) {
-            // T L^-H = (L^-1 T^H)^H
-            Ok(factor) => {
-                let mut columns = t.adjoint().to_owned();
-                factor.L().solve_lower_triangular_in_place(&mut columns);
-                columns.adjoint().to_owned()
-            }
-            Err(_) => t.to_owned(),
-        };
-        (signals, self.noise[k].clone())
+        if let Some(own) = self.own.get(k) {
+            return Excited { inputs: own.excitation.clone(), outputs: own.means.clone(), covariance };
+        }
+        let m = t.ncols();
+        let mut columns = Mat::<c64>::identity(m, m);
+        if let Ok(factor) = self.excitation[k].llt(Side::Lower) {
+            // R^H = L^-1
+            factor.L().solve_lower_triangular_in_place(&mut columns);
+        }
+        let inputs = columns.adjoint().to_owned();
+        Excited { outputs: t * &inputs, inputs, covariance }
     }
 
     fn variance(&self, period: &[Mat<c64>], i: usize, j: usize) -> Vec<f64> {
         self.excitation.iter().zip(period).map(|(m, c)| m[(j, j)].re * c[(i, i)].re).collect()
     }
+}
+
+/// Independent experiments at a line.
+pub(crate) struct Excited {
+    /// Excitation, m x E, without error.
+    pub(crate) inputs: Mat<c64>,
+    /// Signals, q x E.
+    pub(crate) outputs: Mat<c64>,
+    /// Of each column of the signals.
+    pub(crate) covariance: Mat<c64>,
 }
 
 /// `M^T (x) C`.

@@ -14,6 +14,7 @@
 //! J. Schoukens, K. Godfrey, M. Schoukens, IEEE Control Syst. Mag. 38(4) (2018), 49.
 
 mod agreement;
+mod detection;
 mod gather;
 mod interpolate;
 mod levels;
@@ -22,6 +23,8 @@ mod period;
 mod settling;
 
 pub use agreement::LineGroup;
+pub use detection::{DetectionLines, detection_lines};
+pub(crate) use levels::Excited;
 pub use local::{LocalModel, local_response};
 pub use period::{ExcitationPeriod, detect_period};
 pub(crate) use settling::standard_normal;
@@ -73,7 +76,9 @@ pub struct LineResponse {
 pub(super) struct OwnLine {
     /// The input.
     pub(super) input: usize,
-    /// Means of z over the periods times the root of their number, q x E.
+    /// Means of d over the periods times the root of their number, m x E.
+    pub(super) excitation: Mat<c64>,
+    /// The same of z, q x E.
     pub(super) means: Mat<c64>,
 }
 
@@ -129,7 +134,7 @@ impl OwnLine {
     fn new(line: Line) -> Self {
         let power = |j: &usize| line.d.row(*j).squared_norm_l2();
         let input = (0..line.d.nrows()).max_by(|a, b| power(a).total_cmp(&power(b))).unwrap_or(0);
-        OwnLine { input, means: line.z }
+        OwnLine { input, excitation: line.d, means: line.z }
     }
 }
 

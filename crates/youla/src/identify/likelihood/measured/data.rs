@@ -1,7 +1,7 @@
 //! Measured responses with their covariance.
 
 use crate::lti::{Discrete, FrequencyResponse};
-use crate::signal::{LineResponse, inverse};
+use crate::signal::{Excited, LineResponse, inverse};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use std::f64::consts::{PI, TAU};
@@ -98,6 +98,26 @@ impl MeasuredResponse {
             proportional: false,
             exact_inputs: false,
         })
+    }
+
+    /// The lines of a periodic excitation that is itself the input, as alpha of the deviation system S with `z = beta`.
+    pub fn of_system_lines(found: &LineResponse, time: Discrete) -> Self {
+        let (p, m) = (found.response.at(0).nrows(), found.response.at(0).ncols());
+        let columns = |k: usize| {
+            let Excited { inputs, outputs, covariance } = found.excited(k);
+            let whole = Mat::from_fn(m + p, m + p, |i, j| match i >= m && j >= m {
+                true => covariance[(i - m, j - m)],
+                false => c64::ZERO,
+            });
+            let column = |e: usize| {
+                let signals: Vec<c64> = inputs.col(e).iter().chain(outputs.col(e).iter()).copied().collect();
+                Column::new(&signals, m, whole.clone())
+            };
+            (0..outputs.ncols()).map(column).collect()
+        };
+        let lines = (0..found.lines.len()).map(columns).collect();
+        let (omega, degrees) = (found.response.omega.clone(), Some(found.degrees()));
+        MeasuredResponse { time, omega, inputs: m, outputs: p, lines, degrees, proportional: false, exact_inputs: true }
     }
 
     /// The response of a plant from u to y, p x m.

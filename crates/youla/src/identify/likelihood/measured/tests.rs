@@ -160,6 +160,21 @@ fn a_table_that_cannot_be_used_is_refused_with_its_place() {
     );
 }
 
+/// From d to y of the same loop: the pole is 1.05 - 0.6.
+#[test]
+fn lines_from_an_excitation_give_the_system_behind_it() {
+    let mut sum = 0.0;
+    for seed in 0..6 {
+        let [d, _, y] = unstable_loop(seed);
+        let closed = line_response(&[PeriodicExperiment { d: d.as_ref(), z: y.as_ref() }], time()).unwrap();
+        let response = MeasuredResponse::of_system_lines(&closed, time());
+        let found = recommend_from_response(&response, None, &LikelihoodOptions::default()).unwrap();
+        assert!(found.trusted() && found.order == 1, "{seed} {} {:?}", found.order, found.reasons());
+        sum += ((found.modes[0].mode.pole.re - 0.45) / found.modes[0].magnitude_deviation).powi(2);
+    }
+    assert!((0.5..18.0).contains(&sum), "{sum}");
+}
+
 /// The table of a loop, errors of 1 % of each entry and none stated: errors of u count as those of y do.
 #[test]
 fn a_table_of_a_loop_without_variances_gives_its_plant() {

@@ -5,9 +5,10 @@
 //! cube root makes a standard normal number of it.
 
 use super::LineResponse;
+use super::output_rest;
 use super::settling::{GROUP, standard_normal};
 use crate::lti::FrequencyResponse;
-use faer::{Mat, MatRef, RowRef, c64};
+use faer::{Mat, RowRef, c64};
 use std::f64::consts::TAU;
 
 /// What a group of neighbouring lines says.
@@ -31,16 +32,10 @@ impl LineResponse {
     /// If z has not as many signals as the model has inputs and outputs, or the model has fewer frequencies.
     pub fn against(&self, model: &FrequencyResponse) -> Vec<LineGroup> {
         let (p, m) = self.response.omega.first().map_or((0, 0), |_| (model.at(0).nrows(), model.at(0).ncols()));
-        let of = |g: MatRef<c64>| {
-            Mat::from_fn(p, m + p, |i, j| match j < m {
-                true => -g[(i, j)],
-                false => c64::new(f64::from(u8::from(j == m + i)), 0.0),
-            })
-        };
         let rests: Vec<[Mat<c64>; 2]> = (0..self.response.omega.len())
             .map(|k| {
-                let (of, signals) =
-                    (of(model.at(k)), self.own.get(k).map_or(self.response.at(k), |o| o.means.as_ref()));
+                let of = output_rest(model.at(k));
+                let signals = self.own.get(k).map_or(self.response.at(k), |own| own.means.as_ref());
                 [&of * signals, &of * &self.noise[k] * of.adjoint()]
             })
             .collect();

@@ -41,13 +41,7 @@ impl LineResponse {
         kronecker(self.excitation[k].as_ref(), self.noise[k].as_ref())
     }
 
-    /// Signals at line number `k` as columns whose errors are independent of each other, with the covariance C of each.
-    pub(crate) fn uncorrelated(&self, k: usize) -> (Mat<c64>, Mat<c64>) {
-        let excited = self.excited(k);
-        (excited.outputs, excited.covariance)
-    }
-
-    /// The same with the excitation that belongs to them.
+    /// Signals at line number `k` as columns whose errors are independent of each other, with the excitation of each.
     ///
     /// `T R` has the covariance `(R^H M R)^T (x) C`, and `R = L^-H` with `M = L L^H` makes the first factor one.
     pub(crate) fn excited(&self, k: usize) -> Excited {

@@ -173,10 +173,7 @@ impl LineResponse {
             let w = inverse(t.subrows(0, m).to_owned(), || format!("the response from d to u at {hz:.6} Hz"))?;
             let g = t.subrows(m, p) * &w;
             values.extend((0..m).flat_map(|j| (0..p).map(move |i| (i, j))).map(|at| g[at]));
-            let a = Mat::from_fn(p, q, |i, j| match j < m {
-                true => -g[(i, j)],
-                false => c64::new(f64::from(u8::from(j == m + i)), 0.0),
-            });
+            let a = output_rest(g.as_ref());
             plant.excitation.push(w.adjoint() * &self.excitation[k] * &w);
             plant.noise.push(&a * &self.noise[k] * a.adjoint());
             if let Some(total) = self.total.get(k) {
@@ -186,6 +183,12 @@ impl LineResponse {
         plant.response = FrequencyResponse::new(self.response.omega.clone(), values, p, m);
         Ok(plant)
     }
+}
+
+/// `[-G I]`, which takes `z = [u, y]` to `y - G u`.
+pub(crate) fn output_rest(g: MatRef<c64>) -> Mat<c64> {
+    let (p, m) = (g.nrows(), g.ncols());
+    Mat::from_fn(p, m + p, |i, j| if j < m { -g[(i, j)] } else { c64::new(f64::from(u8::from(j == m + i)), 0.0) })
 }
 
 /// The inverse, which the formulas hold as a factor of the covariance; refused where it does not exist.

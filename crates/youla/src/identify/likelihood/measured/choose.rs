@@ -1,7 +1,7 @@
 //! Order, dead time and direct path by Schwarz's criterion: starts of all orders, then models one step away as long as it falls.
 
 use super::data::{Column, MeasuredResponse};
-use super::lines::{VarianceShape, WeighedLines, rest, sizes, unknown, weighed};
+use super::lines::{VarianceShape, WeighedLines, sizes, unknown, weighed};
 use super::search::{Found, search, with_best_inputs};
 use super::subspace::Subspace;
 use crate::identify::likelihood::chart::Chart;
@@ -9,6 +9,7 @@ use crate::identify::likelihood::deviation::delayed;
 use crate::identify::likelihood::model::Model;
 use crate::identify::likelihood::spectra::Sizes;
 use crate::identify::likelihood::{Candidate, LikelihoodOptions};
+use crate::signal::output_rest;
 use crate::{Error, Result};
 use faer::linalg::solvers::DenseSolveCore;
 use faer::{Mat, c64};
@@ -146,7 +147,7 @@ impl<'a> Problem<'a> {
         let (m, p) = (self.response.inputs, self.response.outputs);
         for (line, measured) in self.weighed(first).lines.iter().zip(&self.response.lines) {
             let g = first.model.response(line.z);
-            let of_plant = rest(&Mat::from_fn(p, m, |i, j| g[i * m + j]));
+            let of_plant = output_rest(Mat::from_fn(p, m, |i, j| g[i * m + j]).as_ref());
             for (column, measured) in line.columns.iter().zip(measured) {
                 let [absolute, relative] = unknown(self.response, &self.sizes, measured, &of_plant);
                 for (i, rest) in column.rest(&g, m).iter().enumerate() {

@@ -82,9 +82,9 @@ impl MeasuredResponse {
             return Err(Error::Ports { what, expected: m + 1, found: q });
         }
         let columns = |k: usize| {
-            let (signals, covariance) = found.uncorrelated(k);
-            let column = |e: usize| signals.col(e).iter().copied().collect::<Vec<_>>();
-            (0..signals.ncols()).map(|e| Column::new(&column(e), m, covariance.clone())).collect()
+            let Excited { outputs, covariance, .. } = found.excited(k);
+            let column = |e: usize| outputs.col(e).iter().copied().collect::<Vec<_>>();
+            (0..outputs.ncols()).map(|e| Column::new(&column(e), m, covariance.clone())).collect()
         };
         let lines = (0..found.lines.len()).map(columns).collect();
         let (omega, degrees) = (found.response.omega.clone(), Some(found.degrees()));

@@ -4,6 +4,7 @@ use super::data::{Column, MeasuredResponse};
 use crate::identify::likelihood::model::Model;
 use crate::identify::likelihood::spectra::Sizes;
 use crate::lti::TimeDomain;
+use crate::signal::output_rest;
 use faer::prelude::*;
 use faer::{Mat, Side, c64};
 
@@ -93,7 +94,7 @@ fn covariances(
     let (m, p) = (response.inputs, response.outputs);
     let of = |k: usize, column: &Column| {
         let floor = |i: usize| (ROUNDING * column.y[i].norm() / sizes.y[i]).powi(2).max(1e-30);
-        let rest = rest(&plant[k]);
+        let rest = output_rest(plant[k].as_ref());
         let mut out = match response.degrees.is_none() && !response.proportional {
             true => {
                 let [absolute, relative] = unknown(response, sizes, column, &rest);
@@ -143,12 +144,6 @@ fn smoothed(all: &[Vec<Mat<c64>>], degrees: f64) -> Vec<Vec<Mat<c64>>> {
         vec![sum * Scale(c64::new(bias / number, 0.0)); all[k].len()]
     };
     (0..count).map(at).collect()
-}
-
-/// `[-G I]`
-pub(super) fn rest(g: &Mat<c64>) -> Mat<c64> {
-    let (p, m) = (g.nrows(), g.ncols());
-    Mat::from_fn(p, m + p, |i, j| if j < m { -g[(i, j)] } else { c64::new(f64::from(u8::from(j == m + i)), 0.0) })
 }
 
 /// W with `W^H W = C^-1`.

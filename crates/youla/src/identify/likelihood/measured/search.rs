@@ -3,7 +3,8 @@
 use super::lines::{WeighedLine, WeighedLines};
 use crate::identify::likelihood::chart::Chart;
 use crate::identify::likelihood::model::Model;
-use crate::identify::likelihood::search::damped;
+use crate::identify::likelihood::point::Point;
+use crate::identify::likelihood::search::{damped, reblocked};
 use faer::{Mat, c64};
 use rayon::prelude::*;
 
@@ -72,7 +73,7 @@ pub(super) fn with_best_inputs(lines: &WeighedLines, model: &Model, feedthrough:
 
 /// Searches from a start; `None` where nothing finite comes of it.
 pub(super) fn search(lines: &WeighedLines, start: &Model, feedthrough: bool, most: usize) -> Option<Found> {
-    let mut model = reblocked(start)?;
+    let mut model = reblocked(&Point::at_rest(start.clone(), 0))?.model;
     let mut energy = lines.energy(&model);
     let unit = |energy: f64| (energy / lines.rows().max(1) as f64).min(1.0);
     let (mut damping, mut steps) = (1e-6, 0);
@@ -95,17 +96,8 @@ pub(super) fn search(lines: &WeighedLines, start: &Model, feedthrough: bool, mos
             damping = (damping * 10.0).max(1e-8);
         }
         let Some((trial, value)) = better else { break };
-        (model, energy) = (reblocked(&trial)?, value);
+        (model, energy) = (reblocked(&Point::at_rest(trial, 0))?.model, value);
         steps += 1;
     }
     energy.is_finite().then_some(Found { model, energy, steps })
-}
-
-fn reblocked(model: &Model) -> Option<Model> {
-    let (a, b, c) = model.matrices();
-    let finite = |x: &Mat<f64>| x.col_iter().all(|col| col.iter().all(|v| v.is_finite()));
-    if !(finite(&a) && finite(&b) && finite(&c)) {
-        return None;
-    }
-    Model::of(a.as_ref(), b.as_ref(), c.as_ref(), model.d.clone())
 }

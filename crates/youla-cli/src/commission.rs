@@ -80,5 +80,5 @@ fn sentences(summary: &CampaignSummary, args: &CommissionArgs) -> String {
             }
         };
     }
-    format!("{text}\nReport: {}", args.out.join("report.md").display())
+    format!("{text}\nReport: {}", args.out.join("report.html").display())
 }

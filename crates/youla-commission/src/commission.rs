@@ -1,8 +1,10 @@
 //! The campaign: its points in their order, what is kept of each, and the summary.
 
 use crate::bench::{Bench, LogRow};
+use crate::between::{BetweenRecord, Ends, between, pairs};
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::point::{Operator, Point, PointFiles, RAMP};
+use crate::q_table::write_tables;
 use crate::record::{CampaignSummary, PointRecord, PointStatus, io, read_json, write_json, write_text};
 use crate::report::report;
 use crate::running::{LoopDescription, RunningLoop};
@@ -19,13 +21,13 @@ use youla_paper::rig::{BearingRig, Fidelity, RigParameters};
 use youla_run::{StageClock, write_run};
 
 /// Sample time of the twin, seconds.
-const TS: f64 = 2e-4;
+pub(crate) const TS: f64 = 2e-4;
 /// Consecutive samples for which an input may be clipped, and equal values after which an output counts as stuck.
 const CLIPPED: u16 = 50;
 const STUCK: u16 = 50;
 
-/// Runs a campaign, or what is left of it, and writes `out`: a folder for each point, report.md and summary.json. Points that are done
-/// are kept. The campaign ends at the first point that is not done.
+/// Runs a campaign, or what is left of it, and writes `out`: a folder for each point and each way between two, report.html, summary.json
+/// and q_table.json. What is done is kept. The campaign ends at the first point that is not done.
 ///
 /// # Errors
 /// Bad input, as a folder of another campaign; a controller that does not answer.
@@ -39,6 +41,14 @@ pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Resul
     let controller = Target::place(image.as_deref());
     claim(&campaign, &loops, controller, out)?;
     let mut points = Vec::new();
+    let pairs = pairs(&campaign, &loops);
+    let expected = [campaign.points.len(), pairs.len()];
+    let summarise = |points: &[PointRecord], ways: &[BetweenRecord]| -> Result<CampaignSummary> {
+        let summary = CampaignSummary::new(&campaign.name, controller, expected, points.to_vec(), ways.to_vec());
+        write_text(&out.join("report.html"), &report(&campaign, &summary, out)?)?;
+        write_json(&out.join("summary.json"), &summary)?;
+        Ok(summary)
+    };
     for (at, running) in campaign.points.iter().zip(&loops) {
         let place = out.join(&at.name);
         let kept: Option<PointRecord> = read_json(&place.join("point.json"))?;
@@ -52,14 +62,23 @@ pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Resul
         };
         let done = record.status == PointStatus::Done;
         points.push(record);
-        let summary = CampaignSummary::new(&campaign.name, controller, campaign.points.len(), points.clone());
-        write_text(&out.join("report.md"), &report(&summary))?;
-        write_json(&out.join("summary.json"), &summary)?;
+        let summary = summarise(&points, &[])?;
         if !done {
+            return Ok(summary);
+        }
+    }
+    let mut ways = Vec::new();
+    for [i, j] in pairs {
+        let at = [&campaign.points[i], &campaign.points[j]];
+        let ends = Ends { at, records: [&points[i], &points[j]], running: &loops[i] };
+        ways.push(between(&campaign, &ends, (out, image.as_deref()), operator)?);
+        summarise(&points, &ways)?;
+        if ways.last().is_some_and(|way| way.status != PointStatus::Done) {
             break;
         }
     }
-    Ok(CampaignSummary::new(&campaign.name, controller, campaign.points.len(), points))
+    write_tables(&campaign, &ways, out)?;
+    summarise(&points, &ways)
 }
 
 /// What a folder belongs to.
@@ -103,16 +122,28 @@ fn one_point(
     operator: &mut dyn Operator,
 ) -> Result<PointRecord> {
     operator.notes(&at.name);
+    let (record, files) = Point::new(campaign, at, running, start(campaign, at, running, image)?).run(operator)?;
+    write_point(place, running, &record, files)?;
+    Ok(record)
+}
+
+/// Controller and machine at an operating point, at rest.
+///
+/// # Errors
+/// [`Error::Controller`].
+pub(crate) fn start(
+    campaign: &Campaign,
+    at: &OperatingPoint,
+    running: &RunningLoop,
+    image: Option<&Path>,
+) -> Result<Bench> {
     let mut parameters = RigParameters::shipped();
     parameters.rotation.cross_coupling.value = at.cross_coupling;
     let plant = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, campaign.seed)?;
     let limits = &campaign.limits;
     let [y, beta, u, rate] = [limits.output, limits.residual, limits.input, 2.0 * limits.input];
     let of_guard = [y, y, beta, beta, u, u, rate, rate];
-    let bench = Bench::new(Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?, plant)?;
-    let (record, files) = Point::new(campaign, at, running, bench).run(operator)?;
-    write_point(place, running, &record, files)?;
-    Ok(record)
+    Bench::new(Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?, plant)
 }
 
 /// The record last: a point without it is run again.
@@ -129,7 +160,7 @@ fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files:
     let ts = running.nominal.time().ts();
     for (name, rows) in [("log.csv", &files.log), ("verification.csv", &files.verification)] {
         if !rows.is_empty() {
-            write_text(&place.join(name), &csv(rows, ts))?;
+            write_text(&place.join(name), &log_text(rows, ts))?;
         }
     }
     let found = match files.proposal {
@@ -155,7 +186,8 @@ fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files:
     write_json(&place.join("point.json"), record)
 }
 
-fn csv(rows: &[LogRow], ts: f64) -> String {
+/// Rows as CSV.
+pub(crate) fn log_text(rows: &[LogRow], ts: f64) -> String {
     let mut text = String::from("t,y_h,y_v,u_h,u_v,alpha_1,alpha_2,beta_1,beta_2\n");
     for (k, row) in rows.iter().enumerate() {
         // Writing to a string cannot fail.

@@ -24,6 +24,9 @@ pub enum Error {
     /// The twin was impossible.
     #[error(transparent)]
     Twin(#[from] youla_paper::Error),
+    /// The page could not be made.
+    #[error(transparent)]
+    Report(#[from] youla_report::Error),
     /// A part of a larger task failed.
     #[error("{part}: {source}")]
     Within {
@@ -55,7 +58,7 @@ pub enum Error {
 }
 
 youla::error_context! {
-    sources: Method File Loop Run Twin;
+    sources: Method File Loop Run Twin Report;
     numerical: Controller Refused;
     bad_input: Campaign;
 }

@@ -5,6 +5,7 @@
 //! model. Anything short of a trusted model stops with alpha and Q at zero.
 
 mod bench;
+mod between;
 mod campaign;
 mod commission;
 mod error;
@@ -13,6 +14,7 @@ mod identify;
 mod parameter;
 mod point;
 mod proposal;
+mod q_table;
 mod qemu;
 mod record;
 mod rehearse;
@@ -21,11 +23,13 @@ mod running;
 mod station;
 mod target;
 
+pub use between::{BetweenRecord, Evidence};
 pub use campaign::{Campaign, CampaignLimits, Goal, OperatingPoint};
 pub use commission::commission;
 pub use error::{Error, Result};
 pub use figures::LoopState;
 pub use point::Operator;
+pub use q_table::{QAtSpeed, QTable};
 pub use record::{CampaignSummary, DampingFigures, PointRecord, PointStatus};
 pub use rehearse::{LEVEL, Prediction};
 pub use running::LoopDescription;

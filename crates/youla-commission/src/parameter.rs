@@ -21,7 +21,15 @@ pub(crate) struct LoadedQ {
 /// [`Error::Controller`] where the firmware cannot run it: too many states, a feedthrough, or unstable, as it is where the controller does
 /// not stabilise the nominal model.
 pub(crate) fn parameter_of(running: &RunningLoop, controller: &StateSpace<Discrete>) -> Result<LoadedQ> {
-    let q = running.factors.j_g()?.lower_lft(controller)?.balanced()?;
+    loaded(&running.factors.j_g()?.lower_lft(controller)?)
+}
+
+/// Q with its coefficients.
+///
+/// # Errors
+/// As [`parameter_of`].
+pub(crate) fn loaded(q: &StateSpace<Discrete>) -> Result<LoadedQ> {
+    let q = q.balanced()?;
     let refuse = |problem: String| Err(Error::Controller { problem });
     if q.order() > Q_STATES {
         return refuse(format!("takes a Q of at most {Q_STATES} states; this one has {}", q.order()));

@@ -4,10 +4,12 @@ use crate::bench::{Bench, LogRow};
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::figures::{LoopState, Sizes};
 use crate::identify::{CleanRows, loop_response};
+use crate::parameter::LoadedQ;
 use crate::proposal::{Outcome, Proposal, propose};
 use crate::record::{PointRecord, PointStatus};
 use crate::running::RunningLoop;
 use crate::{Error, Result};
+use youla::lti::{Discrete, StateSpace};
 use youla_link::{Request, Source};
 use youla_run::Identification;
 
@@ -15,7 +17,7 @@ use youla_run::Identification;
 const REST: usize = 5_000;
 /// Samples of the small excitation, and of the first recording.
 const SMALL: usize = 5_000;
-const FIRST: usize = 30_000;
+pub(crate) const FIRST: usize = 30_000;
 /// Amplitude of the small excitation as a share of the largest.
 const SMALL_SHARE: f64 = 0.1;
 /// Share of a limit that the recording may use, by the response to the small excitation.
@@ -60,6 +62,8 @@ impl<'a> Point<'a> {
             amplitude: 0.0,
             seconds: 0.0,
             before: None,
+            modes: Vec::new(),
+            region: None,
             predicted: None,
             reached: None,
             q_order: None,
@@ -103,6 +107,8 @@ impl<'a> Point<'a> {
         self.record.predicted = Some(proposal.prediction);
         self.record.q_order = Some(proposal.new.q.system.order());
         self.record.certified_models = Some(proposal.new.models);
+        self.record.modes.clone_from(&proposal.modes);
+        self.record.region = proposal.region;
         let proposal: &Proposal = files.proposal.insert(proposal);
         if !operator.confirms(&question(&self.at.name, proposal)) {
             return refuse("the switch was not confirmed".into());
@@ -113,11 +119,12 @@ impl<'a> Point<'a> {
 
     /// Switches and compares the verification with its prediction.
     pub(crate) fn verified(&mut self, proposal: &Proposal, verification: &mut Vec<LogRow>) -> Result<()> {
-        *verification = match self.switched(proposal) {
+        *verification = match self.switched(&proposal.new.q) {
             Err(Error::Refused { reason }) => return self.fall_back(reason, true),
             other => other?,
         };
-        let reached = match self.measured(proposal, verification) {
+        let sizes = Sizes { input: &proposal.sizes.0, output: &proposal.sizes.1 };
+        let reached = match self.measured(&proposal.new.q, &proposal.new.controller, sizes, verification) {
             Err(e) => return self.fall_back(format!("the loop could not be measured: {e}"), true),
             Ok(reached) => reached,
         };
@@ -138,7 +145,7 @@ impl<'a> Point<'a> {
     }
 
     /// Largest magnitudes of the signals without excitation.
-    fn at_rest(&mut self) -> Result<[f64; 8]> {
+    pub(crate) fn at_rest(&mut self) -> Result<[f64; 8]> {
         self.bench.run(REST)?;
         self.bench.take_rows();
         self.bench.run(REST)?;
@@ -243,8 +250,8 @@ impl<'a> Point<'a> {
     }
 
     /// Loads and switches, rests, and records the verification.
-    fn switched(&mut self, proposal: &Proposal) -> Result<Vec<LogRow>> {
-        self.bench.load(&proposal.new.q.coefficients)?;
+    pub(crate) fn switched(&mut self, q: &LoadedQ) -> Result<Vec<LogRow>> {
+        self.bench.load(&q.coefficients)?;
         self.bench.ask(&Request::Arm)?;
         self.bench.ask(&Request::SwitchQ)?;
         self.record.switches += 1;
@@ -258,11 +265,16 @@ impl<'a> Point<'a> {
         Ok(rows)
     }
 
-    fn measured(&self, proposal: &Proposal, rows: &[LogRow]) -> Result<LoopState> {
+    /// The loop with `controller`, which is K(Q), by a verification record.
+    pub(crate) fn measured(
+        &self,
+        q: &LoadedQ,
+        controller: &StateSpace<Discrete>,
+        sizes: Sizes<'_>,
+        rows: &[LogRow],
+    ) -> Result<LoopState> {
         let rows = CleanRows::new(rows, self.at.rpm, self.running.nominal.time())?;
-        let response = loop_response(self.running, Some(&proposal.new.q), &rows)?;
-        let sizes = Sizes { input: &proposal.sizes.0, output: &proposal.sizes.1 };
-        LoopState::new(&response, &proposal.new.controller, sizes)
+        LoopState::new(&loop_response(self.running, Some(q), &rows)?, controller, sizes)
     }
 }
 

@@ -10,8 +10,8 @@ use crate::{Error, Result};
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign};
-use youla_run::Identification;
+use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign, region_radius};
+use youla_run::{Identification, ModeEntry, shown_modes};
 
 /// A new controller with its Q.
 pub(crate) struct NewLoop {
@@ -31,6 +31,9 @@ pub(crate) struct Proposal {
     pub(crate) sizes: (Vec<f64>, Vec<f64>),
     pub(crate) new: NewLoop,
     pub(crate) prediction: Prediction,
+    pub(crate) modes: Vec<ModeEntry>,
+    /// Largest departure of S within its region, over frequency.
+    pub(crate) region: Option<f64>,
 }
 
 /// A proposal, or the reason why there is none.
@@ -52,7 +55,9 @@ pub(crate) fn propose(running: &RunningLoop, rows: &CleanRows, name: &str, goal:
         Ok(parts) => {
             let sizes = found.records.sizes();
             let (before, new, prediction) = parts;
-            Ok(Outcome::Proposed(Box::new(Proposal { found, before, sizes, new, prediction })))
+            let modes = found.recommended.as_ref().map_or_else(|_| Vec::new(), shown_modes);
+            let region = region(&found)?;
+            Ok(Outcome::Proposed(Box::new(Proposal { found, before, sizes, new, prediction, modes, region })))
         }
         Err(reason) => Ok(Outcome::Refused { reason, found: Some(Box::new(found)) }),
     }
@@ -65,6 +70,12 @@ fn refusable<T>(outcome: Result<T>) -> Result<Result<T, String>> {
         Err(e) => Ok(Err(e.to_string())),
         Ok(value) => Ok(Ok(value)),
     }
+}
+
+fn region(found: &Identification) -> Result<Option<f64>> {
+    let Some(hansen) = found.scheme().map(|scheme| &scheme.hansen.deviation) else { return Ok(None) };
+    let Some(uncertainty) = &hansen.uncertainty else { return Ok(None) };
+    Ok(region_radius(&hansen.model, uncertainty)?)
 }
 
 fn refuse<T>(reason: String) -> Result<T> {

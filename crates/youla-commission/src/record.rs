@@ -1,11 +1,13 @@
 //! What a campaign leaves: one record for each point, kept for an interrupted campaign, and summary.json.
 
+use crate::between::BetweenRecord;
 use crate::figures::LoopState;
 use crate::rehearse::Prediction;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
+use youla_run::ModeEntry;
 
 /// How a point ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -34,6 +36,12 @@ pub struct PointRecord {
     pub seconds: f64,
     /// The loop with the controller that ran, measured.
     pub before: Option<LoopState>,
+    /// Modes of the recommended model, with their 95 % intervals.
+    #[serde(default)]
+    pub modes: Vec<ModeEntry>,
+    /// Largest departure of S within its region, over frequency.
+    #[serde(default)]
+    pub region: Option<f64>,
     /// What was predicted of the verification.
     pub predicted: Option<Prediction>,
     /// The loop with the new Q, measured.
@@ -70,14 +78,26 @@ pub struct CampaignSummary {
     pub unstable_switches: usize,
     /// Where the loop of the firmware ran: `qemu cortex-m4` or `host`.
     pub controller: String,
-    /// Whether every point is done.
+    /// Whether every point, and the way between the points, is done.
     pub done: bool,
     /// All points that were begun.
     pub points: Vec<PointRecord>,
+    /// Between neighbouring speeds with the same running loop.
+    pub between: Vec<BetweenRecord>,
 }
 
 impl CampaignSummary {
-    pub(crate) fn new(name: &str, controller: &str, expected: usize, points: Vec<PointRecord>) -> Self {
+    /// `expected`: points and pairs of the campaign.
+    pub(crate) fn new(
+        name: &str,
+        controller: &str,
+        expected: [usize; 2],
+        points: Vec<PointRecord>,
+        between: Vec<BetweenRecord>,
+    ) -> Self {
+        let done = |all: &mut dyn Iterator<Item = PointStatus>| all.filter(|s| *s == PointStatus::Done).count();
+        let ended =
+            [done(&mut points.iter().map(|p| p.status)), done(&mut between.iter().map(|between| between.status))];
         let first = points.first();
         CampaignSummary {
             name: name.into(),
@@ -86,10 +106,12 @@ impl CampaignSummary {
                 predicted: first.and_then(|p| p.predicted).map(|predicted| predicted.bounds),
                 reached: first.and_then(|p| p.reached).map(|state| state.damping),
             },
-            unstable_switches: points.iter().map(|p| p.unstable_switches).sum(),
+            unstable_switches: points.iter().map(|p| p.unstable_switches).sum::<usize>()
+                + between.iter().map(|b| b.unstable_switches).sum::<usize>(),
             controller: controller.into(),
-            done: points.len() == expected && points.iter().all(|p| p.status == PointStatus::Done),
+            done: ended == expected,
             points,
+            between,
         }
     }
 }

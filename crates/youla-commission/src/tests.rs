@@ -6,12 +6,14 @@ use crate::point::{Operator, Point, PointFiles, RAMP};
 use crate::running::{LoopDescription, RunningLoop};
 use crate::station::Q_STATES;
 use crate::target::Target;
-use crate::{Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, commission};
+use crate::{
+    Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, commission,
+};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, observer_controller, with_input_port};
 use youla::linalg::eye;
-use youla::lti::{Discrete, frequency_response};
+use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::{ErrorKind, Mat, MatRef};
 use youla_io::export::ExportedController;
 use youla_paper::rig::{BearingRig, Fidelity, RigParameters, bearing_at_speed, degraded};
@@ -133,7 +135,7 @@ fn a_campaign_that_was_stopped_goes_on_and_keeps_what_is_done() {
     assert!(reached > 2.0 * before && reached > predicted[0] && reached < 0.22, "{before} {predicted:?} {reached}");
     let out = place.0.join("out");
     for file in
-        ["report.md", "0 rpm/log.csv", "0 rpm/verification.csv", "0 rpm/q.json", "0 rpm/identification/report.html"]
+        ["report.html", "0 rpm/log.csv", "0 rpm/verification.csv", "0 rpm/q.json", "0 rpm/identification/report.html"]
     {
         assert!(out.join(file).is_file(), "{file}");
     }
@@ -276,9 +278,48 @@ fn seeds() {
 /// Of the linear part of the twin with the new controller, which the campaign does not know.
 fn true_loop_is_stable(q: &Path, at: &OperatingPoint) -> bool {
     let exported: ExportedController = serde_json::from_str(&std::fs::read_to_string(q).unwrap()).unwrap();
+    let time = Discrete::new(exported.ts).unwrap();
+    is_stable_on_the_twin(at, &exported.controller.system(time).unwrap())
+}
+
+fn is_stable_on_the_twin(at: &OperatingPoint, controller: &StateSpace<Discrete>) -> bool {
     let mut parameters = RigParameters::shipped();
     parameters.rotation.cross_coupling.value = at.cross_coupling;
     let truth = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, 1).unwrap().true_plant().unwrap();
-    let controller = exported.controller.system(truth.time()).unwrap();
-    closed_loop(&truth, &with_input_port(&controller).unwrap()).unwrap().is_stable().unwrap()
+    closed_loop(&truth, &with_input_port(controller).unwrap()).unwrap().is_stable().unwrap()
+}
+
+/// Two speeds far apart: the loop between them is certified, measured halfway, and stable on the twin at every speed between.
+#[test]
+fn q_over_speed() {
+    let place = Place::new("speed");
+    let mut campaign = short();
+    campaign.points.push(OperatingPoint { name: "fast".into(), rpm: 2500.0, ..campaign.points[0].clone() });
+    let summary = place.run(&campaign, "out", true).0.unwrap();
+    let [way] = summary.between.as_slice() else { panic!("{:?}", summary.between) };
+    assert!(summary.done && way.status == PointStatus::Done && summary.unstable_switches == 0, "{way:?}");
+    let evidence = way.evidence.unwrap();
+    assert!(evidence.holds() && evidence.room > 2.0 * evidence.change, "{evidence:?}");
+    assert!(way.rpm == 1250.0 && way.reached.unwrap().damping >= way.expected.unwrap());
+    let resonances = |point: &PointRecord| point.modes.iter().filter(|mode| mode.zeta < Some(0.5)).count();
+    assert_eq!(summary.points.iter().map(resonances).collect::<Vec<_>>(), [2, 2]);
+
+    let out = place.0.join("out");
+    assert!(out.join("report.html").is_file() && out.join("0 rpm to fast/verification.csv").is_file());
+    let table = QTable::read(&out.join("q_table.json")).unwrap();
+    let running = RunningLoop::read(&example().join("weak.toml"), Discrete::new(2e-4).unwrap()).unwrap();
+    for rpm in [0.0, 300.0, 1250.0, 2000.0, 2500.0] {
+        let controller = running.factors.controller_of(&table.at(rpm, Q_STATES).unwrap()).unwrap();
+        let at = OperatingPoint { rpm, ..campaign.points[0].clone() };
+        assert!(is_stable_on_the_twin(&at, &controller), "{rpm}");
+    }
+    let beyond = table.at(2600.0, Q_STATES).unwrap_err().to_string();
+    assert!(beyond.contains("the table holds 0 to 2500 rpm, not 2600 rpm"), "{beyond}");
+    let small = table.at(1250.0, 1).unwrap_err().to_string();
+    assert!(small.contains("1 states at most"), "{small}");
+    assert!(QTable::read(&out.join("summary.json")).unwrap_err().to_string().contains("q_table.json"));
+
+    let (again, person) = place.run(&campaign, "out", false);
+    assert_eq!(again.unwrap(), summary);
+    assert_eq!(person.notes, ["0 rpm: done before", "fast: done before", "0 rpm to fast: done before"]);
 }

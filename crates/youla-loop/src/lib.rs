@@ -1,10 +1,11 @@
-//! Tools for a running loop: check of the recorded data, design of the excitation, redesign of the controller.
+//! Tools for a running loop: check of the recorded data, design of the excitation, redesign of the controller and its table over an operating point.
 //!
 //! | module | content |
 //! |---|---|
 //! | [`check`] | tests of a record before identification; each finding states severity, location, figures and remedy |
 //! | [`excite`] | an excitation sequence for the port alpha or the plant input, with predicted peaks and mode accuracies |
 //! | [`redesign`] | a new controller on an identified model, with predicted damping and robustness |
+//! | [`schedule`] | Q between two operating points, with evidence that the loop stays stable |
 //!
 //! Matrices are samples x channels; feedback is positive, `u = K y`. Nothing is repaired and nothing is read from files.
 //!
@@ -28,5 +29,6 @@ pub mod check;
 mod error;
 pub mod excite;
 pub mod redesign;
+pub mod schedule;
 
 pub use error::{Error, Result};

@@ -85,6 +85,7 @@ pub use page::page;
 pub use parts::{recommend_alone, redesign_of};
 pub use pipeline::identify;
 pub use plot::{Plot, plot, plottable, write_plots};
+pub use recommended::shown_modes;
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory};
 pub use redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry, entry as redesign_entry};
 pub use redraw::redraw;

@@ -84,7 +84,7 @@ impl From<&Recommendation> for RecommendedEntry {
             file: FILE.into(),
             order: found.order,
             dead_time: found.dead_time.clone(),
-            modes: modes(found),
+            modes: shown_modes(found),
             response_deviation: DeviationEntry {
                 hz: deviation.hz.clone(),
                 absolute: deviation.absolute.iter().map(|at| rows(at.as_ref())).collect(),
@@ -94,8 +94,8 @@ impl From<&Recommendation> for RecommendedEntry {
     }
 }
 
-/// The modes that the response shows.
-fn modes(found: &Recommendation) -> Vec<ModeEntry> {
+/// The modes that the response shows, with 95 % intervals.
+pub fn shown_modes(found: &Recommendation) -> Vec<ModeEntry> {
     let visible = found.plant.visible_modes().ok();
     let shown = |m: &&ModeEstimate| visible.as_ref().is_none_or(|v| residue_at(v, m.mode.pole).is_some());
     found.modes.iter().filter(shown).map(mode).collect()
@@ -164,7 +164,7 @@ impl<'a> RecommendedDetails<'a> {
             dead_time: &found.dead_time,
             continuous: continuous(found).map(|system| SystemMatrices::new(&system)),
             predictor: PredictorEntry::from(&found.predictor),
-            modes: modes(found),
+            modes: shown_modes(found),
             candidates: &found.candidates,
             evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
         }

@@ -17,7 +17,7 @@ mod youla_parameter;
 
 pub use figures::{LoopFigures, least_damping, loop_modes};
 pub use lqg::Gains;
-pub use robust::small_gain;
+pub use robust::{region_radius, small_gain};
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};

@@ -28,11 +28,7 @@ pub fn small_gain(
     q: &StateSpace<Discrete>,
     uncertainty: &Uncertainty,
 ) -> Result<Option<f64>> {
-    let nyquist = std::f64::consts::PI / s.time().ts();
-    let half = POINTS / 2;
-    let linear = (1..=half).map(|k| nyquist * k as f64 / (half + 1) as f64);
-    let logarithmic = (0..half).map(|k| nyquist * 10f64.powf(-3.0 + 3.0 * k as f64 / half as f64));
-    let omega: Vec<f64> = linear.chain(logarithmic).collect();
+    let omega = grid(s.time());
     let Some(band) = uncertainty.response(&omega)? else { return Ok(None) };
     let (of_s, of_q) = (frequency_response(s, &omega)?, frequency_response(q, &omega)?);
     let (p, m) = (s.outputs(), s.inputs());
@@ -50,6 +46,26 @@ pub fn small_gain(
         largest = largest.max(sigma.first().copied().unwrap_or(0.0) * radius.sqrt());
     }
     Ok(Some(largest))
+}
+
+/// Largest Frobenius norm over frequency of a departure of S within its region, beta per alpha; `None` where S has no region.
+///
+/// # Errors
+/// Those of the frequency responses.
+pub fn region_radius(s: &StateSpace<Discrete>, uncertainty: &Uncertainty) -> Result<Option<f64>> {
+    let omega = grid(s.time());
+    let Some(band) = uncertainty.response(&omega)? else { return Ok(None) };
+    let entries = || (0..s.outputs()).flat_map(|i| (0..s.inputs()).map(move |j| (i, j)));
+    let radius = |k: usize| entries().map(|(i, j)| squared_radius(&band, k, i, j)).sum::<f64>().sqrt();
+    Ok(Some((0..omega.len()).map(radius).fold(0.0, f64::max)))
+}
+
+fn grid(time: Discrete) -> Vec<f64> {
+    let nyquist = std::f64::consts::PI / time.ts();
+    let half = POINTS / 2;
+    let linear = (1..=half).map(|k| nyquist * k as f64 / (half + 1) as f64);
+    let logarithmic = (0..half).map(|k| nyquist * 10f64.powf(-3.0 + 3.0 * k as f64 / half as f64));
+    linear.chain(logarithmic).collect()
 }
 
 /// Square of the longest half axis of the region of an entry.

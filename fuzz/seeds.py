@@ -1,6 +1,6 @@
 """Writes the seeds of the fuzz targets to crates/youla-io/tests/seeds: synthetic, a few hundred bytes each.
 Needs numpy, scipy, h5py, pyarrow and polars; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
-import gzip, hashlib, io, json, pathlib
+import gzip, hashlib, io, json, math, pathlib, struct
 import h5py
 import numpy as np
 import polars
@@ -173,3 +173,13 @@ for name, content, log in [
     figure = {'key': 'loop', 'title': 'Loop', 'caption': '', 'layout': 'beside',
               'panels': [{'title': 'p', 'x': {**axis, 'log': log}, 'y': {**axis, 'range': None}, 'content': content}]}
     report(f'figure-{name}.json', redesign={'loops': empty['methods'], 'figure': figure, 'tables': []})
+
+q = {'a': [[0.5]], 'b': [[0.1, 0]], 'c': [[0], [0.2]], 'd': [[0, 0], [0, 0]]}
+put('q_table_json', 'two.json', json.dumps({'ts': 5e-5, 'points': [{'name': 'a', 'rpm': 0, 'q': q}, {'name': 'b', 'rpm': 1000, 'q': q}],
+    'between': [{'gain': 0.1, 'room': 1, 'change': 0.1, 'region': 0.1, 'q_room': 0.5, 'q_error': 0}]}))
+put('campaign_toml', 'example.toml', (root / "examples/commission/campaign.toml").read_text())
+# Bodies of frames of youla-link, one a line: describe, alive, arm, start, stop, begin, write, commit, switch, release, read; a body of rows.
+single = lambda *values: struct.pack(f'<{len(values)}f', *values)
+put('link', 'requests.bin', b'\n'.join([b'\0', b'\1', b'\2', b'\3\1\x12\4\0' + single(0.5), b'\4', b'\5',
+    b'\6\0\0' + single(0.25, 0.25, 0.25), b'\7\1\2\3\4', b'\x08', b'\x09', b'\x0b\0\0']))
+put('link', 'rows.bin', struct.pack('<Q', 40) + 2 * (single(1, -2, 0.5, 0.25, 0.5, -0.5, 0.02, math.nan) + struct.pack('<I', 3)))

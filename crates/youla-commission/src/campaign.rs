@@ -85,7 +85,15 @@ impl Campaign {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
-        let campaign: Campaign = toml_file::parse(&text, path)?;
+        Self::parse(&text, path)
+    }
+
+    /// The same of a text; `path` is named in errors.
+    ///
+    /// # Errors
+    /// As [`Campaign::read`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let campaign: Campaign = toml_file::parse(text, path)?;
         match campaign.problem() {
             None => Ok(campaign),
             Some(problem) => Err(Error::Campaign { path: path.to_owned(), problem }),

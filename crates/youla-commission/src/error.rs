@@ -27,6 +27,9 @@ pub enum Error {
     /// The page could not be made.
     #[error(transparent)]
     Report(#[from] youla_report::Error),
+    /// The connection of a twin failed.
+    #[error(transparent)]
+    Connection(#[from] youla_rig::Error),
     /// A part of a larger task failed.
     #[error("{part}: {source}")]
     Within {
@@ -60,5 +63,5 @@ pub enum Error {
 youla::error_context! {
     sources: Method File Loop Run Twin Report;
     numerical: Controller Refused;
-    bad_input: Campaign;
+    bad_input: Campaign Connection;
 }

@@ -22,6 +22,7 @@ mod report;
 mod running;
 mod station;
 mod target;
+mod twin;
 
 pub use between::{BetweenRecord, Evidence};
 pub use campaign::{Campaign, CampaignLimits, Goal, OperatingPoint};
@@ -33,6 +34,7 @@ pub use q_table::{QAtSpeed, QTable};
 pub use record::{CampaignSummary, DampingFigures, PointRecord, PointStatus};
 pub use rehearse::{LEVEL, Prediction};
 pub use running::LoopDescription;
+pub use twin::{TwinPlant, serve_loop};
 
 #[cfg(test)]
 mod tests;

@@ -39,9 +39,17 @@ impl QTable {
     /// # Errors
     /// [`Error::Campaign`] for a file that is no such table; [`youla_io::Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let wrong = |problem: &str| Error::Campaign { path: path.to_owned(), problem: problem.into() };
         let text = std::fs::read_to_string(path).map_err(|source| crate::record::io(path, source))?;
-        let table: QTable = serde_json::from_str(&text)
+        Self::parse(&text, path)
+    }
+
+    /// The same of a text; `path` is named in errors.
+    ///
+    /// # Errors
+    /// [`Error::Campaign`].
+    pub fn parse(text: &str, path: &Path) -> Result<Self> {
+        let wrong = |problem: &str| Error::Campaign { path: path.to_owned(), problem: problem.into() };
+        let table: QTable = serde_json::from_str(text)
             .map_err(|e| wrong(&format!("{e}; give the q_table.json of a campaign over speed")))?;
         let rising = table.points.windows(2).all(|pair| pair[0].rpm < pair[1].rpm);
         if table.points.len() < 2 || table.between.len() + 1 != table.points.len() || !rising {

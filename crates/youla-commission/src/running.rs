@@ -20,6 +20,24 @@ pub struct LoopDescription {
     pub controller: ControllerSettings,
 }
 
+impl LoopDescription {
+    /// The two tables of a file that may hold others, for example a run.toml.
+    ///
+    /// # Errors
+    /// [`youla_io::Error::Settings`] with line and key.
+    pub(crate) fn of_file(path: &Path) -> Result<Self> {
+        #[derive(Deserialize)]
+        struct Tables {
+            nominal: NominalModel,
+            controller: ControllerSettings,
+        }
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let Tables { nominal, controller } = toml_file::parse(&text, path)?;
+        Ok(LoopDescription { nominal, controller })
+    }
+}
+
 /// The same as systems.
 pub(crate) struct RunningLoop {
     pub(crate) description: LoopDescription,
@@ -42,21 +60,29 @@ impl RunningLoop {
     }
 
     pub(crate) fn new(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
-        let folder = path.parent().unwrap_or(Path::new(""));
-        let refuse = |problem: String| Err(Error::Campaign { path: path.to_owned(), problem });
-        let nominal = description.nominal.realise(folder, time)?;
-        let RealisedController::Observer { f, l } = description.controller.realise(folder, time)? else {
-            return refuse("the controller of a campaign is an observer; give [controller.observer]".into());
-        };
+        let running = Self::of_any_size(description, path, time)?;
+        let nominal = &running.nominal;
         if nominal.order() > STATES || (nominal.inputs(), nominal.outputs()) != (2, 2) {
-            return refuse(format!(
+            let problem = format!(
                 "the nominal model has {} states, {} inputs and {} outputs; the firmware takes at most {STATES} states, 2 inputs and 2 \
                  outputs",
                 nominal.order(),
                 nominal.inputs(),
                 nominal.outputs()
-            ));
+            );
+            return Err(Error::Campaign { path: path.to_owned(), problem });
         }
+        Ok(running)
+    }
+
+    /// A loop that need not fit the firmware of a campaign.
+    pub(crate) fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let nominal = description.nominal.realise(folder, time)?;
+        let RealisedController::Observer { f, l } = description.controller.realise(folder, time)? else {
+            let problem = "the controller of the firmware is an observer; give [controller.observer]".into();
+            return Err(Error::Campaign { path: path.to_owned(), problem });
+        };
         let scale = nominal.state_scales()?;
         let balanced = nominal.with_scaled_states(&scale);
         let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);

@@ -11,7 +11,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// The address cannot be used.
-    #[error("{address}: {source}; give an address as udp://127.0.0.1:4000")]
+    #[error("{address}: {source}; give an address as udp://127.0.0.1:4000 or serial:/dev/ttyACM0")]
     Address {
         /// As given.
         address: String,
@@ -22,7 +22,9 @@ pub enum Error {
     #[error("the connection to the rig failed: {0}")]
     Connection(#[from] std::io::Error),
     /// No reply.
-    #[error("the rig at {address} does not answer; check that it runs and that no firewall keeps its datagrams")]
+    #[error(
+        "the rig at {address} does not answer; check that it runs, and that no firewall and no other speed of the line keeps its frames"
+    )]
     Silent {
         /// Where it was asked.
         address: String,

@@ -8,7 +8,9 @@ mod plant;
 mod recorder;
 mod rig;
 mod settings;
+mod sink;
 mod twin;
+mod way;
 
 pub use description::{Description, RigChannel};
 pub use error::{Error, Result};
@@ -16,6 +18,7 @@ pub use plant::{LinearPlant, Plant, PlantFault};
 pub use recorder::{LogReport, Recorder};
 pub use rig::{Answer, Rig};
 pub use settings::settings;
+pub use sink::{CsvLog, LogRow, PlotStream, RowSink};
 pub use twin::{Pace, RotorStation, Twin, rotor, serve};
 pub use youla_link::{Outcome, Request, Source};
 pub use youla_rt::{Cause, Phase, Status, Trip};

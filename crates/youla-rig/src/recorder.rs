@@ -1,13 +1,11 @@
 //! A log in which every row is there or reported missing.
 
+use crate::sink::{CsvLog, LogRow, RowSink};
 use crate::{Description, Error, Result};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use youla_link::{Arrival, Frame, Kind, RowBlock, RowShape, Tracker};
-use youla_rt::Trip;
+use youla_rt::{Status, Trip};
 
 /// What became of the rows of a log.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -30,18 +28,25 @@ pub struct LogReport {
 
 /// Rows of one frame that wait for those before them.
 struct Block {
-    text: String,
-    rows: u64,
-    trips: Vec<(u64, Option<Trip>)>,
+    /// Row after row.
+    values: Vec<f32>,
+    status: Vec<Status>,
+}
+
+impl Block {
+    fn rows(&self) -> u64 {
+        self.status.len() as u64
+    }
 }
 
 /// Frames that wait for an earlier one: the window of [`Tracker`].
 const WAITING: usize = 64;
 
-/// Writes the rows of frames to a CSV file, in the order of their samples.
+/// Writes the rows of frames to a file, in the order of their samples.
 pub struct Recorder {
-    file: BufWriter<File>,
+    sinks: Vec<Box<dyn RowSink>>,
     path: PathBuf,
+    largest: Vec<f32>,
     shape: RowShape,
     schema: u32,
     sample_time: f64,
@@ -54,18 +59,23 @@ pub struct Recorder {
 }
 
 impl Recorder {
-    /// Begins a log of a machine whose frames have this schema.
+    /// Begins a log of a machine whose frames have this schema, as CSV.
     ///
     /// # Errors
     /// [`Error::File`].
     pub fn create(path: &Path, machine: &Description, schema: u32) -> Result<Self> {
-        let failed = |source| Error::File { path: path.to_owned(), source };
-        let mut file = BufWriter::new(File::create(path).map_err(failed)?);
-        writeln!(file, "{}", machine.columns().join(",")).map_err(failed)?;
-        Ok(Recorder {
-            file,
+        let file = CsvLog::create(path, machine).map_err(|source| Error::File { path: path.to_owned(), source })?;
+        Ok(Self::with(vec![Box::new(file)], path, machine, schema))
+    }
+
+    /// Begins a log that goes to these sinks; errors name `path`.
+    pub fn with(sinks: Vec<Box<dyn RowSink>>, path: &Path, machine: &Description, schema: u32) -> Self {
+        let shape = machine.shape();
+        Recorder {
+            sinks,
             path: path.to_owned(),
-            shape: machine.shape(),
+            largest: vec![0.0; 2 * (shape.inputs + shape.outputs)],
+            shape,
             schema,
             sample_time: machine.sample_time,
             waiting: BTreeMap::new(),
@@ -73,7 +83,13 @@ impl Recorder {
             of_frame: 0,
             trip: None,
             report: LogReport::default(),
-        })
+        }
+    }
+
+    /// Largest magnitudes of y, u, alpha and beta since the last call.
+    pub fn take_largest(&mut self) -> Vec<f32> {
+        let zeros = vec![0.0; self.largest.len()];
+        std::mem::replace(&mut self.largest, zeros)
     }
 
     /// Takes the bytes of a datagram or packet.
@@ -96,26 +112,15 @@ impl Recorder {
         if matches!(self.report.frames.receive(frame.sequence), Arrival::Doubled | Arrival::Stale) {
             return Ok(());
         }
-        let text = self.text(&block);
-        self.of_frame = self.of_frame.max(text.rows);
-        // Two frames of the same samples: the machine has started again.
-        self.report.foreign += u64::from(self.waiting.insert(block.first, text).is_some());
-        self.write_in_order()
-    }
-
-    fn text(&self, block: &RowBlock<'_>) -> Block {
-        let mut text = Block { text: String::new(), rows: 0, trips: Vec::new() };
+        let mut rows = Block { values: Vec::new(), status: Vec::new() };
         for row in block.rows() {
-            // Writing to a string cannot fail.
-            let _ = write!(text.text, "{:?}", row.sample as f64 * self.sample_time);
-            for value in row.values() {
-                let _ = write!(text.text, ",{value:?}");
-            }
-            let _ = writeln!(text.text, ",{}", row.status.bits());
-            text.trips.push((row.sample, row.status.trip()));
-            text.rows += 1;
+            rows.values.extend(row.values());
+            rows.status.push(row.status);
         }
-        text
+        self.of_frame = self.of_frame.max(rows.rows());
+        // Two frames of the same samples: the machine has started again.
+        self.report.foreign += u64::from(self.waiting.insert(block.first, rows).is_some());
+        self.write_in_order()
     }
 
     fn write_in_order(&mut self) -> Result<()> {
@@ -139,10 +144,15 @@ impl Recorder {
             return Ok(());
         }
         self.miss(next, first - next);
-        self.file.write_all(block.text.as_bytes()).map_err(|source| self.failed(source))?;
-        self.next = Some(first + block.rows);
-        self.report.rows += block.rows;
-        for (sample, trip) in block.trips {
+        self.next = Some(first + block.rows());
+        let rows = block.values.chunks_exact(self.largest.len().max(1)).zip(&block.status);
+        for (sample, (values, status)) in (first..).zip(rows) {
+            let row = LogRow { time: sample as f64 * self.sample_time, values, status: *status };
+            let written = self.sinks.iter_mut().try_for_each(|sink| sink.take(&row));
+            written.map_err(|source| Error::File { path: self.path.clone(), source })?;
+            self.report.rows += 1;
+            self.largest.iter_mut().zip(values).for_each(|(most, value)| *most = most.max(value.abs()));
+            let trip = status.trip();
             if self.trip != trip {
                 self.trip = trip;
                 self.report.trips.extend(trip.map(|trip| (sample, trip)));
@@ -158,15 +168,15 @@ impl Recorder {
         }
     }
 
-    /// Rows in the log up to now.
-    pub fn rows(&self) -> u64 {
-        self.report.rows
+    /// The log up to now.
+    pub fn report(&self) -> &LogReport {
+        &self.report
     }
 
     /// The sample after the last one that should have come when the machine was at `sample`: rows are sent in whole frames, and the
     /// last one is still in its hands.
     pub fn end(&self, sample: u64) -> u64 {
-        let waiting = self.waiting.last_key_value().map_or(0, |(first, block)| first + block.rows);
+        let waiting = self.waiting.last_key_value().map_or(0, |(first, block)| first + block.rows());
         let reached = waiting.max(self.next.unwrap_or(0));
         let frames = sample.saturating_sub(reached) / self.of_frame.max(1);
         reached + frames * self.of_frame
@@ -183,11 +193,8 @@ impl Recorder {
         if let Some(next) = self.next {
             self.miss(next, end.saturating_sub(next));
         }
-        self.file.flush().map_err(|source| self.failed(source))?;
+        let finished = self.sinks.iter_mut().try_for_each(|sink| sink.finish());
+        finished.map_err(|source| Error::File { path: self.path.clone(), source })?;
         Ok(self.report)
-    }
-
-    fn failed(&self, source: std::io::Error) -> Error {
-        Error::File { path: self.path.clone(), source }
     }
 }

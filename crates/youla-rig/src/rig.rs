@@ -1,8 +1,8 @@
-//! Requests to a machine over UDP, and its rows.
+//! Requests to a machine, and its rows.
 
+use crate::way::Way;
 use crate::{Description, Error, Recorder, Result};
 use std::collections::VecDeque;
-use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request};
 use youla_rt::{Checksum, Status};
@@ -22,12 +22,12 @@ pub struct Answer {
 
 /// A connection to a machine.
 pub struct Rig {
-    socket: UdpSocket,
+    way: Way,
     address: String,
     description: Description,
     schema: u32,
     sequence: u32,
-    /// Datagrams that came while a reply was awaited.
+    /// Frames that came while a reply was awaited.
     inbox: VecDeque<Vec<u8>>,
 }
 
@@ -35,18 +35,18 @@ const PATIENCE: Duration = Duration::from_millis(200);
 const ATTEMPTS: usize = 10;
 
 impl Rig {
-    /// Connects to `udp://HOST:PORT` and asks for the description.
+    /// Connects to `udp://HOST:PORT` or `serial:DEVICE[@BAUD]` and asks for the description.
     ///
     /// # Errors
     /// [`Error::Address`], [`Error::Silent`], [`Error::Description`].
     pub fn connect(address: &str) -> Result<Self> {
-        let wrong = |source| Error::Address { address: address.to_owned(), source };
-        let place = address.strip_prefix("udp://").unwrap_or(address);
-        let socket = UdpSocket::bind(("0.0.0.0", 0)).map_err(wrong)?;
-        socket.connect(place).map_err(wrong)?;
+        Self::over(Way::open(address)?, address)
+    }
+
+    pub(crate) fn over(way: Way, address: &str) -> Result<Self> {
         let description = Description::default();
         let mut rig =
-            Rig { socket, address: address.to_owned(), description, schema: 0, sequence: 0, inbox: VecDeque::new() };
+            Rig { way, address: address.to_owned(), description, schema: 0, sequence: 0, inbox: VecDeque::new() };
         let answer = rig.ask(&Request::Describe)?;
         let mut schema = Checksum::new();
         schema.append(&answer.data);
@@ -79,8 +79,7 @@ impl Rig {
         let frame = Frame { kind: Kind::Request, schema: self.schema, sequence: self.sequence, body };
         let length = frame.write(&mut bytes).map_err(|_| too_long())?;
         for _ in 0..ATTEMPTS {
-            // A machine that is not there yet refuses; the next attempt may reach it.
-            let _ = self.socket.send(bytes.get(..length).unwrap_or_default());
+            self.way.send(bytes.get(..length).unwrap_or_default());
             if let Some(answer) = self.await_answer()? {
                 return match answer.outcome {
                     Outcome::Done => Ok(answer),
@@ -94,25 +93,13 @@ impl Rig {
     fn await_answer(&mut self) -> Result<Option<Answer>> {
         let until = Instant::now() + PATIENCE;
         while let Some(left) = until.checked_duration_since(Instant::now()) {
-            let Some(bytes) = self.datagram(left)? else { continue };
+            let Some(bytes) = self.way.receive(left)? else { continue };
             match answer_to(self.sequence, &bytes) {
                 Some(answer) => return Ok(Some(answer)),
                 None => self.inbox.push_back(bytes),
             }
         }
         Ok(None)
-    }
-
-    /// The next datagram within a time.
-    fn datagram(&self, within: Duration) -> Result<Option<Vec<u8>>> {
-        use std::io::ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
-        self.socket.set_read_timeout(Some(within.max(Duration::from_millis(1))))?;
-        let mut bytes = [0; 2048];
-        match self.socket.recv(&mut bytes) {
-            Ok(length) => Ok(bytes.get(..length).map(<[u8]>::to_vec)),
-            Err(e) if matches!(e.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused) => Ok(None),
-            Err(e) => Err(e.into()),
-        }
     }
 
     /// Hands the rows that come within a time to a recorder, at least those that have come already.
@@ -126,7 +113,7 @@ impl Rig {
                 recorder.take(&bytes)?;
             }
             let Some(left) = until.checked_duration_since(Instant::now()) else { return Ok(()) };
-            self.inbox.extend(self.datagram(left)?);
+            self.inbox.extend(self.way.receive(left)?);
         }
     }
 

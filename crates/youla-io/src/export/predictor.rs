@@ -5,6 +5,8 @@ use super::NamedModel;
 use crate::matrices::rows;
 use crate::values::{Value, Variables};
 use serde::{Deserialize, Serialize};
+use youla::linalg::{block, eye};
+use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
 
 /// The six matrices by rows, as `details.predictor` of the model's JSON states them.
@@ -59,6 +61,16 @@ impl Predictor {
             Some(Predictor { a: a?, b: b?, c: c?, d: d?, k, covariance })
         };
         found().map_or(serde_json::Value::Null, |predictor| serde_json::json!({ "predictor": predictor }))
+    }
+}
+
+impl NamedModel {
+    /// The model with its noise, from u and the innovations e to y, and the covariance of e; `None` where its file has no predictor.
+    pub fn with_noise(&self) -> Option<(StateSpace<Discrete>, Mat<f64>)> {
+        let [a, b, c, d, k, covariance] = Predictor::of(self)?.matrices(self).map(|(_, matrix)| matrix);
+        let inputs = block(&[&[b.as_ref(), k.as_ref()]]);
+        let through = block(&[&[d.as_ref(), eye(d.nrows()).as_ref()]]);
+        Some((StateSpace::new(a, inputs, c, through, self.system.time()).ok()?, covariance))
     }
 }
 

@@ -11,6 +11,10 @@ mod pages;
 #[cfg(test)]
 mod tests;
 mod thrift;
+mod thrift_writer;
+mod write;
+
+pub use write::{ColumnValues, ParquetWriter};
 
 use crate::choose::ChannelRef;
 use crate::error::{CorruptAt, Error, Result};

@@ -79,3 +79,40 @@ fn damaged_files_are_refused() {
         }
     }
 }
+
+/// More columns than a short list of the format holds, two groups, numbers at the ends of their range.
+#[test]
+fn what_is_written_is_read_back() {
+    let path = std::env::temp_dir().join(format!("youla-parquet-{}.parquet", std::process::id()));
+    let names: Vec<String> = (0..20).map(|k| format!("c{k}")).collect();
+    let mut written = ParquetWriter::create(&path, &names).unwrap();
+    let whole = [i32::MIN, -1, i32::MAX];
+    for group in 0..2 {
+        let double: Vec<f64> = (0..3).map(|k| 0.1 * f64::from(3 * group + k)).collect();
+        let single = [f32::MIN_POSITIVE, f32::NAN, -1.5];
+        let columns: Vec<ColumnValues<'_>> = (0..20)
+            .map(|k| match k % 3 {
+                0 => ColumnValues::Double(&double),
+                1 => ColumnValues::Float(&single),
+                _ => ColumnValues::Integer(&whole),
+            })
+            .collect();
+        written.group(&columns).unwrap();
+        assert!(written.group(&columns[1..]).is_err(), "a group with a column too few");
+    }
+    written.finish().unwrap();
+    let found = read_parquet(&path).unwrap();
+    assert_eq!(found.column("c18").unwrap(), (0..6).map(|k| 0.1 * f64::from(k)).collect::<Vec<_>>());
+    let single = found.column("c19").unwrap();
+    assert!(single[0] == f64::from(f32::MIN_POSITIVE) && single[1].is_nan() && single[5] == -1.5, "{single:?}");
+    assert_eq!(found.column("c17").unwrap(), whole.map(f64::from).repeat(2));
+
+    // Without its end a file is refused.
+    let mut cut = ParquetWriter::create(&path, &["t"]).unwrap();
+    cut.group(&[ColumnValues::Double(&[1.0])]).unwrap();
+    drop(cut);
+    assert!(matches!(read_parquet(&path), Err(Error::Corrupt { .. })));
+    ParquetWriter::create(&path, &["t"]).unwrap().finish().unwrap();
+    assert_eq!(read_parquet(&path).unwrap().column("t").unwrap(), Vec::<f64>::new());
+    std::fs::remove_file(path).unwrap();
+}

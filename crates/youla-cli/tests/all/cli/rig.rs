@@ -11,9 +11,9 @@ struct Twin {
 }
 
 impl Twin {
-    fn start() -> Self {
+    fn start(more: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
-        command.args(["rig", "twin", "--port", "0", "--duration", "300"]).stdout(Stdio::piped());
+        command.args(["rig", "twin", "--port", "0", "--duration", "300"]).args(more).stdout(Stdio::piped());
         let mut process = command.spawn().expect("the program starts");
         let mut address = String::new();
         BufReader::new(process.stdout.as_mut().expect("piped")).read_line(&mut address).expect("a line");
@@ -31,8 +31,9 @@ impl Drop for Twin {
 #[test]
 fn identify_takes_the_record_as_it_is() {
     let folder = empty_folder("rig");
-    let twin = Twin::start();
-    let record = ["rig", "record", &twin.address, "--out", "log.csv", "--duration", "1", "--excite", "0.5", "--json"];
+    let twin = Twin::start(&[]);
+    let record =
+        ["rig", "excite", &twin.address, "--amplitude", "0.5", "--out", "log.csv", "--duration", "1", "--json"];
     let recorded = youla(&folder, &record);
     assert_eq!((recorded.code, recorded.stderr.as_str()), (Some(0), ""));
     let report: serde_json::Value = serde_json::from_str(&recorded.stdout).expect("JSON");
@@ -60,4 +61,75 @@ fn identify_takes_the_record_as_it_is() {
     assert!(stopped.stdout.contains("Q = 0"), "{}", stopped.stdout);
     let nobody = youla(&folder, &["rig", "status", "udp://127.0.0.1:1"]);
     assert!(nobody.code == Some(2) && nobody.stderr.contains("does not answer"), "{}", nobody.stderr);
+}
+
+/// The gas bearing in the time of the requests, its log as Parquet; then the identified model as a twin under the same loop.
+#[test]
+fn a_model_of_a_twin_is_a_twin() {
+    let folder = empty_folder("rig-twins");
+    let file = format!("{}/../../examples/commission/weak.toml", env!("CARGO_MANIFEST_DIR"));
+    let bearing = Twin::start(&[&file, "--bearing", "instrumented"]);
+    let excite = |address: &str, log: &str| {
+        let words =
+            ["rig", "excite", address, "--amplitude", "0.5", "--hold", "8", "--duration", "4", "--settings", &file];
+        let recorded = youla(&folder, &[&words[..], &["--out", log, "--force", "--json"]].concat());
+        assert_eq!((recorded.code, recorded.stderr.as_str()), (Some(0), ""));
+        serde_json::from_str::<serde_json::Value>(&recorded.stdout).expect("JSON")
+    };
+    let report = excite(&bearing.address, "log.parquet");
+    assert!(report["rows"].as_u64() > Some(15_000), "{report}");
+    let identified = youla(&folder, &["identify", "run.toml", "--out", "run", "--json"]);
+    assert_eq!(identified.code, Some(0), "{}", identified.stderr);
+    let resonances = |text: &str| -> Vec<f64> {
+        let summary: serde_json::Value = serde_json::from_str(text).expect("JSON");
+        let modes = summary["recommended"]["modes"].as_array().expect("modes");
+        let light = modes.iter().filter(|mode| mode["zeta"].as_f64().is_some_and(|zeta| zeta < 0.2));
+        light.map(|mode| mode["hz"].as_f64().expect("a number")).collect()
+    };
+    let of_bearing = resonances(&identified.stdout);
+    assert_eq!(of_bearing.len(), 2, "{of_bearing:?}");
+
+    let model = Twin::start(&[&file, "--model", &folder.join("run").display().to_string()]);
+    excite(&model.address, "again.csv");
+    let identified = youla(&folder, &["identify", "run.toml", "--out", "again", "--json"]);
+    assert_eq!(identified.code, Some(0), "{}", identified.stderr);
+    let of_model = resonances(&identified.stdout);
+    let near = |(a, b): (&f64, &f64)| (a / b - 1.0).abs() < 5e-3;
+    assert!(of_model.len() == 2 && of_model.iter().zip(&of_bearing).all(near), "{of_model:?} {of_bearing:?}");
+}
+
+#[test]
+fn a_twin_that_cannot_be_is_refused() {
+    let folder = empty_folder("rig-refused");
+    let file = format!("{}/../../examples/commission/weak.toml", env!("CARGO_MANIFEST_DIR"));
+    std::fs::write(
+        folder.join("one.json"),
+        r#"{"name": "g", "inputs": [{"name": "u", "unit": "V"}],
+        "outputs": [{"name": "y", "unit": "um"}], "ts": 1e-3, "a": [[0.5]], "b": [[1]], "c": [[1]], "d": [[0]]}"#,
+    )
+    .expect("written");
+    for (words, sentence) in [
+        (&["--model", "one.json"][..], "its plant has 1 inputs and 1 outputs"),
+        (&["--model", "none.json"], "none.json"),
+        (&["--bearing", "rotating", "--rpm=-5"], "speed"),
+    ] {
+        let refused = youla(&folder, &[&["rig", "twin", &file, "--port", "0"][..], words].concat());
+        assert!(refused.code == Some(2) && refused.stderr.contains(sentence), "{}", refused.stderr);
+    }
+    let twin = Twin::start(&[]);
+    let log = youla(&folder, &["rig", "record", &twin.address, "--out", "log.txt", "--duration", "1"]);
+    assert!(log.code == Some(2) && log.stderr.contains("a .csv or a .parquet file"), "{}", log.stderr);
+    std::fs::write(
+        folder.join("table.json"),
+        r#"{"ts": 5e-5, "points": [
+        {"name": "a", "rpm": 0, "q": {"a": [[0.5]], "b": [[0.1, 0]], "c": [[0], [0.2]], "d": [[0, 0], [0, 0]]}},
+        {"name": "b", "rpm": 1000, "q": {"a": [[0.5]], "b": [[0.1, 0]], "c": [[0], [-0.2]], "d": [[0, 0], [0, 0]]}}],
+        "between": [{"gain": 0.1, "room": 1, "change": 0.1, "region": 0.1, "q_room": 0.5, "q_error": 0}]}"#,
+    )
+    .expect("written");
+    let load = |words: &[&str]| youla(&folder, &[&["rig", "load", &twin.address, "table.json"][..], words].concat());
+    let (without, beyond, within) = (load(&[]), load(&["--speed", "1001"]), load(&["--speed", "250", "--switch"]));
+    assert!(without.code == Some(2) && without.stderr.contains("add --speed RPM"), "{}", without.stderr);
+    assert!(beyond.stderr.contains("the table holds 0 to 1000 rpm, not 1001 rpm"), "{}", beyond.stderr);
+    assert!(within.code == Some(0) && within.stdout.contains("Q of bank 1"), "{} {}", within.stdout, within.stderr);
 }

@@ -5,22 +5,25 @@ use std::path::{Path, PathBuf};
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
 use youla::signal::SampleStream;
+use youla_commission::{Campaign, QTable};
 use youla_greybox::{Declaration, DeclaredStructure};
 use youla_io::export::ExportedController;
 use youla_io::{
     ChannelRef, CsvOptions, DecimalSign, NpyStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
     npz_from_bytes, parquet_from_bytes,
 };
+use youla_link::{Frame, Kind, LARGEST_FRAME, PacketReader, Reply, Request, RowBlock};
 use youla_paper::rig::RigParameters;
 use youla_paper::study::{PaperSettings, Row};
 use youla_report::{ReportData, html};
+use youla_rig::{Description, Recorder, rotor};
 use youla_run::{ModelFile, RunSettings};
 
 /// A reader and its name, which is that of its fuzz target and of its folder of seeds.
 pub(crate) type Reader = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const READERS: [Reader; 17] = [
+pub(crate) const READERS: [Reader; 20] = [
     ("csv", csv),
     ("mat", mat),
     ("mat73", mat),
@@ -38,6 +41,9 @@ pub(crate) const READERS: [Reader; 17] = [
     ("report_json", report_json),
     ("model_json", model_json),
     ("controller_json", controller_json),
+    ("q_table_json", q_table_json),
+    ("campaign_toml", campaign_toml),
+    ("link", link),
 ];
 
 fn path() -> &'static Path {
@@ -158,3 +164,56 @@ pub(crate) fn controller_json(bytes: &[u8]) {
     let _ = controller.rust();
     let _ = Discrete::new(controller.ts).map(|time| controller.controller.system(time));
 }
+
+/// A table of Q over speed, with a Q from each of its ways.
+pub(crate) fn q_table_json(bytes: &[u8]) {
+    let Ok(text) = std::str::from_utf8(bytes) else { return };
+    if let Ok(table) = QTable::parse(text, path()) {
+        for pair in table.points.windows(2) {
+            let _ = table.at(0.5 * (pair[0].rpm + pair[1].rpm), 2);
+        }
+    }
+}
+
+/// A campaign.
+pub(crate) fn campaign_toml(bytes: &[u8]) {
+    let _ = std::str::from_utf8(bytes).map(|text| Campaign::parse(text, path()));
+}
+
+/// The bytes of a line: as they come, and as the body of a frame that is whole, to the machine and to the host.
+pub(crate) fn link(bytes: &[u8]) {
+    let Ok(mut machine) = rotor(1) else { return };
+    let mut reply = [0; LARGEST_FRAME];
+    let Ok(description) = Description::parse(DESCRIPTION.as_bytes()) else { return };
+    let _ = Description::parse(bytes);
+    let mut recorder = Recorder::with(Vec::new(), path(), &description, machine.station.schema());
+    let mut take = |frame: &[u8]| {
+        let _ = machine.station.receive(frame, &mut reply);
+        machine.sample();
+        let _ = recorder.take(frame);
+    };
+    let mut packets = PacketReader::new();
+    for byte in bytes {
+        if let Some(Ok(frame)) = packets.push(*byte) {
+            take(frame);
+        }
+    }
+    let _ = (Request::read(bytes), Reply::read(bytes), RowBlock::read(bytes, description.shape()));
+    // Each line of bytes as a body: mutations do not find checksums.
+    let schema = rotor(1).map_or(0, |machine| machine.station.schema());
+    for (sequence, body) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
+        for kind in [Kind::Request, Kind::Rows, Kind::Reply] {
+            let mut frame = [0; LARGEST_FRAME];
+            let written = Frame { kind, schema, sequence, body }.write(&mut frame);
+            written.ok().and_then(|length| frame.get(..length)).into_iter().for_each(&mut take);
+        }
+    }
+    let _ = recorder.finish(0);
+}
+
+/// Of a machine with the channels of the rotor.
+const DESCRIPTION: &str = r#"name = "rotor"
+sample_time = 5e-5
+inputs = [{ name = "u_h" }, { name = "u_v" }]
+outputs = [{ name = "y_h" }, { name = "y_v" }]
+"#;

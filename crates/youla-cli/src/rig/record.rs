@@ -1,0 +1,216 @@
+//! `youla rig record` and `youla rig excite`: a log in which every row is there or reported missing, and its run.toml.
+
+use super::log_file::ParquetLog;
+use super::{ADDRESS, refused, seconds};
+use crate::output::{Failure, Form, say, say_wrapped};
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+use youla_rig::{Answer, LogReport, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings};
+
+pub(super) const RECORD_EXAMPLE: &str = "\
+Example:
+  youla rig record udp://127.0.0.1:4000 --out log.parquet --duration 10";
+
+pub(super) const EXCITE_EXAMPLES: &str = "\
+Example:
+  youla rig excite udp://127.0.0.1:4000 --amplitude 0.5 --out log.parquet --duration 10
+  youla identify run.toml                      the run.toml beside the log";
+
+/// Time between two signs of life, and between two lines of figures.
+const BEAT: Duration = Duration::from_millis(100);
+
+/// Arguments of `youla rig record`.
+#[derive(Debug, Args)]
+pub(crate) struct RecordArgs {
+    #[arg(help = ADDRESS)]
+    address: String,
+    /// The log: .csv or .parquet.
+    #[arg(long, value_name = "LOG")]
+    out: PathBuf,
+    /// Seconds.
+    #[arg(long, value_name = "S")]
+    duration: f64,
+    /// Take everything but [data] of the run.toml beside the log from this one.
+    #[arg(long, value_name = "RUN.TOML")]
+    settings: Option<PathBuf>,
+    /// Send the rows to PlotJuggler as well, as JSON over UDP, 1000 a second at most.
+    #[arg(long, value_name = "HOST:PORT")]
+    plotjuggler: Option<String>,
+    /// Replace an existing log and run.toml.
+    #[arg(long)]
+    force: bool,
+}
+
+/// Arguments of `youla rig excite`.
+#[derive(Debug, Args)]
+pub(crate) struct ExciteArgs {
+    #[command(flatten)]
+    record: RecordArgs,
+    /// Amplitude at alpha of a pseudo-random binary sequence, or factor of the machine's own sequence.
+    #[arg(long, value_name = "A")]
+    amplitude: f32,
+    /// Samples of each value of the sequence.
+    #[arg(long, value_name = "N", default_value_t = 4, conflicts_with = "own")]
+    hold: u16,
+    /// Play the sequence that the machine holds.
+    #[arg(long)]
+    own: bool,
+}
+
+pub(super) fn record(form: Form, args: &RecordArgs) -> Result<(), Failure> {
+    recorded(form, args, None)
+}
+
+pub(super) fn excite(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
+    let source = if args.own { Source::Own } else { Source::Prbs { order: 18, hold: args.hold } };
+    recorded(form, &args.record, Some(Request::Start { source, amplitude: args.amplitude }))
+}
+
+fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result<(), Failure> {
+    let duration = seconds("--duration", args.duration)?;
+    let run_file = args.out.with_file_name("run.toml");
+    for path in [&args.out, &run_file] {
+        if path.exists() && !args.force {
+            return Err(refused(format!("{} exists already; choose another --out or add --force", path.display())));
+        }
+    }
+    let read = |path: &PathBuf| std::fs::read_to_string(path).map_err(|e| Failure::io(path, e));
+    let base = args.settings.as_ref().map(read).transpose()?;
+    let mut rig = Rig::connect(&args.address)?;
+    // Settings that cannot be read are refused before the experiment.
+    settings(rig.description(), "log.csv", 1, base.as_deref())?;
+    let mut recorder = recorder(args, &rig)?;
+    let begun = match &start {
+        None => Ok(()),
+        Some(start) => rig.ask(&Request::Arm).and_then(|_| rig.ask(start)).map(drop),
+    };
+    let ended = begun.map_err(Failure::from).and_then(|()| run(form, &mut rig, &mut recorder, duration));
+    // Whatever happened, the excitation is stopped and the log is whole.
+    let last = rig.ask(&if start.is_some() { Request::Stop } else { Request::Alive });
+    // What was on its way; the rows of the machine's next frame are not sent yet.
+    rig.record(&mut recorder, BEAT)?;
+    let end = last.as_ref().map_or(0, |answer| recorder.end(answer.sample));
+    let report = recorder.finish(end)?;
+    let log = args.out.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let text = settings(rig.description(), &log, report.rows, base.as_deref())?;
+    std::fs::write(&run_file, text).map_err(|e| Failure::io(&run_file, e))?;
+    say_report(form, &report, &args.out, &run_file)?;
+    ended?;
+    last?;
+    Ok(())
+}
+
+fn recorder(args: &RecordArgs, rig: &Rig) -> Result<Recorder, Failure> {
+    let machine = rig.description();
+    let ending = args.out.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
+    let mut sinks: Vec<Box<dyn RowSink>> = match ending {
+        "parquet" => vec![Box::new(ParquetLog::create(&args.out, machine)?)],
+        "csv" => vec![Box::new(youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?)],
+        _ => return Err(refused(format!("--out {}: a log is a .csv or a .parquet file", args.out.display()))),
+    };
+    if let Some(address) = &args.plotjuggler {
+        let stream = PlotStream::open(address, machine)
+            .map_err(|e| refused(format!("--plotjuggler {address}: {e}; give an address as 127.0.0.1:9870")))?;
+        sinks.push(Box::new(stream));
+    }
+    Ok(Recorder::with(sinks, &args.out, machine, rig.schema()))
+}
+
+/// Takes rows until the time is over, or Ctrl-C.
+fn run(form: Form, rig: &mut Rig, recorder: &mut Recorder, duration: Duration) -> Result<(), Failure> {
+    let interrupted = Arc::new(AtomicBool::new(false));
+    let set = interrupted.clone();
+    // Where no handler can be set, Ctrl-C ends the program; the guard of the machine then ends the excitation.
+    let _ = ctrlc::set_handler(move || set.store(true, Ordering::Relaxed));
+    let live = Live::new(form, duration);
+    let begin = Instant::now();
+    while let Some(left) = duration.checked_sub(begin.elapsed()).filter(|left| !left.is_zero()) {
+        if interrupted.load(Ordering::Relaxed) {
+            break;
+        }
+        rig.record(recorder, left.min(BEAT))?;
+        // A sign of life for the guard.
+        let answer = rig.ask(&Request::Alive)?;
+        live.show(begin.elapsed(), rig, recorder, &answer);
+    }
+    live.0.finish_and_clear();
+    Ok(())
+}
+
+/// A line of figures, on a terminal only.
+struct Live(ProgressBar);
+
+impl Live {
+    fn new(form: Form, duration: Duration) -> Self {
+        let hidden = form.quiet || form.json;
+        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(duration.as_millis() as u64) };
+        if let Ok(style) = ProgressStyle::with_template("{bar:16} {msg}") {
+            bar.set_style(style);
+        }
+        Live(bar)
+    }
+
+    fn show(&self, elapsed: Duration, rig: &Rig, recorder: &mut Recorder, answer: &Answer) {
+        let machine = rig.description();
+        let channels = machine.outputs.iter().chain(&machine.inputs);
+        let largest = channels.zip(recorder.take_largest());
+        let largest = largest.map(|(channel, value)| format!("{} {value:.3} {}", channel.name, channel.unit));
+        let phase = match answer.status.phase() {
+            Phase::Exciting => "exciting",
+            Phase::Tripped => "TRIPPED",
+            Phase::Idle | Phase::Armed => "idle",
+        };
+        let (rows, missing) = (recorder.report().rows, recorder.report().missing);
+        self.0.set_position(elapsed.as_millis() as u64);
+        self.0.set_message(format!(
+            "{:.1} s, {rows} rows, {missing} missing, {phase}; largest {}",
+            elapsed.as_secs_f64(),
+            largest.collect::<Vec<_>>().join(", ")
+        ));
+    }
+}
+
+fn say_report(form: Form, report: &LogReport, log: &Path, run: &Path) -> Result<(), Failure> {
+    let frames = &report.frames;
+    if form.json {
+        let trips: Vec<Value> = report.trips.iter().map(|(sample, trip)| trip_as_json(*sample, trip)).collect();
+        return say(&json!({
+            "log": log, "run": run, "rows": report.rows, "missing": report.missing, "gaps": report.gaps,
+            "frames": { "taken": frames.taken, "lost": frames.lost, "doubled": frames.doubled,
+                "reordered": frames.reordered, "stale": frames.stale },
+            "damaged": report.damaged, "foreign": report.foreign, "trips": trips,
+        })
+        .to_string());
+    }
+    if form.quiet {
+        return Ok(());
+    }
+    let mut text = format!(
+        "{}: {} rows, {} missing in {} gaps. Frames: {} taken, {} lost, {} doubled, {} reordered, {} stale, {} damaged, {} foreign.",
+        log.display(),
+        report.rows,
+        report.missing,
+        report.gaps.len(),
+        frames.taken,
+        frames.lost,
+        frames.doubled,
+        frames.reordered,
+        frames.stale,
+        report.damaged,
+        report.foreign
+    );
+    for (sample, trip) in &report.trips {
+        text +=
+            &format!("\nThe guard ended the excitation at sample {sample}: {} (channel {}).", trip.cause, trip.channel);
+    }
+    say_wrapped(&format!("{text}\nSettings: {}", run.display()))
+}
+
+fn trip_as_json(sample: u64, trip: &youla_rig::Trip) -> Value {
+    json!({ "sample": sample, "cause": trip.cause.to_string(), "channel": trip.channel })
+}

@@ -1,0 +1,138 @@
+//! Where the rows of a log go: a CSV file, and a stream for PlotJuggler. Other files are made by whoever has a writer for them.
+
+use crate::Description;
+use std::fs::File;
+use std::io::{BufWriter, Result, Write};
+use std::net::UdpSocket;
+use std::path::Path;
+use youla_rt::Status;
+
+/// A row of a log.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogRow<'a> {
+    /// Sample times sample time, seconds.
+    pub time: f64,
+    /// y, u, alpha, beta.
+    pub values: &'a [f32],
+    /// Phase, bank of Q, causes of the guard.
+    pub status: Status,
+}
+
+/// Takes the rows of a log in the order of their samples.
+pub trait RowSink {
+    /// A row.
+    ///
+    /// # Errors
+    /// Of the file.
+    fn take(&mut self, row: &LogRow<'_>) -> Result<()>;
+
+    /// The end of the log.
+    ///
+    /// # Errors
+    /// Of the file.
+    fn finish(&mut self) -> Result<()>;
+}
+
+/// A CSV file: `t`, y, u, alpha, beta, `status`.
+pub struct CsvLog(BufWriter<File>);
+
+impl CsvLog {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// Of the file.
+    pub fn create(path: &Path, machine: &Description) -> Result<Self> {
+        let mut file = BufWriter::new(File::create(path)?);
+        writeln!(file, "{}", machine.columns().join(","))?;
+        Ok(CsvLog(file))
+    }
+}
+
+impl RowSink for CsvLog {
+    fn take(&mut self, row: &LogRow<'_>) -> Result<()> {
+        write!(self.0, "{:?}", row.time)?;
+        for value in row.values {
+            write!(self.0, ",{value:?}")?;
+        }
+        writeln!(self.0, ",{}", row.status.bits())
+    }
+
+    fn finish(&mut self) -> Result<()> {
+        self.0.flush()
+    }
+}
+
+/// At most so many rows a second go to a plot.
+const ROWS_PER_SECOND: f64 = 1000.0;
+
+/// Rows as JSON datagrams, as the UDP server of PlotJuggler takes them: `timestamp` and one number per column. At most 1000 rows a
+/// second are sent, and one that does not arrive is missing in the plot only.
+pub struct PlotStream {
+    socket: UdpSocket,
+    columns: Vec<String>,
+    every: u64,
+    row: u64,
+}
+
+impl PlotStream {
+    /// To `HOST:PORT`; PlotJuggler listens at port 9870.
+    ///
+    /// # Errors
+    /// For an address that cannot be used.
+    pub fn open(address: &str, machine: &Description) -> Result<Self> {
+        let socket = UdpSocket::bind(("0.0.0.0", 0))?;
+        socket.connect(address)?;
+        let every = (1.0 / (machine.sample_time * ROWS_PER_SECOND)).ceil().max(1.0) as u64;
+        Ok(PlotStream { socket, columns: machine.columns(), every, row: 0 })
+    }
+
+    fn json(&self, row: &LogRow<'_>) -> String {
+        let number = |value: f32| if value.is_finite() { format!("{value:?}") } else { "null".into() };
+        let values = row.values.iter().map(|value| number(*value)).chain([row.status.bits().to_string()]);
+        let fields = self.columns.iter().skip(1).zip(values).map(|(name, value)| format!("{name:?}:{value}"));
+        format!("{{\"timestamp\":{:?},{}}}", row.time, fields.collect::<Vec<_>>().join(","))
+    }
+}
+
+impl RowSink for PlotStream {
+    fn take(&mut self, row: &LogRow<'_>) -> Result<()> {
+        if self.row.is_multiple_of(self.every) {
+            // A plot that is not there yet.
+            let _ = self.socket.send(self.json(row).as_bytes());
+        }
+        self.row += 1;
+        Ok(())
+    }
+
+    fn finish(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::RigChannel;
+    use std::time::Duration;
+
+    #[test]
+    fn a_plot_gets_a_row_each_millisecond() {
+        let listener = UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+        listener.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+        let channel = |name: &str| vec![RigChannel { name: name.into(), unit: String::new() }];
+        let machine =
+            Description { sample_time: 2e-4, inputs: channel("u"), outputs: channel("y"), ..Description::default() };
+        let mut stream = PlotStream::open(&listener.local_addr().unwrap().to_string(), &machine).unwrap();
+        for k in 0..10 {
+            let values = [f32::NAN, 0.25, 0.0, k as f32];
+            stream.take(&LogRow { time: 2e-4 * f64::from(k), values: &values, status: Status::from_bits(5) }).unwrap();
+        }
+        let mut bytes = [0; 500];
+        let mut next = || {
+            let length = listener.recv(&mut bytes).unwrap();
+            String::from_utf8(bytes[..length].to_vec()).unwrap()
+        };
+        assert_eq!(next(), r#"{"timestamp":0.0,"y":null,"u":0.25,"alpha_1":0.0,"beta_1":0.0,"status":5}"#);
+        assert_eq!(next(), r#"{"timestamp":0.001,"y":null,"u":0.25,"alpha_1":0.0,"beta_1":5.0,"status":5}"#);
+    }
+}

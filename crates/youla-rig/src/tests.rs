@@ -10,6 +10,8 @@ use std::time::{Duration, Instant};
 use youla_link::{LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
 use youla_rt::{Cause, Controller, ExcitedLoop, Limits, Matrices, OUT_WITHIN, Phase, QCoefficients};
 
+mod board;
+
 /// A rotor that is served on a thread.
 struct Served {
     address: String,

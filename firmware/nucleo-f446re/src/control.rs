@@ -3,7 +3,7 @@
 //! It never waits for the serial port: frames and requests pass through two channels, and what finds no place is lost, which the log states
 //! as a gap. At most one frame is written per sample, so its time is bounded.
 
-use crate::machine::{Rig, code, volts};
+use crate::machine::{ROOM, Rig, code, volts};
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::dac::{DacChannel, Value};
@@ -17,15 +17,12 @@ use embassy_sync::zerocopy_channel::{Channel, Receiver, Sender};
 /// A frame on its way between the interrupt and the serial port.
 #[derive(Clone, Copy)]
 pub(crate) struct Slot {
-    bytes: [u8; Slot::ROOM],
+    bytes: [u8; ROOM],
     length: usize,
 }
 
 impl Slot {
-    /// Enough for the rows of a frame and for the reply with the description; a frame that is longer is lost.
-    const ROOM: usize = 768;
-
-    pub(crate) const EMPTY: Slot = Slot { bytes: [0; Slot::ROOM], length: 0 };
+    pub(crate) const EMPTY: Slot = Slot { bytes: [0; ROOM], length: 0 };
 
     pub(crate) fn frame(&self) -> &[u8] {
         self.bytes.get(..self.length).unwrap_or_default()

@@ -15,6 +15,9 @@ pub(crate) const RATE: u32 = 5000;
 /// Rows of a frame. The sample that completes a frame also takes its checksum, so more rows make this sample longer.
 const ROWS: u16 = 16;
 
+/// Bytes of the longest frame between the interrupt and the serial port: rows, or the reply with the description.
+pub(crate) const ROOM: usize = 768;
+
 /// The host copies it into the run.toml of a log, so model and gains must be those below.
 const DESCRIPTION: &str = r#"name = "low-pass"
 sample_time = 2e-4

@@ -36,13 +36,14 @@ impl Lateness {
     /// Microseconds within which this share of the samples began, parts of 10 000.
     fn within(&self, share: u64) -> u64 {
         let mut left = (self.samples * share).div_ceil(10_000);
-        for (microseconds, count) in (1..).zip(&self.classes) {
+        // The last class has no upper end but the largest.
+        for (microseconds, count) in (1..CLASSES as u64).zip(&self.classes) {
             left = left.saturating_sub(*count);
             if left == 0 {
                 return microseconds;
             }
         }
-        CLASSES as u64
+        self.largest.div_ceil(1000)
     }
 }
 
@@ -53,8 +54,9 @@ impl fmt::Display for Lateness {
         for to in [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, CLASSES] {
             let (these, others) = rest.split_at(to - from);
             let count: u64 = these.iter().sum();
+            let end = if to == CLASSES { "more".into() } else { to.to_string() };
             if count > 0 {
-                writeln!(f, "{from:>6} to {to:>5} us  {count:>9}")?;
+                writeln!(f, "{from:>6} to {end:>5} us  {count:>9}")?;
             }
             (rest, from) = (others, to);
         }

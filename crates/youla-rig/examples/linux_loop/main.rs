@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release -p youla-rig --example linux_loop -- 1000 10 4000       samples per second, seconds, port
-//! youla rig record udp://127.0.0.1:4000 --out log.csv --duration 5 --excite 0.5
+//! youla rig excite udp://127.0.0.1:4000 --amplitude 0.5 --out log.csv --duration 5
 //! ```
 //!
 //! The thread of the loop makes no call that waits for anything but the next period: frames and requests pass through channels to a

@@ -3,8 +3,8 @@
 use crate::output::{Failure, Form, say};
 use clap::Args;
 use std::path::PathBuf;
-use youla_io::export::{ModelFormat, c_controller, export_model, write_export};
-use youla_run::{controller_for_export, model_for_export};
+use youla_io::export::{ModelFormat, c_controller, c_loop, export_model, write_export};
+use youla_run::{controller_for_export, loop_for_export, model_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -12,6 +12,7 @@ Examples:
   youla export runs/demo-levitated-mass-001 --to npz --model hansen_reduced --out model.npz
   youla export model.json --to matlab --out g.m
   youla export runs/demo-levitated-mass-001 --to c-controller --out controller.h
+  youla export runs/rotor-001 --to c-loop --out loop.h
   youla export runs/demo-levitated-mass-001 --to c-controller --q runs/demo-levitated-mass-001/8-redesign/controller.json";
 
 /// What is exported as what.
@@ -20,8 +21,8 @@ pub(crate) struct ExportArgs {
     /// A run folder, or a model as JSON, MATLAB or NumPy file.
     #[arg(value_name = "RUN|MODEL")]
     source: PathBuf,
-    /// mat, json, npz, python, matlab, c (C99 header of the model) or c-controller (C99 header of the controller of a run with the
-    /// ports alpha and beta).
+    /// mat, json, npz, python, matlab, c (C99 header of the model), c-controller (C99 header of the controller of a run with the
+    /// ports alpha and beta) or c-loop (C99 header of the whole loop of a firmware: guard, excitation, exchangeable Q).
     #[arg(long, value_name = "FORMAT", value_parser = format)]
     to: Format,
     /// Model of the run: recommended by default, or hansen, hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller,
@@ -39,20 +40,24 @@ pub(crate) struct ExportArgs {
     force: bool,
 }
 
-/// Either kind of export.
+/// A kind of export.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Format {
     Model(ModelFormat),
     Controller,
+    Loop,
 }
 
 const CONTROLLER: &str = "c-controller";
+const LOOP: &str = "c-loop";
 
 fn format(name: &str) -> Result<Format, String> {
-    if name == CONTROLLER {
-        return Ok(Format::Controller);
+    match name {
+        CONTROLLER => return Ok(Format::Controller),
+        LOOP => return Ok(Format::Loop),
+        _ => {}
     }
-    let known: Vec<&str> = ModelFormat::ALL.iter().map(|format| format.key()).chain([CONTROLLER]).collect();
+    let known: Vec<&str> = ModelFormat::ALL.iter().map(|format| format.key()).chain([CONTROLLER, LOOP]).collect();
     let found = ModelFormat::ALL.into_iter().find(|format| format.key() == name);
     found.map(Format::Model).ok_or_else(|| format!("there is no such format; known are {}", known.join(", ")))
 }
@@ -60,8 +65,9 @@ fn format(name: &str) -> Result<Format, String> {
 /// Writes the file and says which.
 pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
     let misplaced = match args.to {
-        Format::Model(_) if args.q.is_some() => Some("--q serves --to c-controller only"),
+        Format::Model(_) | Format::Loop if args.q.is_some() => Some("--q serves --to c-controller only"),
         Format::Controller if args.model.is_some() => Some("--model does not serve --to c-controller; give a Q by --q"),
+        Format::Loop if args.model.is_some() => Some("--model does not serve --to c-loop"),
         _ => None,
     };
     if let Some(problem) = misplaced {
@@ -83,6 +89,13 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
                 "inputs": controller.measured, "outputs": controller.commanded,
             });
             (made.header.into_bytes(), file_name(&controller.name, "h"), about)
+        }
+        Format::Loop => {
+            let export = loop_for_export(&args.source)?;
+            let about = serde_json::json!({
+                "model": export.name, "order": export.observer.model.a.len(), "inputs": export.measured, "outputs": export.commanded,
+            });
+            (c_loop(&export)?.into_bytes(), file_name(&export.name, "h"), about)
         }
     };
     let path = args.out.clone().unwrap_or(default);

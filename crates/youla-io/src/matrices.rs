@@ -49,7 +49,7 @@ pub(crate) fn rows(m: MatRef<'_, f64>) -> Rows {
     (0..m.nrows()).map(|i| m.row(i).iter().copied().collect()).collect()
 }
 
-fn matrix(what: &str, rows: &Rows, columns: usize) -> Result<Mat<f64>> {
+pub(crate) fn matrix(what: &str, rows: &Rows, columns: usize) -> Result<Mat<f64>> {
     match rows.iter().position(|row| row.len() != columns) {
         Some(bad) => Err(Error::Method(youla::Error::Shape {
             what: format!("row {} of {what}", bad + 1),

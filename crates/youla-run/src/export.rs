@@ -2,13 +2,16 @@
 
 use super::artefacts::{Provenance, SCHEMA};
 use super::records::SourceFile;
+use super::settings::{RealisedController, RunSettings};
 use crate::{Error, Result};
 use std::io::Read;
 use std::path::{Path, PathBuf};
+use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::unknown;
-use youla_io::export::ExportedController;
-use youla_io::export::{ControllerExport, NamedModel, model_from_bytes, read_model};
+use youla_io::export::{
+    ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, model_from_bytes, read_model,
+};
 use youla_io::{open, sha256};
 
 /// The model files of a run folder; the first that is there is what a run is exported as.
@@ -71,6 +74,52 @@ pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerE
         q: q.map(parameter).transpose()?,
         origin: origin(run, &path)? + &q_origin,
     })
+}
+
+/// The loop of a firmware: nominal model and gains of a run whose controller is an observer, or those of the `controller.json` of a redesign
+/// by LQG.
+///
+/// # Errors
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a source whose controller is no observer.
+pub fn loop_for_export(source: &Path) -> Result<LoopExport> {
+    if source.is_dir() { loop_of_run(source) } else { loop_of_redesign(source) }
+}
+
+fn loop_of_run(run: &Path) -> Result<LoopExport> {
+    require_run(run)?;
+    let (path, settings) = (run.join("2-factor/nominal.json"), RunSettings::read(&run.join("run.toml"))?);
+    let nominal = read_model(&path)?;
+    let time = nominal.system.time();
+    let RealisedController::Observer { f, l } = settings.controller.realise(run, time)? else {
+        let problem = "the controller of this run is no observer with gains; the loop of the firmware needs [controller.observer], and \
+                       --to c-controller exports any controller";
+        return Err(not(run, problem));
+    };
+    // States of one size, which single precision needs.
+    let scale = nominal.system.state_scales()?;
+    let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
+    let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
+    Ok(LoopExport {
+        name: "loop".into(),
+        observer: ObserverData::new(&nominal.system.with_scaled_states(&scale), f.as_ref(), l.as_ref()),
+        measured: nominal.outputs,
+        commanded: nominal.inputs,
+        ts: time.ts(),
+        origin: origin(run, &path)?,
+    })
+}
+
+fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    let found: Option<ExportedController> = serde_json::from_slice(&bytes).ok();
+    let Some(ExportedController { observer: Some(observer), ts, measured, commanded, .. }) = found else {
+        let problem = "this is neither a run folder nor the controller.json of a redesign by LQG";
+        return Err(not(path, problem));
+    };
+    let origin = origin(path, path)?;
+    Ok(LoopExport { name: "loop".into(), measured, commanded, observer, ts, origin })
 }
 
 /// Q from either kind of file.

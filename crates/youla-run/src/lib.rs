@@ -70,7 +70,7 @@ pub use controller_errors::{
 pub use entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
 pub use error::{Error, Result};
 pub use excite::{ExcitationPort, RunExcitation, excite_run, write_excitation};
-pub use export::{controller_for_export, model_for_export};
+pub use export::{controller_for_export, loop_for_export, model_for_export};
 pub use factorise::{DeclaredLoop, LoopFactors, declared_loop, factorise, factorise_run};
 pub use findings::cautions;
 pub use folder::write_artefacts;

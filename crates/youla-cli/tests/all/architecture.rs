@@ -16,7 +16,20 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("youla-report", &["youla"]),
     ("youla-run", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report"]),
     ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-rt", "youla-run"]),
-    ("youla-commission", &["youla", "youla-io", "youla-link", "youla-loop", "youla-paper", "youla-rt", "youla-run"]),
+    (
+        "youla-commission",
+        &[
+            "youla",
+            "youla-io",
+            "youla-link",
+            "youla-loop",
+            "youla-paper",
+            "youla-rt",
+            "youla-run",
+            "youla-report",
+            "youla-rig",
+        ],
+    ),
     (
         "youla-cli",
         &[

@@ -7,6 +7,7 @@
 
 mod c;
 mod c_controller;
+mod c_loop;
 mod controller;
 mod json;
 mod matlab;
@@ -19,6 +20,7 @@ mod sequence;
 mod text;
 
 pub use c_controller::{CController, ControllerExport, c_controller};
+pub use c_loop::{LoopExport, c_loop};
 pub use controller::{ExportedController, ObserverData};
 pub use precision::SingleError;
 pub use read::{model_from_bytes, read_model};

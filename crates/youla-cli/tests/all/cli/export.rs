@@ -77,6 +77,9 @@ fn the_controller_of_a_run_goes_to_firmware() {
     let q = ["export", run, "--to", "c-controller", "--q", deviation.to_str().expect("text"), "--out", "q.h"];
     done(&youla(&folder, &q));
     assert!(fs::read_to_string(folder.join("q.h")).expect("written").contains("Controller J_K(Q) with a Q of "));
+
+    done(&youla(&folder, &["export", run, "--to", "c-loop"]));
+    assert!(fs::read_to_string(folder.join("loop.h")).expect("written").contains("loop_switch_q"));
 }
 
 #[test]
@@ -85,7 +88,16 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     let run = demo().to_str().expect("text");
     fs::write(folder.join("recommended.npz"), "mine").expect("writable");
     fs::write(folder.join("odd.json"), "{\"refused\": \"too few samples\"}").expect("writable");
-    let cases: [(&[&str], &str); 8] = [
+    // The same run with a controller that is no observer.
+    fs::create_dir_all(folder.join("other/2-factor")).expect("writable");
+    for file in ["summary.json", "2-factor/nominal.json"] {
+        fs::copy(demo().join(file), folder.join("other").join(file)).expect("writable");
+    }
+    let settings = fs::read_to_string(demo().join("run.toml")).expect("written");
+    let (head, _) = settings.split_once("[controller").expect("a controller");
+    let other = "[controller.state_space]\ndomain = \"discrete\"\nfeedback = \"positive\"\na = []\nb = []\nc = [[]]\nd = [[-1.0]]\n";
+    fs::write(folder.join("other/run.toml"), head.to_owned() + other).expect("writable");
+    let cases: [(&[&str], &str); 11] = [
         (
             &["export", run, "--to", "npz"],
             "recommended.npz exists already; choose another file, or replace it with --force",
@@ -99,6 +111,9 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
         (&["export", "odd.json", "--to", "npz"], "there is no model; it was refused: too few samples"),
         (&["export", "odd.json", "--to", "npz", "--model", "hansen"], "a model is chosen by name in a run folder only"),
         (&["export", "odd.json", "--to", "c-controller"], "this is no run folder"),
+        (&["export", "other", "--to", "c-loop"], "needs [controller.observer]"),
+        (&["export", "odd.json", "--to", "c-loop"], "neither a run folder nor the controller.json"),
+        (&["export", run, "--to", "c-loop", "--model", "nominal"], "--model does not serve --to c-loop"),
         (&["export", run, "--to", "c", "--q", "odd.json"], "--q serves --to c-controller only"),
     ];
     for (arguments, sentence) in cases {
@@ -112,7 +127,7 @@ fn what_cannot_be_exported_is_refused_and_leaves_nothing() {
     );
     let mut left: Vec<_> = fs::read_dir(&folder).expect("there").map(|e| e.expect("readable").file_name()).collect();
     left.sort();
-    assert_eq!(left, ["odd.json", "recommended.npz"]);
+    assert_eq!(left, ["odd.json", "other", "recommended.npz"]);
     assert_eq!(fs::read(folder.join("recommended.npz")).expect("there"), b"mine");
     done(&youla(&folder, &["export", run, "--to", "npz", "--force"]));
     assert!(read_model(folder.join("recommended.npz")).is_ok());

@@ -3,6 +3,7 @@
 //! and fail where the program is absent.
 
 mod c;
+mod c_loop;
 mod scripts;
 
 use std::ffi::OsStr;

@@ -11,7 +11,7 @@
 //! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
 //! | [`read_npz`], [`NpyStream`] | NumPy archives and arrays |
 //! | [`read_uff58`] | universal files, dataset 58: measured responses |
-//! | [`read_parquet`], [`ParquetWriter`](crate::ParquetWriter) | Parquet, with the feature `parquet` |
+//! | [`read_parquet`], `ParquetWriter` | Parquet, with the feature `parquet` |
 //! | [`Variables`] | the contents of a MATLAB, NumPy or Parquet file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
 //! | [`ModelFile`] | the JSON form of a discrete-time model |

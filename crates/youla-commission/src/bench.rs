@@ -1,158 +1,88 @@
-//! Controller and plant in lock-step, and the log of the rows that the controller sends.
+//! What a point works with: the twin in lock-step, or a machine over its link.
 
-use crate::target::{Target, failed};
-use crate::{Error, Result};
-use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request, RowBlock, RowShape};
-use youla_paper::rig::{BearingRig, Rig};
-use youla_rt::{Checksum, Phase, Status, Trip};
-
-const SHAPE: RowShape = RowShape { inputs: 2, outputs: 2 };
+use crate::Result;
+use crate::link::Link;
+use crate::lock_step::LockStep;
+use crate::parameter::LoadedQ;
+use crate::station::Q_STATES;
+use youla_link::{LARGEST_CHUNK, Request};
+use youla_rt::{Checksum, Trip};
 
 /// A row: y, u, alpha, beta.
 pub(crate) type LogRow = [f64; 8];
 
-/// The controller with the twin.
-pub(crate) struct Bench {
-    target: Target,
-    plant: BearingRig,
-    schema: u32,
-    sequence: u32,
-    reply: Option<(Outcome, Status)>,
-    /// Rows since the last [`Bench::take_rows`].
-    rows: Vec<LogRow>,
-    status: Option<Status>,
-    frame: Vec<u8>,
-    next: u64,
+/// A machine with its controller.
+pub(crate) enum Bench {
+    /// The twin in this process.
+    Twin(Box<LockStep>),
+    /// Any machine that speaks youla-link.
+    Link(Link),
 }
 
 impl Bench {
-    /// At rest.
-    ///
-    /// # Errors
-    /// As [`Bench::ask`].
-    pub(crate) fn new(target: Target, plant: BearingRig) -> Result<Self> {
-        let mut bench = Bench {
-            target,
-            plant,
-            schema: 0,
-            sequence: 0,
-            reply: None,
-            rows: Vec::new(),
-            status: None,
-            frame: Vec::new(),
-            next: 0,
-        };
-        bench.ask(&Request::Describe)?;
-        Ok(bench)
-    }
-
-    /// One sample.
-    fn sample(&mut self, request: &[u8]) -> Result<()> {
-        let mut frame = std::mem::take(&mut self.frame);
-        frame.clear();
-        let u = self.target.receive(&mut frame)?;
-        let taken = self.take(&frame);
-        self.frame = frame;
-        taken?;
-        let y = self.plant.measure().map(|y| y as f32);
-        self.target.send(&y, request)?;
-        self.plant.actuate(u.map(f64::from));
-        Ok(())
-    }
-
-    fn take(&mut self, bytes: &[u8]) -> Result<()> {
-        if bytes.is_empty() {
-            return Ok(());
-        }
-        let damaged = || failed("sent a frame that cannot be read");
-        let frame = Frame::read(bytes).map_err(|_| damaged())?;
-        self.schema = frame.schema;
-        if frame.kind == Kind::Reply {
-            let reply = Reply::read(frame.body).ok_or_else(damaged)?;
-            self.reply = Some((reply.outcome, reply.status));
-            return Ok(());
-        }
-        let block = RowBlock::read(frame.body, SHAPE).ok_or_else(damaged)?;
-        for row in block.rows() {
-            if row.sample != self.next {
-                return Err(failed("left rows out of its log"));
-            }
-            self.next += 1;
-            self.status = Some(row.status);
-            let mut values = [0.0; 8];
-            values.iter_mut().zip(row.values()).for_each(|(place, value)| *place = value.into());
-            self.rows.push(values);
-        }
-        Ok(())
-    }
-
     /// Runs so many samples, rounded up to whole frames.
     ///
     /// # Errors
-    /// [`Error::Controller`] for a controller that stops or sends what cannot be read.
+    /// [`crate::Error::Controller`] for a controller that stops or sends what cannot be read; [`crate::Error::Refused`] where rows were lost on
+    /// the way.
     pub(crate) fn run(&mut self, samples: usize) -> Result<()> {
-        let until = self.rows.len() + samples;
-        while self.rows.len() < until {
-            self.sample(&[])?;
+        match self {
+            Bench::Twin(twin) => twin.run(samples),
+            Bench::Link(link) => link.run(samples, false),
         }
-        Ok(())
     }
 
     /// As [`Bench::run`], until the guard ends the excitation.
     pub(crate) fn excite(&mut self, samples: usize) -> Result<()> {
-        let until = self.rows.len() + samples;
-        while self.rows.len() < until && self.trip().is_none() {
-            self.sample(&[])?;
+        match self {
+            Bench::Twin(twin) => twin.excite(samples),
+            Bench::Link(link) => link.run(samples, true),
         }
-        Ok(())
     }
 
-    /// Sends a request and awaits its reply. The bench is behind a frame of rows before and after it.
+    /// Sends a request and awaits its reply.
     ///
     /// # Errors
-    /// [`Error::Controller`] where it is refused.
-    pub(crate) fn ask(&mut self, request: &Request<'_>) -> Result<Status> {
-        self.sequence += 1;
-        let mut body = [0; 4 * LARGEST_CHUNK + 8];
-        let too_long = || failed("takes no request of this length");
-        let length = request.write(&mut body).ok_or_else(too_long)?;
-        let body = body.get(..length).unwrap_or_default();
-        let mut bytes = [0; LARGEST_FRAME];
-        let frame = Frame { kind: Kind::Request, schema: self.schema, sequence: self.sequence, body };
-        let length = frame.write(&mut bytes).map_err(|_| too_long())?;
-        self.reply = None;
-        self.sample(bytes.get(..length).unwrap_or_default())?;
-        self.run(1)?;
-        match self.reply.take() {
-            Some((Outcome::Done, status)) => Ok(status),
-            Some((outcome, _)) => Err(Error::Controller { problem: format!("refused a request: {outcome:?}") }),
-            None => Err(failed("does not answer")),
+    /// [`crate::Error::Controller`] where it is refused.
+    pub(crate) fn ask(&mut self, request: &Request<'_>) -> Result<()> {
+        match self {
+            Bench::Twin(twin) => twin.ask(request).map(drop),
+            Bench::Link(link) => link.ask(request),
         }
     }
 
-    /// Loads coefficients of Q, A, B, C by rows.
+    /// Loads Q without switching to it.
     ///
     /// # Errors
     /// As [`Bench::ask`].
-    pub(crate) fn load(&mut self, coefficients: &[f32]) -> Result<()> {
+    pub(crate) fn load(&mut self, q: &LoadedQ) -> Result<()> {
+        let states = match self {
+            Bench::Twin(_) => Q_STATES,
+            Bench::Link(link) => link.q_states(),
+        };
         self.ask(&Request::BeginQ)?;
-        let bytes: Vec<u8> = coefficients.iter().flat_map(|value| value.to_le_bytes()).collect();
+        let bytes: Vec<u8> = q.coefficients(states).iter().flat_map(|value| value.to_le_bytes()).collect();
         for (number, values) in bytes.chunks(4 * LARGEST_CHUNK).enumerate() {
             self.ask(&Request::WriteQ { place: (number * LARGEST_CHUNK) as u16, values })?;
         }
         let mut checksum = Checksum::new();
         checksum.append(&bytes);
-        self.ask(&Request::CommitQ(checksum.value()))?;
-        Ok(())
+        self.ask(&Request::CommitQ(checksum.value()))
     }
 
     /// The rows since the last call.
     pub(crate) fn take_rows(&mut self) -> Vec<LogRow> {
-        std::mem::take(&mut self.rows)
+        match self {
+            Bench::Twin(twin) => twin.take_rows(),
+            Bench::Link(link) => link.take_rows(),
+        }
     }
 
     /// What the guard found, while it has tripped.
     pub(crate) fn trip(&self) -> Option<Trip> {
-        self.status.filter(|status| status.phase() == Phase::Tripped)?.trip()
+        match self {
+            Bench::Twin(twin) => twin.trip(),
+            Bench::Link(link) => link.trip(),
+        }
     }
 }

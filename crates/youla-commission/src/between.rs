@@ -9,7 +9,6 @@ use crate::point::{FIRST, Operator, Point};
 use crate::q_table::point_q;
 use crate::record::{PointRecord, PointStatus, io, read_json, write_json, write_text};
 use crate::running::RunningLoop;
-use crate::station::Q_STATES;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -166,7 +165,7 @@ fn evidence(ends: &Ends<'_>, out: &Path, record: &mut BetweenRecord) -> Result<L
     let Some(found) = between_points(q, s)? else {
         return refuse("a loop between the points is not stable, or too near to it: add a point between them".into());
     };
-    let halfway = q_between(q, 0.5, Q_STATES)?;
+    let halfway = q_between(q, 0.5, ends.running.q_states)?;
     let BetweenPoints { gain, room, change, q_room, .. } = found;
     let region = |i: usize| ends.records[i].region.unwrap_or(f64::INFINITY);
     let figures = Evidence { gain, room, change, region: region(0).max(region(1)), q_room, q_error: halfway.error };
@@ -179,7 +178,7 @@ fn evidence(ends: &Ends<'_>, out: &Path, record: &mut BetweenRecord) -> Result<L
             figures.region, figures.q_error
         ));
     }
-    loaded(&halfway.q)
+    loaded(&halfway.q, ends.running.q_states)
 }
 
 /// Runs the machine halfway with its Q.
@@ -191,7 +190,7 @@ fn checked(
 ) -> Result<()> {
     let mut point = Point::new(campaign, halfway, ends.running, bench);
     point.record.amplitude = ends.records[0].amplitude.min(ends.records[1].amplitude);
-    point.record.seconds = FIRST as f64 * ends.running.nominal.time().ts();
+    point.record.seconds = FIRST;
     let bound = |i: usize| ends.records[i].predicted.map_or(f64::INFINITY, |predicted| predicted.bounds[0]);
     let expected = bound(0).min(bound(1));
     record.expected = Some(expected);

@@ -17,6 +17,9 @@ pub struct Campaign {
     /// Image of the firmware for QEMU, relative to the file; the controller runs on the host where it or QEMU is absent.
     #[serde(default)]
     pub image: Option<PathBuf>,
+    /// Address of a machine that speaks youla-link, as `youla rig` takes it; absent for the twin in this process.
+    #[serde(default)]
+    pub machine: Option<String>,
     /// What no experiment may exceed.
     pub limits: CampaignLimits,
     /// What is wanted.
@@ -114,6 +117,12 @@ impl Campaign {
         let bad = positive.iter().find(|(_, value)| !(*value > 0.0 && value.is_finite()));
         if let Some((key, value)) = bad {
             return Some(format!("{key} is {value}, but must be a number above 0"));
+        }
+        let of_twin = self.image.is_some() || self.points.iter().any(|point| point.cross_coupling != 0.0);
+        if self.machine.is_some() && of_twin {
+            return Some(
+                "`image` and `cross_coupling` belong to the twin; leave them out where `machine` is given".into(),
+            );
         }
         if self.points.is_empty() {
             return Some("there is no operating point; add [[points]]".into());

@@ -3,6 +3,8 @@
 use crate::bench::{Bench, LogRow};
 use crate::between::{BetweenRecord, Ends, between, pairs};
 use crate::campaign::{Campaign, OperatingPoint};
+use crate::link::Link;
+use crate::lock_step::LockStep;
 use crate::point::{Operator, Point, PointFiles, RAMP};
 use crate::q_table::write_tables;
 use crate::record::{CampaignSummary, PointRecord, PointStatus, io, read_json, write_json, write_text};
@@ -21,7 +23,7 @@ use youla_paper::rig::{BearingRig, Fidelity, RigParameters};
 use youla_run::{StageClock, write_run};
 
 /// Sample time of the twin, seconds.
-pub(crate) const TS: f64 = 2e-4;
+const TS: f64 = 2e-4;
 /// Consecutive samples for which an input may be clipped, and equal values after which an output counts as stuck.
 const CLIPPED: u16 = 50;
 const STUCK: u16 = 50;
@@ -34,11 +36,9 @@ const STUCK: u16 = 50;
 pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Result<CampaignSummary> {
     let campaign = Campaign::read(path)?;
     let folder = path.parent().unwrap_or(Path::new(""));
-    let time = Discrete::new(TS)?;
-    let loops = campaign.points.iter().map(|point| RunningLoop::read(&folder.join(&point.running), time));
-    let loops: Vec<RunningLoop> = loops.collect::<Result<_>>()?;
+    let loops = loops(&campaign, folder)?;
     let image = campaign.image.as_ref().map(|image| folder.join(image));
-    let controller = Target::place(image.as_deref());
+    let controller = campaign.machine.as_deref().unwrap_or_else(|| Target::place(image.as_deref()));
     claim(&campaign, &loops, controller, out)?;
     let mut points = Vec::new();
     let pairs = pairs(&campaign, &loops);
@@ -79,6 +79,25 @@ pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Resul
     }
     write_tables(&campaign, &ways, out)?;
     summarise(&points, &ways)
+}
+
+/// The loops of the points, at the sample time of the machine.
+fn loops(campaign: &Campaign, folder: &Path) -> Result<Vec<RunningLoop>> {
+    let files = campaign.points.iter().map(|point| folder.join(&point.running));
+    let Some(address) = &campaign.machine else {
+        let time = Discrete::new(TS)?;
+        return files.map(|file| RunningLoop::read(&file, time)).collect();
+    };
+    let rig = youla_rig::Rig::connect(address)?;
+    let machine = rig.description();
+    let shape = machine.shape();
+    let refuse = |problem: String| Err(Error::Controller { problem });
+    if (shape.inputs, shape.outputs) != (2, 2) {
+        return refuse(format!("has {} inputs and {} outputs; a campaign takes 2 and 2", shape.inputs, shape.outputs));
+    }
+    let Some(q_states) = machine.q_order else { return refuse("states no q_order: it takes no Q".into()) };
+    let time = Discrete::new(machine.sample_time)?;
+    files.map(|file| RunningLoop::of_machine(&file, time, q_states)).collect()
 }
 
 /// What a folder belongs to.
@@ -137,13 +156,17 @@ pub(crate) fn start(
     running: &RunningLoop,
     image: Option<&Path>,
 ) -> Result<Bench> {
+    let limits = &campaign.limits;
+    if let Some(address) = &campaign.machine {
+        return Ok(Bench::Link(Link::connect(address, [limits.output, limits.input, limits.residual])?));
+    }
     let mut parameters = RigParameters::shipped();
     parameters.rotation.cross_coupling.value = at.cross_coupling;
     let plant = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, campaign.seed)?;
-    let limits = &campaign.limits;
     let [y, beta, u, rate] = [limits.output, limits.residual, limits.input, 2.0 * limits.input];
     let of_guard = [y, y, beta, beta, u, u, rate, rate];
-    Bench::new(Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?, plant)
+    let target = Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?;
+    Ok(Bench::Twin(Box::new(LockStep::new(target, plant)?)))
 }
 
 /// The record last: a point without it is run again.

@@ -11,6 +11,8 @@ mod commission;
 mod error;
 mod figures;
 mod identify;
+mod link;
+mod lock_step;
 mod parameter;
 mod point;
 mod proposal;

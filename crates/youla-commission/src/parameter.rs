@@ -1,7 +1,6 @@
 //! A new controller as a Q around the running one: each controller that stabilises the nominal model is K(Q) of a stable Q.
 
 use crate::running::{RunningLoop, padded};
-use crate::station::Q_STATES;
 use crate::{Error, Result};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
@@ -9,10 +8,16 @@ use youla::lti::{Discrete, StateSpace};
 /// Q as the firmware runs it.
 #[derive(Debug, Clone)]
 pub(crate) struct LoadedQ {
-    /// Its coefficients, rounded to single precision: A, B, C by rows.
-    pub(crate) coefficients: Vec<f32>,
-    /// The same numbers as a system.
+    /// Its coefficients, rounded to single precision.
     pub(crate) system: StateSpace<Discrete>,
+}
+
+impl LoadedQ {
+    /// A, B, C by rows for a bank of so many states, filled up with zeros.
+    pub(crate) fn coefficients(&self, states: usize) -> Vec<f32> {
+        let q = &self.system;
+        [padded(q.a(), states, states), padded(q.b(), states, q.inputs()), padded(q.c(), q.outputs(), states)].concat()
+    }
 }
 
 /// Q from beta to alpha with K(Q) = `controller`, `J_G` closed with it; its order is the sum of both.
@@ -21,30 +26,28 @@ pub(crate) struct LoadedQ {
 /// [`Error::Controller`] where the firmware cannot run it: too many states, a feedthrough, or unstable, as it is where the controller does
 /// not stabilise the nominal model.
 pub(crate) fn parameter_of(running: &RunningLoop, controller: &StateSpace<Discrete>) -> Result<LoadedQ> {
-    loaded(&running.factors.j_g()?.lower_lft(controller)?)
+    loaded(&running.factors.j_g()?.lower_lft(controller)?, running.q_states)
 }
 
-/// Q with its coefficients.
+/// Q for a bank of so many states, in single precision.
 ///
 /// # Errors
 /// As [`parameter_of`].
-pub(crate) fn loaded(q: &StateSpace<Discrete>) -> Result<LoadedQ> {
+pub(crate) fn loaded(q: &StateSpace<Discrete>, most: usize) -> Result<LoadedQ> {
     let q = q.balanced()?;
     let refuse = |problem: String| Err(Error::Controller { problem });
-    if q.order() > Q_STATES {
-        return refuse(format!("takes a Q of at most {Q_STATES} states; this one has {}", q.order()));
+    if q.order() > most {
+        return refuse(format!("takes a Q of at most {most} states; this one has {}", q.order()));
     }
     if q.d().norm_max() > 1e-9 {
         return refuse("takes no Q with a feedthrough, which needs the measurement before the command".into());
     }
-    let coefficients =
-        [padded(q.a(), Q_STATES, Q_STATES), padded(q.b(), Q_STATES, 2), padded(q.c(), 2, Q_STATES)].concat();
     let single = |m: youla::MatRef<'_, f64>| Mat::from_fn(m.nrows(), m.ncols(), |i, j| f64::from(m[(i, j)] as f32));
     let system = StateSpace::new(single(q.a()), single(q.b()), single(q.c()), Mat::zeros(2, 2), q.time())?;
     if !system.is_stable()? {
         return refuse("takes no unstable Q; the new controller does not stabilise the nominal model".into());
     }
-    Ok(LoadedQ { coefficients, system })
+    Ok(LoadedQ { system })
 }
 
 /// What an excitation of K(Q) is at the plant input: the inputs that it causes while the outputs are zero.

@@ -9,23 +9,27 @@ use crate::proposal::{Outcome, Proposal, propose};
 use crate::record::{PointRecord, PointStatus};
 use crate::running::RunningLoop;
 use crate::{Error, Result};
+use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla_link::{Request, Source};
 use youla_run::Identification;
 
-/// Samples without excitation before and after each step: transients of the loop decay.
-const REST: usize = 5_000;
-/// Samples of the small excitation, and of the first recording.
-const SMALL: usize = 5_000;
-pub(crate) const FIRST: usize = 30_000;
+/// Seconds without excitation before and after each step: transients of the loop decay.
+const REST: f64 = 1.0;
+/// Seconds of the small excitation, and of the first recording.
+const SMALL: f64 = 1.0;
+pub(crate) const FIRST: f64 = 6.0;
 /// Amplitude of the small excitation as a share of the largest.
 const SMALL_SHARE: f64 = 0.1;
 /// Share of a limit that the recording may use, by the response to the small excitation.
 const USED: f64 = 0.8;
+/// Relative difference of residuals above which the machine runs another loop than stated; single precision makes less than 1e-4.
+const ANOTHER_LOOP: f64 = 0.01;
 /// Samples of the ramp.
 pub(crate) const RAMP: u16 = 500;
-/// Order of the register of the excitation, and samples of each of its values: power up to 625 Hz at 5 kHz.
-const PRBS: Source = Source::Prbs { order: 18, hold: 8 };
+/// Order of the register of the excitation, and seconds of each of its values: power up to 625 Hz.
+const ORDER: u8 = 18;
+const HOLD: f64 = 1.6e-3;
 
 /// What is asked of a person before a switch, and said meanwhile.
 pub trait Operator {
@@ -90,14 +94,31 @@ impl<'a> Point<'a> {
         Ok((self.record, files))
     }
 
+    /// At least one.
+    fn samples(&self, seconds: f64) -> usize {
+        (seconds / self.running.nominal.time().ts()).round().max(1.0) as usize
+    }
+
+    fn rest(&mut self) -> Result<()> {
+        let samples = self.samples(REST);
+        self.bench.run(samples)
+    }
+
     /// Alpha and Q to zero.
     pub(crate) fn silence(&mut self) -> Result<()> {
         self.bench.ask(&Request::Stop)?;
         self.bench.ask(&Request::ReleaseQ)?;
-        self.bench.run(REST)
+        self.rest()
     }
 
     fn circle(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<()> {
+        if self.campaign.machine.is_some() {
+            let question =
+                format!("{}: is the machine at {:.0} rpm, and may it be excited?", self.at.name, self.at.rpm);
+            if !operator.confirms(&question) {
+                return refuse("the operating point was not confirmed".into());
+            }
+        }
         operator.notes("check of the loop");
         let still = self.at_rest()?;
         operator.notes("small excitation");
@@ -146,9 +167,9 @@ impl<'a> Point<'a> {
 
     /// Largest magnitudes of the signals without excitation.
     pub(crate) fn at_rest(&mut self) -> Result<[f64; 8]> {
-        self.bench.run(REST)?;
+        self.rest()?;
         self.bench.take_rows();
-        self.bench.run(REST)?;
+        self.rest()?;
         let largest = largest(&self.bench.take_rows());
         if let Some(trip) = self.bench.trip() {
             return refuse(format!("without an excitation the guard has tripped: {}", trip.cause));
@@ -180,8 +201,9 @@ impl<'a> Point<'a> {
     fn amplitude(&mut self, still: &[f64; 8]) -> Result<f64> {
         let most = self.campaign.limits.excitation;
         let small = SMALL_SHARE * most;
-        let rows = self.excited(small, SMALL)?;
+        let rows = self.excited(small, self.samples(SMALL))?;
         self.stopped()?;
+        self.runs_the_loop(&rows)?;
         let excited = largest(&rows);
         let mut amplitude = most;
         for (at, name, limit) in self.limits() {
@@ -198,10 +220,30 @@ impl<'a> Point<'a> {
         Ok(amplitude)
     }
 
+    /// Whether the residuals of the machine are those of the loop that its file states.
+    fn runs_the_loop(&self, rows: &[LogRow]) -> Result<()> {
+        let signal = |first: usize| Mat::from_fn(rows.len(), 2, |i, j| rows[i][first + j]);
+        let (y, u, beta) = (signal(0), signal(2), signal(6));
+        let signals = self.running.factors.signals(u.as_ref(), y.as_ref())?;
+        // From the second half on the filters have settled.
+        let half = rows.len() / 2;
+        let logged = beta.subrows(half, rows.len() - half);
+        let error = (signals.beta().subrows(half, rows.len() - half) - logged).norm_l2() / logged.norm_l2();
+        match error <= ANOTHER_LOOP {
+            true => Ok(()),
+            false => refuse(format!(
+                "the machine does not run the loop of {}: its residuals differ from those of the file by {:.1} %",
+                self.at.running.display(),
+                100.0 * error
+            )),
+        }
+    }
+
     /// Arms, starts and runs over the ramp, then records.
     fn excited(&mut self, amplitude: f64, samples: usize) -> Result<Vec<LogRow>> {
         self.bench.ask(&Request::Arm)?;
-        self.bench.ask(&Request::Start { source: PRBS, amplitude: amplitude as f32 })?;
+        let source = Source::Prbs { order: ORDER, hold: self.samples(HOLD) as u16 };
+        self.bench.ask(&Request::Start { source, amplitude: amplitude as f32 })?;
         self.bench.excite(RAMP.into())?;
         self.bench.take_rows();
         self.recorded_rows(samples)
@@ -217,7 +259,7 @@ impl<'a> Point<'a> {
 
     fn stopped(&mut self) -> Result<()> {
         self.bench.ask(&Request::Stop)?;
-        self.bench.run(REST)?;
+        self.rest()?;
         self.bench.take_rows();
         Ok(())
     }
@@ -226,7 +268,7 @@ impl<'a> Point<'a> {
     pub(crate) fn recorded(&mut self, operator: &mut dyn Operator, files: &mut PointFiles) -> Result<Box<Proposal>> {
         let ts = self.running.nominal.time().ts();
         let most = (self.campaign.limits.duration / ts) as usize;
-        files.log = self.excited(self.record.amplitude, FIRST.min(most))?;
+        files.log = self.excited(self.record.amplitude, self.samples(FIRST).min(most))?;
         loop {
             self.record.seconds = files.log.len() as f64 * ts;
             operator.notes(&format!("identification from {:.1} s", self.record.seconds));
@@ -251,11 +293,11 @@ impl<'a> Point<'a> {
 
     /// Loads and switches, rests, and records the verification.
     pub(crate) fn switched(&mut self, q: &LoadedQ) -> Result<Vec<LogRow>> {
-        self.bench.load(&q.coefficients)?;
+        self.bench.load(q)?;
         self.bench.ask(&Request::Arm)?;
         self.bench.ask(&Request::SwitchQ)?;
         self.record.switches += 1;
-        self.bench.excite(REST)?;
+        self.bench.excite(self.samples(REST))?;
         if let Some(trip) = self.bench.trip() {
             return refuse(format!("after the switch the guard has tripped: {}", trip.cause));
         }

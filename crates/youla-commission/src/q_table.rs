@@ -108,18 +108,18 @@ pub(crate) fn write_tables(campaign: &Campaign, between: &[BetweenRecord], out: 
     let mut chains: Vec<QTable> = Vec::new();
     for way in between.iter().filter(|way| way.status == PointStatus::Done) {
         let Some(evidence) = way.evidence else { continue };
-        let at = |name: &str| -> Result<Option<QAtSpeed>> {
-            let Some(point) = campaign.points.iter().find(|point| point.name == name) else { return Ok(None) };
+        let at = |name: &str| -> Result<QAtSpeed> {
+            let rpm = campaign.points.iter().find(|point| point.name == name).map_or(f64::NAN, |point| point.rpm);
             let q = SystemMatrices::new(&point_q(&out.join(name))?);
-            Ok(Some(QAtSpeed { name: name.into(), rpm: point.rpm, q }))
+            Ok(QAtSpeed { name: name.into(), rpm, q })
         };
-        let (Some(from), Some(to)) = (at(&way.from)?, at(&way.to)?) else { continue };
+        let (from, to, ts) = (at(&way.from)?, at(&way.to)?, point_q(&out.join(&way.from))?.time().ts());
         match chains.iter_mut().find(|chain| chain.points.last().is_some_and(|last| last.name == from.name)) {
             Some(chain) => {
                 chain.points.push(to);
                 chain.between.push(evidence);
             }
-            None => chains.push(QTable { ts: crate::commission::TS, points: vec![from, to], between: vec![evidence] }),
+            None => chains.push(QTable { ts, points: vec![from, to], between: vec![evidence] }),
         }
     }
     for (number, chain) in chains.iter().enumerate() {

@@ -1,6 +1,6 @@
 //! The loop as it is described: nominal model, gains, factors, and the numbers that the firmware takes.
 
-use crate::station::{NUMBERS, STATES};
+use crate::station::{NUMBERS, Q_STATES, STATES};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -45,6 +45,8 @@ pub(crate) struct RunningLoop {
     pub(crate) f: Mat<f64>,
     pub(crate) l: Mat<f64>,
     pub(crate) factors: CoprimeFactors<Discrete>,
+    /// Largest order of Q.
+    pub(crate) q_states: usize,
 }
 
 impl RunningLoop {
@@ -75,6 +77,21 @@ impl RunningLoop {
         Ok(running)
     }
 
+    /// The loop that a machine with banks of `q_states` states runs.
+    ///
+    /// # Errors
+    /// As [`RunningLoop::read`].
+    pub(crate) fn of_machine(path: &Path, time: Discrete, q_states: usize) -> Result<Self> {
+        let running = Self::of_any_size(LoopDescription::of_file(path)?, path, time)?;
+        let ports = (running.nominal.inputs(), running.nominal.outputs());
+        if ports != (2, 2) {
+            let problem =
+                format!("a campaign takes 2 inputs and 2 outputs; the nominal model has {} and {}", ports.0, ports.1);
+            return Err(Error::Campaign { path: path.to_owned(), problem });
+        }
+        Ok(RunningLoop { q_states, ..running })
+    }
+
     /// A loop that need not fit the firmware of a campaign.
     pub(crate) fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -88,7 +105,7 @@ impl RunningLoop {
         let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
         let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
         let factors = CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref())?;
-        Ok(RunningLoop { description, nominal: balanced, f, l, factors })
+        Ok(RunningLoop { description, nominal: balanced, f, l, factors, q_states: Q_STATES })
     }
 
     /// What [`crate::station::station`] takes.

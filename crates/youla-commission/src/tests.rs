@@ -1,13 +1,15 @@
 //! The circle on the twin: on the host in every run, over seeds in QEMU on request.
 
 use crate::bench::Bench;
+use crate::lock_step::LockStep;
 use crate::parameter::parameter_of;
 use crate::point::{Operator, Point, PointFiles, RAMP};
 use crate::running::{LoopDescription, RunningLoop};
 use crate::station::Q_STATES;
 use crate::target::Target;
 use crate::{
-    Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, commission,
+    Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, TwinPlant,
+    commission, serve_loop,
 };
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -157,12 +159,12 @@ fn a_switch_that_goes_wrong_is_taken_back() {
     let running = RunningLoop::read(&example().join("weak.toml"), Discrete::new(2e-4).unwrap()).unwrap();
     let plant = BearingRig::new(&RigParameters::shipped(), Fidelity::Rotating { rpm: 0.0 }, 1).unwrap();
     let numbers = running.numbers(&[12.0, 12.0, 12.0, 12.0, 5.0, 5.0, 10.0, 10.0], [50, 50, RAMP]);
-    let bench = Bench::new(Target::start(None, &numbers).unwrap(), plant).unwrap();
+    let bench = LockStep::new(Target::start(None, &numbers).unwrap(), plant).unwrap();
+    let bench = Bench::Twin(Box::new(bench));
     let mut point = Point::new(&campaign, &campaign.points[0], &running, bench);
     point.record.amplitude = 0.5;
     let mut proposal = point.recorded(&mut Person::default(), &mut PointFiles::default()).unwrap();
-    let of_c = proposal.new.q.coefficients.len() - 2 * Q_STATES;
-    proposal.new.q.coefficients[of_c..].iter_mut().for_each(|value| *value *= -20.0);
+    proposal.new.q.system = proposal.new.q.system.map_output(&(faer::Scale(-20.0) * eye(2)));
     let ended = point.verified(&proposal, &mut Vec::new());
     let Err(Error::Refused { reason }) = ended else { panic!("{ended:?}") };
     assert!(reason.contains("guard"), "{reason}");
@@ -185,7 +187,7 @@ fn a_new_controller_is_a_q_around_the_running_one() {
     let f = lqr(g, &weights).unwrap().f;
     let new = observer_controller(g, f.as_ref(), running.l.as_ref()).unwrap();
     let q = parameter_of(&running, &new).unwrap();
-    assert_eq!((q.system.order(), q.coefficients.len()), (12, Q_STATES * (Q_STATES + 4)));
+    assert_eq!((q.system.order(), q.coefficients(Q_STATES).len()), (12, Q_STATES * (Q_STATES + 4)));
     let with_q = running.factors.controller_of(&q.system).unwrap();
     let omega: Vec<f64> = (1..60).map(|k| 250.0 * f64::from(k)).collect();
     let (found, expected) = (frequency_response(&with_q, &omega).unwrap(), frequency_response(&new, &omega).unwrap());
@@ -322,4 +324,42 @@ fn q_over_speed() {
     let (again, person) = place.run(&campaign, "out", false);
     assert_eq!(again.unwrap(), summary);
     assert_eq!(person.notes, ["0 rpm: done before", "fast: done before", "0 rpm to fast: done before"]);
+}
+
+/// The same bearing behind a socket, in lock-step: the figures are those of the campaign on the twin, but for the times of the requests.
+#[test]
+fn a_machine_over_its_link_is_commissioned() {
+    let place = Place::new("link");
+    let socket = std::net::UdpSocket::bind(("127.0.0.1", 0)).unwrap();
+    let address = format!("udp://{}", socket.local_addr().unwrap());
+    let over = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
+    let (end, file) = (over.clone(), place.0.join("weak.toml"));
+    let machine = std::thread::spawn(move || {
+        let plant = TwinPlant::Bearing { fidelity: Fidelity::Rotating { rpm: 0.0 }, cross_coupling: 0.0 };
+        serve_loop(&socket, &file, &plant, (1, true), || end.load(std::sync::atomic::Ordering::Relaxed))
+    });
+    let campaign = Campaign { machine: Some(address.clone()), ..short() };
+    let refused = place.run(&campaign, "refused", false).0.unwrap();
+    assert_eq!(refused.points[0].reason.as_deref(), Some("the operating point was not confirmed"));
+    let summary = place.run(&campaign, "out", true).0.unwrap();
+    let point = &summary.points[0];
+    assert!(summary.done && summary.controller == address, "{:?}", point.reason);
+    let (before, reached) = (summary.damping.before.unwrap(), summary.damping.reached.unwrap());
+    assert!((before / 0.0863 - 1.0).abs() < 0.05, "{before}");
+    assert!(reached > 2.0 * before && reached < 0.22, "{before} {reached}");
+
+    // Another loop in the file than in the machine.
+    let weak = std::fs::read_to_string(place.0.join("weak.toml")).unwrap();
+    let first = weak.split("observer_gain = [[").nth(1).unwrap().split(',').next().unwrap();
+    std::fs::write(place.0.join("other.toml"), weak.replacen(first, "-3.0", 1)).unwrap();
+    let points = vec![OperatingPoint { running: "other.toml".into(), ..campaign.points[0].clone() }];
+    let other = place.run(&Campaign { points, ..campaign.clone() }, "other", true).0.unwrap();
+    let reason = other.points[0].reason.as_deref().unwrap();
+    assert!(reason.contains("does not run the loop of other.toml"), "{reason}");
+    // A limit that the machine itself does not hold.
+    let limits = crate::CampaignLimits { residual: 1e-3, ..campaign.limits };
+    let tight = place.run(&Campaign { limits, ..campaign }, "tight", true).0.unwrap();
+    assert!(tight.points[0].reason.as_deref().unwrap().contains("beta"), "{:?}", tight.points[0].reason);
+    over.store(true, std::sync::atomic::Ordering::Relaxed);
+    machine.join().unwrap().unwrap();
 }

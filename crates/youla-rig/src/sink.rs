@@ -19,7 +19,7 @@ pub struct LogRow<'a> {
 }
 
 /// Takes the rows of a log in the order of their samples.
-pub trait RowSink {
+pub trait RowSink: Send {
     /// A row.
     ///
     /// # Errors

@@ -12,6 +12,7 @@ use crate::{
     commission, serve_loop,
 };
 use std::path::{Path, PathBuf};
+use std::process::Command;
 use std::time::Instant;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr, observer_controller, with_input_port};
 use youla::linalg::eye;
@@ -218,8 +219,13 @@ fn a_campaign_that_cannot_be_run_is_refused_with_the_key() {
 
 /// The same figures, to the last digit, on host and target.
 #[test]
-#[ignore = "needs the image `commission` of firmware/mps2-an386, and qemu-system-arm"]
+#[ignore = "needs qemu-system-arm and the target thumbv7em-none-eabihf"]
 fn the_target_gives_what_the_host_gives() {
+    let mut cargo = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+    cargo.args(["build", "--release", "--locked"]).current_dir(example().join("../../firmware/mps2-an386"));
+    // What concerns the host concerns not the target.
+    cargo.env_remove("RUSTFLAGS").env("CARGO_TARGET_DIR", example().join("../../target/firmware"));
+    assert!(cargo.status().unwrap().success());
     let place = Place::new("target");
     let host = place.run(&short(), "host", true).0.unwrap();
     let image = Campaign::read(&example().join("campaign.toml")).unwrap().image.map(|image| example().join(image));
@@ -243,6 +249,21 @@ fn seeds() {
         let begin = Instant::now();
         let summary = place.run(&campaign, &format!("{seed}"), true).0.unwrap();
         println!("seed {seed}: {}, {:.0} s", summary.controller, begin.elapsed().as_secs_f64());
+        for way in &summary.between {
+            let (evidence, reached) = (way.evidence.unwrap(), way.reached.unwrap().damping);
+            println!(
+                "  {} to {}: {:?}, gain {:.3}, room {:.2}, region {:.2}, change {:.2}, expected {:.4}, reached {reached:.4}",
+                way.from,
+                way.to,
+                way.status,
+                evidence.gain,
+                evidence.room,
+                evidence.region,
+                evidence.change,
+                way.expected.unwrap()
+            );
+            assert!(way.status == PointStatus::Done && evidence.holds(), "{seed} {way:?}");
+        }
         for (at, (all, point)) in campaign.points.iter().zip(points.iter_mut().zip(summary.points)) {
             assert_eq!(point.status, PointStatus::Done, "{seed} {}: {:?}", point.name, point.reason);
             let (predicted, reached) = (point.predicted.unwrap(), point.reached.unwrap());

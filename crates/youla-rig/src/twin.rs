@@ -36,7 +36,7 @@ impl<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M,
     }
 }
 
-/// Serves a twin until `end` says so. Rows go to the host that asked last.
+/// Serves a twin until `end` says so. Rows go to each host that asked within the last second.
 ///
 /// # Errors
 /// [`Error::Connection`].
@@ -47,31 +47,51 @@ pub fn serve<const N: usize, const M: usize, const P: usize, const K: usize, G: 
     end: impl Fn() -> bool,
 ) -> Result<()> {
     let begin = Instant::now();
-    let mut host = None;
+    let mut hosts = Hosts::default();
     let mut done = 0_u64;
     socket.set_read_timeout(Some(Duration::from_micros(500)))?;
     while !end() {
-        let asked = take_request(socket, twin, &mut host)?;
+        let asked = take_request(socket, twin, &mut hosts)?;
         match pace {
             Pace::RealTime(period) => {
                 let due = begin.elapsed().as_nanos() / period.as_nanos().max(1);
                 while u128::from(done) < due {
                     done += 1;
-                    step(socket, twin, host)?;
+                    step(socket, twin, &hosts)?;
                 }
             }
-            Pace::LockStep if asked => while !step(socket, twin, host)? {},
+            Pace::LockStep if asked => while !step(socket, twin, &hosts)? {},
             Pace::LockStep => (),
         }
     }
     Ok(())
 }
 
+/// Hosts with the time of their last request: one records, another may ask for the status meanwhile.
+#[derive(Default)]
+struct Hosts(Vec<(SocketAddr, Instant)>);
+
+/// Time after which a host that asks no more gets no more rows, and most hosts at a time.
+const PRESENT: Duration = Duration::from_secs(1);
+const MOST_HOSTS: usize = 4;
+
+impl Hosts {
+    fn heard(&mut self, host: SocketAddr) {
+        self.0.retain(|(known, at)| *known != host && at.elapsed() < PRESENT);
+        self.0.truncate(MOST_HOSTS - 1);
+        self.0.push((host, Instant::now()));
+    }
+
+    fn present(&self) -> impl Iterator<Item = SocketAddr> {
+        self.0.iter().filter(|(_, at)| at.elapsed() < PRESENT).map(|(host, _)| *host)
+    }
+}
+
 /// Whether there was a request.
 fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
     socket: &UdpSocket,
     twin: &mut Twin<'_, N, M, P, K, G>,
-    host: &mut Option<SocketAddr>,
+    hosts: &mut Hosts,
 ) -> Result<bool> {
     use std::io::ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
     let mut bytes = [0; 2048];
@@ -84,7 +104,7 @@ fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, 
     let mut reply = [0; LARGEST_FRAME];
     let request = bytes.get(..length).unwrap_or_default();
     let Ok(Some(length)) = twin.station.receive(request, &mut reply) else { return Ok(false) };
-    *host = Some(from);
+    hosts.heard(from);
     send(socket, reply.get(..length).unwrap_or_default(), from);
     Ok(true)
 }
@@ -93,14 +113,12 @@ fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, 
 fn step<const N: usize, const M: usize, const P: usize, const K: usize, G: Plant<M, P>>(
     socket: &UdpSocket,
     twin: &mut Twin<'_, N, M, P, K, G>,
-    host: Option<SocketAddr>,
+    hosts: &Hosts,
 ) -> Result<bool> {
     twin.sample();
     let mut bytes = [0; LARGEST_FRAME];
     let Some(Ok(length)) = twin.station.frame(&mut bytes) else { return Ok(false) };
-    if let Some(host) = host {
-        send(socket, bytes.get(..length).unwrap_or_default(), host);
-    }
+    hosts.present().for_each(|host| send(socket, bytes.get(..length).unwrap_or_default(), host));
     Ok(true)
 }
 

@@ -34,7 +34,15 @@ fn identify_takes_the_record_as_it_is() {
     let twin = Twin::start(&[]);
     let record =
         ["rig", "excite", &twin.address, "--amplitude", "0.5", "--out", "log.csv", "--duration", "1", "--json"];
+    // Another host meanwhile takes nothing from the log.
+    let address = twin.address.clone();
+    let asked = std::thread::spawn(move || {
+        std::thread::sleep(std::time::Duration::from_millis(600));
+        youla(&empty_folder("rig-status"), &["rig", "status", &address]).stdout
+    });
     let recorded = youla(&folder, &record);
+    let status = asked.join().expect("asked");
+    assert!(status.contains("exciting") || status.contains("idle"), "{status}");
     assert_eq!((recorded.code, recorded.stderr.as_str()), (Some(0), ""));
     let report: serde_json::Value = serde_json::from_str(&recorded.stdout).expect("JSON");
     let number = |key: &str| report[key].as_u64().expect("a number");

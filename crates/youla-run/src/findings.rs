@@ -7,8 +7,10 @@ pub(super) use extra::further_lines;
 pub(super) use trust::verdict_lines;
 
 use super::identification::Identification;
+use super::records::LoopRecord;
 use super::segments::RecordSegment;
 use youla::identify::innovation_form::Convergence;
+use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{Uncertainty, amplitudes};
 use youla_greybox::Stop;
 use youla_greybox::refine::RefineNoise;
@@ -114,6 +116,15 @@ pub(super) fn notes(found: &Identification) -> Vec<Note> {
         let part = |s: &RecordSegment| format!("{} is rows {} to {} of {}", s.record, s.rows[0], s.rows[1], s.file);
         let parts: Vec<String> = found.records.segments.iter().map(part).collect();
         add(Status::Info, format!("Parts of files, each identified as a separate experiment: {}.", parts.join("; ")));
+    }
+    let short = found.records.estimation.iter().map(LoopRecord::samples).filter(|samples| *samples < SHORTEST_RECORD);
+    let (count, samples) = short.fold((0, 0), |(count, sum), samples| (count + 1, sum + samples));
+    if count > 0 && count < found.records.estimation.len() {
+        let text = format!(
+            "{count} estimation records with {samples} samples together are shorter than {SHORTEST_RECORD} samples; the recommended model \
+             leaves them out."
+        );
+        add(Status::Caution, text);
     }
     if let Some(text) = disturbance_note(found) {
         add(Status::Info, text);

@@ -48,6 +48,17 @@ impl<'a> LoopKnowledge<'a> {
         Ok(LoopKnowledge { controller, estimation, verification })
     }
 
+    /// The same of some of the records, by their places.
+    pub(super) fn of_records(&self, estimation: &[usize], verification: &[usize]) -> Self {
+        let some =
+            |all: &[LoopSignals<'a>], places: &[usize]| places.iter().filter_map(|k| all.get(*k).copied()).collect();
+        LoopKnowledge {
+            controller: self.controller,
+            estimation: some(&self.estimation, estimation),
+            verification: some(&self.verification, verification),
+        }
+    }
+
     /// K_d from y to u, m x p in units of the sizes: zero in open loop; `None` where the controller does not see all of y.
     pub(super) fn direct(&self, sizes: &Sizes) -> Option<Mat<f64>> {
         let (m, p) = (sizes.u.len(), sizes.y.len());

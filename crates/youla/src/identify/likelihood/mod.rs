@@ -32,6 +32,8 @@ mod known_loop;
 mod lag_sums;
 mod lanes;
 mod linearise;
+#[cfg(test)]
+mod many_records;
 mod measured;
 mod missed;
 mod mode_estimates;
@@ -78,10 +80,15 @@ const LARGEST_DEAD_TIME: usize = 20;
 /// Samples per parameter of the smallest model, below which nothing is tried.
 const SAMPLES_PER_PARAMETER: usize = 10;
 
+/// Records with fewer samples are left out where there is a longer one: their ends take as many parameters as they have information. A log with
+/// lost rows has such stretches.
+pub const SHORTEST_RECORD: usize = 100;
+
 /// The model that the records support, with its evidence.
 ///
 /// The records of `estimation` decide; those of `verification` (which may be empty) are asked whether they agree. What is known of
 /// the loop is asked too; without it nothing shows that an excitation, not the noise, moved the plant, and the model is not trusted.
+/// Records shorter than [`SHORTEST_RECORD`] are left out where there are longer ones.
 ///
 /// The result does not depend on the number of threads.
 ///
@@ -117,6 +124,11 @@ pub fn recommend(
     options: &LikelihoodOptions,
 ) -> Result<Recommendation> {
     check(estimation, verification)?;
+    let [estimating, verifying] = [estimation, verification].map(long_enough);
+    let known = known.map(|known| known.of_records(&estimating, &verifying));
+    let [estimation, verification] = [(estimation, &estimating), (verification, &verifying)]
+        .map(|(all, kept)| kept.iter().map(|k| all[*k]).collect::<Vec<_>>());
+    let (estimation, verification, known) = (estimation.as_slice(), verification.as_slice(), known.as_ref());
     let problem = problem(estimation, known, options)?;
     let mut candidates = Vec::new();
     let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
@@ -143,6 +155,13 @@ pub fn recommend(
         candidates,
         evidence,
     })
+}
+
+/// The records that are not left out, by their places.
+fn long_enough(records: &[Experiment<'_>]) -> Vec<usize> {
+    let long = |k: &usize| records[*k].u.nrows() >= SHORTEST_RECORD;
+    let some = (0..records.len()).any(|k| long(&k));
+    (0..records.len()).filter(|k| long(k) || !some).collect()
 }
 
 /// Shapes, finite entries, channels that move.

@@ -58,14 +58,18 @@ pub(crate) struct Found {
 }
 
 impl Found {
-    /// -2 log likelihood plus log N per parameter of model and noise (Schwarz).
+    /// -2 log likelihood plus log N per parameter of model and noise (Schwarz), and a share for the ends of further records.
     pub(crate) fn criterion(&self, samples: usize) -> f64 {
-        self.deviance + penalty(self.parameters + self.noise.parameters(), samples)
+        self.deviance + penalty(self.parameters + self.noise.parameters(), samples, &self.point)
     }
 }
 
-fn penalty(parameters: usize, samples: usize) -> f64 {
-    (samples.max(2) as f64).ln() * parameters as f64
+/// log N for each parameter, and log of the samples of a record for each state at the ends of each further record: a mode without damping
+/// takes whatever each of many short records has at its frequency.
+fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
+    let (samples, records) = (samples.max(2) as f64, point.ends.len().max(1) as f64);
+    let of_ends = (records - 1.0) * point.model.order() as f64 * (samples / records).max(1.0).ln();
+    samples.ln() * parameters as f64 + of_ends
 }
 
 /// -2 log likelihood and noise of a point.
@@ -141,7 +145,7 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
         if gain < options.tolerance {
             break;
         }
-        let penalty = penalty(parameters + noise.parameters(), spectra.samples());
+        let penalty = penalty(parameters + noise.parameters(), spectra.samples(), &point);
         if steps >= 3 && cost + penalty - options.aim > HOPELESS * gain {
             break;
         }

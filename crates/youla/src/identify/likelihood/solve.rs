@@ -166,16 +166,22 @@ impl Problem<'_> {
     fn chosen_on_a_part(&self, samples: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
         let share = SHORT as f64 / samples as f64;
         let kept = |rows: usize| ((rows as f64 * share) as usize).max(SHORTEST).min(rows);
-        let cut = |e: &Experiment<'_>| {
+        let mut longest: Vec<usize> = (0..self.experiments.len()).collect();
+        longest.sort_by_key(|k| std::cmp::Reverse(self.experiments[*k].u.nrows()));
+        // Of many records the longest only.
+        let mut sum = 0;
+        longest.retain(|k| {
+            sum += kept(self.experiments[*k].u.nrows());
+            sum <= LONG
+        });
+        longest.sort_unstable();
+        let cut = |k: &usize| {
+            let e = &self.experiments[*k];
             let rows = kept(e.u.nrows());
-            (rows, e.u.subrows(0, rows).to_owned(), e.y.subrows(0, rows).to_owned())
+            (e.u.subrows(0, rows).to_owned(), e.y.subrows(0, rows).to_owned())
         };
-        let parts: Vec<_> = self.experiments.iter().map(cut).collect();
-        let short: Vec<Experiment<'_>> =
-            parts.iter().map(|(_, u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
-        if parts.iter().map(|part| part.0).sum::<usize>() > LONG {
-            return None;
-        }
+        let parts: Vec<_> = longest.iter().map(cut).collect();
+        let short: Vec<Experiment<'_>> = parts.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
         let part = Problem { experiments: &short, ..self.clone() };
         let chosen = part.solve(table)?.chosen;
         let spectra = self.spectra(&chosen.delays);

@@ -19,11 +19,19 @@
  * -DYOULA_Q_ORDER=20.
  */
 @real@
+#include <limits.h>
 #include <stdint.h>
 #include <string.h>
 
 #ifndef YOULA_Q_ORDER
 #define YOULA_Q_ORDER 20
+#endif
+#if YOULA_Q_ORDER < 1
+#error "YOULA_Q_ORDER is the largest order of Q; set it to 1 or more"
+#endif
+/* With these flags the compiler takes every number for finite, and the checks of the guard drop out. */
+#if defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__ > 0
+#error "the guard needs numbers that are not finite; compile without -ffast-math and -ffinite-math-only"
 #endif
 
 enum { @p@_states = @n@, @p@_inputs = @m@, @p@_outputs = @q@, @p@_q_states = YOULA_Q_ORDER };
@@ -113,15 +121,16 @@ static inline uint32_t @p@_crc(uint32_t crc, @p@_real value)
         0xedb88320u, 0xf00f9344u, 0xd6d6a3e8u, 0xcb61b38cu, 0x9b64c2b0u, 0x86d3d2d4u, 0xa00ae278u, 0xbdbdf21cu
     };
     uint64_t bits = 0;
-    if (sizeof value == 4) {
-        uint32_t word;
-        memcpy(&word, &value, 4);
+    uint32_t word;
+    if (sizeof value == sizeof word) {
+        memcpy(&word, &value, sizeof word);
         bits = word;
     } else {
-        memcpy(&bits, &value, 8);
+        memcpy(&bits, &value, sizeof bits);
     }
-    for (unsigned k = 0; k < sizeof value; k++) {
-        uint32_t x = crc ^ (uint32_t)(bits >> (8 * k) & 255);
+    /* A char of a signal processor may have 16 bits. */
+    for (unsigned k = 0; k < sizeof value * CHAR_BIT; k += 8) {
+        uint32_t x = crc ^ (uint32_t)(bits >> k & 255);
         x = x >> 4 ^ nibbles[x & 15];
         crc = x >> 4 ^ nibbles[x & 15];
     }
@@ -145,8 +154,8 @@ static inline void @p@_fall(@p@_ramp *r, uint16_t by)
     r->position = (uint16_t)(r->position > by ? r->position - by : 0);
 }
 
-/* Out within 10 samples. */
-static inline void @p@_drop(@p@_ramp *r) { @p@_fall(r, (uint16_t)((r->top + 9) / 10)); }
+/* Out within 10 samples. The sum does not fit an int of 16 bits. */
+static inline void @p@_drop(@p@_ramp *r) { @p@_fall(r, (uint16_t)(((uint32_t)r->top + 9) / 10)); }
 
 static inline void @p@_bank_fade(@p@_bank *b, int fast)
 {

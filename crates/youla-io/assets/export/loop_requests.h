@@ -52,7 +52,9 @@ static inline int @p@_begin_q(@p@_loop *s)
 
 static inline int @p@_refused(@p@_loop *s, int why)
 {
-    s->pending = @p@_is_excited(s) ? @p@_q_refused : s->pending;
+    if (@p@_is_excited(s)) {
+        s->pending = @p@_q_refused;
+    }
     return why;
 }
 
@@ -122,10 +124,10 @@ static inline int @p@_prbs_init(@p@_prbs *s, int order, uint16_t hold, const uin
     if (order < 3 || order > 23 || second[order] == 0) {
         return 0;
     }
-    s->mask = 1u << (order - 1) | 1u << (second[order] - 1);
+    s->mask = (uint32_t)1 << (order - 1) | (uint32_t)1 << (second[order] - 1);
     s->hold = s->left = hold > 1 ? hold : 1;
     for (int i = 0; i < @m@; i++) {
-        if (starts[i] < 1 || starts[i] >= 1u << order) {
+        if (starts[i] < 1 || starts[i] >= (uint32_t)1 << order) {
             return 0;
         }
         s->registers[i] = starts[i];
@@ -171,6 +173,15 @@ static inline void @p@_multisine_next(const @p@_tone *tones, @p@_real (*phasors)
         phasors[t][1] = tones[t].sine * c + tones[t].cosine * s;
     }
     *place = *place + 1 < period ? *place + 1 : 0;
+}
+
+/* The values of this sample from a table of `count` rows, which repeats; zeros without rows. Set *place to 0 at first. */
+static inline void @p@_table_next(const @p@_real (*rows)[@m@], uint32_t count, uint32_t *place, @p@_real values[@m@])
+{
+    for (int i = 0; i < @m@; i++) {
+        values[i] = *place < count ? rows[*place][i] : 0;
+    }
+    *place = *place + 1 < count ? *place + 1 : 0;
 }
 
 #endif

@@ -96,7 +96,9 @@ static inline void @p@_command(@p@_loop *s, const @p@_real wanted[@m@], @p@_real
         for (int i = 0; finite && i < @m@; i++) {
             s->alpha[i] = s->alpha[i] + wanted[i] * weight;
         }
-        s->pending = finite ? s->pending : @p@_excitation_not_finite;
+        if (!finite) {
+            s->pending = @p@_excitation_not_finite;
+        }
     }
     @p@_q_output(s, @p@_connected, port);
     for (int i = 0; i < @m@; i++) {
@@ -171,7 +173,7 @@ static inline uint32_t @p@_status(const @p@_loop *s)
 {
     uint32_t bits = (uint32_t)s->phase | s->cause << 8 | (s->channel < 15 ? s->channel : 15) << 12;
     for (int i = 0; i < @q@ && i < 8; i++) {
-        bits |= s->valid[i] ? 0 : 1u << (16 + i);
+        bits |= s->valid[i] ? 0 : (uint32_t)1 << (16 + i);
     }
     for (int b = 0; b < 2; b++) {
         bits |= s->banks[b].role == @p@_connected ? (uint32_t)(b + 1) << 2 : 0;

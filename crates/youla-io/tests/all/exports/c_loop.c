@@ -68,11 +68,14 @@ int main(void)
 {
     static loop_loop s;
     loop_prbs prbs;
-    loop_tone tone = {real(), real(), {{(loop_real)0.5, 0}, {0, (loop_real)0.25}}};
-    loop_real phasors[1][2], levels[2] = {(loop_real)0.5, (loop_real)0.75}, of_prbs[2], of_tone[2];
+    loop_tone tone = {0, 0, {{(loop_real)0.5, 0}, {0, (loop_real)0.25}}};
+    loop_real phasors[1][2], levels[2] = {(loop_real)0.5, (loop_real)0.75}, of_prbs[2], of_tone[2], of_table[2];
     const uint32_t starts[2] = {1, 77};
-    uint32_t place = 0;
+    const loop_real rows[3][2] = {{(loop_real)0.25, 0}, {0, (loop_real)-0.125}, {(loop_real)-0.25, (loop_real)0.125}};
+    uint32_t place = 0, row_of_table = 0;
     const loop_limits limits = {{50, 50, INFINITY}, {3, 3, INFINITY}, {8, 8}, {6, 6}, 3, 4, 20, 60};
+    tone.cosine = real();
+    tone.sine = real();
     if (loop_init(&s, &limits, 25) != 0 || !loop_prbs_init(&prbs, 10, 2, starts)) {
         return 1;
     }
@@ -85,9 +88,9 @@ int main(void)
         }
         loop_prbs_next(&prbs, levels, of_prbs);
         loop_multisine_next(&tone, phasors, 1, 50, &place, of_tone);
-        const loop_real off = real();
+        loop_table_next(rows, 3, &row_of_table, of_table);
         for (int j = 0; j < 2; j++) {
-            wanted[j] = of_prbs[j] + of_tone[j] + off;
+            wanted[j] = of_prbs[j] + of_tone[j] + of_table[j] + real();
         }
         loop_command(&s, wanted, u);
         for (int j = 0; j < 3; j++) {

@@ -9,13 +9,13 @@ use youla::{Mat, MatRef};
 use youla_io::export::{LoopExport, ObserverData, c_loop};
 use youla_rt::{
     Cause, Controller, Excitation, ExcitedLoop, Limits, LoopRefusal, Matrices, Multisine, Prbs, QCoefficients,
-    QRefusal, Tone,
+    QRefusal, Table, Tone,
 };
 
 const SAMPLES: usize = 200_000;
 const ORDER_OF_Q: usize = 3;
 
-fn matrices() -> Matrices<f64, 3, 2, 3> {
+pub(super) fn matrices() -> Matrices<f64, 3, 2, 3> {
     Matrices {
         a: [[1.1, 0.0, 0.0], [0.0, 1.05, 0.0], [0.05, 0.0, 0.4]],
         b: [[1.0, 0.0], [0.0, 1.0], [0.3, 0.2]],
@@ -26,7 +26,7 @@ fn matrices() -> Matrices<f64, 3, 2, 3> {
     }
 }
 
-fn header() -> String {
+pub(super) fn header() -> String {
     let all = matrices();
     let of = |rows: &dyn Fn(usize, usize) -> f64, height, width| Mat::from_fn(height, width, rows);
     let model = StateSpace::new(
@@ -37,13 +37,16 @@ fn header() -> String {
         Discrete::new(1e-3).unwrap(),
     );
     let (f, l) = (of(&|i, j| all.f[i][j], 2, 3), of(&|i, j| all.l[i][j], 3, 3));
-    let gains: [MatRef<'_, f64>; 2] = [f.as_ref(), l.as_ref()];
+    header_of(&model.unwrap(), f.as_ref(), l.as_ref())
+}
+
+pub(super) fn header_of(model: &StateSpace<Discrete>, f: MatRef<'_, f64>, l: MatRef<'_, f64>) -> String {
     let channels = |name: &str, count| (1..=count).map(|k| Channel::new(format!("{name}{k}"), "V")).collect();
     let export = LoopExport {
         name: "loop".into(),
-        measured: channels("y", 3),
-        commanded: channels("u", 2),
-        observer: ObserverData::new(&model.unwrap(), gains[0], gains[1]),
+        measured: channels("y", model.outputs()),
+        commanded: channels("u", model.inputs()),
+        observer: ObserverData::new(model, f, l),
         ts: 1e-3,
         origin: "a test".into(),
     };
@@ -51,7 +54,7 @@ fn header() -> String {
 }
 
 /// What the C header calls a refusal.
-fn code(done: Result<(), LoopRefusal>) -> u64 {
+pub(super) fn code(done: Result<(), LoopRefusal>) -> u64 {
     match done {
         Ok(()) => 0,
         Err(LoopRefusal::Limits) => 1,
@@ -120,6 +123,8 @@ macro_rules! played {
         let angle = core::f64::consts::TAU * 3.0 / 50.0;
         let tone = Tone { cosine: of(angle.cos()), sine: of(angle.sin()), gains: [[0.5, 0.0], [0.0, 0.25]] };
         let mut multisine: Excitation<'_, $real, 2, 1> = Excitation::Multisine(Multisine::new([tone], 50));
+        let rows = [[0.25, 0.0], [0.0, -0.125], [-0.25, 0.125]];
+        let mut table: Excitation<'_, $real, 2, 0> = Excitation::Table(Table::new(&rows));
         let mut script = format!("{:x} {:x}\n", tone.cosine.to_bits(), tone.sine.to_bits());
         let (mut expected, mut seen) = (String::new(), BTreeSet::new());
         let (mut random, mut x) = (Random(7), [0.0_f64; 3]);
@@ -176,9 +181,9 @@ macro_rules! played {
                 running.release_q();
                 request("9".into(), None);
             }
-            let off: $real = if random.one_in(3000.0) { <$real>::NAN } else { 0.0 };
-            let (a, b) = (prbs.advance(), multisine.advance());
-            let wanted: [$real; 2] = core::array::from_fn(|j| a[j] + b[j] + off);
+            let off: [$real; 2] = core::array::from_fn(|_| if random.one_in(6000.0) { <$real>::NAN } else { 0.0 });
+            let (a, b, c) = (prbs.advance(), multisine.advance(), table.advance());
+            let wanted: [$real; 2] = core::array::from_fn(|j| a[j] + b[j] + c[j] + off[j]);
             let u = running.command(&wanted);
             let mut y: [$real; 3] = core::array::from_fn(|i| {
                 let sum: f64 = (0..3).map(|j| m.c[i][j] * x[j]).sum();
@@ -228,7 +233,7 @@ macro_rules! played {
                 "{:x} {} {} {} {}",
                 requests.len(),
                 requests.join(" "),
-                bits(&[off]),
+                bits(&off),
                 bits(&y),
                 bits(&share)
             );

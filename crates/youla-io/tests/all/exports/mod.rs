@@ -4,6 +4,7 @@
 
 mod c;
 mod c_loop;
+mod c_loop_parts;
 mod scripts;
 
 use std::ffi::OsStr;

@@ -3,18 +3,17 @@
 use crate::bench::{Bench, LogRow};
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::commission::{log_text, start};
+use crate::error::refuse;
 use crate::figures::{LoopState, Sizes};
 use crate::parameter::{LoadedQ, loaded};
 use crate::point::{FIRST, Operator, Point};
-use crate::q_table::point_q;
+use crate::q_table::{point_q, point_s};
 use crate::record::{PointRecord, PointStatus, io, read_json, write_json, write_text};
 use crate::running::RunningLoop;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
-use youla::lti::{Discrete, StateSpace};
-use youla_io::export::read_model;
 use youla_loop::schedule::{BetweenPoints, between_points, q_between};
 
 /// Two neighbouring speeds with the same running loop.
@@ -42,6 +41,17 @@ pub struct BetweenRecord {
     pub switches: usize,
     /// Switches after which the guard ended the excitation or the loop was not measured as stable.
     pub unstable_switches: usize,
+}
+
+impl BetweenRecord {
+    /// Both points by their names; also its folder.
+    pub fn name(&self) -> String {
+        way_name(&self.from, &self.to)
+    }
+}
+
+fn way_name(from: &str, to: &str) -> String {
+    format!("{from} to {to}")
 }
 
 /// Figures of the evidence, see [`youla_loop::schedule`].
@@ -101,7 +111,7 @@ pub(crate) fn between(
     (out, image): (&Path, Option<&Path>),
     operator: &mut dyn Operator,
 ) -> Result<BetweenRecord> {
-    let name = format!("{} to {}", ends.at[0].name, ends.at[1].name);
+    let name = way_name(&ends.at[0].name, &ends.at[1].name);
     let place = out.join(&name);
     let kept: Option<BetweenRecord> = read_json(&place.join("between.json"))?;
     if let Some(kept) = kept.filter(|kept| kept.status == PointStatus::Done) {
@@ -123,7 +133,7 @@ fn examined(
     operator: &mut dyn Operator,
 ) -> Result<(BetweenRecord, Vec<LogRow>)> {
     let halfway = OperatingPoint {
-        name: format!("{} to {}", ends.at[0].name, ends.at[1].name),
+        name: way_name(&ends.at[0].name, &ends.at[1].name),
         rpm: 0.5 * (ends.at[0].rpm + ends.at[1].rpm),
         ..ends.at[0].clone()
     };
@@ -157,10 +167,7 @@ fn examined(
 /// The Q halfway, if the loops between the points are all stable.
 fn evidence(ends: &Ends<'_>, out: &Path, record: &mut BetweenRecord) -> Result<LoadedQ> {
     let folder = |i: usize| out.join(&ends.at[i].name);
-    let s = |i: usize| -> Result<StateSpace<Discrete>> {
-        Ok(read_model(folder(i).join("identification/4-identify/deviation.json"))?.system)
-    };
-    let (s, q) = ([s(0)?, s(1)?], [point_q(&folder(0))?, point_q(&folder(1))?]);
+    let (s, q) = ([point_s(&folder(0))?, point_s(&folder(1))?], [point_q(&folder(0))?, point_q(&folder(1))?]);
     let (s, q) = ([&s[0], &s[1]], [&q[0], &q[1]]);
     let Some(found) = between_points(q, s)? else {
         return refuse("a loop between the points is not stable, or too near to it: add a point between them".into());
@@ -241,8 +248,4 @@ fn reached(
 fn rms(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     let count = values.len().max(1) as f64;
     (values.map(|v| v * v).sum::<f64>() / count).sqrt()
-}
-
-fn refuse<T>(reason: String) -> Result<T> {
-    Err(Error::Refused { reason })
 }

@@ -60,6 +60,14 @@ pub enum Error {
     },
 }
 
+/// There is nothing to switch to, for this reason.
+///
+/// # Errors
+/// [`Error::Refused`], always.
+pub(crate) fn refuse<T>(reason: String) -> Result<T> {
+    Err(Error::Refused { reason })
+}
+
 youla::error_context! {
     sources: Method File Loop Run Twin Report;
     numerical: Controller Refused;

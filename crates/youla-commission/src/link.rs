@@ -1,6 +1,7 @@
 //! A machine over its link. A thread takes its rows and gives signs of life, so that the excitation goes on while the campaign computes.
 
 use crate::bench::LogRow;
+use crate::error::refuse;
 use crate::target::failed;
 use crate::{Error, Result};
 use std::path::Path;
@@ -146,10 +147,6 @@ impl Drop for Link {
             let _ = thread.join();
         }
     }
-}
-
-fn refuse<T>(reason: String) -> Result<T> {
-    Err(Error::Refused { reason })
 }
 
 fn tripped(shared: &Shared) -> Option<Trip> {

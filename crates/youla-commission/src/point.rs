@@ -2,6 +2,7 @@
 
 use crate::bench::{Bench, LogRow};
 use crate::campaign::{Campaign, OperatingPoint};
+use crate::error::refuse;
 use crate::figures::{LoopState, Sizes};
 use crate::identify::{CleanRows, loop_response};
 use crate::parameter::LoadedQ;
@@ -318,10 +319,6 @@ impl<'a> Point<'a> {
         let rows = CleanRows::new(rows, self.at.rpm, self.running.nominal.time())?;
         LoopState::new(&loop_response(self.running, Some(q), &rows)?, controller, sizes)
     }
-}
-
-fn refuse<T>(reason: String) -> Result<T> {
-    Err(Error::Refused { reason })
 }
 
 fn largest(rows: &[LogRow]) -> [f64; 8] {

@@ -1,6 +1,7 @@
 //! From a record to a switch that can be answered for: model, verdict, new controller, certificate, prediction.
 
 use crate::campaign::Goal;
+use crate::error::refuse;
 use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, identified, loop_response};
 use crate::parameter::{LoadedQ, parameter_of};
@@ -76,10 +77,6 @@ fn region(found: &Identification) -> Result<Option<f64>> {
     let Some(hansen) = found.scheme().map(|scheme| &scheme.hansen.deviation) else { return Ok(None) };
     let Some(uncertainty) = &hansen.uncertainty else { return Ok(None) };
     Ok(region_radius(&hansen.model, uncertainty)?)
-}
-
-fn refuse<T>(reason: String) -> Result<T> {
-    Err(Error::Refused { reason })
 }
 
 fn designed(

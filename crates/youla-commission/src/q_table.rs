@@ -2,13 +2,14 @@
 
 use crate::between::{BetweenRecord, Evidence};
 use crate::campaign::Campaign;
+use crate::error::refuse;
 use crate::record::{PointStatus, read_json, write_json};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
 use youla_io::SystemMatrices;
-use youla_io::export::ExportedController;
+use youla_io::export::{ExportedController, read_model};
 use youla_loop::schedule::{QBetween, q_between};
 
 /// Q over the speed.
@@ -64,7 +65,6 @@ impl QTable {
     /// [`Error::Refused`] for a speed beyond the table, and for a Q whose reduction takes more than the evidence leaves;
     /// [`Error::Method`] for matrices that do not fit.
     pub fn at(&self, rpm: f64, most: usize) -> Result<StateSpace<Discrete>> {
-        let refuse = |reason: String| Err(Error::Refused { reason });
         let place = self.points.windows(2).position(|pair| (pair[0].rpm..=pair[1].rpm).contains(&rpm));
         let Some(place) = place else {
             let ends = [self.points.first(), self.points.last()].map(|point| point.map_or(f64::NAN, |p| p.rpm));
@@ -98,6 +98,14 @@ pub(crate) fn point_q(folder: &Path) -> Result<StateSpace<Discrete>> {
     let exported: ExportedController = read_json(&path)?.ok_or_else(missing)?;
     let q = exported.q.as_ref().ok_or_else(missing)?;
     Ok(q.system(Discrete::new(exported.ts)?)?)
+}
+
+/// S of a point that is done.
+///
+/// # Errors
+/// Files.
+pub(crate) fn point_s(folder: &Path) -> Result<StateSpace<Discrete>> {
+    Ok(read_model(folder.join("identification/4-identify/deviation.json"))?.system)
 }
 
 /// Writes one table for each chain of pairs that are done: `q_table.json`, further ones with a number.

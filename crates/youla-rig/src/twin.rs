@@ -1,6 +1,7 @@
 //! A machine over UDP: the loop of the firmware around a plant on the host.
 
 use crate::plant::{LinearPlant, Plant};
+use crate::way::received;
 use crate::{Error, Result};
 use std::net::{SocketAddr, UdpSocket};
 use std::time::{Duration, Instant};
@@ -93,14 +94,8 @@ fn take_request<const N: usize, const M: usize, const P: usize, const K: usize, 
     twin: &mut Twin<'_, N, M, P, K, G>,
     hosts: &mut Hosts,
 ) -> Result<bool> {
-    use std::io::ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
     let mut bytes = [0; 2048];
-    let (length, from) = match socket.recv_from(&mut bytes) {
-        Ok(received) => received,
-        // A host that has gone.
-        Err(e) if matches!(e.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused) => return Ok(false),
-        Err(e) => return Err(Error::Connection(e)),
-    };
+    let Some((length, from)) = received(socket.recv_from(&mut bytes))? else { return Ok(false) };
     let mut reply = [0; LARGEST_FRAME];
     let request = bytes.get(..length).unwrap_or_default();
     let Ok(Some(length)) = twin.station.receive(request, &mut reply) else { return Ok(false) };

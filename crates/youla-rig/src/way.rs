@@ -69,18 +69,18 @@ impl Way {
                 socket.set_read_timeout(Some(within))?;
                 let mut bytes = [0; 2048];
                 let received = socket.recv(&mut bytes);
-                Ok(arrived(received)?.and_then(|length| bytes.get(..length).map(<[u8]>::to_vec)))
+                Ok(self::received(received)?.and_then(|length| bytes.get(..length).map(<[u8]>::to_vec)))
             }
             Way::Serial(line) => line.receive(within),
         }
     }
 }
 
-/// Nothing arrived, or nobody is there yet: no failure of the connection.
-fn arrived(received: std::io::Result<usize>) -> Result<Option<usize>> {
+/// `None` where nothing came in time, or nobody is there (yet): no failure of the connection.
+pub(crate) fn received<T>(received: std::io::Result<T>) -> Result<Option<T>> {
     use ErrorKind::{ConnectionRefused, Interrupted, TimedOut, WouldBlock};
     match received {
-        Ok(length) => Ok(Some(length)),
+        Ok(found) => Ok(Some(found)),
         Err(e) if matches!(e.kind(), WouldBlock | TimedOut | Interrupted | ConnectionRefused) => Ok(None),
         Err(e) => Err(e.into()),
     }
@@ -107,7 +107,7 @@ impl SerialLine {
             };
             self.port.set_read_timeout(left)?;
             let mut bytes = [0; 4096];
-            let Some(length) = arrived(self.port.read(&mut bytes))? else { continue };
+            let Some(length) = received(self.port.read(&mut bytes))? else { continue };
             self.bytes.extend_from_slice(bytes.get(..length).unwrap_or_default());
         }
     }

@@ -4,11 +4,11 @@ use super::{BEFORE, HALFWAY, PREDICTED, REACHED};
 use crate::Result;
 use crate::between::BetweenRecord;
 use crate::campaign::Campaign;
+use crate::q_table::point_s;
 use crate::record::{CampaignSummary, PointRecord};
 use std::f64::consts::TAU;
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace, frequency_response};
-use youla_io::export::read_model;
 use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Guide, GuideKind, Panel, Region};
 use youla_run::ModeEntry;
 
@@ -19,7 +19,7 @@ pub(super) fn key(point: &str) -> String {
 
 /// Key of the way between two points.
 pub(super) fn way_key(way: &BetweenRecord) -> String {
-    format!("way {} to {}", way.from, way.to)
+    format!("way {}", way.name())
 }
 
 fn axis(label: &str, unit: &str) -> Axis {
@@ -124,12 +124,9 @@ fn resonances(point: &PointRecord) -> impl Iterator<Item = &ModeEntry> {
 
 /// S at the points that share their factors, and its changes beside the room.
 pub(super) fn deviation(summary: &CampaignSummary, out: &Path) -> Result<Figure> {
-    let of_point = |name: &str| -> Result<StateSpace<Discrete>> {
-        Ok(read_model(out.join(name).join("identification/4-identify/deviation.json"))?.system)
-    };
     let (mut at_points, mut changes, mut rooms) = (Vec::<Curve>::new(), Vec::new(), Vec::new());
     for way in &summary.between {
-        let s = [of_point(&way.from)?, of_point(&way.to)?];
+        let s = [point_s(&out.join(&way.from))?, point_s(&out.join(&way.to))?];
         for (name, s) in [&way.from, &way.to].into_iter().zip(&s) {
             if at_points.iter().all(|curve| curve.method != key(name)) {
                 at_points.push(gain(key(name), s)?);
@@ -140,7 +137,7 @@ pub(super) fn deviation(summary: &CampaignSummary, out: &Path) -> Result<Figure>
             kind: GuideKind::Level,
             x: changes.last().map_or_else(Vec::new, |curve: &Curve| curve.x.clone()),
             y: changes.last().map_or_else(Vec::new, |curve| vec![evidence.room; curve.x.len()]),
-            label: format!("room, {} to {}", way.from, way.to),
+            label: format!("room, {}", way.name()),
             at: [30.0, evidence.room],
         }));
     }

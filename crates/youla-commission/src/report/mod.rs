@@ -56,10 +56,7 @@ fn methods(summary: &CampaignSummary) -> Vec<Method> {
     ];
     let fixed = fixed.into_iter().map(|(key, label, role)| Method::new(key, label, role));
     let of_points = summary.points.iter().map(|p| Method::new(figures::key(&p.name), p.name.clone(), Role::Other));
-    let of_ways = summary
-        .between
-        .iter()
-        .map(|way| Method::new(figures::way_key(way), format!("{} to {}", way.from, way.to), Role::Other));
+    let of_ways = summary.between.iter().map(|way| Method::new(figures::way_key(way), way.name(), Role::Other));
     fixed.chain(of_points).chain(of_ways).collect()
 }
 
@@ -74,7 +71,7 @@ fn points(summary: &CampaignSummary) -> Section {
         )),
     ];
     let of_points = summary.points.iter().filter_map(|p| Some((&p.name, p.reason.as_ref()?)));
-    let of_ways = summary.between.iter().filter_map(|b| Some((format!("{} to {}", b.from, b.to), b.reason.as_ref()?)));
+    let of_ways = summary.between.iter().filter_map(|b| Some((b.name(), b.reason.as_ref()?)));
     let reasons: Vec<String> = of_points
         .map(|(name, reason)| format!("{name}: {reason}."))
         .chain(of_ways.map(|(name, reason)| format!("{name}: {reason}.")))

@@ -96,7 +96,7 @@ pub(super) fn between(summary: &CampaignSummary) -> Table {
         Row {
             method: super::figures::way_key(way),
             cells: vec![
-                format!("{} to {}", way.from, way.to),
+                way.name(),
                 word(way.status),
                 number(of(|e| e.gain), 3),
                 number(of(|e| e.room), 3),

@@ -6,6 +6,7 @@ pub mod hansen;
 pub mod innovation_form;
 pub mod likelihood;
 pub mod subspace;
+mod verdict;
 
 pub use direct::direct;
 pub use hansen::{HansenData, HansenModel, HansenOptions, hansen, hansen_stream};

@@ -1,6 +1,6 @@
 //! What is known of the loop in which the records were taken.
 
-use super::spectra::Sizes;
+use crate::identify::likelihood::data::spectra::Sizes;
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, MatRef, Result};
@@ -24,9 +24,9 @@ pub struct LoopSignals<'a> {
 /// The controller that ran, and the signals of each record in its terms.
 #[derive(Debug, Clone)]
 pub struct LoopKnowledge<'a> {
-    pub(super) controller: Option<&'a StateSpace<Discrete>>,
-    pub(super) estimation: Vec<LoopSignals<'a>>,
-    pub(super) verification: Vec<LoopSignals<'a>>,
+    pub(crate) controller: Option<&'a StateSpace<Discrete>>,
+    pub(crate) estimation: Vec<LoopSignals<'a>>,
+    pub(crate) verification: Vec<LoopSignals<'a>>,
 }
 
 impl<'a> LoopKnowledge<'a> {
@@ -49,7 +49,7 @@ impl<'a> LoopKnowledge<'a> {
     }
 
     /// The same of some of the records, by their places.
-    pub(super) fn of_records(&self, estimation: &[usize], verification: &[usize]) -> Self {
+    pub(crate) fn of_records(&self, estimation: &[usize], verification: &[usize]) -> Self {
         let some =
             |all: &[LoopSignals<'a>], places: &[usize]| places.iter().filter_map(|k| all.get(*k).copied()).collect();
         LoopKnowledge {
@@ -60,7 +60,7 @@ impl<'a> LoopKnowledge<'a> {
     }
 
     /// K_d from y to u, m x p in units of the sizes: zero in open loop; `None` where the controller does not see all of y.
-    pub(super) fn direct(&self, sizes: &Sizes) -> Option<Mat<f64>> {
+    pub(crate) fn direct(&self, sizes: &Sizes) -> Option<Mat<f64>> {
         let (m, p) = (sizes.u.len(), sizes.y.len());
         let Some(k) = self.controller else { return Some(Mat::zeros(m, p)) };
         // what it sees ends with y: y - r, or [u; y] for an observer
@@ -69,7 +69,7 @@ impl<'a> LoopKnowledge<'a> {
     }
 
     /// The excitation of each estimation record, where all are known and one is not zero.
-    pub(super) fn excitation(&self) -> Option<Vec<MatRef<'a, f64>>> {
+    pub(crate) fn excitation(&self) -> Option<Vec<MatRef<'a, f64>>> {
         let all: Vec<MatRef<'a, f64>> = self.estimation.iter().map(|r| r.excitation).collect::<Option<_>>()?;
         all.iter().any(|x| x.norm_l2() > 0.0).then_some(all)
     }

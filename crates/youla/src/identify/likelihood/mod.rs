@@ -11,69 +11,41 @@
 //!
 //! | step | module |
 //! |---|---|
-//! | starts: states of long regressions of several pasts | `lag_sums`, `states`, `starts` |
-//! | dead time from the newest inputs of a regression | `dead_time` |
-//! | search in local coordinates, the noise estimated with it | `search`, `linearise`, `chart`, `noise` |
-//! | one mode more, one less, another dead time, until Schwarz's criterion falls no more | `solve`, `neighbours`, `grow` |
+//! | records as lines of their Fourier transforms | `data` |
+//! | starts: states of long regressions of several pasts; dead time from the newest inputs of a regression | `choose::{states, starts, dead_time}` |
+//! | search in local coordinates, the noise estimated with it | `search` |
+//! | one mode more, one less, another dead time, until Schwarz's criterion falls no more | `choose::{solve, neighbours, grow}` |
 //! | standard deviations: information of the record, and scatter of models that it does not distinguish | `deviation` |
-//! | questions to the records, each with a figure and a limit | `trust` |
+//! | questions to the records, each with a figure and a limit | [`verdict`](super::verdict) |
 
-mod autoregression;
-mod balancing;
-mod block;
-mod chart;
-mod dead_time;
-mod deviation;
-mod feedthrough;
-mod grouping;
-mod grow;
-mod innovation;
+pub(super) mod choose;
+pub(super) mod data;
+pub(super) mod deviation;
 mod known_loop;
-mod lag_sums;
-mod lanes;
-mod linearise;
 #[cfg(test)]
 mod many_records;
 mod measured;
-mod missed;
-mod mode_estimates;
-mod model;
-mod neighbours;
-mod noise;
 mod options;
-mod physical;
-mod point;
-mod problem;
 mod recommendation;
-mod residual;
-mod resize;
-mod response_deviation;
-mod rows;
-mod search;
-mod solve;
-mod spectra;
-mod starts;
-mod state_lanes;
-mod states;
+pub(super) mod search;
 #[cfg(test)]
 mod tests;
-mod trust;
 
 pub use super::subspace::Experiment;
+pub use deviation::mode_estimates::ModeEstimate;
+pub use deviation::response_deviation::{ResponseDeviation, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
-pub use mode_estimates::ModeEstimate;
 pub use options::LikelihoodOptions;
 pub use recommendation::{Candidate, Evidence, Predictor, Recommendation};
-pub use response_deviation::{ResponseDeviation, ResponseError};
 
+use super::verdict::{self, Parts};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
+use choose::problem::Problem;
+use data::spectra::Sizes;
 use deviation::Directions;
-use problem::Problem;
-use spectra::Sizes;
-use trust::Parts;
 
 /// Largest dead time that is tried, samples.
 const LARGEST_DEAD_TIME: usize = 20;
@@ -138,20 +110,20 @@ pub fn recommend(
     let shares = [slow.as_slice(), &deviation::grid(spectra.samples())].concat();
     let parts = Parts::new(&problem, &solution, verification);
     let excitation = known.and_then(LoopKnowledge::excitation);
-    let missed = excitation.map(|x| missed::missed(&spectra, choice, &x, problem.skip));
+    let missed = excitation.map(|x| deviation::missed::missed(&spectra, choice, &x, problem.skip));
     let directions = Directions::new(&spectra, &solution, parts.scatter, missed);
     let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
-    let mut evidence = trust::of_model(&spectra, &solution, &shares[slow.len()..], &variances[slow.len()..]);
+    let mut evidence = verdict::of_model(&spectra, &solution, &shares[slow.len()..], &variances[slow.len()..]);
     evidence.extend(parts.evidence(&solution));
-    evidence.extend(trust::of_loop(&spectra, &solution, known, directions.missed()));
-    let plant = physical::plant(choice, &problem.sizes, time)?;
+    evidence.extend(verdict::of_loop(&spectra, &solution, known, directions.missed()));
+    let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
     Ok(Recommendation {
-        predictor: innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
+        predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
         plant,
         dead_time: choice.delays.clone(),
         order: choice.order(),
         response_deviation: ResponseDeviation::new(problem.sizes.clone(), time, (&shares, &variances), directions),
-        modes: mode_estimates::modes(&spectra, choice, time),
+        modes: deviation::mode_estimates::modes(&spectra, choice, time),
         candidates,
         evidence,
     })

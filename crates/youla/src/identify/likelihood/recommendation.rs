@@ -1,8 +1,8 @@
 //! The recommended model with what it rests on.
 
-use super::mode_estimates::ModeEstimate;
-use super::response_deviation::ResponseDeviation;
 use crate::Mat;
+use crate::identify::likelihood::deviation::mode_estimates::ModeEstimate;
+use crate::identify::likelihood::deviation::response_deviation::ResponseDeviation;
 use crate::lti::{Discrete, StateSpace};
 
 /// The model that the records support, with its evidence.
@@ -98,7 +98,7 @@ impl Evidence {
         Evidence { question: question.into(), figure, limit, significance: None }
     }
 
-    pub(super) fn beyond_chance(self, significance: f64) -> Self {
+    pub(crate) fn beyond_chance(self, significance: f64) -> Self {
         Evidence { significance: Some(significance), ..self }
     }
 

@@ -1,18 +1,18 @@
 //! Identities of the search, and seeded statistics of what it states.
 
-use super::autoregression::Regression;
-use super::chart::Chart;
-use super::deviation::inverse_root;
-use super::linearise::linearise;
-use super::model::Model;
-use super::noise::Noise;
-use super::physical;
-use super::point::{Point, energy};
-use super::problem::Choice;
-use super::search::{Found, deviance, reblocked, with_best_ends, with_best_inputs};
-use super::spectra::{Sizes, Spectra};
 use super::*;
 use crate::control::{closed_loop, with_input_port};
+use crate::identify::likelihood::choose::problem::Choice;
+use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::deviation::inverse_root;
+use crate::identify::likelihood::deviation::physical;
+use crate::identify::likelihood::search::autoregression::Regression;
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::linearise::linearise;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::likelihood::search::point::{Point, energy};
+use crate::identify::likelihood::search::{Found, deviance, reblocked, with_best_ends, with_best_inputs};
 use crate::linalg::eye;
 use crate::lti::{StateSpace, frequency_response, simulate};
 use crate::{Mat, c64};

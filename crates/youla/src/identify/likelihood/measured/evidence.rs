@@ -6,7 +6,7 @@ use crate::Result;
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::deviation::delayed;
-use crate::identify::likelihood::trust::accuracy;
+use crate::identify::verdict::accuracy;
 use crate::lti::{Discrete, StateSpace};
 use crate::signal::standard_normal;
 use std::f64::consts::TAU;

@@ -1,8 +1,8 @@
 //! Lines in scaled channels, inputs delayed, each with the matrix that whitens its residual.
 
 use super::data::{Column, MeasuredResponse};
-use crate::identify::likelihood::model::Model;
-use crate::identify::likelihood::spectra::Sizes;
+use crate::identify::likelihood::data::spectra::Sizes;
+use crate::identify::likelihood::search::model::Model;
 use crate::lti::TimeDomain;
 use crate::signal::output_rest;
 use faer::prelude::*;

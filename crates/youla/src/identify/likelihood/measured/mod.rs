@@ -31,10 +31,10 @@ mod tests;
 
 pub use data::{MeasuredResponse, ResponseTable, ResponseVariance};
 
-use super::deviation::{Directions, inverse_root};
-use super::recommendation::{Predictor, Recommendation};
-use super::response_deviation::ResponseDeviation;
-use super::{LikelihoodOptions, mode_estimates, physical};
+use super::LikelihoodOptions;
+use crate::identify::likelihood::deviation::response_deviation::ResponseDeviation;
+use crate::identify::likelihood::deviation::{Directions, inverse_root, mode_estimates, physical};
+use crate::identify::likelihood::recommendation::{Predictor, Recommendation};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, Result};
 use choose::Problem;

@@ -3,8 +3,8 @@
 use super::choose::{Fitted, Problem, Task};
 use super::search::with_best_inputs;
 use super::subspace::Subspace;
-use crate::identify::likelihood::model::Model;
-use crate::identify::likelihood::neighbours::sets;
+use crate::identify::likelihood::choose::neighbours::sets;
+use crate::identify::likelihood::search::model::Model;
 use rayon::prelude::*;
 
 impl Problem<'_> {

@@ -1,9 +1,9 @@
 //! Levenberg-Marquardt on weighed lines.
 
 use super::lines::{WeighedLine, WeighedLines};
-use crate::identify::likelihood::chart::Chart;
-use crate::identify::likelihood::model::Model;
-use crate::identify::likelihood::point::Point;
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{damped, reblocked};
 use faer::{Mat, c64};
 use rayon::prelude::*;

@@ -11,7 +11,7 @@
 //! Autom. Control 41 (1996), 960; the map is that of discrete Laguerre functions.
 
 use super::lines::WeighedLines;
-use crate::identify::likelihood::model::Model;
+use crate::identify::likelihood::search::model::Model;
 use faer::linalg::solvers::DenseSolveCore;
 use faer::prelude::*;
 use faer::{Mat, Side, c64};

@@ -8,11 +8,11 @@
 //! Helmersson and Ribarits, Automatica 40 (2004), 1629). The columns of t are eliminated record by record.
 
 use super::chart::Chart;
-use super::lanes::LANES;
 use super::noise::Noise;
 use super::point::Point;
 use super::rows::{Place, Rows};
-use super::spectra::{Spectra, parts};
+use crate::identify::likelihood::data::lanes::LANES;
+use crate::identify::likelihood::data::spectra::{Spectra, parts};
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, Par, c64};
 use rayon::prelude::*;

@@ -1,11 +1,11 @@
 //! The choice of order and dead time by the likelihood of the record: starts, then models one step away as long as Schwarz's
 //! criterion falls.
 
-use super::Candidate;
 use super::dead_time::dead_times;
-use super::lag_sums::LagSums;
 use super::problem::{Choice, Problem, Solution, Task};
-use super::search::{search, with_best_ends, with_best_inputs};
+use crate::identify::likelihood::Candidate;
+use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
 

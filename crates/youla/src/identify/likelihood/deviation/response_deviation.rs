@@ -1,7 +1,7 @@
 //! Standard deviations of the response of the recommended model.
 
-use super::deviation::Directions;
-use super::spectra::Sizes;
+use super::Directions;
+use crate::identify::likelihood::data::spectra::Sizes;
 use crate::lti::Discrete;
 use crate::{Mat, MatRef};
 use faer::c64;

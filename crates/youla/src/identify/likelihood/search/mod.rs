@@ -7,14 +7,27 @@
 //! from it by an all-pass with their mirror images, whose gain |det A_u| appears in the likelihood: so poles may cross the
 //! circle, and neither a stable predictor nor a Kalman gain is needed to search.
 
-use super::chart::Chart;
-use super::feedthrough;
-use super::linearise::{Linearised, linearise_quickly};
-use super::model::Model;
-use super::noise::Noise;
-use super::point::Point;
-use super::spectra::Spectra;
+pub(crate) mod autoregression;
+pub(crate) mod balancing;
+pub(crate) mod block;
+pub(crate) mod chart;
+pub(crate) mod feedthrough;
+pub(crate) mod grouping;
+pub(crate) mod linearise;
+pub(crate) mod model;
+pub(crate) mod noise;
+pub(crate) mod point;
+pub(crate) mod residual;
+pub(crate) mod rows;
+pub(crate) mod state_lanes;
+
+use crate::identify::likelihood::data::spectra::Spectra;
+use chart::Chart;
 use faer::{Mat, c64};
+use linearise::{Linearised, linearise_quickly};
+use model::Model;
+use noise::Noise;
+use point::Point;
 
 /// Choices of a search.
 #[derive(Debug, Clone)]

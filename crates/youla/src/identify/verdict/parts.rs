@@ -6,15 +6,15 @@
 //! ```
 //! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
-use super::super::Evidence;
-use super::super::chart::Chart;
-use super::super::deviation::inverse_root;
-use super::super::linearise::{compressed, linearise, stacked};
-use super::super::point::energy;
-use super::super::problem::{Problem, Solution};
-use super::super::search::{with_best_ends, with_slope_of_unstable};
-use super::super::spectra::Spectra;
 use super::excess;
+use crate::identify::likelihood::Evidence;
+use crate::identify::likelihood::choose::problem::{Problem, Solution};
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::deviation::inverse_root;
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
+use crate::identify::likelihood::search::point::energy;
+use crate::identify::likelihood::search::{with_best_ends, with_slope_of_unstable};
 use crate::identify::subspace::Experiment;
 use faer::{Mat, c64};
 

@@ -1,12 +1,12 @@
 //! A start of a given order from the model that the records ask for: the regressions of a given order alone often lead to a local
 //! minimum, as the order leaves no room for a detour.
 
-use super::balancing::balanced;
 use super::grow;
-use super::model::Model;
-use super::point::Point;
 use super::problem::{Problem, Task};
-use super::search::with_best_inputs;
+use crate::identify::likelihood::search::balancing::balanced;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::point::Point;
+use crate::identify::likelihood::search::with_best_inputs;
 use std::sync::Arc;
 
 impl Problem<'_> {

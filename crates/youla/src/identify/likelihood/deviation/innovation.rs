@@ -4,9 +4,9 @@
 //! of the whole where the plant is stable: K is zero for the states of the plant. Where it is not, the gain comes from the Riccati
 //! equation of plant and noise, which mirrors its poles.
 
-use super::autoregression::Regression;
-use super::noise::Noise;
-use super::recommendation::Predictor;
+use crate::identify::likelihood::recommendation::Predictor;
+use crate::identify::likelihood::search::autoregression::Regression;
+use crate::identify::likelihood::search::noise::Noise;
 use crate::linalg::{RiccatiProblem, block, block_diagonal, dare};
 use crate::lti::{Discrete, StateSpace};
 use faer::{Mat, Scale};

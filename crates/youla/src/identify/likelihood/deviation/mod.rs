@@ -6,13 +6,19 @@
 //! ```
 //! The weights are those of Schwarz's criterion, which approximates the posterior probability of a model.
 
-use super::chart::Chart;
-use super::linearise::linearise;
-use super::missed::Missed;
-use super::model::Model;
-use super::problem::{Choice, Solution};
-use super::spectra::Spectra;
+pub(crate) mod innovation;
+pub(crate) mod missed;
+pub(crate) mod mode_estimates;
+pub(crate) mod physical;
+pub(crate) mod response_deviation;
+
+use crate::identify::likelihood::choose::problem::{Choice, Solution};
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::linearise::linearise;
+use crate::identify::likelihood::search::model::Model;
 use faer::{Mat, c64};
+use missed::Missed;
 
 /// Rivals of less weight are left out.
 const LEAST_WEIGHT: f64 = 1e-12;

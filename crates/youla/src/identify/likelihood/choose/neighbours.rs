@@ -1,11 +1,11 @@
 //! Models one step away: another dead time, one pole or pair less, one mode more.
 
 use super::grow;
-use super::model::Model;
 use super::problem::{Choice, NOISE_ORDER, Problem, Task};
-use super::search::{deviance, with_best_inputs};
-use super::spectra::Spectra;
 use super::starts::THINNED;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::{deviance, with_best_inputs};
 use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;

@@ -1,9 +1,9 @@
 //! The records with what is fixed about the model, and the searches that are made on them.
 
-use super::Candidate;
-use super::point::Point;
-use super::search::{Found, SearchOptions, search};
-use super::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::Candidate;
+use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::search::point::Point;
+use crate::identify::likelihood::search::{Found, SearchOptions, search};
 use crate::identify::subspace::Experiment;
 use faer::Mat;
 use rayon::prelude::*;

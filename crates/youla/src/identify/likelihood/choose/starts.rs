@@ -1,12 +1,12 @@
 //! Starts of the search from long regressions: of different pasts, ridges and orders the most promising.
 
-use super::lag_sums::LagSums;
-use super::model::Model;
-use super::noise::Noise;
 use super::problem::{NOISE_ORDER, Problem, Task};
-use super::search::{deviance, with_best_ends, with_best_inputs};
-use super::spectra::Spectra;
 use super::states::States;
+use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::likelihood::search::{deviance, with_best_ends, with_best_inputs};
 use rayon::prelude::*;
 use std::sync::Arc;
 

@@ -15,10 +15,10 @@ mod parts;
 pub(crate) use loop_evidence::of_loop;
 pub(crate) use parts::Parts;
 
-use super::Evidence;
-use super::deviation::response;
-use super::problem::Solution;
-use super::spectra::Spectra;
+use crate::identify::likelihood::Evidence;
+use crate::identify::likelihood::choose::problem::Solution;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::deviation::response;
 use faer::c64;
 
 /// Excess of chi-square over its mean in its standard deviations.

@@ -1,7 +1,7 @@
 //! Starts: states of the predictor from a long ridge regression (PBSIDopt: Chiuso, Automatica 43 (2007), 1034), all from the
 //! lag sums.
 
-use super::lag_sums::LagSums;
+use crate::identify::likelihood::data::lag_sums::LagSums;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 

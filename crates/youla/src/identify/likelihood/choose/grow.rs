@@ -6,11 +6,11 @@
 //! ```
 //! the best grid points become starts with the dominant pair of directions of R (rank one adds two states).
 
-use super::block::Block;
-use super::lanes::{LANES, Lanes, add_real_product};
-use super::model::Model;
-use super::noise::Noise;
-use super::spectra::Spectra;
+use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::block::Block;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side, c64};
 use pulp::{Arch, NullaryFnOnce};

@@ -3,7 +3,7 @@
 use super::model::Model;
 use super::noise::Noise;
 use super::residual::residual;
-use super::spectra::Spectra;
+use crate::identify::likelihood::data::spectra::Spectra;
 use faer::c64;
 
 /// A model and the vectors t of the records.

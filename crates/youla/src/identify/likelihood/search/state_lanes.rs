@@ -1,7 +1,7 @@
 //! States of a block on several lines at a time.
 
 use super::block::Block;
-use super::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
 use faer::c64;
 
 /// `M = (z I - A)^-1`, row by row, and `X = M (B U + z t)` of one block.

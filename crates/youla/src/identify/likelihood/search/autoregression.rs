@@ -1,7 +1,7 @@
 //! The autoregression of the noise at one output, with a zero where slow drift lies below white noise.
 
-use super::lanes::{LANES, Lanes};
-use super::spectra::{Lines, Spectra, parts};
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use faer::c64;
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;

@@ -8,8 +8,8 @@
 //! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients.
 
 use super::autoregression::{Correlations, Regression};
-use super::lanes::{LANES, Lanes, add_real_product};
-use super::spectra::{Lines, Spectra, parts};
+use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use faer::{Mat, c64};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;

@@ -6,14 +6,14 @@
 //! ```
 //! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
-use super::super::Evidence;
-use super::super::chart::Chart;
-use super::super::linearise::{Extra, linearise_with};
-use super::super::point::energy;
-use super::super::problem::Solution;
-use super::super::search::with_slope_of_unstable;
-use super::super::spectra::{Lines, Spectra};
 use super::excess;
+use crate::identify::likelihood::Evidence;
+use crate::identify::likelihood::choose::problem::Solution;
+use crate::identify::likelihood::data::spectra::{Lines, Spectra};
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
+use crate::identify::likelihood::search::point::energy;
+use crate::identify::likelihood::search::with_slope_of_unstable;
 use faer::c64;
 use rustfft::FftPlanner;
 

@@ -2,11 +2,11 @@
 
 use super::block::Block;
 use super::chart::Chart;
-use super::lanes::{LANES, Lanes};
 use super::model::Model;
 use super::noise::Noise;
-use super::spectra::Lines;
 use super::state_lanes::states;
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::spectra::Lines;
 use faer::{Mat, c64};
 use pulp::{Arch, NullaryFnOnce};
 use std::ops::Range;

@@ -1,9 +1,9 @@
 //! The found model in physical units, with its dead time as states.
 
-use super::model::Model;
-use super::problem::Choice;
-use super::spectra::Sizes;
 use crate::Result;
+use crate::identify::likelihood::choose::problem::Choice;
+use crate::identify::likelihood::data::spectra::Sizes;
+use crate::identify::likelihood::search::model::Model;
 use crate::lti::{Discrete, StateSpace};
 use faer::Mat;
 

@@ -1,13 +1,13 @@
 //! What the known loop says: controller and excitation.
 
-use super::super::deviation::{grid, response};
-use super::super::missed::Missed;
-use super::super::model::Model;
-use super::super::noise::Noise;
-use super::super::problem::Solution;
-use super::super::search::with_best_ends;
-use super::super::spectra::{Sizes, Spectra};
-use super::super::{Evidence, LoopKnowledge};
+use crate::identify::likelihood::choose::problem::Solution;
+use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::deviation::missed::Missed;
+use crate::identify::likelihood::deviation::{grid, response};
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::likelihood::search::with_best_ends;
+use crate::identify::likelihood::{Evidence, LoopKnowledge};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
 use faer::{MatRef, c64};

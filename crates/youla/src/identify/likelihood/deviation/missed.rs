@@ -6,10 +6,10 @@
 //! The excitation is an instrument: it is independent of the noise, so that `Delta G` has mean zero where G is right, with variance
 //! `Phi_v (S_ux S_xx^-1 S_xu)^-1`. What exceeds this is error of the model: nonlinear friction, a plant that drifts, missing modes.
 
-use super::noise::Noise;
-use super::problem::Choice;
-use super::spectra::{Spectra, lines_of, long_enough};
-use super::trust::excess;
+use crate::identify::likelihood::choose::problem::Choice;
+use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
+use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::verdict::excess;
 use faer::{Mat, MatRef, Side, c64};
 
 /// Lines of a band, over all records.

@@ -1,9 +1,9 @@
 //! What a model leaves of the outputs on the lines of a record.
 
-use super::lanes::{LANES, Lanes};
 use super::model::Model;
-use super::spectra::{Lines, parts};
 use super::state_lanes::states;
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::spectra::{Lines, parts};
 use faer::c64;
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;

@@ -4,13 +4,13 @@
 //! var f = (df/dtheta) (J'J)^-1 (df/dtheta)',     f: natural frequency, damping ratio, magnitude
 //! ```
 
-use super::block::Block;
-use super::chart::Chart;
-use super::deviation::inverse_root;
-use super::linearise::linearise;
-use super::model::Model;
-use super::problem::Choice;
-use super::spectra::Spectra;
+use super::inverse_root;
+use crate::identify::likelihood::choose::problem::Choice;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::block::Block;
+use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::linearise::linearise;
+use crate::identify::likelihood::search::model::Model;
 use crate::lti::Discrete;
 use crate::lti::modes::{Mode, mode};
 use faer::{Mat, c64};

@@ -1,6 +1,6 @@
 //! Dead time: how many of the newest inputs a long regression does without.
 
-use super::lag_sums::LagSums;
+use crate::identify::likelihood::data::lag_sums::LagSums;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 

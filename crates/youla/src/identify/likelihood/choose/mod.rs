@@ -1,0 +1,10 @@
+//! The choice of order, dead time and direct path: starts from long regressions, then models one step away.
+
+pub(crate) mod dead_time;
+pub(crate) mod grow;
+pub(crate) mod neighbours;
+pub(crate) mod problem;
+pub(crate) mod resize;
+pub(crate) mod solve;
+pub(crate) mod starts;
+pub(crate) mod states;

@@ -1,10 +1,10 @@
 //! Subspace identification straight from files that need not fit into memory: what `youla subspace` does.
 
-use super::artefacts::{ModelFile, Provenance, SCHEMA};
-use super::folder::to_value;
-use super::records::SourceFile;
-use super::settings::{SubspaceTable, parse_table};
-use super::subspace_details::{LongDetails, SubspaceDetails};
+use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
+use crate::folder::subspace_details::{LongDetails, SubspaceDetails};
+use crate::folder::to_value;
+use crate::records::SourceFile;
+use crate::settings::{SubspaceTable, parse_table};
 use crate::{Error, Result};
 use faer::MatMut;
 use serde_json::Value;

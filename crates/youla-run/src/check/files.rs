@@ -1,9 +1,9 @@
 //! Files as they are read and tested one record at a time.
 
 use super::{CheckedRecord, DataCheck};
-use crate::computed::ComputedChannels;
+use crate::records::computed::ComputedChannels;
+use crate::records::segments::{Part, parts};
 use crate::records::{LoopRecord, UsedRows, channels_of, refuse_overlap};
-use crate::segments::{Part, parts};
 use crate::settings::DataFile;
 use crate::{Error, Result};
 use rayon::prelude::*;

@@ -9,10 +9,10 @@ mod result;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
-use super::factorise::{declared_controller, declared_loop};
-use super::records::{LoopRecord, RunRecords};
-use super::settings::{DataFile, RunSettings, labelled};
-use crate::computed::ComputedChannels;
+use crate::records::computed::ComputedChannels;
+use crate::records::{LoopRecord, RunRecords};
+use crate::settings::{DataFile, RunSettings, labelled};
+use crate::stages::factors::{declared_controller, declared_loop};
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;

@@ -1,12 +1,12 @@
 //! What a comparison needs of a finished run.
 
-use crate::entries::{ModeEntry, pairs};
-use crate::export::model_for_export;
+use crate::finished::export::model_for_export;
+use crate::finished::redraw::read_report;
 use crate::folder::ModelFacts;
 use crate::method::Method;
-use crate::redraw::read_report;
-use crate::robustness::{DiskEntry, RobustnessEntry};
+use crate::stages::validate::robustness::{DiskEntry, RobustnessEntry};
 use crate::summary::Summary;
+use crate::summary::entries::{ModeEntry, pairs};
 use crate::{Error, Result};
 use serde::Deserialize;
 use std::collections::BTreeMap;

@@ -1,12 +1,12 @@
 //! What the JSON files of a run folder hold besides models.
 
-use crate::artefacts::Provenance;
-use crate::entries::{ModeEntry, OrRefused, finite_all, pairs};
+use crate::folder::artefacts::Provenance;
+use crate::records::segments::RecordSegment;
 use crate::records::{LoopRecord, RunRecords};
-use crate::residual_tests::{RecordResiduals, step_keys};
-use crate::robustness::{RobustnessFile, ScalesEntry};
-use crate::segments::RecordSegment;
-use crate::verdict::{ModelVerdict, RecordVerdict};
+use crate::stages::validate::residuals::{RecordResiduals, step_keys};
+use crate::stages::validate::robustness::{RobustnessFile, ScalesEntry};
+use crate::stages::validate::{ModelVerdict, RecordVerdict};
+use crate::summary::entries::{ModeEntry, OrRefused, finite_all, pairs};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla::signal::Channel;
@@ -14,15 +14,15 @@ use youla::validate::RESIDUAL_LAGS;
 
 /// What a stage found, and where it comes from.
 #[derive(Serialize)]
-pub(super) struct Artefact<'a, T> {
+pub(crate) struct Artefact<'a, T> {
     #[serde(flatten)]
-    pub(super) content: T,
-    pub(super) provenance: &'a Provenance,
+    pub(crate) content: T,
+    pub(crate) provenance: &'a Provenance,
 }
 
 /// `1-record/records.json`.
 #[derive(Serialize)]
-pub(super) struct RecordsFile<'a> {
+pub(crate) struct RecordsFile<'a> {
     sample_time: f64,
     inputs: &'a [Channel],
     outputs: &'a [Channel],
@@ -32,7 +32,7 @@ pub(super) struct RecordsFile<'a> {
 }
 
 #[derive(Serialize)]
-pub(super) struct RecordLength<'a> {
+pub(crate) struct RecordLength<'a> {
     name: &'a str,
     samples: usize,
 }
@@ -55,26 +55,26 @@ impl<'a> From<&'a RunRecords> for RecordsFile<'a> {
 
 /// `details` of `2-factor/left.json` and `right.json`.
 #[derive(Serialize)]
-pub(super) struct FactorDetails {
-    pub(super) bezout_residual: f64,
+pub(crate) struct FactorDetails {
+    pub(crate) bezout_residual: f64,
 }
 
 /// `3-signals/signals.json`.
 #[derive(Serialize)]
-pub(super) struct SignalsFile {
-    pub(super) dropped_samples: usize,
-    pub(super) controller_mismatch: Option<f64>,
+pub(crate) struct SignalsFile {
+    pub(crate) dropped_samples: usize,
+    pub(crate) controller_mismatch: Option<f64>,
 }
 
 /// `7-validate/verdict.json`.
 #[derive(Serialize)]
-pub(super) struct VerdictFile<'a> {
-    pub(super) models: BTreeMap<String, VerdictEntry<'a>>,
-    pub(super) channel_scales: OrRefused<ScalesEntry>,
+pub(crate) struct VerdictFile<'a> {
+    pub(crate) models: BTreeMap<String, VerdictEntry<'a>>,
+    pub(crate) channel_scales: OrRefused<ScalesEntry>,
 }
 
 #[derive(Serialize)]
-pub(super) struct VerdictEntry<'a> {
+pub(crate) struct VerdictEntry<'a> {
     #[serde(flatten)]
     facts: ModelFacts,
     robustness: RobustnessFile<'a>,
@@ -122,7 +122,7 @@ impl<'a> From<&'a ModelVerdict> for VerdictEntry<'a> {
 
 /// `7-validate/residuals.json`.
 #[derive(Serialize)]
-pub(super) struct ResidualsFile<'a> {
+pub(crate) struct ResidualsFile<'a> {
     lags: usize,
     steps: Vec<String>,
     models: BTreeMap<&'a str, BTreeMap<&'a str, &'a RecordResiduals>>,

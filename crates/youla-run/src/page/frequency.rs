@@ -1,24 +1,24 @@
 //! Frequency responses of all models: magnitude and phase, principal gains, regions, and the measured ones.
 
 use crate::Result;
-use crate::identification::Identification;
-use crate::lines;
 use crate::method::Method;
-use crate::recommended;
-use crate::response::{self, bounds_db, decibel, magnitude, model_responses, phase};
-use crate::uncertainty::SystemUncertainty;
+use crate::result::Identification;
+use crate::stages::nonparametric;
+use crate::stages::responses::{self, bounds_db, decibel, magnitude, model_responses, phase};
+use crate::stages::uncertainty::SystemUncertainty;
+use crate::summary::recommended;
 use std::f64::consts::TAU;
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
 
-pub(super) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
+pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(&found.verdict, &found.hz)?;
-    let models = responses.iter().flat_map(|(method, r)| response::drawn(method.key(), r)).collect();
+    let models = responses.iter().flat_map(|(method, r)| responses::drawn(method.key(), r)).collect();
     let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty(*method)?)));
     let of_scheme = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port)));
     let bands = recommended(found, &responses).into_iter().chain(of_scheme).collect();
     let singular = singular(found, &responses)?;
-    let (indirect, lines) = (indirect(found), lines::drawn(found));
+    let (indirect, lines) = (indirect(found), nonparametric::drawn(found));
     Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect, lines, bands, singular })
 }
 
@@ -84,5 +84,5 @@ fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -
 
 /// All pairs of output and input.
 fn ports(found: &Identification) -> impl Iterator<Item = (usize, usize)> {
-    response::ports(found.records.outputs.len(), found.records.inputs.len())
+    responses::ports(found.records.outputs.len(), found.records.inputs.len())
 }

@@ -1,0 +1,219 @@
+//! An excitation for the machine of a run.toml: its loop, the sequence, the files.
+
+pub(crate) mod figure;
+
+use crate::Result;
+use crate::excite::figure::figure;
+use crate::records::{RunRecords, channels_of, read_records};
+use crate::settings::{RealisedController, RunSettings};
+use crate::stages::factors::factorise;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use youla::control::with_input_port;
+use youla::lti::{Discrete, Partitioned, StateSpace};
+use youla::signal::Channel;
+use youla::signal::{Detrend, Record};
+use youla_io::export::{SequenceFormat, export_sequence};
+use youla_io::folder::{refuse_existing, replace_files};
+use youla_io::{Format, Source, TimeSource, read};
+use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
+use youla_report::svg;
+
+/// Where the excitation enters.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExcitationPort {
+    /// The port alpha of Fig. 3, `u = F xh + alpha`: the observer of the controller knows of it.
+    Alpha,
+    /// The plant input, `u = K y + alpha`: the controller does not know of it.
+    Input,
+}
+
+impl ExcitationPort {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            ExcitationPort::Alpha => "port alpha of the controller (u = F xh + alpha)",
+            ExcitationPort::Input => "plant input (u = K y + alpha)",
+        }
+    }
+}
+
+/// An excitation for the machine of a run.
+#[derive(Debug, Clone)]
+pub struct RunExcitation {
+    /// Name of the machine.
+    pub name: String,
+    /// Where it enters.
+    pub port: ExcitationPort,
+    /// Names and units of the columns: those that run.toml declares for this port, else `alpha_<input>`.
+    pub columns: Vec<Channel>,
+    /// The inputs of the plant.
+    pub inputs: Vec<Channel>,
+    /// Its outputs.
+    pub outputs: Vec<Channel>,
+    /// The excitation.
+    pub excited: Excited,
+}
+
+/// Makes an excitation for the machine that `settings` describe, in the loop of its nominal model; paths are relative to `folder`.
+///
+/// Without a `port`, it enters where run.toml declares an excitation (`input_excitation`, `alpha`); where it declares none, at the port
+/// alpha of a controller that is given by its observer gains, else at the plant input. The data files are read only where they hold
+/// what is needed: the sample time if `[data] sample_time` does not state it, and the weights of the factors of a controller that is not
+/// given by its gains, for its port alpha. With `quiet`, a record without excitation, the noise is taken from that
+/// ([`output_noise`]).
+///
+/// # Errors
+/// As [`excite`]; whatever is wrong with nominal model, controller and the files that are read.
+pub fn excite_run(
+    settings: &RunSettings,
+    folder: &Path,
+    options: &ExciteOptions,
+    port: Option<ExcitationPort>,
+    quiet: Option<&Path>,
+) -> Result<RunExcitation> {
+    let time = sample_time(settings, folder)?;
+    let nominal = settings.nominal.realise(folder, time)?;
+    let controller = settings.controller.realise(folder, time)?;
+    let port = port.unwrap_or_else(|| usual_port(settings, &controller));
+    let (inputs, outputs) = (channels_of(&settings.data.inputs), channels_of(&settings.data.outputs));
+    let ported = ported(settings, folder, &nominal, &controller, port)?;
+    let on = ExcitedLoop { nominal: &nominal, controller: &ported, inputs: &inputs, outputs: &outputs };
+    let mut options = options.clone();
+    if let Some(file) = quiet {
+        options.noise = noise_of(settings, &on, file).map_err(|e| e.within(file.display().to_string()))?;
+    }
+    let excited = excite(&on, &options)?;
+    let declared = match port {
+        ExcitationPort::Alpha => &settings.data.alpha,
+        ExcitationPort::Input => &settings.data.input_excitation,
+    };
+    let columns = match &declared[..] {
+        [] => inputs.iter().map(|c| Channel::new(format!("alpha_{}", c.name), &c.unit)).collect(),
+        declared => channels_of(declared),
+    };
+    Ok(RunExcitation { name: settings.name.clone(), port, columns, inputs, outputs, excited })
+}
+
+fn sample_time(settings: &RunSettings, folder: &Path) -> Result<Discrete> {
+    match settings.data.sample_time {
+        Some(ts) => Ok(Discrete::new(ts)?),
+        None => {
+            let part = "[data] states no sample_time, and the records, which would show it, cannot be read";
+            read_records(&settings.data, folder).map(|records| records.time).map_err(|e| e.within(part))
+        }
+    }
+}
+
+fn usual_port(settings: &RunSettings, controller: &RealisedController) -> ExcitationPort {
+    let observer = matches!(controller, RealisedController::Observer { .. });
+    match (settings.data.input_excitation.is_empty(), settings.data.alpha.is_empty(), observer) {
+        (false, ..) | (true, true, false) => ExcitationPort::Input,
+        (true, false, _) | (true, true, true) => ExcitationPort::Alpha,
+    }
+}
+
+/// The controller with the port, `(y, alpha)` to `(u, ..)`.
+fn ported(
+    settings: &RunSettings,
+    folder: &Path,
+    nominal: &StateSpace<Discrete>,
+    controller: &RealisedController,
+    port: ExcitationPort,
+) -> Result<Partitioned<Discrete>> {
+    let records = match (controller, port) {
+        (RealisedController::System(k), ExcitationPort::Input) => return Ok(with_input_port(k)?),
+        (RealisedController::System(_), ExcitationPort::Alpha) => {
+            let part = "the port alpha of a controller without observer gains rests on the estimation records (or take the port input)";
+            read_records(&settings.data, folder).map_err(|e| e.within(part))?
+        }
+        (RealisedController::Observer { .. }, _) => without_data(settings, nominal.time()),
+    };
+    let factors = factorise(nominal, controller, &records, &settings.factors)?.factors;
+    match port {
+        ExcitationPort::Alpha => Ok(factors.j_k()?),
+        ExcitationPort::Input => Ok(with_input_port(&factors.controller()?)?),
+    }
+}
+
+/// Records of which only clock and channels are known; the factors of observer gains need no more.
+fn without_data(settings: &RunSettings, time: Discrete) -> RunRecords {
+    RunRecords {
+        time,
+        inputs: channels_of(&settings.data.inputs),
+        outputs: channels_of(&settings.data.outputs),
+        estimation: Vec::new(),
+        verification: Vec::new(),
+        sources: Vec::new(),
+        segments: Vec::new(),
+        measured: None,
+        true_plant: None,
+    }
+}
+
+fn noise_of(settings: &RunSettings, on: &ExcitedLoop, file: &Path) -> Result<Vec<f64>> {
+    let data = &settings.data;
+    let clock = TimeSource { column: data.time_column.clone(), ts: data.sample_time, ..TimeSource::default() };
+    let source = Source {
+        path: file.to_owned(),
+        format: Format::Detect,
+        time: clock,
+        channels: data.outputs.clone(),
+        csv: data.csv.clone(),
+    };
+    let record = read(&source)?.detrend(Detrend::Mean)?.record;
+    Ok(output_noise(on, record.data())?)
+}
+
+impl RunExcitation {
+    /// The sequence as a record named `alpha`.
+    ///
+    /// # Errors
+    /// [`youla::Error::DuplicateChannel`] where two columns have one name.
+    pub fn record(&self) -> Result<Record> {
+        Ok(Record::new("alpha", self.columns.clone(), self.excited.alpha.clone(), self.excited.time)?)
+    }
+
+    /// What the comments of the files say.
+    pub fn about(&self) -> Vec<String> {
+        let s = &self.excited.summary;
+        let [low, high] = s.band;
+        let mut lines = vec![
+            format!("Excitation of {}, at the {}.", self.name, self.port.words()),
+            format!("{}, {low} to {high} Hz, {}, seed {}.", s.shape, s.independence, s.seed),
+            format!("{} samples of {:?} s, {:.4} s.", s.samples, s.sample_time, s.duration),
+        ];
+        lines.extend(s.filter.iter().map(|how| {
+            let bands: Vec<String> =
+                s.notches.iter().map(|n| format!("{:.2} to {:.2} Hz", n.band[0], n.band[1])).collect();
+            format!("Kept free: {} ({how}).", bands.join(", "))
+        }));
+        lines
+    }
+}
+
+/// Writes `alpha` in the formats asked for and the picture `excite.svg` to `folder`, which is made if need be.
+///
+/// # Errors
+/// [`youla_io::Error::FileExists`] for a file that is there, unless `replace` is set; then nothing is written. [`youla_io::Error::Io`],
+/// and those of [`export_sequence`].
+pub fn write_excitation(
+    found: &RunExcitation,
+    formats: &[SequenceFormat],
+    folder: &Path,
+    replace: bool,
+) -> Result<Vec<PathBuf>> {
+    let record = found.record()?;
+    let about = found.about();
+    let mut files = Vec::new();
+    for format in formats {
+        files.push((format!("alpha.{}", format.extension()), export_sequence(&record, *format, &about)?));
+    }
+    let (figure, methods) = figure(found);
+    files.push(("excite.svg".to_owned(), svg(&figure, &methods)?.into_bytes()));
+    if !replace {
+        refuse_existing(folder, &files)?;
+    }
+    Ok(replace_files(folder, &files)?)
+}

@@ -1,0 +1,170 @@
+//! What a run folder holds, for [`youla_io::export`].
+
+use crate::folder::artefacts::{Provenance, SCHEMA};
+use crate::records::SourceFile;
+use crate::settings::{RealisedController, RunSettings};
+use crate::{Error, Result};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use youla::Mat;
+use youla::lti::{Discrete, StateSpace};
+use youla::signal::unknown;
+use youla_io::export::{
+    ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, model_from_bytes, read_model,
+};
+use youla_io::{open, sha256};
+
+/// The model files of a run folder; the first that is there is what a run is exported as.
+const MODELS: [&str; 11] = [
+    "4-identify/recommended",
+    "5-recombine/hansen",
+    "6-reduce/hansen_reduced",
+    "4-identify/direct",
+    "4-identify/grey_box",
+    "4-identify/deviation",
+    "2-factor/nominal",
+    "2-factor/controller",
+    "2-factor/left",
+    "2-factor/right",
+    "8-redesign/new_controller",
+];
+
+/// Reads a model for export: a file as [`read_model`] does, or the model `name` of a run folder, `recommended` by default, else the first that the run holds. One that
+/// does not say where it comes from gets the file and its SHA-256 as provenance.
+///
+/// # Errors
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a folder that is no run folder, and for a name given with a file;
+/// [`youla::Error::UnknownChannel`] for a model that the run does not hold, with those that it holds.
+pub fn model_for_export(source: &Path, name: Option<&str>) -> Result<NamedModel> {
+    let path = match (source.is_dir(), name) {
+        (true, name) => model_file(source, name)?,
+        (false, None) => source.to_owned(),
+        (false, Some(_)) => {
+            return Err(not(source, "this is no folder; a model is chosen by name in a run folder only"));
+        }
+    };
+    let mut model = read_model(&path)?;
+    if model.provenance.is_null() {
+        let file = SourceFile { path: path.display().to_string(), purpose: "model".into(), sha256: sha256(&path)? };
+        let program = concat!("youla ", env!("CARGO_PKG_VERSION")).into();
+        let provenance = Provenance { schema: SCHEMA, program, seed: None, sources: vec![file], options: () };
+        model.provenance = serde_json::to_value(provenance)
+            .map_err(|source| Error::Report(youla_report::Error::ReportData { source }))?;
+    }
+    model.origin = origin(source, &path)?;
+    Ok(model)
+}
+
+/// The controller of a run folder with its ports, from `2-factor/`, and a Q: a model from beta to alpha, or the `controller.json` of a
+/// redesign that holds one.
+///
+/// # Errors
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a source that is no run folder.
+pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerExport> {
+    require_run(run)?;
+    let path = run.join("2-factor/left.json");
+    let (nominal, left) = (read_model(run.join("2-factor/nominal.json"))?, read_model(&path)?);
+    let q_origin = q.map(|q| Ok::<_, Error>(format!(" and {}", origin(q, q)?))).transpose()?.unwrap_or_default();
+    Ok(ControllerExport {
+        name: "controller".into(),
+        measured: nominal.outputs,
+        commanded: nominal.inputs,
+        nominal: nominal.system,
+        left: left.system,
+        q: q.map(parameter).transpose()?,
+        origin: origin(run, &path)? + &q_origin,
+    })
+}
+
+/// The loop of a firmware: nominal model and gains of a run whose controller is an observer, or those of the `controller.json` of a redesign
+/// by LQG.
+///
+/// # Errors
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a source whose controller is no observer.
+pub fn loop_for_export(source: &Path) -> Result<LoopExport> {
+    if source.is_dir() { loop_of_run(source) } else { loop_of_redesign(source) }
+}
+
+fn loop_of_run(run: &Path) -> Result<LoopExport> {
+    require_run(run)?;
+    let (path, settings) = (run.join("2-factor/nominal.json"), RunSettings::read(&run.join("run.toml"))?);
+    let nominal = read_model(&path)?;
+    let time = nominal.system.time();
+    let RealisedController::Observer { f, l } = settings.controller.realise(run, time)? else {
+        let problem = "the controller of this run is no observer with gains; the loop of the firmware needs [controller.observer], and \
+                       --to c-controller exports any controller";
+        return Err(not(run, problem));
+    };
+    // States of one size, which single precision needs.
+    let scale = nominal.system.state_scales()?;
+    let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
+    let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
+    Ok(LoopExport {
+        name: "loop".into(),
+        observer: ObserverData::new(&nominal.system.with_scaled_states(&scale), f.as_ref(), l.as_ref()),
+        measured: nominal.outputs,
+        commanded: nominal.inputs,
+        ts: time.ts(),
+        origin: origin(run, &path)?,
+    })
+}
+
+fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    let found: Option<ExportedController> = serde_json::from_slice(&bytes).ok();
+    let Some(ExportedController { observer: Some(observer), ts, measured, commanded, .. }) = found else {
+        let problem = "this is neither a run folder nor the controller.json of a redesign by LQG";
+        return Err(not(path, problem));
+    };
+    let origin = origin(path, path)?;
+    Ok(LoopExport { name: "loop".into(), measured, commanded, observer, ts, origin })
+}
+
+/// Q from either kind of file.
+fn parameter(path: &Path) -> Result<StateSpace<Discrete>> {
+    let mut bytes = Vec::new();
+    let read = open(path)?.read_to_end(&mut bytes);
+    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    match serde_json::from_slice::<ExportedController>(&bytes) {
+        Ok(ExportedController { q: Some(q), ts, .. }) => Ok(q.system(Discrete::new(ts)?)?),
+        Ok(_) => Err(not(path, "this controller was not designed by its Q")),
+        Err(_) => Ok(model_from_bytes(&bytes, path)?.system),
+    }
+}
+
+fn model_file(run: &Path, name: Option<&str>) -> Result<PathBuf> {
+    require_run(run)?;
+    let there: Vec<&str> = MODELS.into_iter().filter(|path| run.join(path).with_extension("mat").is_file()).collect();
+    let last = |path: &str| path.rsplit('/').next().unwrap_or(path).to_owned();
+    let name = name.map_or_else(|| there.first().map_or_else(String::new, |path| last(path)), str::to_owned);
+    match there.iter().find(|path| last(path) == name) {
+        Some(path) => Ok(run.join(path).with_extension("json")),
+        None => {
+            let names = there.iter().map(|path| last(path)).collect();
+            Err(unknown(&format!("the run {}", run.display()), &name, names).into())
+        }
+    }
+}
+
+fn require_run(run: &Path) -> Result<()> {
+    match run.join("summary.json").is_file() {
+        true => Ok(()),
+        false => Err(not(run, "this is no run folder (there is no summary.json in it)")),
+    }
+}
+
+fn not(path: &Path, problem: &str) -> Error {
+    Error::File(youla_io::Error::NotAModel { path: path.to_owned(), problem: problem.to_owned() })
+}
+
+/// The file from the run folder on, or its name, with the first digits of its SHA-256.
+fn origin(source: &Path, path: &Path) -> Result<String> {
+    let from = source.parent().filter(|_| source != path);
+    let shown = match from {
+        Some(parent) => path.strip_prefix(parent).unwrap_or(path).display().to_string(),
+        None => path.file_name().unwrap_or_default().to_string_lossy().into_owned(),
+    };
+    Ok(format!("{shown}, SHA-256 {}", &sha256(path)?[..16]))
+}

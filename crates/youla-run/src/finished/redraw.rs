@@ -1,0 +1,37 @@
+//! The report of a finished run, drawn again from its data.
+
+use crate::{Error, Result};
+use std::io::Read;
+use std::path::{Path, PathBuf};
+use youla_io::folder::replace_file;
+use youla_io::open;
+use youla_report::{ReportData, html};
+
+/// Draws `report.html` of a run folder again from its `report.json` and returns its path.
+///
+/// # Errors
+/// [`youla_io::Error::MissingFile`] where there is no `report.json`, [`Error::NotAReport`] where it is of another kind,
+/// [`youla_io::Error::Io`]; the old report stays then.
+pub fn redraw(run: &Path) -> Result<PathBuf> {
+    let report = read_report(run)?;
+    let path = run.join("report.html");
+    replace_file(&path, &html(&report)?)?;
+    Ok(path)
+}
+
+/// The `report.json` of a run folder.
+///
+/// # Errors
+/// [`youla_io::Error::MissingFile`], [`Error::NotAReport`], [`youla_io::Error::Io`].
+pub(crate) fn read_report(run: &Path) -> Result<ReportData> {
+    if run.is_file() {
+        let problem = "this is a file; give the folder of a run, which holds report.json".into();
+        return Err(Error::File(youla_io::Error::NotAModel { path: run.to_owned(), problem }));
+    }
+    let data = run.join("report.json");
+    let mut text = String::new();
+    open(&data)?
+        .read_to_string(&mut text)
+        .map_err(|source| Error::File(youla_io::Error::Io { path: data.clone(), source }))?;
+    serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })
+}

@@ -1,0 +1,304 @@
+//! The numbered artefacts of a run folder, written stage by stage.
+
+pub(crate) mod artefacts;
+pub(crate) mod subspace_details;
+pub(crate) mod write;
+
+mod files;
+
+pub(crate) use files::ModelFacts;
+
+use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
+use crate::folder::subspace_details::{DeviationDetails, SubspaceDetails};
+use crate::records::LoopRecord;
+use crate::result::{Filtered, Identification, SchemeRun};
+use crate::stages::redesign;
+use crate::stages::reduction;
+use crate::stages::stabilisation::{DiagramFile, as_csv};
+use crate::stages::uncertainty::SystemUncertainty;
+use crate::stages::validate::robustness::scales_entry;
+use crate::summary::entries::Refused;
+use crate::summary::recommended::{self, RecommendedDetails};
+use crate::{Error, Result};
+use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictEntry, VerdictFile};
+use serde::Serialize;
+use youla::MatRef;
+use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla::lti::{Discrete, StateSpace};
+use youla::signal::Channel;
+use youla_io::folder::RunFolder;
+use youla_io::{Packing, Value, Variable, write_mat};
+use youla_report::{figure_csv, svg};
+
+/// Writes all artefacts of a run except report and summary.
+///
+/// # Errors
+/// [`youla_io::Error::Io`].
+pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()> {
+    let provenance = Provenance {
+        schema: SCHEMA,
+        program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
+        seed: found.settings.seed,
+        sources: found.records.sources.clone(),
+        options: found.settings.clone(),
+    };
+    let writer = Writer { found, folder, provenance };
+    folder.text("run.toml", &found.settings.to_toml()?)?;
+    writer.records()?;
+    writer.factors()?;
+    writer.signals()?;
+    writer.models()?;
+    writer.verdict()?;
+    writer.certificate()?;
+    writer.redesign()
+}
+
+struct Writer<'a> {
+    found: &'a Identification,
+    folder: &'a RunFolder,
+    provenance: Provenance,
+}
+
+impl Writer<'_> {
+    /// `1-record/`: every record as it was used, channels by name.
+    fn records(&self) -> Result<()> {
+        let records = &self.found.records;
+        let purposes = [("estimation", &records.estimation), ("verification", &records.verification)];
+        for (purpose, group) in purposes {
+            for record in group {
+                self.record(purpose, record)?;
+            }
+        }
+        self.json("1-record/records.json", RecordsFile::from(records))?;
+        self.json("1-record/check.json", self.found.data.entry())
+    }
+
+    fn record(&self, purpose: &str, record: &LoopRecord) -> Result<()> {
+        let mut variables = vec![number("ts", record.time.ts())];
+        let groups = [
+            ("u", Some(&record.u)),
+            ("y", Some(&record.y)),
+            ("input_excitation", record.input_excitation.as_ref()),
+            ("reference", record.reference.as_ref()),
+            ("alpha", record.alpha.as_ref()),
+            ("disturbance", record.disturbance.as_ref()),
+        ];
+        for (name, matrix) in groups {
+            variables.extend(matrix.map(|m| array(name, m.as_ref())));
+        }
+        self.mat(&format!("1-record/{purpose}-{}.mat", record.name), &variables)
+    }
+
+    /// `2-factor/`: the two systems of (15), the controller and the nominal model.
+    fn factors(&self) -> Result<()> {
+        let declared = &self.found.declared;
+        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+        self.model_with("2-factor/controller", &declared.controller, (y, u), &())?;
+        self.model("2-factor/nominal", &declared.nominal, &())?;
+        let f = match &self.found.filtered {
+            Ok(filtered) => &filtered.factorisation,
+            Err(reason) => return self.refused("2-factor/factors.json", reason),
+        };
+        let details = FactorDetails { bezout_residual: f.bezout_residual };
+        let loop_ports: Vec<Channel> =
+            self.found.records.inputs.iter().chain(&self.found.records.outputs).cloned().collect();
+        let youla = |names: [&str; 2]| -> Vec<Channel> {
+            let channel = |name: &str, c: &Channel| Channel::new(format!("{name} of {}", c.name), &c.unit);
+            let (u, y) = (self.found.records.inputs.iter(), self.found.records.outputs.iter());
+            u.map(|c| channel(names[0], c)).chain(y.map(|c| channel(names[1], c))).collect()
+        };
+        let (right, left) = (f.factors.right().system(), f.factors.left().system());
+        self.model_with("2-factor/right", right, (youla(["eta", "epsilon"]), loop_ports.clone()), &details)?;
+        self.model_with("2-factor/left", left, (loop_ports, youla(["alpha", "beta"])), &details)
+    }
+
+    /// `3-signals/`: alpha and beta of each estimation record.
+    fn signals(&self) -> Result<()> {
+        let Ok(Filtered { signals: s, .. }) = &self.found.filtered else { return Ok(()) };
+        for (record, signals) in self.found.records.estimation.iter().zip(&s.experiments) {
+            let variables = [
+                number("ts", record.time.ts()),
+                number("dropped_samples", s.settle as f64),
+                array("alpha", signals.alpha()),
+                array("beta", signals.beta()),
+            ];
+            self.mat(&format!("3-signals/{}.mat", record.name), &variables)?;
+        }
+        let file = SignalsFile { dropped_samples: s.settle, controller_mismatch: s.controller_mismatch };
+        self.json("3-signals/signals.json", file)
+    }
+
+    /// `4-identify/`, `5-recombine/`, `6-reduce/`: the models.
+    fn models(&self) -> Result<()> {
+        let found = self.found;
+        match &found.recommended {
+            Ok(model) => {
+                let name = recommended::FILE.trim_end_matches(".json");
+                self.model(name, &model.plant, &RecommendedDetails::new(model))?;
+            }
+            Err(e) => self.refused(recommended::FILE, e)?,
+        }
+        let y = &found.records.outputs;
+        match &found.direct {
+            Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))?,
+            Some(Err(e)) => self.refused("4-identify/direct.json", e)?,
+            None => {}
+        }
+        self.diagram("4-identify/stabilisation_direct", found.direct_diagram.as_ref(), y)?;
+        self.grey_box()?;
+        match &found.scheme {
+            Some(Ok(scheme)) => self.scheme(scheme),
+            Some(Err(e)) => self.refused("4-identify/deviation.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// The physical structure.
+    fn grey_box(&self) -> Result<()> {
+        self.uncertainty("4-identify/grey_box_uncertainty.json", &self.found.grey_box_uncertainty)?;
+        match &self.found.grey_box {
+            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &run.details()?),
+            Some(Err(e)) => self.refused("4-identify/grey_box.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// What the scheme gave.
+    fn scheme(&self, scheme: &SchemeRun) -> Result<()> {
+        let (u, y) = (&self.found.records.inputs, &self.found.records.outputs);
+        let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
+            channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
+        };
+        let s = &scheme.hansen.deviation;
+        let details = DeviationDetails::new(&scheme.hansen, scheme.refinement.as_ref());
+        self.model_with("4-identify/deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
+        self.diagram("4-identify/stabilisation_deviation", Some(&scheme.diagram), &named("beta", y))?;
+        self.model("5-recombine/hansen", &scheme.hansen.plant, &())?;
+        let known = &scheme.uncertainty;
+        self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
+        self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
+        match &scheme.reduction {
+            Some(Ok(r)) => {
+                self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &r.details())?;
+                self.json("6-reduce/sweep.json", r.file())?;
+                Ok(self.folder.text("6-reduce/sweep.csv", &reduction::as_csv(&r.found.sweep))?)
+            }
+            Some(Err(e)) => self.refused("6-reduce/hansen_reduced.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// A stabilisation diagram, or why there is none.
+    fn diagram(&self, name: &str, diagram: Option<&Result<StabilisationDiagram>>, outputs: &[Channel]) -> Result<()> {
+        match diagram {
+            Some(Ok(diagram)) => {
+                self.json(&format!("{name}.json"), DiagramFile::new(diagram, outputs))?;
+                Ok(self.folder.text(&format!("{name}.csv"), &as_csv(diagram))?)
+            }
+            Some(Err(e)) => self.refused(&format!("{name}.json"), e),
+            None => Ok(()),
+        }
+    }
+
+    /// `7-validate/certificate.json`.
+    fn certificate(&self) -> Result<()> {
+        let Some(scheme) = self.found.scheme() else { return Ok(()) };
+        self.json("7-validate/certificate.json", scheme.certificate.entry())
+    }
+
+    /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.
+    fn redesign(&self) -> Result<()> {
+        match &self.found.redesign {
+            Some(Ok(new)) => {
+                let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+                self.model_with("8-redesign/new_controller", &new.controller.system, (y, u), &())?;
+                let exported = redesign::exported(&self.found.records, new);
+                self.folder.text("8-redesign/controller.rs", &exported.rust())?;
+                self.folder.json("8-redesign/controller.json", &exported)?;
+                let (figure, loops) = (redesign::figure(new)?, redesign::loops());
+                self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &loops))?;
+                self.folder.text("8-redesign/response.svg", &svg(&figure, &loops)?)?;
+                self.json("8-redesign/redesign.json", redesign::entry(new))
+            }
+            Some(Err(e)) => self.refused("8-redesign/redesign.json", e),
+            None => Ok(()),
+        }
+    }
+
+    /// `7-validate/verdict.json`, `7-validate/residuals.json` and the predictions.
+    fn verdict(&self) -> Result<()> {
+        let verdict = &self.found.verdict;
+        let models = verdict.models.iter().map(|v| (v.method.key().to_owned(), VerdictEntry::from(v))).collect();
+        self.json("7-validate/verdict.json", VerdictFile { models, channel_scales: scales_entry(self.found) })?;
+        self.json("7-validate/residuals.json", ResidualsFile::from(&verdict.models[..]))?;
+        for (k, record) in self.found.records.verification.iter().enumerate() {
+            let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
+            for v in &self.found.verdict.models {
+                let predicted = v.records[k].predicted.as_ref().ok();
+                variables.extend(predicted.map(|p| array(v.method.key(), p.as_ref())));
+            }
+            self.mat(&format!("7-validate/{}.mat", record.name), &variables)?;
+        }
+        Ok(())
+    }
+
+    fn model(&self, name: &str, model: &StateSpace<Discrete>, details: &impl Serialize) -> Result<()> {
+        let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+        self.model_with(name, model, (u, y), details)
+    }
+
+    /// Nothing where there is none.
+    fn uncertainty(&self, name: &str, known: &Option<SystemUncertainty>) -> Result<()> {
+        let Some(known) = known else { return Ok(()) };
+        self.json(name, known.file(&self.found.hz))
+    }
+
+    fn model_with(
+        &self,
+        name: &str,
+        model: &StateSpace<Discrete>,
+        ports: (Vec<Channel>, Vec<Channel>),
+        details: &impl Serialize,
+    ) -> Result<()> {
+        let title = name.rsplit('/').next().unwrap_or(name);
+        let details = to_value(details)?;
+        let file = ModelFile::new(title, model, ports, details, self.provenance.clone())?;
+        self.folder.json(&format!("{name}.json"), &file)?;
+        let variables = [
+            array("a", model.a()),
+            array("b", model.b()),
+            array("c", model.c()),
+            array("d", model.d()),
+            number("ts", model.time().ts()),
+            Variable { name: "program".into(), value: Value::text(&self.provenance.program) },
+        ];
+        self.mat(&format!("{name}.mat"), &variables)
+    }
+
+    /// A file of a stage with the provenance of the run.
+    fn json(&self, name: &str, content: impl Serialize) -> Result<()> {
+        Ok(self.folder.json(name, &Artefact { content, provenance: &self.provenance })?)
+    }
+
+    /// The reason why there is no such file.
+    fn refused(&self, name: &str, reason: &Error) -> Result<()> {
+        Ok(self.folder.json(name, &Refused { refused: reason.to_string() })?)
+    }
+
+    fn mat(&self, name: &str, variables: &[Variable]) -> Result<()> {
+        Ok(self.folder.file(name, |path| write_mat(path, variables, Packing::Plain))?)
+    }
+}
+
+/// Details of a model as the artefact holds them.
+pub(crate) fn to_value(details: &impl Serialize) -> Result<serde_json::Value> {
+    serde_json::to_value(details).map_err(|source| Error::Report(youla_report::Error::ReportData { source }))
+}
+
+fn number(name: &str, value: f64) -> Variable {
+    Variable { name: name.into(), value: Value::scalar(value) }
+}
+
+fn array(name: &str, value: MatRef<'_, f64>) -> Variable {
+    Variable { name: name.into(), value: Value::matrix(value) }
+}

@@ -1,0 +1,48 @@
+//! Writes a run folder: data first, then the report drawn from them, summary.json last.
+
+use crate::folder::write_artefacts;
+use crate::page::page;
+use crate::result::Identification;
+use crate::stages::clock::{Stage, StageClock};
+use crate::summary::{Summary, responses, summary};
+use crate::{Error, Result};
+use std::path::{Path, PathBuf};
+use youla_io::folder::RunFolder;
+use youla_report::html;
+
+/// A finished run folder.
+#[derive(Debug, Clone)]
+pub struct WrittenRun {
+    /// Where it is.
+    pub folder: PathBuf,
+    /// Its summary.json.
+    pub summary: Summary,
+}
+
+/// Writes all artefacts, `report.json`, `report.html`, `response.json` and `summary.json` to `target`. Nothing is left behind on failure.
+///
+/// # Errors
+/// [`youla_io::Error::OutputExists`], [`youla_io::Error::Io`].
+pub fn write_run(
+    found: &Identification,
+    target: &Path,
+    replace: bool,
+    clock: &mut StageClock<'_>,
+) -> Result<WrittenRun> {
+    let folder = RunFolder::create(target, replace)?;
+    clock.run(Stage::Write, || write_artefacts(found, &folder))?;
+    let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let so_far = clock.seconds.clone();
+    clock.run(Stage::Report, || {
+        let page = page(found, &so_far, &name)?;
+        folder.compact_json("report.json", &page)?;
+        // Drawn from the rounded numbers of report.json, so that `youla report` draws the same page again.
+        let as_written = serde_json::to_vec(&page).and_then(|bytes| serde_json::from_slice(&bytes));
+        let page = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
+        Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)
+    })?;
+    folder.compact_json("response.json", &responses(found)?)?;
+    let summary = summary(found, &clock.seconds)?;
+    folder.json("summary.json", &summary)?;
+    Ok(WrittenRun { folder: folder.finish()?, summary })
+}

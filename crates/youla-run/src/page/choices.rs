@@ -1,0 +1,106 @@
+//! What the recommended model's search chose, from what, and why: one row per choice, each with the key that fixes it.
+
+use crate::result::Identification;
+use youla::identify::likelihood::{Candidate, Recommendation};
+use youla::signal::Detrend;
+use youla_report::data as draw;
+
+/// The table of the report.
+pub(crate) fn table(found: &Identification, model: &Recommendation) -> draw::EvidenceTable {
+    let (options, detrend) = (&found.settings.recommended, found.settings.data.detrend);
+    let rows = [
+        order(model, options.order.is_some()),
+        dead_time(model, options.dead_time.is_some()),
+        feedthrough(model, options.feedthrough.is_some()),
+        noise(model),
+        ends(model),
+        means(detrend),
+    ];
+    draw::EvidenceTable {
+        title: "Choices".into(),
+        text: "What the records decided where no key fixed it; the criterion is Schwarz's.".into(),
+        columns: ["Choice", "Chosen", "From", "Reason", "Key that fixes it"].map(String::from).to_vec(),
+        rows: rows.map(|row| row.to_vec()).to_vec(),
+        caption: String::new(),
+    }
+}
+
+/// Choice, chosen, from, reason, key.
+type Row = [String; 5];
+
+const FIXED: &str = "fixed by the key";
+
+fn order(model: &Recommendation, fixed: bool) -> Row {
+    let reason = if fixed { FIXED.into() } else { margin(model, |c| c.order != model.order, "order") };
+    let from = distinct(model.candidates.iter().map(|c| c.order));
+    ["Order".into(), model.order.to_string(), from, reason, "[recommended] order".into()]
+}
+
+fn dead_time(model: &Recommendation, fixed: bool) -> Row {
+    let reason = if fixed { FIXED.into() } else { margin(model, |c| c.dead_time != model.dead_time, "dead time") };
+    let from = distinct(model.candidates.iter().flat_map(|c| c.dead_time.iter().copied()));
+    ["Dead time, samples".into(), listed(&model.dead_time), from, reason, "[recommended] dead_time".into()]
+}
+
+fn feedthrough(model: &Recommendation, fixed: bool) -> Row {
+    let direct = model.plant.d().col_iter().any(|col| col.iter().any(|d| *d != 0.0));
+    let reason = match (fixed, direct) {
+        (true, _) => FIXED,
+        (false, true) => "the criterion falls with it, and the controller's own direct path is known",
+        (false, false) => "the criterion does not fall with it, or the loop leaves it undetermined",
+    };
+    let chosen = if direct { "yes" } else { "no" };
+    let from = "yes, no".to_owned();
+    ["Direct path from u to y".into(), chosen.into(), from, reason.into(), "[recommended] feedthrough".into()]
+}
+
+fn noise(model: &Recommendation) -> Row {
+    let order = model.predictor.a.nrows() - model.plant.order();
+    let chosen = if order == 0 { "white".into() } else { format!("autoregressions, {order} states in all") };
+    let from = "0 to 40 coefficients per output, with and without slow drift".into();
+    ["Noise".into(), chosen, from, "the least criterion, anew at each step of the search".into(), "none".into()]
+}
+
+fn ends(model: &Recommendation) -> Row {
+    let count = model.order + model.plant.outputs();
+    let chosen = format!("{count} numbers of each record estimated");
+    let reason = "both ends of a record are part of the model, so that no sample is left out as settling";
+    ["Start and end of the records".into(), chosen, "none".into(), reason.into(), "none".into()]
+}
+
+fn means(kind: Detrend) -> Row {
+    let chosen = match kind {
+        Detrend::None => "kept",
+        Detrend::Mean => "taken out",
+        Detrend::Linear => "taken out with the straight line",
+    };
+    let reason = "the line at 0 Hz is left out of the search and the drift of each output from one end of a record to the other is \
+                  estimated, so that means and straight lines decide nothing";
+    ["Means".into(), chosen.into(), "kept, mean, straight line".into(), reason.into(), "[data] detrend".into()]
+}
+
+/// By how much the criterion of the best other candidate is larger.
+fn margin(model: &Recommendation, other: impl Fn(&Candidate) -> bool, what: &str) -> String {
+    let least = |of: &dyn Fn(&&Candidate) -> bool| {
+        model.candidates.iter().filter(of).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+    };
+    let (Some(next), Some(chosen)) = (least(&|c| other(c)), least(&|c| !other(c))) else {
+        return format!("no other {what} was tried");
+    };
+    let value = if what == "order" { next.order.to_string() } else { listed(&next.dead_time) };
+    match next.criterion - chosen.criterion {
+        gap if gap >= 0.0 => format!("the best with another {what}, {value}, has a criterion {gap:.1} larger"),
+        gap => format!("{value} has a criterion {:.1} smaller, too little to prefer it", -gap),
+    }
+}
+
+fn listed(values: &[usize]) -> String {
+    values.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
+}
+
+fn distinct(values: impl Iterator<Item = usize>) -> String {
+    let mut all: Vec<usize> = values.collect();
+    all.sort_unstable();
+    all.dedup();
+    listed(&all)
+}

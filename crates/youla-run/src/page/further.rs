@@ -1,0 +1,92 @@
+//! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
+
+use crate::method::Method;
+use crate::page::verdict::{deviation_line, region_line};
+use crate::result::Identification;
+use youla::control::IsoZone;
+use youla_greybox::hansen_pem::PemStart;
+use youla_report::data::{ReportPart, Status, Verdict};
+
+/// Lines below the answer, each with its evidence.
+pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
+    [deviation_line, region_line, margin_line, redesign_line, reduction_line, grey_box_line, factor_line]
+        .iter()
+        .filter_map(|line| line(found))
+        .collect()
+}
+
+/// Margins of the loop of G(S); none where it is unstable, which the answer states, and where no controller ran.
+fn margin_line(found: &Identification) -> Option<Verdict> {
+    if found.declared.controller.is_zero() {
+        return None;
+    }
+    let robustness = &found.verdict.of(Method::Hansen)?.robustness;
+    let margins = robustness.margins.as_ref().ok()?;
+    let zone = margins.zone()?;
+    let worst = margins.outputs.iter().map(|c| c.sensitivity.value).fold(0.0, f64::max);
+    let disk = margins.output_disks.balanced;
+    let highest = disk.highest_gain.map_or("any higher value".into(), |g| format!("{g:.2}"));
+    let text = format!(
+        "The peak sensitivity of the loop with G(S) is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
+         all outputs together. The loop stays stable when the gains of all outputs change by factors between {:.2} and \
+         {highest}, or their phases by up to {:.0} degrees.",
+        margins.output_sensitivity.value, disk.lowest_gain, disk.phase_degrees
+    );
+    let status = match zone {
+        IsoZone::A | IsoZone::B => Status::Good,
+        IsoZone::C => Status::Caution,
+        IsoZone::D => Status::Bad,
+    };
+    Some(Verdict { status, text, evidence: ReportPart::Margins })
+}
+
+fn redesign_line(found: &Identification) -> Option<Verdict> {
+    let new = found.new_controller()?;
+    let status = if new.gains_damping() { Status::Good } else { Status::Caution };
+    Some(Verdict { status, text: crate::stages::redesign::sentence(new), evidence: ReportPart::Redesign })
+}
+
+/// Whether the controller stabilises the reduced model, and the error of the reduction in the loop.
+fn reduction_line(found: &Identification) -> Option<Verdict> {
+    Some(found.reduced()?.verdict())
+}
+
+/// The fit of the physical structure against that of G(S).
+fn grey_box_line(found: &Identification) -> Option<Verdict> {
+    let run = found.structure()?;
+    let fit = |values: &[f64]| values.iter().map(|f| format!("{f:.1} %")).collect::<Vec<_>>().join(", ");
+    let model = fit(&run.found.model.fit);
+    let plant = run.found.fit_of_plant.as_ref().map_or_else(String::new, |plant| format!(", G(S) to {}", fit(plant)));
+    let start = match run.found.won {
+        PemStart::Projection => "the projection of G(S)",
+        PemStart::Nominal => "its initial values",
+        PemStart::Direct => "the projection of a model of u and y by PBSIDopt",
+    };
+    let text = format!(
+        "The physical structure fits the estimation records to {model} per output{plant} (search started from {start})."
+    );
+    let (status, text) = match run.found.local_minimum_suspected {
+        true => (
+            Status::Caution,
+            text + " The fit is more than 1 percentage point below that of G(S): the search ended in a local minimum, or the structure does not describe the plant.",
+        ),
+        false if run.found.fit_of_plant.is_none() => {
+            (Status::Caution, text + " There is no G(S) to compare it with, so a local minimum could not be noticed.")
+        }
+        false => (Status::Good, text),
+    };
+    let (doubt, residuals) = match &run.intervals {
+        Ok(known) => (!known.residuals.independent() || known.coloured == known.residuals.white(), known.verdict()),
+        Err(reason) => (true, format!("There are no intervals: {reason}.")),
+    };
+    let status = if doubt { Status::Caution } else { status };
+    Some(Verdict { status, text: format!("{text} {residuals}"), evidence: ReportPart::Fits })
+}
+
+fn factor_line(found: &Identification) -> Option<Verdict> {
+    let residual = found.filtered.as_ref().ok()?.factorisation.bezout_residual;
+    // Half of the digits of double precision; scaled factors have 1e-13 (test `states_are_scaled_before_factorising`).
+    let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
+    let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
+    Some(Verdict { status, text, evidence: ReportPart::Certificate })
+}

@@ -1,0 +1,168 @@
+//! The result of a run: what each stage found, and what was asked for but is impossible.
+
+use crate::check::DataCheck;
+use crate::method::Method;
+use crate::records::RunRecords;
+use crate::settings::RunSettings;
+use crate::stages::certificate::RunCertificate;
+use crate::stages::factors::{DeclaredLoop, LoopFactors};
+use crate::stages::grey_box::GreyBoxRun;
+use crate::stages::nonparametric::LinesOfRun;
+use crate::stages::reduction::RunReduction;
+use crate::stages::signals::DeviationSignals;
+use crate::stages::uncertainty::{RunUncertainty, SystemUncertainty};
+use crate::stages::validate::Verdict;
+use crate::{Error, Result};
+use youla::identify::hansen::HansenModel;
+use youla::identify::likelihood::Recommendation;
+use youla::identify::subspace::SubspaceModel;
+use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla::signal::IndirectResponse;
+use youla_greybox::hansen_refine::Refinement;
+use youla_loop::redesign::Redesign;
+
+/// Everything that a run found. A method that is impossible does not end the run: its field holds the reason.
+#[derive(Debug)]
+pub struct Identification {
+    /// What was asked for.
+    pub settings: RunSettings,
+    /// The records.
+    pub records: RunRecords,
+    /// The check of the records.
+    pub data: DataCheck,
+    /// Nominal model and controller.
+    pub declared: DeclaredLoop,
+    /// The recommended model with its evidence.
+    pub recommended: Result<Recommendation>,
+    /// The coprime factors, with alpha and beta of the estimation records.
+    pub filtered: Result<Filtered>,
+    /// The modified Hansen scheme and what rests on it; `None` where alpha and beta do not exist.
+    pub scheme: Option<Result<SchemeRun>>,
+    /// The physical structure where one was declared.
+    pub grey_box: Option<Result<GreyBoxRun>>,
+    /// Its uncertainty, where it can be had.
+    pub grey_box_uncertainty: Option<SystemUncertainty>,
+    /// The new controller where it was asked for.
+    pub redesign: Option<Result<Redesign>>,
+    /// The direct model where it was asked for.
+    pub direct: Option<Result<SubspaceModel>>,
+    /// The stabilisation diagram of the direct model.
+    pub direct_diagram: Option<Result<StabilisationDiagram>>,
+    /// The non-parametric response of the plant where an excitation is known.
+    pub indirect: Option<Result<IndirectResponse>>,
+    /// The plant without a model, where an excitation is known: at its lines, or in windows.
+    pub lines: Option<Result<LinesOfRun>>,
+    /// Frequencies of the responses of all models, Hz.
+    pub hz: Vec<f64>,
+    /// Evidence on every model.
+    pub verdict: Verdict,
+}
+
+/// Factors and signals of the scheme.
+#[derive(Debug, Clone)]
+pub struct Filtered {
+    /// The factors of nominal model and controller.
+    pub factorisation: LoopFactors,
+    /// alpha and beta of the estimation records.
+    pub signals: DeviationSignals,
+}
+
+/// The modified Hansen scheme and what rests on it.
+#[derive(Debug)]
+pub struct SchemeRun {
+    /// S and G(S).
+    pub hansen: HansenModel,
+    /// What the refinement of S changed, where it was asked for.
+    pub refinement: Option<Refinement>,
+    /// The stabilisation diagram of S.
+    pub diagram: Result<StabilisationDiagram>,
+    /// The uncertainty of S and of G(S).
+    pub uncertainty: RunUncertainty,
+    /// `G_red(S)` in its loop where it was asked for.
+    pub reduction: Option<Result<RunReduction>>,
+    /// The loop of G(S): the exact test, the region of S, errors in the description of the controller.
+    pub certificate: RunCertificate,
+}
+
+/// Something that was asked for but is impossible; the run goes on without it.
+#[derive(Debug, Clone, Copy)]
+pub struct Refusal<'a> {
+    /// Key in summary.json.
+    pub key: &'static str,
+    /// In words.
+    pub what: &'static str,
+    /// The reason.
+    pub error: &'a Error,
+}
+
+impl Identification {
+    /// What was asked for but is impossible, with the reasons.
+    pub fn refusals(&self) -> Vec<Refusal<'_>> {
+        let scheme = self.scheme();
+        [
+            refusal("recommended", "recommended model", Some(&self.recommended)),
+            refusal("factors", "coprime factorisation, and so no Hansen scheme", Some(&self.filtered)),
+            refusal(Method::Hansen.key(), "model by the Hansen scheme", self.scheme.as_ref()),
+            refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
+            refusal(Method::HansenReduced.key(), "reduced model", scheme.and_then(|s| s.reduction.as_ref())),
+            refusal(Method::GreyBox.key(), "grey-box model", self.grey_box.as_ref()),
+            refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
+            refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
+            refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
+            refusal("lines", "response at the lines of the excitation", self.lines.as_ref()),
+            refusal("redesign", "new controller", self.redesign.as_ref()),
+        ]
+        .into_iter()
+        .flatten()
+        .collect()
+    }
+
+    /// The scheme, where it gave a model.
+    pub fn scheme(&self) -> Option<&SchemeRun> {
+        found(self.scheme.as_ref())
+    }
+
+    /// The direct model, where there is one.
+    pub fn direct(&self) -> Option<&SubspaceModel> {
+        found(self.direct.as_ref())
+    }
+
+    /// The reduced model, where there is one.
+    pub(crate) fn reduced(&self) -> Option<&RunReduction> {
+        found(self.scheme()?.reduction.as_ref())
+    }
+
+    /// The estimate of the physical structure, where there is one.
+    pub(crate) fn structure(&self) -> Option<&GreyBoxRun> {
+        found(self.grey_box.as_ref())
+    }
+
+    /// The new controller, where there is one.
+    pub(crate) fn new_controller(&self) -> Option<&Redesign> {
+        found(self.redesign.as_ref())
+    }
+
+    /// The uncertainty of the model that a method of the scheme gave.
+    pub fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
+        match method {
+            Method::Hansen => self.scheme()?.uncertainty.plant.as_ref(),
+            Method::GreyBox => self.grey_box_uncertainty.as_ref(),
+            _ => None,
+        }
+    }
+
+    /// Whether and how well the declared controller explains the inputs; see [`DeviationSignals::controller_mismatch`].
+    pub fn controller_mismatch(&self) -> Option<f64> {
+        self.filtered.as_ref().ok()?.signals.controller_mismatch
+    }
+}
+
+/// The result of something that was asked for and is possible.
+pub(crate) fn found<T>(outcome: Option<&Result<T>>) -> Option<&T> {
+    outcome?.as_ref().ok()
+}
+
+fn refusal<'a, T>(key: &'static str, what: &'static str, outcome: Option<&'a Result<T>>) -> Option<Refusal<'a>> {
+    let error = outcome?.as_ref().err()?;
+    Some(Refusal { key, what, error })
+}

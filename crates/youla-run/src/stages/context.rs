@@ -1,0 +1,42 @@
+//! What the stages of a run take: what was asked for, the records, the loop that ran, and its coprime factors.
+
+use crate::records::RunRecords;
+use crate::settings::{Prediction, RunSettings};
+use crate::stages::factors::{DeclaredLoop, LoopFactors};
+use crate::stages::signals::DeviationSignals;
+
+/// Settings, records and loop of a run.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct RunContext<'a> {
+    /// What was asked for.
+    pub(crate) settings: &'a RunSettings,
+    /// The records.
+    pub(crate) records: &'a RunRecords,
+    /// Nominal model and controller.
+    pub(crate) declared: &'a DeclaredLoop,
+    /// The factors of the loop, where they exist.
+    pub(crate) factorisation: Option<&'a LoopFactors>,
+}
+
+impl RunContext<'_> {
+    /// What drives the models on verification records: as stated, or what suits the nominal model and what is known.
+    pub(crate) fn prediction(&self) -> Prediction {
+        let data = &self.settings.data;
+        // A known alpha drives the loop through the factors.
+        let driven = if data.alpha.is_empty() { data.excitation_is_known() } else { self.factorisation.is_some() };
+        let bounded = self.declared.nominal.is_stable().unwrap_or(true);
+        let suits = if driven && !bounded { Prediction::ClosedLoop } else { Prediction::OpenLoop };
+        self.settings.verification.prediction.unwrap_or(suits)
+    }
+}
+
+/// The same where the factors and the signals alpha and beta exist.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SchemeContext<'a> {
+    /// Settings, records and loop.
+    pub(crate) run: RunContext<'a>,
+    /// The factors of the loop.
+    pub(crate) factorisation: &'a LoopFactors,
+    /// alpha and beta.
+    pub(crate) signals: &'a DeviationSignals,
+}

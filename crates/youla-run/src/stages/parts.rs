@@ -1,0 +1,45 @@
+//! Parts of a run alone, for programs that hold records and results in memory: the recommended model, and a new controller on a
+//! finished run.
+
+use crate::records::RunRecords;
+use crate::result::Identification;
+use crate::settings::RunSettings;
+use crate::stages::context::{RunContext, SchemeContext};
+use crate::stages::factors::declared_loop;
+use crate::stages::recommend::recommend;
+use crate::stages::redesign::redesigned;
+use crate::{Error, Result};
+use std::path::Path;
+use youla::identify::likelihood::Recommendation;
+use youla_loop::redesign::{Redesign, RedesignOptions};
+
+/// The recommended model of a run without anything else; paths are relative to `folder`.
+///
+/// # Errors
+/// Those of [`crate::identify`] and of [`youla::identify::likelihood::recommend`].
+pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Recommendation> {
+    settings.check()?;
+    let declared = declared_loop(settings, records, folder)?;
+    recommend(RunContext { settings, records, declared: &declared, factorisation: None })
+}
+
+/// A new controller on the result of a run, as `[redesign]` with these options gives it.
+///
+/// # Errors
+/// Those of [`youla_loop::redesign::redesign`]; the reason why the run has no factors or no G(S).
+pub fn redesign_of(run: &Identification, options: &RedesignOptions) -> Result<Redesign> {
+    let settings = RunSettings { redesign: Some(options.clone()), ..run.settings.clone() };
+    let missing = || {
+        Error::Method(youla::Error::Unsupported {
+            what: "a redesign of a run without coprime factors and G(S)",
+            instead: "its summary states under `refused` why there are none",
+        })
+    };
+    let filtered = run.filtered.as_ref().map_err(|_| missing())?;
+    let scheme = run.scheme().ok_or_else(missing)?;
+    let (records, declared) = (&run.records, &run.declared);
+    let factorisation = &filtered.factorisation;
+    let of_run = RunContext { settings: &settings, records, declared, factorisation: Some(factorisation) };
+    let context = SchemeContext { run: of_run, factorisation, signals: &filtered.signals };
+    redesigned(context, &scheme.hansen, run.reduced()).unwrap_or_else(|| Err(missing()))
+}

@@ -1,0 +1,183 @@
+//! The driver: from records, nominal model and controller to models with evidence. Read this file first.
+
+use crate::check::check_records;
+use crate::error::no_model::NoModel;
+use crate::records::RunRecords;
+use crate::result::{Filtered, Identification, SchemeRun, found};
+use crate::settings::RunSettings;
+use crate::stages::certificate::certificate;
+use crate::stages::clock::{Stage, StageClock};
+use crate::stages::context::{RunContext, SchemeContext};
+use crate::stages::direct::direct;
+use crate::stages::factors::{declared_loop, factorise_run};
+use crate::stages::grey_box::criterion::SchemeStart;
+use crate::stages::grey_box::{GreyBoxRun, grey_box};
+use crate::stages::hansen::{Scheme, require_length, scheme};
+use crate::stages::nonparametric::lines;
+use crate::stages::recommend::recommend;
+use crate::stages::redesign::{redesigned, redesigned_on};
+use crate::stages::reduction::{RunReduction, run_reduction};
+use crate::stages::responses::{check_grid, grid, indirect};
+use crate::stages::signals::deviation_signals;
+use crate::stages::uncertainty::{run_uncertainty, structure_uncertainty};
+use crate::stages::validate::{Candidates, verify};
+use crate::{Error, Result};
+use std::path::Path;
+use youla::ErrorKind;
+
+/// Identifies the plant of a loop from its records: the recommended model by maximum likelihood, and beside it the modified
+/// Hansen scheme, direct identification and what else was asked for.
+///
+/// A method that is impossible on these records does not end the run: its field of the result holds the reason.
+///
+/// # Errors
+/// Bad input; [`Error::NoModel`] with the reason of every candidate where no method gives a model.
+pub fn identify(
+    settings: RunSettings,
+    records: RunRecords,
+    folder: &Path,
+    clock: &mut StageClock<'_>,
+) -> Result<Identification> {
+    settings.check()?;
+    check_grid(&settings.frequency_response, records.time)?;
+    let declared = declared_loop(&settings, &records, folder)?;
+    let filtered = own_line(filtered(&settings, &records, folder, clock))?;
+    let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
+    let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
+    let context =
+        filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
+    let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(&declared.controller)))?;
+    let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
+        let others = || match records.measured {
+            None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
+            Some(_) => Default::default(),
+        };
+        rayon::join(|| recommend(run), others)
+    });
+    let (s, grey_box) = s;
+    let (recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
+    let reduction = clock.run(Stage::Reduce, || {
+        let (hansen, options) = (&found(s.as_ref())?.hansen, settings.reduction.as_ref()?);
+        Some(run_reduction(&context?.factorisation.factors, hansen, &records, options)) // (29)
+    });
+    let candidates = Candidates {
+        recommended: recommended.as_ref().ok(),
+        hansen: found(s.as_ref()).map(|s| &s.hansen),
+        direct: found(direct.as_ref()),
+        reduction: found(reduction.as_ref()),
+        grey_box: found(grey_box.as_ref()),
+    };
+    let identified = candidates.identified();
+    if identified.is_empty() {
+        let asked = direct.is_some();
+        let outcomes = [
+            ("the recommended model", recommended.err()),
+            ("the modified Hansen scheme", filtered.err().or_else(|| s?.err())),
+            ("direct identification", direct.and_then(Result::err)),
+            ("the physical structure", grey_box.and_then(Result::err)),
+        ];
+        let reasons = outcomes.into_iter().filter_map(|(name, reason)| Some((name, reason?))).collect();
+        return Err(Error::NoModel(NoModel::new(reasons, asked, records.time)));
+    }
+    let models = [&[&declared.nominal], &identified[..]].concat();
+    let hz = grid(&settings.frequency_response, &models, records.time)?;
+    // (26), the loop certificate and the response that rests on no model.
+    let ((indirect, lines), verdict) = clock.run(Stage::Validate, || {
+        let indirect = match &records.measured {
+            None => indirect(run, context.map(|c| c.signals)),
+            Some(measured) => Some(measured.shown()),
+        };
+        Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))
+    })?;
+    let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
+    let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
+    let scheme = match (s, context) {
+        (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, reduction, &hz, clock)?)),
+        (Some(Err(reason)), _) => Some(Err(reason)),
+        _ => None,
+    };
+    let redesign = clock.run(Stage::Redesign, || {
+        let context = context?;
+        match (&scheme, &recommended, &records.measured) {
+            (Some(Ok(s)), ..) => redesigned(context, &s.hansen, found(s.reduction.as_ref())),
+            (_, Ok(model), Some(_)) => redesigned_on(context, &model.plant),
+            _ => None,
+        }
+    });
+    Ok(Identification {
+        settings,
+        records,
+        data,
+        declared,
+        recommended,
+        filtered,
+        scheme,
+        grey_box,
+        grey_box_uncertainty,
+        redesign,
+        direct,
+        direct_diagram,
+        indirect,
+        lines,
+        hz,
+        verdict,
+    })
+}
+
+/// Separates what costs a method its line from what ends the run: a numerical condition, a record that is too short for the
+/// method and a nominal model that the controller does not stabilise are of the first kind, other bad input of the second.
+fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
+    match outcome {
+        Err(e) if e.kind() == ErrorKind::BadInput && !e.is_of_the_records() => Err(e),
+        outcome => Ok(outcome),
+    }
+}
+
+/// Factors of nominal model and controller, alpha and beta.
+fn filtered(
+    settings: &RunSettings,
+    records: &RunRecords,
+    folder: &Path,
+    clock: &mut StageClock<'_>,
+) -> Result<Filtered> {
+    let factorisation = clock.run(Stage::Factor, || factorise_run(settings, records, folder))?; // (13)-(15)
+    let settle = settings.factors.settle;
+    let signals =
+        clock.run(Stage::Signals, || deviation_signals(&factorisation.factors, &records.estimation, settle))?; // (28)
+    Ok(Filtered { factorisation, signals })
+}
+
+/// The scheme, and the physical structure that is started from it.
+fn structures(
+    run: RunContext<'_>,
+    context: Option<SchemeContext<'_>>,
+) -> (Option<Result<Scheme>>, Option<Result<GreyBoxRun>>) {
+    let s = context.map(of_scheme);
+    let start = found(s.as_ref()).zip(context).map(|(s, context)| SchemeStart {
+        factors: &context.factorisation.factors,
+        signals: context.signals,
+        hansen: &s.hansen,
+    });
+    let grey_box = grey_box(run, start);
+    (s, grey_box)
+}
+
+fn of_scheme(context: SchemeContext<'_>) -> Result<Scheme> {
+    let SchemeContext { run, signals, .. } = context;
+    require_length(&run.settings.hansen, run.records, signals.settle)?;
+    scheme(context).map_err(|e| e.within(signals.context()))
+}
+
+/// Region and certificate of G(S).
+fn judged(
+    context: SchemeContext<'_>,
+    s: Scheme,
+    reduction: Option<Result<RunReduction>>,
+    hz: &[f64],
+    clock: &mut StageClock<'_>,
+) -> Result<SchemeRun> {
+    let Scheme { hansen, refinement, diagram } = s;
+    let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
+    let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
+    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, certificate })
+}

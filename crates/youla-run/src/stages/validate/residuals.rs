@@ -1,0 +1,160 @@
+//! The residual of every model on every verification record: correlations with what excites the loop, fits some steps ahead.
+
+use crate::Result;
+use crate::records::{LoopRecord, channels_of};
+use crate::stages::context::RunContext;
+use crate::summary::entries::{finite, finite_all};
+use serde::{Deserialize, Serialize};
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use youla::linalg::block;
+use youla::lti::{Discrete, StateSpace};
+use youla::validate::{
+    LargestCorrelation, PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise,
+    residual_correlations,
+};
+use youla::{Mat, MatRef};
+
+/// The residual of one model on one record.
+#[derive(Debug, Clone, Serialize)]
+pub struct RecordResiduals {
+    /// Names of the signals with which it is correlated.
+    pub excitations: Vec<String>,
+    /// Whether these come from outside of the loop. Otherwise they are the inputs, which hold fed-back noise, and judge
+    /// nothing.
+    pub external: bool,
+    /// The correlations.
+    pub correlations: ResidualCorrelations,
+    /// Fits in percent over the second half: per [`youla::validate::PREDICTION_STEPS`] and last for the simulation, per output.
+    pub k_step_fits: Vec<Vec<f64>>,
+    /// What predicts the residual of the simulation in them.
+    pub predictor: ResidualPredictor,
+}
+
+/// What predicts the residual of a simulation some steps ahead.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ResidualPredictor {
+    /// The noise model of the model itself, from its Kalman gain or that of S.
+    Kalman,
+    /// An autoregression of the residual.
+    Autoregression,
+}
+
+impl ResidualPredictor {
+    pub(crate) fn words(self) -> &'static str {
+        match self {
+            ResidualPredictor::Kalman => "Kalman gain",
+            ResidualPredictor::Autoregression => "autoregression",
+        }
+    }
+}
+
+impl RecordResiduals {
+    /// Whether the residual does not depend on past excitation; `None` where nothing from outside is known.
+    pub fn independent(&self) -> Option<bool> {
+        self.external.then_some(self.correlations.independent)
+    }
+}
+
+/// Tests measured less predicted outputs, samples x p, without the first samples that do not count; `noise` is what the model
+/// states of its noise.
+pub(crate) fn residual_tests(
+    run: RunContext<'_>,
+    record: &LoopRecord,
+    noise: Option<&StateSpace<Discrete>>,
+    measured: MatRef<'_, f64>,
+    predicted: MatRef<'_, f64>,
+) -> Result<RecordResiduals> {
+    let (data, skip) = (&run.settings.data, run.settings.verification.skip);
+    let moving = |x: &Mat<f64>| x.col_iter().all(|c| c.iter().any(|v| *v != c[0]));
+    let known = [
+        (&record.alpha, &data.alpha),
+        (&record.input_excitation, &data.input_excitation),
+        (&record.reference, &data.reference),
+    ];
+    let known: Vec<_> =
+        known.into_iter().filter_map(|(x, specs)| x.as_ref().filter(|x| moving(x)).map(|x| (x, specs))).collect();
+    // Without feedback the inputs come from outside.
+    let external = !known.is_empty() || run.declared.controller.is_zero();
+    let (x, channels) = match known.is_empty() {
+        false => {
+            let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();
+            (Cow::Owned(block(&[&parts])), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
+        }
+        true => (Cow::Borrowed(&record.u), run.records.inputs.clone()),
+    };
+    let (measured, predicted) = (measured.get(skip.., ..), predicted.get(skip.., ..));
+    let e = measured - predicted;
+    let (k_step_fits, predictor) = fits_ahead(measured, predicted, noise)?;
+    Ok(RecordResiduals {
+        excitations: channels.into_iter().map(|c| c.name).collect(),
+        external,
+        correlations: residual_correlations(e.as_ref(), (*x).as_ref().get(skip.., ..))?,
+        k_step_fits,
+        predictor,
+    })
+}
+
+/// By the noise model where there is one with a stable predictor, else by an autoregression.
+fn fits_ahead(
+    measured: MatRef<'_, f64>,
+    predicted: MatRef<'_, f64>,
+    noise: Option<&StateSpace<Discrete>>,
+) -> Result<(Vec<Vec<f64>>, ResidualPredictor)> {
+    match noise.map(|noise| k_step_fits_by_noise(measured, predicted, noise)) {
+        Some(Ok(fits)) => Ok((fits, ResidualPredictor::Kalman)),
+        Some(Err(error)) if !matches!(error, youla::Error::Unstable { .. } | youla::Error::Singular { .. }) => {
+            Err(error.into())
+        }
+        _ => Ok((k_step_fits(measured, predicted)?, ResidualPredictor::Autoregression)),
+    }
+}
+
+/// Keys of the fits some steps ahead, the simulation last.
+pub(crate) fn step_keys() -> Vec<String> {
+    PREDICTION_STEPS.iter().map(usize::to_string).chain(["simulation".to_owned()]).collect()
+}
+
+/// What summary.json says of the residual of a model on a record.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct ResidualEntry {
+    /// Whether the residual does not depend on past excitation; `null` where none from outside is known.
+    pub independent: Option<bool>,
+    /// The causal correlation that is largest in its standard deviations.
+    pub largest: Option<LargestEntry>,
+    /// Fits in percent over the second half of the record, per output: some samples ahead, and of the simulation.
+    pub k_step_fits: BTreeMap<String, Vec<Option<f64>>>,
+    /// What predicts the residual in them.
+    pub predictor: ResidualPredictor,
+}
+
+/// Where a residual depends most on past excitation.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+pub struct LargestEntry {
+    /// Output, counted from 0.
+    pub output: usize,
+    /// Excitation, counted from 0.
+    pub input: usize,
+    /// Samples by which the excitation is earlier.
+    pub lag: usize,
+    /// In standard deviations.
+    pub deviations: Option<f64>,
+}
+
+impl From<&RecordResiduals> for ResidualEntry {
+    fn from(r: &RecordResiduals) -> Self {
+        let largest = |l: LargestCorrelation| LargestEntry {
+            output: l.output,
+            input: l.input,
+            lag: l.lag,
+            deviations: finite(l.deviations),
+        };
+        ResidualEntry {
+            independent: r.independent(),
+            largest: r.correlations.largest.map(largest),
+            k_step_fits: step_keys().into_iter().zip(r.k_step_fits.iter().map(|f| finite_all(f))).collect(),
+            predictor: r.predictor,
+        }
+    }
+}

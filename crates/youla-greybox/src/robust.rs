@@ -14,11 +14,10 @@ use super::levenberg::{Outcome, minimise};
 use super::{GreyBoxOptions, Stop};
 use crate::Result;
 use serde::{Deserialize, Serialize};
+use youla::statistics::{median, robust_deviation};
 
 /// Deviations up to which a residual counts in full: 95 % efficiency where the noise is normal after all.
 pub(super) const LIMIT: f64 = 1.345;
-/// Ratio of the deviation to the median magnitude of normal noise.
-const DEVIATION_OVER_MEDIAN: f64 = 1.4826;
 /// Largest number of weightings; some ten are usual.
 const ROUNDS: usize = 50;
 
@@ -90,8 +89,8 @@ impl Weighting {
     fn new(residuals: Vec<Vec<f64>>, outputs: usize) -> Self {
         let of_output = |i: usize| residuals.iter().flat_map(move |e| e.iter().skip(i).step_by(outputs).copied());
         let deviation = |i: usize| {
-            let middle = median(of_output(i).collect());
-            DEVIATION_OVER_MEDIAN * median(of_output(i).map(|e| (e - middle).abs()).collect())
+            let middle = median(of_output(i));
+            robust_deviation(of_output(i).map(|e| e - middle))
         };
         let deviations = (0..outputs).map(deviation).collect();
         Weighting { residuals, deviations }
@@ -138,12 +137,4 @@ impl Weighting {
 /// 1 up to the limit, then falling with the residual; 1 for all where the limit is zero.
 fn weight(residual: f64, limit: f64) -> f64 {
     if limit > 0.0 && residual.abs() > limit { limit / residual.abs() } else { 1.0 }
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    let middle = values.len() / 2;
-    if values.is_empty() {
-        return 0.0;
-    }
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }

@@ -13,11 +13,12 @@
 //! their own, on top of this one.
 //!
 //! ```text
-//! error -> linalg -> lti -> signal -> control -> factor -> identify -> reduce -> validate
+//! error -> statistics -> linalg -> lti -> signal -> control -> factor -> identify -> reduce -> validate
 //! ```
 //!
 //! | module | holds |
 //! |---|---|
+//! | [`statistics`] | quantiles and distributions |
 //! | [`linalg`] | ordered real Schur form, Sylvester, Lyapunov and Riccati equations, exponential and logarithm, each with its residual |
 //! | [`lti`] | state space with the time domain as a type, interconnection, discretisation, response, norms, simulation |
 //! | [`signal`] | labelled, clocked data; spectra; excitation signals and their persistency |
@@ -174,6 +175,7 @@ pub mod linalg;
 pub mod lti;
 pub mod reduce;
 pub mod signal;
+pub mod statistics;
 pub mod validate;
 
 pub use error::{Error, ErrorKind, Result};

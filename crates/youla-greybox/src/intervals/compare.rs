@@ -10,9 +10,9 @@
 //! at a bound, the probability is an upper bound. Coloured residuals make differences of V look more certain than they are.
 
 use super::super::GreyBoxModel;
-use super::chi_square::chi_square_tail;
 use crate::{Error, Result};
 use serde::Serialize;
+use youla::statistics::chi_square_tail;
 
 /// Outcome of the likelihood-ratio test.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -5,11 +5,10 @@ use super::super::sampled::SampledSlope;
 use super::GreyBoxIntervals;
 use crate::{Error, Result};
 use youla::Mat;
-use youla::identify::subspace::uncertainty::{
-    Reach, ellipse, mode_change, response_changes, two_sided_student, zero_changes,
-};
+use youla::identify::subspace::uncertainty::{Reach, mode_change, response_changes, zero_changes};
 use youla::identify::subspace::{BlockInfluence, ModeBand, ResponseBand};
 use youla::lti::{Discrete, Eigen, Mode, StateSpace, frequency_response};
+use youla::statistics::{ellipse, two_sided_student};
 
 impl GreyBoxIntervals {
     /// The frequency response of the plant at the angular frequencies `omega`, rad/s, with its regions.

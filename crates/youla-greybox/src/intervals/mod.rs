@@ -9,7 +9,6 @@
 //! (`../uncertainty.rs`) or counts their colour (`sandwich.rs`); a test of the residuals (`residuals.rs`) says which one holds.
 //! `compare.rs` compares structures by their likelihood.
 
-mod chi_square;
 mod compare;
 mod known;
 mod lags;
@@ -31,8 +30,8 @@ use sandwich::{Counted, coloured, middle, residual_sums};
 use serde::{Deserialize, Serialize};
 use youla::Mat;
 use youla::identify::subspace::BlockInfluence;
-use youla::identify::subspace::uncertainty::two_sided_student;
 use youla::lti::{Discrete, StateSpace};
+use youla::statistics::two_sided_student;
 
 /// Largest default number of lags of the correlation of the residuals.
 const MOST_LAGS: usize = 500;

@@ -9,13 +9,12 @@
 //! 2nd ed., 1999, section 16.6, for each output, which holds for coloured residuals too. Residuals that are coloured leave the estimate consistent in open loop and make the covariance wrong;
 //! those that depend on past inputs say that the structure lacks something.
 
-use super::chi_square::chi_square_tail;
 use super::lags::LagSums;
 use crate::{Error, Result};
 use serde::Serialize;
 use youla::Mat;
-pub(super) use youla::identify::subspace::uncertainty::student;
 use youla::linalg::solve;
+use youla::statistics::{chi_square_tail, normal_quantile};
 
 /// Lags of both tests, at most.
 pub(super) const LAGS: usize = 25;
@@ -23,8 +22,6 @@ pub(super) const LAGS: usize = 25;
 const LEVEL: f64 = 0.99;
 /// Directions of the inputs with less than this share of the largest power say nothing.
 const NO_POWER: f64 = 1e-6;
-/// A normal distribution as that of Student.
-const MANY: f64 = 1e9;
 
 /// What the residuals say of the noise and of the structure.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -119,7 +116,7 @@ impl ResidualSums {
         Ok(ResidualTest {
             samples: self.samples,
             autocorrelation: (0..p).map(|i| (1..=lags).map(|lag| normalised(i, lag)).collect()).collect(),
-            autocorrelation_bound: student(0.5 * (1.0 + LEVEL), MANY) / n.sqrt(),
+            autocorrelation_bound: normal_quantile(0.5 * (1.0 + LEVEL)) / n.sqrt(),
             statistic,
             degrees_of_freedom,
             p_value: chi_square_tail(statistic, degrees_of_freedom),

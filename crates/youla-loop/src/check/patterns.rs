@@ -2,9 +2,9 @@
 
 use super::options::CheckOptions;
 use super::outliers::Outliers;
-use super::robust::{MEDIAN, deviation};
 use youla::Mat;
-use youla::linalg::{least_squares, quantile};
+use youla::linalg::least_squares;
+use youla::statistics::{quantile, robust_deviation};
 
 /// Share of the energy of the innovation around a wrong sample that it must make.
 /// Chosen; no false alarm in 200 simulated clean records (`docs/check.md`).
@@ -66,7 +66,7 @@ impl<'a> Search<'a> {
         };
         let sums = all.map(added).collect();
         let length = a.iter().map(|v| v * v).sum::<f64>().sqrt();
-        let sigma = deviation(&e);
+        let sigma = robust_deviation(e.iter().copied());
         Search { e, a, sums, length, sigma }
     }
 
@@ -83,7 +83,7 @@ impl<'a> Search<'a> {
         let mut lambda: Vec<f64> = (0..self.e.len()).map(|k| self.lambda(k)).collect();
         let mut sorted: Vec<f64> = lambda.iter().map(|v| v.abs()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        let sigma = quantile(&sorted, 0.5) / MEDIAN;
+        let sigma = robust_deviation(lambda.iter().copied());
         let least = (options.outlier * sigma).max(2.0 * quantile(&sorted, TAIL)).max(ROUNDING * self.length);
         let total: f64 = self.e.iter().map(|v| v * v).sum();
         let (mut found, mut taken, mut rest) = (Vec::new(), 0.0, Vec::new());

@@ -2,6 +2,7 @@
 
 use super::regression::{Fit, Lagged};
 use crate::error::Result;
+use youla::statistics::robust_deviation;
 
 /// Passes of a robust regression.
 const PASSES: usize = 4;
@@ -9,15 +10,6 @@ const PASSES: usize = 4;
 /// One normal residual in 5e8. Chosen, not measured.
 const SPIKE: f64 = 6.0;
 const MOST: f64 = 0.1;
-/// Median of the magnitude of a normal variable, `Phi^-1(3/4)`.
-pub(super) const MEDIAN: f64 = 0.674_489_75;
-
-/// Standard deviation from the median of the magnitudes.
-pub(super) fn deviation(e: &[f64]) -> f64 {
-    let mut sizes: Vec<f64> = e.iter().map(|v| v.abs()).collect();
-    sizes.sort_unstable_by(f64::total_cmp);
-    youla::linalg::quantile(&sizes, 0.5) / MEDIAN
-}
 
 impl Lagged {
     /// A regression and its residuals without the rows of few great residuals and those that follow them: wrong samples would
@@ -32,7 +24,7 @@ impl Lagged {
         for _ in 0..PASSES {
             let mut now = vec![false; self.rows];
             for e in &e {
-                let least = SPIKE * deviation(e);
+                let least = SPIKE * robust_deviation(e.iter().copied());
                 for k in (0..e.len()).filter(|k| e[*k].abs() > least && least > 0.0) {
                     let last = (k + self.lags).min(now.len() - 1);
                     now[k..=last].fill(true);

@@ -9,10 +9,10 @@
 
 use super::finding::{Finding, Severity, Test, with_unit};
 use super::regression::{Fit, Lagged};
-use super::robust::deviation;
 use crate::error::Result;
 use youla::linalg::least_squares;
 use youla::signal::Channel;
+use youla::statistics::robust_deviation;
 use youla::{Mat, MatRef};
 
 /// What happened to a row.
@@ -61,7 +61,7 @@ pub(super) fn of_record(lagged: &Lagged, m: usize, p: usize, known: usize) -> Re
         let columns =
             [lagged.past(0..m, 1), lagged.past(m..m + p, 0), lagged.past(outside, 0), vec![lagged.trend(0)]].concat();
         let (fit, e) = lagged.robust_fit(&[lagged.column(input, 0)], columns)?;
-        let sigma = deviation(&e[0]);
+        let sigma = robust_deviation(e[0].iter().copied());
         let least = (GREAT * sigma).max(LEAST);
         let great: Vec<usize> = (0..e[0].len()).filter(|k| e[0][*k].abs() > least).collect();
         let starts: Vec<usize> = great

@@ -22,7 +22,7 @@ pub fn quantile(values: &[f64], share: f64) -> f64 {
     let number = |v: &f64| if v.is_nan() { f64::NEG_INFINITY } else { *v };
     let mut sorted: Vec<f64> = values.iter().map(number).collect();
     sorted.sort_by(f64::total_cmp);
-    youla::linalg::quantile(&sorted, share)
+    youla::statistics::quantile(&sorted, share)
 }
 
 /// The middle value.

@@ -1,6 +1,6 @@
 //! What a box shows of a sample.
 
-use youla::linalg::quantile;
+use youla::statistics::quantile;
 
 /// Median, quartiles, whiskers and what lies beyond them.
 ///

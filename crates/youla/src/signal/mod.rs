@@ -19,7 +19,7 @@ pub use periodic::{
     DetectionLines, ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period,
     detection_lines, line_response, local_response,
 };
-pub(crate) use periodic::{Excited, inverse, output_rest, standard_normal};
+pub(crate) use periodic::{Excited, inverse, output_rest};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};

@@ -11,8 +11,8 @@
 //!
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), section 16.6; M. S. Bartlett, J. R. Stat. Soc. B 8 (1946), 27.
 
-use crate::identify::subspace::uncertainty::student;
 use crate::linalg::check_shape;
+use crate::statistics::normal_quantile;
 use crate::{MatRef, Result};
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
@@ -21,9 +21,6 @@ use rustfft::num_complex::Complex;
 pub const RESIDUAL_LAGS: usize = 25;
 /// Probability with which a single correlation of noise lies in its band.
 const LEVEL: f64 = 0.99;
-
-/// Degrees of freedom with which the distribution of Student is the normal one.
-const MANY: f64 = 1e9;
 
 /// Correlations of the residual of one model on one record.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,7 +92,7 @@ pub fn residual_correlations(e: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Result<R
         x.iter().map(|x| transform.correlation(x, x)).collect(),
     );
     let reach = n / 10;
-    let c = student(0.5 * (1.0 + LEVEL), MANY);
+    let c = normal_quantile(0.5 * (1.0 + LEVEL));
     let normalised = |r: &[f64], k: usize| if r[0] > 0.0 { r[k] / r[0] } else { 0.0 };
     let lags = RESIDUAL_LAGS.min(n.saturating_sub(1));
     let auto: Vec<Vec<f64>> = of_e.iter().map(|r| (0..=lags).map(|k| normalised(r, k)).collect()).collect();
@@ -127,7 +124,7 @@ pub fn residual_correlations(e: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Result<R
         }
     }
     let tests = (cross.len() * (lags + 1)).max(1) as f64;
-    let bound = student(1.0 - 0.5 * (1.0 - LEVEL) / tests, MANY);
+    let bound = normal_quantile(1.0 - 0.5 * (1.0 - LEVEL) / tests);
     let independent = largest.is_none_or(|l| l.deviations.abs() < bound);
     Ok(ResidualCorrelations { auto, auto_band: c / (n as f64).sqrt(), cross, largest, independent })
 }

@@ -4,7 +4,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each module uses only those before it.
-const MODULES: [&str; 9] = ["error", "linalg", "lti", "signal", "control", "factor", "identify", "reduce", "validate"];
+const MODULES: [&str; 10] =
+    ["error", "statistics", "linalg", "lti", "signal", "control", "factor", "identify", "reduce", "validate"];
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();

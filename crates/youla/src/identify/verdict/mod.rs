@@ -21,13 +21,6 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::deviation::response;
 use faer::c64;
 
-/// Excess of chi-square over its mean in its standard deviations.
-pub(crate) fn excess(statistic: f64, degrees: f64) -> f64 {
-    // Wilson and Hilferty: the cube root is normal.
-    let part = 2.0 / (9.0 * degrees.max(1.0));
-    ((statistic / degrees.max(1.0)).max(0.0).cbrt() - (1.0 - part)) / part.sqrt()
-}
-
 /// What the model and its residual say.
 pub(crate) fn of_model(
     spectra: &Spectra,

@@ -6,7 +6,6 @@
 //! ```
 //! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
-use super::excess;
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
@@ -14,6 +13,7 @@ use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::with_slope_of_unstable;
+use crate::statistics::chi_square_deviations;
 use faer::c64;
 use rustfft::FftPlanner;
 
@@ -61,7 +61,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
         ((statistic - distinct.len() as f64).max(0.0) / moved).sqrt(),
         LARGEST_SHARE,
     )
-    .beyond_chance(excess(statistic, distinct.len() as f64).max(telling))
+    .beyond_chance(chi_square_deviations(statistic, distinct.len() as f64).max(telling))
 }
 
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.

@@ -6,7 +6,6 @@
 //! ```
 //! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
-use super::excess;
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
@@ -16,6 +15,7 @@ use crate::identify::likelihood::search::linearise::{compressed, linearise, stac
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::{with_best_ends, with_slope_of_unstable};
 use crate::identify::subspace::Experiment;
+use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
 
 /// Pieces of a record with at least so many samples each.
@@ -93,7 +93,7 @@ fn chow(parts: &[&Part], parameters: usize) -> Option<(f64, f64)> {
     let whole = Part::together(parts)?;
     let degrees = ((parts.len() - 1) * parameters) as f64;
     let statistic = parts.iter().map(|p| p.explained(parameters)).sum::<f64>() - whole.explained(parameters);
-    (degrees > 0.0).then(|| (excess(statistic, degrees), statistic / degrees))
+    (degrees > 0.0).then(|| (chi_square_deviations(statistic, degrees), statistic / degrees))
 }
 
 impl Parts {

@@ -6,8 +6,9 @@
 
 use super::LineResponse;
 use super::output_rest;
-use super::settling::{GROUP, standard_normal};
+use super::settling::GROUP;
 use crate::lti::FrequencyResponse;
+use crate::statistics::f_deviations;
 use faer::{Mat, RowRef, c64};
 use std::f64::consts::TAU;
 
@@ -109,7 +110,7 @@ impl LineResponse {
             LineGroup {
                 entry,
                 hz: [range.start, range.end - 1].map(|k| self.response.omega[lines[k]] / TAU),
-                deviations: standard_normal(found / noise.max(f64::MIN_POSITIVE), count * degrees.0, count * degrees.1),
+                deviations: f_deviations(found / noise.max(f64::MIN_POSITIVE), count * degrees.0, count * degrees.1),
                 relative: ((found - noise).max(0.0) / sum(size).max(f64::MIN_POSITIVE)).sqrt(),
             }
         };

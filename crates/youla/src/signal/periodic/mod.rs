@@ -27,7 +27,6 @@ pub use detection::{DetectionLines, detection_lines};
 pub(crate) use levels::Excited;
 pub use local::{LocalModel, local_response};
 pub use period::{ExcitationPeriod, detect_period};
-pub(crate) use settling::standard_normal;
 
 use crate::lti::{Discrete, FrequencyResponse};
 use crate::{Error, Result};

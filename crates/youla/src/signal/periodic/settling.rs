@@ -3,9 +3,8 @@
 //! A period is compared with the mean of those after it: in every channel and group of neighbouring lines, the ratio of its
 //! squared distance to the variance of the others has an F distribution when the record is settled. Paulson's cube root
 //! makes it a standard normal number, which above 4.5 (probability 3e-6 per group) counts as evidence of a transient.
-//!
-//! Source: E. Paulson, An approximate normalization of the analysis of variance distribution, Ann. Math. Stat. 13 (1942), 233.
 
+use crate::statistics::f_deviations;
 use faer::c64;
 
 /// Lines of a group.
@@ -44,12 +43,5 @@ fn evident(distance: &[f64], scatter: &[f64], count: f64) -> bool {
     if scatter <= 0.0 {
         return distance > 0.0;
     }
-    standard_normal(distance / scatter, degrees, degrees * (count - 1.0)) > EVIDENCE
-}
-
-/// Paulson's standard normal number of a ratio of mean squares with these degrees of freedom.
-pub(crate) fn standard_normal(ratio: f64, degrees: f64, of_scatter: f64) -> f64 {
-    let root = ratio.cbrt();
-    let (first, second) = (2.0 / (9.0 * degrees), 2.0 / (9.0 * of_scatter));
-    ((1.0 - second) * root - (1.0 - first)) / (second * root * root + first).sqrt()
+    f_deviations(distance / scatter, degrees, degrees * (count - 1.0)) > EVIDENCE
 }

@@ -1,18 +1,12 @@
 //! Dead time: how many of the newest inputs a long regression does without.
 
 use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::statistics::chi_square_limit;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
-/// Normal quantile of the probability 1e-3 that an input that acts is taken for one that does not; by Wilson and Hilferty the
-/// limit of chi-square with f degrees of freedom is `f (1 - 2/(9 f) + 3.09 sqrt(2/(9 f)))^3`.
+/// Normal quantile of the probability 1e-3 that an input that does not act is taken for one that does.
 const QUANTILE: f64 = 3.09;
-
-/// Chi-square limit, Wilson and Hilferty (1931).
-pub(crate) fn chi_square_limit(degrees: f64, quantile: f64) -> f64 {
-    let part = 2.0 / (9.0 * degrees);
-    degrees * (1.0 - part + quantile * part.sqrt()).powi(3)
-}
 
 /// For each input the number of samples by which it can be delayed without loss: the largest d for which the coefficients of
 /// u(t-1) ... u(t-d) are jointly zero for all outputs.

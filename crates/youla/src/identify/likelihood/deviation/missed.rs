@@ -9,7 +9,7 @@
 use crate::identify::likelihood::choose::problem::Choice;
 use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
 use crate::identify::likelihood::search::noise::Noise;
-use crate::identify::verdict::excess;
+use crate::statistics::chi_square_deviations;
 use faer::{Mat, MatRef, Side, c64};
 
 /// Lines of a band, over all records.
@@ -112,7 +112,7 @@ pub(crate) fn missed(spectra: &Spectra, choice: &Choice, excitation: &[MatRef<'_
             bands.push(Band { share, excess: found.excess, variance: found.variance });
         }
     }
-    Missed { bands, significance: if degrees > 0.0 { excess(statistic, degrees) } else { 0.0 } }
+    Missed { bands, significance: if degrees > 0.0 { chi_square_deviations(statistic, degrees) } else { 0.0 } }
 }
 
 /// Powers of the noise of each output.

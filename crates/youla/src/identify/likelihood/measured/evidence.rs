@@ -8,7 +8,7 @@ use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::deviation::delayed;
 use crate::identify::verdict::accuracy;
 use crate::lti::{Discrete, StateSpace};
-use crate::signal::standard_normal;
+use crate::statistics::f_deviations;
 use std::f64::consts::TAU;
 
 /// Lines of a group.
@@ -58,7 +58,7 @@ fn unexplained(lines: &WeighedLines, chosen: &Fitted, degrees: f64) -> Evidence 
         }
         let ratio = spent * energy / count;
         let of_scatter = if degrees.is_finite() { degrees * group.len() as f64 * lines.outputs as f64 } else { MANY };
-        let beyond = standard_normal(ratio, count, of_scatter);
+        let beyond = f_deviations(ratio, count, of_scatter);
         let share = (rest * (1.0 - 1.0 / ratio).max(0.0) / all.max(f64::MIN_POSITIVE)).sqrt();
         if beyond > worst.1 {
             worst = (share, beyond);

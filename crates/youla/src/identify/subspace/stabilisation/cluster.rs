@@ -6,8 +6,8 @@
 //! in any order, in a time of the square of the number of poles (Murtagh, The Computer Journal 26, 354, 1983).
 
 use super::{DiagramPole, Linkage, PoleStability, StabilisationOptions, modal_assurance};
-use crate::linalg::quantile;
 use crate::lti::{Discrete, TimeDomain};
+use crate::statistics::quantile;
 use crate::{Mat, c64};
 
 /// Poles of many orders that are close in frequency, damping ratio and mode shape: a mode of what was identified, as far as

@@ -12,11 +12,11 @@ mod inputs;
 mod options;
 mod poles;
 mod response;
-pub mod student;
 #[cfg(test)]
 mod tests;
 mod zeros;
 
+use crate::statistics as student;
 pub use band::Reach;
 pub use band::{ModeBand, ResponseBand};
 pub use bootstrap::Bootstrap;
@@ -26,7 +26,6 @@ pub use figures::{Draw, Interval};
 pub use options::{UncertaintyMethod, UncertaintyOptions};
 pub(super) use poles::pole_deviations;
 pub use response::{mode_change, response_changes};
-pub use student::{ellipse, student, two_sided_student};
 pub use zeros::zero_changes;
 
 use super::innovation::{Innovation, NoInnovation};

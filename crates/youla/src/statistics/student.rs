@@ -1,4 +1,4 @@
-//! Quantiles for variances that are themselves estimates.
+//! Quantiles of the normal distribution, and of those of Student and Hotelling for variances that are themselves estimates.
 
 /// Quantile of Student's distribution with `nu` degrees of freedom for a two-sided interval of the given level: the series
 /// of Cornish and Fisher (Abramowitz, Stegun, 26.7.5), to four digits from 6 degrees of freedom on.
@@ -8,7 +8,7 @@ pub fn two_sided_student(level: f64, nu: f64) -> f64 {
 
 /// One-sided quantile.
 pub fn student(probability: f64, nu: f64) -> f64 {
-    let x = normal(probability);
+    let x = normal_quantile(probability);
     let polynomial = |c: &[f64]| c.iter().fold(0.0, |sum, c| sum * x * x + c) * x;
     let terms = [
         polynomial(&[1.0, 1.0]) / 4.0,
@@ -26,7 +26,7 @@ pub fn ellipse(level: f64, nu: f64) -> f64 {
 }
 
 /// Quantile of the normal distribution, by bisection of its distribution function.
-fn normal(probability: f64) -> f64 {
+pub fn normal_quantile(probability: f64) -> f64 {
     let (mut low, mut high) = (-9.0, 9.0);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
@@ -53,7 +53,8 @@ mod tests {
     /// Abramowitz, Stegun, table 26.10; F(2, 20) at 95 % is 3.493 (table 26.9).
     #[test]
     fn tables() {
-        let found = [normal(0.975), two_sided_student(0.95, 10.0), two_sided_student(0.95, 40.0), student(0.95, 20.0)];
+        let found =
+            [normal_quantile(0.975), two_sided_student(0.95, 10.0), two_sided_student(0.95, 40.0), student(0.95, 20.0)];
         for (found, table) in found.into_iter().zip([1.959964, 2.228, 2.021, 1.725]) {
             assert!((found - table).abs() < 6e-4, "{found} {table}");
         }

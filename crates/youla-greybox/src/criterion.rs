@@ -38,8 +38,6 @@ pub(super) struct Criterion<'a> {
     time: Discrete,
     /// Initial states per experiment that are estimated.
     pub(super) initial: usize,
-    /// Whether a plant that is not stable is refused.
-    confined: bool,
     /// Number of parameters of the structure.
     pub(super) physical: usize,
     /// Number of all parameters q.
@@ -58,7 +56,6 @@ pub(super) struct Comparison<'a> {
     pub(super) noise: &'a NoiseModel,
     pub(super) initial_state: InitialState,
     pub(super) deviations: &'a [f64],
-    pub(super) confined: bool,
 }
 
 /// The criterion at one parameter vector.
@@ -89,7 +86,7 @@ impl<'a> Criterion<'a> {
         time: Discrete,
         comparison: Comparison<'a>,
     ) -> Result<Self> {
-        let Comparison { closure, noise, initial_state, deviations, confined } = comparison;
+        let Comparison { closure, noise, initial_state, deviations } = comparison;
         let physical = structure.names().len();
         check_start(start, physical)?;
         check_time(structure, time)?;
@@ -118,7 +115,6 @@ impl<'a> Criterion<'a> {
             deviations,
             time,
             initial,
-            confined,
             physical,
             parameters,
             degrees_of_freedom,
@@ -140,9 +136,6 @@ impl<'a> Criterion<'a> {
     pub(super) fn evaluate(&self, theta: &[f64]) -> Result<Point> {
         let (own, gain) = theta.split_at(self.physical);
         let plant = sample(self.structure, own, &self.coordinates, self.time)?;
-        if self.confined {
-            plant.discrete.require_stable("a model of the search")?;
-        }
         let seen = self.simulated.system(&plant.discrete, gain)?;
         let sampled = with_scaled_outputs(seen.as_ref().unwrap_or(&plant.discrete), &self.deviations)?;
         let mut point = Point { theta: theta.to_vec(), cost: 0.0, plant, sampled, initial_states: Vec::new() };

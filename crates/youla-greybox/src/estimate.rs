@@ -89,7 +89,6 @@ pub(super) fn comparison<'a>(problem: &Problem<'a>, options: &'a GreyBoxOptions)
         noise: &options.noise,
         initial_state: options.initial_state,
         deviations: &options.output_deviations,
-        confined: problem.confined,
     }
 }
 

@@ -41,7 +41,6 @@
 //! | intervals, test of the residuals, comparison of structures | `intervals` |
 //! | projection of a frequency response on a structure | `projection` |
 //! | searches from a projection or from several starts | [`projected_pem`], [`hansen_pem`], [`subspace_pem`], `multi_start` |
-//! | refinement of black-box models | [`refine`], [`hansen_refine`] |
 
 mod bounds;
 mod checks;
@@ -54,7 +53,6 @@ mod delays;
 mod error;
 mod estimate;
 pub mod hansen_pem;
-pub mod hansen_refine;
 mod identifiability;
 mod intervals;
 mod levenberg;
@@ -66,7 +64,6 @@ mod predictor;
 mod problem;
 pub mod projected_pem;
 mod projection;
-pub mod refine;
 mod result;
 mod robust;
 mod sampled;
@@ -95,7 +92,7 @@ pub use intervals::{
     ResidualAssumption, ResidualTest, compare, greybox_intervals, likelihood_ratio,
 };
 pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
-pub use noise::{InnovationStart, NoiseFilter, NoiseModel};
+pub use noise::{InnovationStart, NoiseFilter, NoiseKind, NoiseModel};
 pub use options::GreyBoxOptions;
 pub use problem::Problem;
 pub(crate) use projection::decayed;

@@ -26,6 +26,26 @@ pub enum NoiseModel {
     Filter(NoiseFilter),
 }
 
+/// The models of the noise that need nothing to be known of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum NoiseKind {
+    /// White noise at the outputs: the simulation is fitted.
+    #[default]
+    OutputError,
+    /// White innovations with a free gain K: the prediction one step ahead is fitted, by a stable predictor.
+    Innovation,
+}
+
+impl From<NoiseKind> for NoiseModel {
+    fn from(kind: NoiseKind) -> Self {
+        match kind {
+            NoiseKind::OutputError => NoiseModel::OutputError,
+            NoiseKind::Innovation => NoiseModel::Innovation(InnovationStart::default()),
+        }
+    }
+}
+
 /// Where the search for the gain K begins.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]

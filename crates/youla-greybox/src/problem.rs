@@ -29,14 +29,12 @@ pub struct Problem<'a> {
     pub(super) experiments: &'a [Experiment<'a>],
     pub(super) time: Discrete,
     pub(super) closure: Option<Closure<'a>>,
-    /// Whether models that are not stable are rejected.
-    pub(super) confined: bool,
 }
 
 impl<'a> Problem<'a> {
     /// The plant alone, driven by the measured inputs, sampled at `time`.
     pub fn new(structure: &'a dyn Structure, experiments: &'a [Experiment<'a>], time: Discrete) -> Self {
-        Problem { structure, experiments, time, closure: None, confined: false }
+        Problem { structure, experiments, time, closure: None }
     }
 
     /// The closed loop of the model and the controller that ran, driven by the external signal w alone; `output` (y or beta)
@@ -52,11 +50,6 @@ impl<'a> Problem<'a> {
     /// [`crate::greybox_intervals`] counts the colour. For a stable plant the simulation of the plant alone is efficient.
     pub fn in_loop(self, controller: &'a Partitioned<Discrete>, output: LoopOutput) -> Self {
         Problem { closure: Some(Closure::new(controller, output)), ..self }
-    }
-
-    /// The same problem; where `stable`, models that are not stable are rejected.
-    pub(super) fn confined(self, stable: bool) -> Self {
-        Problem { confined: stable, ..self }
     }
 
     /// Refuses a simulated loop: the method needs the measured u.

@@ -18,7 +18,6 @@ use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::signal::IndirectResponse;
-use youla_greybox::hansen_refine::Refinement;
 use youla_loop::redesign::Redesign;
 
 /// Everything that a run found. A method that is impossible does not end the run: its field holds the reason.
@@ -72,8 +71,6 @@ pub struct Filtered {
 pub struct SchemeRun {
     /// S and G(S).
     pub hansen: HansenModel,
-    /// What the refinement of S changed, where it was asked for.
-    pub refinement: Option<Refinement>,
     /// The stabilisation diagram of S.
     pub diagram: Result<StabilisationDiagram>,
     /// The uncertainty of S and of G(S).

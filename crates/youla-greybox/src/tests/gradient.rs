@@ -23,7 +23,7 @@ pub(in super::super) fn comparison<'a>(
     initial_state: InitialState,
     deviations: &'a [f64],
 ) -> Comparison<'a> {
-    Comparison { closure: None, noise, initial_state, deviations, confined: false }
+    Comparison { closure: None, noise, initial_state, deviations }
 }
 
 /// Largest error of the gradient over all parameters, those of the noise too, relative to `|J_j| |r|`.

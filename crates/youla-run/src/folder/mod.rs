@@ -170,7 +170,7 @@ impl Writer<'_> {
             channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
         };
         let s = &scheme.hansen.deviation;
-        let details = DeviationDetails::new(&scheme.hansen, scheme.refinement.as_ref());
+        let details = DeviationDetails::new(&scheme.hansen);
         self.model_with("4-identify/deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
         self.diagram("4-identify/stabilisation_deviation", Some(&scheme.diagram), &named("beta", y))?;
         self.model("5-recombine/hansen", &scheme.hansen.plant, &())?;

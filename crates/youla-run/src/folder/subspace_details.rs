@@ -7,7 +7,6 @@ use youla::identify::innovation_form::{Convergence, InnovationForm};
 use youla::identify::subspace::{
     DataFactor, HorizonReport, LineAmplitude, OrderReport, OutputFit, SubspaceModel, amplitudes,
 };
-use youla_greybox::hansen_refine::Refinement;
 
 /// Horizons, order, excitation, moved poles, disturbances.
 #[derive(Serialize)]
@@ -49,22 +48,20 @@ impl<'a> From<&'a SubspaceModel> for SubspaceDetails<'a> {
     }
 }
 
-/// The same of S, with its innovation form and its refinement.
+/// The same of S, with its innovation form.
 #[derive(Serialize)]
 pub(crate) struct DeviationDetails<'a> {
     #[serde(flatten)]
     subspace: SubspaceDetails<'a>,
     #[serde(skip_serializing_if = "Option::is_none")]
     innovation_form: Option<InnovationFormEntry>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    refinement: Option<&'a Refinement>,
 }
 
 impl<'a> DeviationDetails<'a> {
     /// Of S.
-    pub(crate) fn new(hansen: &'a HansenModel, refinement: Option<&'a Refinement>) -> Self {
+    pub(crate) fn new(hansen: &'a HansenModel) -> Self {
         let innovation_form = hansen.innovation_form.as_ref().map(InnovationFormEntry::from);
-        DeviationDetails { subspace: SubspaceDetails::from(&hansen.deviation), innovation_form, refinement }
+        DeviationDetails { subspace: SubspaceDetails::from(&hansen.deviation), innovation_form }
     }
 }
 

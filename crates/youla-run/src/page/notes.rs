@@ -8,8 +8,6 @@ use crate::result::Identification;
 use youla::identify::innovation_form::Convergence;
 use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{Uncertainty, amplitudes};
-use youla_greybox::Stop;
-use youla_greybox::refine::RefineNoise;
 use youla_report::data::{Note, ReportPart, Status};
 
 /// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.
@@ -83,28 +81,6 @@ pub(crate) fn notes(found: &Identification) -> Vec<Note> {
             form.iterations,
             form.change,
             100.0 * form.misfit
-        );
-        add(status, text);
-    }
-    if let Some(refined) = scheme.and_then(|s| s.refinement.as_ref()) {
-        let (status, ended) = match refined.stop {
-            Stop::Iterations => (Status::Caution, " (the limit `max_iterations`)"),
-            _ => (Status::Info, ""),
-        };
-        let noise = match refined.noise {
-            RefineNoise::OutputError => "the simulated beta",
-            RefineNoise::Innovation => "beta predicted one step ahead",
-        };
-        let fits = |fit: &[f64]| fit.iter().map(|f| format!("{f:.2}")).collect::<Vec<_>>().join(" and ");
-        let text = format!(
-            "S was refined on {noise}: {} iterations{ended} reduced the criterion from {:.5e} to {:.5e}; the fit of the simulated \
-             beta changed from {} % to {} %. S is {}.",
-            refined.iterations,
-            refined.cost_before,
-            refined.cost,
-            fits(&refined.fit_before),
-            fits(&refined.fit),
-            if refined.stable { "stable, so that the controller stabilises G(S)" } else { "not stable" },
         );
         add(status, text);
     }

@@ -2,8 +2,7 @@
 
 use super::options::Prediction;
 use serde::{Deserialize, Serialize};
-use youla_greybox::refine::RefineNoise;
-use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, InnovationStart, NoiseModel};
+use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, NoiseKind};
 
 /// What is known of the plant's physics, the table `[grey_box]` of run.toml.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -17,7 +16,7 @@ pub struct GreyBoxSettings {
     pub prediction: Prediction,
     /// The model of the noise.
     #[serde(default)]
-    pub noise: RefineNoise,
+    pub noise: NoiseKind,
     /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub delays: Vec<usize>,
@@ -48,7 +47,7 @@ impl GreyBoxSettings {
         GreyBoxSettings {
             structure,
             prediction: Prediction::default(),
-            noise: RefineNoise::default(),
+            noise: NoiseKind::default(),
             delays: Vec::new(),
             alternative: Vec::new(),
             start_from_initial: yes(),
@@ -57,11 +56,7 @@ impl GreyBoxSettings {
 
     /// The options of the search.
     pub(crate) fn search(&self) -> GreyBoxOptions {
-        let noise = match self.noise {
-            RefineNoise::OutputError => NoiseModel::OutputError,
-            RefineNoise::Innovation => NoiseModel::Innovation(InnovationStart::default()),
-        };
-        GreyBoxOptions { noise, delays: self.delays.clone(), ..GreyBoxOptions::default() }
+        GreyBoxOptions { noise: self.noise.into(), delays: self.delays.clone(), ..GreyBoxOptions::default() }
     }
 
     /// What is wrong with a structure, beside `inputs` and `outputs` channels.

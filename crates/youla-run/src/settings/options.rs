@@ -1,9 +1,7 @@
 //! Options of single stages: factors, S, verification, frequency responses.
 
-use super::shown;
 use serde::{Deserialize, Serialize};
 use youla::identify::innovation_form::{InnovationOptions, NoiseForm};
-use youla_greybox::refine::{RefineNoise, RefineOptions};
 
 /// Options of the coprime factors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -82,10 +80,6 @@ pub enum DeviationStructure {
 pub struct DeviationSettings {
     /// How the noise of beta is modelled.
     pub structure: DeviationStructure,
-    /// The model of the noise with which the prediction-error method refines S afterwards; no refinement when absent.
-    #[serde(skip_serializing_if = "Option::is_none", with = "shown::optional")]
-    #[schemars(with = "Option<RefineNoise>")]
-    pub refine: Option<RefineOptions>,
 }
 
 impl DeviationSettings {

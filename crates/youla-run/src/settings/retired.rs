@@ -3,7 +3,7 @@
 use toml::de::{DeTable, DeValue};
 
 /// Tables that held the key, the key (with a dot where it was a table and is none now), and what to do instead.
-const RETIRED: [(&str, &str, &str); 31] = [
+const RETIRED: [(&str, &str, &str); 30] = [
     ("", "stabilisation", "the program chooses the orders and criteria of the diagrams; leave the table out"),
     ("data", "time_tolerance", "a time step may deviate by 0.1 % of the sample time; leave the key out"),
     ("nominal", "bearing", "give the matrices of the model in [nominal.state_space]"),
@@ -22,7 +22,6 @@ const RETIRED: [(&str, &str, &str); 31] = [
     ("hansen.uncertainty direct.uncertainty", "seed", "the seed is fixed; leave the key out"),
     ("deviation", "iterations", "the innovation form is refitted at most 20 times; leave the key out"),
     ("deviation", "tolerance", "the relative change of K_s must fall below 1e-6; leave the key out"),
-    ("deviation", "refine.", "write `refine = \"output-error\"` or `refine = \"innovation\"` in [deviation]"),
     ("certificate redesign", "band", "500 models are drawn with a fixed seed; leave the key out"),
     ("certificate", "gain_error", "a gain error of 5 % is tried; leave the key out"),
     ("certificate", "saturation", "a limit of 90 % of the largest u is tried; leave the key out"),
@@ -83,7 +82,6 @@ mod tests {
                 assert!(start == header.len() && sentence.ends_with(instead), "{text}{sentence}");
             }
         }
-        assert_eq!(retired("[deviation]\nrefine = \"innovation\"", ""), None);
         assert!(retired("weight = 1", "direct").is_some());
     }
 }

@@ -9,7 +9,6 @@ use youla::identify::subspace::{
     Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
 };
 use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
-use youla_greybox::refine::{RefineNoise, RefineOptions};
 
 /// Options with the table that shows them.
 pub(in crate::settings) trait Shown: Sized + Clone {
@@ -275,26 +274,5 @@ impl From<ReductionOptions> for ReductionTable {
 impl From<ReductionTable> for ReductionOptions {
     fn from(ReductionTable { method, order, stability_boundary }: ReductionTable) -> Self {
         ReductionOptions { method, order, stability_boundary, ..ReductionOptions::default() }
-    }
-}
-
-impl Shown for RefineOptions {
-    type Table = RefineTable;
-}
-
-/// A refinement is named by its model of the noise.
-#[derive(Serialize, Deserialize)]
-#[serde(transparent)]
-pub(in crate::settings) struct RefineTable(RefineNoise);
-
-impl From<RefineOptions> for RefineTable {
-    fn from(options: RefineOptions) -> Self {
-        RefineTable(options.noise)
-    }
-}
-
-impl From<RefineTable> for RefineOptions {
-    fn from(RefineTable(noise): RefineTable) -> Self {
-        RefineOptions { noise, ..RefineOptions::default() }
     }
 }

@@ -1,4 +1,4 @@
-//! The modified Hansen scheme on the records of a run: S by (25), G(S) by (17), the diagram of S, its refinement.
+//! The modified Hansen scheme on the records of a run: S by (25), G(S) by (17), the diagram of S.
 
 use crate::records::RunRecords;
 use crate::stages::context::SchemeContext;
@@ -7,14 +7,11 @@ use crate::{Error, Result};
 use youla::identify::hansen::{HansenData, HansenModel, HansenOptions};
 use youla::identify::subspace::SubspaceOptions;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
-use youla_greybox::hansen_refine::{RefinedHansen, Refinement, refine_hansen};
 
 /// What the scheme gives.
 pub(crate) struct Scheme {
     /// S and G(S).
     pub(crate) hansen: HansenModel,
-    /// What the refinement of S changed, where it was asked for.
-    pub(crate) refinement: Option<Refinement>,
     /// The stabilisation diagram of S, or the reason why there is none.
     pub(crate) diagram: Result<StabilisationDiagram>,
 }
@@ -22,7 +19,7 @@ pub(crate) struct Scheme {
 /// S, G(S) and the diagram of S.
 ///
 /// # Errors
-/// Those of [`HansenData::identify`] and of the refinement.
+/// Those of [`HansenData::identify`].
 pub(crate) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     let SchemeContext { run, factorisation, signals } = context;
     let (settings, factors) = (run.settings, &factorisation.factors);
@@ -30,10 +27,7 @@ pub(crate) fn scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     let options = HansenOptions { subspace: settings.hansen.clone(), noise: settings.deviation.noise() };
     let hansen = data.identify(&options)?;
     let diagram = diagram(data.subspace(), &hansen.deviation, &settings.hansen);
-    let Some(options) = &settings.deviation.refine else { return Ok(Scheme { hansen, refinement: None, diagram }) };
-    let refined = refine_hansen(hansen, factors, &signals.experiments, options);
-    let RefinedHansen { model, refinement } = refined.map_err(|e| e.within("[deviation] refine"))?;
-    Ok(Scheme { hansen: model, refinement: Some(refinement), diagram })
+    Ok(Scheme { hansen, diagram })
 }
 
 /// Refuses a part of a file that is too short for the horizon, by its name.

@@ -176,8 +176,8 @@ fn judged(
     hz: &[f64],
     clock: &mut StageClock<'_>,
 ) -> Result<SchemeRun> {
-    let Scheme { hansen, refinement, diagram } = s;
+    let Scheme { hansen, diagram } = s;
     let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
     let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
-    Ok(SchemeRun { hansen, refinement, diagram, uncertainty, reduction, certificate })
+    Ok(SchemeRun { hansen, diagram, uncertainty, reduction, certificate })
 }

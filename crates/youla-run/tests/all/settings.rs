@@ -94,9 +94,8 @@ fn orders_are_numbers_words_or_rules() {
         assert_eq!(settings.reduction.as_ref().unwrap().order, order);
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
     }
-    let horizon =
-        parse(&format!("{MINIMAL}\n[hansen]\nhorizon = \"auto\"\n[deviation]\nrefine = \"innovation\"\n")).unwrap();
-    assert!(horizon.hansen.horizon.is_auto() && horizon.deviation.refine.is_some());
+    let horizon = parse(&format!("{MINIMAL}\n[hansen]\nhorizon = \"auto\"\n")).unwrap();
+    assert!(horizon.hansen.horizon.is_auto());
     assert_eq!(parse(&horizon.to_toml().unwrap()).unwrap(), horizon);
 }
 

@@ -126,10 +126,10 @@ pub(crate) enum Command {
         #[arg(value_name = "RUN")]
         run: PathBuf,
     },
-    /// Draw figures of a run for papers: SVG, PNG, and the numbers as CSV.
+    /// Draw figures of a run for papers: SVG, and the numbers as CSV.
     ///
-    /// Without FIGURE, the figures of the run are listed. Sizes are those on paper; text is 9 points at every size. SVG and PNG
-    /// contain the same font on every machine.
+    /// Without FIGURE, the figures of the run are listed. Sizes are those on paper; text is 9 points at every size. Every SVG
+    /// file contains the same font.
     #[command(after_help = plot::EXAMPLES)]
     Plot(plot::PlotArgs),
     /// Compare finished runs on one page: models, modes, distances, fits, settings.

@@ -17,7 +17,6 @@ mod manual;
 mod output;
 mod paper;
 mod plot;
-mod raster;
 mod rig;
 mod run_folder;
 mod study;

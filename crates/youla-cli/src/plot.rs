@@ -1,7 +1,6 @@
-//! `youla plot`: figures of a run as SVG, PNG and CSV.
+//! `youla plot`: figures of a run as SVG and CSV.
 
 use crate::output::{Failure, Form, say};
-use crate::raster;
 use clap::Args;
 use std::path::PathBuf;
 use youla_report::{FigureChoice, Print};
@@ -13,9 +12,7 @@ Examples:
   youla plot runs/drive-001 all                 all of them as SVG and CSV, in runs/drive-001/figures
   youla plot runs/drive-001 bode --output y --input u --width 8.5
                                                 one column wide
-  youla plot runs/drive-001 verification --png --dpi 600 --out paper/figures
-  youla plot runs/drive-001 poles --methods hansen,direct --outlines
-                                                for programs that do not take the font in the file: Inkscape, LaTeX";
+  youla plot runs/drive-001 poles --methods hansen,direct --out paper/figures";
 
 /// What is drawn, and how.
 #[derive(Debug, Args)]
@@ -27,13 +24,7 @@ pub(crate) struct PlotArgs {
     /// one, those that the run has are listed.
     #[arg(value_name = "FIGURE")]
     figure: Option<String>,
-    /// Write SVG; so it is where neither --png nor --csv is given.
-    #[arg(long, requires = "figure")]
-    svg: bool,
-    /// Write PNG.
-    #[arg(long, requires = "figure")]
-    png: bool,
-    /// Write the numbers alone; SVG and PNG always have them beside them.
+    /// Write the numbers alone, without the SVG.
     #[arg(long, requires = "figure")]
     csv: bool,
     /// Folder for the files, made if need be; files of the same names are replaced. RUN/figures by default.
@@ -45,12 +36,6 @@ pub(crate) struct PlotArgs {
     /// Height on paper; what the panels ask for by default.
     #[arg(long, value_name = "CM", allow_negative_numbers = true)]
     height: Option<f64>,
-    /// Pixels per inch of PNG.
-    #[arg(long, value_name = "N", default_value_t = 300, value_parser = clap::value_parser!(u32).range(30..=2400))]
-    dpi: u32,
-    /// In SVG, texts as outlines instead of the font, for programs that do not take a font from the file.
-    #[arg(long, requires = "figure")]
-    outlines: bool,
     /// Only this output; all by default.
     #[arg(long, value_name = "NAME")]
     output: Option<String>,
@@ -76,7 +61,7 @@ pub(crate) fn plot(form: Form, args: &PlotArgs) -> Result<(), Failure> {
     };
     let print = Print { width_cm: args.width, height_cm: args.height, ..Print::default() };
     let plots = youla_run::plot(&args.run, figure, &choice, &print)?;
-    let files = plots.iter().map(|plot| files(plot, args)).collect::<Result<Vec<_>, Failure>>()?.concat();
+    let files: Vec<_> = plots.iter().flat_map(|plot| files(plot, args.csv)).collect();
     let folder = args.out.clone().unwrap_or_else(|| args.run.join("figures"));
     let paths = write_plots(&folder, &files)?;
     youla_io::folder::add_to_list(&args.run, &paths)?;
@@ -95,18 +80,10 @@ pub(crate) fn plot(form: Form, args: &PlotArgs) -> Result<(), Failure> {
 }
 
 /// The files of one figure, the numbers last.
-fn files(plot: &Plot, args: &PlotArgs) -> Result<Vec<(String, Vec<u8>)>, Failure> {
-    let mut files = Vec::new();
-    let mut add = |ending: &str, bytes: Vec<u8>| files.push((format!("{}.{ending}", plot.name), bytes));
-    if args.svg || !(args.png || args.csv) {
-        let svg = if args.outlines { raster::outlined(&plot.svg)? } else { plot.svg.clone() };
-        add("svg", svg.into_bytes());
-    }
-    if args.png {
-        add("png", raster::drawn(&plot.svg, args.dpi)?);
-    }
-    add("csv", plot.csv.clone().into_bytes());
-    Ok(files)
+fn files(plot: &Plot, only_numbers: bool) -> Vec<(String, Vec<u8>)> {
+    let svg = (!only_numbers).then(|| (format!("{}.svg", plot.name), plot.svg.clone().into_bytes()));
+    let csv = (format!("{}.csv", plot.name), plot.csv.clone().into_bytes());
+    svg.into_iter().chain([csv]).collect()
 }
 
 fn list(form: Form, args: &PlotArgs) -> Result<(), Failure> {

@@ -53,5 +53,5 @@ pub use same_mode::match_modes;
 pub use story::Story;
 pub use story_html::story_html;
 pub use svg::pretty_unit;
-pub use svg::{FIGURE_FONT, Print, svg, svg_for};
+pub use svg::{Print, svg, svg_for};
 pub use trace::{Timeline, Trace};

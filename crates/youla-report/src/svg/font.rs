@@ -5,9 +5,6 @@
 
 use std::sync::OnceLock;
 
-/// The font of all figures as TrueType: what draws an SVG file as pixels needs it under the name `Youla Figures`.
-pub const FIGURE_FONT: &[u8] = include_bytes!("../../assets/font/figures.ttf");
-
 const EMBEDDED: &[u8] = include_bytes!("../../assets/font/figures.woff2");
 const WIDTHS: &str = include_str!("../../assets/font/widths.txt");
 

@@ -32,7 +32,6 @@ mod tests;
 mod text;
 mod ticks;
 
-pub use font::FIGURE_FONT;
 pub(crate) use style::{Marker, Styles};
 pub use text::pretty_unit;
 

@@ -1,6 +1,6 @@
 //! The QR iteration with implicit double shifts that reduces a Hessenberg matrix to quasi-triangular form: J. G. F. Francis,
 //! The QR transformation, Comput. J. 4 (1961-62), 265 and 332; the test for deflation is that of M. Ahues and F. Tisseur,
-//! LAPACK Working Note 122 (1997).
+//! LAPACK Working Note 122 (1997). `schur` says why it is not that of faer.
 
 use super::bulge_chasing::sweep;
 use super::schur::standardise;

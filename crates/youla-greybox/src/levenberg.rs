@@ -1,17 +1,17 @@
 //! Levenberg-Marquardt on the triangular factor of `[J r]`.
 //!
-//! The step and its damping are those of `damped.rs`; the lengths of the columns of J are their largest so far.
+//! The step and its damping are those of [`youla::linalg::damped_step`]; the lengths of the columns of J are their largest so far.
 //!
 //! A parameter that its bound holds back stays for the step (`bounds.rs`); one that the step would take beyond a bound goes
 //! to that bound, and the others take the step that is best with it there.
 
 use super::bounds::Bounds;
 use super::criterion::{Criterion, Point};
-use super::damped::{Damping, damped_step, length};
 use super::linearisation::Linearisation;
 use super::{GreyBoxOptions, Stop};
 use crate::Result;
 use faer::Mat;
+use youla::linalg::{Damping, Trial, damped_step, decrease};
 
 /// The residual is nothing but rounding below this share of the output.
 const ROUNDING: f64 = 1e-12;
@@ -74,7 +74,7 @@ pub(super) fn minimise(
             None if work.iterations == options.max_iterations => Err(Stop::Iterations),
             None => {
                 let search = Search { criterion, bounds, point: &point, face: &face, scale: &scale, options };
-                search.descend(&mut damping, &mut work)
+                damping.descend(|damping| search.tried(damping, &mut work)).ok_or(Stop::StepTooSmall)
             }
         };
         match next {
@@ -106,24 +106,23 @@ struct Search<'a> {
 }
 
 impl Search<'_> {
-    /// The next point with a lower criterion, with more damping after each trial that has none.
-    fn descend(&self, damping: &mut Damping, work: &mut Work) -> Result<Point, Stop> {
-        let theta = &self.point.theta;
-        loop {
-            let step = self.step_within_bounds(damping.value);
-            if length(&step.step, self.scale) <= self.options.step_tolerance * length(theta, self.scale) {
-                return Err(Stop::StepTooSmall);
+    /// The step with a damping.
+    fn tried(&self, damping: f64, work: &mut Work) -> Trial<Point> {
+        let step = self.step_within_bounds(damping);
+        if length(&step.step, self.scale) <= self.options.step_tolerance * length(&self.point.theta, self.scale) {
+            return Trial::Negligible;
+        }
+        work.evaluations += 1;
+        match self.criterion.evaluate(&step.theta) {
+            Ok(point) if point.cost < self.point.cost => {
+                let ratio = (self.point.cost - point.cost) / step.predicted;
+                Trial::Lower { point, ratio }
             }
-            work.evaluations += 1;
-            match self.criterion.evaluate(&step.theta) {
-                Ok(trial) if trial.cost < self.point.cost => {
-                    damping.relax((self.point.cost - trial.cost) / step.predicted);
-                    return Ok(trial);
-                }
-                Ok(_) => {}
-                Err(_) => work.diverged += 1,
+            Ok(_) => Trial::Rejected,
+            Err(_) => {
+                work.diverged += 1;
+                Trial::Rejected
             }
-            damping.tighten();
         }
     }
 
@@ -154,12 +153,11 @@ impl Search<'_> {
         if !moving.is_empty() {
             let columns = Mat::from_fn(jacobian.nrows(), moving.len(), |i, j| jacobian[(i, moving[j])]);
             let wanted = if moving.len() == free.len() { residual.to_owned() } else { residual - jacobian * &step };
-            let scale = |j: usize| self.scale[free[moving[j]]];
-            let solved = damped_step(columns.as_ref(), wanted.as_ref(), scale, damping);
+            let scale: Vec<f64> = moving.iter().map(|k| self.scale[free[*k]]).collect();
+            let solved = damped_step(columns.as_ref(), wanted.as_ref(), &scale, damping);
             moving.iter().enumerate().for_each(|(j, k)| step[(*k, 0)] = solved[(j, 0)]);
         }
-        let left = residual - jacobian * &step;
-        let predicted = 0.5 * (residual.squared_norm_l2() - left.squared_norm_l2());
+        let predicted = 0.5 * decrease(jacobian, residual, &step);
         let mut found = Step { step: vec![0.0; theta.len()], theta: theta.clone(), predicted };
         for (k, parameter) in free.iter().enumerate() {
             found.step[*parameter] = step[(k, 0)];
@@ -176,6 +174,11 @@ struct Step {
     theta: Vec<f64>,
     /// Decrease of the linearised criterion.
     predicted: f64,
+}
+
+/// `|D theta|`.
+pub(super) fn length(theta: &[f64], scale: &[f64]) -> f64 {
+    theta.iter().zip(scale).map(|(theta, scale)| (theta * scale).powi(2)).sum::<f64>().sqrt()
 }
 
 /// The lengths of the columns of J where they exceed those before; one over the typical size of a parameter that has no

@@ -36,7 +36,7 @@
 //! | predictors of noise models | `noise`, `predictor`, `whitening`, `simulated` |
 //! | sensitivities and their triangular factor | `sensitivity`, `sensitivity_bank`, `small_qr` |
 //! | criterion, initial states | `criterion`, `steady`, `linearisation` |
-//! | search within bounds, robust loss | `levenberg`, `damped`, `bounds`, `robust`, `options` |
+//! | search within bounds, robust loss | `levenberg`, `bounds`, `robust`, `options` |
 //! | result, covariance, undetermined parameters | `estimate`, `result`, `uncertainty`, `identifiability` |
 //! | intervals, test of the residuals, comparison of structures | `intervals` |
 //! | projection of a frequency response on a structure | `projection` |
@@ -47,7 +47,6 @@ mod checks;
 mod closure;
 mod cost;
 mod criterion;
-mod damped;
 mod declared;
 mod delays;
 mod error;

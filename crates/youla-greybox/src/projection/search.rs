@@ -1,11 +1,12 @@
-//! Levenberg-Marquardt on the weighted misfit, by the steps of `../damped.rs`.
+//! Levenberg-Marquardt on the weighted misfit.
 
 use super::super::Stop;
-use super::super::damped::{Damping, damped_step, length};
+use super::super::levenberg::length;
 use super::ProjectionOptions;
 use super::misfit::{Misfit, Point};
 use crate::Result;
 use faer::MatRef;
+use youla::linalg::{Damping, Trial, damped_step, decrease, leading_rank};
 
 /// The misfit is nothing but rounding below this share of the response.
 const ROUNDING: f64 = 1e-13;
@@ -41,31 +42,33 @@ pub(super) fn minimise(misfit: &Misfit<'_>, start: Point, options: &ProjectionOp
         if iterations == options.max_iterations {
             return end(point, Stop::Iterations);
         }
-        loop {
-            let step = damped_step(jacobian, residual, |j| if scale[j] > 0.0 { scale[j] } else { 1.0 }, damping.value);
-            let left = residual - jacobian * &step;
-            let predicted = residual.squared_norm_l2() - left.squared_norm_l2();
+        let next = damping.descend(|damping| {
+            let step = damped_step(jacobian, residual, &scale, damping);
+            let predicted = decrease(jacobian, residual, &step);
             let step: Vec<f64> = step.col(0).iter().copied().collect();
             // Written so that a step that is not a number ends the search too.
             let moves = length(&step, &scale) > options.step_tolerance * length(&point.theta, &scale);
             if !moves {
-                return end(point, Stop::StepTooSmall);
+                return Trial::Negligible;
             }
             let theta: Vec<f64> = point.theta.iter().zip(&step).map(|(theta, step)| theta + step).collect();
             match misfit.evaluate(&theta) {
                 Ok(trial) if trial.cost < point.cost => {
-                    damping.relax((point.cost - trial.cost) / predicted);
-                    (point, iterations) = (trial, iterations + 1);
-                    break;
+                    let ratio = (point.cost - trial.cost) / predicted;
+                    Trial::Lower { point: trial, ratio }
                 }
-                _ => damping.tighten(),
+                _ => Trial::Rejected,
             }
+        });
+        match next {
+            Some(lower) => (point, iterations) = (lower, iterations + 1),
+            None => return end(point, Stop::StepTooSmall),
         }
     }
 }
 
 /// Length of the part of the residual that a step can remove, to first order.
 fn removable(jacobian: MatRef<'_, f64>, residual: MatRef<'_, f64>) -> f64 {
-    let rank = youla::linalg::leading_rank(jacobian, jacobian.ncols());
+    let rank = leading_rank(jacobian, jacobian.ncols());
     residual.subrows(0, rank).norm_l2()
 }

@@ -16,6 +16,7 @@ mod gramian_balancing;
 mod hessenberg;
 mod kronecker;
 mod least_squares;
+mod levenberg;
 mod logm;
 mod lyapunov;
 mod reflector;
@@ -38,6 +39,7 @@ pub use gramian_balancing::gramian_balancing;
 pub use hessenberg::{Hessenberg, hessenberg};
 pub use least_squares::regress;
 pub use least_squares::{LeastSquares, least_squares};
+pub use levenberg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
 pub use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
 pub use reorder::OrderedSchur;
@@ -53,6 +55,9 @@ mod levels;
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{Mat, MatRef, c64};
+
+/// Keeps a divisor above zero: far below every power of a channel in units of its own size, with an inverse that is finite.
+pub(crate) const TINY: f64 = 1e-300;
 
 /// Identity matrix of size n.
 pub fn eye(n: usize) -> Mat<f64> {

@@ -2,6 +2,7 @@
 
 use super::ChannelScaling;
 use super::view::View;
+use crate::linalg::TINY;
 use crate::{Error, Result};
 use faer::ColRef;
 use rayon::prelude::*;
@@ -26,7 +27,7 @@ impl Moments {
         let (first, samples) = (values[0], values.nrows() as f64);
         let (peak, constant) =
             values.iter().fold((0.0_f64, true), |(peak, same), v| (peak.max(v.abs()), same && *v == first));
-        let peak = peak.max(1e-300);
+        let peak = peak.max(TINY);
         let (inverse, shift) = (1.0 / peak, first / peak);
         let (sum, squares) = values.iter().fold((0.0, 0.0), |(sum, squares), v| {
             let distance = v * inverse - shift;

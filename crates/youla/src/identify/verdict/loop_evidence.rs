@@ -9,6 +9,7 @@ use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::with_best_ends;
 use crate::identify::likelihood::{Evidence, LoopKnowledge};
 use crate::identify::subspace::Experiment;
+use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace};
 use faer::{MatRef, c64};
 
@@ -45,7 +46,7 @@ fn error(spectra: &Spectra, solution: &Solution, missed: &Missed) -> Evidence {
     let shares = grid(spectra.samples());
     let relative = |share: &f64| {
         let size: f64 = response(&solution.chosen, *share).iter().map(|g| g.norm_sqr()).sum();
-        missed.near(*share, entries).iter().sum::<f64>() / size.max(1e-300)
+        missed.near(*share, entries).iter().sum::<f64>() / size.max(TINY)
     };
     let mean = shares.iter().map(relative).sum::<f64>() / shares.len() as f64;
     Evidence::new(
@@ -70,7 +71,7 @@ fn controller(controller: &StateSpace<Discrete>, records: &[(MatRef<'_, f64>, Ma
     let all: f64 = spectra.records.iter().map(|r| r.y.iter().map(|x| x.norm_sqr()).sum::<f64>()).sum();
     Some(Evidence::new(
         "Part of the inputs that the stated controller does not explain (controller)",
-        (left / all.max(1e-300)).sqrt(),
+        (left / all.max(TINY)).sqrt(),
         LARGEST_REST,
     ))
 }

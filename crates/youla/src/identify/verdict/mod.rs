@@ -19,6 +19,7 @@ use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::deviation::response;
+use crate::linalg::TINY;
 use faer::c64;
 
 /// What the model and its residual say.
@@ -39,7 +40,7 @@ pub(crate) fn accuracy(responses: &[Vec<c64>], variances: &[Vec<f64>]) -> Eviden
         .zip(variances)
         .map(|(g, s)| {
             let size = g.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
-            s.iter().sum::<f64>().sqrt() / size.max(1e-300)
+            s.iter().sum::<f64>().sqrt() / size.max(TINY)
         })
         .collect();
     shares.sort_by(f64::total_cmp);

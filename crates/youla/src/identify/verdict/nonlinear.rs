@@ -13,6 +13,7 @@ use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::with_slope_of_unstable;
+use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::c64;
 use rustfft::FftPlanner;
@@ -55,7 +56,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
         if own > DISTINCT * length(parameters + f) { along.abs() / own.sqrt() } else { 0.0 }
     };
     let telling = (0..count).map(single).fold(0.0, f64::max);
-    let moved = energy(spectra, &clean, &found.noise).max(1e-300);
+    let moved = energy(spectra, &clean, &found.noise).max(TINY);
     Evidence::new(
         "Output that a nonlinear function at the inputs explains, over what the model explains, beyond chance (nonlinearity)",
         ((statistic - distinct.len() as f64).max(0.0) / moved).sqrt(),
@@ -114,6 +115,6 @@ fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) ->
         work[samples - 1 - k] = v.conj();
     }
     planner.plan_fft_inverse(samples).process(&mut work);
-    let size = (work.iter().map(|v| v.re * v.re).sum::<f64>() / samples.max(1) as f64).sqrt().max(1e-300);
+    let size = (work.iter().map(|v| v.re * v.re).sum::<f64>() / samples.max(1) as f64).sqrt().max(TINY);
     work.iter().map(|v| v.re / size).collect()
 }

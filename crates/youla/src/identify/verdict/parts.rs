@@ -15,6 +15,7 @@ use crate::identify::likelihood::search::linearise::{compressed, linearise, stac
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::{with_best_ends, with_slope_of_unstable};
 use crate::identify::subspace::Experiment;
+use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
 
@@ -139,7 +140,7 @@ impl Parts {
     fn compared(&self, a: &Part, b: &Part, solution: &Solution, which: &str) -> Vec<Evidence> {
         let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
         let difference = self.difference(a, b, solution);
-        let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(1e-300);
+        let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(TINY);
         let question =
             format!("Difference of the responses from {which}, relative to them, beyond chance (repeatability)");
         let noise = format!("Ratio of the noise powers in {which} (stationarity)");

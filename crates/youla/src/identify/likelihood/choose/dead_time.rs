@@ -1,6 +1,7 @@
 //! Dead time: how many of the newest inputs a long regression does without.
 
 use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::linalg::TINY;
 use crate::statistics::chi_square_limit;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
@@ -35,7 +36,7 @@ pub(crate) fn dead_times(sums: &LagSums, inputs: usize, largest: usize) -> Vec<u
             let statistic: f64 = (0..p)
                 .map(|o| {
                     let b = Mat::<f64>::from_fn(d, 1, |i, _| theta[(places[i], o)]);
-                    (b.transpose() * factor.solve(&b))[(0, 0)] / (left[(o, o)] / degrees).max(1e-300)
+                    (b.transpose() * factor.solve(&b))[(0, 0)] / (left[(o, o)] / degrees).max(TINY)
                 })
                 .sum();
             statistic < chi_square_limit((d * p) as f64, QUANTILE)

@@ -2,6 +2,7 @@
 //! lag sums.
 
 use crate::identify::likelihood::data::lag_sums::LagSums;
+use crate::linalg::TINY;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side};
 
@@ -44,7 +45,7 @@ impl States {
         let count = largest.min(future * p);
         let singular: Vec<f64> = svd.S().column_vector().iter().take(count).copied().collect();
         let select = svd.U().subcols(0, count).transpose() * &predictor;
-        let select = Mat::from_fn(count, size, |i, j| select[(i, j)] / singular[i].max(1e-300));
+        let select = Mat::from_fn(count, size, |i, j| select[(i, j)] / singular[i].max(TINY));
         Some(States { inputs, past, select, singular })
     }
 
@@ -84,7 +85,7 @@ fn ridged(gram: &Mat<f64>) -> Option<faer::linalg::solvers::Llt<f64>> {
     let mut regular = gram.clone();
     for i in 0..gram.nrows() {
         regular[(i, i)] *= 1.0 + 1e-12;
-        regular[(i, i)] += 1e-300;
+        regular[(i, i)] += TINY;
     }
     regular.llt(Side::Lower).ok()
 }

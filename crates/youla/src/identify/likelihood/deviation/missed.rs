@@ -9,6 +9,7 @@
 use crate::identify::likelihood::choose::problem::Choice;
 use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
 use crate::identify::likelihood::search::noise::Noise;
+use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, MatRef, Side, c64};
 
@@ -117,7 +118,7 @@ pub(crate) fn missed(spectra: &Spectra, choice: &Choice, excitation: &[MatRef<'_
 
 /// Powers of the noise of each output.
 fn spectrum(noise: &Noise, filters: &[c64]) -> Vec<f64> {
-    filters.iter().enumerate().map(|(i, a)| noise.covariance[(i, i)] / a.norm_sqr().max(1e-300)).collect()
+    filters.iter().enumerate().map(|(i, a)| noise.covariance[(i, i)] / a.norm_sqr().max(TINY)).collect()
 }
 
 fn sums(spectra: &Spectra, choice: &Choice, excitation: &[MatRef<'_, f64>], skip: usize, count: usize) -> Vec<Sums> {
@@ -172,7 +173,7 @@ fn error_of(sums: &Sums, least: f64, noise: &[f64]) -> Option<BandError> {
         variance: vec![0.0; p * m],
     };
     for i in 0..p {
-        (0..rank).for_each(|k| out.statistic += 2.0 * along[(i, k)].norm_sqr() / noise[i].max(1e-300));
+        (0..rank).for_each(|k| out.statistic += 2.0 * along[(i, k)].norm_sqr() / noise[i].max(TINY));
         for j in 0..m {
             let g = (0..rank).fold(c64::ZERO, |sum, k| sum + along[(i, k)] / sizes[k] * svd.U()[(j, k)].conj());
             let variance: f64 = (0..rank).map(|k| noise[i] * (svd.U()[(j, k)].norm() / sizes[k]).powi(2)).sum();

@@ -17,6 +17,7 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
+use crate::linalg::TINY;
 use faer::{Mat, c64};
 use missed::Missed;
 
@@ -27,7 +28,7 @@ const LEAST_WEIGHT: f64 = 1e-12;
 /// does not determine are left large.
 pub(crate) fn inverse_root(factor: &Mat<f64>, parameters: usize) -> Mat<f64> {
     let rows = parameters.min(factor.nrows());
-    let lengths: Vec<f64> = (0..parameters).map(|j| factor.col(j).norm_l2().max(1e-300)).collect();
+    let lengths: Vec<f64> = (0..parameters).map(|j| factor.col(j).norm_l2().max(TINY)).collect();
     let unit = Mat::from_fn(rows, parameters, |i, j| factor[(i, j)] / lengths[j]);
     let Ok(svd) = unit.svd() else { return Mat::zeros(parameters, parameters) };
     let (s, v) = (svd.S().column_vector(), svd.V());
@@ -105,7 +106,7 @@ impl Directions {
         let weighed =
             |(model, delays, criterion): (Model, Vec<usize>, f64)| (model, delays, (-0.5 * (criterion - least)).exp());
         let rivals: Vec<(Model, Vec<usize>, f64)> = rivals.into_iter().map(weighed).collect();
-        let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(1e-300);
+        let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(TINY);
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
         Directions { model, delays, chart, root, rivals, missed: None }

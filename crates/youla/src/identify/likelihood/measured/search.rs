@@ -4,7 +4,8 @@ use super::lines::{WeighedLine, WeighedLines};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::Point;
-use crate::identify::likelihood::search::{damped, reblocked};
+use crate::identify::likelihood::search::{FIRST_DAMPING, damped, reblocked};
+use crate::linalg::{Damping, LEAST_DAMPING, Trial};
 use faer::{Mat, c64};
 use rayon::prelude::*;
 
@@ -66,7 +67,7 @@ fn rows(lines: &WeighedLines, chunk: &[WeighedLine], model: &Model, chart: &Char
 pub(super) fn with_best_inputs(lines: &WeighedLines, model: &Model, feedthrough: bool) -> Option<Model> {
     let chart = Chart::inputs_only(model, feedthrough);
     let factor = linearise(lines, model, &chart);
-    let (step, _) = damped(&factor, &vec![0.0; chart.parameters()], 0.0);
+    let (step, _) = damped(&factor, chart.parameters(), LEAST_DAMPING);
     let moved = chart.moved(model, &step);
     lines.energy(&moved).is_finite().then_some(moved)
 }
@@ -76,26 +77,24 @@ pub(super) fn search(lines: &WeighedLines, start: &Model, feedthrough: bool, mos
     let mut model = reblocked(&Point::at_rest(start.clone(), 0))?.model;
     let mut energy = lines.energy(&model);
     let unit = |energy: f64| (energy / lines.rows().max(1) as f64).min(1.0);
-    let (mut damping, mut steps) = (1e-6, 0);
+    let (mut damping, mut steps) = (Damping::new(FIRST_DAMPING), 0);
     while steps < most && energy.is_finite() {
         let chart = Chart::new(&model, feedthrough);
         let factor = linearise(lines, &model, &chart);
-        let mut better = None;
-        for _ in 0..9 {
-            let (step, promised) = damped(&factor, &vec![0.0; chart.parameters()], damping);
-            if promised.is_nan() || promised <= 0.5 * TOLERANCE * unit(energy) {
-                break;
+        let lower = damping.descend(|damping| {
+            let (step, promised) = damped(&factor, chart.parameters(), damping);
+            // A promise that is not a number ends the search as well.
+            if promised.is_nan() || promised <= TOLERANCE * unit(energy) {
+                return Trial::Negligible;
             }
             let trial = chart.moved(&model, &step);
             let value = lines.energy(&trial);
-            if value < energy {
-                better = Some((trial, value));
-                damping = if damping <= 1e-9 { 0.0 } else { damping * 0.1 };
-                break;
+            match value < energy {
+                true => Trial::Lower { point: (trial, value), ratio: (energy - value) / promised },
+                false => Trial::Rejected,
             }
-            damping = (damping * 10.0).max(1e-8);
-        }
-        let Some((trial, value)) = better else { break };
+        });
+        let Some((trial, value)) = lower else { break };
         (model, energy) = (reblocked(&Point::at_rest(trial, 0))?.model, value);
         steps += 1;
     }

@@ -7,6 +7,7 @@
 //! so that D is found from (u, y) where K_d is known, and only there.
 
 use super::model::Model;
+use crate::linalg::TINY;
 use faer::Mat;
 use faer::prelude::*;
 
@@ -15,7 +16,7 @@ pub(crate) fn log_loop(model: &Model, direct: &Mat<f64>) -> f64 {
     if model.d.iter().all(|d| *d == 0.0) || direct.nrows() != model.inputs {
         return 0.0;
     }
-    around(model, direct).determinant().abs().max(1e-300).ln()
+    around(model, direct).determinant().abs().max(TINY).ln()
 }
 
 /// Slopes of `-log |det (I - D K_d)|` in the entries of D, row by row: those of `K_d (I - D K_d)^-1`, transposed.

@@ -13,6 +13,7 @@ use super::point::Point;
 use super::rows::{Place, Rows};
 use crate::identify::likelihood::data::lanes::LANES;
 use crate::identify::likelihood::data::spectra::{Spectra, parts};
+use crate::linalg::TINY;
 use faer::linalg::matmul::triangular::{self, BlockStructure};
 use faer::{Accum, Mat, Par, c64};
 use rayon::prelude::*;
@@ -137,7 +138,7 @@ fn orthogonal(place: Place<'_>, count: usize) -> Mat<f64> {
 /// Upper triangular root of the normal equations, columns brought to unit length first; enough for a step of a search.
 fn root_of(gram: &Mat<f64>) -> Mat<f64> {
     let n = gram.nrows();
-    let lengths: Vec<f64> = (0..n).map(|i| gram[(i, i)].max(1e-300).sqrt()).collect();
+    let lengths: Vec<f64> = (0..n).map(|i| gram[(i, i)].max(TINY).sqrt()).collect();
     for ridge in [1e-13, 1e-10, 1e-6] {
         let unit = Mat::from_fn(n, n, |i, j| {
             let (i, j) = (i.max(j), i.min(j));

@@ -22,6 +22,7 @@ pub(crate) mod rows;
 pub(crate) mod state_lanes;
 
 use crate::identify::likelihood::data::spectra::Spectra;
+use crate::linalg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
 use chart::Chart;
 use faer::{Mat, c64};
 use linearise::{Linearised, linearise_quickly};
@@ -48,10 +49,17 @@ pub(crate) struct SearchOptions {
     pub(crate) radius: f64,
 }
 
-/// Share of the column of a drift beside those of the states below which the drift is not determined.
-const ALIKE: f64 = 1e-3;
-/// A search is given up where its distance to the aim is this many times what its last step gained.
-const HOPELESS: f64 = 20.0;
+/// Damping of the first step, relative to the squared lengths of the columns of the Jacobian: starts from long regressions lie near enough
+/// to a minimum for steps of Gauss and Newton.
+pub(crate) const FIRST_DAMPING: f64 = 1e-6;
+/// Part of the column of a drift beside those of the states, relative to its length, below which the drift is not determined. Chosen: an
+/// integrator of the plant leaves less, an output that drifts by itself all of it.
+const LEAST_DRIFT: f64 = 1e-3;
+/// A search is given up where its distance to the aim is this many times what its last step gained. Chosen: of 2 to 25 steps of a search the
+/// gains fall from step to step.
+const STEPS_TO_AIM: f64 = 20.0;
+/// Diagonal of the factor, relative to the largest, below which the records do not determine a direction: rounding of a sum of squares.
+const UNDETERMINED: f64 = 1e-10;
 
 /// Where a search ended.
 #[derive(Clone)]
@@ -100,18 +108,17 @@ fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
 pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
     let chart = Chart::inputs_only(&model, feedthrough);
     let point = Point::at_rest(model, spectra.records.len());
-    let linearised = linearise_quickly(spectra, &point, &chart, noise);
-    let zero = vec![0.0; chart.parameters()];
-    let (step, _) = damped(&linearised.factor, &zero, 0.0);
-    moved(&point, &chart, &linearised, &step)
+    let Linearised { factor, ends } = linearise_quickly(spectra, &point, &chart, noise);
+    let (step, _) = damped(&factor, chart.parameters(), LEAST_DAMPING);
+    moved(&point, &chart, &ends, &step)
 }
 
 /// The ends of the records by least squares, the model kept.
 pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> Point {
     let chart = Chart::fixed(&model);
     let point = Point::at_rest(model, spectra.records.len());
-    let linearised = linearise_quickly(spectra, &point, &chart, noise);
-    moved(&point, &chart, &linearised, &[])
+    let Linearised { ends, .. } = linearise_quickly(spectra, &point, &chart, noise);
+    moved(&point, &chart, &ends, &[])
 }
 
 /// Searches from a start; `None` where nothing finite comes of it.
@@ -125,41 +132,36 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
     if !cost.is_finite() {
         return None;
     }
-    let (mut damping, mut steps) = (1e-6, 0);
+    let (mut damping, mut steps) = (Damping::new(FIRST_DAMPING), 0);
     let mut parameters = Chart::new(&point.model, options.feedthrough).parameters();
     while steps < options.steps {
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
-        let linearised = linearise_quickly(spectra, &point, &chart, &noise);
-        let pull = pull(spectra, &point.model, &chart, options);
-        let mut best = None;
-        for _ in 0..9 {
-            let (step, predicted) = damped(&linearised.factor, &pull, damping);
-            if predicted.is_nan() || predicted <= 0.5 * options.tolerance {
-                break;
+        let Linearised { factor, ends } = linearise_quickly(spectra, &point, &chart, &noise);
+        let factor = with_slope(factor, &slope(spectra, &point.model, &chart, options));
+        let lower = damping.descend(|damping| {
+            let (step, promised) = damped(&factor, parameters, damping);
+            // A promise that is not a number ends the search as well.
+            if promised.is_nan() || promised <= options.tolerance {
+                return Trial::Negligible;
             }
-            let trial = moved(&point, &chart, &linearised, &step);
+            let trial = moved(&point, &chart, &ends, &step);
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
-            let (value, new_noise) = cost_of(&trial);
+            let (value, noise) = cost_of(&trial);
             if value < cost && (options.radius.is_infinite() || inside()) {
-                best = Some((trial, value, new_noise));
-                damping = if damping <= 1e-9 { 0.0 } else { damping * 0.1 };
-                break;
+                return Trial::Lower { point: (trial, value, noise), ratio: (cost - value) / promised };
             }
-            damping = (damping * 10.0).max(1e-6);
-            if damping > 1e4 {
-                break;
-            }
-        }
-        let Some((trial, value, new_noise)) = best else { break };
+            Trial::Rejected
+        });
+        let Some((trial, value, lower_noise)) = lower else { break };
         steps += 1;
         let gain = cost - value;
-        (point, cost, noise) = (reblocked(&trial)?, value, new_noise);
+        (point, cost, noise) = (reblocked(&trial)?, value, lower_noise);
         if gain < options.tolerance {
             break;
         }
         let penalty = penalty(parameters + noise.parameters(), spectra.samples(), &point);
-        if steps >= 3 && cost + penalty - options.aim > HOPELESS * gain {
+        if steps >= 3 && cost + penalty - options.aim > STEPS_TO_AIM * gain {
             break;
         }
     }
@@ -191,11 +193,11 @@ pub(crate) fn reblocked(point: &Point) -> Option<Point> {
     Some(Point { model, ends })
 }
 
-/// The point moved by a step of the parameters, t by what is best with it.
-fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) -> Point {
+/// The point moved by a step of the parameters, t by what is best with it, by the rows of each record that determine t.
+fn moved(point: &Point, chart: &Chart, determined: &[Mat<f64>], step: &[f64]) -> Point {
     let (states, n) = (point.model.order(), point.model.end_count());
     let mut ends = point.ends.clone();
-    for (end, rows) in ends.iter_mut().zip(&linearised.ends) {
+    for (end, rows) in ends.iter_mut().zip(determined) {
         let last = n + step.len();
         let mut change = vec![0.0; n];
         for i in (0..n.min(rows.nrows())).rev() {
@@ -204,7 +206,7 @@ fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) ->
             (i + 1..n).for_each(|j| value -= rows[(i, j)] * change[j]);
             let diagonal = rows[(i, i)];
             // An integrator of the plant describes the drift of its output as well.
-            let least = if i < states { 1e-12 } else { ALIKE * rows.col(i).norm_l2() };
+            let least = if i < states { 1e-12 } else { LEAST_DRIFT * rows.col(i).norm_l2() };
             change[i] = if diagonal.abs() > least { value / diagonal } else { 0.0 };
         }
         end.iter_mut().zip(change).for_each(|(e, c)| *e += c);
@@ -212,38 +214,22 @@ fn moved(point: &Point, chart: &Chart, linearised: &Linearised, step: &[f64]) ->
     Point { model: chart.moved(&point.model, step), ends }
 }
 
-/// The damped step of `1/2 |r - J s|^2 + pull' s` and the decrease that it promises, columns in units of their lengths.
-pub(crate) fn damped(factor: &Mat<f64>, pull: &[f64], damping: f64) -> (Vec<f64>, f64) {
-    let parameters = pull.len();
-    if parameters == 0 || factor.nrows() < parameters {
+/// The damped step of the leading parameters of a factor `[J r]` and the decrease of the sum of squares that it promises; none where the rows
+/// are fewer than the parameters.
+pub(crate) fn damped(factor: &Mat<f64>, parameters: usize, damping: f64) -> (Vec<f64>, f64) {
+    if factor.nrows() < parameters {
         return (vec![0.0; parameters], 0.0);
     }
-    let lengths: Vec<f64> = (0..parameters).map(|j| factor.col(j).norm_l2().max(1e-300)).collect();
-    let unit = Mat::from_fn(parameters, parameters, |i, j| factor[(i, j)] / lengths[j]);
-    let Ok(svd) = unit.svd() else { return (vec![0.0; parameters], 0.0) };
-    let s: Vec<f64> = svd.S().column_vector().iter().copied().collect();
-    let (u, v) = (svd.U(), svd.V());
-    let mut solved = vec![0.0; parameters];
-    let mut promised = 0.0;
-    let floor = 1e-20 * s[0] * s[0];
-    for k in 0..parameters {
-        let mut g = 0.0;
-        for i in 0..parameters {
-            g += s[k] * u[(i, k)] * factor[(i, parameters)] - v[(i, k)] * pull[i] / lengths[i];
-        }
-        let weight = s[k] * s[k] + damping * s[0] * s[0] + floor;
-        let along = g / weight;
-        promised += along * g - 0.5 * along * along * s[k] * s[k];
-        for i in 0..parameters {
-            solved[i] += v[(i, k)] * along;
-        }
-    }
-    (solved.iter().zip(&lengths).map(|(x, l)| x / l).collect(), promised)
+    let jacobian = factor.submatrix(0, 0, parameters, parameters);
+    let residual = factor.submatrix(0, parameters, parameters, 1);
+    let lengths: Vec<f64> = jacobian.col_iter().map(|column| column.norm_l2()).collect();
+    let step = damped_step(jacobian, residual, &lengths, damping);
+    (step.col(0).iter().copied().collect(), decrease(jacobian, residual, &step))
 }
 
 /// Slopes of the terms of half the deviance that are no squares.
-fn pull(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
-    let mut out = pull_of_unstable(spectra, model, chart);
+fn slope(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
+    let mut out = slope_of_unstable(spectra, model, chart);
     if chart.feedthrough {
         let slopes = feedthrough::slopes(model, &options.direct);
         let first = out.len() - slopes.len();
@@ -252,29 +238,29 @@ fn pull(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions
     out
 }
 
-/// `[R r]` of a point whose residual goes with the slope of `N log |det A_u|`: `R' r` becomes the slope of half the deviance.
+/// `[R r]` of a point whose residual goes with the slope of `N log |det A_u|`.
 ///
 /// The residual of an unstable plant on the lines is that of its two-sided inverse, whose product with the sensitivities has the
 /// mean of this slope, not zero; parts of the records with other excitations would seem to disagree.
-pub(crate) fn with_slope_of_unstable(
-    mut factor: Mat<f64>,
-    spectra: &Spectra,
-    model: &Model,
-    chart: &Chart,
-) -> Mat<f64> {
-    let slope = pull_of_unstable(spectra, model, chart);
+pub(crate) fn with_slope_of_unstable(factor: Mat<f64>, spectra: &Spectra, model: &Model, chart: &Chart) -> Mat<f64> {
+    with_slope(factor, &slope_of_unstable(spectra, model, chart))
+}
+
+/// `[R r - w]` with `R' w` the slope of what is no square beside `1/2 |r|^2`: then `R' (r - w)` is the slope of half the deviance, and the same
+/// steps lower both.
+fn with_slope(mut factor: Mat<f64>, slope: &[f64]) -> Mat<f64> {
     if slope.iter().all(|s| *s == 0.0) {
         return factor;
     }
     let columns = factor.ncols() - 1;
     let rows = columns.min(factor.nrows());
     let largest = (0..rows).map(|i| factor[(i, i)].abs()).fold(0.0, f64::max);
-    // R' w = slope by forward substitution; directions that the record does not determine take no part.
+    // w by forward substitution; directions that the records do not determine take no part.
     let mut w = vec![0.0; rows];
     for i in 0..rows {
         let known: f64 = (0..i).map(|k| factor[(k, i)] * w[k]).sum();
         let diagonal = factor[(i, i)];
-        if diagonal.abs() > 1e-10 * largest {
+        if diagonal.abs() > UNDETERMINED * largest {
             w[i] = (slope.get(i).copied().unwrap_or(0.0) - known) / diagonal;
         }
     }
@@ -283,7 +269,7 @@ pub(crate) fn with_slope_of_unstable(
 }
 
 /// Slope of `N log |det A_u|`, by differences.
-fn pull_of_unstable(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
+fn slope_of_unstable(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
     let parameters = chart.parameters();
     let mut out = vec![0.0; parameters];
     let samples = spectra.samples() as f64;

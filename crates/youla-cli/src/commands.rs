@@ -76,7 +76,7 @@ fn identify_and_write(
     } else if form.quiet {
         Ok(())
     } else {
-        say_wrapped(&table::results(&found, &written.folder))
+        say_wrapped(&table::results(&found, &written))
     }
 }
 

@@ -2,23 +2,23 @@
 
 use crate::terminal;
 use std::fmt::Write;
-use std::path::Path;
 use youla::identify::subspace::{Factorisation, InputFit};
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
-use youla_run::{Identification, LongModel, cautions};
+use youla_run::{Identification, LongModel, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
-pub(crate) fn results(found: &Identification, folder: &Path) -> String {
+pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
     text += &fitted(&rows(found), terminal::width().unwrap_or(usize::MAX));
     text += &modes(found);
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
-    for caution in cautions(found) {
+    for caution in cautions(found, &written.summary) {
         let _ = write!(text, "\ncaution: {caution}");
     }
+    let folder = &written.folder;
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
     text
 }

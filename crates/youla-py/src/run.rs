@@ -180,15 +180,14 @@ impl Run {
 
     /// report.json.
     fn page(&self, py: Python<'_>) -> PyResult<String> {
-        let of = || Ok::<_, Failure>(serde_json::to_string(&page(&self.found, &self.seconds, "")?)?);
-        Ok(py.detach(of)?)
+        Ok(py.detach(|| Ok::<_, Failure>(serde_json::to_string(&self.report()?)?))?)
     }
 
     /// report.html.
     fn html(&self, py: Python<'_>) -> PyResult<String> {
         let of = || {
             // Drawn from the rounded numbers of report.json, as the program does.
-            let written = serde_json::to_vec(&page(&self.found, &self.seconds, "")?)?;
+            let written = serde_json::to_vec(&self.report()?)?;
             Ok::<_, Failure>(youla_report::html(&serde_json::from_slice(&written)?)?)
         };
         Ok(py.detach(of)?)
@@ -215,25 +214,18 @@ impl Run {
     }
 }
 
-/// The models by key.
-const METHODS: [Method; 7] = [
-    Method::Likelihood,
-    Method::Nominal,
-    Method::Direct,
-    Method::Hansen,
-    Method::HansenReduced,
-    Method::GreyBox,
-    Method::TruePlant,
-];
-
 impl Run {
+    fn report(&self) -> Result<youla_report::ReportData> {
+        Ok(page(&self.found, &summary(&self.found, &self.seconds)?, "")?)
+    }
+
     fn model_of(&self, key: &str) -> Option<&StateSpace<Discrete>> {
         let scheme = self.found.scheme();
         match key {
             "controller" => Some(&self.found.declared.controller),
             "deviation" => Some(&scheme?.hansen.deviation.model),
             "new_controller" => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
-            key => Some(&self.found.verdict.of(*METHODS.iter().find(|m| m.key() == key)?)?.model),
+            key => Some(&self.found.verdict.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
         }
     }
 

@@ -56,24 +56,25 @@ pub use stages::controller_errors::{
     Changed, ChangedMode, ControllerError, ControllerErrorEffect, ControllerErrorEntry, EffectEntry, ModePoint,
 };
 pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise, factorise_run};
+pub use stages::grey_box::GreyBoxRun;
 pub use stages::grey_box::criterion::StructureSearch;
-pub use stages::grey_box::{GreyBoxRun, PhysicalEntry};
-pub use stages::nonparametric::{LinesEntry, LinesOfRun};
+pub use stages::nonparametric::LinesOfRun;
 pub use stages::parts::{recommend_alone, redesign_of};
 pub use stages::pipeline::identify;
 pub use stages::redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry, entry as redesign_entry};
 pub use stages::reduction::{ReductionEntry, RunReduction};
 pub use stages::signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stages::uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
-pub use stages::validate::residuals::{LargestEntry, RecordResiduals, ResidualEntry, ResidualPredictor};
-pub use stages::validate::robustness::{DiskEntry, Robustness, RobustnessEntry, ScalesEntry};
+pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
+pub use stages::validate::robustness::LoopRobustness;
 pub use stages::validate::{ModelVerdict, RecordVerdict, Verdict};
 pub use streaming::{
     LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
     read_subspace_options,
 };
 pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
+pub use summary::model::{LargestEntry, ModelEntry, ResidualEntry};
+pub use summary::physical::PhysicalEntry;
 pub use summary::recommended::shown_modes;
-pub use summary::{
-    MethodEntry, PortCurves, ReferenceEntry, ResponsesEntry, SUMMARY_SCHEMA, Summary, responses, summary,
-};
+pub use summary::robustness::ScalesEntry;
+pub use summary::{SUMMARY_SCHEMA, Summary, summary};

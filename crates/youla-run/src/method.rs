@@ -23,6 +23,17 @@ pub enum Method {
 }
 
 impl Method {
+    /// All models.
+    pub const ALL: [Method; 7] = [
+        Method::Likelihood,
+        Method::Nominal,
+        Method::Direct,
+        Method::Hansen,
+        Method::HansenReduced,
+        Method::GreyBox,
+        Method::TruePlant,
+    ];
+
     /// Key in summary.json and in file names.
     pub fn key(self) -> &'static str {
         match self {

@@ -2,9 +2,10 @@
 
 use std::path::{Path, PathBuf};
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla::lti::{FrequencyResponse, frequency_response};
 use youla::signal::Detrend;
 use youla_run::{
-    Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, responses, signal_records,
+    Identification, Method, RunSettings, StageClock, factorise_run, identify, read_records, signal_records,
 };
 
 /// The settings of an example with its data in place, and its folder.
@@ -25,10 +26,6 @@ fn run((settings, folder): (RunSettings, PathBuf)) -> Identification {
     identify(settings, records, &folder, &mut StageClock::new(&mut silent)).unwrap()
 }
 
-fn numbers(value: &serde_json::Value) -> Vec<f64> {
-    value.as_array().unwrap().iter().map(|v| v.as_f64().unwrap()).collect()
-}
-
 /// Flexible drive: over 10-150 Hz the Hansen model follows the indirect response S_dy / S_du (Welch, Hann, 8000 samples,
 /// half overlap) within 2 dB rms; the rigid nominal model knew nothing of the resonance, the direct estimate misses it.
 #[test]
@@ -36,10 +33,14 @@ fn numbers(value: &serde_json::Value) -> Vec<f64> {
 fn flexible_drive() {
     let found = run(example("flexible-drive"));
     assert_eq!(found.settings.frequency_response.window, 8000);
-    let response = serde_json::to_value(responses(&found).unwrap()).unwrap();
-    let hz = numbers(&response["hz"]);
-    let curve = |name: &str| numbers(&response[name][0][0]);
-    let (indirect, hansen) = (curve("indirect_db"), curve("hansen_db"));
+    let measured = &found.indirect.as_ref().unwrap().as_ref().unwrap().response;
+    let hz: Vec<f64> = measured.omega.iter().map(|w| w / std::f64::consts::TAU).collect();
+    let decibels = |response: &FrequencyResponse| -> Vec<f64> {
+        response.entry(0, 0).iter().map(|g| 20.0 * g.norm().log10()).collect()
+    };
+    let curve =
+        |method| decibels(&frequency_response(&found.verdict.of(method).unwrap().model, &measured.omega).unwrap());
+    let (indirect, hansen) = (decibels(measured), curve(Method::Hansen));
     let band = |from: f64, to: f64| (0..hz.len()).filter(|&k| (from..=to).contains(&hz[k])).collect::<Vec<_>>();
     let rms = |model: &[f64]| {
         let band = band(10.0, 150.0);
@@ -47,7 +48,7 @@ fn flexible_drive() {
         (energy / band.len() as f64).sqrt()
     };
     assert!(rms(&hansen) <= 2.0, "Hansen misses the indirect response by {:.2} dB", rms(&hansen));
-    assert!(rms(&curve("direct_db")) > 2.0 * rms(&hansen), "the direct estimate is expected to be biased");
+    assert!(rms(&curve(Method::Direct)) > 2.0 * rms(&hansen), "the direct estimate is expected to be biased");
     let extreme = |from, to, sign: f64| {
         let k = band(from, to).into_iter().max_by(|&a, &b| (sign * hansen[a]).total_cmp(&(sign * hansen[b])));
         hz[k.unwrap()]

@@ -48,6 +48,10 @@ pub struct LineLevels {
     pub input: usize,
     /// Where the values come from.
     pub basis: LevelBasis,
+    /// Samples of a period; of the longest record where the excitation is not periodic; 0 where the response was given.
+    pub period: usize,
+    /// Periods that were averaged, for each estimation record.
+    pub periods: Vec<usize>,
     /// Frequencies, Hz.
     #[serde(with = "numbers::seven_digits")]
     pub hz: Vec<f64>,

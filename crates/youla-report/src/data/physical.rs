@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 /// A parameter or derived quantity of a physical structure, in report, summary and artefact.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PhysicalParameter {
     /// Name.
     pub name: String,
@@ -23,7 +23,7 @@ pub struct PhysicalParameter {
 }
 
 /// Intervals, correlations and comparison of structures.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PhysicalEstimate {
     /// Probability with which an interval should hold the truth; absent where there are none.
     pub level: Option<f64>,
@@ -38,7 +38,7 @@ pub struct PhysicalEstimate {
 }
 
 /// One of several physical structures.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 pub struct PhysicalStructure {
     /// Name.
     pub name: String,

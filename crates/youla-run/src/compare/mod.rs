@@ -12,6 +12,7 @@ mod tables;
 pub use distances::Distance;
 
 use crate::method;
+use crate::page::models;
 use crate::{Error, Result};
 use run::FinishedRun;
 use serde::Serialize;
@@ -90,6 +91,7 @@ pub fn write_comparison(found: &Comparison, page: &Path, replace: bool) -> Resul
 fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<ReportData> {
     let first = &runs[0].report;
     let label = |key: &str| first.methods.iter().find(|m| m.key == key).map_or(key.to_owned(), |m| m.label.clone());
+    let entries = || runs.iter().filter_map(|r| Some((r.key.as_str(), r.entry()?)));
     let same_time = runs.iter().all(|r| r.report.sample_time == first.sample_time);
     Ok(ReportData {
         title: format!("Comparison of {} runs", runs.len()),
@@ -102,19 +104,20 @@ fn page(runs: &[FinishedRun], model: &str, distances: &[Distance]) -> Result<Rep
         methods: runs.iter().enumerate().map(|(k, r)| method(k, r)).collect(),
         overview: vec![
             tables::overview(runs),
-            tables::modes(runs, model),
+            tables::modes(runs),
             distances::table(runs, distances),
             settings::differences(runs)?,
         ],
         notes: tables::notes(runs),
-        fits: runs.iter().flat_map(FinishedRun::fits).collect(),
+        fits: entries().flat_map(|(key, model)| models::fits(key, model)).collect(),
         verification: figures::verification(runs, model),
         frequency: Some(figures::frequency(runs, model)?),
         poles: runs.iter().map(|r| figures::poles(r, same_time)).collect::<Result<_>>()?,
-        modes: runs.iter().flat_map(|r| r.modes(model)).collect(),
-        certificates: runs.iter().filter_map(|r| r.certificate(model)).collect(),
-        margins: runs.iter().filter_map(|r| r.margins(model)).collect(),
-        margins_caption: "The gaps are those of each run to its own nominal model and G(S), in its own scales.".into(),
+        modes: entries().flat_map(|(key, model)| models::modes(key, model)).collect(),
+        certificates: entries().map(|(key, model)| models::certificate(key, model)).collect(),
+        margins: entries().map(|(key, model)| models::margins(key, model)).collect(),
+        margins_caption: "The gaps are those of each run to its own nominal and recommended model, in its own scales."
+            .into(),
         ..ReportData::default()
     })
 }

@@ -1,20 +1,20 @@
 //! The runs and their modes as tables, and what makes them hard to compare.
 
 use super::run::FinishedRun;
-use youla_report::data::{EvidenceTable, Fit, Mode, Note, ReportData, Status, Verdict};
+use crate::page::models;
+use youla_report::data::{EvidenceTable, Mode, Note, ReportData, Status, Verdict};
 use youla_report::match_modes;
 
 /// One row per run: verdict, order, fit.
 pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
     let row = |run: &FinishedRun| {
-        let fits = run.fits();
         vec![
             run.name.clone(),
             run.summary.name.clone(),
             verdict(&run.report),
             run.model.system.order().to_string(),
             format!("{} s", run.model.system.time().ts()),
-            mean(&fits).map_or("\u{2013}".into(), |fit| format!("{fit:.1} %")),
+            mean_fit(run).map_or("\u{2013}".into(), |fit| format!("{fit:.1} %")),
         ]
     };
     EvidenceTable {
@@ -37,14 +37,13 @@ fn verdict(report: &ReportData) -> String {
     }
 }
 
-fn mean(fits: &[Fit]) -> Option<f64> {
-    let all: Vec<f64> = fits.iter().map(|f| f.fit).collect::<Option<_>>()?;
-    (!all.is_empty()).then(|| all.iter().sum::<f64>() / all.len() as f64)
+fn mean_fit(run: &FinishedRun) -> Option<f64> {
+    run.entry()?.mean_fit().filter(|fit| fit.is_finite())
 }
 
 /// The oscillating modes of the first run, and how far those of the others are from them.
-pub(super) fn modes(runs: &[FinishedRun], model: &str) -> EvidenceTable {
-    let all: Vec<Vec<Mode>> = runs.iter().map(|r| oscillating(r, model)).collect();
+pub(super) fn modes(runs: &[FinishedRun]) -> EvidenceTable {
+    let all: Vec<Vec<Mode>> = runs.iter().map(|r| oscillating(r)).collect();
     let first: Vec<&Mode> = all[0].iter().collect();
     let partners: Vec<Vec<Option<&Mode>>> = all[1..]
         .iter()
@@ -66,8 +65,9 @@ pub(super) fn modes(runs: &[FinishedRun], model: &str) -> EvidenceTable {
     }
 }
 
-fn oscillating(run: &FinishedRun, model: &str) -> Vec<Mode> {
-    let mut modes: Vec<Mode> = run.modes(model).into_iter().filter(|m| m.zeta.abs() < 1.0).collect();
+fn oscillating(run: &FinishedRun) -> Vec<Mode> {
+    let all = run.entry().map_or_else(Vec::new, |model| models::modes(&run.key, model));
+    let mut modes: Vec<Mode> = all.into_iter().filter(|m| m.zeta.abs() < 1.0).collect();
     modes.sort_by(|a, b| a.hz.total_cmp(&b.hz));
     modes
 }

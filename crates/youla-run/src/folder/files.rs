@@ -1,14 +1,18 @@
 //! What the JSON files of a run folder hold besides models.
 
+use crate::Result;
 use crate::folder::artefacts::Provenance;
 use crate::records::segments::RecordSegment;
 use crate::records::{LoopRecord, RunRecords};
+use crate::result::Identification;
+use crate::stages::validate::ModelVerdict;
 use crate::stages::validate::residuals::{RecordResiduals, step_keys};
-use crate::stages::validate::robustness::{RobustnessFile, ScalesEntry};
-use crate::stages::validate::{ModelVerdict, RecordVerdict};
-use crate::summary::entries::{ModeEntry, OrRefused, finite_all, pairs};
-use serde::{Deserialize, Serialize};
+use crate::summary::entries::OrRefused;
+use crate::summary::model::ModelEntry;
+use crate::summary::robustness::{ScalesEntry, scales};
+use serde::Serialize;
 use std::collections::BTreeMap;
+use youla::control::Margins;
 use youla::signal::Channel;
 use youla::validate::RESIDUAL_LAGS;
 
@@ -66,57 +70,24 @@ pub(crate) struct SignalsFile {
     pub(crate) controller_mismatch: Option<f64>,
 }
 
-/// `7-validate/verdict.json`.
+/// `7-validate/verdict.json`: the entries of summary.json, and all margins with the frequencies at which they are met.
 #[derive(Serialize)]
 pub(crate) struct VerdictFile<'a> {
-    pub(crate) models: BTreeMap<String, VerdictEntry<'a>>,
+    pub(crate) models: BTreeMap<&'a str, ModelEntry>,
+    pub(crate) margins: BTreeMap<&'a str, OrRefused<&'a Margins>>,
     pub(crate) channel_scales: OrRefused<ScalesEntry>,
 }
 
-#[derive(Serialize)]
-pub(crate) struct VerdictEntry<'a> {
-    #[serde(flatten)]
-    facts: ModelFacts,
-    robustness: RobustnessFile<'a>,
-}
-
-/// A model in `7-validate/verdict.json`, without its robustness.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct ModelFacts {
-    pub(crate) order: usize,
-    pub(crate) poles: Vec<[f64; 2]>,
-    pub(crate) modes: Vec<ModeEntry>,
-    pub(crate) stabilised_by_controller: bool,
-    pub(crate) closed_loop_poles: Vec<[f64; 2]>,
-    pub(crate) records: Vec<RecordFacts>,
-}
-
-/// A model on a record.
-#[derive(Debug, Clone, Serialize, Deserialize)]
-pub(crate) struct RecordFacts {
-    pub(crate) record: String,
-    pub(crate) fit: Vec<Option<f64>>,
-    pub(crate) vaf: Vec<Option<f64>>,
-    pub(crate) failure: Option<String>,
-}
-
-impl<'a> From<&'a ModelVerdict> for VerdictEntry<'a> {
-    fn from(v: &'a ModelVerdict) -> Self {
-        let record = |r: &RecordVerdict| RecordFacts {
-            record: r.record.clone(),
-            fit: finite_all(&r.fit),
-            vaf: finite_all(&r.vaf),
-            failure: r.predicted.as_ref().err().cloned(),
-        };
-        let facts = ModelFacts {
-            order: v.model.order(),
-            poles: pairs(&v.poles),
-            modes: v.modes.iter().map(ModeEntry::from).collect(),
-            stabilised_by_controller: v.certificate.stable,
-            closed_loop_poles: pairs(&v.certificate.poles),
-            records: v.records.iter().map(record).collect(),
-        };
-        VerdictEntry { facts, robustness: RobustnessFile::from(&v.robustness) }
+impl<'a> VerdictFile<'a> {
+    pub(crate) fn new(found: &'a Identification) -> Result<Self> {
+        let models = &found.verdict.models;
+        let entry = |v: &'a ModelVerdict| Ok((v.method.key(), ModelEntry::new(found, v)?));
+        let margins = |v: &'a ModelVerdict| (v.method.key(), OrRefused::new(v.robustness.margins.as_ref()));
+        Ok(VerdictFile {
+            models: models.iter().map(entry).collect::<Result<_>>()?,
+            margins: models.iter().map(margins).collect(),
+            channel_scales: scales(found),
+        })
     }
 }
 

@@ -6,8 +6,6 @@ pub(crate) mod write;
 
 mod files;
 
-pub(crate) use files::ModelFacts;
-
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
 use crate::folder::subspace_details::{DeviationDetails, SubspaceDetails};
 use crate::records::LoopRecord;
@@ -16,11 +14,11 @@ use crate::stages::redesign;
 use crate::stages::reduction;
 use crate::stages::stabilisation::{DiagramFile, as_csv};
 use crate::stages::uncertainty::SystemUncertainty;
-use crate::stages::validate::robustness::scales_entry;
 use crate::summary::entries::Refused;
+use crate::summary::physical::PhysicalDetails;
 use crate::summary::recommended::{self, RecommendedDetails};
 use crate::{Error, Result};
-use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictEntry, VerdictFile};
+use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile};
 use serde::Serialize;
 use youla::MatRef;
 use youla::identify::subspace::stabilisation::StabilisationDiagram;
@@ -157,7 +155,7 @@ impl Writer<'_> {
     fn grey_box(&self) -> Result<()> {
         self.uncertainty("4-identify/grey_box_uncertainty.json", &self.found.grey_box_uncertainty)?;
         match &self.found.grey_box {
-            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &run.details()?),
+            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &PhysicalDetails::new(run)?),
             Some(Err(e)) => self.refused("4-identify/grey_box.json", e),
             None => Ok(()),
         }
@@ -228,8 +226,7 @@ impl Writer<'_> {
     /// `7-validate/verdict.json`, `7-validate/residuals.json` and the predictions.
     fn verdict(&self) -> Result<()> {
         let verdict = &self.found.verdict;
-        let models = verdict.models.iter().map(|v| (v.method.key().to_owned(), VerdictEntry::from(v))).collect();
-        self.json("7-validate/verdict.json", VerdictFile { models, channel_scales: scales_entry(self.found) })?;
+        self.json("7-validate/verdict.json", VerdictFile::new(self.found)?)?;
         self.json("7-validate/residuals.json", ResidualsFile::from(&verdict.models[..]))?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];

@@ -4,11 +4,11 @@ use crate::folder::write_artefacts;
 use crate::page::page;
 use crate::result::Identification;
 use crate::stages::clock::{Stage, StageClock};
-use crate::summary::{Summary, responses, summary};
+use crate::summary::{Summary, summary};
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla_io::folder::RunFolder;
-use youla_report::html;
+use youla_report::{ReportData, html};
 
 /// A finished run folder.
 #[derive(Debug, Clone)]
@@ -34,14 +34,14 @@ pub fn write_run(
     let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let so_far = clock.seconds.clone();
     clock.run(Stage::Report, || {
-        let page = page(found, &so_far, &name)?;
+        let page = page(found, &summary(found, &so_far)?, &name)?;
         folder.compact_json("report.json", &page)?;
         // Drawn from the rounded numbers of report.json, so that `youla report` draws the same page again.
         let as_written = serde_json::to_vec(&page).and_then(|bytes| serde_json::from_slice(&bytes));
-        let page = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
+        let page: ReportData = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
+        folder.compact_json("response.json", &page.frequency)?;
         Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)
     })?;
-    folder.compact_json("response.json", &responses(found)?)?;
     let summary = summary(found, &clock.seconds)?;
     folder.json("summary.json", &summary)?;
     Ok(WrittenRun { folder: folder.finish()?, summary })

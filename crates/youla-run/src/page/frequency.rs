@@ -1,15 +1,23 @@
 //! Frequency responses of all models: magnitude and phase, principal gains, regions, and the measured ones.
 
+use super::nonparametric;
 use crate::Result;
 use crate::method::Method;
 use crate::result::Identification;
-use crate::stages::nonparametric;
 use crate::stages::responses::{self, bounds_db, decibel, magnitude, model_responses, phase};
 use crate::stages::uncertainty::SystemUncertainty;
-use crate::summary::recommended;
 use std::f64::consts::TAU;
+use youla::c64;
+use youla::identify::likelihood::ResponseError;
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
+
+/// Level of the regions that are stated.
+const LEVEL: f64 = 0.95;
+/// Its quantile of the normal distribution, both sides.
+const NORMAL: f64 = 1.959_963_984_540_054;
+/// Its quantile of chi-square with two degrees of freedom, for the region of a complex number.
+const ELLIPSE: f64 = 5.991_464_547_107_979;
 
 pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(&found.verdict, &found.hz)?;
@@ -44,7 +52,31 @@ fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]
     let Ok(model) = &found.recommended else { return Vec::new() };
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
     let errors: Vec<_> = found.hz.iter().map(|f| model.response_deviation.at(*f)).collect();
-    own.flat_map(|(_, r)| ports(found).map(|port| recommended::band(&errors, r, port)).collect::<Vec<_>>()).collect()
+    own.flat_map(|(_, r)| ports(found).map(|port| recommended_band(&errors, r, port)).collect::<Vec<_>>()).collect()
+}
+
+/// The 95 % region of the response from an input to an output, with the errors at its frequencies.
+fn recommended_band(
+    errors: &[ResponseError],
+    response: &FrequencyResponse,
+    (output, input): (usize, usize),
+) -> draw::Band {
+    let half = |g: &c64, error: &ResponseError| NORMAL * error.of_magnitude(*g, (output, input));
+    let bounds = response
+        .entry(output, input)
+        .into_iter()
+        .zip(errors)
+        .map(|(g, e)| [g.norm() - half(&g, e), g.norm() + half(&g, e)]);
+    let (low_db, high_db) = bounds_db(bounds);
+    draw::Band {
+        method: Method::Likelihood.key().into(),
+        output,
+        input,
+        level: LEVEL,
+        low_db,
+        high_db,
+        region: errors.iter().flat_map(|e| e.covariance((output, input)).map(|v| ELLIPSE * v)).collect(),
+    }
 }
 
 fn band(method: Method, known: &SystemUncertainty, (output, input): (usize, usize)) -> draw::Band {

@@ -1,36 +1,45 @@
 //! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
 
 use crate::method::Method;
-use crate::page::verdict::{deviation_line, region_line};
 use crate::result::Identification;
+use crate::summary::Summary;
 use youla::control::IsoZone;
+use youla::identify::subspace::DeviationEvidence;
 use youla_greybox::hansen_pem::PemStart;
 use youla_report::data::{ReportPart, Status, Verdict};
 
 /// Lines below the answer, each with its evidence.
-pub(crate) fn further_lines(found: &Identification) -> Vec<Verdict> {
-    [deviation_line, region_line, margin_line, redesign_line, reduction_line, grey_box_line, factor_line]
-        .iter()
-        .filter_map(|line| line(found))
-        .collect()
+pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
+    let lines = [
+        deviation_line(found),
+        region_line(found),
+        margin_line(found, summary),
+        redesign_line(found),
+        reduction_line(found),
+        grey_box_line(found),
+        factor_line(summary),
+    ];
+    lines.into_iter().flatten().collect()
 }
 
-/// Margins of the loop of G(S); none where it is unstable, which the answer states, and where no controller ran.
-fn margin_line(found: &Identification) -> Option<Verdict> {
+/// Margins of the loop of the recommended model, of G(S) where there is none; nothing where the loop is unstable, which the answer
+/// states, and where no controller ran.
+fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     if found.declared.controller.is_zero() {
         return None;
     }
-    let robustness = &found.verdict.of(Method::Hansen)?.robustness;
-    let margins = robustness.margins.as_ref().ok()?;
-    let zone = margins.zone()?;
-    let worst = margins.outputs.iter().map(|c| c.sensitivity.value).fold(0.0, f64::max);
-    let disk = margins.output_disks.balanced;
+    let recommended = summary.model(Method::Likelihood).map(|m| (m, "the recommended model"));
+    let (model, name) = recommended.or_else(|| Some((summary.model(Method::Hansen)?, "G(S)")))?;
+    let robustness = &model.robustness;
+    let zone = robustness.iso_14839_zone?;
+    let worst = robustness.output_peak_sensitivities.iter().flatten().flatten().copied().fold(0.0, f64::max);
+    let disk = robustness.output_disk_margin.as_ref()?;
     let highest = disk.highest_gain.map_or("any higher value".into(), |g| format!("{g:.2}"));
     let text = format!(
-        "The peak sensitivity of the loop with G(S) is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for \
-         all outputs together. The loop stays stable when the gains of all outputs change by factors between {:.2} and \
-         {highest}, or their phases by up to {:.0} degrees.",
-        margins.output_sensitivity.value, disk.lowest_gain, disk.phase_degrees
+        "The peak sensitivity of the loop with {name} is {worst:.2} at the worst output (zone {zone} of ISO 14839-3) and {:.2} for all \
+         outputs together. The loop stays stable when the gains of all outputs change by factors between {:.2} and {highest}, or their \
+         phases by up to {:.0} degrees.",
+        robustness.peak_sensitivity?, disk.lowest_gain?, disk.phase_deg?
     );
     let status = match zone {
         IsoZone::A | IsoZone::B => Status::Good,
@@ -83,10 +92,54 @@ fn grey_box_line(found: &Identification) -> Option<Verdict> {
     Some(Verdict { status, text: format!("{text} {residuals}"), evidence: ReportPart::Fits })
 }
 
-fn factor_line(found: &Identification) -> Option<Verdict> {
-    let residual = found.filtered.as_ref().ok()?.factorisation.bezout_residual;
+fn factor_line(summary: &Summary) -> Option<Verdict> {
+    let residual = summary.bezout_residual?;
     // Half of the digits of double precision; scaled factors have 1e-13 (test `states_are_scaled_before_factorising`).
     let status = if residual < 1e-8 { Status::Good } else { Status::Bad };
     let text = format!("The coprime factors satisfy the Bezout identity to {residual:.1e} (relative).");
+    Some(Verdict { status, text, evidence: ReportPart::Certificate })
+}
+
+/// Order and fit of S and, where its uncertainty is computed, whether it differs from noise.
+fn deviation_line(found: &Identification) -> Option<Verdict> {
+    let hansen = &found.scheme()?.hansen;
+    let s = &hansen.deviation;
+    let stable = if s.stability.stable { "stable" } else { "unstable" };
+    let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
+    let text = format!("S has order {}, is {stable} and fits beta to {}", s.model.order(), fit.join(", "));
+    // Stability of S is no evidence that S is right.
+    let of_stability = if s.stability.stable { Status::Info } else { Status::Bad };
+    let (more, of_evidence) = match hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
+        Some(evidence) => information(evidence),
+        None => (".".into(), Status::Info),
+    };
+    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: ReportPart::Order })
+}
+
+fn information(evidence: &DeviationEvidence) -> (String, Status) {
+    let figures = format!(
+        "t = {:.1}, threshold {:.1} at {:.0} %",
+        evidence.statistic,
+        evidence.threshold,
+        100.0 * evidence.level
+    );
+    if evidence.against_nominal() {
+        (
+            format!("; models from each half of the data agree: the data contradict the nominal model ({figures})."),
+            Status::Good,
+        )
+    } else {
+        let text = format!(
+            "; models from each half of the data do not agree: S may be noise, there is no evidence against the nominal model ({figures})."
+        );
+        (text, Status::Caution)
+    }
+}
+
+/// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
+fn region_line(found: &Identification) -> Option<Verdict> {
+    let certificate = &found.scheme()?.certificate;
+    let (text, band) = certificate.band_sentence().zip(certificate.band.as_ref())?;
+    let status = if band.holds() { Status::Good } else { Status::Caution };
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

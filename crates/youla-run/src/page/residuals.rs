@@ -2,6 +2,7 @@
 
 use crate::result::Identification;
 use crate::settings::Prediction;
+use crate::stages::validate::residuals::ResidualPredictor;
 use youla::validate::{PREDICTION_STEPS, ResidualCorrelations};
 use youla_report::data as draw;
 
@@ -29,7 +30,10 @@ pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
                     .iter()
                     .map(|f| f.iter().map(|f| f.is_finite().then_some(*f)).collect())
                     .collect(),
-                predictor: r.predictor.words().into(),
+                predictor: match r.predictor {
+                    ResidualPredictor::Kalman => "Kalman gain".into(),
+                    ResidualPredictor::Autoregression => "autoregression".into(),
+                },
             });
         }
     }

@@ -1,52 +1,84 @@
 //! The answer to "Can it be trusted?": the recommended model with its evidence, fit and residuals on fresh data, data and controller,
 //! the loop.
 
+use super::nonparametric;
+use super::recommended::figure;
 use crate::check::OF_SETTINGS;
 use crate::method::Method;
 use crate::result::Identification;
-use crate::stages::nonparametric;
-use crate::stages::validate::ModelVerdict;
-use crate::stages::validate::residuals::RecordResiduals;
-use crate::summary::recommended;
-use youla::identify::subspace::DeviationEvidence;
+use crate::summary::Summary;
+use crate::summary::model::{ModelEntry, ResidualEntry};
+use youla::identify::likelihood::Evidence;
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{ReportPart, Status, Verdict};
 
 /// The lines, each with its evidence.
-pub(crate) fn verdict_lines(found: &Identification) -> Vec<Verdict> {
-    let rest = [unnoticed_line, fit_line, residual_line, data_line, loop_line];
-    let of_model = recommended::verdict_lines(found).into_iter().chain(nonparametric::verdict_lines(found));
-    of_model.chain(rest.iter().filter_map(|line| line(found))).collect()
+pub(crate) fn verdict_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
+    let rest = [unnoticed_line(found), fit_line(found, summary), residual_line(found, summary)];
+    let last = [data_line(found), loop_line(found, summary)];
+    let of_model = recommended_lines(found).into_iter().chain(nonparametric::verdict_lines(found));
+    of_model.chain(rest.into_iter().chain(last).flatten()).collect()
 }
 
-/// The model that the lines are about: the recommended one, G(S) where there is none.
-fn subject(found: &Identification) -> (Method, &'static str) {
-    match found.recommended {
-        Ok(_) => (Method::Likelihood, "the recommended model"),
-        Err(_) => (Method::Hansen, "G(S)"),
+/// The line on the recommended model, then one line for each question that its evidence fails.
+fn recommended_lines(found: &Identification) -> Vec<Verdict> {
+    let line = |status, text: String| Verdict { status, text, evidence: ReportPart::Recommended };
+    let model = match &found.recommended {
+        Ok(model) => model,
+        Err(reason) => return vec![line(Status::Bad, format!("No model is recommended: {reason}."))],
+    };
+    let dead_time = match &model.dead_time[..] {
+        delays if delays.iter().all(|d| *d == 0) => String::new(),
+        [1] => " and a dead time of 1 sample".to_owned(),
+        delays => {
+            let delays: Vec<String> = delays.iter().map(usize::to_string).collect();
+            format!(" and a dead time of {} samples", delays.join(", "))
+        }
+    };
+    let what = format!("The recommended model has order {}{dead_time}", model.order);
+    let failed: Vec<&Evidence> = model.evidence.iter().filter(|e| !e.holds()).collect();
+    let all = model.evidence.len();
+    let first = match failed.len() {
+        0 => line(Status::Good, format!("Trusted: all {all} tests of the recommended model are passed. {what}.")),
+        n => line(Status::Bad, format!("Not trusted: {n} of {all} tests of the recommended model failed. {what}.")),
+    };
+    let sentence = |e: &Evidence| format!("{}: {}, limit {}.", e.question, figure(e.figure), e.limit);
+    std::iter::once(first).chain(failed.into_iter().map(|e| line(Status::Bad, sentence(e)))).collect()
+}
+
+/// The model that the lines are about: the recommended one, else the first that was identified.
+fn subject<'a>(found: &Identification, summary: &'a Summary) -> Option<(Method, &'a ModelEntry)> {
+    let given = [Method::Nominal, Method::TruePlant];
+    let method = found.verdict.models.iter().map(|v| v.method).find(|method| !given.contains(method))?;
+    Some((method, summary.model(method)?))
+}
+
+/// The name of a model in a sentence.
+fn name(method: Method) -> &'static str {
+    match method {
+        Method::Likelihood => "the recommended model",
+        Method::Hansen => "G(S)",
+        Method::HansenReduced => "the reduced model",
+        Method::Direct => "the direct model",
+        Method::GreyBox => "the physical structure",
+        Method::Nominal => "the nominal model",
+        Method::TruePlant => "the true plant",
     }
 }
 
-/// Mean fit over all verification records and outputs.
-fn mean_fit(v: &ModelVerdict) -> f64 {
-    let all: Vec<f64> = v.records.iter().flat_map(|r| r.fit.iter().copied()).collect();
-    all.iter().sum::<f64>() / all.len() as f64
-}
-
-fn fit_line(found: &Identification) -> Option<Verdict> {
+fn fit_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
     if found.records.verification.is_empty() {
         let text = "No verification record was given, so the fit on fresh data is unknown.".into();
         return Some(Verdict { status: Status::Caution, text, evidence: ReportPart::Fits });
     }
     let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
-    let of = |method: Method| found.verdict.of(method).map(mean_fit);
-    let (method, name) = subject(found);
-    let (fit, nominal) = (of(method)?, of(Method::Nominal)?);
-    let mut text =
-        format!("On fresh data {name} has a mean fit of {}, the nominal model {}", percent(fit), percent(nominal));
-    for (other, name) in [(Method::Hansen, "G(S)"), (Method::Direct, "the direct model")] {
+    let of = |method: Method| summary.model(method)?.mean_fit();
+    let (method, model) = subject(found, summary)?;
+    let (fit, nominal) = (model.mean_fit()?, of(Method::Nominal)?);
+    let mut text = format!("On fresh data {} has a mean fit of {}", name(method), percent(fit));
+    for other in [Method::Nominal, Method::Hansen, Method::Direct] {
         if let Some(fit) = of(other).filter(|_| other != method) {
-            text += &format!(", {name} {}", percent(fit));
+            text += &format!(", {} {}", name(other), percent(fit));
         }
     }
     text.push('.');
@@ -66,41 +98,37 @@ fn unnoticed_line(found: &Identification) -> Option<Verdict> {
 }
 
 /// Whether the residual depends on what excited the loop; nothing without a verification record.
-fn residual_line(found: &Identification) -> Option<Verdict> {
-    let (method, name) = subject(found);
-    let records = &found.verdict.of(method)?.records;
-    let tested: Vec<_> = records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect();
-    let dependent = || tested.iter().map(|(_, r)| *r).filter(|r| !r.correlations.independent);
-    let (status, text) = match tested.iter().max_by(|a, b| size(a.1).total_cmp(&size(b.1)))? {
-        (_, worst) if !worst.external => {
-            let text = format!(
-                "No external excitation is known, so the residuals of {name} were not tested for dependence on it."
-            );
-            (Status::Caution, text)
-        }
-        _ if tested.iter().all(|(_, r)| r.correlations.independent) => (
-            Status::Good,
-            format!(
-                "The residual of {name} on fresh data does not depend on past excitation: no missing dynamics detected."
-            ),
-        ),
-        _ if dependent().all(explained) => {
-            let text =
-                format!("{name} explains 99.9 % of the output on fresh data; what is left is too small to judge by.");
-            (Status::Good, capital(&text))
-        }
-        (record, worst) => {
-            let at = worst.correlations.largest?;
-            let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
-            let text = format!(
-                "The residual of {name} on fresh data depends on past excitation: the residual of {output} in {record} has a \
-                 correlation of {:.3} with {input} at a lag of {} samples ({:.0} standard deviations).",
-                size(worst),
-                at.lag,
-                at.deviations.abs()
-            );
-            (Status::Caution, text)
-        }
+fn residual_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
+    let (method, model) = subject(found, summary)?;
+    let name = name(method);
+    let dependent = || model.residuals.values().filter(|r| r.independent == Some(false));
+    let deviations = |r: &ResidualEntry| r.largest.as_ref().and_then(|l| l.correlation).map_or(0.0, f64::abs);
+    let (record, worst) = model.residuals.iter().max_by(|a, b| deviations(a.1).total_cmp(&deviations(b.1)))?;
+    let (status, text) = if worst.independent.is_none() {
+        let text = format!(
+            "No external excitation is known, so the residuals of {name} were not tested for dependence on it."
+        );
+        (Status::Caution, text)
+    } else if dependent().next().is_none() {
+        let text = format!(
+            "The residual of {name} on fresh data does not depend on past excitation: no missing dynamics detected."
+        );
+        (Status::Good, text)
+    } else if dependent().all(explained) {
+        let text =
+            format!("{name} explains 99.9 % of the output on fresh data; what is left is too small to judge by.");
+        (Status::Good, capital(&text))
+    } else {
+        let at = worst.largest.as_ref()?;
+        let (output, input) = (&found.records.outputs[at.output].name, &worst.excitations[at.input]);
+        let text = format!(
+            "The residual of {name} on fresh data depends on past excitation: the residual of {output} in {record} has a correlation of \
+             {:.3} with {input} at a lag of {} samples ({:.0} standard deviations).",
+            deviations(worst),
+            at.lag,
+            at.deviations.map_or(f64::NAN, f64::abs)
+        );
+        (Status::Caution, text)
     };
     Some(Verdict { status, text, evidence: ReportPart::Residuals })
 }
@@ -110,21 +138,14 @@ fn residual_line(found: &Identification) -> Option<Verdict> {
 /// 60 dB. Chosen, not measured.
 const EXPLAINED: f64 = 99.9;
 
-fn explained(residuals: &RecordResiduals) -> bool {
-    residuals.k_step_fits.last().is_some_and(|fits| fits.iter().all(|fit| *fit >= EXPLAINED))
+fn explained(residual: &ResidualEntry) -> bool {
+    let fits = residual.k_step_fits.get("simulation");
+    fits.is_some_and(|fits| fits.iter().all(|fit| fit.is_some_and(|fit| fit >= EXPLAINED)))
 }
 
 fn capital(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or(String::new(), |c| c.to_uppercase().collect::<String>() + letters.as_str())
-}
-
-/// The causal correlation that is largest in its standard deviations.
-fn size(residuals: &RecordResiduals) -> f64 {
-    let tests = &residuals.correlations;
-    let Some(at) = tests.largest else { return 0.0 };
-    let with = tests.cross.iter().find(|c| (c.output, c.input) == (at.output, at.input));
-    with.map_or(0.0, |c| c.values[c.values.len() / 2 + at.lag].abs())
 }
 
 /// The result of the check of the data, and whether the declared controller explains the logged input.
@@ -181,48 +202,11 @@ fn of_alpha(found: &Identification) -> (String, Status) {
     }
 }
 
-/// Order and fit of S and, where its uncertainty is computed, whether it differs from noise.
-pub(crate) fn deviation_line(found: &Identification) -> Option<Verdict> {
-    let hansen = &found.scheme()?.hansen;
-    let s = &hansen.deviation;
-    let stable = if s.stability.stable { "stable" } else { "unstable" };
-    let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
-    let text = format!("S has order {}, is {stable} and fits beta to {}", s.model.order(), fit.join(", "));
-    // Stability of S is no evidence that S is right.
-    let of_stability = if s.stability.stable { Status::Info } else { Status::Bad };
-    let (more, of_evidence) = match hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
-        Some(evidence) => information(evidence),
-        None => (".".into(), Status::Info),
-    };
-    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: ReportPart::Order })
-}
-
-fn information(evidence: &DeviationEvidence) -> (String, Status) {
-    let figures = format!(
-        "t = {:.1}, threshold {:.1} at {:.0} %",
-        evidence.statistic,
-        evidence.threshold,
-        100.0 * evidence.level
-    );
-    if evidence.against_nominal() {
-        (
-            format!("; models from each half of the data agree: the data contradict the nominal model ({figures})."),
-            Status::Good,
-        )
-    } else {
-        let text = format!(
-            "; models from each half of the data do not agree: S may be noise, there is no evidence against the nominal model ({figures})."
-        );
-        (text, Status::Caution)
-    }
-}
-
 /// Whether the controller stabilises the model.
-fn loop_line(found: &Identification) -> Option<Verdict> {
-    let (method, name) = subject(found);
-    let v = found.verdict.of(method)?;
-    let worst = v.certificate.worst_pole.map_or(0.0, |p| p.norm());
-    let (of_loop, verb, adjective) = match v.certificate.stable {
+fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
+    let (method, model) = subject(found, summary)?;
+    let (name, worst) = (name(method), model.worst_closed_loop_pole().map_or(0.0, |[re, im]| re.hypot(im)));
+    let (status, verb, adjective) = match model.stabilised_by_controller {
         true => (Status::Good, "stabilises", "stable"),
         false => (Status::Bad, "does not stabilise", "unstable"),
     };
@@ -230,13 +214,5 @@ fn loop_line(found: &Identification) -> Option<Verdict> {
         true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst:.5}."),
         false => format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst:.5}."),
     };
-    Some(Verdict { status: of_loop, text, evidence: ReportPart::Certificate })
-}
-
-/// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
-pub(crate) fn region_line(found: &Identification) -> Option<Verdict> {
-    let certificate = &found.scheme()?.certificate;
-    let (text, band) = certificate.band_sentence().zip(certificate.band.as_ref())?;
-    let status = if band.holds() { Status::Good } else { Status::Caution };
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

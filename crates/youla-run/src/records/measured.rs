@@ -5,7 +5,6 @@
 
 use crate::records::SourceFile;
 use crate::settings::{DataFile, DataSettings};
-use crate::stages::responses::{decibel, ports};
 use crate::{Error, Result};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
@@ -14,7 +13,6 @@ use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
 use youla::signal::{Channel, IndirectResponse, Record};
 use youla::{Mat, c64};
 use youla_io::{ChannelSpec, CsvOptions, Source, TimeSource, UffKind, is_uff, read, read_uff58, sha256, survey};
-use youla_report::data::{LevelBasis, LineLevels};
 
 /// Largest part of the inputs that the stated controller may leave, errors of the response included.
 const LARGEST_REST: f64 = 0.1;
@@ -78,27 +76,6 @@ impl MeasuredTable {
         }
         let question = "Part of the inputs that the stated controller does not explain (controller)";
         Ok(Some(Evidence::new(question, (rest / all.max(f64::MIN_POSITIVE)).sqrt(), LARGEST_REST)))
-    }
-
-    /// Of the plant the values with their stated deviations, for the figure.
-    pub(crate) fn levels(&self) -> Vec<LineLevels> {
-        let ResponseVariance::Known(variance) = &self.table.variance else { return Vec::new() };
-        if self.of_loop {
-            return Vec::new();
-        }
-        let hz: Vec<f64> = self.table.omega.iter().map(|w| w / TAU).collect();
-        let (outputs, inputs) = self.table.values.first().map_or((0, 0), |v| (v.nrows(), v.ncols()));
-        let one = |(output, input): (usize, usize)| LineLevels {
-            output,
-            input,
-            basis: LevelBasis::Stated,
-            hz: hz.clone(),
-            response_db: self.table.values.iter().map(|v| decibel(v[(output, input)].norm())).collect(),
-            noise_db: variance.iter().map(|v| decibel(v[(output, input)].sqrt())).collect(),
-            total_db: Vec::new(),
-            distortion_db: Vec::new(),
-        };
-        ports(outputs, inputs).map(one).collect()
     }
 
     /// The plant at its frequencies, as the figures show it; there is no coherence.

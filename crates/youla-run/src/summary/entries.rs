@@ -52,6 +52,9 @@ pub struct ModeEntry {
     /// Interval of the damping ratio.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub zeta_interval: Option<[Option<f64>; 2]>,
+    /// Residue, output by output the values of all inputs, `[re, im]`; empty where it is not known.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub residue: Vec<[f64; 2]>,
 }
 
 impl From<&Mode> for ModeEntry {
@@ -63,6 +66,7 @@ impl From<&Mode> for ModeEntry {
             zeta_deviation: None,
             hz_interval: None,
             zeta_interval: None,
+            residue: Vec::new(),
         }
     }
 }

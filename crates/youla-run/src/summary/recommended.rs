@@ -1,27 +1,20 @@
 //! The recommended model in summary.json, in the run folder and in the report.
 
 use crate::method::Method;
-use crate::page::choices;
-use crate::result::Identification;
-use crate::stages::responses::bounds_db;
 use crate::stages::validate::residue_at;
-use crate::summary::entries::{ModeEntry, finite};
+use crate::summary::entries::{ModeEntry, finite, pairs};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation, ResponseError};
-use youla::lti::{Continuous, FrequencyResponse, StateSpace};
-use youla::{Mat, MatRef, c64};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation};
+use youla::lti::{Continuous, StateSpace};
+use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
-use youla_report::data as draw;
 
 /// The model's JSON in the run folder.
 pub(crate) const FILE: &str = "4-identify/recommended.json";
 
 /// Level of the intervals and bands that are stated, and its quantile of the normal distribution.
 const LEVEL: (f64, f64) = (0.95, 1.959_963_984_540_054);
-
-/// 95 % quantile of chi-square with two degrees of freedom, for the region of a complex number.
-const ELLIPSE: f64 = 5.991_464_547_107_979;
 
 /// The recommended model in summary.json.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -97,20 +90,23 @@ impl From<&Recommendation> for RecommendedEntry {
 /// The modes that the response shows, with 95 % intervals.
 pub fn shown_modes(found: &Recommendation) -> Vec<ModeEntry> {
     let visible = found.plant.visible_modes().ok();
-    let shown = |m: &&ModeEstimate| visible.as_ref().is_none_or(|v| residue_at(v, m.mode.pole).is_some());
-    found.modes.iter().filter(shown).map(mode).collect()
-}
-
-fn mode(m: &ModeEstimate) -> ModeEntry {
-    let interval =
-        |value: f64, deviation: f64| Some([value - LEVEL.1 * deviation, value + LEVEL.1 * deviation].map(finite));
-    ModeEntry {
-        hz_deviation: finite(m.hz_deviation),
-        zeta_deviation: finite(m.zeta_deviation),
-        hz_interval: interval(m.mode.hz, m.hz_deviation),
-        zeta_interval: interval(m.mode.zeta, m.zeta_deviation),
-        ..ModeEntry::from(&m.mode)
-    }
+    let mode = |m: &ModeEstimate| {
+        let residue = match &visible {
+            None => Vec::new(),
+            Some(visible) => pairs(residue_at(visible, m.mode.pole)?),
+        };
+        let interval =
+            |value: f64, deviation: f64| Some([value - LEVEL.1 * deviation, value + LEVEL.1 * deviation].map(finite));
+        Some(ModeEntry {
+            hz_deviation: finite(m.hz_deviation),
+            zeta_deviation: finite(m.zeta_deviation),
+            hz_interval: interval(m.mode.hz, m.hz_deviation),
+            zeta_interval: interval(m.mode.zeta, m.zeta_deviation),
+            residue,
+            ..ModeEntry::from(&m.mode)
+        })
+    };
+    found.modes.iter().filter_map(mode).collect()
 }
 
 fn rows(m: MatRef<'_, f64>) -> Vec<Vec<Option<f64>>> {
@@ -174,115 +170,4 @@ impl<'a> RecommendedDetails<'a> {
 /// Dead time is a state at z = 0, which has no logarithm.
 fn continuous(found: &Recommendation) -> Option<StateSpace<Continuous>> {
     found.plant.inverse_zoh().ok()
-}
-
-/// The line on the recommended model, then one line for each question that its evidence fails.
-pub(crate) fn verdict_lines(found: &Identification) -> Vec<draw::Verdict> {
-    let line = |status, text: String| draw::Verdict { status, text, evidence: draw::ReportPart::Recommended };
-    let model = match &found.recommended {
-        Ok(model) => model,
-        Err(reason) => {
-            return vec![line(draw::Status::Bad, format!("No model is recommended: {reason}."))];
-        }
-    };
-    let delays = &model.dead_time;
-    let dead_time = match delays.iter().any(|d| *d > 0) {
-        true if delays[..] == [1] => " and a dead time of 1 sample".to_owned(),
-        true => format!(
-            " and a dead time of {} samples",
-            delays.iter().map(usize::to_string).collect::<Vec<_>>().join(", ")
-        ),
-        false => String::new(),
-    };
-    let what = format!("The recommended model has order {}{dead_time}", model.order);
-    let (all, failed) = (model.evidence.len(), model.evidence.iter().filter(|e| !e.holds()).count());
-    let mut lines = Vec::new();
-    if model.trusted() {
-        let text = format!("Trusted: all {all} tests of the recommended model are passed. {what}.");
-        lines.push(line(draw::Status::Good, text));
-    } else {
-        lines.push(line(
-            draw::Status::Bad,
-            format!("Not trusted: {failed} of {all} tests of the recommended model failed. {what}."),
-        ));
-    }
-    lines.extend(model.evidence.iter().filter(|e| !e.holds()).map(|e| line(draw::Status::Bad, sentence(e))));
-    lines
-}
-
-fn sentence(e: &Evidence) -> String {
-    format!("{}: {}, limit {}.", e.question, figure(e.figure), e.limit)
-}
-
-/// Three decimals, or a power of ten where these are too many digits.
-fn figure(value: f64) -> String {
-    match value {
-        v if !v.is_finite() => "not finite".into(),
-        v if v.abs() >= 1e5 => format!("{v:.1e}"),
-        v => format!("{v:.3}"),
-    }
-}
-
-/// Evidence and candidates as tables of the report.
-pub(crate) fn tables(found: &Identification) -> Vec<draw::EvidenceTable> {
-    let Ok(model) = &found.recommended else { return Vec::new() };
-    let evidence = |e: &Evidence| {
-        let held = if e.holds() { "yes" } else { "no" };
-        vec![e.question.clone(), figure(e.figure), format!("{}", e.limit), held.to_owned()]
-    };
-    let least = model.candidates.iter().map(|c| c.criterion).fold(f64::INFINITY, f64::min);
-    let mut candidates: Vec<_> = model.candidates.iter().collect();
-    candidates.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    candidates.truncate(MOST_CANDIDATES);
-    let candidate = |c: &&youla::identify::likelihood::Candidate| {
-        let delays: Vec<String> = c.dead_time.iter().map(usize::to_string).collect();
-        vec![c.order.to_string(), delays.join(", "), format!("{:.1}", c.criterion - least), c.origin.clone()]
-    };
-    vec![
-        draw::EvidenceTable {
-            title: "Evidence on the recommended model".into(),
-            text: "The model is trusted where it passes every test: each figure is at most its limit.".into(),
-            columns: ["Test", "Figure", "Limit", "Passed"].map(String::from).to_vec(),
-            rows: model.evidence.iter().map(evidence).collect(),
-            caption: String::new(),
-        },
-        choices::table(found, model),
-        draw::EvidenceTable {
-            title: "Candidates".into(),
-            text: "Order and dead time are those with the least criterion; dead times that the criterion does not separate are \
-                   decided by the least gain near the Nyquist frequency."
-                .into(),
-            columns: ["Order", "Dead time, samples", "Criterion above the least", "Start"].map(String::from).to_vec(),
-            rows: candidates.iter().map(candidate).collect(),
-            caption: "Schwarz's criterion: -2 log likelihood + log(samples) per parameter. A difference of 10 is strong evidence."
-                .into(),
-        },
-    ]
-}
-
-/// Rows of the table of candidates.
-const MOST_CANDIDATES: usize = 12;
-
-/// The 95 % region of the response from an input to an output, with the errors at its frequencies.
-pub(crate) fn band(
-    errors: &[ResponseError],
-    response: &FrequencyResponse,
-    (output, input): (usize, usize),
-) -> draw::Band {
-    let half = |g: &c64, error: &ResponseError| LEVEL.1 * error.of_magnitude(*g, (output, input));
-    let bounds = response
-        .entry(output, input)
-        .into_iter()
-        .zip(errors)
-        .map(|(g, e)| [g.norm() - half(&g, e), g.norm() + half(&g, e)]);
-    let (low_db, high_db) = bounds_db(bounds);
-    draw::Band {
-        method: Method::Likelihood.key().into(),
-        output,
-        input,
-        level: LEVEL.0,
-        low_db,
-        high_db,
-        region: errors.iter().flat_map(|e| e.covariance((output, input)).map(|v| ELLIPSE * v)).collect(),
-    }
 }

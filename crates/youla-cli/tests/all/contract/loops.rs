@@ -97,8 +97,8 @@ fn summary_says_what_each_loop_can_bear() {
         "input_disk_margin",
         "iso_14839_zone",
         "lowest_gain",
-        "nu_gap_to_hansen",
         "nu_gap_to_nominal",
+        "nu_gap_to_recommended",
         "output_disk_margin",
         "output_peak_sensitivities",
         "peak_complementary_sensitivity",
@@ -112,7 +112,7 @@ fn summary_says_what_each_loop_can_bear() {
         let robustness = &entry["robustness"];
         assert_eq!(keys(robustness), expected, "{model}");
         let number = |key: &str| robustness[key].as_f64().expect("a number");
-        for key in ["coprime_margin", "nu_gap_to_hansen", "nu_gap_to_nominal"] {
+        for key in ["coprime_margin", "nu_gap_to_recommended", "nu_gap_to_nominal"] {
             assert!((0.0..=1.0).contains(&number(key)), "{model}: {key}");
         }
         if entry["stabilised_by_controller"] == false {
@@ -133,7 +133,7 @@ fn summary_says_what_each_loop_can_bear() {
     }
     let gap = |pointer: &str| summary.pointer(pointer).and_then(Value::as_f64).expect("a number");
     assert!(gap("/nominal/robustness/nu_gap_to_nominal") < 1e-6);
-    assert!(gap("/methods/hansen/robustness/nu_gap_to_hansen") < 1e-6);
-    let there = gap("/methods/hansen/robustness/nu_gap_to_nominal");
-    assert!((there - gap("/nominal/robustness/nu_gap_to_hansen")).abs() < 1e-6);
+    assert!(gap("/methods/likelihood/robustness/nu_gap_to_recommended") < 1e-6);
+    let there = gap("/methods/likelihood/robustness/nu_gap_to_nominal");
+    assert!((there - gap("/nominal/robustness/nu_gap_to_recommended")).abs() < 1e-6);
 }

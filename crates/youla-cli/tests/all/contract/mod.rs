@@ -40,7 +40,7 @@ fn summary_has_the_documented_structure() {
     ]);
     expected.sort_unstable();
     assert_eq!(keys(&summary), expected);
-    assert_eq!(summary["schema"], 3);
+    assert_eq!(summary["schema"], 4);
     assert_eq!(summary["refused"], Value::Object(Map::new()));
     for fit in [&summary["nominal"]["fit"], &summary["true_plant"]["fit"]] {
         assert_eq!(keys(fit), ["verification"]);
@@ -98,24 +98,21 @@ fn summary_fits_its_schema() {
 fn summary_describes_every_method() {
     let summary = json(&demo().join("summary.json"));
     assert_eq!(keys(&summary["methods"]), ["direct", "hansen", "hansen_reduced", "likelihood"]);
-    let common = ["fit", "modes", "order", "poles", "residuals", "robustness", "stabilised_by_controller"];
-    let hansen = [
+    let expected = [
+        "closed_loop_poles",
         "fit",
         "modes",
+        "modes_above_nyquist",
+        "modes_cancelled",
         "order",
         "poles",
         "residuals",
         "robustness",
-        "s_order",
-        "s_stable",
         "stabilised_by_controller",
+        "vaf",
+        "zeros",
     ];
-    for (name, expected, order) in [
-        ("direct", &common[..], 6),
-        ("hansen", &hansen[..], 16),
-        ("hansen_reduced", &hansen[..], 6),
-        ("likelihood", &common[..], 6),
-    ] {
+    for (name, order) in [("direct", 6), ("hansen", 16), ("hansen_reduced", 6), ("likelihood", 6)] {
         let method = &summary["methods"][name];
         assert_eq!(keys(method), expected, "{name}");
         assert_eq!(method["order"], order, "{name}");
@@ -125,43 +122,33 @@ fn summary_describes_every_method() {
         assert_eq!(poles.len(), order);
         assert!(poles.iter().all(|p| numbers(p).len() == 2));
         let modes = method["modes"].as_array().expect("an array");
-        let with_deviations = ["hz", "hz_deviation", "hz_interval", "zeta", "zeta_deviation", "zeta_interval"];
-        let of_mode = if ["hansen", "likelihood"].contains(&name) { &with_deviations[..] } else { &["hz", "zeta"] };
+        let with_deviations =
+            ["hz", "hz_deviation", "hz_interval", "residue", "zeta", "zeta_deviation", "zeta_interval"];
+        let known = ["hansen", "likelihood"].contains(&name);
+        let of_mode = if known { &with_deviations[..] } else { &["hz", "residue", "zeta"] };
         assert!(!modes.is_empty() && modes.iter().all(|m| keys(m) == of_mode), "{name}");
     }
-    assert_eq!(summary["methods"]["hansen"]["s_order"], 10);
-    assert_eq!(summary["methods"]["hansen"]["s_stable"], true);
+    assert_eq!(keys(&summary["nominal"]), expected);
 }
 
 #[test]
 fn frequency_responses_share_one_grid() {
     let response = &json(&demo().join("response.json"));
-    let all = [
-        "coherence",
-        "direct_db",
-        "hansen_db",
-        "hansen_reduced_db",
-        "hz",
-        "indirect_db",
-        "likelihood_db",
-        "lines",
-        "nominal_db",
-        "true_plant_db",
-    ];
-    assert_eq!(keys(response), all);
+    assert_eq!(keys(response), ["bands", "hz", "indirect", "lines", "models", "singular"]);
     let hz = numbers(&response["hz"]);
     assert!(hz.len() > 100 && hz.windows(2).all(|w| w[0] < w[1]));
-    // Two inputs and two outputs: [output][input][frequency], coherence [output][frequency].
+    // Two inputs and two outputs of six models.
     let array = |value: &Value| value.as_array().expect("an array").clone();
-    for key in all.iter().filter(|key| key.ends_with("_db")) {
-        let outputs = array(&response[key]);
-        assert_eq!(outputs.len(), 2, "{key}");
-        for curves in outputs.iter().map(array) {
-            assert!(curves.len() == 2 && curves.iter().all(|curve| numbers(curve).len() == hz.len()), "{key}");
-        }
+    let models = array(&response["models"]);
+    let of = |method: &str| models.iter().filter(|m| m["method"] == method).count();
+    let all = ["direct", "hansen", "hansen_reduced", "likelihood", "nominal", "true_plant"];
+    assert_eq!((models.len(), all.map(of)), (24, [4; 6]));
+    assert!(models.iter().all(|m| ["magnitude_db", "phase_deg"].iter().all(|key| numbers(&m[*key]).len() == hz.len())));
+    let indirect = array(&response["indirect"]);
+    assert_eq!(indirect.len(), 4);
+    for entry in &indirect {
+        let coherence = numbers(&entry["coherence"]);
+        assert_eq!(coherence.len(), numbers(&entry["hz"]).len());
+        assert!(coherence.iter().all(|c| (0.0..=1.0 + 1e-12).contains(c)));
     }
-    let coherence = array(&response["coherence"]);
-    assert_eq!(coherence.len(), 2);
-    assert!(coherence.iter().all(|c| numbers(c).len() == hz.len()));
-    assert!(coherence.iter().flat_map(numbers).all(|c| (0.0..=1.0 + 1e-12).contains(&c)));
 }

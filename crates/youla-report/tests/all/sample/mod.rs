@@ -5,6 +5,7 @@ mod modal;
 
 use curves::{estimation, experiment, frequency};
 use modal::Modal;
+use youla::control::IsoZone;
 use youla::signal::Channel;
 use youla_report::data::*;
 use youla_report::{ReportData, Timeline, Trace};
@@ -204,31 +205,37 @@ fn report(plan: &Plan) -> ReportData {
         if place == 2 {
             poles.extend([[0.62, 0.31], [0.62, -0.31], [-0.35, 0.0], [0.81, 0.0]]);
         }
-        let scheme = place >= 2;
         data.certificates.push(Certificate {
             method: method.key.clone(),
             order: poles.len(),
-            s_order: scheme.then_some(8),
-            s_stable: scheme.then_some(true),
             stabilised_by_controller: Some(place != 1),
             worst_closed_loop_pole: Some(if place == 1 { [0.9989, 0.0613] } else { [0.9812, 0.1023] }),
         });
         let stable = place != 1;
-        data.margins.push(LoopMargins {
-            method: method.key.clone(),
-            refusal: (!stable).then(|| "the loop is unstable, with the pole 1.002000".into()),
-            peak_sensitivity: stable.then_some(2.314),
-            zone: stable.then(|| "A".into()),
-            lowest_gain: stable.then_some(-0.25),
-            highest_gain: None,
-            phase_deg: stable.then_some(41.25),
-            delay_ms: stable.then_some(0.75),
-            disk: stable.then_some(0.6),
-            disk_phase_deg: stable.then_some(33.4),
-            coprime: Some(if stable { 0.31 } else { 0.0 }),
-            gap_to_nominal: Some(0.0),
-            gap_to_hansen: Some(1.0),
-        });
+        let disk =
+            DiskMargin { alpha: Some(0.6), lowest_gain: Some(0.54), highest_gain: Some(1.86), phase_deg: Some(33.4) };
+        let figures = Robustness {
+            peak_sensitivity: Some(2.314),
+            iso_14839_zone: Some(IsoZone::A),
+            lowest_gain: Some(-0.25),
+            phase_margin_deg: Some(41.25),
+            delay_margin_s: Some(7.5e-4),
+            input_disk_margin: Some(disk.clone()),
+            output_disk_margin: Some(disk),
+            coprime_margin: Some(0.31),
+            ..Robustness::default()
+        };
+        let unstable = Robustness {
+            refused: Some("the loop is unstable, with the pole 1.002000".into()),
+            coprime_margin: Some(0.0),
+            ..Robustness::default()
+        };
+        let robustness = Robustness {
+            nu_gap_to_nominal: Some(0.0),
+            nu_gap_to_recommended: Some(1.0),
+            ..if stable { figures } else { unstable }
+        };
+        data.margins.push(LoopMargins { method: method.key.clone(), robustness });
         let zeros = if outputs == inputs { vec![[0.9, 0.1], [0.9, -0.1], [-2.5, 0.0]] } else { Vec::new() };
         data.poles.push(Poles { method: method.key.clone(), poles, zeros });
     }

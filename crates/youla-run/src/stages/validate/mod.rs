@@ -15,7 +15,7 @@ use crate::stages::validate::noise_models::{
     noise_of_direct, noise_of_hansen, noise_of_recommended, noise_of_structure,
 };
 use crate::stages::validate::residuals::{RecordResiduals, residual_tests};
-use crate::stages::validate::robustness::{Robustness, channel_scales, robustness};
+use crate::stages::validate::robustness::{LoopRobustness, channel_scales, robustness};
 use crate::{Error, Result};
 use rayon::prelude::*;
 use youla::control::{ChannelScales, with_input_port};
@@ -57,7 +57,7 @@ pub struct ModelVerdict {
     /// Its loop with the controller that ran.
     pub certificate: LoopCertificate,
     /// Margins of that loop, and distances from other models.
-    pub robustness: Robustness,
+    pub robustness: LoopRobustness,
     /// One entry per verification record.
     pub records: Vec<RecordVerdict>,
 }
@@ -164,17 +164,17 @@ impl<'a> Candidates<'a> {
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
 pub(crate) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Verdict> {
     let scales = channel_scales(run.records).map_err(|e| e.to_string());
-    let plant = candidates.hansen.map(|h| &h.plant);
+    let recommended = candidates.recommended.map(|r| &r.plant);
     let all = candidates.all(run)?;
     let verdicts: Vec<Result<ModelVerdict>> =
-        all.par_iter().map(|candidate| verify_model(run, &scales, plant, candidate)).collect();
+        all.par_iter().map(|candidate| verify_model(run, &scales, recommended, candidate)).collect();
     Ok(Verdict { prediction: run.prediction(), models: verdicts.into_iter().collect::<Result<_>>()?, scales })
 }
 
 fn verify_model(
     run: RunContext<'_>,
     scales: &Result<ChannelScales, String>,
-    plant: Option<&StateSpace<Discrete>>,
+    recommended: Option<&StateSpace<Discrete>>,
     Candidate { method, model, noise }: &Candidate<'_>,
 ) -> Result<ModelVerdict> {
     let verify = |r: &LoopRecord| verify_record(run, model, noise.as_ref(), r);
@@ -186,7 +186,7 @@ fn verify_model(
         modes: model.modes()?,
         visible: model.visible_modes().ok(),
         certificate: certify(model, &run.declared.controller)?,
-        robustness: robustness(run.declared, scales, plant, model),
+        robustness: robustness(run.declared, scales, recommended, model),
         records,
     })
 }

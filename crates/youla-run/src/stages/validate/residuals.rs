@@ -3,15 +3,12 @@
 use crate::Result;
 use crate::records::{LoopRecord, channels_of};
 use crate::stages::context::RunContext;
-use crate::summary::entries::{finite, finite_all};
 use serde::{Deserialize, Serialize};
 use std::borrow::Cow;
-use std::collections::BTreeMap;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
 use youla::validate::{
-    LargestCorrelation, PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise,
-    residual_correlations,
+    PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations,
 };
 use youla::{Mat, MatRef};
 
@@ -39,15 +36,6 @@ pub enum ResidualPredictor {
     Kalman,
     /// An autoregression of the residual.
     Autoregression,
-}
-
-impl ResidualPredictor {
-    pub(crate) fn words(self) -> &'static str {
-        match self {
-            ResidualPredictor::Kalman => "Kalman gain",
-            ResidualPredictor::Autoregression => "autoregression",
-        }
-    }
 }
 
 impl RecordResiduals {
@@ -114,47 +102,4 @@ fn fits_ahead(
 /// Keys of the fits some steps ahead, the simulation last.
 pub(crate) fn step_keys() -> Vec<String> {
     PREDICTION_STEPS.iter().map(usize::to_string).chain(["simulation".to_owned()]).collect()
-}
-
-/// What summary.json says of the residual of a model on a record.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct ResidualEntry {
-    /// Whether the residual does not depend on past excitation; `null` where none from outside is known.
-    pub independent: Option<bool>,
-    /// The causal correlation that is largest in its standard deviations.
-    pub largest: Option<LargestEntry>,
-    /// Fits in percent over the second half of the record, per output: some samples ahead, and of the simulation.
-    pub k_step_fits: BTreeMap<String, Vec<Option<f64>>>,
-    /// What predicts the residual in them.
-    pub predictor: ResidualPredictor,
-}
-
-/// Where a residual depends most on past excitation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct LargestEntry {
-    /// Output, counted from 0.
-    pub output: usize,
-    /// Excitation, counted from 0.
-    pub input: usize,
-    /// Samples by which the excitation is earlier.
-    pub lag: usize,
-    /// In standard deviations.
-    pub deviations: Option<f64>,
-}
-
-impl From<&RecordResiduals> for ResidualEntry {
-    fn from(r: &RecordResiduals) -> Self {
-        let largest = |l: LargestCorrelation| LargestEntry {
-            output: l.output,
-            input: l.input,
-            lag: l.lag,
-            deviations: finite(l.deviations),
-        };
-        ResidualEntry {
-            independent: r.independent(),
-            largest: r.correlations.largest.map(largest),
-            k_step_fits: step_keys().into_iter().zip(r.k_step_fits.iter().map(|f| finite_all(f))).collect(),
-            predictor: r.predictor,
-        }
-    }
 }

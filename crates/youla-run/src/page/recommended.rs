@@ -1,13 +1,64 @@
-//! What the recommended model's search chose, from what, and why: one row per choice, each with the key that fixes it.
+//! The recommended model on the page: its tests, what the search chose and why, and the candidates.
 
 use crate::result::Identification;
-use youla::identify::likelihood::{Candidate, Recommendation};
+use youla::identify::likelihood::{Candidate, Evidence, LikelihoodOptions, Recommendation};
 use youla::signal::Detrend;
-use youla_report::data as draw;
+use youla_report::data::EvidenceTable;
 
-/// The table of the report.
-pub(crate) fn table(found: &Identification, model: &Recommendation) -> draw::EvidenceTable {
+/// Rows of the table of candidates.
+const MOST_CANDIDATES: usize = 12;
+
+/// The tables; none without a recommended model.
+pub(crate) fn tables(found: &Identification) -> Vec<EvidenceTable> {
+    let Ok(model) = &found.recommended else { return Vec::new() };
     let (options, detrend) = (&found.settings.recommended, found.settings.data.detrend);
+    vec![evidence(model), choices(model, options, detrend), candidates(model)]
+}
+
+fn evidence(model: &Recommendation) -> EvidenceTable {
+    let row = |e: &Evidence| {
+        let passed = if e.holds() { "yes" } else { "no" };
+        vec![e.question.clone(), figure(e.figure), e.limit.to_string(), passed.to_owned()]
+    };
+    EvidenceTable {
+        title: "Evidence on the recommended model".into(),
+        text: "The model is trusted where it passes every test: each figure is at most its limit.".into(),
+        columns: ["Test", "Figure", "Limit", "Passed"].map(String::from).to_vec(),
+        rows: model.evidence.iter().map(row).collect(),
+        caption: String::new(),
+    }
+}
+
+/// Three decimals, or a power of ten where these are too many digits.
+pub(crate) fn figure(value: f64) -> String {
+    match value {
+        v if !v.is_finite() => "not finite".into(),
+        v if v.abs() >= 1e5 => format!("{v:.1e}"),
+        v => format!("{v:.3}"),
+    }
+}
+
+fn candidates(model: &Recommendation) -> EvidenceTable {
+    let mut sorted: Vec<&Candidate> = model.candidates.iter().collect();
+    sorted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    let least = sorted.first().map_or(0.0, |c| c.criterion);
+    let row = |c: &&Candidate| {
+        vec![c.order.to_string(), listed(&c.dead_time), format!("{:.1}", c.criterion - least), c.origin.clone()]
+    };
+    EvidenceTable {
+        title: "Candidates".into(),
+        text: "Order and dead time are those with the least criterion; dead times that the criterion does not separate are decided by \
+               the least gain near the Nyquist frequency."
+            .into(),
+        columns: ["Order", "Dead time, samples", "Criterion above the least", "Start"].map(String::from).to_vec(),
+        rows: sorted.iter().take(MOST_CANDIDATES).map(row).collect(),
+        caption: "Schwarz's criterion: -2 log likelihood + log(samples) per parameter. A difference of 10 is strong evidence."
+            .into(),
+    }
+}
+
+/// What the search chose, from what, and why: one row per choice, each with the key that fixes it.
+fn choices(model: &Recommendation, options: &LikelihoodOptions, detrend: Detrend) -> EvidenceTable {
     let rows = [
         order(model, options.order.is_some()),
         dead_time(model, options.dead_time.is_some()),
@@ -16,7 +67,7 @@ pub(crate) fn table(found: &Identification, model: &Recommendation) -> draw::Evi
         ends(model),
         means(detrend),
     ];
-    draw::EvidenceTable {
+    EvidenceTable {
         title: "Choices".into(),
         text: "What the records decided where no key fixed it; the criterion is Schwarz's.".into(),
         columns: ["Choice", "Chosen", "From", "Reason", "Key that fixes it"].map(String::from).to_vec(),
@@ -24,7 +75,6 @@ pub(crate) fn table(found: &Identification, model: &Recommendation) -> draw::Evi
         caption: String::new(),
     }
 }
-
 /// Choice, chosen, from, reason, key.
 type Row = [String; 5];
 

@@ -1,0 +1,52 @@
+//! Models on a page, a run's own or those of a comparison, from their entries; `key` names the method of the page.
+
+use crate::summary::entries::ModeEntry;
+use crate::summary::model::ModelEntry;
+use youla_report::data as draw;
+
+/// Fits by record and output.
+pub(crate) fn fits(key: &str, model: &ModelEntry) -> Vec<draw::Fit> {
+    let fit = |(record, (output, fit)): (&String, (usize, &Option<f64>))| draw::Fit {
+        record: record.clone(),
+        output,
+        method: key.to_owned(),
+        fit: *fit,
+    };
+    let by_output = model.fit.iter().flat_map(|(record, of)| of.iter().enumerate().map(move |of| (record, of)));
+    by_output.map(fit).collect()
+}
+
+/// The modes that the response of the model shows.
+pub(crate) fn modes(key: &str, model: &ModelEntry) -> Vec<draw::Mode> {
+    let mode = |m: &ModeEntry| {
+        let deviation = m.hz_deviation.zip(m.zeta_deviation).map(|(hz, zeta)| [hz, zeta]);
+        Some(draw::Mode { method: key.to_owned(), hz: m.hz?, zeta: m.zeta?, deviation, residue: m.residue.clone() })
+    };
+    model.modes.iter().filter_map(mode).collect()
+}
+
+/// Poles and zeros in z.
+pub(crate) fn poles(key: &str, model: &ModelEntry) -> draw::Poles {
+    draw::Poles { method: key.to_owned(), poles: model.poles.clone(), zeros: model.zeros.clone() }
+}
+
+/// How many modes of a model are left out, and why.
+pub(crate) fn unlisted(key: &str, model: &ModelEntry) -> Option<draw::UnlistedModes> {
+    let (cancelled, above_nyquist) = (model.modes_cancelled, model.modes_above_nyquist);
+    (cancelled + above_nyquist > 0).then(|| draw::UnlistedModes { method: key.to_owned(), cancelled, above_nyquist })
+}
+
+/// The loop of a model with the controller that ran.
+pub(crate) fn certificate(key: &str, model: &ModelEntry) -> draw::Certificate {
+    draw::Certificate {
+        method: key.to_owned(),
+        order: model.order,
+        stabilised_by_controller: Some(model.stabilised_by_controller),
+        worst_closed_loop_pole: model.worst_closed_loop_pole(),
+    }
+}
+
+/// Margins of that loop, and distances.
+pub(crate) fn margins(key: &str, model: &ModelEntry) -> draw::LoopMargins {
+    draw::LoopMargins { method: key.to_owned(), robustness: model.robustness.clone() }
+}

@@ -1,0 +1,146 @@
+//! The records of a run on its page: files, findings, signals, predictions.
+
+use crate::Result;
+use crate::records::{LoopRecord, SourceFile, channels_of};
+use crate::result::Identification;
+use crate::settings::Prediction;
+use youla::MatRef;
+use youla::signal::Channel;
+use youla_loop::check::{Finding, Severity};
+use youla_report::data::{self as draw, SignalKind};
+use youla_report::{Timeline, Trace};
+
+/// From what, in one sentence.
+pub(crate) fn summary_sentence(found: &Identification) -> String {
+    let records = &found.records;
+    let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
+    let how = match found.declared.controller.is_zero() {
+        true => "in open loop",
+        false => "in closed loop",
+    };
+    let from = match &records.measured {
+        Some(measured) => {
+            let of = if measured.of_loop { "loop" } else { "plant" };
+            format!("the response of the {of} at {} frequencies", measured.table.omega.len())
+        }
+        None => format!("{} with {samples} samples", counted(records.estimation.len(), "record")),
+    };
+    format!(
+        "Identified {how} from {from} (sample time {} s, {}, {}).",
+        records.time.ts(),
+        counted(records.inputs.len(), "input"),
+        counted(records.outputs.len(), "output"),
+    )
+}
+
+fn counted(count: usize, what: &str) -> String {
+    format!("{count} {what}{}", if count == 1 { "" } else { "s" })
+}
+
+/// Files that were read.
+pub(crate) fn sources(found: &Identification) -> Vec<draw::Source> {
+    let source =
+        |s: &SourceFile| draw::Source { path: s.path.clone(), purpose: s.purpose.clone(), sha256: s.sha256.clone() };
+    found.records.sources.iter().map(source).collect()
+}
+
+/// What the check of the data found, the most serious first.
+pub(crate) fn findings(found: &Identification) -> Vec<draw::DataFinding> {
+    let status = |severity: Severity| match severity {
+        Severity::Note => draw::Status::Info,
+        Severity::Caution => draw::Status::Caution,
+        Severity::Defect => draw::Status::Bad,
+    };
+    let one = |(f, more): (&Finding, usize)| draw::DataFinding {
+        status: status(f.severity),
+        test: f.test.key().into(),
+        record: f.record.clone(),
+        channel: f.channel.clone(),
+        rows: f.rows,
+        what: f.what.clone(),
+        advice: f.advice.clone(),
+        further: more,
+    };
+    found.data.grouped().into_iter().map(one).collect()
+}
+
+/// Signals of the estimation records.
+///
+/// # Errors
+/// Those of [`Trace::new`].
+pub(crate) fn experiments(found: &Identification) -> Result<Vec<draw::DrawnExperiment>> {
+    found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
+}
+
+fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::DrawnExperiment> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let (u, y) = (&found.records.inputs, &found.records.outputs);
+    let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
+        channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
+    };
+    let mut drawn = Vec::new();
+    let mut add = |kind: SignalKind, channels: &[Channel], data: MatRef<'_, f64>| -> Result<()> {
+        let dropped = record.samples() - data.nrows();
+        for (j, channel) in channels.iter().enumerate() {
+            // Samples dropped at the start are a gap, so that all signals share one clock.
+            let mut values = vec![f64::NAN; dropped];
+            values.extend(data.col(j).iter());
+            let trace = Trace::new(&channel.name, &values, &clock)?;
+            drawn.push(draw::Signal { kind, channel: channel.clone(), trace });
+        }
+        Ok(())
+    };
+    let data = &found.settings.data;
+    for (specs, excitation) in [
+        (&data.input_excitation, &record.input_excitation),
+        (&data.reference, &record.reference),
+        (&data.alpha, &record.alpha),
+    ] {
+        if let Some(excitation) = excitation {
+            add(SignalKind::Excitation, &channels_of(specs), excitation.as_ref())?;
+        }
+    }
+    add(SignalKind::Input, u, record.u.as_ref())?;
+    add(SignalKind::Output, y, record.y.as_ref())?;
+    if let Ok(filtered) = &found.filtered {
+        let signals = &filtered.signals.experiments[k];
+        add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
+        add(SignalKind::Beta, &named("beta", y), signals.beta())?;
+    }
+    Ok(draw::DrawnExperiment { name: record.name.clone(), clock, signals: drawn })
+}
+
+/// Measured outputs beside the predictions of all models.
+///
+/// # Errors
+/// Those of [`Trace::new`].
+pub(crate) fn verification(found: &Identification) -> Result<Vec<draw::Verification>> {
+    found.records.verification.iter().enumerate().map(|(k, r)| verified(found, k, r)).collect()
+}
+
+fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
+    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let prediction = match found.verdict.prediction {
+        Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
+        Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
+    };
+    let outputs = (0..record.y.ncols())
+        .map(|output| {
+            let name = &found.records.outputs[output].name;
+            let measured = record.y.col_as_slice(output);
+            let mut predictions = Vec::new();
+            for v in &found.verdict.models {
+                let Ok(predicted) = &v.records[k].predicted else { continue };
+                let values = predicted.col_as_slice(output);
+                let residual: Vec<f64> = measured.iter().zip(values).map(|(y, yp)| y - yp).collect();
+                predictions.push(draw::Prediction {
+                    method: v.method.key().into(),
+                    predicted: Trace::new(name, values, &clock)?,
+                    residual: Trace::new(name, &residual, &clock)?,
+                });
+            }
+            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, measured, &clock)?, predictions })
+        })
+        .collect::<Result<_>>()?;
+    Ok(draw::Verification { record: record.name.clone(), prediction: prediction.into(), clock, outputs })
+}

@@ -1,4 +1,4 @@
-//! From the log to a better controller: identify, reduce in the loop, redesign, and try it on the machine.
+//! From the log to a better controller: identify, redesign, and try it on the machine.
 //!
 //! `cargo run -p youla-cli --example 07_redesign`
 
@@ -6,9 +6,6 @@
 
 mod machine;
 
-use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Order, SubspaceOptions};
-use youla::reduce::{ReducedOrder, ReductionLoop, ReductionOptions, reduce_in_loop};
 use youla::validate::certify;
 use youla_loop::redesign::{RedesignOptions, RedesignProblem, redesign};
 
@@ -18,23 +15,17 @@ type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>
 fn main() -> Result<()> {
     let machine = machine::bearing()?;
     let log = machine.log(20_000, 0.3, 1)?;
-    let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
-    let options = SubspaceOptions { horizon: 30.into(), order: Order::Fixed(12), ..Default::default() }.into();
-    let found = hansen(&machine.factors, &[signals], &options)?;
-
-    let inside = ReductionLoop::new(&machine.factors, &found.deviation.model)?;
-    let asked = ReductionOptions { order: ReducedOrder::Fixed(6), ..Default::default() };
-    let reduced = reduce_in_loop(&inside, &asked)?.reduction.model;
-    println!("G(S) of order {} reduced to {}", found.plant.order(), reduced.order());
+    let found = machine.identified(&log)?.model;
+    println!("the record supports a model of order {}", found.order);
 
     let rms = |m: &youla::Mat<f64>| -> Vec<f64> {
         (0..m.ncols()).map(|j| (m.col(j).iter().map(|v| v * v).sum::<f64>() / m.nrows() as f64).sqrt()).collect()
     };
     let problem = RedesignProblem {
-        model: &reduced,
+        plant: &found.plant,
+        model: &found.plant,
         factors: &machine.factors,
-        deviation: &found.deviation.model,
-        uncertainty: None,
+        region: Some(&found.region),
         input_size: &rms(&log.u),
         output_size: &rms(&log.y),
     };

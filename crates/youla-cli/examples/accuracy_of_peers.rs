@@ -60,7 +60,7 @@ fn bound(system: &Loop, record: &[youla::Mat<f64>; 3]) -> Result<Vec<f64>> {
         dead_time: Some(vec![dead_time; system.plant.inputs()]),
         ..LikelihoodOptions::default()
     };
-    let stated = system.recommended(record, &options)?.response_deviation;
+    let stated = system.recommended(record, &options)?.region;
     let (p, m) = (system.plant.outputs(), system.plant.inputs());
     let variance = |hz: f64| {
         let error = stated.at(hz);

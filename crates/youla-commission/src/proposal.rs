@@ -8,10 +8,9 @@ use crate::parameter::{LoadedQ, parameter_of};
 use crate::rehearse::{Prediction, on_model, predict};
 use crate::running::RunningLoop;
 use crate::{Error, Result};
-use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign, region_radius};
+use youla_loop::redesign::{DeviationRegion, Redesign, RedesignOptions, RedesignProblem, redesign};
 use youla_run::{Identification, ModeEntry, shown_modes};
 
 /// A new controller with its Q.
@@ -57,7 +56,7 @@ pub(crate) fn propose(running: &RunningLoop, rows: &CleanRows, name: &str, goal:
             let sizes = found.records.sizes();
             let (before, new, prediction) = parts;
             let modes = found.recommended.as_ref().map_or_else(|_| Vec::new(), shown_modes);
-            let region = region(&found)?;
+            let region = region(running, &found)?;
             Ok(Outcome::Proposed(Box::new(Proposal { found, before, sizes, new, prediction, modes, region })))
         }
         Err(reason) => Ok(Outcome::Refused { reason, found: Some(Box::new(found)) }),
@@ -73,10 +72,10 @@ fn refusable<T>(outcome: Result<T>) -> Result<Result<T, String>> {
     }
 }
 
-fn region(found: &Identification) -> Result<Option<f64>> {
-    let Some(hansen) = found.scheme().map(|scheme| &scheme.hansen.deviation) else { return Ok(None) };
-    let Some(uncertainty) = &hansen.uncertainty else { return Ok(None) };
-    Ok(region_radius(&hansen.model, uncertainty)?)
+fn region(running: &RunningLoop, found: &Identification) -> Result<Option<f64>> {
+    let Ok(model) = &found.recommended else { return Ok(None) };
+    let deviations = DeviationRegion { factors: &running.factors, plant: &model.plant, region: &model.region };
+    Ok(Some(deviations.radius()?))
 }
 
 fn designed(
@@ -90,12 +89,11 @@ fn designed(
         Ok(model) => return refuse(format!("the model is not trusted: {}", model.reasons().join("; "))),
         Err(e) => return refuse(format!("there is no recommended model: {e}")),
     };
-    let Some(scheme) = found.scheme() else { return refuse("there is no region of S to certify the switch".into()) };
     let (input, output) = found.records.sizes();
     let sizes = Sizes { input: &input, output: &output };
     let measured = loop_response(running, None, rows)?;
     let before = LoopState::new(&measured, &running.factors.controller()?, sizes)?;
-    let new = new_loop(running, model, &scheme.hansen, sizes, goal.damping * before.damping)?;
+    let new = new_loop(running, model, sizes, goal.damping * before.damping)?;
     let prediction = predict(running, model, &new, rows, sizes)?;
     let relative = prediction.deviation / prediction.damping;
     if relative.is_nan() || relative > goal.deviation {
@@ -109,18 +107,12 @@ fn designed(
 
 /// The controller of the smallest input weight, and so of the most damping, that keeps every limit, stabilises every model within the
 /// region of S and can be loaded as Q.
-fn new_loop(
-    running: &RunningLoop,
-    model: &Recommendation,
-    hansen: &HansenModel,
-    sizes: Sizes<'_>,
-    wanted: f64,
-) -> Result<NewLoop> {
+fn new_loop(running: &RunningLoop, model: &Recommendation, sizes: Sizes<'_>, wanted: f64) -> Result<NewLoop> {
     let problem = RedesignProblem {
+        plant: &model.plant,
         model: &model.plant,
         factors: &running.factors,
-        deviation: &hansen.deviation.model,
-        uncertainty: hansen.deviation.uncertainty.as_ref(),
+        region: Some(&model.region),
         input_size: sizes.input,
         output_size: sizes.output,
     };

@@ -20,7 +20,6 @@ use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
 use youla_loop::check::CheckOptions;
 use youla_loop::redesign::RedesignOptions;
-use youla_run::CertificateSettings;
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
     DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
@@ -194,7 +193,6 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         deviation: DeviationSettings::default(),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         grey_box: None,
-        certificate: Some(CertificateSettings { controller_errors: true }),
         redesign: Some(RedesignOptions::default()),
         check: CheckOptions::default(),
         verification: VerificationSettings { prediction: Some(Prediction::OpenLoop), skip: 0 },

@@ -44,7 +44,7 @@ impl Region {
     pub(crate) fn recommended(found: &Recommendation, hz: &[f64]) -> Result<Self> {
         let response = frequency_response(&found.plant, &omega(hz))?;
         let (p, m) = (found.plant.outputs(), found.plant.inputs());
-        let errors: Vec<_> = hz.iter().map(|f| found.response_deviation.at(*f)).collect();
+        let errors: Vec<_> = hz.iter().map(|f| found.region.at(*f)).collect();
         let covariance =
             Array4::from_shape_fn((hz.len(), p, m, 3), |(k, i, j, part)| errors[k].covariance((i, j))[part]);
         let magnitude = Array4::from_shape_fn((hz.len(), p, m, 2), |(k, i, j, side)| {

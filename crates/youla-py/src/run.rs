@@ -149,7 +149,7 @@ impl Run {
             return None;
         }
         let slopes = Mat::from_fn(p, m, |i, j| c64::new(view[[i, j]].re, view[[i, j]].im));
-        Some(found.response_deviation.at(hz).along(slopes.as_ref()))
+        Some(found.region.at(hz).along(slopes.as_ref()))
     }
 
     /// The non-parametric response of the plant where an excitation is known.

@@ -45,16 +45,13 @@ pub use result::{Filtered, Identification, Refusal, SchemeRun};
 pub use schema::reference::settings_reference;
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{
-    AlternativeStructure, CertificateSettings, ControllerSettings, DataFile, DataSettings, DeviationSettings,
-    Discretisation, DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold,
-    IdealPid, NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
+    AlternativeStructure, ControllerSettings, DataFile, DataSettings, DeviationSettings, Discretisation,
+    DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
+    NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
     VerificationSettings, parse_table,
 };
 pub use stages::certificate::{CertificateEntry, RunCertificate};
 pub use stages::clock::{Stage, StageClock, StageTimes};
-pub use stages::controller_errors::{
-    Changed, ChangedMode, ControllerError, ControllerErrorEffect, ControllerErrorEntry, EffectEntry, ModePoint,
-};
 pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise, factorise_run};
 pub use stages::grey_box::GreyBoxRun;
 pub use stages::grey_box::criterion::StructureSearch;

@@ -37,6 +37,10 @@ pub struct Identification {
     pub filtered: Result<Filtered>,
     /// The modified Hansen scheme and what rests on it; `None` where alpha and beta do not exist.
     pub scheme: Option<Result<SchemeRun>>,
+    /// The loop of the recommended plant: the exact test by S, the region, margins; `None` without factors.
+    pub certificate: Option<Result<RunCertificate>>,
+    /// The reduced plant in its loop where it was asked for.
+    pub reduction: Option<Result<RunReduction>>,
     /// The physical structure where one was declared.
     pub grey_box: Option<Result<GreyBoxRun>>,
     /// Its uncertainty, where it can be had.
@@ -75,10 +79,6 @@ pub struct SchemeRun {
     pub diagram: Result<StabilisationDiagram>,
     /// The uncertainty of S and of G(S).
     pub uncertainty: RunUncertainty,
-    /// `G_red(S)` in its loop where it was asked for.
-    pub reduction: Option<Result<RunReduction>>,
-    /// The loop of G(S): the exact test, the region of S, errors in the description of the controller.
-    pub certificate: RunCertificate,
 }
 
 /// Something that was asked for but is impossible; the run goes on without it.
@@ -101,7 +101,8 @@ impl Identification {
             refusal("factors", "coprime factorisation, and so no Hansen scheme", Some(&self.filtered)),
             refusal(Method::Hansen.key(), "model by the Hansen scheme", self.scheme.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
-            refusal(Method::HansenReduced.key(), "reduced model", scheme.and_then(|s| s.reduction.as_ref())),
+            refusal(Method::HansenReduced.key(), "reduced model", self.reduction.as_ref()),
+            refusal("certificate", "certificate of the loop", self.certificate.as_ref()),
             refusal(Method::GreyBox.key(), "grey-box model", self.grey_box.as_ref()),
             refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
             refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
@@ -126,7 +127,12 @@ impl Identification {
 
     /// The reduced model, where there is one.
     pub(crate) fn reduced(&self) -> Option<&RunReduction> {
-        found(self.scheme()?.reduction.as_ref())
+        found(self.reduction.as_ref())
+    }
+
+    /// The certificate of the loop, where there is one.
+    pub fn certified(&self) -> Option<&RunCertificate> {
+        found(self.certificate.as_ref())
     }
 
     /// The estimate of the physical structure, where there is one.

@@ -180,3 +180,4 @@ pub mod validate;
 
 pub use error::{Error, ErrorKind, Result};
 pub use faer::{Mat, MatRef, c64};
+pub use identify::identify;

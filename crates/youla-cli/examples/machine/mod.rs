@@ -4,11 +4,12 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
+use youla::control::{LqrWeights, NoiseCovariance, RunningController, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
+use youla::identify::Identified;
 use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
-use youla::signal::{Excitation, SquareWaves};
+use youla::signal::{Excitation, LoopRecord, SquareWaves};
 use youla::{Mat, Result};
 use youla_paper::rig::{Bearing, degraded};
 
@@ -62,6 +63,14 @@ fn machine(plant: StateSpace<Discrete>, nominal: StateSpace<Discrete>, input_wei
 }
 
 impl Machine {
+    /// The model that a log supports.
+    pub(crate) fn identified(&self, log: &Log) -> Result<Identified> {
+        let record = LoopRecord::new(self.plant.time(), log.u.clone(), log.y.clone())?.with_alpha(log.alpha.clone())?;
+        let (f, l) = self.gains.clone();
+        let controller = RunningController::observer(&self.nominal, f, l)?;
+        youla::identify(&[record], &[], &controller, Some(&self.nominal), &Default::default())
+    }
+
     /// The loop under square waves on alpha, with white output noise.
     pub(crate) fn log(&self, samples: usize, noise: f64, seed: u64) -> Result<Log> {
         let (p, m) = (self.plant.outputs(), self.plant.inputs());

@@ -89,7 +89,7 @@ fn rotary_pendulum() {
             assert!(h > &(n + 5.0), "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
         }
     }
-    let refusal = found.scheme().unwrap().reduction.as_ref().unwrap().as_ref().unwrap_err();
+    let refusal = found.reduction.as_ref().unwrap().as_ref().unwrap_err();
     assert!(matches!(refusal, youla_run::Error::Method(youla::Error::Unstable { .. })), "{refusal}");
 }
 

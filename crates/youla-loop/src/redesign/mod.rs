@@ -3,11 +3,11 @@
 //! Two ways, both LQG with output weights, so that resonances gain damping:
 //! - [`RedesignMethod::Lqg`]: new F and L on the model itself, a controller in observer form of its own;
 //! - [`RedesignMethod::Youla`]: F, L and observer of the running controller stay, `alpha = Q beta` is closed around S. Every
-//!   closed-loop map is affine in S, and with the region of S known, `|| W Q (I - S Q)^-1 || < 1` keeps the loop stable for
-//!   every S in it ([`small_gain`]).
+//!   closed-loop map is affine in S, and with the region of the plant known, `|| W Q (I - S Q)^-1 || < 1` keeps the loop stable for
+//!   every S in it ([`DeviationRegion::small_gain`]).
 //!
 //! Several weights are tried. Of the controllers whose peak sensitivity is below its limit, the one with the highest minimum
-//! damping is chosen that also stabilises every model drawn from the confidence region of S. Source: theory as in `validate::exact`;
+//! damping is chosen that also stabilises every model drawn from the confidence region of the plant. Source: theory as in `validate::exact`;
 //! B. D. O. Anderson, J. B. Moore, Optimal Control, 1990; T.-T. Tay, I. Mareels, J. B. Moore, High Performance Control, 1998.
 
 mod figures;
@@ -17,14 +17,15 @@ mod youla_parameter;
 
 pub use figures::{LoopFigures, least_damping, loop_modes};
 pub use lqg::Gains;
-pub use robust::{region_radius, small_gain};
+pub use robust::DeviationRegion;
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
+use youla::control::{closed_loop, with_input_port};
 use youla::factor::CoprimeFactors;
-use youla::identify::subspace::Uncertainty;
+use youla::identify::likelihood::Region;
 use youla::lti::{Discrete, StateSpace};
-use youla::validate::{BandCertificate, BandOptions, ExactCertificate, certify_band, certify_deviation};
+use youla::validate::{BandCertificate, BandOptions, ExactCertificate, certify_deviation, certify_region};
 use youla::{ErrorKind, Mat};
 
 /// What is redesigned.
@@ -62,10 +63,10 @@ pub struct RedesignOptions {
     pub output_noise: f64,
     /// Largest peak of the output sensitivity, channels in their rms. ISO 14839-3 calls up to 3 zone A.
     pub peak_sensitivity: f64,
-    /// Largest value of the small-gain product over the region of S, for `youla`; below 1; not a key of run.toml.
+    /// Largest value of the small-gain product over the region of the plant, for `youla`; below 1; not a key of run.toml.
     #[serde(skip)]
     pub small_gain: f64,
-    /// Models that are drawn from the region of S for the final test; not a key of run.toml.
+    /// Models that are drawn from the region of the plant for the final test; not a key of run.toml.
     #[serde(skip)]
     pub band: BandOptions,
 }
@@ -86,15 +87,14 @@ impl Default for RedesignOptions {
 /// The input of a redesign.
 #[derive(Debug, Clone, Copy)]
 pub struct RedesignProblem<'a> {
-    /// The model for the LQG design and the figures: G(S), or better its reduction or a physical structure, because G(S) contains
-    /// modes that nearly cancel.
+    /// The identified plant, on which every new controller is tested.
+    pub plant: &'a StateSpace<Discrete>,
+    /// The model for the LQG design and the figures: the plant itself, its reduction or a physical structure.
     pub model: &'a StateSpace<Discrete>,
     /// The factors of the running controller.
     pub factors: &'a CoprimeFactors<Discrete>,
-    /// S.
-    pub deviation: &'a StateSpace<Discrete>,
-    /// The uncertainty of S, where it is known.
-    pub uncertainty: Option<&'a Uncertainty>,
+    /// The region of the plant, where it is known.
+    pub region: Option<&'a Region>,
     /// Size of each plant input, its rms.
     pub input_size: &'a [f64],
     /// Size of each plant output, its rms.
@@ -110,7 +110,7 @@ pub struct TriedWeight {
     pub least_damping: Option<f64>,
     /// Peak of the output sensitivity.
     pub peak_sensitivity: Option<f64>,
-    /// Small-gain product over the region of S, for `youla` with a known region.
+    /// Small-gain product over the region of the plant, for `youla` with a known region.
     pub small_gain: Option<f64>,
     /// Whether every drawn model within the region is stabilised; absent where that was not tested.
     pub band_holds: Option<bool>,
@@ -142,9 +142,9 @@ pub struct Redesign {
     pub present: LoopFigures,
     /// The loop of the model with the new one.
     pub predicted: LoopFigures,
-    /// The exact test of G(S) with K(Q), for `youla`.
+    /// The exact test of the plant with K(Q), for `youla`.
     pub exact: Option<ExactCertificate>,
-    /// The new loop over the region of S, where it is known.
+    /// The new loop over the region of the plant, where it is known.
     pub band: Option<BandCertificate>,
     /// All weights that were tried, in the order of the options.
     pub candidates: Vec<TriedWeight>,
@@ -163,16 +163,16 @@ impl Redesign {
 ///
 /// # Errors
 /// [`Error::NoRedesign`] when no weight meets the limits, with the reason of the nearest; [`youla::Error::OutOfRange`] for options outside of their
-/// range; [`youla::Error::NotStabilising`] when the running controller does not stabilise G(S).
+/// range; [`youla::Error::NotStabilising`] when the running controller does not stabilise the plant.
 pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Result<Redesign> {
     check(options)?;
-    let plant = problem.factors.plant_of(problem.deviation)?;
+    let deviation = problem.factors.deviation_of(problem.plant)?;
     let running = problem.factors.controller()?;
     let sizes = (problem.input_size, problem.output_size);
     let present = LoopFigures::new(problem.model, &running, sizes)?;
     let mut tried: Vec<(TriedWeight, Option<(NewController, LoopFigures)>)> = Vec::new();
     for weight in &options.input_weights {
-        tried.push(try_weight(problem, options, &plant, *weight)?);
+        tried.push(try_weight(problem, options, &deviation, *weight)?);
     }
     let mut order: Vec<usize> = (0..tried.len()).filter(|k| tried[*k].1.is_some()).collect();
     let damping = |k: usize| tried[k].0.least_damping.unwrap_or(f64::NEG_INFINITY);
@@ -185,12 +185,13 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
             let input_weight = tried[k].0.input_weight;
             let candidates = tried.into_iter().map(|t| t.0).collect();
             let method = options.method;
-            let exact = controller.q.as_ref().map(|q| certify_deviation(problem.factors, problem.deviation, Some(q)));
+            let exact = controller.q.as_ref().map(|q| certify_deviation(problem.factors, &deviation, Some(q)));
             let exact = exact.transpose()?;
             return Ok(Redesign { method, input_weight, controller, present, predicted, exact, band, candidates });
         }
-        tried[k].0.refused =
-            band.map(|b| format!("unstable for {} of {} models within the region of S", b.unstable_within, b.within));
+        tried[k].0.refused = band.map(|b| {
+            format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within)
+        });
     }
     let reasons: Vec<String> =
         tried.iter().filter_map(|(c, _)| Some(format!("weight {}: {}", c.input_weight, c.refused.as_ref()?))).collect();
@@ -224,7 +225,7 @@ fn check(options: &RedesignOptions) -> Result<()> {
 fn try_weight(
     problem: &RedesignProblem<'_>,
     options: &RedesignOptions,
-    plant: &StateSpace<Discrete>,
+    deviation: &StateSpace<Discrete>,
     weight: f64,
 ) -> Result<(TriedWeight, Option<(NewController, LoopFigures)>)> {
     let mut candidate = TriedWeight {
@@ -237,13 +238,12 @@ fn try_weight(
     };
     let designed = match options.method {
         RedesignMethod::Lqg => lqg::design(problem, weight, options.output_noise),
-        RedesignMethod::Youla => youla_parameter::design(problem, weight, options.output_noise),
+        RedesignMethod::Youla => youla_parameter::design(problem, deviation, weight, options.output_noise),
     };
     let designed = designed.and_then(|controller| {
-        // The loop of G(S) must be stable too; its pole is in the error.
-        let ports = youla::control::with_input_port(&controller.system)?;
-        let whole = youla::control::closed_loop(plant, &ports)?;
-        whole.require_stable("the loop of G(S)")?;
+        // The loop of the plant must be stable too; its pole is in the error.
+        let whole = closed_loop(problem.plant, &with_input_port(&controller.system)?)?;
+        whole.require_stable("the loop of the identified plant")?;
         let figures = LoopFigures::new(problem.model, &controller.system, (problem.input_size, problem.output_size))?;
         Ok((controller, figures))
     });
@@ -259,30 +259,32 @@ fn try_weight(
     };
     candidate.least_damping = Some(figures.least_damping);
     candidate.peak_sensitivity = Some(figures.peak_sensitivity);
-    if let (Some(q), Some(uncertainty)) = (&controller.q, problem.uncertainty) {
-        candidate.small_gain = small_gain(problem.deviation, q, uncertainty)?;
+    if let (Some(q), Some(region)) = (&controller.q, problem.region) {
+        let deviations = DeviationRegion { factors: problem.factors, plant: problem.plant, region };
+        candidate.small_gain = Some(deviations.small_gain(deviation, q)?);
     }
     candidate.refused = if figures.peak_sensitivity > options.peak_sensitivity {
         Some(format!("the peak of the sensitivity is {:.2}", figures.peak_sensitivity))
     } else {
         let beyond = candidate.small_gain.filter(|product| *product > options.small_gain);
-        beyond.map(|product| format!("the small-gain product over the region of S is {product:.2}"))
+        beyond.map(|product| format!("the small-gain product over the region of the plant is {product:.2}"))
     };
     let kept = candidate.refused.is_none().then_some((controller, figures));
     Ok((candidate, kept))
 }
 
-/// The loop of the new controller with the models of the region of S, each recombined to its plant.
+/// The loop of the new controller with the plants of the region.
 fn band(
     problem: &RedesignProblem<'_>,
     options: &RedesignOptions,
     controller: &NewController,
 ) -> Result<Option<BandCertificate>> {
-    let Some(uncertainty) = problem.uncertainty else { return Ok(None) };
-    let ports = youla::control::with_input_port(&controller.system)?;
-    let closed = |s: &StateSpace<Discrete>| youla::control::closed_loop(&problem.factors.plant_of(s)?, &ports);
-    // The experiment ran under the running controller, so the true S is stable.
-    Ok(certify_band(uncertainty, &options.band, StateSpace::is_stable, closed)?)
+    let Some(region) = problem.region else { return Ok(None) };
+    let running = with_input_port(&problem.factors.controller()?)?;
+    // The records were taken under the running controller, so that it stabilises the true plant.
+    let possible = |plant: &StateSpace<Discrete>| closed_loop(plant, &running)?.is_stable();
+    let ports = with_input_port(&controller.system)?;
+    Ok(Some(certify_region(region, &options.band, possible, |plant| closed_loop(plant, &ports))?))
 }
 
 /// A diagonal matrix.

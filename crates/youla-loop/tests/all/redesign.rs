@@ -3,16 +3,14 @@
 use crate::common::{self, rng};
 use faer::Scale;
 use std::cell::Cell;
-use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr, real_time_controller};
-use youla::factor::{CoprimeFactors, YoulaSignals};
-use youla::identify::hansen::{HansenModel, hansen};
-use youla::identify::subspace::{
-    Experiment, InitialState, Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
-};
+use youla::control::{LqrWeights, NoiseCovariance, RunningController, kalman, lqr, real_time_controller};
+use youla::factor::CoprimeFactors;
+use youla::identify::Identified;
+use youla::identify::likelihood::LikelihoodOptions;
+use youla::identify::subspace::{Experiment, InitialState, Order, SubspaceMethod, SubspaceOptions, subspace};
 use youla::linalg::eye;
 use youla::lti::{Discrete, PeakOptions, StateSpace, hinf_norm};
-use youla::reduce::{ReducedOrder, ReductionOptions, reduce};
-use youla::signal::Channel;
+use youla::signal::{Channel, LoopRecord};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
@@ -126,21 +124,15 @@ impl Bench {
         without_harmonics(later, RPM / 60.0, 5, Discrete::new(2e-4).unwrap()).unwrap()
     }
 
-    fn identify(&self, seed: u64) -> (HansenModel, ExperimentRecord) {
+    /// Of order six, which the controllers of this test have as their number of states.
+    fn identify(&self, seed: u64) -> (Identified, ExperimentRecord) {
         let log = self.record(&mut self.running(), seed);
-        let signals = self.factors.signals(log.u_applied.as_ref(), log.y.as_ref()).unwrap();
-        let signals =
-            YoulaSignals::new(self.clean(signals.alpha()).as_ref(), self.clean(signals.beta()).as_ref()).unwrap();
-        let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
-        let options = SubspaceOptions {
-            method: SubspaceMethod::Cva,
-            horizon: 30.into(),
-            order: Order::Fixed(12),
-            initial_state: InitialState::Estimated,
-            uncertainty,
-            ..Default::default()
-        };
-        (hansen(&self.factors, &[signals], &options.into()).unwrap(), log)
+        let [u, y, alpha] = [&log.u_applied, &log.y, &log.alpha].map(|signal| self.clean(signal.as_ref()));
+        let record = LoopRecord::new(Discrete::new(2e-4).unwrap(), u, y).unwrap().with_alpha(alpha).unwrap();
+        let nominal = self.factors.nominal();
+        let controller = RunningController::observer(nominal, self.f.clone(), self.l.clone()).unwrap();
+        let options = LikelihoodOptions { order: Some(6), ..LikelihoodOptions::default() };
+        (youla::identify(&[record], &[], &controller, Some(nominal), &options).unwrap(), log)
     }
 
     /// Figures of the loop from an experiment: an open-loop identification from a disturbance at the plant input to y.
@@ -178,29 +170,23 @@ fn rms(m: &Mat<f64>) -> Vec<f64> {
     m.col_iter().map(|c| c.norm_l2() / (c.nrows() as f64).sqrt()).collect()
 }
 
-/// A new controller on a model of G(S), with the sizes of u and y.
+/// A new controller on the identified plant, with the sizes of u and y.
 fn designed(
     bench: &Bench,
-    found: &HansenModel,
-    model: &StateSpace<Discrete>,
+    found: &Identified,
     log: &ExperimentRecord,
     options: &RedesignOptions,
 ) -> (Redesign, [Vec<f64>; 2]) {
     let sizes = [&log.u_applied, &log.y].map(|signal| rms(&bench.clean(signal.as_ref())));
     let problem = RedesignProblem {
-        model,
+        plant: &found.model.plant,
+        model: &found.model.plant,
         factors: &bench.factors,
-        deviation: &found.deviation.model,
-        uncertainty: found.deviation.uncertainty.as_ref(),
+        region: Some(&found.model.region),
         input_size: &sizes[0],
         output_size: &sizes[1],
     };
     (redesign(&problem, options).unwrap(), sizes)
-}
-
-fn order_six(found: &HansenModel) -> StateSpace<Discrete> {
-    let options = ReductionOptions { order: ReducedOrder::Fixed(6), ..Default::default() };
-    reduce(&found.plant, &options).unwrap().model
 }
 
 fn near(measured: f64, predicted: f64, tolerance: f64) {
@@ -213,12 +199,11 @@ fn exported_data_are_the_controller() {
     let bench = Bench::new(0.0, 30.0);
     let time = Discrete::new(2e-4).unwrap();
     let plant = Bearing::default().plant().unwrap().zoh(time).unwrap().balanced().unwrap();
-    let deviation = bench.factors.deviation_of(&plant).unwrap();
     let problem = RedesignProblem {
+        plant: &plant,
         model: &plant,
         factors: &bench.factors,
-        deviation: &deviation,
-        uncertainty: None,
+        region: None,
         input_size: &[0.5; 2],
         output_size: &[1.0; 2],
     };
@@ -274,8 +259,7 @@ fn exported_data_are_the_controller() {
 fn damping_rises_as_predicted_at_2500_rpm() {
     let bench = Bench::new(0.0, 1000.0);
     let (found, log) = bench.identify(3);
-    let model = order_six(&found);
-    let (new, sizes) = designed(&bench, &found, &model, &log, &RedesignOptions::default());
+    let (new, sizes) = designed(&bench, &found, &log, &RedesignOptions::default());
     let before = bench.measured(bench.running(), 11, &sizes);
     let gains = new.controller.gains.as_ref().unwrap();
     let after = bench.measured(observer::<6>(&gains.model, gains.f.as_ref(), gains.l.as_ref()), 12, &sizes);
@@ -292,13 +276,12 @@ fn damping_rises_as_predicted_at_2500_rpm() {
 fn q_lowers_the_resonance_as_predicted_at_2500_rpm() {
     let bench = Bench::new(0.0, 1000.0);
     let (found, log) = bench.identify(3);
-    let model = order_six(&found);
     let options = RedesignOptions { method: RedesignMethod::Youla, ..Default::default() };
-    let (new, sizes) = designed(&bench, &found, &model, &log, &options);
+    let (new, sizes) = designed(&bench, &found, &log, &options);
     let before = bench.measured(bench.running(), 11, &sizes);
     let q = new.controller.q.as_ref().unwrap();
     let filter = youla_rt::Filter::new(array(q.a()), array(q.b()), array(q.c()), array(q.d())).unwrap();
-    let with_q = WithQ::<6, 18> { inner: bench.running(), q: filter, state: youla_rt::State::at_rest() };
+    let with_q = WithQ::<6, 12> { inner: bench.running(), q: filter, state: youla_rt::State::at_rest() };
     let after = bench.measured(with_q, 12, &sizes);
     assert!(new.band.unwrap().holds() && new.gains_damping());
     near(after.peak, new.predicted.peak_response, 0.1);
@@ -311,11 +294,11 @@ fn damping_rises_as_predicted_on_an_unstable_rotor() {
     let bench = Bench::new(0.25, 10.0);
     assert!(!bench.rig(0).true_plant().unwrap().is_stable().unwrap());
     let (found, log) = bench.identify(4);
-    assert!(!found.plant.is_stable().unwrap(), "the identified rotor must be unstable as well");
-    let (new, sizes) = designed(&bench, &found, &found.plant, &log, &RedesignOptions::default());
+    assert!(!found.model.plant.is_stable().unwrap(), "the identified rotor must be unstable as well");
+    let (new, sizes) = designed(&bench, &found, &log, &RedesignOptions::default());
     let before = bench.measured(bench.running(), 11, &sizes);
     let gains = new.controller.gains.as_ref().unwrap();
-    let after = bench.measured(observer::<18>(&gains.model, gains.f.as_ref(), gains.l.as_ref()), 12, &sizes);
+    let after = bench.measured(observer::<6>(&gains.model, gains.f.as_ref(), gains.l.as_ref()), 12, &sizes);
     assert!(new.band.unwrap().holds());
     near(before.damping, new.present.least_damping, 0.1);
     near(after.damping, new.predicted.least_damping, 0.15);

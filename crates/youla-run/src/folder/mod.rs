@@ -47,6 +47,8 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
     writer.signals()?;
     writer.models()?;
     writer.verdict()?;
+    writer.deviation()?;
+    writer.reduction()?;
     writer.certificate()?;
     writer.redesign()
 }
@@ -169,13 +171,29 @@ impl Writer<'_> {
         };
         let s = &scheme.hansen.deviation;
         let details = DeviationDetails::new(&scheme.hansen);
-        self.model_with("4-identify/deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
+        self.model_with("4-identify/hansen_deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
         self.diagram("4-identify/stabilisation_deviation", Some(&scheme.diagram), &named("beta", y))?;
         self.model("5-recombine/hansen", &scheme.hansen.plant, &())?;
         let known = &scheme.uncertainty;
         self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
         self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
-        match &scheme.reduction {
+        Ok(())
+    }
+
+    /// S of the recommended plant.
+    fn deviation(&self) -> Result<()> {
+        let (Ok(model), Ok(filtered)) = (&self.found.recommended, &self.found.filtered) else { return Ok(()) };
+        let (u, y) = (&self.found.records.inputs, &self.found.records.outputs);
+        let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
+            channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
+        };
+        let s = filtered.factorisation.factors.deviation_of(&model.plant)?;
+        self.model_with("4-identify/deviation", &s, (named("alpha", u), named("beta", y)), &())
+    }
+
+    /// `6-reduce/`: the reduced plant and what every order costs.
+    fn reduction(&self) -> Result<()> {
+        match &self.found.reduction {
             Some(Ok(r)) => {
                 self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &r.details())?;
                 self.json("6-reduce/sweep.json", r.file())?;
@@ -200,8 +218,11 @@ impl Writer<'_> {
 
     /// `7-validate/certificate.json`.
     fn certificate(&self) -> Result<()> {
-        let Some(scheme) = self.found.scheme() else { return Ok(()) };
-        self.json("7-validate/certificate.json", scheme.certificate.entry())
+        match &self.found.certificate {
+            Some(Ok(certificate)) => self.json("7-validate/certificate.json", certificate.entry()),
+            Some(Err(e)) => self.refused("7-validate/certificate.json", e),
+            None => Ok(()),
+        }
     }
 
     /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.

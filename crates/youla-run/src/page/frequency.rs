@@ -51,7 +51,7 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
 fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<draw::Band> {
     let Ok(model) = &found.recommended else { return Vec::new() };
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
-    let errors: Vec<_> = found.hz.iter().map(|f| model.response_deviation.at(*f)).collect();
+    let errors: Vec<_> = found.hz.iter().map(|f| model.region.at(*f)).collect();
     own.flat_map(|(_, r)| ports(found).map(|port| recommended_band(&errors, r, port)).collect::<Vec<_>>()).collect()
 }
 

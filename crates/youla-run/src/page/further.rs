@@ -138,8 +138,8 @@ fn information(evidence: &DeviationEvidence) -> (String, Status) {
 
 /// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
 fn region_line(found: &Identification) -> Option<Verdict> {
-    let certificate = &found.scheme()?.certificate;
-    let (text, band) = certificate.band_sentence().zip(certificate.band.as_ref())?;
-    let status = if band.holds() { Status::Good } else { Status::Caution };
+    let certificate = found.certified()?;
+    let text = certificate.band_sentence();
+    let status = if certificate.band.holds() { Status::Good } else { Status::Caution };
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

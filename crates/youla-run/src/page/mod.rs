@@ -66,7 +66,7 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         physical: structure.map(|of| of.estimate.clone()),
         reduction: found.reduced().map(|reduction| reduction.drawn()),
         certificates: all().map(|(key, model)| models::certificate(key, model)).collect(),
-        loop_tables: found.scheme().map_or_else(Vec::new, |s| s.certificate.tables()),
+        loop_tables: found.certified().map_or_else(Vec::new, |c| c.tables()),
         recommended: recommended::tables(found),
         redesign: redesign(found)?,
         margins: all().map(|(key, model)| models::margins(key, model)).collect(),

@@ -1,6 +1,5 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
-mod certificate;
 mod controller;
 mod data;
 mod disturbance;
@@ -13,7 +12,6 @@ mod pid;
 mod retired;
 mod shown;
 
-pub use certificate::CertificateSettings;
 pub use controller::{ControllerSettings, Feedback, Hold, RealisedController};
 pub(crate) use data::labelled;
 pub use data::{DataFile, DataSettings};
@@ -76,9 +74,6 @@ pub struct RunSettings {
     /// A physical structure, estimated from the result of the scheme on; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grey_box: Option<GreyBoxSettings>,
-    /// What is stated about the loop; its cheap parts also without this table.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub certificate: Option<CertificateSettings>,
     /// A new controller on the identified model; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<RedesignOptions>,
@@ -111,7 +106,6 @@ impl RunSettings {
             direct: None,
             reduction: None,
             grey_box: None,
-            certificate: None,
             redesign: None,
             verification: VerificationSettings::default(),
             check: CheckOptions::default(),
@@ -197,7 +191,6 @@ impl RunSettings {
             ("direct", self.direct.is_some()),
             ("reduction", self.reduction.is_some()),
             ("grey_box", self.grey_box.is_some()),
-            ("certificate", self.certificate.is_some()),
         ];
         let (table, _) = asked.into_iter().find(|(_, asked)| *asked)?;
         Some(format!("[{table}] needs estimation records, but [data] has a response; leave the table out"))

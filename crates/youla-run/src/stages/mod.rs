@@ -3,7 +3,6 @@
 pub(crate) mod certificate;
 pub(crate) mod clock;
 pub(crate) mod context;
-pub(crate) mod controller_errors;
 pub(crate) mod direct;
 pub(crate) mod factors;
 pub(crate) mod grey_box;

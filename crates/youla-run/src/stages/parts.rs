@@ -4,7 +4,7 @@
 use crate::records::RunRecords;
 use crate::result::Identification;
 use crate::settings::RunSettings;
-use crate::stages::context::{RunContext, SchemeContext};
+use crate::stages::context::RunContext;
 use crate::stages::factors::declared_loop;
 use crate::stages::recommend::recommend;
 use crate::stages::redesign::redesigned;
@@ -26,20 +26,18 @@ pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Pa
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.
 ///
 /// # Errors
-/// Those of [`youla_loop::redesign::redesign`]; the reason why the run has no factors or no G(S).
+/// Those of [`youla_loop::redesign::redesign`]; the reason why the run has no factors or no model.
 pub fn redesign_of(run: &Identification, options: &RedesignOptions) -> Result<Redesign> {
     let settings = RunSettings { redesign: Some(options.clone()), ..run.settings.clone() };
     let missing = || {
         Error::Method(youla::Error::Unsupported {
-            what: "a redesign of a run without coprime factors and G(S)",
+            what: "a redesign of a run without coprime factors or without a recommended model",
             instead: "its summary states under `refused` why there are none",
         })
     };
     let filtered = run.filtered.as_ref().map_err(|_| missing())?;
-    let scheme = run.scheme().ok_or_else(missing)?;
-    let (records, declared) = (&run.records, &run.declared);
-    let factorisation = &filtered.factorisation;
-    let of_run = RunContext { settings: &settings, records, declared, factorisation: Some(factorisation) };
-    let context = SchemeContext { run: of_run, factorisation, signals: &filtered.signals };
-    redesigned(context, &scheme.hansen, run.reduced()).unwrap_or_else(|| Err(missing()))
+    let model = run.recommended.as_ref().map_err(|_| missing())?;
+    let (records, declared, factorisation) = (&run.records, &run.declared, Some(&filtered.factorisation));
+    let context = RunContext { settings: &settings, records, declared, factorisation };
+    redesigned(context, model, run.reduced()).unwrap_or_else(|| Err(missing()))
 }

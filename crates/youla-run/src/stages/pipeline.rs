@@ -15,8 +15,8 @@ use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::{Scheme, require_length, scheme};
 use crate::stages::nonparametric::lines;
 use crate::stages::recommend::recommend;
-use crate::stages::redesign::{redesigned, redesigned_on};
-use crate::stages::reduction::{RunReduction, run_reduction};
+use crate::stages::redesign::redesigned;
+use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
 use crate::stages::signals::deviation_signals;
 use crate::stages::uncertainty::{run_uncertainty, structure_uncertainty};
@@ -57,8 +57,8 @@ pub fn identify(
     let (s, grey_box) = s;
     let (recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
     let reduction = clock.run(Stage::Reduce, || {
-        let (hansen, options) = (&found(s.as_ref())?.hansen, settings.reduction.as_ref()?);
-        Some(run_reduction(&context?.factorisation.factors, hansen, &records, options)) // (29)
+        let (model, options) = (recommended.as_ref().ok()?, settings.reduction.as_ref()?);
+        Some(run_reduction(&factorisation?.factors, &model.plant, &records, options)) // (29)
     });
     let candidates = Candidates {
         recommended: recommended.as_ref().ok(),
@@ -92,18 +92,14 @@ pub fn identify(
     let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
     let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
     let scheme = match (s, context) {
-        (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, reduction, &hz, clock)?)),
+        (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, &hz)?)),
         (Some(Err(reason)), _) => Some(Err(reason)),
         _ => None,
     };
-    let redesign = clock.run(Stage::Redesign, || {
-        let context = context?;
-        match (&scheme, &recommended, &records.measured) {
-            (Some(Ok(s)), ..) => redesigned(context, &s.hansen, found(s.reduction.as_ref())),
-            (_, Ok(model), Some(_)) => redesigned_on(context, &model.plant),
-            _ => None,
-        }
-    });
+    let certificate =
+        clock.run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?)));
+    let redesign =
+        clock.run(Stage::Redesign, || redesigned(run, recommended.as_ref().ok()?, found(reduction.as_ref())));
     Ok(Identification {
         settings,
         records,
@@ -112,6 +108,8 @@ pub fn identify(
         recommended,
         filtered,
         scheme,
+        certificate,
+        reduction,
         grey_box,
         grey_box_uncertainty,
         redesign,
@@ -168,16 +166,9 @@ fn of_scheme(context: SchemeContext<'_>) -> Result<Scheme> {
     scheme(context).map_err(|e| e.within(signals.context()))
 }
 
-/// Region and certificate of G(S).
-fn judged(
-    context: SchemeContext<'_>,
-    s: Scheme,
-    reduction: Option<Result<RunReduction>>,
-    hz: &[f64],
-    clock: &mut StageClock<'_>,
-) -> Result<SchemeRun> {
+/// Region of G(S).
+fn judged(context: SchemeContext<'_>, s: Scheme, hz: &[f64]) -> Result<SchemeRun> {
     let Scheme { hansen, diagram } = s;
     let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
-    let certificate = clock.run(Stage::Certify, || certificate(context, &hansen))?;
-    Ok(SchemeRun { hansen, diagram, uncertainty, reduction, certificate })
+    Ok(SchemeRun { hansen, diagram, uncertainty })
 }

@@ -1,16 +1,15 @@
 //! `[redesign]`: a new controller on the model of a run, with what it is worth.
 
 use crate::records::RunRecords;
-use crate::stages::context::SchemeContext;
+use crate::stages::context::RunContext;
 use crate::stages::reduction::RunReduction;
 use crate::stages::responses::decibel;
 use crate::summary::entries::{BandEntry, finite};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
-use youla::identify::hansen::HansenModel;
-use youla::identify::subspace::Uncertainty;
-use youla::lti::{Discrete, SharedMode, StateSpace, frequency_response};
+use youla::identify::likelihood::Recommendation;
+use youla::lti::{SharedMode, frequency_response};
 use youla::validate::ExactCertificate;
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
@@ -18,44 +17,23 @@ use youla_loop::redesign::{LoopFigures, Redesign, RedesignMethod, RedesignProble
 use youla_report::data as draw;
 use youla_report::figure::{Axis, Content, Curve, Figure, Panel};
 
-/// Designs on the reduced model where there is one, else on G(S).
+/// Designs on the reduced model where there is one, else on the recommended plant; every new controller is tested on the plant and its
+/// region.
 ///
 /// # Errors
 /// As [`redesign`].
 pub(crate) fn redesigned(
-    context: SchemeContext<'_>,
-    hansen: &HansenModel,
+    run: RunContext<'_>,
+    recommended: &Recommendation,
     reduced: Option<&RunReduction>,
 ) -> Option<Result<Redesign>> {
-    let model = reduced.map_or(&hansen.plant, |r| &r.found.reduction.model);
-    designed(context, model, (&hansen.deviation.model, hansen.deviation.uncertainty.as_ref()))
-}
-
-/// Designs on the recommended model, with the S that belongs to it.
-///
-/// # Errors
-/// As [`redesign`].
-pub(crate) fn redesigned_on(context: SchemeContext<'_>, model: &StateSpace<Discrete>) -> Option<Result<Redesign>> {
-    context.run.settings.redesign.as_ref()?;
-    match context.factorisation.factors.deviation_of(model) {
-        Ok(deviation) => designed(context, model, (&deviation, None)),
-        Err(e) => Some(Err(Error::from(e).within("[redesign]"))),
-    }
-}
-
-fn designed(
-    context: SchemeContext<'_>,
-    model: &StateSpace<Discrete>,
-    (deviation, uncertainty): (&StateSpace<Discrete>, Option<&Uncertainty>),
-) -> Option<Result<Redesign>> {
-    let run = context.run;
-    let options = run.settings.redesign.as_ref()?;
+    let (options, factorisation) = (run.settings.redesign.as_ref()?, run.factorisation?);
     let (input, output) = run.records.sizes();
     let problem = RedesignProblem {
-        model,
-        factors: &context.factorisation.factors,
-        deviation,
-        uncertainty,
+        plant: &recommended.plant,
+        model: reduced.map_or(&recommended.plant, |r| &r.found.reduction.model),
+        factors: &factorisation.factors,
+        region: Some(&recommended.region),
         input_size: &input,
         output_size: &output,
     };
@@ -90,9 +68,9 @@ pub struct RedesignEntry {
     pub present: LoopEntry,
     /// The loop with the new controller, on the model.
     pub predicted: LoopEntry,
-    /// The new controller on every model within the region of S; `null` without an uncertainty.
+    /// The new controller on every model within the region of the plant; `null` without an uncertainty.
     pub band: Option<BandEntry>,
-    /// The exact test of G(S) with K(Q), for `youla`.
+    /// The exact test of the plant with K(Q), for `youla`.
     pub exact: Option<ExactEntry>,
     /// All weights that were tried.
     pub candidates: Vec<TriedWeight>,
@@ -167,7 +145,7 @@ pub(crate) fn sentence(redesign: &Redesign) -> String {
     let Redesign { present, predicted, .. } = redesign;
     let band = redesign.band.map_or_else(String::new, |b| {
         format!(
-            "; it stabilises all {} models drawn from the {:.0} % confidence region of S",
+            "; it stabilises all {} models drawn from the {:.0} % confidence region of the plant",
             b.within,
             100.0 * b.level
         )

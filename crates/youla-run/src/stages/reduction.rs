@@ -5,8 +5,7 @@ use crate::records::RunRecords;
 use crate::summary::entries::{finite, pair, pairs};
 use serde::{Deserialize, Serialize};
 use youla::factor::CoprimeFactors;
-use youla::identify::hansen::HansenModel;
-use youla::lti::Discrete;
+use youla::lti::{Discrete, StateSpace};
 use youla::reduce::{
     LoopReduction, ReductionLoop, ReductionMethod, ReductionOptions, ReductionSweep, SweepRow, reduce_in_loop,
 };
@@ -25,11 +24,11 @@ pub struct RunReduction {
     pub found: LoopReduction<Discrete>,
 }
 
-/// Reduces G(S) in its loop. Normalised coprime factors depend on the unit of the outputs against that of the inputs: where no
+/// Reduces the plant in its loop. Normalised coprime factors depend on the unit of the outputs against that of the inputs: where no
 /// scales are given, the rms of the estimation records is theirs.
 pub(crate) fn run_reduction(
     factors: &CoprimeFactors<Discrete>,
-    hansen: &HansenModel,
+    plant: &StateSpace<Discrete>,
     records: &RunRecords,
     options: &ReductionOptions,
 ) -> Result<RunReduction> {
@@ -39,7 +38,7 @@ pub(crate) fn run_reduction(
         options.output_scale.get_or_insert(outputs);
         options.input_scale.get_or_insert(inputs);
     }
-    let model = ReductionLoop::new(factors, &hansen.deviation.model)?;
+    let model = ReductionLoop::of_plant(factors, plant)?;
     let found = reduce_in_loop(&model, &options)?;
     Ok(RunReduction { options, found })
 }

@@ -6,7 +6,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla::c64;
-use youla::identify::subspace::{Interval, ModeBand};
+use youla::identify::likelihood::Interval;
+use youla::identify::subspace::ModeBand;
 use youla::lti::Mode;
 use youla::validate::BandCertificate;
 

@@ -93,7 +93,7 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         seconds: seconds.iter().map(|(stage, seconds)| (stage.name().to_owned(), *seconds)).collect(),
         true_plant,
         channel_scales: robustness::scales(run),
-        certificate: run.scheme().map(|s| s.certificate.entry()),
+        certificate: run.certified().map(|c| c.entry()),
         redesign: run.new_controller().map(redesign::entry),
         reduction: run.reduced().map(|reduction| reduction.entry()),
         uncertainty: run.scheme().and_then(|s| UncertaintyEntry::new(&s.hansen, &run.settings.hansen.uncertainty)),

@@ -69,7 +69,7 @@ impl From<&Evidence> for EvidenceFigure {
 
 impl From<&Recommendation> for RecommendedEntry {
     fn from(found: &Recommendation) -> Self {
-        let deviation = &found.response_deviation;
+        let deviation = &found.region;
         RecommendedEntry {
             method: Method::Likelihood.key().into(),
             trusted: found.trusted(),

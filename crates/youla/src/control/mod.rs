@@ -9,6 +9,7 @@ mod margin;
 mod margins;
 mod observer_controller;
 mod real_time;
+mod running_controller;
 
 pub use closed_loop::{closed_loop, with_input_port};
 pub use gap::{ChannelScales, NuGap, coprime_margin, normalised_left_factors, normalised_right_factors, nu_gap};
@@ -18,6 +19,7 @@ pub use margin::peak_sensitivity;
 pub use margins::{
     ChannelMargins, DelayLimit, DiskMargin, DiskMargins, GainLimit, IsoZone, Margins, PhaseLimit, margins,
 };
-pub use margins::{LinearMargins, WorstMargins};
+pub use margins::{LinearMargins, MARGIN_NAMES};
 pub use observer_controller::observer_controller;
 pub use real_time::real_time_controller;
+pub use running_controller::RunningController;

@@ -3,6 +3,7 @@
 
 mod bezout;
 mod coprime;
+mod loop_factors;
 mod signals;
 mod stable;
 mod stream;
@@ -10,6 +11,7 @@ mod youla;
 
 pub use coprime::CoprimeFactors;
 pub use coprime::shear;
+pub use loop_factors::loop_factors;
 pub use signals::YoulaSignals;
 pub use stable::{Denominator, StableFactors, left_coprime, right_coprime};
 pub use stream::YoulaStream;

@@ -3,6 +3,7 @@
 pub mod direct;
 pub mod fit;
 pub mod hansen;
+mod identified;
 pub mod innovation_form;
 pub mod likelihood;
 pub mod subspace;
@@ -10,6 +11,7 @@ mod verdict;
 
 pub use direct::direct;
 pub use hansen::{HansenData, HansenModel, HansenOptions, hansen, hansen_stream};
+pub use identified::{Deviation, Identified, identify, identify_response};
 pub use innovation_form::{InnovationOptions, NoiseForm};
 pub use subspace::{
     Experiment, Horizon, Order, Stability, SubspaceData, SubspaceMethod, SubspaceModel, SubspaceOptions,

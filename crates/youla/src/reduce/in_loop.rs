@@ -53,6 +53,27 @@ impl<T: TimeDomain> ReductionLoop<T> {
         })
     }
 
+    /// The loop of the factors with a plant itself.
+    ///
+    /// ```text
+    /// T = loop of the plant with J_K:    W_o = T from n to beta,   W_i = T from alpha to u,   N + V S = T from alpha to y
+    /// ```
+    ///
+    /// # Errors
+    /// Ports, sample times, [`Error::AlgebraicLoop`].
+    pub fn of_plant(factors: &CoprimeFactors<T>, plant: &StateSpace<T>) -> Result<Self> {
+        let (m, p) = (factors.inputs(), factors.outputs());
+        let ports = factors.j_k()?;
+        let whole = closed_loop(plant, &ports)?;
+        Ok(ReductionLoop {
+            plant: plant.clone(),
+            weights: FrequencyWeights { output: whole.part(m + p..m + 2 * p, m..m + p), input: whole.part(0..m, 0..m) },
+            response: whole.part(m..m + p, 0..m),
+            ports,
+            controller: with_input_port(&factors.controller()?)?,
+        })
+    }
+
     /// G(S).
     pub fn plant(&self) -> &StateSpace<T> {
         &self.plant

@@ -4,18 +4,18 @@
 //! holds the share p of the models that lie nearest to the estimate. The statement is about the error that the records let
 //! expect, not about what no record shows (an operating point never visited, a mode never excited).
 
-use crate::identify::subspace::{Draw, Interval, Uncertainty};
+use crate::identify::likelihood::{Draw, Interval, Region};
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
-/// Choices of [`certify_band`].
+/// Choices of [`certify_region`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct BandOptions {
-    /// Models that are drawn; a bootstrap has its replicates instead.
+    /// Models that are drawn.
     pub draws: usize,
     /// Seed of the drawing.
     pub seed: u64,
@@ -56,22 +56,21 @@ impl BandCertificate {
     }
 }
 
-/// Tests the loop that `closed` makes of each model of an estimate (S, or a plant), by its largest pole.
+/// Tests the loop that `closed` makes of each plant of a region, by its largest pole. Plants in parallel; the same seed gives the same
+/// result.
 ///
-/// `possible` says which models are left out because something else is known: a machine that ran under K while the records
-/// were taken has a stable S. Where nothing else is known it is true throughout.
-///
-/// `None` where there is no uncertainty. Models in parallel; the same seed gives the same result.
+/// `possible` says which plants are left out because something else is known: the controller that ran stabilised the plant while
+/// the records were taken. Where nothing else is known it is true throughout.
 ///
 /// # Errors
 /// Those of `closed` for the estimate; a loop that is not well posed counts as unstable. [`Error::OutOfRange`] for fewer than 20
 /// draws.
-pub fn certify_band<F>(
-    uncertainty: &Uncertainty,
+pub fn certify_region<F>(
+    region: &Region,
     options: &BandOptions,
     possible: impl Fn(&StateSpace<Discrete>) -> Result<bool> + Sync,
     closed: F,
-) -> Result<Option<BandCertificate>>
+) -> Result<BandCertificate>
 where
     F: Fn(&StateSpace<Discrete>) -> Result<StateSpace<Discrete>> + Sync,
 {
@@ -79,31 +78,30 @@ where
         let what = "the number of models to draw".into();
         return Err(Error::OutOfRange { what, value: options.draws as f64, must: "at least 20" });
     }
-    let Some(level) = uncertainty.level() else { return Ok(None) };
-    let radius = |model: &StateSpace<Discrete>| spectral_radius(&closed(model)?);
-    let draws = uncertainty.draws(options.draws, options.seed);
+    let radius = |plant: &StateSpace<Discrete>| spectral_radius(&closed(plant)?);
+    let draws = region.draws(options.draws, options.seed);
     let mut tested: Vec<(f64, f64)> = draws
         .par_iter()
-        .filter(|draw| possible(&draw.model).unwrap_or(true))
-        .map(|Draw { model, distance }| (*distance, radius(model).unwrap_or(f64::INFINITY)))
+        .filter(|draw| possible(&draw.plant).unwrap_or(true))
+        .map(|Draw { plant, distance }| (*distance, radius(plant).unwrap_or(f64::INFINITY)))
         .collect();
     tested.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let within = (level * tested.len() as f64).floor() as usize;
+    let within = (LEVEL * tested.len() as f64).floor() as usize;
     let unstable = |part: &[(f64, f64)]| part.iter().filter(|(_, radius)| *radius >= 1.0 || radius.is_nan()).count();
-    let Some(radius) = uncertainty.intervals(|model| Ok(vec![radius(model)?]))?.first().copied() else {
-        return Ok(None);
-    };
-    Ok(Some(BandCertificate {
-        level,
+    Ok(BandCertificate {
+        level: LEVEL,
         impossible: draws.len() - tested.len(),
         models: tested.len(),
         within,
         unstable: unstable(&tested),
         unstable_within: unstable(&tested[..within]),
         worst_within: tested[..within].iter().map(|(_, radius)| *radius).fold(0.0, f64::max),
-        radius,
-    }))
+        radius: region.intervals(LEVEL, |plant| Ok(vec![radius(plant)?]))?[0],
+    })
 }
+
+/// Level of regions and intervals.
+const LEVEL: f64 = 0.95;
 
 fn spectral_radius(closed: &StateSpace<Discrete>) -> Result<f64> {
     Ok(closed.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max))

@@ -51,7 +51,7 @@ fn identified(plant: &StateSpace<Discrete>, noise: f64, seed: u64) -> Recommenda
 
 /// Errors at 40 frequencies over the response, and over the stated deviations, root mean squares.
 fn errors(found: &Recommendation, plant: &StateSpace<Discrete>) -> [f64; 2] {
-    let deviation = &found.response_deviation;
+    let deviation = &found.region;
     let (mut relative, mut stated, mut count) = (0.0, 0.0, 0.0);
     for k in (20..140).step_by(3) {
         let omega = [std::f64::consts::TAU * deviation.hz[k]];

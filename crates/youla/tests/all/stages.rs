@@ -49,7 +49,7 @@ fn models_do_not_depend_on_the_number_of_threads() {
             let scheme = found.scheme.unwrap().unwrap();
             let models =
                 (scheme.hansen.deviation.model, scheme.hansen.plant, direct.model, found.recommended.unwrap().plant);
-            let reduced = scheme.reduction.unwrap().unwrap().found;
+            let reduced = found.reduction.unwrap().unwrap().found;
             (models, (reduced.reduction.model, reduced.sweep), scheme.diagram.unwrap())
         })
     };

@@ -32,11 +32,11 @@ fn the_reduction_is_measured_at_every_order() {
     assert!(page.contains("The controller stabilises the reduced model of order 6"));
 }
 
-/// The demonstration's controller stabilises the bearing with hardly any damping; the region of S is small.
+/// The demonstration's controller stabilises the bearing with hardly any damping; the region is small.
 #[test]
-fn the_certificate_covers_the_region_of_s_and_wrong_controllers() {
+fn the_certificate_covers_the_region_of_the_plant() {
     let certificate = &json(&demo().join("summary.json"))["certificate"];
-    let expected = ["band", "controller_errors", "deviation_poles", "identity_residual", "margins", "stable"];
+    let expected = ["band", "deviation_poles", "identity_residual", "margins", "stable"];
     assert_eq!(keys(certificate), expected);
     assert_eq!((&certificate["stable"], &certificate["band"]["holds"]), (&Value::Bool(true), &Value::Bool(true)));
     assert!(certificate["identity_residual"].as_f64().expect("a number") < 1e-9);
@@ -45,22 +45,6 @@ fn the_certificate_covers_the_region_of_s_and_wrong_controllers() {
     let [low, high] = [0, 1].map(|k| numbers(&band["radius"]["bounds"])[k]);
     let estimate = band["radius"]["value"].as_f64().expect("a number");
     assert!(low < estimate && estimate < high && high < 1.0);
-    let errors = certificate["controller_errors"].as_array().expect("an array");
-    let names: Vec<&str> = errors.iter().filter_map(|e| e["error"].as_str()).collect();
-    assert_eq!(names, ["none", "delay", "gain_high", "gain_low", "saturation", "initial_state"]);
-    // With a delay left out S comes out unstable; 5 % of gain move the modes of the machine by less than 1 %.
-    assert!(errors[1]["deviation_radius"].as_f64() > Some(1.0));
-    let machine = |error: &Value| {
-        let modes = error["modes"].as_array().expect("an array").clone();
-        modes.into_iter().filter(|m| m["without"]["hz"].as_f64() > Some(190.0)).collect::<Vec<_>>()
-    };
-    for error in &errors[2..4] {
-        assert_eq!(machine(error).len(), 2);
-        for mode in machine(error) {
-            let ratio = mode["hz"].as_f64().unwrap() / mode["without"]["hz"].as_f64().unwrap();
-            assert!((ratio - 1.0).abs() < 0.01, "{mode}");
-        }
-    }
     let file = json(&demo().join("7-validate/certificate.json"));
     assert_eq!(file["band"], certificate["band"]);
 }

@@ -23,7 +23,7 @@ mod zone;
 pub use channel::{ChannelMargins, DelayLimit, GainLimit, PhaseLimit};
 pub use disk::{DiskMargin, DiskMargins};
 pub use linear::LinearMargins;
-pub use worst::WorstMargins;
+pub use worst::MARGIN_NAMES;
 pub use zone::IsoZone;
 
 use super::{closed_loop, with_input_port};

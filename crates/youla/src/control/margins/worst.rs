@@ -7,56 +7,20 @@ use crate::lti::{StateSpace, TimeDomain};
 use std::cmp::Ordering;
 use std::ops::Range;
 
-/// Margins of a loop, each of its worst channel; `None` where there is none.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct WorstMargins {
-    /// Largest peak of the sensitivity of one output.
-    pub output_sensitivity: Option<f64>,
-    /// Peak of the sensitivity of all outputs.
-    pub all_outputs_sensitivity: Option<f64>,
-    /// The limit of the gain of a channel below 1 that is highest.
-    pub lowest_gain: Option<f64>,
-    /// The limit of the gain of a channel above 1 that is lowest.
-    pub highest_gain: Option<f64>,
-    /// Smallest phase margin, degrees.
-    pub phase_degrees: Option<f64>,
-    /// Smallest delay margin, seconds.
-    pub delay: Option<f64>,
-    /// Normalised coprime margin in scaled channels; `None` without scales.
-    pub coprime: Option<f64>,
-}
+/// Names of the margins with the units of their values, each of its worst channel, in the order of [`critical`].
+pub const MARGIN_NAMES: [&str; FIGURES] = [
+    "peak sensitivity, worst output",
+    "peak sensitivity, all outputs",
+    "lowest gain factor",
+    "highest gain factor",
+    "phase margin, degrees",
+    "delay margin, seconds",
+    "disk margin",
+    "normalised coprime margin",
+];
 
-impl WorstMargins {
-    pub(super) fn of_figures(figures: [Option<f64>; FIGURES]) -> Self {
-        let [output_sensitivity, all_outputs_sensitivity, lowest_gain, highest_gain, phase_degrees, delay, coprime] =
-            figures;
-        WorstMargins {
-            output_sensitivity,
-            all_outputs_sensitivity,
-            lowest_gain,
-            highest_gain,
-            phase_degrees,
-            delay,
-            coprime,
-        }
-    }
-
-    /// Of a plant under `u = K y`, exactly.
-    ///
-    /// # Errors
-    /// As [`super::margins()`].
-    pub fn of<T: TimeDomain>(
-        plant: &StateSpace<T>,
-        controller: &StateSpace<T>,
-        scales: Option<&ChannelScales>,
-    ) -> Result<Self> {
-        let critical = critical(plant, controller, scales)?;
-        Ok(Self::of_figures(critical.map(|margin| margin.map(|m| m.value))))
-    }
-}
-
-/// Figures of [`WorstMargins`].
-pub(super) const FIGURES: usize = 7;
+/// Margins of a loop, each of its worst channel.
+pub(super) const FIGURES: usize = 8;
 
 /// One margin with its place.
 #[derive(Debug, Clone)]
@@ -74,9 +38,10 @@ pub(super) enum Kind {
     Gain(usize),
     Phase(usize),
     Delay(usize),
+    Disk(usize),
 }
 
-/// The exact margins in the order of [`WorstMargins`].
+/// The exact margins in the order of [`MARGIN_NAMES`]; `None` where there is none, and the coprime margin without scales.
 pub(super) fn critical<T: TimeDomain>(
     plant: &StateSpace<T>,
     controller: &StateSpace<T>,
@@ -105,6 +70,9 @@ pub(super) fn critical<T: TimeDomain>(
     let delay = |i: usize, c: &ChannelMargins| {
         c.delay.map(|l| Critical { value: l.seconds, frequency: l.frequency, kind: Kind::Delay(i) })
     };
+    let disk = |i: usize, c: &ChannelMargins| {
+        Some(Critical { value: c.disk.alpha, frequency: c.disk.frequency, kind: Kind::Disk(i) })
+    };
     Ok([
         each(&peak, Ordering::Greater),
         Some(all),
@@ -112,6 +80,7 @@ pub(super) fn critical<T: TimeDomain>(
         each(&|i, c| gain(i, c.highest_gain), Ordering::Less),
         each(&phase, Ordering::Less),
         each(&delay, Ordering::Less),
+        each(&disk, Ordering::Less),
         scales.map(|scales| coprime(plant, controller, scales)).transpose()?.flatten(),
     ])
 }

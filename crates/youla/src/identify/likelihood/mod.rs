@@ -33,7 +33,7 @@ mod tests;
 
 pub use super::subspace::Experiment;
 pub use deviation::mode_estimates::ModeEstimate;
-pub use deviation::response_deviation::{ResponseDeviation, ResponseError};
+pub use deviation::region::{Draw, Interval, Region, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
 pub use options::LikelihoodOptions;
@@ -122,7 +122,7 @@ pub fn recommend(
         plant,
         dead_time: choice.delays.clone(),
         order: choice.order(),
-        response_deviation: ResponseDeviation::new(problem.sizes.clone(), time, (&shares, &variances), directions),
+        region: deviation::region::Region::new(problem.sizes.clone(), time, (&shares, &variances), directions),
         modes: deviation::mode_estimates::modes(&spectra, choice, time),
         candidates,
         evidence,

@@ -2,7 +2,7 @@
 
 use crate::Mat;
 use crate::identify::likelihood::deviation::mode_estimates::ModeEstimate;
-use crate::identify::likelihood::deviation::response_deviation::ResponseDeviation;
+use crate::identify::likelihood::deviation::region::Region;
 use crate::lti::{Discrete, StateSpace};
 
 /// The model that the records support, with its evidence.
@@ -14,8 +14,8 @@ pub struct Recommendation {
     pub dead_time: Vec<usize>,
     /// States without those of the dead time.
     pub order: usize,
-    /// Standard deviations of the frequency response.
-    pub response_deviation: ResponseDeviation,
+    /// The plants that the records do not tell from this one.
+    pub region: Region,
     /// Real poles and pairs with their standard deviations, by natural frequency.
     pub modes: Vec<ModeEstimate>,
     /// Plant and noise as one innovation form.

@@ -215,7 +215,7 @@ fn stated_deviations_are_those_of_the_scatter_over_seeds() {
         let options = LikelihoodOptions { order: Some(1), dead_time: Some(vec![0]), ..Default::default() };
         let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
         let found = recommend(&experiments, &[], None, time(), &options).unwrap();
-        let deviation = &found.response_deviation;
+        let deviation = &found.region;
         for k in (10..140).step_by(30) {
             let omega = [std::f64::consts::TAU * deviation.hz[k]];
             let of = |system: &StateSpace<Discrete>| frequency_response(system, &omega).unwrap().at(0)[(0, 0)];
@@ -283,7 +283,7 @@ fn the_number_of_threads_changes_nothing() {
     let (one, three) = (with(1), with(3));
     assert_eq!(one.plant, three.plant);
     assert_eq!(one.candidates, three.candidates);
-    assert_eq!(one.response_deviation.absolute, three.response_deviation.absolute);
+    assert_eq!(one.region.absolute, three.region.absolute);
 }
 
 #[test]

@@ -10,7 +10,7 @@ pub(crate) mod innovation;
 pub(crate) mod missed;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
-pub(crate) mod response_deviation;
+pub(crate) mod region;
 
 use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
@@ -110,6 +110,35 @@ impl Directions {
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
         Directions { model, delays, chart, root, rivals, missed: None }
+    }
+
+    /// Independent errors of the parameters.
+    pub(crate) fn errors(&self) -> usize {
+        self.root.ncols()
+    }
+
+    /// The model with independent errors of its parameters, in standard deviations, and its dead times.
+    pub(crate) fn moved(&self, errors: &[f64]) -> (Model, &[usize]) {
+        let along = |j: usize| (0..self.root.ncols()).map(|k| self.root[(j, k)] * errors[k]).sum();
+        let step: Vec<f64> = (0..self.root.nrows()).map(along).collect();
+        (self.chart.moved(&self.model, &step), &self.delays)
+    }
+
+    /// Models of another structure that the record does not distinguish, with their dead times and weights.
+    pub(crate) fn rivals(&self) -> impl Iterator<Item = (&Model, &[usize], f64)> {
+        let others = |(model, delays, _): &&(Model, Vec<usize>, f64)| {
+            model.order() != self.model.order() || *delays != self.delays
+        };
+        self.rivals.iter().filter(others).map(|(model, delays, root)| (model, delays.as_slice(), root * root))
+    }
+
+    /// The rival that a number between 0 and 1 picks, with the frequency of its weight; `None` for the model itself.
+    pub(crate) fn rival_at(&self, chance: f64) -> Option<(&Model, &[usize])> {
+        let mut passed = 0.0;
+        self.rivals().find_map(|(model, delays, weight)| {
+            passed += weight;
+            (chance < passed).then_some((model, delays))
+        })
     }
 
     /// The error that the excitation shows.

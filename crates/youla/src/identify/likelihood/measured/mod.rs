@@ -32,7 +32,7 @@ mod tests;
 pub use data::{MeasuredResponse, ResponseTable, ResponseVariance};
 
 use super::LikelihoodOptions;
-use crate::identify::likelihood::deviation::response_deviation::ResponseDeviation;
+use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::{Directions, inverse_root, mode_estimates, physical};
 use crate::identify::likelihood::recommendation::{Predictor, Recommendation};
 use crate::lti::{Discrete, StateSpace};
@@ -94,12 +94,7 @@ pub fn recommend_from_response(
         plant,
         dead_time: chosen.delays.clone(),
         order: chosen.model.order(),
-        response_deviation: ResponseDeviation::new(
-            problem.sizes().clone(),
-            response.time,
-            (&shares, &variances),
-            directions,
-        ),
+        region: Region::new(problem.sizes().clone(), response.time, (&shares, &variances), directions),
         modes,
         candidates,
         evidence,

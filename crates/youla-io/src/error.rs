@@ -73,6 +73,14 @@ pub enum Error {
         /// What is wrong.
         problem: String,
     },
+    /// A table holds no frequency response.
+    #[error("{}: {problem}", path.display())]
+    NotAResponse {
+        /// The file.
+        path: PathBuf,
+        /// What is missing.
+        problem: String,
+    },
     /// The operating system failed to read or write a file.
     #[error("{}: {source}", path.display())]
     Io {
@@ -223,7 +231,7 @@ impl From<Error> for youla::Error {
 youla::error_context! {
     sources: Method;
     numerical: Json;
-    bad_input: Settings OutputExists NotReplaced Unwritable FileExists NotAModel Io MissingFile NoData Cell FieldCount
+    bad_input: Settings OutputExists NotReplaced Unwritable FileExists NotAModel NotAResponse Io MissingFile NoData Cell FieldCount
         Delimiter Corrupt
         FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit SampleTimeMissing;
 }

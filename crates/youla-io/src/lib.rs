@@ -11,6 +11,7 @@
 //! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
 //! | [`read_npz`], [`NpyStream`] | NumPy archives and arrays |
 //! | [`read_uff58`] | universal files, dataset 58: measured responses |
+//! | [`read_response`] | tables of measured responses |
 //! | [`read_parquet`], `ParquetWriter` | Parquet, with the feature `parquet` |
 //! | [`Variables`] | the contents of a MATLAB, NumPy or Parquet file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
@@ -52,6 +53,7 @@ mod npz;
 mod open;
 #[cfg(feature = "parquet")]
 mod parquet;
+mod response;
 #[cfg(test)]
 pub(crate) mod scratch;
 mod source;
@@ -77,6 +79,7 @@ pub use open::{open, read_text};
 #[cfg(feature = "parquet")]
 pub use parquet::{ColumnValues, ParquetWriter};
 pub use parquet::{parquet_from_bytes, read_parquet};
+pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource};

@@ -17,8 +17,7 @@ NUMBERS = ['0', '-1', '1', '2', '1e300', '-1e300', '1e-300', '5e-324', '1e308', 
            'true', '""', '[]', '{}', '"\\u001b[2J"', '[[]]', '[1e300]', '[nan]', '[0.0]']
 VALUES = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e308, 5e-324, 1e-300, 0.0, 1e30, -1e17]
 VERBS = [['check', 'run.toml'], ['identify', 'run.toml', '--out', 'out', '--force'], ['excite', 'run.toml', '--amplitude', '0.5', '--band', '5,100', '--duration', '1', '--out', 'out'],
-         ['signals', 'run.toml', '--out', 'out'], ['check', 'LOG', '--input', 'u', '--output', 'y', '--sample-time', '1e-3'], ['init', 'LOG', '--out', 'new.toml'],
-         ['subspace', 'LOG', '--input', 'u', '--output', 'y', '--sample-time', '1e-3', '--out', 'out']]
+         ['signals', 'run.toml', '--out', 'out'], ['check', 'LOG', '--input', 'u', '--output', 'y', '--sample-time', '1e-3'], ['init', 'LOG', '--out', 'new.toml']]
 OF_RUN = [['report', 'run'], ['compare', 'run', 'other'], ['plot', 'run', 'all'], ['export', 'run', '--to', 'c-controller', '--out', 'c.h']] + [
     ['export', 'run', '--to', to, '--out', f'model.{to}'] for to in ('npz', 'mat', 'python', 'matlab', 'c')]
 OF_MODEL = [['export', 'model.json', '--to', to, '--out', 'x'] for to in ('npz', 'mat', 'python', 'matlab', 'c')]

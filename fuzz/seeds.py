@@ -100,8 +100,6 @@ model = {'a': np.eye(2) / 2, 'b': np.ones((2, 1)), 'c': np.ones((1, 2)), 'd': np
 put('model', 'model.mat', matlab({**model, 'inputs': np.array([['u']], dtype=object)}, False))
 put('npz', 'two.npz', saved(u=np.arange(4.0), y=np.arange(4, dtype=np.float32).reshape(2, 2)))
 put('npz', 'text.npz', saved(names=np.array(['u', 'y']), n=np.int16(3)))
-put('npy', 'rows.npy', array(np.arange(6.0).reshape(3, 2)))
-put('npy', 'columns.npy', array(np.asfortranarray(np.arange(6, dtype='>f4').reshape(3, 2))))
 k = np.arange(40)
 log = pa.table({
     't': pa.array(1763000000123456789 + 1000000 * k, pa.timestamp('ns')), 'u [V]': k**2 / 8, 'y.1': (k / 4).astype(np.float32),

@@ -3,7 +3,7 @@
 use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, study, subspace};
+use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, study};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -30,8 +30,6 @@ Examples:
   youla excite run.toml --amplitude 0.5 --band 20,400 --duration 4 --limit-output 30
                                                an excitation for the running machine that keeps its limits
   youla signals run.toml --out signals         alpha and beta as CSV, to go on in another tool
-  youla subspace long.npy --input '#1' --output '#2' --sample-time 1e-4
-                                               a model straight from a file of any length
   youla report runs/demo-levitated-mass-001       draw the report of a run again from its data
   youla plot runs/demo-levitated-mass-001 bode --width 8.5
                                                figures for a paper, from the same data
@@ -96,11 +94,6 @@ pub(crate) enum Command {
         #[arg(long, value_name = "DIR", default_value = "signals")]
         out: PathBuf,
     },
-    /// Identify a model from u to y by subspace identification, straight from files of any length.
-    ///
-    /// The files are read in two passes, three if ill-conditioned data need QR. Memory does not depend on their length.
-    #[command(after_help = subspace::EXAMPLES)]
-    Subspace(subspace::SubspaceArgs),
     /// Print the JSON schema of run.toml, for editors.
     #[command(
         after_help = "Example:\n  youla schema > run.schema.json\n\nand, as the first line of run.toml: #:schema run.schema.json"
@@ -110,15 +103,6 @@ pub(crate) enum Command {
         #[arg(long)]
         markdown: bool,
     },
-    /// Print the completions of a shell.
-    #[command(after_help = "Example:\n  source <(youla completions bash)")]
-    Completions {
-        /// The shell.
-        shell: clap_complete::Shell,
-    },
-    /// Print the man page.
-    #[command(after_help = "Example:\n  youla man > ~/.local/share/man/man1/youla.1")]
-    Man,
     /// Draw report.html of a run again from its report.json.
     #[command(after_help = "Example:\n  youla report runs/demo-levitated-mass-001")]
     Report {
@@ -144,12 +128,12 @@ pub(crate) enum Command {
     /// inputs and outputs are checked, and the accuracy of the modes is predicted.
     #[command(after_help = excite::EXAMPLES)]
     Excite(Box<excite::ExciteArgs>),
-    /// Record a machine that speaks youla-link, read its status, load Q, or play such a machine.
+    /// Record a machine that speaks youla-link, read its status, load Q, or simulate such a machine.
     #[command(subcommand)]
     Rig(rig::RigCommand),
     /// Commission a controller on the twin of the gas bearing: excite, record, identify, redesign, switch and verify at each operating point.
     ///
-    /// An interrupted campaign goes on where it was. It ends at the first point whose model is not trusted, whose new controller is not
+    /// An interrupted campaign resumes. It ends at the first point whose model is not trusted, whose new controller is not
     /// certified or confirmed, or whose verification is worse than predicted; alpha and Q are then zero, and the exit code is 1.
     #[command(after_help = commission::EXAMPLES)]
     Commission(commission::CommissionArgs),

@@ -1,11 +1,11 @@
 //! `youla check`: what is wrong with the data.
 
 use crate::log_flags::{LogFlags, places};
-use crate::output::{Failure, Form, say, say_wrapped};
+use crate::output::{Failure, Form};
 use crate::run_folder::folder_of;
 use clap::Args;
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use youla_io::folder::require_place;
 use youla_loop::check::Severity;
 use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, read_check_options};
@@ -42,18 +42,13 @@ pub(crate) fn check(form: Form, args: &CheckArgs) -> Result<bool, Failure> {
     }
     args.out.as_ref().map_or(Ok(()), |folder| require_place(&folder.join("check.json")))?;
     let found = if args.log.input.is_empty() { of_run(args)? } else { of_files(args)? };
-    let json =
-        serde_json::to_string_pretty(&found.entry()).map_err(|e| Failure::io(Path::new("the check"), e.into()))?;
+    let json = serde_json::json!(found.entry());
     if let Some(folder) = &args.out {
         let file = folder.join("check.json");
         fs::create_dir_all(folder).map_err(|source| Failure::io(folder, source))?;
-        fs::write(&file, json.clone() + "\n").map_err(|source| Failure::io(&file, source))?;
+        fs::write(&file, format!("{json:#}\n")).map_err(|source| Failure::io(&file, source))?;
     }
-    match (form.json, form.quiet) {
-        (true, _) => say(&json)?,
-        (_, true) => {}
-        _ => say_wrapped(&text(&found))?,
-    }
+    form.print(|| json, || text(&found))?;
     Ok(found.count(Severity::Defect) == 0)
 }
 

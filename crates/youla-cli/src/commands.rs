@@ -2,11 +2,11 @@
 
 use crate::args::{Args, Command};
 use crate::demo::demo;
-use crate::output::{Failure, Form, Progress, say, say_wrapped};
+use crate::output::{Failure, Form, say};
+use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, commission, compare, excite, export, init, manual, paper, plot, rig, study, subspace, table};
-use clap::CommandFactory;
-use std::path::{Path, PathBuf};
+use crate::{check, commission, compare, excite, export, init, paper, plot, rig, study, table};
+use std::path::Path;
 use youla_io::folder::{NumberedFolder, RunFolder};
 use youla_run::{
     RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_reference,
@@ -33,12 +33,9 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
             let (settings, folder) = args.settings()?;
             identify_and_write(form, &args.output_folder, &folder, settings, |s| read_records(&s.data, &folder))
         }
-        Command::Completions { shell } => manual::completions(*shell, Args::command()),
-        Command::Man => manual::man_page(&Args::command()),
         Command::Schema { markdown } => schema(*markdown),
         Command::Init(args) => init::init(form, args),
         Command::Signals { settings, out } => signals(form, settings, out),
-        Command::Subspace(args) => subspace::identify(form, args),
         Command::Report { run } => report(form, run),
         Command::Compare(args) => compare::run(form, args),
         Command::Excite(args) => excite::make(form, args),
@@ -64,20 +61,17 @@ fn identify_and_write(
     };
     let target = output.out.as_deref().or(numbered.as_ref().map(NumberedFolder::path)).unwrap_or(Path::new("run"));
     RunFolder::check(target, output.force)?;
-    let progress = Progress::new(form.quiet || form.json);
-    let mut announce = |stage: Stage| progress.stage(stage);
+    let progress = Progress::new(form.is_silent());
+    let mut announce = |stage: Stage| {
+        let position = 1 + Stage::ALL.iter().position(|s| *s == stage).unwrap_or_default();
+        progress.show(&format!("[{position}/{}] {}", Stage::ALL.len(), stage.name()));
+    };
     let mut clock = StageClock::new(&mut announce);
     let records = clock.run(Stage::Record, || read(&settings))?;
     let found = identify(settings, records, folder, &mut clock)?;
     let written = write_run(&found, target, output.force, &mut clock)?;
-    progress.finish();
-    if form.json {
-        say(&written.summary.to_string())
-    } else if form.quiet {
-        Ok(())
-    } else {
-        say_wrapped(&table::results(&found, &written))
-    }
+    progress.clear();
+    form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))
 }
 
 fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {
@@ -87,15 +81,15 @@ fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {
     let factorisation = factorise_run(&settings, &records, &folder)?;
     let signals = signal_records(&factorisation.factors, &records)?;
     let paths = write_signals(&signals, out)?;
-    let written = || signals.iter().map(|record| record.samples()).zip(&paths);
-    match (form.json, form.quiet) {
-        (true, _) => {
-            let about = |(samples, path): (usize, &PathBuf)| serde_json::json!({ "file": path.display().to_string(), "samples": samples });
-            say(&serde_json::Value::from(written().map(about).collect::<Vec<_>>()).to_string())
-        }
-        (_, true) => Ok(()),
-        _ => written().try_for_each(|(samples, path)| say(&format!("{} ({samples} samples)", path.display()))),
-    }
+    let written: Vec<(usize, String)> = signals
+        .iter()
+        .map(|record| record.samples())
+        .zip(paths.iter().map(|path| path.display().to_string()))
+        .collect();
+    form.print(
+        || written.iter().map(|(samples, file)| serde_json::json!({ "file": file, "samples": samples })).collect(),
+        || written.iter().map(|(samples, file)| format!("{file} ({samples} samples)")).collect::<Vec<_>>().join("\n"),
+    )
 }
 
 fn schema(markdown: bool) -> Result<(), Failure> {
@@ -107,9 +101,5 @@ fn schema(markdown: bool) -> Result<(), Failure> {
 
 fn report(form: Form, run: &Path) -> Result<(), Failure> {
     let path = redraw(run)?;
-    match (form.json, form.quiet) {
-        (true, _) => say(&serde_json::json!({ "report": path.display().to_string() }).to_string()),
-        (_, true) => Ok(()),
-        _ => say(&path.display().to_string()),
-    }
+    form.print(|| serde_json::json!({ "report": path.display().to_string() }), || path.display().to_string())
 }

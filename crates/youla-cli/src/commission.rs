@@ -1,6 +1,6 @@
 //! `youla commission`: the circle of commissioning on the twin of the gas bearing.
 
-use crate::output::{Failure, Form, ask_line, say, say_wrapped};
+use crate::output::{Failure, Form, ask_line};
 use clap::Args;
 use std::path::PathBuf;
 use youla_commission::{CampaignSummary, Operator, PointStatus, commission};
@@ -14,7 +14,7 @@ Example:
 pub(crate) struct CommissionArgs {
     /// The campaign: machine, limits, goal, operating points.
     campaign: PathBuf,
-    /// Folder of the results; one that holds a part of the same campaign is completed.
+    /// Folder of the results; an unfinished campaign there is resumed.
     #[arg(long)]
     out: PathBuf,
     /// Switch without asking a person; with --json nobody is asked, and nothing is switched without it.
@@ -45,9 +45,9 @@ impl Operator for Terminal {
     }
 
     fn notes(&mut self, text: &str) {
-        if !(self.form.quiet || self.form.json) {
+        if !self.form.json {
             // Without an output the campaign goes on.
-            let _ = say_wrapped(text);
+            let _ = self.form.print(|| serde_json::Value::Null, || text.to_owned());
         }
     }
 }
@@ -56,13 +56,7 @@ impl Operator for Terminal {
 pub(crate) fn run(form: Form, args: &CommissionArgs) -> Result<bool, Failure> {
     let mut terminal = Terminal { form, yes: args.yes };
     let summary = commission(&args.campaign, &args.out, &mut terminal)?;
-    if form.json {
-        let text = serde_json::to_string(&summary)
-            .map_err(|e| Failure::io(&args.out.join("summary.json"), std::io::Error::from(e)))?;
-        say(&text)?;
-    } else if !form.quiet {
-        say_wrapped(&sentences(&summary, args))?;
-    }
+    form.print(|| serde_json::json!(summary), || sentences(&summary, args))?;
     Ok(summary.done)
 }
 

@@ -1,6 +1,6 @@
 //! `youla compare`: finished runs beside each other.
 
-use crate::output::{Failure, Form, say, say_wrapped};
+use crate::output::{Failure, Form};
 use crate::table::fitted;
 use crate::terminal;
 use clap::Args;
@@ -36,11 +36,7 @@ pub(crate) fn run(form: Form, args: &CompareArgs) -> Result<(), Failure> {
     require_place(&args.out)?;
     let found = compare(&args.runs, &args.model)?;
     write_comparison(&found, &args.out, args.force)?;
-    match (form.json, form.quiet) {
-        (true, _) => say(&serde_json::json!(found).to_string()),
-        (_, true) => Ok(()),
-        _ => say_wrapped(&text(&found, args)),
-    }
+    form.print(|| serde_json::json!(found), || text(&found, args))
 }
 
 fn text(found: &Comparison, args: &CompareArgs) -> String {

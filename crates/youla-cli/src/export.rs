@@ -1,6 +1,6 @@
 //! `youla export`: a model or the controller of a run, for another tool.
 
-use crate::output::{Failure, Form, say};
+use crate::output::{Failure, Form};
 use clap::Args;
 use std::path::PathBuf;
 use youla_io::export::{ModelFormat, c_controller, c_loop, export_model, write_export};
@@ -73,7 +73,7 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
     if let Some(problem) = misplaced {
         return Err(youla_io::Error::NotAModel { path: args.source.clone(), problem: problem.into() }.into());
     }
-    let (bytes, default, about) = match args.to {
+    let (bytes, default, mut about) = match args.to {
         Format::Model(format) => {
             let model = model_for_export(&args.source, args.model.as_deref())?;
             let about = serde_json::json!({
@@ -100,15 +100,9 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
     };
     let path = args.out.clone().unwrap_or(default);
     write_export(&path, &bytes, args.force)?;
-    match (form.json, form.quiet) {
-        (true, _) => {
-            let mut about = about;
-            about["file"] = serde_json::json!(path.display().to_string());
-            say(&about.to_string())
-        }
-        (_, true) => Ok(()),
-        _ => say(&path.display().to_string()),
-    }
+    let file = path.display().to_string();
+    about["file"] = file.as_str().into();
+    form.print(|| about, || file)
 }
 
 /// The name of a model may come from a file: only letters, digits, `-` and `_` of it.

@@ -87,8 +87,7 @@ pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
     let csv = args.dialect.options();
     let columns = survey(&args.log, &csv)?;
     let missing = missing(args);
-    let silent = form.quiet || form.json;
-    if !silent || (!missing.is_empty() && !form.json) {
+    if !form.is_silent() || (!missing.is_empty() && !form.json) {
         say(&table(&columns))?;
     }
     if !missing.is_empty() && !std::io::stdin().is_terminal() {
@@ -98,11 +97,7 @@ pub(crate) fn init(form: Form, args: &InitArgs) -> Result<(), Failure> {
     let draft = answered(args, &columns)?;
     let text = draft.toml(&columns)?;
     std::fs::write(&args.out, text).map_err(|source| Failure::io(&args.out, source))?;
-    match (form.json, form.quiet) {
-        (true, _) => say(&about(args, &draft, &columns).to_string()),
-        (_, true) => Ok(()),
-        _ => say(&next(args, &draft)),
-    }
+    form.print(|| about(args, &draft, &columns), || next(args, &draft))
 }
 
 /// What was written, and the columns of the log.

@@ -1,7 +1,6 @@
 //! Ctrl-C in a computation that writes its results as it goes.
 
-use indicatif::ProgressBar;
-use std::io::Write;
+use crate::progress::Progress;
 use std::path::Path;
 
 /// The exit code of a program that SIGINT ended, as shells count it: 128 + 2.
@@ -9,16 +8,14 @@ const INTERRUPTED: i32 = 130;
 
 /// From here on Ctrl-C ends the program with exit code 130 and one sentence: where the finished items are and how to go on. An item is
 /// written by one call of the system, so that at most the last one is incomplete; the next call computes it again.
-pub(crate) fn resumable(items: &'static str, folder: &Path, bar: &ProgressBar) {
+pub(crate) fn resumable(items: &'static str, folder: &Path) {
     let sentence = format!(
         "interrupted: the finished {items} are kept in {}; run the same command again to continue from them",
         folder.display()
     );
-    let bar = bar.clone();
     // Where no handler can be set, Ctrl-C ends the program without the sentence; the finished items are kept all the same.
     let _ = ctrlc::set_handler(move || {
-        bar.finish_and_clear();
-        let _ = writeln!(std::io::stderr(), "{}", crate::output::shown(&sentence));
+        Progress::new(false).say(&crate::output::sanitised(&sentence));
         std::process::exit(INTERRUPTED);
     });
 }

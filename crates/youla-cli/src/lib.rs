@@ -13,22 +13,26 @@ mod identify;
 mod init;
 mod interrupt;
 mod log_flags;
-mod manual;
 mod output;
 mod paper;
 mod plot;
+mod progress;
 mod rig;
 mod run_folder;
 mod study;
-mod subspace;
 mod table;
 mod terminal;
 
 pub use demo::{Machine, demo};
 pub use output::Failure;
 
-use clap::Parser;
+use clap::{CommandFactory, Parser};
 use std::ffi::OsString;
+
+/// The description of the command line, from which the example `manual` writes man page and completions.
+pub fn command() -> clap::Command {
+    args::Args::command()
+}
 
 /// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect or a campaign stopped;
 /// 2 for input that cannot be used; 3 for an impossible computation. Ctrl-C in `paper` and `study` ends the process with 130.

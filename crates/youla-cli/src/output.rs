@@ -1,13 +1,11 @@
-//! Standard output, progress on the terminal, and how failures end the program.
+//! What the program prints, and how failures end it.
 
 use crate::terminal;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::Value;
 use std::io::Write;
-use std::path::Path;
-use std::time::Duration;
+use std::path::{Path, PathBuf};
 use youla::ErrorKind;
-use youla_run::{ReadingProgress, Stage};
 
 /// How results are printed.
 #[derive(Debug, Clone, Copy, Args)]
@@ -18,6 +16,27 @@ pub(crate) struct Form {
     /// Print the result as JSON instead of a table; of a run, the contents of summary.json.
     #[arg(long, global = true, conflicts_with = "quiet")]
     pub(crate) json: bool,
+}
+
+impl Form {
+    /// Whether nobody reads words: neither text nor progress is shown.
+    pub(crate) fn is_silent(self) -> bool {
+        self.quiet || self.json
+    }
+
+    /// Prints a result, in the form that was asked for.
+    pub(crate) fn print(self, json: impl FnOnce() -> Value, text: impl FnOnce() -> String) -> Result<(), Failure> {
+        match (self.json, self.quiet) {
+            (true, _) => say(&json().to_string()),
+            (_, true) => Ok(()),
+            _ => print(&terminal::shown(&sanitised(&text()))),
+        }
+    }
+}
+
+/// Paths, one on each line.
+pub(crate) fn lines_of(paths: &[PathBuf]) -> String {
+    paths.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join("\n")
 }
 
 /// Why the program ends early.
@@ -53,7 +72,7 @@ pub(crate) fn fail(failure: &Failure) -> u8 {
         Failure::OutputClosed => 0,
         Failure::Refused(sentence, kind) => {
             // Without standard error the progress is not shown.
-            let _ = writeln!(std::io::stderr(), "{} {}", terminal::error_word(), shown(sentence));
+            let _ = writeln!(terminal::stderr(), "{} {}", terminal::error_word(), sanitised(sentence));
             match kind {
                 ErrorKind::BadInput => 2,
                 ErrorKind::Numerical => 3,
@@ -63,7 +82,7 @@ pub(crate) fn fail(failure: &Failure) -> u8 {
 }
 
 /// Names come from files: what would command the terminal or turn the direction of the text is written as `\u001b`, as in JSON.
-pub(crate) fn shown(text: &str) -> String {
+pub(crate) fn sanitised(text: &str) -> String {
     let commands = |c: char| {
         let turns =
             matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
@@ -76,18 +95,18 @@ pub(crate) fn shown(text: &str) -> String {
     out
 }
 
-/// Prints text for people: words wrapped at the width of the terminal, and colour where there is one.
-pub(crate) fn say_wrapped(text: &str) -> Result<(), Failure> {
-    print(&terminal::shown(&shown(text)))
+/// Prints text as it is to standard output.
+pub(crate) fn say(text: &str) -> Result<(), Failure> {
+    print(&sanitised(text))
 }
 
-/// Prints a line to standard output.
-pub(crate) fn say(text: &str) -> Result<(), Failure> {
-    print(&shown(text))
+/// Prints a file that a command has written.
+pub(crate) fn say_file(path: &Path) -> Result<(), Failure> {
+    say(std::fs::read_to_string(path).map_err(|e| Failure::io(path, e))?.trim_end())
 }
 
 fn print(text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
+    let mut out = terminal::stdout();
     writeln!(out, "{text}").and_then(|()| out.flush()).map_err(|e| match e.kind() {
         std::io::ErrorKind::BrokenPipe => Failure::OutputClosed,
         _ => Failure::io(Path::new("standard output"), e),
@@ -100,59 +119,13 @@ pub(crate) fn ask_line(question: &str) -> Result<(), Failure> {
     write!(out, "{question}: ").and_then(|()| out.flush()).map_err(|e| Failure::io(Path::new("the terminal"), e))
 }
 
-/// One bar over the stages, on a terminal only.
-pub(crate) struct Progress(ProgressBar);
-
-impl Progress {
-    pub(crate) fn new(hidden: bool) -> Self {
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(Stage::ALL.len() as u64) };
-        if let Ok(style) = ProgressStyle::with_template("{spinner} [{pos}/{len}] {msg} ({elapsed})") {
-            bar.set_style(style);
-        }
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Progress(bar)
-    }
-
-    pub(crate) fn stage(&self, stage: Stage) {
-        let position = Stage::ALL.iter().position(|s| *s == stage).unwrap_or_default();
-        self.0.set_position(position as u64 + 1);
-        self.0.set_message(stage.name());
-    }
-
-    pub(crate) fn finish(&self) {
-        self.0.finish_and_clear();
-    }
-}
-
-/// Samples read so far, on a terminal only.
-pub(crate) struct Reading(ProgressBar);
-
-impl Reading {
-    pub(crate) fn new(hidden: bool) -> Self {
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new_spinner() };
-        if let Ok(style) = ProgressStyle::with_template("{spinner} {msg} {human_pos} samples ({elapsed})") {
-            bar.set_style(style);
-        }
-        Reading(bar)
-    }
-
-    pub(crate) fn at(&self, at: ReadingProgress) {
-        self.0.set_message(format!("pass {}:", at.pass));
-        self.0.set_position(at.samples);
-    }
-
-    pub(crate) fn finish(&self) {
-        self.0.finish_and_clear();
-    }
-}
-
 #[cfg(test)]
 mod tests {
-    use super::shown;
+    use super::sanitised;
 
     #[test]
     fn nothing_commands_the_terminal() {
-        assert_eq!(shown("a\u{1b}[2Jb\r\n\tc \u{202e}d\u{9b}"), "a\\u001b[2Jb\\u000d\n\tc \\u202ed\\u009b");
-        assert_eq!(shown("täglich 5 µm – gut"), "täglich 5 µm – gut");
+        assert_eq!(sanitised("a\u{1b}[2Jb\r\n\tc \u{202e}d\u{9b}"), "a\\u001b[2Jb\\u000d\n\tc \\u202ed\\u009b");
+        assert_eq!(sanitised("täglich 5 µm – gut"), "täglich 5 µm – gut");
     }
 }

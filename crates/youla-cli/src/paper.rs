@@ -1,13 +1,11 @@
 //! `youla paper` and `youla study merge`: settings from the arguments, progress with the remaining time, Table 1 at the end.
 
 use crate::interrupt;
-use crate::output::{Failure, Form, say};
+use crate::output::{Failure, Form, say, say_file};
+use crate::progress::Progress;
 use crate::table;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 use youla_paper::rig::RigParameters;
 use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
 use youla_paper::study::{Method, PaperSettings, Shard};
@@ -105,22 +103,27 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
 }
 
 fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
-    let bar = Bar::new(form.quiet || form.json);
-    interrupt::resumable("loops", target, &bar.bar);
-    let written = paper(configuration, target, &|progress| bar.show(progress))?;
-    bar.bar.finish_and_clear();
+    let progress = Progress::new(form.is_silent());
+    interrupt::resumable("loops", target);
+    let written = paper(configuration, target, &|now| match now {
+        PaperProgress::Begins(stage, loops) => progress.begin(stage.name(), loops),
+        PaperProgress::Done(loops) => progress.done(loops),
+        PaperProgress::Continued { path, loops, redone } => {
+            say_continued(&progress, path, &format!("{loops} loops"), redone);
+        }
+    })?;
+    progress.clear();
+    let summary = target.join("summary.json");
     match &written.paper {
-        _ if form.quiet => Ok(()),
-        Some(_) if form.json => {
-            let path = target.join("summary.json");
-            say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end())
-        }
-        Some(paper) => say(&table::paper(paper, &written)),
-        None if form.json => {
+        Some(_) if form.json => say_file(&summary),
+        Some(paper) => form.print(Default::default, || table::paper(paper, &written)),
+        None => {
             let (folder, shard) = (written.folder.display().to_string(), configuration.shard.to_string());
-            say(&serde_json::json!({ "folder": folder, "shard": shard }).to_string())
+            form.print(
+                || serde_json::json!({ "folder": folder, "shard": shard }),
+                || part_of(configuration.shard, &written),
+            )
         }
-        None => say(&part_of(configuration.shard, &written)),
     }
 }
 
@@ -129,61 +132,11 @@ fn part_of(shard: Shard, written: &WrittenPaper) -> String {
     format!("shard {shard} is complete: {folder}\nwhen all parts are: youla study merge PART... --out DIR")
 }
 
-/// One bar per stage, on a terminal only.
-pub(crate) struct Bar {
-    pub(crate) bar: ProgressBar,
-    quiet: bool,
-}
-
-impl Bar {
-    pub(crate) fn new(hidden: bool) -> Self {
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(0) };
-        bar.enable_steady_tick(Duration::from_millis(100));
-        Bar { bar, quiet: hidden }
-    }
-
-    fn show(&self, progress: PaperProgress<'_>) {
-        match progress {
-            PaperProgress::Begins(stage, loops) => self.begin(stage.name(), loops),
-            PaperProgress::Done(loops) => self.bar.set_position(loops as u64),
-            PaperProgress::Continued { path, loops, redone } => self.continued(path, &format!("{loops} loops"), redone),
-        }
-    }
-
-    /// A file of an earlier call.
-    pub(crate) fn continued(&self, path: &Path, found: &str, redone: usize) {
-        let path = path.display();
-        let damaged = if redone > 0 {
-            format!(", {redone} damaged or incomplete rows are computed again")
-        } else {
-            String::new()
-        };
-        self.say(&format!("{path}: {found} are there already{damaged}"));
-        // The remaining time is that of the loops of this call.
-        self.bar.reset_eta();
-    }
-
-    /// Above the bar, or on standard error where there is none to be seen.
-    fn say(&self, text: &str) {
-        if !self.quiet && self.bar.is_hidden() {
-            // Without standard error the progress is not shown.
-            let _ = writeln!(std::io::stderr(), "{text}");
-        } else {
-            self.bar.println(text);
-        }
-    }
-
-    pub(crate) fn begin(&self, stage: &'static str, loops: usize) {
-        let template = if loops > 0 {
-            "{spinner} {msg} {wide_bar} {pos}/{len}, {elapsed} gone, {eta} left"
-        } else {
-            "{spinner} {msg} ({elapsed})"
-        };
-        if let Ok(style) = ProgressStyle::with_template(template) {
-            self.bar.set_style(style);
-        }
-        self.bar.reset();
-        self.bar.set_length(loops as u64);
-        self.bar.set_message(stage);
-    }
+/// A file of an earlier call.
+pub(crate) fn say_continued(progress: &Progress, path: &Path, found: &str, redone: usize) {
+    let damaged = match redone {
+        0 => String::new(),
+        _ => format!(", {redone} damaged or incomplete rows are computed again"),
+    };
+    progress.say(&format!("{}: {found} are there already{damaged}", path.display()));
 }

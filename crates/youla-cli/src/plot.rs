@@ -1,6 +1,6 @@
 //! `youla plot`: figures of a run as SVG and CSV.
 
-use crate::output::{Failure, Form, say};
+use crate::output::{Failure, Form, lines_of};
 use clap::Args;
 use std::path::PathBuf;
 use youla_report::{FigureChoice, Print};
@@ -65,18 +65,12 @@ pub(crate) fn plot(form: Form, args: &PlotArgs) -> Result<(), Failure> {
     let folder = args.out.clone().unwrap_or_else(|| args.run.join("figures"));
     let paths = write_plots(&folder, &files)?;
     youla_io::folder::add_to_list(&args.run, &paths)?;
-    match (form.json, form.quiet) {
-        (true, _) => {
-            let about = |plot: &Plot| {
-                let files = paths.iter().filter(|path| path.file_stem().is_some_and(|stem| stem == plot.name.as_str()));
-                let files: Vec<String> = files.map(|path| path.display().to_string()).collect();
-                serde_json::json!({ "figure": plot.name, "title": plot.title, "caption": plot.caption, "files": files })
-            };
-            say(&serde_json::Value::from(plots.iter().map(about).collect::<Vec<_>>()).to_string())
-        }
-        (_, true) => Ok(()),
-        _ => paths.iter().try_for_each(|path| say(&path.display().to_string())),
-    }
+    let about = |plot: &Plot| {
+        let files = paths.iter().filter(|path| path.file_stem().is_some_and(|stem| stem == plot.name.as_str()));
+        let files: Vec<String> = files.map(|path| path.display().to_string()).collect();
+        serde_json::json!({ "figure": plot.name, "title": plot.title, "caption": plot.caption, "files": files })
+    };
+    form.print(|| plots.iter().map(about).collect(), || lines_of(&paths))
 }
 
 /// The files of one figure, the numbers last.
@@ -88,12 +82,8 @@ fn files(plot: &Plot, only_numbers: bool) -> Vec<(String, Vec<u8>)> {
 
 fn list(form: Form, args: &PlotArgs) -> Result<(), Failure> {
     let figures = plottable(&args.run)?;
-    match (form.json, form.quiet) {
-        (true, _) => {
-            let all = figures.iter().map(|f| serde_json::json!({ "figure": f.key(), "about": f.about() }));
-            say(&serde_json::Value::from(all.collect::<Vec<_>>()).to_string())
-        }
-        (_, true) => Ok(()),
-        _ => figures.iter().try_for_each(|figure| say(&format!("{:<16} {}", figure.key(), figure.about()))),
-    }
+    form.print(
+        || figures.iter().map(|f| serde_json::json!({ "figure": f.key(), "about": f.about() })).collect(),
+        || figures.iter().map(|f| format!("{:<16} {}", f.key(), f.about())).collect::<Vec<_>>().join("\n"),
+    )
 }

@@ -1,8 +1,9 @@
 //! `youla study`: the study of starts, and parts of the study of the paper.
 
 use crate::interrupt;
-use crate::output::{Failure, Form, say};
-use crate::paper::{self, Bar};
+use crate::output::{Failure, Form, say_file};
+use crate::paper;
+use crate::progress::Progress;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use youla_paper::run_starts::{StartsProgress, WrittenStarts, starts};
@@ -71,22 +72,20 @@ fn count(form: Form, args: &StartsArgs) -> Result<(), Failure> {
     let settings = StartsSettings::shipped(&cases, args.items, args.seed);
     let default = || Path::new("runs").join(format!("starts-seed-{}", args.seed));
     let target = args.out.clone().unwrap_or_else(default);
-    let bar = Bar::new(form.quiet || form.json);
-    interrupt::resumable("items", &target, &bar.bar);
-    let written = starts(&settings, &target, &|progress| match progress {
-        StartsProgress::Begins(case, items) => bar.begin(case.key(), items),
-        StartsProgress::Done(items) => bar.bar.set_position(items as u64),
-        StartsProgress::Continued { path, items, redone } => bar.continued(path, &format!("{items} items"), redone),
+    let progress = Progress::new(form.is_silent());
+    interrupt::resumable("items", &target);
+    let written = starts(&settings, &target, &|now| match now {
+        StartsProgress::Begins(case, items) => progress.begin(case.key(), items),
+        StartsProgress::Done(items) => progress.done(items),
+        StartsProgress::Continued { path, items, redone } => {
+            paper::say_continued(&progress, path, &format!("{items} items"), redone);
+        }
     })?;
-    bar.bar.finish_and_clear();
-    if form.quiet {
-        return Ok(());
+    progress.clear();
+    match form.json {
+        true => say_file(&target.join("summary.json")),
+        false => form.print(Default::default, || table(&written)),
     }
-    if form.json {
-        let path = target.join("summary.json");
-        return say(std::fs::read_to_string(&path).map_err(|e| Failure::io(&path, e))?.trim_end());
-    }
-    say(&table(&written))
 }
 
 fn table(written: &WrittenStarts) -> String {

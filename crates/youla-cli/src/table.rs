@@ -2,10 +2,9 @@
 
 use crate::terminal;
 use std::fmt::Write;
-use youla::identify::subspace::{Factorisation, InputFit};
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
-use youla_run::{Identification, LongModel, WrittenRun, cautions};
+use youla_run::{Identification, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
@@ -35,35 +34,6 @@ fn modes(found: &Identification) -> String {
             write!(text, "\nmode of G(S): {:.2} +- {hz:.2} Hz, damping ratio {:.4} +- {zeta:.4}", mode.hz, mode.zeta);
     }
     text
-}
-
-/// Order, modes, fit and how the data were factored.
-pub(crate) fn subspace(model: &LongModel, peak_memory: Option<f64>) -> youla_run::Result<String> {
-    let found = &model.found;
-    let factor = match (found.factor.by, found.factor.condition) {
-        (Factorisation::Qr, None) => "QR".to_owned(),
-        (Factorisation::Qr, Some(condition)) => format!("QR (condition {condition:.1e})"),
-        (_, condition) => format!("Gram matrix (condition {:.1e})", condition.unwrap_or(f64::NAN)),
-    };
-    let mut text = format!("{} samples, {} passes\n", model.samples, model.passes);
-    let _ = write!(text, "order {}, data factored by {factor}\n\n", found.order.order);
-    let mut rows = vec![["mode", "Hz", "damping"].map(str::to_owned).to_vec()];
-    for (k, mode) in found.model.modes()?.iter().enumerate() {
-        rows.push(vec![(k + 1).to_string(), format!("{:.4}", mode.hz), format!("{:.5}", mode.zeta)]);
-    }
-    text += &aligned(&rows);
-    let by = match found.fit.by {
-        InputFit::Simulation => "simulated",
-        InputFit::Prediction | InputFit::Observer => "predicted one step ahead",
-    };
-    let mut rows = vec![vec![format!("fit, {by}"), "percent".to_owned()]];
-    let outputs = model.outputs.iter().zip(&found.fit.percent);
-    rows.extend(outputs.map(|(channel, percent)| vec![channel.name.clone(), format!("{percent:.2}")]));
-    let _ = write!(text, "\n{}", aligned(&rows).trim_end());
-    if let Some(peak) = peak_memory {
-        let _ = write!(text, "\n\npeak memory {:.0} MB", peak / 1e6);
-    }
-    Ok(text)
 }
 
 /// Table 1, what became of the paper's claims, and where everything is.

@@ -1,11 +1,11 @@
 //! The terminal: its width, words wrapped at it, and colour where there is one.
 
-use console::{Term, style};
+pub(crate) use anstream::{stderr, stdout};
 
 /// Columns of a terminal on standard output; `None` where the output goes elsewhere.
 pub(crate) fn width() -> Option<usize> {
-    let size = Term::stdout().size_checked();
-    size.map(|(_, columns)| usize::from(columns).max(NARROWEST))
+    let size = terminal_size::terminal_size_of(std::io::stdout());
+    size.map(|(width, _)| usize::from(width.0).max(NARROWEST))
 }
 
 /// Below this nothing is wrapped any narrower.
@@ -47,21 +47,24 @@ pub(crate) fn wrapped(line: &str, columns: usize) -> String {
     text
 }
 
-/// Defects red, cautions yellow; `console` leaves colour out where there is no terminal, and for NO_COLOR.
+/// Bold red and bold yellow (ECMA-48); `anstream` leaves them out where there is no terminal, and for NO_COLOR.
+const RED: &str = "\u{1b}[1;31m";
+const YELLOW: &str = "\u{1b}[1;33m";
+const PLAIN_AGAIN: &str = "\u{1b}[0m";
+
+/// Defects red, cautions yellow.
 fn coloured(line: &str) -> String {
-    let split = |word: &str| line.strip_prefix(word).map(str::to_owned);
-    if let Some(rest) = split("defect") {
-        return format!("{}{rest}", style("defect").red().bold());
-    }
-    if let Some(rest) = split("caution") {
-        return format!("{}{rest}", style("caution").yellow().bold());
+    for (word, colour) in [("defect", RED), ("caution", YELLOW)] {
+        if let Some(rest) = line.strip_prefix(word) {
+            return format!("{colour}{word}{PLAIN_AGAIN}{rest}");
+        }
     }
     line.to_owned()
 }
 
 /// The word before the sentence of a failure, for standard error.
 pub(crate) fn error_word() -> String {
-    style("error:").red().bold().for_stderr().to_string()
+    format!("{RED}error:{PLAIN_AGAIN}")
 }
 
 #[cfg(test)]

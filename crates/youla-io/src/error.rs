@@ -218,16 +218,6 @@ pub enum Error {
     },
 }
 
-/// A stream of samples reports its errors as errors of the method.
-impl From<Error> for youla::Error {
-    fn from(error: Error) -> Self {
-        match error {
-            Error::Method(error) => error,
-            error => youla::Error::Stream(Box::new(error)),
-        }
-    }
-}
-
 youla::error_context! {
     sources: Method;
     numerical: Json;

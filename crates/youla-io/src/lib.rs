@@ -7,9 +7,9 @@
 //! | module or item | content |
 //! |---|---|
 //! | [`Source`], [`read`] | one description of a recorded file: path, format, time, channels |
-//! | [`read_csv`], [`CsvStream`], [`write_csv`] | text: comma, semicolon, tab or blanks, plain or gzip |
+//! | [`read_csv`], [`write_csv`] | text: comma, semicolon, tab or blanks, plain or gzip |
 //! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
-//! | [`read_npz`], [`NpyStream`] | NumPy archives and arrays |
+//! | [`read_npz`] | NumPy archives |
 //! | [`read_uff58`] | universal files, dataset 58: measured responses |
 //! | [`read_response`] | tables of measured responses |
 //! | [`read_parquet`], `ParquetWriter` | Parquet, with the feature `parquet` |
@@ -48,7 +48,6 @@ mod limits;
 mod matfile;
 mod matrices;
 mod model_file;
-mod npy;
 mod npz;
 mod open;
 #[cfg(feature = "parquet")]
@@ -64,7 +63,7 @@ mod uff;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, CsvStream, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
+pub use csv::{CsvOptions, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 #[cfg(not(feature = "mat73"))]
 use disabled::hdf;
 #[cfg(not(feature = "parquet"))]
@@ -73,7 +72,6 @@ pub use error::{CorruptAt, Error, Result, TextPosition};
 pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
 pub use matrices::{Rows, SystemMatrices};
 pub use model_file::ModelFile;
-pub use npy::{NpyStream, is_npy};
 pub use npz::{npz_from_bytes, read_npz};
 pub use open::{open, read_text};
 #[cfg(feature = "parquet")]

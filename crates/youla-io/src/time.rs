@@ -104,33 +104,6 @@ impl TimeSource {
         }
     }
 
-    /// The same from a time column of any length, value by value; the steps are compared with the median of the first 65536.
-    ///
-    /// # Errors
-    /// As [`TimeSource::resolve`].
-    pub(super) fn resolve_streamed(&self, what: &str, mut next: impl FnMut() -> Result<Option<f64>>) -> Result<Clock> {
-        let mut times = Vec::new();
-        while times.len() <= STEPS {
-            match next()? {
-                Some(time) => times.push(time),
-                None => return self.resolve(what, Some(&times)),
-            }
-        }
-        let clock = self.resolve(what, Some(&times))?;
-        let ts = self.ts.unwrap_or_else(|| median_step(&times));
-        let (first, mut last, mut count) = (times[0], times[STEPS], times.len());
-        while let Some(time) = next()? {
-            count += 1;
-            let dt = time - last;
-            if !self.is_step(dt, ts) {
-                return Err(Error::NonUniformTime { what: what.to_owned(), row: count, dt, ts });
-            }
-            last = time;
-        }
-        let time = if self.ts.is_some() { clock.time } else { Discrete::new(mean_step(first, last, count))? };
-        Ok(Clock { time, parts: vec![(0, first)] })
-    }
-
     fn measured(&self, what: &str, times: &[f64], declared: Option<f64>) -> Result<Clock> {
         let middle = median_step(times);
         if let Some(ts) = declared {
@@ -168,9 +141,6 @@ impl TimeSource {
         Ok(parts)
     }
 }
-
-/// Steps of a streamed time column of which the median is taken.
-const STEPS: usize = 1 << 16;
 
 /// Sample time, and first row (from 0) and time of each part without gaps.
 #[derive(Debug)]
@@ -244,26 +214,6 @@ mod tests {
         gap[70] = gap[69];
         let error = split.resolve("t", Some(&gap)).unwrap_err();
         assert!(matches!(error, Error::NonUniformTime { row: 71, .. }), "{error}");
-    }
-
-    #[test]
-    fn a_streamed_column_gives_the_same_clock() {
-        for (n, ts) in [(1000, 2e-4), (STEPS + 1, 2e-4), (STEPS + 5000, 1.0 / 3.0)] {
-            let times = times(n, ts);
-            for source in [TimeSource::default(), TimeSource { ts: Some(ts), ..Default::default() }] {
-                let mut next = times.iter().copied();
-                let streamed = source.resolve_streamed("t", || Ok(next.next())).unwrap();
-                let whole = source.resolve("t", Some(&times)).unwrap();
-                assert_eq!((streamed.time, streamed.parts), (whole.time, whole.parts));
-            }
-        }
-        for row in [60, STEPS + 100] {
-            let mut gap = times(STEPS + 1000, 0.1);
-            gap.remove(row);
-            let mut next = gap.iter().copied();
-            let error = TimeSource::default().resolve_streamed("t", || Ok(next.next())).unwrap_err();
-            assert!(matches!(error, Error::NonUniformTime { row: found, .. } if found == row + 1), "{error}");
-        }
     }
 
     #[test]

@@ -59,21 +59,7 @@ def n4sid() -> None:
     print(f"N4SID, horizon 20: {whole:.1f} ms by youla.subspace, {native:.1f} ms by the extension module; best {np.min(pairs, axis=0)}; ratio of medians {whole / native:.3f}")
     small = [median(lambda: youla.subspace(log, method="n4sid", order=1, horizon=2, past=2), 1) for _ in range(9)]
     print(f"N4SID, horizon 2: {np.median(small):.1f} ms, which is a bound of reading, checking and copying")
-    program(table, median(lambda: youla.subspace(log, **options)))
     assert np.array_equal(table, kept)
-
-
-def program(table: np.ndarray, whole: float) -> None:
-    """The same identification by the program of the wheel, which reads the array from a file in blocks."""
-    with tempfile.TemporaryDirectory() as folder:
-        file, chosen = Path(folder) / "log.npy", Path(folder) / "options.toml"
-        np.save(file, table)
-        chosen.write_text('method = "n4sid"\norder = 4\nhorizon = 20\n')
-        start = [str(Path(sys.executable).parent / "python"), "-m", "youla"]
-        of = ["subspace", "--input", "#1,#2", "--output", "#3,#4", "--sample-time", str(DT), "--options", str(chosen), "-q", str(file)]
-        alone = median(lambda: subprocess.run([*start, "--version"], check=True, capture_output=True))
-        both = median(lambda: subprocess.run([*start, *of], check=True, capture_output=True))
-    print(f"the program: {both:.1f} ms, {both - alone:.1f} ms without its start; youla.subspace then {whole:.1f} ms, {whole / (both - alone):.2f} times")
 
 
 def identify() -> None:

@@ -1,7 +1,6 @@
 //! The extension module `youla._native`: what the Python package computes. Settings come as JSON, records and matrices as NumPy
 //! arrays; results go back as JSON and arrays. The package around it gives them their types.
 
-mod arrays;
 mod failure;
 mod logs;
 mod matrices;

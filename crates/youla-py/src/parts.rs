@@ -36,9 +36,6 @@ pub(crate) struct Subspace {
 pub(crate) fn subspace(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, choices: &str) -> PyResult<Subspace> {
     let chosen = settings(chosen)?;
     let choices = parse_subspace_options(&as_toml(choices)?, Path::new(OPTIONS)).map_err(Failure::from)?;
-    if let Some(found) = crate::arrays::in_place(py, &logs, &chosen.data, &choices)? {
-        return Ok(Subspace { found });
-    }
     let logs = records(py, logs)?;
     worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;

@@ -87,40 +87,6 @@ pub(crate) fn run<T: Send + 'static>(
     }
 }
 
-/// Runs `work` on what the caller has lent, on a thread as [`run`] does; after an interrupt the caller waits until the thread ends.
-pub(crate) fn run_borrowed<T: Send>(py: Python<'_>, work: impl FnOnce(&Stop) -> Result<T> + Send) -> PyResult<T> {
-    py.detach(|| {
-        let stop = Stop::default();
-        let of_thread = &stop;
-        let (sender, receiver) = sync_channel(1);
-        let body = move || {
-            let result = if forked() { on_threads(0, || work(of_thread)) } else { work(of_thread) };
-            // Nobody waits after an interrupt.
-            let _ = sender.send(result);
-        };
-        std::thread::scope(|scope| {
-            let spawned = Builder::new().name("youla".into()).stack_size(STACK).spawn_scoped(scope, body);
-            let thread = spawned.map_err(|e| Failure::numerical(format!("no thread can be started: {e}")))?;
-            let mut interrupted = Ok(());
-            let outcome = loop {
-                match receiver.recv_timeout(POLL) {
-                    Err(RecvTimeoutError::Timeout) if interrupted.is_ok() => {
-                        interrupted = Python::attach(|py| py.check_signals());
-                        stop.0.store(interrupted.is_err(), Ordering::Relaxed);
-                    }
-                    Err(RecvTimeoutError::Timeout) => {}
-                    outcome => break outcome,
-                }
-            };
-            // A thread that ended by an interrupt has unwound.
-            let _ = thread.join();
-            interrupted?;
-            let without = |_| Failure::numerical(WITHOUT_RESULT);
-            Ok(outcome.map_err(without)??)
-        })
-    })
-}
-
 /// On a pool of so many threads; 0 for one per core.
 fn on_threads<T: Send>(count: usize, work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(count).stack_size(STACK).build();

@@ -18,7 +18,6 @@ mod result;
 mod schema;
 mod settings;
 mod stages;
-mod streaming;
 mod summary;
 
 pub use check::{
@@ -48,7 +47,7 @@ pub use settings::{
     AlternativeStructure, ControllerSettings, DataFile, DataSettings, DeviationSettings, Discretisation,
     DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
     NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
-    VerificationSettings, parse_table,
+    VerificationSettings, parse_subspace_options, parse_table,
 };
 pub use stages::certificate::{CertificateEntry, RunCertificate};
 pub use stages::clock::{Stage, StageClock, StageTimes};
@@ -65,10 +64,6 @@ pub use stages::uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, 
 pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
 pub use stages::validate::robustness::LoopRobustness;
 pub use stages::validate::{ModelVerdict, RecordVerdict, Verdict};
-pub use streaming::{
-    LongModel, LongRecords, ReadingProgress, identify_long, long_model_file, parse_subspace_options,
-    read_subspace_options,
-};
 pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
 pub use summary::model::{LargestEntry, ModelEntry, ResidualEntry};
 pub use summary::physical::PhysicalEntry;

@@ -2,7 +2,7 @@
 
 mod text;
 
-use crate::output::{Failure, Form, say};
+use crate::output::{Failure, Form, lines_of};
 use crate::run_folder::folder_of;
 use clap::{Args, ValueEnum};
 use std::path::PathBuf;
@@ -151,18 +151,13 @@ pub(crate) fn make(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
     youla_io::folder::require_place(&args.out.join("excite.svg"))?;
     let found = excite_run(&settings, &folder, &options(args)?, port, args.noise_record.as_deref())?;
     let files = write_excitation(&found, &args.to, &args.out, args.force)?;
-    if form.json {
+    let about = || {
         let mut about = serde_json::json!(found.excited.summary);
         about["port"] = serde_json::json!(found.port);
         about["files"] = files.iter().map(|path| path.display().to_string()).collect();
-        say(&about.to_string())
-    } else if form.quiet {
-        Ok(())
-    } else {
-        let mut text = text::of(&found);
-        files.iter().for_each(|path| text += &format!("\n{}", path.display()));
-        say(&text)
-    }
+        about
+    };
+    form.print(about, || format!("{}\n{}", text::of(&found), lines_of(&files)))
 }
 
 fn options(args: &ExciteArgs) -> Result<ExciteOptions, Failure> {

@@ -5,7 +5,7 @@ mod log_file;
 mod record;
 mod twin;
 
-use crate::output::{Failure, Form, say, say_wrapped};
+use crate::output::{Failure, Form};
 use clap::Subcommand;
 use load::{LoadArgs, load};
 use record::{ExciteArgs, RecordArgs, excite, record};
@@ -20,7 +20,7 @@ const ADDRESS: &str = "Address of the machine, udp://HOST:PORT or serial:DEVICE[
 /// The verbs of a rig.
 #[derive(Debug, Subcommand)]
 pub(crate) enum RigCommand {
-    /// Play a machine over UDP: a rotor at 20 kHz, or the loop of a file around the gas bearing or an identified model.
+    /// Simulate a machine over UDP: a rotor at 20 kHz, or the loop of a file around the gas bearing or an identified model.
     #[command(after_help = twin::EXAMPLES)]
     Twin(TwinArgs),
     /// Record a log without an excitation, and write the run.toml beside it.
@@ -30,7 +30,7 @@ pub(crate) enum RigCommand {
     Record(RecordArgs),
     /// Excite the machine, record the log, and write the run.toml beside it.
     ///
-    /// Each row is in the log or reported missing. The guard of the machine ends the excitation where a limit is exceeded; the log goes on.
+    /// Each row is in the log or reported missing. The guard of the machine ends the excitation where a limit is exceeded; the recording continues.
     #[command(after_help = record::EXCITE_EXAMPLES)]
     Excite(ExciteArgs),
     /// Print name, phase and guard of a machine.
@@ -98,18 +98,18 @@ fn say_status(form: Form, rig: &Rig, answer: &Answer) -> Result<(), Failure> {
         Phase::Exciting => "exciting",
         Phase::Tripped => "tripped",
     };
-    if form.json {
+    let machine = rig.description();
+    let json = || {
         let trip = status.trip().map(|trip| json!({ "cause": trip.cause.to_string(), "channel": trip.channel }));
-        return say(&json!({
-            "name": rig.description().name, "sample_time": rig.description().sample_time, "sample": answer.sample,
+        json!({
+            "name": machine.name, "sample_time": machine.sample_time, "sample": answer.sample,
             "phase": phase, "trip": trip, "bank": status.bank(),
         })
-        .to_string());
-    }
-    if form.quiet {
-        return Ok(());
-    }
-    let trip = status.trip().map_or(String::new(), |trip| format!(": {} (channel {})", trip.cause, trip.channel));
-    let q = if status.bank() == 0 { "Q = 0".to_owned() } else { format!("Q of bank {}", status.bank()) };
-    say_wrapped(&format!("{}: sample {}, {phase}{trip}, {q}", rig.description().name, answer.sample))
+    };
+    let text = || {
+        let trip = status.trip().map_or(String::new(), |trip| format!(": {} (channel {})", trip.cause, trip.channel));
+        let q = if status.bank() == 0 { "Q = 0".to_owned() } else { format!("Q of bank {}", status.bank()) };
+        format!("{}: sample {}, {phase}{trip}, {q}", machine.name, answer.sample)
+    };
+    form.print(json, text)
 }

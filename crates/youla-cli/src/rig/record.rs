@@ -2,9 +2,9 @@
 
 use super::log_file::ParquetLog;
 use super::{ADDRESS, refused, seconds};
-use crate::output::{Failure, Form, say, say_wrapped};
+use crate::output::{Failure, Form};
+use crate::progress::Progress;
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,7 +21,7 @@ Example:
   youla rig excite udp://127.0.0.1:4000 --amplitude 0.5 --out log.parquet --duration 10
   youla identify run.toml                      the run.toml beside the log";
 
-/// Time between two signs of life, and between two lines of figures.
+/// Time between two heartbeats, and between two states of the line of figures.
 const BEAT: Duration = Duration::from_millis(100);
 
 /// Arguments of `youla rig record`.
@@ -35,7 +35,7 @@ pub(crate) struct RecordArgs {
     /// Seconds.
     #[arg(long, value_name = "S")]
     duration: f64,
-    /// Take everything but [data] of the run.toml beside the log from this one.
+    /// Copy all settings except [data] from this file.
     #[arg(long, value_name = "RUN.TOML")]
     settings: Option<PathBuf>,
     /// Send the rows to PlotJuggler as well, as JSON over UDP, 1000 a second at most.
@@ -127,88 +127,70 @@ fn run(form: Form, rig: &mut Rig, recorder: &mut Recorder, duration: Duration) -
     let set = interrupted.clone();
     // Where no handler can be set, Ctrl-C ends the program; the guard of the machine then ends the excitation.
     let _ = ctrlc::set_handler(move || set.store(true, Ordering::Relaxed));
-    let live = Live::new(form, duration);
+    let progress = Progress::new(form.is_silent());
     let begin = Instant::now();
     while let Some(left) = duration.checked_sub(begin.elapsed()).filter(|left| !left.is_zero()) {
         if interrupted.load(Ordering::Relaxed) {
             break;
         }
         rig.record(recorder, left.min(BEAT))?;
-        // A sign of life for the guard.
+        // A heartbeat for the guard.
         let answer = rig.ask(&Request::Alive)?;
-        live.show(begin.elapsed(), rig, recorder, &answer);
+        progress.show(&figures(begin.elapsed(), rig, recorder, &answer));
     }
-    live.0.finish_and_clear();
+    progress.clear();
     Ok(())
 }
 
-/// A line of figures, on a terminal only.
-struct Live(ProgressBar);
-
-impl Live {
-    fn new(form: Form, duration: Duration) -> Self {
-        let hidden = form.quiet || form.json;
-        let bar = if hidden { ProgressBar::hidden() } else { ProgressBar::new(duration.as_millis() as u64) };
-        if let Ok(style) = ProgressStyle::with_template("{bar:16} {msg}") {
-            bar.set_style(style);
-        }
-        Live(bar)
-    }
-
-    fn show(&self, elapsed: Duration, rig: &Rig, recorder: &mut Recorder, answer: &Answer) {
-        let machine = rig.description();
-        let channels = machine.outputs.iter().chain(&machine.inputs);
-        let largest = channels.zip(recorder.take_largest());
-        let largest = largest.map(|(channel, value)| format!("{} {value:.3} {}", channel.name, channel.unit));
-        let phase = match answer.status.phase() {
-            Phase::Exciting => "exciting",
-            Phase::Tripped => "TRIPPED",
-            Phase::Idle | Phase::Armed => "idle",
-        };
-        let (rows, missing) = (recorder.report().rows, recorder.report().missing);
-        self.0.set_position(elapsed.as_millis() as u64);
-        self.0.set_message(format!(
-            "{:.1} s, {rows} rows, {missing} missing, {phase}; largest {}",
-            elapsed.as_secs_f64(),
-            largest.collect::<Vec<_>>().join(", ")
-        ));
-    }
+/// What was recorded so far, in one line.
+fn figures(elapsed: Duration, rig: &Rig, recorder: &mut Recorder, answer: &Answer) -> String {
+    let machine = rig.description();
+    let channels = machine.outputs.iter().chain(&machine.inputs);
+    let largest = channels.zip(recorder.take_largest());
+    let largest = largest.map(|(channel, value)| format!("{} {value:.3} {}", channel.name, channel.unit));
+    let phase = match answer.status.phase() {
+        Phase::Exciting => "exciting",
+        Phase::Tripped => "TRIPPED",
+        Phase::Idle | Phase::Armed => "idle",
+    };
+    let (rows, missing) = (recorder.report().rows, recorder.report().missing);
+    let largest = largest.collect::<Vec<_>>().join(", ");
+    format!("{:.1} s, {rows} rows, {missing} missing, {phase}; largest {largest}", elapsed.as_secs_f64())
 }
 
 fn say_report(form: Form, report: &LogReport, log: &Path, run: &Path) -> Result<(), Failure> {
+    form.print(|| as_json(report, log, run), || as_text(report, log, run))
+}
+
+fn as_json(report: &LogReport, log: &Path, run: &Path) -> Value {
     let frames = &report.frames;
-    if form.json {
-        let trips: Vec<Value> = report.trips.iter().map(|(sample, trip)| trip_as_json(*sample, trip)).collect();
-        return say(&json!({
-            "log": log, "run": run, "rows": report.rows, "missing": report.missing, "gaps": report.gaps,
-            "frames": { "taken": frames.taken, "lost": frames.lost, "doubled": frames.doubled,
-                "reordered": frames.reordered, "stale": frames.stale },
-            "damaged": report.damaged, "foreign": report.foreign, "trips": trips,
-        })
-        .to_string());
-    }
-    if form.quiet {
-        return Ok(());
-    }
+    let trips: Vec<Value> = report.trips.iter().map(|(sample, trip)| trip_as_json(*sample, trip)).collect();
+    json!({
+        "log": log, "run": run, "rows": report.rows, "missing": report.missing, "gaps": report.gaps,
+        "frames": { "taken": frames.taken, "lost": frames.lost, "doubled": frames.doubled,
+            "reordered": frames.reordered, "stale": frames.stale },
+        "damaged": report.damaged, "foreign": report.foreign, "trips": trips,
+    })
+}
+
+fn as_text(report: &LogReport, log: &Path, run: &Path) -> String {
+    let LogReport { rows, missing, gaps, frames, damaged, foreign, .. } = report;
     let mut text = format!(
-        "{}: {} rows, {} missing in {} gaps. Frames: {} taken, {} lost, {} doubled, {} reordered, {} stale, {} damaged, {} foreign.",
+        "{}: {rows} rows, {missing} missing in {} gaps. Frames: {} taken, {} lost, {} duplicated, {} reordered, {} late, {damaged} damaged, \
+         {foreign} of other senders.",
         log.display(),
-        report.rows,
-        report.missing,
-        report.gaps.len(),
+        gaps.len(),
         frames.taken,
         frames.lost,
         frames.doubled,
         frames.reordered,
         frames.stale,
-        report.damaged,
-        report.foreign
     );
     for (sample, trip) in &report.trips {
         text +=
             &format!("\nThe guard ended the excitation at sample {sample}: {} (channel {}).", trip.cause, trip.channel);
     }
-    say_wrapped(&format!("{text}\nSettings: {}", run.display()))
+    format!("{text}\nSettings: {}", run.display())
 }
 
 fn trip_as_json(sample: u64, trip: &youla_rig::Trip) -> Value {

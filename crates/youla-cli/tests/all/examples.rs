@@ -6,11 +6,15 @@ use std::process::Command;
 
 /// What an example prints. All tests of the package build the examples beside themselves; a single one does not.
 fn output(name: &str) -> String {
+    output_of(name, &[])
+}
+
+fn output_of(name: &str, arguments: &[&str]) -> String {
     let tests = std::env::current_exe().expect("the test is a file");
     let target = tests.parent().and_then(Path::parent).expect("target/PROFILE/deps");
     let program = target.join("examples").join(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     assert!(program.is_file(), "{name} is not built; run `cargo build --examples` or all tests of the package");
-    let run = Command::new(program).output().expect("the example starts");
+    let run = Command::new(program).args(arguments).output().expect("the example starts");
     assert!(run.status.success(), "{name}: {}", String::from_utf8_lossy(&run.stderr));
     String::from_utf8(run.stdout).expect("text")
 }
@@ -118,5 +122,15 @@ fn the_friction_of_the_joint_needs_no_other_file() {
         let all = model["details"]["parameters"].as_array().expect("parameters");
         let value = all.iter().find(|p| p["name"] == name).and_then(|p| p["value"].as_f64()).expect("a value");
         assert!((value / expected - 1.0).abs() < tolerance, "{name} = {value}, published {expected}");
+    }
+}
+
+#[test]
+fn man_page_and_completions_know_every_verb() {
+    for wanted in ["man", "bash", "zsh", "fish"] {
+        let text = output_of("manual", &[wanted]);
+        for verb in ["paper", "demo", "init", "check", "identify", "signals", "report", "schema"] {
+            assert!(text.contains(verb), "{verb} is not in {wanted}");
+        }
     }
 }

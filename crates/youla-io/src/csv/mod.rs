@@ -9,13 +9,11 @@ mod options;
 mod parse;
 mod plan;
 mod read;
-mod stream;
 mod write;
 
 pub use options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
 pub(crate) use read::{column_names, read_csv_parts};
 pub use read::{csv_from_bytes, read_csv};
-pub use stream::CsvStream;
 pub(crate) use write::csv_to_bytes;
 pub use write::write_csv;
 

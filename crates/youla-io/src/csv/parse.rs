@@ -8,7 +8,7 @@ use std::collections::HashSet;
 /// Most columns of a table. Rows are samples; a compressed file of some kilobytes may contain millions of cells on one line.
 const MOST_COLUMNS: usize = 1 << 16;
 
-/// Most numbers of the chosen columns, 400 MB: a compressed file of some megabytes may hold far more. Files of any length are read as streams.
+/// Most numbers of the chosen columns, 400 MB: a compressed file of some megabytes may hold far more.
 const MOST_NUMBERS: usize = 50_000_000;
 
 /// The dialect of a text file and its columns.
@@ -95,10 +95,7 @@ impl Selection {
         while self.next(fields, lines, |position, value| out[position].push(value))? {
             rows += 1;
             if rows * self.columns > MOST_NUMBERS {
-                let (found, remedy) = (
-                    "a table of more than 50 million numbers",
-                    "choose fewer rows or columns, or use `youla subspace`",
-                );
+                let (found, remedy) = ("a table of more than 50 million numbers", "choose fewer rows or columns");
                 return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
             }
         }

@@ -111,7 +111,7 @@ impl FeedbackCheck {
             (false, true) => (
                 Severity::Note,
                 "no feedback from past outputs to the input is detected".to_owned(),
-                "If the loop was open, identify directly from u and y by `youla subspace`",
+                "If the loop was open, say so: `--open-loop`, or a controller without gain in [controller]",
             ),
             (false, false) => return None,
         };

@@ -4,9 +4,7 @@ use crate::summary::entries::pair;
 use serde::Serialize;
 use youla::identify::hansen::HansenModel;
 use youla::identify::innovation_form::{Convergence, InnovationForm};
-use youla::identify::subspace::{
-    DataFactor, HorizonReport, LineAmplitude, OrderReport, OutputFit, SubspaceModel, amplitudes,
-};
+use youla::identify::subspace::{DataFactor, HorizonReport, LineAmplitude, OrderReport, SubspaceModel, amplitudes};
 
 /// Horizons, order, excitation, moved poles, disturbances.
 #[derive(Serialize)]
@@ -86,13 +84,4 @@ impl From<&InnovationForm> for InnovationFormEntry {
             from_kalman: form.from_kalman,
         }
     }
-}
-
-/// The same of a model from long records.
-#[derive(Serialize)]
-pub(crate) struct LongDetails<'a> {
-    #[serde(flatten)]
-    pub(crate) subspace: SubspaceDetails<'a>,
-    pub(crate) fit: &'a OutputFit,
-    pub(crate) samples: u64,
 }

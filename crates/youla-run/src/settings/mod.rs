@@ -26,8 +26,7 @@ use crate::{Error, Result};
 use explain::{explain, problem_at};
 use retired::retired;
 use serde::{Deserialize, Serialize};
-pub(crate) use shown::SubspaceTable;
-use shown::{RecommendedTable, ReductionTable};
+use shown::{RecommendedTable, ReductionTable, SubspaceTable};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::LikelihoodOptions;
@@ -239,6 +238,18 @@ pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: 
         Some((start, problem)) => Err(problem_at(path, text, start, problem)),
         None => toml::from_str(text).map_err(|e| explain(&e, text, path, at)),
     }
+}
+
+/// Parses options of a subspace identification, with the keys of `[direct]`; `path` is named in errors.
+///
+/// # Errors
+/// [`youla_io::Error::Settings`] with line, column and key.
+pub fn parse_subspace_options(text: &str, path: &Path) -> Result<SubspaceOptions> {
+    let refused = |problem: &str| {
+        let (path, problem) = (path.to_owned(), problem.to_owned());
+        Error::File(youla_io::Error::Settings { path, at: None, problem })
+    };
+    parse_table::<SubspaceTable>(text, path, "direct")?.try_into().map_err(refused)
 }
 
 /// Whether a file that should be a run.toml is data: not named so, and no TOML.

@@ -60,7 +60,7 @@ fn keys_of_version_0_1_name_their_successors() {
     assert!(error.contains("[nominal.state_space]"), "{error}");
 }
 
-/// Every form of an order, in run.toml and in the options of `youla subspace`; what is written reads back.
+/// Every form of an order, in run.toml and in the options of the Python `subspace`; what is written reads back.
 #[test]
 fn orders_are_numbers_words_or_rules() {
     use youla::identify::subspace::{AutoOrder, Order, OrderRule};

@@ -351,14 +351,6 @@ pub enum Error {
         /// The value in the first experiment.
         value: f64,
     },
-    /// A stream gave other samples when it was read again.
-    #[error(
-        "the records have other lengths in the second pass over them than in the first; keep the files as they are"
-    )]
-    RecordChanged,
-    /// A stream of samples failed.
-    #[error("{0}")]
-    Stream(Box<dyn std::error::Error + Send + Sync>),
 }
 
 crate::error_context! {
@@ -367,7 +359,7 @@ crate::error_context! {
         Diverged PoleOnBoundary NoReducedOrder NoCandidate;
     bad_input: Shape NotFinite OutOfRange SampleTimeMismatch NotSymmetric NotPositive Ports Polynomial NotStabilising
         Order Unsupported UnknownChannel DuplicateChannel NotFiniteSample InsufficientExcitation TooFewSamples
-        NotPeriodic UnequalPeriods NotExcited ConstantChannel RecordChanged Stream;
+        NotPeriodic UnequalPeriods NotExcited ConstantChannel;
 }
 
 impl Error {

@@ -6,7 +6,6 @@ mod coprime;
 mod loop_factors;
 mod signals;
 mod stable;
-mod stream;
 mod youla;
 
 pub use coprime::CoprimeFactors;
@@ -14,4 +13,3 @@ pub use coprime::shear;
 pub use loop_factors::loop_factors;
 pub use signals::YoulaSignals;
 pub use stable::{Denominator, StableFactors, left_coprime, right_coprime};
-pub use stream::YoulaStream;

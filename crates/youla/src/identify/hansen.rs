@@ -8,14 +8,12 @@
 //! plant. Source: the paper, eqs (20)-(25); Hansen, Franklin and Kosut 1989.
 
 use super::innovation_form::{self, InnovationForm, NoiseForm};
-use super::subspace::subspace_stream;
 use super::subspace::{
     DeviationEvidence, Experiment, NoUncertainty, SubspaceData, SubspaceModel, SubspaceOptions, Uncertainty,
 };
 use crate::Result;
-use crate::factor::{CoprimeFactors, YoulaSignals, YoulaStream};
+use crate::factor::{CoprimeFactors, YoulaSignals};
 use crate::lti::{Discrete, StateSpace};
-use crate::signal::SampleStream;
 
 /// The identified deviation system and the plant that it stands for.
 #[derive(Debug, Clone)]
@@ -120,66 +118,5 @@ impl<'a> HansenData<'a> {
             deviation.uncertainty.as_ref().map(|u| u.through(|s| self.factors.plant_of(s))).transpose()?;
         let evidence = uncertainty.is_some().then(|| self.data.evidence(deviation.order.order, subspace));
         Ok(HansenModel { deviation, plant, innovation_form, uncertainty, evidence })
-    }
-}
-
-/// The same as [`hansen`] from a stream of u and y that need not fit into memory; the first `settle` samples of each experiment
-/// are dropped behind the filter, for example [`CoprimeFactors::settling_samples`].
-///
-/// # Errors
-/// As [`subspace_stream`] and [`YoulaStream`]; [`crate::Error::AlgebraicLoop`] when G(S) is not well posed.
-pub fn hansen_stream(
-    factors: &CoprimeFactors<Discrete>,
-    measured: impl SampleStream,
-    settle: usize,
-    options: &SubspaceOptions,
-) -> Result<HansenModel> {
-    let mut signals = YoulaStream::new(factors, measured, settle)?;
-    let deviation = subspace_stream(&mut signals, factors.nominal().time(), options)?;
-    let plant = factors.plant_of(&deviation.model)?;
-    Ok(HansenModel { deviation, plant, innovation_form: None, uncertainty: None, evidence: None })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::identify::subspace::{ExperimentStream, Order};
-    use crate::lti::simulate;
-    use crate::{Error, Mat};
-    use rand::{RngExt, SeedableRng};
-    use rand_chacha::ChaCha8Rng;
-
-    fn first_order(pole: f64) -> StateSpace<Discrete> {
-        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
-        StateSpace::new(number(pole), number(1.0), number(1.0), number(0.0), Discrete::new(0.1).unwrap()).unwrap()
-    }
-
-    #[test]
-    fn a_stream_of_u_and_y_gives_the_same_deviation_system() {
-        let gain = Mat::from_fn(1, 1, |_, _| -0.5);
-        let factors = CoprimeFactors::observer(&first_order(0.9), gain.as_ref(), gain.as_ref()).unwrap();
-        let rng = &mut ChaCha8Rng::seed_from_u64(31);
-        let records = [6000, 900].map(|samples| {
-            let [u, noise] = [1.0, 0.1].map(|size| Mat::from_fn(samples, 1, |_, _| size * (rng.random::<f64>() - 0.5)));
-            let y = simulate(&first_order(0.8), u.as_ref(), &[0.0]).unwrap() + noise;
-            (u, y)
-        });
-        let experiments = [0, 1].map(|k| Experiment::new(records[k].0.as_ref(), records[k].1.as_ref()));
-        let options = SubspaceOptions { horizon: 5.into(), order: Order::Fixed(2), ..Default::default() };
-        let settle = factors.settling_samples(1e-3).unwrap();
-        assert!(settle > 5);
-        let signals =
-            [0, 1].map(|k| factors.signals(experiments[k].u, experiments[k].y).unwrap().after(settle).unwrap());
-        let whole = hansen(&factors, &signals, &options.clone().into()).unwrap();
-        let stream = || ExperimentStream::new(&experiments).unwrap();
-        let streamed = hansen_stream(&factors, stream(), settle, &options).unwrap();
-        let gap = |a: &StateSpace<Discrete>, b: &StateSpace<Discrete>| {
-            let parts = [(a.a(), b.a()), (a.b(), b.b()), (a.c(), b.c()), (a.d(), b.d())];
-            parts.map(|(a, b)| (a - b).norm_max()).into_iter().fold(0.0, f64::max)
-        };
-        assert!(gap(&whole.plant, &streamed.plant) < 1e-10);
-        assert!(gap(&whole.deviation.model, &streamed.deviation.model) < 1e-10);
-        let short = hansen_stream(&factors, stream(), 900, &options);
-        assert!(matches!(short, Err(Error::TooFewSamples { found: 900, needed: 901, .. })));
     }
 }

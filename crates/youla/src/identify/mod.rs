@@ -10,10 +10,10 @@ pub mod subspace;
 mod verdict;
 
 pub use direct::direct;
-pub use hansen::{HansenData, HansenModel, HansenOptions, hansen, hansen_stream};
+pub use hansen::{HansenData, HansenModel, HansenOptions, hansen};
 pub use identified::{Deviation, Identified, identify, identify_response};
 pub use innovation_form::{InnovationOptions, NoiseForm};
 pub use subspace::{
     Experiment, Horizon, Order, Stability, SubspaceData, SubspaceMethod, SubspaceModel, SubspaceOptions,
-    UncertaintyMethod, UncertaintyOptions, subspace, subspace_stream,
+    UncertaintyMethod, UncertaintyOptions, subspace,
 };

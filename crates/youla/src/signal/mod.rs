@@ -11,7 +11,6 @@ mod periodic;
 mod persistency;
 mod record;
 mod spectrum;
-mod stream;
 
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
@@ -25,4 +24,3 @@ pub(crate) use periodic::{Excited, inverse, output_rest};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
-pub use stream::{JoinedStreams, SampleStream};

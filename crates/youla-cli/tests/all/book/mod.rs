@@ -56,10 +56,10 @@ fn run_chapters(set: &str, wanted: impl Fn(&str) -> bool, language: Option<Langu
         }
         let name = page.trim_start_matches("../").trim_end_matches(".md");
         let folder = folder_of(&format!("{set}/{name}"));
-        if name == "README" || name == "book/long-records" {
+        if name == "README" || name == "book/signals" {
             readme::write_scene(&folder);
         }
-        if name == "book/long-records" {
+        if name == "book/signals" {
             fs::write(folder.join("run.toml"), run_of_readme()).expect("written");
         }
         run_chapter(&folder, name, &steps, language);

@@ -1,10 +1,7 @@
-//! What README.md takes for granted: a log of a drive with a resonance under its controller, records in open loop, options.
+//! What README.md takes for granted: a log of a drive with a resonance under its controller, nominal model and controller.
 
-use flate2::Compression;
-use flate2::write::GzEncoder;
 use std::fmt::Write as _;
 use std::fs;
-use std::io::Write as _;
 use std::path::Path;
 
 /// A difference equation of order two: coefficients of z^-1 and z^-2 in numerator and denominator, and the last two outputs.
@@ -23,7 +20,7 @@ impl Second {
     }
 }
 
-/// Writes `log.csv` (two minutes at 2 kHz), and in open loop `long.npy` (two inputs, two outputs), `bench.csv.gz` and `options.toml`.
+/// Writes `log.csv` (two minutes at 2 kHz), `nominal.json` and `K.json`.
 pub(crate) fn write_scene(folder: &Path) {
     let write = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).expect("written");
     let mut text = String::from("t,r,d,u,y\n");
@@ -34,21 +31,6 @@ pub(crate) fn write_scene(folder: &Path) {
 
     write("nominal.json", MODEL.as_bytes());
     write("K.json", controller().as_bytes());
-    let rows = open_loop(20_000);
-    let mut header = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': ({}, 4), }}", rows.len());
-    header += &" ".repeat(117 - header.len());
-    let mut long = [b"\x93NUMPY\x01\x00".as_slice(), &118_u16.to_le_bytes(), header.as_bytes(), b"\n"].concat();
-    long.extend(rows.iter().flatten().flat_map(|x| x.to_le_bytes()));
-    write("long.npy", &long);
-    write("options.toml", b"horizon = 10\norder = 4\n");
-
-    let mut text = String::from("t,u,y\n");
-    for (k, [u, _, y, _]) in rows.iter().enumerate() {
-        let _ = writeln!(text, "{},{u},{y}", k as f64 * 5e-4);
-    }
-    let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
-    packed.write_all(text.as_bytes()).expect("memory");
-    write("bench.csv.gz", &packed.finish().expect("memory"));
 }
 
 /// The rigid body of the nominal model, sampled every 0.5 ms.
@@ -59,20 +41,6 @@ fn controller() -> String {
     let ([d, n1, n2], [a1, a2]) = ([-5.50311, -0.27062, 5.23249], [-1.14636, 0.41698]);
     let (c1, c2) = (n1 - d * a1, n2 - d * a2);
     format!(r#"{{"ts": 5e-4, "a": [[{}, {}], [1, 0]], "b": [[1], [0]], "c": [[{c1}, {c2}]], "d": [[{d}]]}}"#, -a1, -a2)
-}
-
-/// Two springs, each with an input and an output of its own: `u1, u2, y1, y2`.
-fn open_loop(samples: usize) -> Vec<[f64; 4]> {
-    let mut springs = [spring(), spring()];
-    let mut past = [[0.0; 2]; 2];
-    let mut noise = uniform();
-    (0..samples)
-        .map(|_| {
-            let y = [0, 1].map(|k| springs[k].next(past[k]) + 1e-6 * noise());
-            past = past.map(|u| [noise(), u[0]]);
-            [past[0][0], past[1][0], y[0], y[1]]
-        })
-        .collect()
 }
 
 /// `250 / (s^2 + 2 zeta w s + w^2)`, w = 54.7 Hz, zeta = 0.03, sampled every 0.5 ms.

@@ -151,7 +151,7 @@ const LOGS: [Mistake; 7] = [
     ),
 ];
 
-const CALLS: [Mistake; 17] = [
+const CALLS: [Mistake; 15] = [
     called("a log for a run.toml", &["check", "log.csv"], &["log.csv", "--input", "--output", "youla init"]),
     called("the same to identify", &["identify", "log.csv"], &["log.csv", "--input", "--sample-time", "youla init"]),
     called("the same to signals", &["signals", "log.csv"], &["log.csv: this is no run.toml", "youla init"]),
@@ -202,16 +202,6 @@ const CALLS: [Mistake; 17] = [
         "a folder below a file",
         &["identify", "run.toml", "--out", "log.csv/x"],
         &["log.csv/x", "choose another place by --out"],
-    ),
-    called(
-        "a file in no folder",
-        &["subspace", "log.csv", "--input", "u", "--output", "y", "--time", "t", "--out", "no/such/g.json"],
-        &["no/such/g.json", "--out"],
-    ),
-    called(
-        "a MATLAB file to subspace",
-        &["subspace", "log.mat", "--input", "u", "--output", "y", "--sample-time", "1"],
-        &["log.mat: a MATLAB file", "youla identify"],
     ),
     called("a log to export", &["export", "log.csv", "--to", "python"], &["log.csv", "no model", "run folder"]),
     called("a log to report", &["report", "log.csv"], &["log.csv", "folder of a run"]),

@@ -17,5 +17,4 @@ mod notes;
 mod plot;
 mod response;
 mod rig;
-mod subspace;
 mod verbs;

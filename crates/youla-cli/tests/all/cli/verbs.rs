@@ -14,7 +14,7 @@ fn without_arguments_help_is_shown() {
 #[test]
 fn every_verb_has_an_example() {
     let folder = empty_folder("help-verbs");
-    for verb in ["demo", "check", "identify", "signals", "subspace", "report", "excite", "schema"] {
+    for verb in ["demo", "check", "identify", "signals", "report", "excite", "schema"] {
         let found = youla(&folder, &[verb, "--help"]);
         assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""), "{verb}");
         assert!(found.stdout.contains(&format!("Example:\n  youla {verb}")), "{}", found.stdout);
@@ -86,18 +86,4 @@ fn a_report_with_an_impossible_clock_is_refused() {
         assert!(found.stderr.contains("report.json") && found.stderr.contains(evidence), "{}", found.stderr);
         assert_eq!(found.stderr.trim_end().lines().count(), 1, "{}", found.stderr);
     }
-}
-
-#[test]
-fn completions_and_man_page_know_every_verb() {
-    let folder = empty_folder("manual");
-    let verbs = ["paper", "demo", "init", "check", "identify", "signals", "subspace", "report"];
-    for arguments in [&["completions", "bash"][..], &["completions", "zsh"], &["completions", "fish"], &["man"]] {
-        let found = youla(&folder, arguments);
-        assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""));
-        for verb in verbs {
-            assert!(found.stdout.contains(verb), "{verb} is not in {arguments:?}");
-        }
-    }
-    assert_eq!(youla(&folder, &["completions", "abacus"]).code, Some(2));
 }

@@ -4,13 +4,12 @@
 use std::path::{Path, PathBuf};
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::Discrete;
-use youla::signal::SampleStream;
 use youla_commission::{Campaign, QTable};
 use youla_greybox::{Declaration, DeclaredStructure};
 use youla_io::export::ExportedController;
 use youla_io::{
-    ChannelRef, CsvOptions, DecimalSign, NpyStream, TimeSource, Variables, csv_from_bytes, mat_from_bytes,
-    npz_from_bytes, parquet_from_bytes,
+    ChannelRef, CsvOptions, DecimalSign, TimeSource, Variables, csv_from_bytes, mat_from_bytes, npz_from_bytes,
+    parquet_from_bytes,
 };
 use youla_link::{Frame, Kind, LARGEST_FRAME, PacketReader, Reply, Request, RowBlock};
 use youla_paper::rig::RigParameters;
@@ -23,13 +22,12 @@ use youla_run::{ModelFile, RunSettings};
 pub(crate) type Reader = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const READERS: [Reader; 20] = [
+pub(crate) const READERS: [Reader; 19] = [
     ("csv", csv),
     ("mat", mat),
     ("mat73", mat),
     ("model", model),
     ("npz", npz),
-    ("npy", npy),
     ("parquet", parquet),
     ("run_toml", run_toml),
     ("paper_toml", paper_toml),
@@ -98,16 +96,6 @@ fn written(bytes: &[u8]) -> PathBuf {
     let file = std::env::temp_dir().join(format!("youla-readers-{}", std::process::id()));
     std::fs::write(&file, bytes).expect("the folder of temporary files can be written");
     file
-}
-
-/// A NumPy array as a stream of samples, which reads from a file.
-pub(crate) fn npy(bytes: &[u8]) {
-    let file = written(bytes);
-    if let Ok(mut stream) = NpyStream::open(&file, &[ChannelRef::Column(1)], &[ChannelRef::Column(2)]) {
-        let mut rows = youla::Mat::zeros(64, 2);
-        let _ = stream.read(rows.as_mut());
-    }
-    let _ = std::fs::remove_file(file);
 }
 
 pub(crate) fn run_toml(bytes: &[u8]) {

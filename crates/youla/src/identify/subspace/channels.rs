@@ -42,34 +42,33 @@ pub(super) struct Channels<'a> {
 impl<'a> Channels<'a> {
     pub(super) fn new(experiments: &[Experiment<'a>], options: &SubspaceOptions) -> Result<Self> {
         check_blocks(options)?;
-        let (inputs, _) = check_shapes(experiments)?;
+        let (inputs, outputs) = check_shapes(experiments)?;
         let disturbed = check_disturbances(experiments)?;
         let delays = Delays::new(&options.delays, inputs)?;
         let mut statistics = Statistics::new(inputs);
         for (k, Experiment { u, y, .. }) in experiments.iter().enumerate() {
             check_length(k, u.nrows(), least_blocks(options), delays.longest())?;
-            statistics.add(View::of(*u, *y), k, 0)?;
+            statistics.add(View::of(*u, *y), k)?;
         }
         let given: Vec<View<'a>> = experiments.iter().map(|e| View::of(e.u, e.y)).collect();
         if !disturbed && delays.longest() == 0 {
-            let channels = Channels::read(inputs, statistics, given.len(), options.scaling)?;
+            let channels = Channels::read((inputs, outputs), statistics, given.len(), options.scaling)?;
             return Ok(Channels { held: Storage::Borrowed(given), ..channels });
         }
         Channels::made(experiments, disturbed, delays, options)
     }
 
-    /// Of records that were read in passing and are not held.
-    pub(super) fn read(
-        inputs: usize,
+    /// Scales and numbers of channels, before any record is held.
+    fn read(
+        (inputs, outputs): (usize, usize),
         statistics: Statistics,
         experiments: usize,
         scaling: ChannelScaling,
     ) -> Result<Self> {
-        let channels = statistics.channels();
         let scale = statistics.scales(scaling)?;
-        let spread = (inputs..channels).map(|j| statistics.spread(j) / scale[j]).collect();
+        let spread = (inputs..inputs + outputs).map(|j| statistics.spread(j) / scale[j]).collect();
         let delays = Delays::new(&[], inputs)?;
-        let (held, outputs) = (Storage::Borrowed(Vec::new()), channels - inputs);
+        let held = Storage::Borrowed(Vec::new());
         let (w_scale, delayed) = (Vec::new(), vec![Vec::new(); experiments]);
         Ok(Channels { held, inputs, outputs, scale, w_scale, spread, delays, delayed })
     }
@@ -91,9 +90,9 @@ impl<'a> Channels<'a> {
         let quiet = y.iter().zip(&w).map(|(y, w)| without(*y, *w)).collect::<Result<Vec<_>>>()?;
         let mut statistics = Statistics::new(inputs);
         for e in 0..y.len() {
-            statistics.add(View::of(u[e].as_ref(), quiet.get(e).map_or(y[e], |y| y.as_ref())), e, 0)?;
+            statistics.add(View::of(u[e].as_ref(), quiet.get(e).map_or(y[e], |y| y.as_ref())), e)?;
         }
-        let channels = Channels::read(inputs, statistics, y.len(), options.scaling)?;
+        let channels = Channels::read((inputs, y[0].ncols()), statistics, y.len(), options.scaling)?;
         let w_scale: Vec<Vec<f64>> = w.iter().map(|w| (0..w.ncols()).map(|j| rms_or_one(*w, j)).collect()).collect();
         let (u_scale, y_scale) = channels.scale.split_at(inputs);
         let signals = |e: usize| Signals {
@@ -134,11 +133,6 @@ impl<'a> Channels<'a> {
         }
     }
 
-    /// Scales of inputs and outputs.
-    pub(super) fn scale(&self) -> &[f64] {
-        &self.scale
-    }
-
     /// Scales of the outputs.
     pub(super) fn y_scale(&self) -> &[f64] {
         &self.scale[self.inputs..]
@@ -152,7 +146,7 @@ impl<'a> Channels<'a> {
         }
         let mut statistics = Statistics::new(self.inputs);
         for (e, (signals, a)) in self.scaled().iter().zip(disturbances).enumerate() {
-            statistics.add(View::of(signals.u.as_ref(), (&signals.y - &signals.w * a).as_ref()), e, 0)?;
+            statistics.add(View::of(signals.u.as_ref(), (&signals.y - &signals.w * a).as_ref()), e)?;
         }
         Ok((self.inputs..self.scale.len()).map(|j| statistics.spread(j)).collect())
     }

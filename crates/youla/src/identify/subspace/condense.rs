@@ -25,14 +25,14 @@ pub(super) type Factors = Vec<Mat<f64>>;
 
 /// How the regressors are made, the first way that works.
 #[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+enum Way {
     Sums,
     Rows,
     ByOutputs,
 }
 
 /// What all experiments share.
-pub(super) struct Regression<'a> {
+struct Regression<'a> {
     predictor: &'a Predictor,
     unknowns: &'a Unknowns,
     modes: Option<Modes>,
@@ -41,12 +41,12 @@ pub(super) struct Regression<'a> {
 }
 
 impl<'a> Regression<'a> {
-    pub(super) fn new(predictor: &'a Predictor, unknowns: &'a Unknowns, scale: Vec<f64>) -> Self {
+    fn new(predictor: &'a Predictor, unknowns: &'a Unknowns, scale: Vec<f64>) -> Self {
         Regression { predictor, unknowns, modes: Modes::of(predictor), scale }
     }
 
     /// The way that comes first.
-    pub(super) fn first_way(&self) -> Way {
+    fn first_way(&self) -> Way {
         match &self.modes {
             Some(modes) if Sums::can_be_of(modes.lambda()) => Way::Sums,
             _ => self.safe_way(),
@@ -54,7 +54,7 @@ impl<'a> Regression<'a> {
     }
 
     /// The way that works where [`Way::Sums`] loses too many digits.
-    pub(super) fn safe_way(&self) -> Way {
+    fn safe_way(&self) -> Way {
         if self.modes.is_some() { Way::Rows } else { Way::ByOutputs }
     }
 }
@@ -100,7 +100,7 @@ pub(super) fn regressors(view: View<'_>, predictor: &Predictor) -> Regressors {
 }
 
 /// Takes in the samples of one experiment.
-pub(super) struct Condenser<'a> {
+struct Condenser<'a> {
     regression: &'a Regression<'a>,
     share: Option<KnownShare>,
     known: KnownColumns,
@@ -115,7 +115,7 @@ enum State<'a> {
 
 impl<'a> Condenser<'a> {
     /// Before the first sample.
-    pub(super) fn new(regression: &'a Regression<'a>, way: Way, known: KnownColumns) -> Self {
+    fn new(regression: &'a Regression<'a>, way: Way, known: KnownColumns) -> Self {
         let (unknowns, predictor) = (regression.unknowns, regression.predictor);
         let beside = unknowns.through() + known.columns() + unknowns.outputs;
         let output =
@@ -129,7 +129,7 @@ impl<'a> Condenser<'a> {
     }
 
     /// Takes in the next samples, with the regressors of disturbances.
-    pub(super) fn add(&mut self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, known: MatRef<'_, f64>) {
+    fn add(&mut self, u: MatRef<'_, f64>, y: MatRef<'_, f64>, known: MatRef<'_, f64>) {
         let unknowns = self.regression.unknowns;
         let (u_scale, y_scale) = self.regression.scale.split_at(unknowns.inputs);
         let scaled =
@@ -159,7 +159,7 @@ impl<'a> Condenser<'a> {
     }
 
     /// The factors of all outputs; `None` where the way was not good enough.
-    pub(super) fn factors(&self) -> Option<Factors> {
+    fn factors(&self) -> Option<Factors> {
         let unknowns = self.regression.unknowns;
         let mut scale = self.regression.scale.clone();
         if self.share.is_some() {

@@ -7,7 +7,7 @@ use super::channels::Channels;
 use super::disturbance;
 use super::gram::{self, Gram, GramFactor};
 use super::hankel_layout::HankelLayout;
-use super::row_map::{PIECE, QrLanes, RowMap};
+use super::row_map::{PIECE, RowMap};
 use super::view::{Signals, View};
 use super::{DataFactor, Factorisation};
 use crate::linalg::{SequentialQr, leading_rank};
@@ -32,32 +32,28 @@ pub(super) struct HankelLq {
 }
 
 /// The entries of a column of the block-Hankel matrix.
-pub(super) struct Frame {
+struct Frame {
     arrangement: HankelLayout,
     inputs: usize,
     outputs: usize,
     past: usize,
     horizon: usize,
-    pub(super) places: Vec<usize>,
+    places: Vec<usize>,
 }
 
 impl Frame {
-    pub(super) fn new(
-        (inputs, outputs): (usize, usize),
-        (past, horizon): (usize, usize),
-        arrangement: HankelLayout,
-    ) -> Self {
+    fn new((inputs, outputs): (usize, usize), (past, horizon): (usize, usize), arrangement: HankelLayout) -> Self {
         let places = arrangement.places(inputs, outputs, past, horizon);
         Frame { arrangement, inputs, outputs, past, horizon, places }
     }
 
     /// Block rows.
-    pub(super) fn blocks(&self) -> usize {
+    fn blocks(&self) -> usize {
         self.past + self.horizon
     }
 
     /// Refuses fewer Hankel columns than rows.
-    pub(super) fn require(&self, samples: usize, columns: usize) -> Result<()> {
+    fn require(&self, samples: usize, columns: usize) -> Result<()> {
         let (horizon, past, width) = (self.horizon, self.past, self.places.len());
         if columns >= width {
             return Ok(());
@@ -67,7 +63,7 @@ impl Frame {
     }
 
     /// R with the channels of `[u; y]` divided by `scale`.
-    pub(super) fn triangle(self, mut r: Mat<f64>, scale: &[f64], columns: usize, report: DataFactor) -> HankelLq {
+    fn triangle(self, mut r: Mat<f64>, scale: &[f64], columns: usize, report: DataFactor) -> HankelLq {
         let Frame { arrangement, inputs, outputs, past, horizon, places } = self;
         for (column, place) in places.iter().enumerate() {
             let inverse = 1.0 / scale[place % (inputs + outputs)];
@@ -193,9 +189,7 @@ fn factor(views: &[View<'_>], frame: &Frame, factorisation: Factorisation) -> Re
         Choice::Gram(found, report) => Ok((found.r, report, found.taken)),
         Choice::Qr(report) if views.iter().all(|view| view.w.ncols() == 0) => {
             let rows = RowMap::new(views.to_vec(), frame.blocks(), &frame.places);
-            let mut lanes = QrLanes::new(frame.places.len());
-            lanes.add(&rows);
-            Ok((lanes.whole(), report, 0))
+            Ok((rows.triangle(), report, 0))
         }
         Choice::Qr(report) => {
             let (r, taken) = factor_beyond_disturbances(views, frame);
@@ -205,13 +199,13 @@ fn factor(views: &[View<'_>], frame: &Frame, factorisation: Factorisation) -> Re
 }
 
 /// How R is to be had.
-pub(super) enum Choice {
+enum Choice {
     Gram(GramFactor, DataFactor),
     Qr(DataFactor),
 }
 
 /// The Gram matrix where its condition allows it, or what was asked for.
-pub(super) fn choose(by_gram: Option<GramFactor>, factorisation: Factorisation) -> Result<Choice> {
+fn choose(by_gram: Option<GramFactor>, factorisation: Factorisation) -> Result<Choice> {
     let condition = by_gram.as_ref().map_or(f64::INFINITY, |found| found.condition);
     match by_gram {
         Some(found) if factorisation == Factorisation::Gram || condition <= gram::LIMIT => {
@@ -234,10 +228,7 @@ fn factor_beyond_disturbances(views: &[View<'_>], frame: &Frame) -> (Mat<f64>, u
     for view in views {
         let span = disturbance::span(gram::of_disturbance(*view, blocks).as_ref());
         let leading = span.basis.ncols();
-        let rows = RowMap::new(vec![*view], blocks, &frame.places).with_leading(span.basis);
-        let mut lanes = QrLanes::new(leading + width);
-        lanes.add(&rows);
-        let r = lanes.whole();
+        let r = RowMap::new(vec![*view], blocks, &frame.places).with_leading(span.basis).triangle();
         let rank = leading_rank(r.as_ref(), leading);
         whole.fold_rows(r.as_ref().submatrix(rank, leading, r.nrows() - rank, width));
         taken += rank;

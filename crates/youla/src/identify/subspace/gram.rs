@@ -9,7 +9,7 @@
 //! (V. Sima, SLICOT working note 2000-4). The Cholesky factor squares the condition number k of the data: its relative error
 //! is about `1e-16 k^2`, and beyond [`LIMIT`] the data are factored directly.
 
-use super::disturbance;
+use super::disturbance::{self, Beyond};
 use super::view::View;
 use crate::linalg::triangular_condition;
 use crate::{Mat, MatRef};
@@ -57,27 +57,17 @@ impl Gram {
     /// Adds a whole experiment.
     pub(super) fn add(&mut self, view: View<'_>, blocks: usize) {
         let (q, h) = (view.u.ncols() + view.y.ncols(), view.w.ncols());
-        let all = of_experiment(view, blocks);
-        if h == 0 {
-            self.add_matrix(all);
-            return;
-        }
-        let beyond = disturbance::beyond(all.as_ref(), q, h, blocks);
-        self.before.iter_mut().zip(&beyond.before).for_each(|(sum, value)| *sum += value);
-        match self.matrix.nrows() {
-            0 => self.matrix = beyond.gram,
-            _ => self.matrix += beyond.gram,
-        }
-        self.taken += beyond.taken;
-    }
-
-    /// Adds the Gram matrix of an experiment without known disturbances.
-    pub(super) fn add_matrix(&mut self, gram: Mat<f64>) {
-        (0..gram.nrows()).for_each(|i| self.before[i] += gram[(i, i)]);
+        let gram = of_experiment(view, blocks);
+        let Beyond { gram, before, taken } = match h {
+            0 => Beyond { before: (0..gram.nrows()).map(|i| gram[(i, i)]).collect(), gram, taken: 0 },
+            _ => disturbance::beyond(gram.as_ref(), q, h, blocks),
+        };
+        self.before.iter_mut().zip(&before).for_each(|(sum, value)| *sum += value);
         match self.matrix.nrows() {
             0 => self.matrix = gram,
             _ => self.matrix += gram,
         }
+        self.taken += taken;
     }
 
     /// R by Cholesky for the columns at `order`, (block row, channel) in one number; `None` where the Gram matrix is not
@@ -125,14 +115,14 @@ fn of_experiment(view: View<'_>, blocks: usize) -> Mat<f64> {
 }
 
 /// The samples with all channels of each together.
-pub(super) fn interleaved(view: View<'_>) -> Vec<f64> {
+fn interleaved(view: View<'_>) -> Vec<f64> {
     let mut values = vec![0.0; view.channels() * view.samples()];
     view.interleave(0, view.samples(), view.samples(), &mut values);
     values
 }
 
 /// The upper triangle of the Gram matrix from `[L_0 L_1 ...]` and the first and last b - 1 samples.
-pub(super) fn from_lags(lags: Mat<f64>, head: &[f64], tail: &[f64], blocks: usize) -> Mat<f64> {
+fn from_lags(lags: Mat<f64>, head: &[f64], tail: &[f64], blocks: usize) -> Mat<f64> {
     let q = lags.nrows();
     let mut gram = Mat::zeros(q * blocks, q * blocks);
     gram.as_mut().subrows_mut(0, q).copy_from(lags);
@@ -170,7 +160,7 @@ impl View<'_> {
 ///
 /// Frames of B samples are as columns of a matrix X, and with what they look ahead as columns of Y, which overlap in
 /// memory; `X Y'` holds all products of samples up to b - 1 apart.
-pub(super) fn lag_sums(view: View<'_>, blocks: usize, columns: usize) -> Mat<f64> {
+fn lag_sums(view: View<'_>, blocks: usize, columns: usize) -> Mat<f64> {
     let q = view.channels();
     let frame = FRAME.div_ceil(q);
     let frames = columns.div_ceil(frame);

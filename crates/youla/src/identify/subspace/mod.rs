@@ -11,7 +11,6 @@
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
-mod batch;
 mod channels;
 mod condense;
 pub mod delay;
@@ -24,7 +23,6 @@ mod hankel_layout;
 mod horizon;
 mod horizons;
 mod innovation;
-mod memory;
 mod modal;
 mod modal_sums;
 mod open_loop;
@@ -45,7 +43,6 @@ mod ssarx;
 pub mod stabilisation;
 mod stability;
 mod statistics;
-mod stream;
 #[cfg(test)]
 mod tests;
 pub mod uncertainty;
@@ -57,7 +54,6 @@ pub use experiment::Experiment;
 pub use horizon::Horizon;
 pub use horizons::{HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
-pub use memory::ExperimentStream;
 pub use options::{
     AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
     SubspaceMethod, SubspaceOptions,
@@ -65,7 +61,6 @@ pub use options::{
 pub use order::{OrderCandidate, OrderReport, OrderValue};
 pub use output_error::{InputFit, OutputFit};
 pub use stability::{MovedPole, StabilityReport};
-pub use stream::subspace_stream;
 pub(crate) use uncertainty::check as check_uncertainty;
 pub use uncertainty::{
     BlockInfluence, Bootstrap, Delta, DeviationEvidence, Draw, Interval, ModeBand, NoUncertainty, ResponseBand,
@@ -78,7 +73,7 @@ use channels::{Channels, check_blocks};
 use factorisation::HankelLq;
 use faer::{Mat, MatRef, c64};
 use hankel_layout::HankelLayout;
-use output_error::{Base, Condense, Fitted};
+use output_error::{Base, Fitted};
 use projected::{Estimate, Projected};
 
 /// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon
@@ -337,20 +332,9 @@ impl<'a> SubspaceData<'a> {
 
     /// The model of one order in scaled units.
     fn scaled_model(&self, projected: &Projected, order: usize, options: &SubspaceOptions) -> Result<ScaledModel> {
-        self.scaled_model_by(&mut |p, u| Ok(condense::condense(&self.channels, p, u)), projected, order, options)
-    }
-
-    /// The same from records that are condensed in another way.
-    fn scaled_model_by(
-        &self,
-        condense: &mut Condense<'_>,
-        projected: &Projected,
-        order: usize,
-        options: &SubspaceOptions,
-    ) -> Result<ScaledModel> {
         let estimate = projected.estimate(order, options.stability, self.time)?;
         let gain = estimate.innovation.gain();
-        let fitted = output_error::fit(&self.channels, condense, &estimate.pair, gain, &estimate.stability, options)?;
+        let fitted = output_error::fit(&self.channels, &estimate.pair, gain, &estimate.stability, options)?;
         Ok(ScaledModel { estimate, fitted })
     }
 }
@@ -365,8 +349,7 @@ impl SubspaceData<'_> {
         options: &SubspaceOptions,
     ) -> Result<SubspaceModel> {
         let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
-        let condense = &mut |p: &_, u: &_| Ok(condense::condense(&self.channels, p, u));
-        let fitted = output_error::fit_predictions(&self.channels, condense, &pair, gain.as_ref(), options)?;
+        let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
         Ok(SubspaceModel {
             model: self.channels.unscale_model(&pair, &fitted.b, &fitted.d, self.time)?,
             initial_states: fitted.initial_states,

@@ -6,7 +6,7 @@
 //! (SLICOT working note 2000-4, section 2.3, for one experiment). The coefficients of known disturbances are beside x0.
 
 use super::channels::Channels;
-use super::condense::Factors;
+use super::condense::{Factors, condense};
 use super::innovation::observer_gain;
 use super::output_pair::OutputPair;
 use super::sensitivity::{Predictor, Unknowns, simulate};
@@ -58,44 +58,38 @@ pub(super) struct Fitted {
     pub(super) quality: OutputFit,
 }
 
-/// The records as triangular factors, one experiment after the other.
-pub(super) type Condense<'c> = dyn FnMut(&Predictor, &Unknowns) -> Result<Vec<Factors>> + 'c;
-
 /// Finds B, D and the initial states.
 pub(super) fn fit(
     data: &Channels<'_>,
-    condense: &mut Condense<'_>,
     pair: &OutputPair,
     kalman_gain: Option<MatRef<'_, f64>>,
     stability: &StabilityReport,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
     let (predictor, by) = predictor(pair, kalman_gain, is_simulated(stability, options))?;
-    solve(data, condense, pair, predictor, by, options)
+    solve(data, pair, predictor, by, options)
 }
 
 /// The same by the predictions with a given gain, whatever the method.
 pub(super) fn fit_predictions(
     data: &Channels<'_>,
-    condense: &mut Condense<'_>,
     pair: &OutputPair,
     gain: MatRef<'_, f64>,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
     let (predictor, by) = predictor(pair, Some(gain), false)?;
-    solve(data, condense, pair, predictor, by, options)
+    solve(data, pair, predictor, by, options)
 }
 
 fn solve(
     data: &Channels<'_>,
-    condense: &mut Condense<'_>,
     pair: &OutputPair,
     predictor: Predictor,
     by: InputFit,
     options: &SubspaceOptions,
 ) -> Result<Fitted> {
     let unknowns = &unknowns(data, pair, options);
-    let factors = condense(&predictor, unknowns)?;
+    let factors = condense(data, &predictor, unknowns);
     let parts: Vec<Part> = factors.iter().map(|f| join(f, unknowns)).collect();
     let count = unknowns.common();
     let mut whole = SequentialQr::new(count + 1, count + 1);

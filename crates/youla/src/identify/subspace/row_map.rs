@@ -11,32 +11,6 @@ pub(super) const PIECE: usize = 4000;
 /// Lanes that may run at the same time.
 const LANES: usize = 16;
 
-/// Accumulates R by QR, in lanes that are joined at the end.
-pub(super) struct QrLanes {
-    width: usize,
-    lanes: Vec<SequentialQr>,
-}
-
-impl QrLanes {
-    pub(super) fn new(width: usize) -> Self {
-        QrLanes { width, lanes: Vec::new() }
-    }
-
-    pub(super) fn add(&mut self, rows: &RowMap<'_>) {
-        let lanes = rows.total.div_ceil(PIECE).min(LANES);
-        self.lanes.resize_with(lanes.max(self.lanes.len()), || SequentialQr::new(self.width, 1));
-        self.lanes[..lanes].par_iter_mut().enumerate().for_each(|(lane, triangle)| {
-            rows.fold(lane * rows.total / lanes..(lane + 1) * rows.total / lanes, triangle);
-        });
-    }
-
-    pub(super) fn whole(&self) -> Mat<f64> {
-        let mut whole = SequentialQr::new(self.width, self.width);
-        self.lanes.iter().for_each(|lane| whole.fold_rows(lane.r()));
-        whole.r().to_owned()
-    }
-}
-
 /// The transposed Hankel matrix as a map: the row of each sample of each experiment, or of a part of it.
 pub(super) struct RowMap<'a> {
     views: Vec<View<'a>>,
@@ -62,6 +36,21 @@ impl<'a> RowMap<'a> {
     /// The same with combinations of the known disturbances (block row, signal) before the rows.
     pub(super) fn with_leading(self, leading: Mat<f64>) -> Self {
         RowMap { leading, ..self }
+    }
+
+    /// R of all rows, in lanes that are joined at the end.
+    pub(super) fn triangle(&self) -> Mat<f64> {
+        let width = self.leading.ncols() + self.places.len();
+        let lanes = self.total.div_ceil(PIECE).min(LANES);
+        let triangle = |lane: usize| {
+            let mut triangle = SequentialQr::new(width, 1);
+            self.fold(lane * self.total / lanes..(lane + 1) * self.total / lanes, &mut triangle);
+            triangle
+        };
+        let triangles: Vec<SequentialQr> = (0..lanes).into_par_iter().map(triangle).collect();
+        let mut whole = SequentialQr::new(width, width);
+        triangles.iter().for_each(|lane| whole.fold_rows(lane.r()));
+        whole.r().to_owned()
     }
 
     /// Folds a range of rows into a factor, which has room for them only meanwhile.

@@ -2,7 +2,7 @@
 
 use super::ChannelScaling;
 use super::view::View;
-use crate::linalg::TINY;
+use crate::linalg::{self, TINY};
 use crate::{Error, Result};
 use faer::ColRef;
 use rayon::prelude::*;
@@ -60,18 +60,15 @@ impl Moments {
 pub(super) struct Statistics {
     inputs: usize,
     channels: Vec<Moments>,
-    /// The experiment that was read last, and its first values: a channel counts as constant that is so within each.
-    current: Option<usize>,
-    firsts: Vec<f64>,
 }
 
 impl Statistics {
     pub(super) fn new(inputs: usize) -> Self {
-        Statistics { inputs, channels: Vec::new(), current: None, firsts: Vec::new() }
+        Statistics { inputs, channels: Vec::new() }
     }
 
-    /// Takes in samples of an experiment from `start` on; refuses a value that is not finite.
-    pub(super) fn add(&mut self, view: View<'_>, experiment: usize, start: usize) -> Result<()> {
+    /// Takes in an experiment; refuses a value that is not finite.
+    pub(super) fn add(&mut self, view: View<'_>, experiment: usize) -> Result<()> {
         let pieces = view.samples().div_ceil(PIECE);
         let cut = |k: usize| k * view.samples() / pieces;
         let found: Vec<Vec<Moments>> = (0..pieces)
@@ -82,42 +79,23 @@ impl Statistics {
             })
             .collect();
         if found.iter().flatten().any(|m| !(m.mean.is_finite() && m.spread.is_finite())) {
-            self.check_finite(view, experiment, start)?;
+            check_finite(view, experiment)?;
         }
-        found.into_iter().for_each(|piece| self.join(experiment, piece));
+        let firsts: Vec<f64> = found.iter().take(1).flatten().map(|m| m.first).collect();
+        found.into_iter().for_each(|piece| self.join(&firsts, piece));
         Ok(())
     }
 
-    fn join(&mut self, experiment: usize, piece: Vec<Moments>) {
-        if self.current != Some(experiment) {
-            self.current = Some(experiment);
-            self.firsts = piece.iter().map(|m| m.first).collect();
-        }
+    /// `firsts`: the first values of the experiment, within which a constant channel keeps its value.
+    fn join(&mut self, firsts: &[f64], piece: Vec<Moments>) {
         if self.channels.is_empty() {
             self.channels = piece;
             return;
         }
-        for ((all, mut later), first) in self.channels.iter_mut().zip(piece).zip(&self.firsts) {
+        for ((all, mut later), first) in self.channels.iter_mut().zip(piece).zip(firsts) {
             later.constant &= later.first == *first;
             *all = all.and(later);
         }
-    }
-
-    fn check_finite(&self, view: View<'_>, experiment: usize, start: usize) -> Result<()> {
-        for (kind, values) in [("input", view.u), ("output", view.y)] {
-            for k in 0..values.nrows() {
-                if let Some(c) = values.row(k).iter().position(|v| !v.is_finite()) {
-                    let what = format!("the {kind} record of experiment {}", experiment + 1);
-                    return Err(Error::NotFinite { what, row: start + k + 1, column: c + 1 });
-                }
-            }
-        }
-        Ok(())
-    }
-
-    /// Number of channels.
-    pub(super) fn channels(&self) -> usize {
-        self.channels.len()
     }
 
     /// By what each channel is to be divided; refuses channels that are constant throughout.
@@ -140,4 +118,11 @@ impl Statistics {
     pub(super) fn spread(&self, j: usize) -> f64 {
         self.channels[j].spread
     }
+}
+
+fn check_finite(view: View<'_>, experiment: usize) -> Result<()> {
+    for (kind, values) in [("input", view.u), ("output", view.y)] {
+        linalg::check_finite(&format!("the {kind} record of experiment {}", experiment + 1), values)?;
+    }
+    Ok(())
 }

@@ -6,8 +6,8 @@ mod orders;
 mod properties;
 mod recovery;
 mod stabilisation;
-mod stream;
 mod structure;
+mod sums;
 
 use super::*;
 use crate::Mat;

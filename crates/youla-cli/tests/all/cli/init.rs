@@ -101,8 +101,4 @@ fn a_parquet_log_is_listed_and_checked() {
     // Forty samples of a parabola do not excite.
     assert_eq!(found.code, Some(1), "{}", found.stderr);
     assert!(found.stdout.contains("log-first, u:") && found.stdout.contains("log-first, y.1"), "{}", found.stdout);
-    let found =
-        youla(&folder, &["subspace", "log.parquet", "--input", "u [V]", "--output", "y.1", "--sample-time", "1"]);
-    assert_eq!(found.code, Some(2));
-    assert!(found.stderr.contains("a Parquet file cannot be read"), "{}", found.stderr);
 }

@@ -43,7 +43,7 @@ fn mean_fit(run: &FinishedRun) -> Option<f64> {
 
 /// The oscillating modes of the first run, and how far those of the others are from them.
 pub(super) fn modes(runs: &[FinishedRun]) -> EvidenceTable {
-    let all: Vec<Vec<Mode>> = runs.iter().map(|r| oscillating(r)).collect();
+    let all: Vec<Vec<Mode>> = runs.iter().map(oscillating).collect();
     let first: Vec<&Mode> = all[0].iter().collect();
     let partners: Vec<Vec<Option<&Mode>>> = all[1..]
         .iter()

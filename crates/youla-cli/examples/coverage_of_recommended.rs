@@ -1,5 +1,5 @@
-//! How often the 95 % intervals of the recommended model hold the truth: frequency and damping of each mode and |G| at five
-//! frequencies, in four closed loops, with nothing given but the loop. The table of docs/accuracy.md.
+//! How often the 95 % intervals of the recommended model hold the truth: frequency and damping of each mode, |G| at five
+//! frequencies, and the margins, in six closed loops, with nothing given but the loop. The table of docs/accuracy.md.
 //!
 //! ```text
 //! cargo run --release -p youla-cli --example coverage_of_recommended -- [records] [first seed]
@@ -12,8 +12,10 @@ mod loops;
 
 use loops::{Loop, loops};
 use rayon::prelude::*;
+use youla::control::{LinearMargins, MARGIN_NAMES};
 use youla::identify::likelihood::{LikelihoodOptions, ModeEstimate, Recommendation};
 use youla::lti::frequency_response;
+use youla::validate::margin_intervals;
 use youla::{Result, c64};
 
 const QUANTILE: f64 = 1.96;
@@ -45,6 +47,18 @@ fn errors(system: &Loop, found: &Recommendation) -> Result<[Vec<Option<f64>>; 3]
     Ok([hz, zeta, magnitude])
 }
 
+/// Errors of the margins over their stated deviations, in the order of their names; none where a margin is missed.
+fn margin_errors(system: &Loop, found: &Recommendation) -> Result<Vec<(&'static str, Option<f64>)>> {
+    let truth = LinearMargins::new(&system.plant, &system.controller, None)?.deviations(|_| Vec::new())?;
+    let stated = margin_intervals(&found.plant, &system.controller, &found.region, None, 0.95)?;
+    let error = |(name, exact): (&&'static str, Option<(f64, f64)>)| {
+        let (exact, _) = exact.filter(|(value, _)| value.is_finite())?;
+        let near = stated.iter().find(|m| m.name == *name);
+        Some((*name, near.map(|m| (m.interval.value - exact) / m.interval.deviation)))
+    };
+    Ok(MARGIN_NAMES.iter().zip(truth).filter_map(error).collect())
+}
+
 /// Share of the errors within the interval, and their root mean square in deviations.
 fn summary(errors: &[Option<f64>]) -> String {
     let held = errors.iter().filter(|e| e.is_some_and(|e| e.abs() <= QUANTILE)).count();
@@ -62,7 +76,8 @@ fn main() -> Result<()> {
     for system in loops()? {
         let of = |seed: u64| {
             let found = system.recommended(&system.record(seed)?, &LikelihoodOptions::default())?;
-            Ok((errors(&system, &found)?, found.order, found.trusted(), found.reasons()))
+            let margins = margin_errors(&system, &found)?;
+            Ok((errors(&system, &found)?, found.order, found.trusted(), found.reasons(), margins))
         };
         let found: Vec<_> = (first..first + records).into_par_iter().map(of).collect::<Result<Vec<_>>>()?;
         let all = |k: usize| found.iter().flat_map(|f| f.0[k].clone()).collect::<Vec<_>>();
@@ -81,6 +96,13 @@ fn main() -> Result<()> {
             summary(&all(1)),
             summary(&all(2))
         );
+        for name in MARGIN_NAMES {
+            let of = |f: &[(&str, Option<f64>)]| f.iter().filter(|m| m.0 == name).map(|m| m.1).collect::<Vec<_>>();
+            let errors: Vec<_> = found.iter().flat_map(|f| of(&f.4)).collect();
+            if !errors.is_empty() {
+                println!("  {name}: {}", summary(&errors));
+            }
+        }
         if let Some(reason) = found.iter().flat_map(|f| f.3.first()).next() {
             println!("  not trusted: {reason}");
         }

@@ -1,15 +1,14 @@
-//! Four closed loops u = K y + d with known truth, simulated, and what is known of them.
+//! Six closed loops u = K y + d with known truth, simulated, and what is known of them.
 #![allow(dead_code)]
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
-use youla::control::{closed_loop, with_input_port};
-use youla::identify::likelihood::{
-    Experiment, LikelihoodOptions, LoopKnowledge, LoopSignals, Recommendation, recommend,
-};
+use youla::control::{RunningController, closed_loop, with_input_port};
+use youla::identify::likelihood::{LikelihoodOptions, Recommendation};
 use youla::linalg::block;
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
+use youla::signal::LoopRecord;
 use youla::{Mat, Result};
 
 pub(crate) const SAMPLES: usize = 6000;
@@ -19,7 +18,7 @@ pub(crate) struct Loop {
     pub(crate) plant: StateSpace<Discrete>,
     /// Dead time of the plant, samples.
     pub(crate) dead_time: usize,
-    controller: StateSpace<Discrete>,
+    pub(crate) controller: StateSpace<Discrete>,
     noise: f64,
     /// n(t) = colour n(t-1) + e(t).
     colour: f64,
@@ -67,6 +66,32 @@ fn pid(channels: usize, [kp, ki, kd]: [f64; 3], ts: f64) -> Result<StateSpace<Di
     StateSpace::new(a, b, c, d, Discrete::new(ts)?)
 }
 
+/// Two states, one input and one output.
+fn of_matrices(a: [[f64; 2]; 2], b: [f64; 2], c: [f64; 2], ts: f64) -> Result<StateSpace<Discrete>> {
+    let (a, b, c) =
+        (Mat::from_fn(2, 2, |i, j| a[i][j]), Mat::from_fn(2, 1, |i, _| b[i]), Mat::from_fn(1, 2, |_, j| c[j]));
+    StateSpace::new(a, b, c, Mat::zeros(1, 1), Discrete::new(ts)?)
+}
+
+/// `(b0 + b1 z^-1) / (1 - p z^-1)`.
+fn lead([b0, b1, p]: [f64; 3], ts: f64) -> Result<StateSpace<Discrete>> {
+    let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+    StateSpace::new(number(p), number(1.0), number(b1 + p * b0), number(b0), Discrete::new(ts)?)
+}
+
+/// The observer-based controller of the loop with a zero outside of the circle, gains for its own plant.
+fn observer(ts: f64) -> Result<StateSpace<Discrete>> {
+    let nominal = of_matrices(
+        [[0.932379, 0.0877712], [0.0192647, 1.0008857]],
+        [9.65644e-4, 9.74475e-6],
+        [-2.652058, 37.201457],
+        ts,
+    )?;
+    let f = Mat::from_fn(1, 2, |_, j| [-63.524565, -320.817626][j]);
+    let l = Mat::from_fn(2, 1, |i, _| [-0.001181792, -0.001172431][i]);
+    Ok(RunningController::observer(&nominal, f, l)?.system().clone())
+}
+
 pub(crate) fn loops() -> Result<Vec<Loop>> {
     let siso = |ts| modal(&[(20.0, 0.02, &[1.0, 1.0]), (55.0, 0.01, &[0.5, 0.6])], (1, 1), ts);
     let levitation = |ts| {
@@ -112,6 +137,29 @@ pub(crate) fn loops() -> Result<Vec<Loop>> {
             colour: 0.0,
             hz: [20.0, 60.0, 90.0, 120.0, 200.0],
         },
+        Loop {
+            name: "servo with an integrator, lead",
+            plant: of_matrices([[1.0, 2.493e-4], [0.0, 0.9945]], [9.3e-5, 0.743], [1.0, 0.0], 2.5e-4)?,
+            dead_time: 0,
+            controller: lead([-78.4, 77.24, 0.7158], 2.5e-4)?,
+            noise: 4e-4,
+            colour: 0.0,
+            hz: [10.0, 30.0, 60.0, 120.0, 300.0],
+        },
+        Loop {
+            name: "unstable, with a zero outside of the circle",
+            plant: of_matrices(
+                [[0.93238, 0.087771], [0.019265, 1.000886]],
+                [9.6564e-4, 9.7447e-6],
+                [-2.652, 37.2015],
+                1e-3,
+            )?,
+            dead_time: 0,
+            controller: observer(1e-3)?,
+            noise: 5e-3,
+            colour: 0.0,
+            hz: [0.5, 2.0, 5.0, 15.0, 50.0],
+        },
     ])
 }
 
@@ -143,16 +191,13 @@ impl Loop {
 
     /// The model that is recommended for two thirds of a record, the rest kept for its verification.
     pub(crate) fn recommended(&self, [d, u, y]: &[Mat<f64>; 3], options: &LikelihoodOptions) -> Result<Recommendation> {
-        let own = u - d;
-        let signals = |from: usize, rows: usize| LoopSignals {
-            seen: y.subrows(from, rows),
-            explained: own.subrows(from, rows),
-            excitation: Some(d.subrows(from, rows)),
-        };
         let kept = 2 * SAMPLES / 3;
-        let record = |from: usize, rows: usize| Experiment::new(u.subrows(from, rows), y.subrows(from, rows));
-        let rest = SAMPLES - kept;
-        let known = LoopKnowledge::new(Some(&self.controller), vec![signals(0, kept)], vec![signals(kept, rest)])?;
-        recommend(&[record(0, kept)], &[record(kept, rest)], Some(&known), self.plant.time(), options)
+        let record = |from: usize, rows: usize| -> Result<LoopRecord> {
+            let [d, u, y] = [d, u, y].map(|signal| signal.subrows(from, rows).to_owned());
+            LoopRecord::new(self.plant.time(), u, y)?.with_input_excitation(d)
+        };
+        let controller = RunningController::new(self.controller.clone());
+        let (records, fresh) = ([record(0, kept)?], [record(kept, SAMPLES - kept)?]);
+        Ok(youla::identify(&records, &fresh, &controller, None, options)?.model)
     }
 }

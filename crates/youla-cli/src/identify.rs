@@ -1,16 +1,17 @@
 //! `youla identify`: from a run.toml, or straight from a log with flags.
 
-use crate::log_flags::{LogFlags, specs};
+use crate::log_flags::{LogFlags, Sign, specs};
 use crate::output::Failure;
 use crate::run_folder::{OutputFolder, folder_of};
 use clap::Args;
 use std::path::{Path, PathBuf};
+use youla_loop::check::{Severity, Test};
 use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
   youla identify examples/flexible-drive/run.toml --out drive-run
-  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal nominal.json --controller K.json
+  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal nominal.json --controller K.json --feedback positive
 
 A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.
 The controller may also be JSON as [controller] of run.toml:
@@ -30,10 +31,9 @@ pub(crate) struct IdentifyArgs {
     /// File with the controller that ran: a model in discrete time, or JSON with what [controller] of run.toml holds.
     #[arg(long, value_name = "FILE", requires = "input", conflicts_with = "open_loop")]
     controller: Option<PathBuf>,
-    /// The controller of the file acts on the reference less the output, u = K (r - y); without this flag u = K y, as `youla`
-    /// writes controllers.
-    #[arg(long, requires = "controller")]
-    negative_feedback: bool,
+    /// Sign in which the model of the controller is written down; `youla` writes controllers as positive.
+    #[arg(long, value_name = "SIGN", requires = "controller")]
+    feedback: Option<Sign>,
     /// No controller ran.
     #[arg(long, requires = "input")]
     open_loop: bool,
@@ -69,8 +69,13 @@ impl IdentifyArgs {
         let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
         let (m, p) = (data.inputs.len(), data.outputs.len());
+        let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
+        let nominal = NominalModel::ModelFile { file: nominal.clone(), domain: None };
         let controller = match &self.controller {
-            Some(file) => self.controller_of(file)?,
+            Some(file) => {
+                let with = |controller| RunSettings::new(name.clone(), data.clone(), nominal.clone(), controller);
+                self.controller_of(file, with)?
+            }
             None if self.open_loop => ControllerSettings::StateSpace {
                 feedback: Feedback::Positive,
                 domain: None,
@@ -83,22 +88,33 @@ impl IdentifyArgs {
             },
             None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
         };
-        let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
-        Ok(RunSettings::new(name, data, NominalModel::ModelFile { file: nominal.clone(), domain: None }, controller))
+        Ok(RunSettings::new(name, data, nominal, controller))
     }
 
     /// A file with what `[controller]` of run.toml holds states its sign itself; a model needs the flag.
-    fn controller_of(&self, file: &Path) -> Result<ControllerSettings, Failure> {
-        match (ControllerSettings::from_json(file)?, self.negative_feedback) {
-            (None, negative) => {
-                let feedback = if negative { Feedback::Negative } else { Feedback::Positive };
-                Ok(ControllerSettings::ModelFile { feedback, file: file.to_owned() })
+    fn controller_of(
+        &self,
+        file: &Path,
+        with: impl Fn(ControllerSettings) -> RunSettings,
+    ) -> Result<ControllerSettings, Failure> {
+        let model = |feedback| ControllerSettings::ModelFile { feedback, file: file.to_owned() };
+        let refuse = |problem| Err(youla_io::Error::Settings { path: file.to_owned(), at: None, problem }.into());
+        match (ControllerSettings::from_json(file)?, self.feedback) {
+            (None, Some(sign)) => Ok(model(sign.into())),
+            (None, None) => {
+                let explains = |sign: Sign| explains_the_input(&with(model(sign.into())));
+                let agrees = match [explains(Sign::Negative), explains(Sign::Positive)] {
+                    [true, false] => "; the log agrees with negative",
+                    [false, true] => "; the log agrees with positive",
+                    _ => "; the log does not tell which",
+                };
+                refuse(format!(
+                    "the sign of this controller is not stated: add --feedback negative for u = K (r - y), or --feedback positive for \
+                     u = K (y - r){agrees}"
+                ))
             }
-            (Some(controller), false) => Ok(controller),
-            (Some(_), true) => {
-                let problem = "this file states its `feedback` itself; leave --negative-feedback out".into();
-                Err(youla_io::Error::Settings { path: file.to_owned(), at: None, problem }.into())
-            }
+            (Some(controller), None) => Ok(controller),
+            (Some(_), Some(_)) => refuse("this file states its `feedback` itself; leave --feedback out".into()),
         }
     }
 
@@ -106,4 +122,10 @@ impl IdentifyArgs {
         let path = self.files.first().map_or(Path::new(""), PathBuf::as_path).to_owned();
         youla_io::Error::Settings { path, at: None, problem: format!("a log needs {flag}") }.into()
     }
+}
+
+/// Whether the controller of the settings explains the logged inputs, by the check of the data.
+fn explains_the_input(settings: &RunSettings) -> bool {
+    let findings = youla_run::check_run(settings, Path::new("")).map(|check| check.findings);
+    findings.is_ok_and(|all| !all.iter().any(|f| f.test == Test::Controller && f.severity == Severity::Defect))
 }

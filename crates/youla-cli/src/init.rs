@@ -1,9 +1,9 @@
 //! `youla init`: a first run.toml from a log, by questions or flags.
 
 use crate::dialect::Dialect;
-use crate::log_flags::places;
+use crate::log_flags::{Sign, places};
 use crate::output::{Failure, Form, ask_line, say};
-use clap::{Args, ValueEnum};
+use clap::Args;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
 use youla_io::{ChannelRef, SurveyedColumn, survey};
@@ -59,24 +59,6 @@ pub(crate) struct InitArgs {
     /// Replace it if it is there.
     #[arg(long)]
     force: bool,
-}
-
-/// A sign of feedback on the command line.
-#[derive(Debug, Clone, Copy, ValueEnum)]
-enum Sign {
-    /// u = K (r - y)
-    Negative,
-    /// u = K (y - r)
-    Positive,
-}
-
-impl From<Sign> for Feedback {
-    fn from(sign: Sign) -> Self {
-        match sign {
-            Sign::Negative => Feedback::Negative,
-            Sign::Positive => Feedback::Positive,
-        }
-    }
 }
 
 /// Lists the columns of the log, asks what the flags do not say, and writes run.toml.

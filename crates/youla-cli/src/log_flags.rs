@@ -1,8 +1,9 @@
 //! Flags that say what the columns of a log mean, for the verbs that work without a run.toml.
 
 use crate::dialect::Dialect;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use youla_io::{ChannelRef, ChannelSpec};
+use youla_run::Feedback;
 
 /// Channels and clock of a log.
 #[derive(Debug, Args)]
@@ -61,5 +62,23 @@ mod tests {
         let names = |text: &str| places(&given(text)).iter().map(ChannelRef::to_string).collect::<Vec<_>>();
         assert_eq!(names("u(:,1),u(:,2),#3,y"), ["u(:,1)", "u(:,2)", "#3", "y"]);
         assert_eq!(names("a(b,c"), ["a(b,c"]);
+    }
+}
+
+/// A sign of feedback on the command line.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+pub(crate) enum Sign {
+    /// u = K (r - y)
+    Negative,
+    /// u = K (y - r)
+    Positive,
+}
+
+impl From<Sign> for Feedback {
+    fn from(sign: Sign) -> Self {
+        match sign {
+            Sign::Negative => Feedback::Negative,
+            Sign::Positive => Feedback::Positive,
+        }
     }
 }

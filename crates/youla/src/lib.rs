@@ -3,7 +3,8 @@
 //! Feedback makes the input of a plant depend on its noise, which biases ordinary identification. With a doubly coprime
 //! factorisation of a nominal model and of the controller that ran, the same data identify the *Youla deviation system* S,
 //! which is stable, has an input that is independent of the noise, and represents the true plant G(S). This library factorises,
-//! filters, identifies S, recombines it to G(S), reduces it and says what the result is worth.
+//! filters, identifies S, recombines it to G(S), reduces it and says what the result is worth. Its first name, [`identify()`], takes the
+//! plant from u and y by maximum likelihood, without a tuning key, and derives S from it.
 //!
 #![doc = include_str!("../assets/docs/flow.svg")]
 //!
@@ -24,18 +25,30 @@
 //! | [`signal`] | labelled, clocked data; spectra; excitation signals and their persistency |
 //! | [`control`] | LQR, Kalman predictor, observer-based controller (also for firmware), closed loops, margins, nu-gap |
 //! | [`factor`] | the eight coprime factors, `J_G`, `J_K`, `K(Q)`, `G(S)`; (u, y) to (alpha, beta) |
-//! | [`identify`] | the subspace family; the Hansen scheme and direct identification on top of it |
+//! | [`mod@identify`] | the model that the records support, [`identify()`]; the subspace family; the Hansen scheme and direct identification on top of it |
 //! | [`reduce`] | balanced truncation, singular perturbation, weighted by the loop, normalised coprime factors; every order judged in the loop |
 //! | [`validate`] | fit, variance accounted for, residual tests, certificates of the loop, prediction of fresh data |
 //!
-//! # Ten programs
+//! # Eleven programs
 //!
 //! Feedback is positive everywhere, `u = K y`; records are samples x channels; the sample time is never guessed.
 //!
 //! In all of them `machine` is an oscillator of 10 Hz, of which the nominal model says 9 Hz; `f` and `l` are the gains of the
 //! controller that ran, `alpha` is the excitation of the loop, `u` and `y` are the log.
 //!
-//! 1. Factorise a nominal model and its controller
+//! 1. From the log of a loop to a model with region, deviation system and evidence ([`identify()`])
+//!
+//! ```
+#![doc = include_str!("../assets/docs/loop.txt")]
+//! use youla::{control::RunningController, signal::LoopRecord};
+//! let record = LoopRecord::new(time, u, y)?.with_alpha(alpha)?;
+//! let controller = RunningController::observer(&nominal, f, l)?; // of a model: RunningController::new(k), u = K y
+//! let found = youla::identify(&[record], &[], &controller, Some(&nominal), &Default::default())?;
+//! assert!((found.model.modes[0].mode.hz - 10.0).abs() < 0.1); // the nominal model says 9 Hz
+//! # Ok::<(), youla::Error>(())
+//! ```
+//!
+//! 2. Factorise a nominal model and its controller
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -46,7 +59,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 2. Bezout identity
+//! 3. Bezout identity
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -57,7 +70,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 3. From (u, y) to (alpha, beta)
+//! 4. From (u, y) to (alpha, beta)
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -70,7 +83,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 4. The modified Hansen scheme
+//! 5. The modified Hansen scheme
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -84,7 +97,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 5. Direct identification from (u, y)
+//! 6. Direct identification from (u, y)
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -96,7 +109,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 6. Uncertainty of a frequency response
+//! 7. Uncertainty of a frequency response
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -112,7 +125,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 7. Reduction in the loop
+//! 8. Reduction in the loop
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -127,7 +140,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 8. Margins and nu-gap
+//! 9. Margins and nu-gap
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -140,7 +153,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 9. Riccati and Lyapunov equations
+//! 10. Riccati and Lyapunov equations
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
@@ -154,7 +167,7 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 10. Certificate of a loop
+//! 11. Certificate of a loop
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]

@@ -27,10 +27,10 @@ fn number_after(text: &str, what: &str) -> f64 {
 }
 
 #[test]
-fn the_scheme_comes_near_to_the_truth() {
-    let text = output("01_scheme");
-    assert!(text.contains("stabilises G(S): true"), "{text}");
-    let (found, truth) = (number_after(&text, "G(S): fit ["), number_after(&text, "truth: fit ["));
+fn the_model_comes_near_to_the_truth() {
+    let text = output("01_identify");
+    assert!(text.contains("stabilises the plant: true"), "{text}");
+    let (found, truth) = (number_after(&text, "identified: fit ["), number_after(&text, "truth: fit ["));
     assert!(found > truth - 1.0, "{text}");
 }
 

@@ -151,7 +151,7 @@ const LOGS: [Mistake; 7] = [
     ),
 ];
 
-const CALLS: [Mistake; 15] = [
+const CALLS: [Mistake; 16] = [
     called("a log for a run.toml", &["check", "log.csv"], &["log.csv", "--input", "--output", "youla init"]),
     called("the same to identify", &["identify", "log.csv"], &["log.csv", "--input", "--sample-time", "youla init"]),
     called("the same to signals", &["signals", "log.csv"], &["log.csv: this is no run.toml", "youla init"]),
@@ -168,6 +168,24 @@ const CALLS: [Mistake; 15] = [
         &["log.csv", "--controller FILE", "--open-loop"],
     ),
     called(
+        "no sign of a controller",
+        &[
+            "identify",
+            "log.csv",
+            "--input",
+            "u",
+            "--output",
+            "y",
+            "--time",
+            "t",
+            "--nominal",
+            "g.json",
+            "--controller",
+            "g.json",
+        ],
+        &["g.json", "--feedback negative for u = K (r - y)", "--feedback positive for u = K (y - r)", "the log"],
+    ),
+    called(
         "a sign twice",
         &[
             "identify",
@@ -182,9 +200,10 @@ const CALLS: [Mistake; 15] = [
             "g.json",
             "--controller",
             "pid.json",
-            "--negative-feedback",
+            "--feedback",
+            "negative",
         ],
-        &["pid.json", "`feedback`", "leave --negative-feedback out"],
+        &["pid.json", "`feedback`", "leave --feedback out"],
     ),
     called("a flag that does not exist", &["identify", "run.toml", "--ouput", "x"], &["'--ouput'", "--output"]),
     called("a verb that does not exist", &["idenfity", "run.toml"], &["'idenfity'", "'identify'"]),

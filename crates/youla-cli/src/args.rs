@@ -3,7 +3,7 @@
 use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, study};
+use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -47,9 +47,9 @@ pub(crate) enum Command {
     /// Results are written to the folder as they are computed. The same command continues an interrupted run.
     #[command(after_help = paper::EXAMPLES)]
     Paper(Box<paper::PaperArgs>),
-    /// Count how often searches converge to the true plant, or merge the parts of a study of the paper.
+    /// What is done with the parts of `youla paper --shard`.
     #[command(subcommand)]
-    Study(study::StudyCommand),
+    Study(paper::StudyCommand),
     /// Simulate a machine under feedback and identify it: a loop in which direct identification fails.
     ///
     /// The default machine, a levitated mass, is unstable, and most of its input is fed-back sensor noise: a direct model from

@@ -5,7 +5,7 @@ use crate::demo::demo;
 use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, commission, compare, excite, export, init, paper, plot, rig, study, table};
+use crate::{check, commission, compare, excite, export, init, paper, plot, rig, table};
 use std::path::Path;
 use youla_io::folder::{NumberedFolder, RunFolder};
 use youla_run::{
@@ -43,7 +43,7 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
         Command::Plot(args) => plot::plot(form, args),
         Command::Paper(args) => paper::reproduce(form, args),
         Command::Rig(command) => rig::run(form, command),
-        Command::Study(args) => study::study(form, args),
+        Command::Study(paper::StudyCommand::Merge { parts, out }) => paper::merge_parts(form, parts, out.as_deref()),
     }
 }
 

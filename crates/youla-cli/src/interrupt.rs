@@ -8,9 +8,9 @@ const INTERRUPTED: i32 = 130;
 
 /// From here on Ctrl-C ends the program with exit code 130 and one sentence: where the finished items are and how to go on. An item is
 /// written by one call of the system, so that at most the last one is incomplete; the next call computes it again.
-pub(crate) fn resumable(items: &'static str, folder: &Path) {
+pub(crate) fn resumable(folder: &Path) {
     let sentence = format!(
-        "interrupted: the finished {items} are kept in {}; run the same command again to continue from them",
+        "interrupted: the finished loops are kept in {}; run the same command again to continue from them",
         folder.display()
     );
     // Where no handler can be set, Ctrl-C ends the program without the sentence; the finished items are kept all the same.

@@ -19,7 +19,6 @@ mod plot;
 mod progress;
 mod rig;
 mod run_folder;
-mod study;
 mod table;
 mod terminal;
 
@@ -35,7 +34,7 @@ pub fn command() -> clap::Command {
 }
 
 /// Runs the program with these arguments, the first of them its name, and returns its exit code: 0; 1 where a check found a defect or a campaign stopped;
-/// 2 for input that cannot be used; 3 for an impossible computation. Ctrl-C in `paper` and `study` ends the process with 130.
+/// 2 for input that cannot be used; 3 for an impossible computation. Ctrl-C in `paper` and `study merge` ends the process with 130.
 pub fn run(args: impl IntoIterator<Item = OsString>) -> u8 {
     let args = match args::Args::try_parse_from(args) {
         Ok(args) => args,

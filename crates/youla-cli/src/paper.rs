@@ -4,7 +4,7 @@ use crate::interrupt;
 use crate::output::{Failure, Form, say, say_file};
 use crate::progress::Progress;
 use crate::table;
-use clap::Args;
+use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
 use youla_paper::rig::RigParameters;
 use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
@@ -50,6 +50,21 @@ pub(crate) struct PaperArgs {
     /// The same for the parameters of the rig.
     #[arg(long, conflicts_with_all = ["print_settings", "settings", "rig", "seed", "models", "methods", "rpm", "shard", "out"])]
     print_rig: bool,
+}
+
+/// What is done with parts of the study.
+#[derive(Debug, Subcommand)]
+pub(crate) enum StudyCommand {
+    /// Join the results folders of all shards and finish the paper from them.
+    #[command(after_help = "Example:\n  youla study merge part1 part2 --out whole")]
+    Merge {
+        /// The results folders of all shards, in any order.
+        #[arg(value_name = "PART", required = true)]
+        parts: Vec<PathBuf>,
+        /// Results folder; runs/paper-seed-S-models-N by default.
+        #[arg(long, value_name = "DIR")]
+        out: Option<PathBuf>,
+    },
 }
 
 fn method(name: &str) -> Result<Method, String> {
@@ -104,13 +119,11 @@ fn default_folder(configuration: &Configuration) -> PathBuf {
 
 fn finish(form: Form, configuration: &Configuration, target: &Path) -> Result<(), Failure> {
     let progress = Progress::new(form.is_silent());
-    interrupt::resumable("loops", target);
+    interrupt::resumable(target);
     let written = paper(configuration, target, &|now| match now {
         PaperProgress::Begins(stage, loops) => progress.begin(stage.name(), loops),
         PaperProgress::Done(loops) => progress.done(loops),
-        PaperProgress::Continued { path, loops, redone } => {
-            say_continued(&progress, path, &format!("{loops} loops"), redone);
-        }
+        PaperProgress::Continued { path, loops, redone } => say_continued(&progress, path, loops, redone),
     })?;
     progress.clear();
     let summary = target.join("summary.json");
@@ -133,10 +146,10 @@ fn part_of(shard: Shard, written: &WrittenPaper) -> String {
 }
 
 /// A file of an earlier call.
-pub(crate) fn say_continued(progress: &Progress, path: &Path, found: &str, redone: usize) {
+fn say_continued(progress: &Progress, path: &Path, loops: usize, redone: usize) {
     let damaged = match redone {
         0 => String::new(),
         _ => format!(", {redone} damaged or incomplete rows are computed again"),
     };
-    progress.say(&format!("{}: {found} are there already{damaged}", path.display()));
+    progress.say(&format!("{}: {loops} loops are there already{damaged}", path.display()));
 }

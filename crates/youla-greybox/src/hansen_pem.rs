@@ -138,7 +138,7 @@ pub fn pem_from_hansen(
     let fit_of_plant = fit_of(&found.plant, problem.experiments, options.pem.initial_state)?;
     let direct = if options.direct_start { direct_target(problem, nominal, options).ok() } else { None };
     let task = Task { problem, nominal, projection: &options.projection, pem: &options.pem };
-    let Searches { projections, runs, won, model } = pem_from_targets("G(S)", &target, direct, &task)?;
+    let Searches { projections, runs, won, model } = pem_from_targets(&target, direct, &task)?;
     Ok(HansenPem { hansen: found, projections, runs, won, model, fit_of_plant })
 }
 

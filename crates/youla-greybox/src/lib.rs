@@ -10,7 +10,7 @@
 //! the maximum-likelihood estimate: consistent and efficient, in closed loop too (L. Ljung, System Identification: Theory for
 //! the User, 2nd ed., 1999, sections 7.2, 8.4, 9.4 and 13.4). The search finds the minimum next to its start. For lightly damped
 //! modes far from their true frequency this is often a local minimum, which [`Stop`] cannot distinguish from the global one;
-//! [`hansen_pem`] and [`subspace_pem`] start at the projection of a black-box model and compare the fits.
+//! [`hansen_pem`] starts at the projection of a black-box model and compares the fits.
 //!
 //! ```
 //! use youla::{Mat, identify::subspace::Experiment, lti::{Discrete, simulate}};
@@ -40,7 +40,7 @@
 //! | result, covariance, undetermined parameters | `estimate`, `result`, `uncertainty`, `identifiability` |
 //! | intervals, test of the residuals, comparison of structures | `intervals` |
 //! | projection of a frequency response on a structure | `projection` |
-//! | searches from a projection or from several starts | [`projected_pem`], [`hansen_pem`], [`subspace_pem`], `multi_start` |
+//! | searches from a projection | [`projected_pem`], [`hansen_pem`] |
 
 mod bounds;
 mod checks;
@@ -56,7 +56,6 @@ mod identifiability;
 mod intervals;
 mod levenberg;
 mod linearisation;
-mod multi_start;
 mod noise;
 mod options;
 mod predictor;
@@ -72,7 +71,6 @@ mod simulated;
 mod small_qr;
 mod steady;
 mod structure;
-pub mod subspace_pem;
 #[cfg(test)]
 mod tests;
 mod uncertainty;
@@ -90,7 +88,6 @@ pub use intervals::{
     ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ParameterInterval,
     ResidualAssumption, ResidualTest, compare, greybox_intervals, likelihood_ratio,
 };
-pub use multi_start::{MultiStart, MultiStartOptions, SearchEnd, StartRun, greybox_multi_start};
 pub use noise::{InnovationStart, NoiseFilter, NoiseKind, NoiseModel};
 pub use options::GreyBoxOptions;
 pub use problem::Problem;

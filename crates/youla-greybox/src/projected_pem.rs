@@ -1,4 +1,4 @@
-//! From a frequency response to the prediction-error method: what [`super::hansen_pem`] and [`super::subspace_pem`] share.
+//! From a frequency response to the prediction-error method: the steps of [`super::hansen_pem`], and of the closed-loop search of a run.
 //!
 //! ```text
 //! theta_0 = arg min sum_k |(Y - G_theta U) W_k|^2          W_jj^2 = Phi_jj domega, the noise-free part of what follows
@@ -69,10 +69,9 @@ pub(super) struct Task<'a> {
 }
 
 /// Projects responses on the structure and starts the prediction-error method at the best projection of each, and at the nominal
-/// parameters. Only the first response must have a projection; `source` says in words what it is of. The first start wins unless a
-/// later one is better by more than rounding.
+/// parameters. Only the first response, that of G(S), must have a projection. The first start wins unless a later one is better by more
+/// than rounding.
 pub(super) fn pem_from_targets(
-    source: &str,
     first: &FrequencyTarget,
     further: Option<FrequencyTarget>,
     task: &Task<'_>,
@@ -86,7 +85,7 @@ pub(super) fn pem_from_targets(
     begun.extend(task.nominal.map(|theta| (PemStart::Nominal, task.cost(theta), theta.to_vec())));
     let search = |theta: &[f64]| greybox(task.problem, theta, task.pem);
     let (runs, best) = searched(begun, search);
-    let Some((won, model)) = best else { return Err(first_error(source, runs)) };
+    let Some((won, model)) = best else { return Err(first_error(runs)) };
     let projections = projections.into_iter().map(|(_, projection)| projection).collect();
     Ok(Searches { projections, runs, won, model })
 }
@@ -141,9 +140,9 @@ impl Task<'_> {
 }
 
 /// Why the first search failed.
-fn first_error(source: &str, runs: Vec<PemRun>) -> Error {
+fn first_error(runs: Vec<PemRun>) -> Error {
     let first = runs.into_iter().find_map(|run| run.cost.err());
-    first.unwrap_or(Error::NoStart).within(format!("the prediction-error method from the projection of {source}"))
+    first.unwrap_or(Error::NoStart).within("the prediction-error method from the projection of G(S)")
 }
 
 /// Whether a fit is more than [`SUSPICION_POINTS`] below another, or below that of a constant, on an output.
@@ -268,3 +267,6 @@ fn simulated_error(model: &StateSpace<Discrete>, e: &Experiment<'_>, initial: In
     };
     Ok(e.y - simulated)
 }
+
+#[cfg(test)]
+mod tests;

@@ -5,9 +5,7 @@ pub mod demo;
 mod error;
 pub mod rig;
 pub mod run;
-pub mod run_starts;
 pub mod story;
-pub mod story_starts;
 pub mod study;
 
 pub use bearing_structure::BearingStructure;

@@ -25,9 +25,9 @@ pub(super) struct Range {
 }
 
 impl Range {
-    /// The range of parameter `j` around `value`.
-    fn around(value: f64, spread: f64) -> Self {
-        Range { low: value / spread, high: value * spread }
+    /// The range around the value of a parameter that is not a rate.
+    fn around(value: f64) -> Self {
+        Range { low: value / SPREAD, high: value * SPREAD }
     }
 
     /// The range of an outer parameter for a response in `band`, rad/s.
@@ -40,7 +40,7 @@ impl Range {
                 // The sign of a decaying rate: slope times parameter is negative.
                 Range { low: -band[0] / BEYOND / first, high: -band[1] * BEYOND / first }
             }
-            _ => Range::around(theta[j], SPREAD),
+            _ => Range::around(theta[j]),
         }
     }
 
@@ -61,37 +61,14 @@ pub(super) fn design(ranges: &[Range]) -> Vec<Vec<f64>> {
     (0..full.unwrap_or(POINTS)).map(point).collect()
 }
 
-/// Where points around a parameter vector lie.
-pub(in super::super) struct Neighbourhood<'a> {
-    /// Each parameter over its value from one over this to this.
-    pub(in super::super) factor: f64,
-    /// Points, the vector itself among them.
-    pub(in super::super) points: usize,
-    /// Every how many-th of Halton's points is taken. The first points of a large base lie close together at the lower end; with
-    /// 409 they do not (L. Kocis and W. J. Whiten, ACM Trans. Math. Softw. 23 (1997), 266).
-    pub(in super::super) leap: usize,
-    /// Smallest and largest value of each parameter.
-    pub(in super::super) limits: &'a [(f64, f64)],
-}
-
-/// Points around a parameter vector, itself first; logarithmic in each parameter, which keeps its sign, and zero stays zero.
-pub(in super::super) fn spread(theta: &[f64], around: &Neighbourhood<'_>) -> Vec<Vec<f64>> {
-    let range = |(value, (min, max)): (&f64, &(f64, f64))| {
-        let Range { low, high } = Range::around(*value, around.factor);
-        Range { low: low.max(*min).min(*max), high: high.max(*min).min(*max) }
-    };
-    let ranges: Vec<Range> = theta.iter().zip(around.limits).map(range).collect();
-    let point = |k: usize| {
-        let share = |j: usize| halton(k * around.leap, PRIMES[j % PRIMES.len()]);
-        ranges.iter().enumerate().map(|(j, range)| range.at(share(j))).collect()
-    };
-    [theta.to_vec()].into_iter().chain((1..around.points).map(point)).collect()
-}
-
-/// The points among which a projection looks for its start where the structure gives none.
+/// The points among which a projection looks for its start where the structure gives none: `theta` first, then points around it,
+/// logarithmic in each parameter, which keeps its sign; zero stays zero.
 pub(super) fn decades(theta: &[f64]) -> Vec<Vec<f64>> {
-    let limits = vec![(f64::NEG_INFINITY, f64::INFINITY); theta.len()];
-    spread(theta, &Neighbourhood { factor: SPREAD, points: POINTS, leap: 1, limits: &limits })
+    let point = |k: usize| {
+        let share = |j: usize| halton(k, PRIMES[j % PRIMES.len()]);
+        theta.iter().enumerate().map(|(j, value)| Range::around(*value).at(share(j))).collect()
+    };
+    [theta.to_vec()].into_iter().chain((1..POINTS).map(point)).collect()
 }
 
 /// The digits of `k` in a base, mirrored at the point.
@@ -117,14 +94,12 @@ mod tests {
     }
 
     #[test]
-    fn points_around_a_vector_keep_signs_and_limits() {
-        let limits = [(0.5, 2.0), (f64::NEG_INFINITY, 0.0), (f64::NEG_INFINITY, f64::INFINITY)];
-        let around = Neighbourhood { factor: 4.0, points: 50, leap: 409, limits: &limits };
-        let points = spread(&[1.0, -3.0, 0.0], &around);
-        assert_eq!((points.len(), &points[0]), (50, &vec![1.0, -3.0, 0.0]));
-        assert!(points.iter().all(|p| (0.5..=2.0).contains(&p[0]) && (-12.0..=-0.75).contains(&p[1]) && p[2] == 0.0));
+    fn points_around_a_vector_keep_signs() {
+        let points = decades(&[1.0, -3.0, 0.0]);
+        assert_eq!((points.len(), &points[0]), (64, &vec![1.0, -3.0, 0.0]));
+        assert!(points.iter().all(|p| (0.1..=10.0).contains(&p[0]) && (-30.0..=-0.3).contains(&p[1]) && p[2] == 0.0));
         let low = points[1..].iter().filter(|p| p[1] > -3.0).count();
-        assert!((20..=29).contains(&low), "{low}");
+        assert!((26..=37).contains(&low), "{low}");
     }
 
     #[test]

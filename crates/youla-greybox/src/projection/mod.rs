@@ -28,7 +28,6 @@ use super::options::require_positive;
 use super::{Stop, Structure};
 use crate::{Error, Result};
 use design::decades;
-pub(super) use design::{Neighbourhood, spread};
 use faer::{Mat, MatRef, c64};
 use misfit::{Misfit, Point};
 use search::{Outcome, minimise};

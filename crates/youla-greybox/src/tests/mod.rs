@@ -3,7 +3,6 @@ mod estimates;
 mod gradient;
 mod limits;
 mod noise;
-mod starts;
 
 pub(super) use gradient::{comparison, gradient_error};
 

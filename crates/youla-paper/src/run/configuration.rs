@@ -9,7 +9,7 @@ use toml::{Table, Value};
 use youla_io::folder::replace_file;
 
 /// The file in a results folder that says what the results are results of.
-pub(crate) const FILE: &str = "configuration.toml";
+const FILE: &str = "configuration.toml";
 
 /// Everything on which the results depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -61,8 +61,22 @@ impl Configuration {
 
     /// Makes `target` the folder of this configuration, or finds that it is.
     pub(super) fn claim(&self, target: &Path) -> Result<()> {
-        let there = |folder: &Path| Configuration::read(folder)?.table();
-        claim(target, &self.table()?, there)
+        let io = |source| Error::File(youla_io::Error::Io { path: target.to_owned(), source });
+        std::fs::create_dir_all(target).map_err(io)?;
+        if target.join(FILE).exists() {
+            return match self.difference(&Configuration::read(target)?)? {
+                None => Ok(()),
+                Some(difference) => Err(Error::OtherSettings { path: target.to_owned(), difference }),
+            };
+        }
+        // A process that was killed while it wrote the file leaves a hidden one behind.
+        let visible = |entry: std::io::Result<std::fs::DirEntry>| {
+            entry.map_or(true, |entry| !entry.file_name().to_string_lossy().starts_with('.'))
+        };
+        if std::fs::read_dir(target).map_err(io)?.any(visible) {
+            return Err(Error::File(youla_io::Error::OutputExists { path: target.to_owned() }));
+        }
+        Ok(replace_file(&target.join(FILE), &self.to_toml()?)?)
     }
 
     fn table(&self) -> Result<Table> {
@@ -83,27 +97,7 @@ impl Configuration {
     }
 }
 
-/// Makes `target` the folder of a configuration, or finds that it is; `there` reads that of a folder.
-pub(crate) fn claim(target: &Path, here: &Table, there: impl Fn(&Path) -> Result<Table>) -> Result<()> {
-    let io = |source| Error::File(youla_io::Error::Io { path: target.to_owned(), source });
-    std::fs::create_dir_all(target).map_err(io)?;
-    if target.join(FILE).exists() {
-        return match first_difference("", &Value::Table(there(target)?), &Value::Table(here.clone())) {
-            None => Ok(()),
-            Some(difference) => Err(Error::OtherSettings { path: target.to_owned(), difference }),
-        };
-    }
-    // A process that was killed while it wrote the file leaves a hidden one behind.
-    let visible = |entry: std::io::Result<std::fs::DirEntry>| {
-        entry.map_or(true, |entry| !entry.file_name().to_string_lossy().starts_with('.'))
-    };
-    if std::fs::read_dir(target).map_err(io)?.any(visible) {
-        return Err(Error::File(youla_io::Error::OutputExists { path: target.to_owned() }));
-    }
-    Ok(replace_file(&target.join(FILE), &toml::to_string(here).map_err(|e| not_toml(&e))?)?)
-}
-
-pub(crate) fn not_toml(error: &toml::ser::Error) -> Error {
+fn not_toml(error: &toml::ser::Error) -> Error {
     Error::File(youla_io::Error::Settings { path: FILE.into(), at: None, problem: error.to_string() })
 }
 

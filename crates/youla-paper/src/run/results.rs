@@ -5,9 +5,8 @@ use crate::study::Paper;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla_io::folder::replace_file;
-use youla_report::data::Method;
-use youla_report::story::{Block, Table};
-use youla_report::{Figure, figure_csv, story_html, svg, table_csv};
+use youla_report::story::Block;
+use youla_report::{figure_csv, story_html, svg, table_csv};
 
 /// Rows of Figs 4 and 5.
 pub(super) const STUDY: &str = "study.csv";
@@ -19,19 +18,11 @@ pub(super) fn write_figures(paper: &Paper, target: &Path) -> Result<()> {
     json(&target.join("summary.json"), &paper_summary(paper)?)?;
     let figures = folder(target, "figures")?;
     let methods = story_methods();
-    let drawn = paper_figures(paper)?;
-    drawn.iter().try_for_each(|drawn| figure_files(&figures, drawn, &methods))
-}
-
-/// A figure as CSV, then as SVG.
-pub(crate) fn figure_files(folder: &Path, figure: &Figure, methods: &[Method]) -> Result<()> {
-    replace_file(&folder.join(format!("{}.csv", figure.key)), &figure_csv(figure, methods))?;
-    Ok(replace_file(&folder.join(format!("{}.svg", figure.key)), &svg(figure, methods)?)?)
-}
-
-/// A table as CSV.
-pub(crate) fn table_file(folder: &Path, table: &Table) -> Result<()> {
-    Ok(replace_file(&folder.join(format!("{}.csv", table.key)), &table_csv(table))?)
+    for figure in &paper_figures(paper)? {
+        replace_file(&figures.join(format!("{}.csv", figure.key)), &figure_csv(figure, &methods))?;
+        replace_file(&figures.join(format!("{}.svg", figure.key)), &svg(figure, &methods)?)?;
+    }
+    Ok(())
 }
 
 /// `timing.json`, every table as CSV, those of times included, and the page.
@@ -41,20 +32,20 @@ pub(super) fn write_page(paper: &Paper, target: &Path) -> Result<()> {
     let tables = folder(target, "tables")?;
     for block in story.sections.iter().flat_map(|section| &section.blocks) {
         if let Block::Table(table) = block {
-            table_file(&tables, table)?;
+            replace_file(&tables.join(format!("{}.csv", table.key)), &table_csv(table))?;
         }
     }
     Ok(replace_file(&target.join("report.html"), &story_html(&story)?)?)
 }
 
 /// Makes a folder of the results.
-pub(crate) fn folder(target: &Path, name: &str) -> Result<PathBuf> {
+fn folder(target: &Path, name: &str) -> Result<PathBuf> {
     let path = target.join(name);
     std::fs::create_dir_all(&path).map_err(|source| Error::File(youla_io::Error::Io { path: path.clone(), source }))?;
     Ok(path)
 }
 
-pub(crate) fn json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
+fn json(path: &Path, value: &impl serde::Serialize) -> Result<()> {
     let text = serde_json::to_string_pretty(value)
         .map_err(|e| Error::File(youla_io::Error::Io { path: path.to_owned(), source: e.into() }))?;
     Ok(replace_file(path, &(text + "\n"))?)

@@ -2,7 +2,7 @@
 //! continued.
 
 use super::item::Evaluated;
-use super::row::{ResultLine, Row};
+use super::row::Row;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -99,7 +99,7 @@ impl FromStr for Shard {
 /// Items whose rows go to one file.
 #[derive(Debug, Clone)]
 pub struct Campaign {
-    /// The results file: [`ResultLine::HEADER`], then the rows of item after item.
+    /// The results file: [`Row::HEADER`], then the rows of item after item.
     pub path: PathBuf,
     /// The items.
     pub items: Range<usize>,
@@ -109,9 +109,9 @@ pub struct Campaign {
 
 /// What a campaign found.
 #[derive(Debug, Clone)]
-pub struct Outcome<R = Row> {
+pub struct Outcome {
     /// All rows, those of an earlier call included.
-    pub rows: Vec<R>,
+    pub rows: Vec<Row>,
     /// Items that were computed in this call, without those that had no loop.
     pub computed: usize,
     /// Time per part of an item, summed over the items of this call; see [`Evaluated::durations`].
@@ -129,12 +129,12 @@ impl Campaign {
     /// # Errors
     /// Of the item with the lowest number that fails; rows before it stay. [`Error::NotResults`] where the file is something
     /// else, [`Error::InUse`] where another process writes to it, [`youla_io::Error::Io`].
-    pub fn run<R: ResultLine>(
+    pub fn run(
         &self,
-        evaluate: impl Fn(usize) -> Result<Evaluated<R>> + Sync,
+        evaluate: impl Fn(usize) -> Result<Evaluated> + Sync,
         continued: &dyn Fn(usize, usize),
         progress: &(dyn Fn(usize) + Sync),
-    ) -> Result<Outcome<R>> {
+    ) -> Result<Outcome> {
         let io = |source| Error::File(youla_io::Error::Io { path: self.path.clone(), source });
         let mut file = OpenOptions::new().create(true).read(true).append(true).open(&self.path).map_err(io)?;
         match file.try_lock() {
@@ -145,7 +145,7 @@ impl Campaign {
         let found = Found::read(&self.path, self.items.clone(), self.rows_per_item)?;
         file.set_len(found.bytes as u64).map_err(io)?;
         if found.bytes == 0 {
-            writeln!(file, "{}", R::HEADER).map_err(io)?;
+            writeln!(file, "{}", Row::HEADER).map_err(io)?;
         }
         let done = found.rows.len() / self.rows_per_item;
         continued(done, found.damaged);
@@ -173,17 +173,17 @@ impl Campaign {
 }
 
 /// The end of the file and what waits for its turn.
-struct Writer<R> {
+struct Writer {
     file: File,
     /// The item that is written next.
     next: usize,
-    waiting: BTreeMap<usize, Result<Evaluated<R>>>,
-    outcome: Outcome<R>,
+    waiting: BTreeMap<usize, Result<Evaluated>>,
+    outcome: Outcome,
     failure: Option<Error>,
 }
 
-impl<R: ResultLine> Writer<R> {
-    fn take(&mut self, item: usize, evaluated: Result<Evaluated<R>>, path: &Path) {
+impl Writer {
+    fn take(&mut self, item: usize, evaluated: Result<Evaluated>, path: &Path) {
         self.waiting.insert(item, evaluated);
         while self.failure.is_none()
             && let Some(evaluated) = self.waiting.remove(&self.next)
@@ -196,7 +196,7 @@ impl<R: ResultLine> Writer<R> {
     }
 
     /// One call of the system per item, so that a process that is killed leaves at most one incomplete item.
-    fn write(&mut self, evaluated: Evaluated<R>, path: &Path) -> Result<()> {
+    fn write(&mut self, evaluated: Evaluated, path: &Path) -> Result<()> {
         let text: String = evaluated.rows.iter().map(|row| row.line() + "\n").collect();
         self.file
             .write_all(text.as_bytes())
@@ -219,22 +219,22 @@ pub fn read_results(path: &Path, items: Range<usize>, rows_per_item: usize) -> R
 }
 
 /// The usable beginning of a results file.
-struct Found<R> {
-    rows: Vec<R>,
+struct Found {
+    rows: Vec<Row>,
     /// Its length.
     bytes: usize,
     /// Lines behind it.
     damaged: usize,
 }
 
-impl<R: ResultLine> Found<R> {
+impl Found {
     /// Reads the complete items at the beginning of a file.
     fn read(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Self> {
         let text =
             std::fs::read(path).map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
         let mut lines = text.split_inclusive(|byte| *byte == b'\n');
         let header = lines.next().unwrap_or_default();
-        let expected = format!("{}\n", R::HEADER);
+        let expected = format!("{}\n", Row::HEADER);
         if header != expected.as_bytes() {
             // A header that was cut off belongs to a process that was killed at once.
             return match expected.as_bytes().starts_with(header) {
@@ -245,7 +245,7 @@ impl<R: ResultLine> Found<R> {
         let (mut rows, mut bytes, mut length) = (Vec::new(), header.len(), header.len());
         for line in lines {
             let item = items.start + rows.len() / rows_per_item;
-            match complete(line).filter(|row: &R| row.item() == item && item < items.end) {
+            match complete(line).filter(|row: &Row| row.item == item && item < items.end) {
                 Some(row) => rows.push(row),
                 None => break,
             }
@@ -260,6 +260,6 @@ impl<R: ResultLine> Found<R> {
     }
 }
 
-fn complete<R: ResultLine>(line: &[u8]) -> Option<R> {
-    R::parse(std::str::from_utf8(line).ok()?.strip_suffix('\n')?)
+fn complete(line: &[u8]) -> Option<Row> {
+    Row::parse(std::str::from_utf8(line).ok()?.strip_suffix('\n')?)
 }

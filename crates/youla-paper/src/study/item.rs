@@ -44,9 +44,9 @@ pub struct Item {
 
 /// The rows of an item, and how long each took.
 #[derive(Debug, Clone)]
-pub struct Evaluated<R = Row> {
+pub struct Evaluated {
     /// The nominal model, then the methods in the order of the settings.
-    pub rows: Vec<R>,
+    pub rows: Vec<Row>,
     /// Design and simulation, then as `rows`.
     pub durations: Vec<Duration>,
 }
@@ -86,17 +86,17 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
 }
 
 /// Seconds of one part after the other.
-pub(super) struct Laps {
+struct Laps {
     last: Instant,
-    pub(super) laps: Vec<Duration>,
+    laps: Vec<Duration>,
 }
 
 impl Laps {
-    pub(super) fn start() -> Self {
+    fn start() -> Self {
         Laps { last: Instant::now(), laps: Vec::new() }
     }
 
-    pub(super) fn lap(&mut self) {
+    fn lap(&mut self) {
         let now = Instant::now();
         self.laps.push(now - self.last);
         self.last = now;
@@ -104,12 +104,12 @@ impl Laps {
 }
 
 /// A record of the loop, from rest.
-pub(super) struct LoopRecord {
-    pub(super) u: Mat<f64>,
-    pub(super) y: Mat<f64>,
+struct LoopRecord {
+    u: Mat<f64>,
+    y: Mat<f64>,
 }
 
-pub(super) fn record(
+fn record(
     design: &Design,
     plant: &StateSpace<Discrete>,
     samples: usize,
@@ -267,7 +267,7 @@ impl LoopData<'_> {
 }
 
 /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
-pub(super) fn fit_on(LoopRecord { u, y }: &LoopRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
+fn fit_on(LoopRecord { u, y }: &LoopRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
     match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
         Ok(predicted) => {
             let percent = fit(y.as_ref(), predicted.as_ref())?;
@@ -299,7 +299,7 @@ fn grey_box(found: &GreyBoxModel) -> Found {
 }
 
 /// What was done to the poles of S.
-pub(super) fn reflected(found: &HansenModel) -> String {
+fn reflected(found: &HansenModel) -> String {
     match found.deviation.stability.moved.len() {
         0 => String::new(),
         poles => format!("{poles} poles of S reflected"),

@@ -11,7 +11,6 @@
 //! | `campaign` | many items on all cores, streamed to a file in order, resumable |
 //! | `experiment`, `experiments` | Table 1 and Figs 6 to 10 on the digital twin |
 //! | `paper` | everything that was found |
-//! | `starts` | how often a search converges, and from which start |
 //! | `statistics` | quantiles, deciles, failures, winners |
 
 mod campaign;
@@ -26,7 +25,6 @@ mod monte_carlo;
 mod paper;
 mod row;
 mod settings;
-mod starts;
 mod statistics;
 mod synchronous;
 
@@ -42,11 +40,7 @@ pub use item::{Evaluated, Item, evaluate};
 pub use method::Method;
 pub use monte_carlo::monte_carlo;
 pub use paper::{Paper, PaperTiming};
-pub use row::{ResultLine, Row, Status};
+pub use row::{Row, Status};
 pub use settings::{CrossoverSettings, ExperimentSettings, PaperSettings, StudyController, StudySettings};
-pub use starts::{
-    CONVERGED_WITHIN, Search, StartCase, StartCount, StartFailure, StartRow, StartsSettings, evaluate_starts,
-    start_counts, start_failures,
-};
 pub use statistics::{Decile, POOR_FIT, TIE, Winner, deciles, median, overall, quantile, winner};
 pub use synchronous::without_harmonics;

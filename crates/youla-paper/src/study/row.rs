@@ -3,21 +3,6 @@
 use super::method::Method;
 use sha2::{Digest, Sha256};
 
-/// One line of a results file of [`super::Campaign`].
-pub trait ResultLine: Sized + Send {
-    /// The first line of the file.
-    const HEADER: &str;
-
-    /// Number of the item, from 0.
-    fn item(&self) -> usize;
-
-    /// The line, without its end.
-    fn line(&self) -> String;
-
-    /// Reads a line; `None` where it is damaged.
-    fn parse(line: &str) -> Option<Self>;
-}
-
 /// What became of an identification.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Status {
@@ -40,11 +25,11 @@ impl Status {
     ];
 
     /// The status with this word.
-    pub(super) fn of_word(word: &str) -> Option<Status> {
+    fn of_word(word: &str) -> Option<Status> {
         Status::ALL.iter().find(|(_, known)| *known == word).map(|(status, _)| *status)
     }
 
-    pub(super) fn word(self) -> &'static str {
+    fn word(self) -> &'static str {
         Status::ALL.iter().find(|(status, _)| *status == self).map_or("", |(_, word)| word)
     }
 }
@@ -129,35 +114,19 @@ impl Row {
     }
 }
 
-impl ResultLine for Row {
-    const HEADER: &str = Row::HEADER;
-
-    fn item(&self) -> usize {
-        self.item
-    }
-
-    fn line(&self) -> String {
-        self.line()
-    }
-
-    fn parse(line: &str) -> Option<Row> {
-        Row::parse(line)
-    }
-}
-
 /// A note without what would end its field.
-pub(super) fn in_one_field(note: &str) -> String {
+fn in_one_field(note: &str) -> String {
     note.chars().map(|c| if c == ',' || c.is_control() { ';' } else { c }).collect()
 }
 
 /// A line with its check behind it.
-pub(super) fn checked(text: String) -> String {
+fn checked(text: String) -> String {
     let check = check(&text);
     format!("{text},{check}")
 }
 
 /// What is before the check, where that is right.
-pub(super) fn unchecked(line: &str) -> Option<&str> {
+fn unchecked(line: &str) -> Option<&str> {
     let (text, found) = line.rsplit_once(',')?;
     (check(text) == found).then_some(text)
 }

@@ -4,5 +4,4 @@ mod bad_input;
 mod resume;
 mod shards;
 mod small;
-mod starts;
 mod whole;

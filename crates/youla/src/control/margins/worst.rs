@@ -7,7 +7,7 @@ use crate::lti::{StateSpace, TimeDomain};
 use std::cmp::Ordering;
 use std::ops::Range;
 
-/// Names of the margins with the units of their values, each of its worst channel, in the order of [`critical`].
+/// Names of the margins with the units of their values, each of its worst channel, in one order everywhere.
 pub const MARGIN_NAMES: [&str; FIGURES] = [
     "peak sensitivity, worst output",
     "peak sensitivity, all outputs",

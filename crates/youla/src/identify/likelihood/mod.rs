@@ -16,7 +16,7 @@
 //! | search in local coordinates, the noise estimated with it | `search` |
 //! | one mode more, one less, another dead time, until Schwarz's criterion falls no more | `choose::{solve, neighbours, grow}` |
 //! | standard deviations: information of the record, and scatter of models that it does not distinguish | `deviation` |
-//! | questions to the records, each with a figure and a limit | [`verdict`](super::verdict) |
+//! | questions to the records, each with a figure and a limit | `identify::verdict` |
 
 pub(super) mod choose;
 pub(super) mod data;

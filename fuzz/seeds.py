@@ -128,8 +128,8 @@ put('structure', 'small.toml', 'sample_time = 0.1\na = [["sqrt(k) ^ -2 * pi", "e
     '[derived]\nratio = "k / m"\n')
 row = '3,0.5,0.1,100,1.5,1.6,hansen,ok,97.1,96.2,12,note'
 put('row', 'row.csv', f'{row},{hashlib.sha256(row.encode()).hexdigest()[:8]}')
-put('paper_toml', 'paper.toml', (root / 'crates/youla-paper/assets/paper.toml').read_bytes())
-put('rig_toml', 'bearing.toml', (root / 'crates/youla-paper/assets/bearing.toml').read_bytes())
+put('paper_toml', 'paper.toml', (root / 'studies/paper/assets/paper.toml').read_bytes())
+put('rig_toml', 'bearing.toml', (root / 'studies/paper/assets/bearing.toml').read_bytes())
 put('check_toml', 'check.toml', 'clipped_samples = 3\nlags = 20\nexcitation_order = 40\ncrest = 4.5\nsignificance = 1e-3\n[limits]\ny = [-1.0, 2.5]\n')
 channel = {'name': 'y', 'unit': 'um'}
 system = {'a': [[0.5, 0.1], [0, 0.25]], 'b': [[1.0], [0]], 'c': [[1, -1e-3]], 'd': [[0]]}

@@ -46,23 +46,24 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("youla-py", &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run"]),
 ];
 
-fn crates() -> PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("..")
+fn project() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
+}
+
+/// The folders of all members of the workspace.
+fn members() -> Vec<PathBuf> {
+    let inside = |folder: &str| fs::read_dir(project().join(folder)).expect("members");
+    ["crates", "studies"].into_iter().flat_map(inside).map(|entry| entry.expect("readable").path()).collect()
 }
 
 #[test]
 fn crates_use_only_what_the_page_shows() {
-    let mut names: Vec<String> = fs::read_dir(crates())
-        .expect("the crates")
-        .map(|entry| entry.expect("readable").file_name().to_string_lossy().into_owned())
-        .collect();
-    names.sort();
-    let mut listed: Vec<&str> = ARROWS.iter().map(|(name, _)| *name).collect();
-    listed.sort_unstable();
-    assert_eq!(names, listed);
-    for (name, expected) in ARROWS {
-        let manifest = fs::read_to_string(crates().join(name).join("Cargo.toml")).expect("a manifest");
+    assert_eq!(members().len(), ARROWS.len());
+    for folder in members() {
+        let manifest = fs::read_to_string(folder.join("Cargo.toml")).expect("a manifest");
         let manifest: toml::Table = manifest.parse().expect("TOML");
+        let name = manifest["package"]["name"].as_str().expect("a name");
+        let (_, expected) = ARROWS.iter().find(|(listed, _)| *listed == name).expect("a crate of the page");
         let dependencies = manifest.get("dependencies").and_then(toml::Value::as_table);
         let found: BTreeSet<&str> = dependencies
             .into_iter()
@@ -80,7 +81,7 @@ const LONGEST: usize = 400;
 
 #[test]
 fn no_file_is_too_long() {
-    for file in sources(&crates()) {
+    for file in members().iter().flat_map(|folder| sources(folder)) {
         let lines = fs::read_to_string(&file).expect("readable").lines().count();
         assert!(lines <= LONGEST, "{} has {lines} lines, at most {LONGEST}", file.display());
     }
@@ -90,7 +91,7 @@ fn no_file_is_too_long() {
 #[test]
 fn one_version_everywhere() {
     let version = env!("CARGO_PKG_VERSION");
-    let text = |name: &str| fs::read_to_string(crates().join("..").join(name)).expect("readable");
+    let text = |name: &str| fs::read_to_string(project().join(name)).expect("readable");
     let manifest: toml::Table = text("Cargo.toml").parse().expect("TOML");
     let dependencies = manifest["workspace"]["dependencies"].as_table().expect("a table");
     for (name, dependency) in dependencies.iter().filter(|(name, _)| name.starts_with("youla")) {

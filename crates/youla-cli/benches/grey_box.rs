@@ -21,7 +21,7 @@ use youla::lti::{Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
 use youla_greybox::{Declaration, DeclaredStructure, GreyBoxOptions, Problem, Structure, greybox};
-use youla_paper::rig::Bearing;
+use youla_twin::rig::Bearing;
 
 /// Errors of all crates.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;

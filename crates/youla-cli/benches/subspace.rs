@@ -19,7 +19,7 @@ use youla::identify::subspace::{Experiment, Order, SubspaceMethod, SubspaceOptio
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, Result};
-use youla_paper::rig::Bearing;
+use youla_twin::rig::Bearing;
 
 const TS: f64 = 2e-4;
 const ROUNDS: usize = 3;

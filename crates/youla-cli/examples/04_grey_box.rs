@@ -8,8 +8,8 @@ mod machine;
 
 use youla::identify::subspace::Experiment;
 use youla_greybox::{GreyBoxOptions, IntervalOptions, LoopOutput, Problem, greybox, greybox_intervals};
-use youla_paper::BearingStructure;
-use youla_paper::rig::Bearing;
+use youla_twin::BearingStructure;
+use youla_twin::rig::Bearing;
 
 /// Errors of all crates.
 type Result<T> = std::result::Result<T, Box<dyn std::error::Error + Send + Sync>>;

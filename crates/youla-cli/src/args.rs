@@ -1,6 +1,5 @@
 //! The command line.
 
-use crate::demo::Machine;
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
 use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig};
@@ -137,4 +136,22 @@ pub(crate) enum Command {
     /// certified or confirmed, or whose verification is worse than predicted; alpha and Q are then zero, and the exit code is 1.
     #[command(after_help = commission::EXAMPLES)]
     Commission(commission::CommissionArgs),
+}
+
+/// The machines that can be simulated.
+#[derive(Debug, Clone, Copy, clap::ValueEnum)]
+pub(crate) enum Machine {
+    /// A levitated mass, unstable, under a PD controller with strong sensor noise
+    Levitation,
+    /// The gas bearing of the paper, 2 x 2, with a nominal model of half the true A
+    Bearing,
+}
+
+impl From<Machine> for youla_twin::Machine {
+    fn from(machine: Machine) -> Self {
+        match machine {
+            Machine::Levitation => youla_twin::Machine::Levitation,
+            Machine::Bearing => youla_twin::Machine::Bearing,
+        }
+    }
 }

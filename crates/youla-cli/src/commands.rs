@@ -1,7 +1,6 @@
 //! What each verb does: read, call the library, print.
 
 use crate::args::{Args, Command};
-use crate::demo::demo;
 use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
@@ -26,8 +25,8 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
     match command {
         Command::Check(_) | Command::Commission(_) => Ok(()),
         Command::Demo { seed, machine, output } => {
-            let (settings, records) = demo(*machine, *seed)?;
-            identify_and_write(form, output, Path::new("."), settings, |_| Ok(records))
+            let demo = youla_twin::demo((*machine).into(), *seed)?;
+            identify_and_write(form, output, Path::new("."), demo.settings, |_| Ok(demo.records))
         }
         Command::Identify(args) => {
             let (settings, folder) = args.settings()?;

@@ -5,7 +5,6 @@ mod check;
 mod commands;
 mod commission;
 mod compare;
-mod demo;
 mod dialect;
 mod excite;
 mod export;
@@ -22,7 +21,6 @@ mod run_folder;
 mod table;
 mod terminal;
 
-pub use demo::{Machine, demo};
 pub use output::Failure;
 
 use clap::{CommandFactory, Parser};

@@ -64,7 +64,14 @@ macro_rules! refused {
     )*};
 }
 
-refused!(youla::Error, youla_commission::Error, youla_io::Error, youla_paper::Error, youla_run::Error);
+refused!(
+    youla::Error,
+    youla_commission::Error,
+    youla_io::Error,
+    youla_paper::Error,
+    youla_run::Error,
+    youla_twin::Error
+);
 
 /// Prints one sentence and gives the exit code: 2 for input that cannot be used, 3 for an impossible computation.
 pub(crate) fn fail(failure: &Failure) -> u8 {

@@ -6,9 +6,9 @@ use crate::progress::Progress;
 use crate::table;
 use clap::{Args, Subcommand};
 use std::path::{Path, PathBuf};
-use youla_paper::rig::RigParameters;
 use youla_paper::run::{Configuration, PaperProgress, WrittenPaper, merge, paper};
 use youla_paper::study::{Method, PaperSettings, Shard};
+use youla_twin::rig::RigParameters;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:

@@ -2,14 +2,10 @@
 
 use crate::Result;
 use crate::link::Link;
-use crate::lock_step::LockStep;
 use crate::parameter::LoadedQ;
-use crate::station::Q_STATES;
 use youla_link::{LARGEST_CHUNK, Request};
 use youla_rt::{Checksum, Trip};
-
-/// A row: y, u, alpha, beta.
-pub(crate) type LogRow = [f64; 8];
+use youla_twin::{LockStep, LogRow, Q_STATES};
 
 /// A machine with its controller.
 pub(crate) enum Bench {
@@ -27,7 +23,7 @@ impl Bench {
     /// the way.
     pub(crate) fn run(&mut self, samples: usize) -> Result<()> {
         match self {
-            Bench::Twin(twin) => twin.run(samples),
+            Bench::Twin(twin) => Ok(twin.run(samples)?),
             Bench::Link(link) => link.run(samples, false),
         }
     }
@@ -35,7 +31,7 @@ impl Bench {
     /// As [`Bench::run`], until the guard ends the excitation.
     pub(crate) fn excite(&mut self, samples: usize) -> Result<()> {
         match self {
-            Bench::Twin(twin) => twin.excite(samples),
+            Bench::Twin(twin) => Ok(twin.excite(samples)?),
             Bench::Link(link) => link.run(samples, true),
         }
     }
@@ -46,7 +42,7 @@ impl Bench {
     /// [`crate::Error::Controller`] where it is refused.
     pub(crate) fn ask(&mut self, request: &Request<'_>) -> Result<()> {
         match self {
-            Bench::Twin(twin) => twin.ask(request).map(drop),
+            Bench::Twin(twin) => Ok(twin.ask(request).map(drop)?),
             Bench::Link(link) => link.ask(request),
         }
     }

@@ -1,6 +1,6 @@
 //! The way between the points: Q over speed, with evidence that the loop stays stable, and a check on the machine halfway.
 
-use crate::bench::{Bench, LogRow};
+use crate::bench::Bench;
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::commission::{log_text, start};
 use crate::error::refuse;
@@ -9,12 +9,12 @@ use crate::parameter::{LoadedQ, loaded};
 use crate::point::{FIRST, Operator, Point};
 use crate::q_table::{point_q, point_s};
 use crate::record::{PointRecord, PointStatus, io, read_json, write_json, write_text};
-use crate::running::RunningLoop;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 use youla_loop::schedule::{BetweenPoints, between_points, q_between};
+use youla_twin::{LogRow, RunningLoop};
 
 /// Two neighbouring speeds with the same running loop.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

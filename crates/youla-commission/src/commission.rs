@@ -1,16 +1,13 @@
 //! The campaign: its points in their order, what is kept of each, and the summary.
 
-use crate::bench::{Bench, LogRow};
+use crate::bench::Bench;
 use crate::between::{BetweenRecord, Ends, between, pairs};
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::link::Link;
-use crate::lock_step::LockStep;
 use crate::point::{Operator, Point, PointFiles, RAMP};
 use crate::q_table::write_tables;
 use crate::record::{CampaignSummary, PointRecord, PointStatus, io, read_json, write_json, write_text};
 use crate::report::report;
-use crate::running::{LoopDescription, RunningLoop};
-use crate::target::Target;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
@@ -19,8 +16,9 @@ use std::path::Path;
 use youla::lti::Discrete;
 use youla_io::SystemMatrices;
 use youla_io::export::ExportedController;
-use youla_paper::rig::{BearingRig, Fidelity, RigParameters};
 use youla_run::{StageClock, write_run};
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
+use youla_twin::{LockStep, LogRow, LoopDescription, RunningLoop, Target};
 
 /// Sample time of the twin, seconds.
 const TS: f64 = 2e-4;
@@ -86,7 +84,7 @@ fn loops(campaign: &Campaign, folder: &Path) -> Result<Vec<RunningLoop>> {
     let files = campaign.points.iter().map(|point| folder.join(&point.running));
     let Some(address) = &campaign.machine else {
         let time = Discrete::new(TS)?;
-        return files.map(|file| RunningLoop::read(&file, time)).collect();
+        return files.map(|file| Ok(RunningLoop::read(&file, time)?)).collect();
     };
     let rig = youla_rig::Rig::connect(address)?;
     let machine = rig.description();
@@ -97,7 +95,7 @@ fn loops(campaign: &Campaign, folder: &Path) -> Result<Vec<RunningLoop>> {
     }
     let Some(q_states) = machine.q_order else { return refuse("states no q_order: it takes no Q".into()) };
     let time = Discrete::new(machine.sample_time)?;
-    files.map(|file| RunningLoop::of_machine(&file, time, q_states)).collect()
+    files.map(|file| Ok(RunningLoop::of_machine(&file, time, q_states)?)).collect()
 }
 
 /// What a folder belongs to.

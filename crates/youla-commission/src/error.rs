@@ -23,7 +23,7 @@ pub enum Error {
     Run(#[from] youla_run::Error),
     /// The twin was impossible.
     #[error(transparent)]
-    Twin(#[from] youla_paper::Error),
+    Twin(youla_twin::Error),
     /// The page could not be made.
     #[error(transparent)]
     Report(#[from] youla_report::Error),
@@ -66,6 +66,20 @@ pub enum Error {
 /// [`Error::Refused`], always.
 pub(crate) fn refuse<T>(reason: String) -> Result<T> {
     Err(Error::Refused { reason })
+}
+
+pub(crate) fn failed(problem: &str) -> Error {
+    Error::Controller { problem: problem.into() }
+}
+
+impl From<youla_twin::Error> for Error {
+    fn from(error: youla_twin::Error) -> Self {
+        match error {
+            youla_twin::Error::Controller { problem } => Error::Controller { problem },
+            youla_twin::Error::File(source) => Error::File(source),
+            other => Error::Twin(other),
+        }
+    }
 }
 
 youla::error_context! {

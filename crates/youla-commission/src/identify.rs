@@ -1,21 +1,20 @@
 //! From rows to models: the run of a record, and the loop itself from an excitation that no noise moves.
 
 use crate::Result;
-use crate::bench::LogRow;
 use crate::parameter::{LoadedQ, at_plant_input};
-use crate::running::RunningLoop;
 use std::path::Path;
 use youla::identify::subspace::{
     Experiment, InitialState, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
 };
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
+use youla::signal::without_harmonics;
 use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec};
-use youla_paper::study::without_harmonics;
 use youla_run::{
     DataFile, DataSettings, Identification, LoopRecord, RunRecords, RunSettings, SourceFile, StageClock, identify,
 };
+use youla_twin::{LogRow, RunningLoop};
 
 /// Rows of one experiment without the harmonics of the speed.
 pub(crate) struct CleanRows {

@@ -12,19 +12,13 @@ mod error;
 mod figures;
 mod identify;
 mod link;
-mod lock_step;
 mod parameter;
 mod point;
 mod proposal;
 mod q_table;
-mod qemu;
 mod record;
 mod rehearse;
 mod report;
-mod running;
-mod station;
-mod target;
-mod twin;
 
 pub use between::{BetweenRecord, Evidence};
 pub use campaign::{Campaign, CampaignLimits, Goal, OperatingPoint};
@@ -35,8 +29,6 @@ pub use point::Operator;
 pub use q_table::{QAtSpeed, QTable};
 pub use record::{CampaignSummary, DampingFigures, PointRecord, PointStatus};
 pub use rehearse::{LEVEL, Prediction};
-pub use running::LoopDescription;
-pub use twin::{TwinPlant, serve_loop};
 
 #[cfg(test)]
 mod tests;

@@ -1,8 +1,6 @@
 //! A machine over its link. A thread takes its rows and gives signs of life, so that the excitation goes on while the campaign computes.
 
-use crate::bench::LogRow;
-use crate::error::refuse;
-use crate::target::failed;
+use crate::error::{failed, refuse};
 use crate::{Error, Result};
 use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, TryRecvError, channel};
@@ -12,6 +10,7 @@ use std::time::{Duration, Instant};
 use youla_link::{LARGEST_CHUNK, Request};
 use youla_rig::{LogRow as RigRow, Recorder, Rig, RowSink};
 use youla_rt::{Phase, Status, Trip};
+use youla_twin::LogRow;
 
 /// Time between two signs of life.
 const BEAT: Duration = Duration::from_millis(100);

@@ -1,9 +1,9 @@
 //! A new controller as a Q around the running one: each controller that stabilises the nominal model is K(Q) of a stable Q.
 
-use crate::running::{RunningLoop, padded};
 use crate::{Error, Result};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
+use youla_twin::{RunningLoop, padded};
 
 /// Q as the firmware runs it.
 #[derive(Debug, Clone)]

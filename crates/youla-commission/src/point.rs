@@ -1,6 +1,6 @@
 //! One operating point: check, small excitation, record, proposal, switch, verification.
 
-use crate::bench::{Bench, LogRow};
+use crate::bench::Bench;
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::error::refuse;
 use crate::figures::{LoopState, Sizes};
@@ -8,12 +8,12 @@ use crate::identify::{CleanRows, loop_response};
 use crate::parameter::LoadedQ;
 use crate::proposal::{Outcome, Proposal, propose};
 use crate::record::{PointRecord, PointStatus};
-use crate::running::RunningLoop;
 use crate::{Error, Result};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla_link::{Request, Source};
 use youla_run::Identification;
+use youla_twin::{LogRow, RunningLoop};
 
 /// Seconds without excitation before and after each step: transients of the loop decay.
 const REST: f64 = 1.0;

@@ -6,12 +6,12 @@ use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, identified, loop_response};
 use crate::parameter::{LoadedQ, parameter_of};
 use crate::rehearse::{Prediction, on_model, predict};
-use crate::running::RunningLoop;
 use crate::{Error, Result};
 use youla::identify::likelihood::Recommendation;
 use youla::lti::{Discrete, StateSpace};
 use youla_loop::redesign::{DeviationRegion, Redesign, RedesignOptions, RedesignProblem, redesign};
 use youla_run::{Identification, ModeEntry, shown_modes};
+use youla_twin::RunningLoop;
 
 /// A new controller with its Q.
 pub(crate) struct NewLoop {

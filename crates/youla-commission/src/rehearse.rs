@@ -4,7 +4,6 @@ use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, response_to};
 use crate::parameter::at_plant_input;
 use crate::proposal::NewLoop;
-use crate::running::RunningLoop;
 use crate::{Error, Result};
 use faer::Side;
 use rand::{RngExt, SeedableRng};
@@ -16,6 +15,7 @@ use youla::identify::likelihood::{Experiment, LikelihoodOptions, Predictor, Reco
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
+use youla_twin::RunningLoop;
 
 /// Rehearsals, and stretches of the record that are identified each for itself.
 const REHEARSALS: usize = 12;

@@ -1,15 +1,10 @@
 //! The circle on the twin: on the host in every run, over seeds in QEMU on request.
 
 use crate::bench::Bench;
-use crate::lock_step::LockStep;
 use crate::parameter::parameter_of;
 use crate::point::{Operator, Point, PointFiles, RAMP};
-use crate::running::{LoopDescription, RunningLoop};
-use crate::station::Q_STATES;
-use crate::target::Target;
 use crate::{
-    Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, TwinPlant,
-    commission, serve_loop,
+    Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, commission,
 };
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -19,8 +14,9 @@ use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::{ErrorKind, Mat, MatRef};
 use youla_io::export::ExportedController;
-use youla_paper::rig::{BearingRig, Fidelity, RigParameters, bearing_at_speed, degraded};
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters, bearing_at_speed, degraded};
+use youla_twin::{LockStep, LoopDescription, Q_STATES, RunningLoop, Target, TwinPlant, serve_loop};
 
 fn example() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/commission")

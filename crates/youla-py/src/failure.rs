@@ -36,7 +36,7 @@ macro_rules! refused {
     )*};
 }
 
-refused!(youla::Error, youla_greybox::Error, youla_loop::Error, youla_report::Error);
+refused!(youla::Error, youla_greybox::Error, youla_loop::Error, youla_report::Error, youla_twin::Error);
 
 impl From<youla_io::Error> for Failure {
     fn from(error: youla_io::Error) -> Self {
@@ -56,15 +56,6 @@ impl From<youla_run::Error> for Failure {
         match error {
             youla_run::Error::File(of_file) => of_file.into(),
             other => Failure { kind: other.kind(), message: other.to_string() },
-        }
-    }
-}
-
-impl From<youla_cli::Failure> for Failure {
-    fn from(failure: youla_cli::Failure) -> Self {
-        match failure {
-            youla_cli::Failure::Refused(message, kind) => Failure { kind, message },
-            youla_cli::Failure::OutputClosed => Failure::input("the output is closed"),
         }
     }
 }

@@ -50,16 +50,16 @@ pub(crate) fn identify_file(py: Python<'_>, path: PathBuf) -> PyResult<Run> {
 #[pyfunction]
 pub(crate) fn demo(py: Python<'_>, machine: &str, seed: u64) -> PyResult<Run> {
     let machine = match machine {
-        "levitation" => youla_cli::Machine::Levitation,
-        "bearing" => youla_cli::Machine::Bearing,
+        "levitation" => youla_twin::Machine::Levitation,
+        "bearing" => youla_twin::Machine::Bearing,
         other => {
             let message = format!("machine is {other:?}, but must be \"levitation\" or \"bearing\"");
             return Err(Failure::input(message).into());
         }
     };
     worker::run(py, false, move |stop| {
-        let (chosen, records) = youla_cli::demo(machine, seed)?;
-        pipeline(chosen, Path::new("."), stop, |_| Ok(records))
+        let demo = youla_twin::demo(machine, seed)?;
+        pipeline(demo.settings, Path::new("."), stop, |_| Ok(demo.records))
     })
 }
 

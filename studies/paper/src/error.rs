@@ -18,9 +18,9 @@ pub enum Error {
     /// A physical structure could not be used or estimated.
     #[error(transparent)]
     GreyBox(#[from] youla_greybox::Error),
-    /// A run was impossible.
+    /// The simulated rig was impossible.
     #[error(transparent)]
-    Run(#[from] youla_run::Error),
+    Twin(#[from] youla_twin::Error),
     /// A report could not be drawn.
     #[error(transparent)]
     Report(#[from] youla_report::Error),
@@ -83,7 +83,7 @@ pub enum Error {
 }
 
 youla::error_context! {
-    sources: Method File GreyBox Report Run;
+    sources: Method File GreyBox Report Twin;
     numerical:;
     bad_input: NoController BadShard NotResults InUse OtherSettings Parts;
 }

@@ -11,7 +11,7 @@ use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::signal::{Excitation, LoopRecord, SquareWaves};
 use youla::{Mat, Result};
-use youla_paper::rig::{Bearing, degraded};
+use youla_twin::rig::{Bearing, degraded};
 
 /// A machine, what is believed of it, and the controller that stabilises both.
 pub(crate) struct Machine {

@@ -6,10 +6,10 @@ use clap::{Args, ValueEnum};
 use std::net::UdpSocket;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use youla_commission::{TwinPlant, serve_loop};
-use youla_paper::rig::Fidelity;
 use youla_rig::{Pace, rotor, serve};
 use youla_run::model_for_export;
+use youla_twin::rig::Fidelity;
+use youla_twin::{TwinPlant, serve_loop};
 
 pub(super) const EXAMPLES: &str = "\
 Examples:

@@ -5,7 +5,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 13] = [
+const ARROWS: [(&str, &[&str]); 14] = [
     ("youla-rt", &[]),
     ("youla-link", &["youla-rt"]),
     ("youla-rig", &["youla-link", "youla-rt"]),
@@ -15,7 +15,10 @@ const ARROWS: [(&str, &[&str]); 13] = [
     ("youla-loop", &["youla"]),
     ("youla-report", &["youla"]),
     ("youla-run", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report"]),
-    ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-rt", "youla-run"]),
+    (
+        "youla-twin",
+        &["youla", "youla-greybox", "youla-io", "youla-link", "youla-loop", "youla-rig", "youla-rt", "youla-run"],
+    ),
     (
         "youla-commission",
         &[
@@ -23,13 +26,14 @@ const ARROWS: [(&str, &[&str]); 13] = [
             "youla-io",
             "youla-link",
             "youla-loop",
-            "youla-paper",
-            "youla-rt",
-            "youla-run",
             "youla-report",
             "youla-rig",
+            "youla-rt",
+            "youla-run",
+            "youla-twin",
         ],
     ),
+    ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-report", "youla-rt", "youla-twin"]),
     (
         "youla-cli",
         &[
@@ -41,9 +45,13 @@ const ARROWS: [(&str, &[&str]); 13] = [
             "youla-report",
             "youla-rig",
             "youla-run",
+            "youla-twin",
         ],
     ),
-    ("youla-py", &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run"]),
+    (
+        "youla-py",
+        &["youla", "youla-cli", "youla-greybox", "youla-io", "youla-loop", "youla-report", "youla-run", "youla-twin"],
+    ),
 ];
 
 fn project() -> PathBuf {

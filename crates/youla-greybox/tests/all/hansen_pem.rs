@@ -14,9 +14,9 @@ use youla::signal::{Excitation, SquareWaves};
 use youla::validate::fit;
 use youla_greybox::hansen_pem::{HansenPemOptions, PemStart, SchemeData, hansen_pem, projection_target};
 use youla_greybox::{Error, Matrix, Problem, Result, Slope, Structure, greybox, project};
-use youla_paper::BearingStructure;
-use youla_paper::rig::{Bearing, degraded};
 use youla_paper::study::{Design, PaperSettings, design};
+use youla_twin::BearingStructure;
+use youla_twin::rig::{Bearing, degraded};
 
 struct Loop {
     design: Design,

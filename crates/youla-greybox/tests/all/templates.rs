@@ -3,8 +3,8 @@
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use youla_greybox::{DeclaredStructure, Structure, Template};
-use youla_paper::BearingStructure;
-use youla_paper::rig::Bearing;
+use youla_twin::BearingStructure;
+use youla_twin::rig::Bearing;
 
 #[test]
 fn the_bearing_is_that_of_the_rig() {

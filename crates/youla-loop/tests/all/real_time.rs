@@ -10,10 +10,10 @@ use youla::linalg::eye;
 use youla::lti::{Discrete, Simulator, StateSpace};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Error, Mat, MatRef};
-use youla_paper::demo;
-use youla_paper::rig::{Bearing, degraded};
 use youla_rt::{Controller, Real, State};
 use youla_run::ControllerSettings;
+use youla_twin::rig::{Bearing, degraded};
+use youla_twin::{Machine, demo};
 
 const SAMPLES: usize = 1_000_000;
 const EXACT: f64 = 1e-12;
@@ -46,7 +46,8 @@ impl Loop {
     fn bearing() -> Self {
         let time = Discrete::new(TS).unwrap();
         let bearing = Bearing::default().plant().unwrap();
-        let ControllerSettings::Observer { state_feedback, observer_gain, .. } = demo(1).unwrap().settings.controller
+        let ControllerSettings::Observer { state_feedback, observer_gain, .. } =
+            demo(Machine::Bearing, 1).unwrap().settings.controller
         else {
             panic!("the demonstration has an observer-based controller")
         };

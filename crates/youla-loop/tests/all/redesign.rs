@@ -10,17 +10,17 @@ use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::{Experiment, InitialState, Order, SubspaceMethod, SubspaceOptions, subspace};
 use youla::linalg::eye;
 use youla::lti::{Discrete, PeakOptions, StateSpace, hinf_norm};
+use youla::signal::without_harmonics;
 use youla::signal::{Channel, LoopRecord};
 use youla::signal::{Excitation, SquareWaves};
 use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
 use youla_loop::redesign::{Redesign, RedesignMethod, RedesignOptions, RedesignProblem, redesign};
-use youla_paper::rig::{
+use youla_twin::rig::{
     Bearing, BearingRig, ExperimentRecord, Fidelity, LoopController, ObserverLoop, Rig, RigParameters,
     bearing_at_speed, degraded, run_experiment,
 };
-use youla_paper::study::without_harmonics;
 
 const RPM: f64 = 2500.0;
 const SAMPLES: usize = 120_000;

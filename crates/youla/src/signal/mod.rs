@@ -6,6 +6,7 @@
 mod channel;
 mod detrend;
 mod excitation;
+mod harmonics;
 mod loop_record;
 mod periodic;
 mod persistency;
@@ -15,6 +16,7 @@ mod spectrum;
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
+pub use harmonics::without_harmonics;
 pub use loop_record::LoopRecord;
 pub use periodic::{
     DetectionLines, ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period,

@@ -181,7 +181,7 @@ fn every_identity<T: TimeDomain>(seed: u64, time: T) {
 #[test]
 fn external_excitation_reaches_alpha() {
     let plant = sampled(&bearing(0.0));
-    let nominal = sampled(&youla_paper::rig::degraded(&bearing(0.0), 0.5, 1.0).unwrap());
+    let nominal = sampled(&youla_twin::rig::degraded(&bearing(0.0), 0.5, 1.0).unwrap());
     let factors = stabilising_factors(&plant, &nominal);
     let mut rng = rng(8);
     let (v1, v2, noise) = (normal(&mut rng, 3000, 2), normal(&mut rng, 3000, 2), normal(&mut rng, 3000, 2));
@@ -200,7 +200,7 @@ fn external_excitation_reaches_alpha() {
 /// process noise, output noise 0.01): the sign of negative feedback in Ut makes (15) fail by 2 ||[M; N] Ut||, about 16.
 #[test]
 fn a_wrong_sign_fails_loudly() {
-    let nominal = youla_paper::rig::Bearing::default().plant().unwrap();
+    let nominal = youla_twin::rig::Bearing::default().plant().unwrap();
     let nominal = sampled(&nominal.with_scaled_states(&[1.0, 1.0, 1340.0, 1340.0, 1.0, 1.0]));
     let (m, p) = (nominal.inputs(), nominal.outputs());
     let one = |k: usize| Mat::<f64>::identity(k, k);

@@ -8,7 +8,7 @@ use youla::control::closed_loop;
 use youla::lti::{Continuous, Mode, StateSpace, TimeDomain, frequency_response};
 use youla::validate::fit;
 use youla::{Mat, MatRef, c64};
-use youla_paper::rig::degraded;
+use youla_twin::rig::degraded;
 
 const EXACT: f64 = 1e-12;
 

@@ -5,11 +5,11 @@ use youla::factor::CoprimeFactors;
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::reduce::{ReducedOrder, ReductionLoop, ReductionMethod, ReductionOptions, reduce, reduce_in_loop};
 use youla::validate::certify;
-use youla_paper::demo;
 use youla_run::{Identification, StageClock, identify};
+use youla_twin::{Machine, demo};
 
 fn identified(seed: u64) -> Identification {
-    let mut demo = demo(seed).unwrap();
+    let mut demo = demo(Machine::Bearing, seed).unwrap();
     demo.settings.reduction = None;
     demo.settings.direct = None;
     demo.settings.hansen.uncertainty = Default::default();

@@ -1,11 +1,11 @@
 //! The whole chain on the simulated bearing: seeded statistics and independence of the number of threads.
 
 use std::path::Path;
-use youla_paper::demo;
 use youla_run::{Identification, Method, StageClock, identify};
+use youla_twin::{Machine, demo};
 
 fn run_demo(seed: u64) -> Identification {
-    let demo = demo(seed).unwrap();
+    let demo = demo(Machine::Bearing, seed).unwrap();
     let mut silent = |_| ();
     identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap()
 }
@@ -110,9 +110,9 @@ fn clusters_of_the_diagrams_are_modes_of_loop_and_plant() {
 fn a_declared_structure_is_estimated_from_the_scheme_on() {
     use youla_greybox::hansen_pem::PemStart;
     use youla_greybox::{Declaration, Template};
-    use youla_paper::BearingStructure;
     use youla_run::GreyBoxSettings;
-    let mut demo = demo(2).unwrap();
+    use youla_twin::BearingStructure;
+    let mut demo = demo(Machine::Bearing, 2).unwrap();
     let structure = Declaration { template: Some(Template::Bearing), ..Default::default() };
     demo.settings.grey_box = Some(GreyBoxSettings { start_from_initial: false, ..GreyBoxSettings::new(structure) });
     let mut silent = |_| ();
@@ -123,7 +123,7 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
         assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");
     }
-    let truth = BearingStructure::parameters(&youla_paper::rig::Bearing::default());
+    let truth = BearingStructure::parameters(&youla_twin::rig::Bearing::default());
     let deviations = run.found.model.standard_deviations().unwrap();
     for ((value, deviation), truth) in run.found.model.parameters.iter().zip(deviations).zip(truth) {
         assert!((value - truth).abs() < 4.0 * deviation, "{value} against {truth}, deviation {deviation}");

@@ -4,7 +4,7 @@
 
 #[path = "../lock_step.rs"]
 mod lock_step;
-#[path = "../../../../crates/youla-commission/src/station.rs"]
+#[path = "../../../../crates/youla-twin/src/station.rs"]
 mod station;
 
 use cortex_m_rt::entry;

@@ -1,12 +1,12 @@
 //! What makes one results folder differ from another.
 
-use crate::rig::{BearingRig, Fidelity, RigParameters};
 use crate::study::{PaperSettings, Shard};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use toml::{Table, Value};
 use youla_io::folder::replace_file;
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
 
 /// The file in a results folder that says what the results are results of.
 const FILE: &str = "configuration.toml";

@@ -3,9 +3,9 @@
 use super::figures_experiments::fit_of;
 use super::words::{AXES, and, percent};
 use crate::Result;
-use crate::rig::{BearingRig, Fidelity, RigParameters};
 use crate::study::{Method, StudyExperiment, TIE};
 use youla::validate::{fit, predict_open_loop};
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
 
 /// The rows of the paper's table.
 const ROWS: [Method; 4] = [Method::Nominal, Method::Pem, Method::Hansen, Method::HansenReduced];

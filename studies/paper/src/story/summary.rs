@@ -5,11 +5,11 @@ use super::figures_experiments::fit_of;
 use super::map;
 use super::tables_experiments::TABLE_1;
 use super::tables_study::compared;
-use crate::BearingStructure;
 use crate::Result;
 use crate::study::{Decile, Method, Paper, StudyExperiment, deciles, overall};
 use serde_json::{Map, Value, json};
 use youla_greybox::Structure;
+use youla_twin::BearingStructure;
 
 /// Schema of the summary.
 const SCHEMA: u32 = 1;

@@ -5,9 +5,9 @@ use super::modes::{oscillations, real_poles};
 use super::order::rig_fit;
 use super::tables::{axes, fit_cells, method_row, order, plain, row, yes};
 use crate::Result;
-use crate::rig::BearingRig;
 use crate::study::{Method, Paper};
 use youla_report::story::{Row, Table};
+use youla_twin::rig::BearingRig;
 
 /// The methods of Table 1, each with its row of the paper's table.
 pub(super) const TABLE_1: [(Method, Option<usize>); 6] = [

@@ -3,12 +3,12 @@
 use super::modes::{oscillations, real_poles};
 use super::tables::{plain, row};
 use super::words::{fixed, short};
-use crate::BearingStructure;
-use crate::rig::Bearing;
 use crate::study::Paper;
 use crate::{Error, Result};
 use youla_greybox::Structure;
 use youla_report::story::Table;
+use youla_twin::BearingStructure;
+use youla_twin::rig::Bearing;
 
 const UNITS: [&str; 14] = {
     const D: &str = "1/s";

@@ -2,12 +2,12 @@
 
 use super::tables::{plain, row};
 use super::words::short;
-use crate::rig::{ExperimentRecord, Fidelity};
 use crate::study::ExcitedChannel;
 use crate::study::{Paper, StudyExperiment};
 use serde::Deserialize;
 use std::f64::consts::TAU;
 use youla_report::story::{Row, Table};
+use youla_twin::rig::{ExperimentRecord, Fidelity};
 
 /// Every parameter with unit and basis, in the order of the file.
 pub(super) fn parameters(paper: &Paper) -> Table {

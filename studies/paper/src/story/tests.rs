@@ -1,7 +1,6 @@
 //! The page from three short real experiments and rows made by hand.
 
 use super::*;
-use crate::rig::RigParameters;
 use crate::study::{
     Experiments, Method, Paper, PaperSettings, PaperTiming, Row, Status, crossover, crossover_items, experiments,
 };
@@ -9,6 +8,7 @@ use std::collections::BTreeSet;
 use std::sync::OnceLock;
 use youla_report::figure::{Content, MEASURED};
 use youla_report::story::{Block, Story, Table};
+use youla_twin::rig::RigParameters;
 
 const MODELS: usize = 40;
 

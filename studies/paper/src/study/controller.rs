@@ -26,7 +26,7 @@ pub struct Design {
     pub peak_plant: f64,
 }
 
-/// The design for one weight of the command. `nominal` has the states `[l; l'; m]` of [`crate::rig::Bearing`].
+/// The design for one weight of the command. `nominal` has the states `[l; l'; m]` of [`youla_twin::rig::Bearing`].
 ///
 /// # Errors
 /// Those of the Riccati equations; [`youla::Error::NotStabilising`] naming the plant that is not stabilised.

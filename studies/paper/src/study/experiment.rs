@@ -4,9 +4,6 @@ use super::controller::{Design, design_with};
 use super::item::{excitation, generator, lower, text};
 use super::method::Method;
 use super::settings::PaperSettings;
-use super::synchronous::without_harmonics;
-use crate::BearingStructure;
-use crate::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, ObserverLoop, RigParameters, run_experiment};
 use crate::study::{ExcitationReport, ExcitationReportOptions, describe_excitation};
 use crate::{Error, Result};
 use rand::RngExt;
@@ -18,11 +15,13 @@ use youla::identify::hansen::{HansenModel, hansen};
 use youla::identify::subspace::{self, InitialState, SubspaceOptions};
 use youla::lti::{Discrete, Mode, StateSpace, simulate};
 use youla::reduce::reduce;
-use youla::signal::Welch;
+use youla::signal::{Welch, without_harmonics};
 use youla::validate::{certify, fit, predict_open_loop};
 use youla::{Mat, MatRef};
 use youla_greybox::hansen_pem::{HansenPemOptions, SchemeData, pem_from_hansen};
 use youla_greybox::{GreyBoxModel, GreyBoxOptions, Problem, Stop, greybox};
+use youla_twin::BearingStructure;
+use youla_twin::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, ObserverLoop, RigParameters, run_experiment};
 
 /// How an experiment differs from the others.
 #[derive(Debug, Clone, PartialEq)]
@@ -132,7 +131,7 @@ pub(super) fn run(
 ) -> Result<StudyExperiment> {
     let start = nominal.degraded(case.a_factor, case.b_factor)?;
     let rig = BearingRig::new(parameters, case.fidelity, 0)?;
-    let time = crate::rig::Rig::time(&rig);
+    let time = youla_twin::rig::Rig::time(&rig);
     let model = start.plant()?.zoh(time)?;
     let weight = settings.experiments.command_weight;
     let design = design_with(&model, &rig.true_plant()?, weight, &settings.controller)?;
@@ -203,7 +202,7 @@ fn closed_loop_record(
         real_time_controller::<6, 2, 2>(nominal, design.state_feedback.as_ref(), design.observer_gain.as_ref())?;
     let mut controller = ObserverLoop { controller, state: youla_rt::State::at_rest() };
     let alpha = excitation(&settings.experiments.excitation, samples, nominal.time(), settings.seed, stream + 1)?;
-    run_experiment(&mut rig, &mut controller, alpha.as_ref(), &parameters.safety)
+    Ok(run_experiment(&mut rig, &mut controller, alpha.as_ref(), &parameters.safety)?)
 }
 
 fn data<'a>(
@@ -216,13 +215,13 @@ fn data<'a>(
 ) -> Result<Data<'a>> {
     let signals = design.factors.signals(estimation.u_applied.as_ref(), estimation.y.as_ref())?;
     let later = |signal: MatRef<'_, f64>| signal.subrows(settle, signal.nrows() - settle).to_owned();
-    let clean = |signal: MatRef<'_, f64>| {
+    let clean = |signal: MatRef<'_, f64>| -> Result<Mat<f64>> {
         let later = later(signal);
         if !turning {
             return Ok(later);
         }
         let hz = settings.experiments.rpm / 60.0;
-        without_harmonics(later.as_ref(), hz, settings.experiments.harmonics, estimation.time)
+        Ok(without_harmonics(later.as_ref(), hz, settings.experiments.harmonics, estimation.time)?)
     };
     Ok(Data {
         settings,

@@ -3,13 +3,13 @@
 use super::experiment::{Case, StudyExperiment, run};
 use super::item::{excitation, generator};
 use super::settings::PaperSettings;
-use crate::BearingStructure;
-use crate::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, OpenLoop, Rig, RigParameters, run_experiment};
 use crate::{Error, Result};
 use rand::RngExt;
 use rayon::prelude::*;
 use youla::identify::subspace;
 use youla_greybox::{GreyBoxModel, Problem, greybox};
+use youla_twin::BearingStructure;
+use youla_twin::rig::{Bearing, BearingRig, ExperimentRecord, Fidelity, OpenLoop, Rig, RigParameters, run_experiment};
 
 /// First stream of the experiments; those of study and map lie elsewhere.
 const FIRST: u64 = 1 << 50;

@@ -4,9 +4,7 @@ use super::controller::{Design, design};
 use super::method::Method;
 use super::row::{Row, Status};
 use super::settings::PaperSettings;
-use crate::BearingStructure;
 use crate::Result;
-use crate::rig::Bearing;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -26,6 +24,8 @@ use youla::signal::RampedExcitation;
 use youla::validate::fit;
 use youla_greybox::hansen_pem::{HansenPemOptions, SchemeData, pem_from_hansen};
 use youla_greybox::{GreyBoxModel, Problem, greybox};
+use youla_twin::BearingStructure;
+use youla_twin::rig::Bearing;
 
 /// What distinguishes one loop from another.
 #[derive(Debug, Clone, PartialEq)]
@@ -63,7 +63,7 @@ pub fn evaluate(item: &Item, truth: &Bearing, time: Discrete, settings: &PaperSe
     let mut clock = Laps::start();
     // theta = 1 would leave nothing of A.
     let a_factor = (1.0 - item.theta).max(f64::EPSILON);
-    let nominal = crate::rig::degraded(&truth.plant()?, a_factor, 1.0)?.zoh(time)?;
+    let nominal = youla_twin::rig::degraded(&truth.plant()?, a_factor, 1.0)?.zoh(time)?;
     let plant = truth.plant()?.zoh(time)?;
     let design = design(&nominal, &plant, &item.command_weights, &settings.controller)?;
     let (samples, verification_samples) = (settings.study.samples, settings.study.verification_samples);

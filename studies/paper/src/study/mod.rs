@@ -26,7 +26,6 @@ mod paper;
 mod row;
 mod settings;
 mod statistics;
-mod synchronous;
 
 pub use campaign::{Campaign, Outcome, Shard, read_results};
 pub use controller::{Design, design, design_with};
@@ -43,4 +42,3 @@ pub use paper::{Paper, PaperTiming};
 pub use row::{Row, Status};
 pub use settings::{CrossoverSettings, ExperimentSettings, PaperSettings, StudyController, StudySettings};
 pub use statistics::{Decile, POOR_FIT, TIE, Winner, deciles, median, overall, quantile, winner};
-pub use synchronous::without_harmonics;

@@ -4,8 +4,8 @@ use super::experiments::Experiments;
 use super::method::Method;
 use super::row::Row;
 use super::settings::PaperSettings;
-use crate::rig::RigParameters;
 use serde::{Deserialize, Serialize};
+use youla_twin::rig::RigParameters;
 
 /// The results of the whole paper, from which the report is drawn.
 #[derive(Debug, Clone)]

@@ -1,7 +1,6 @@
 //! Everything that was chosen for the paper, as one TOML file.
 
 use super::method::Method;
-use crate::rig::Bearing;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -9,6 +8,7 @@ use youla::identify::subspace::SubspaceOptions;
 use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
 use youla::signal::RampedExcitation;
 use youla_greybox::GreyBoxOptions;
+use youla_twin::rig::Bearing;
 
 const NEEDS_LOOP: &str = "the study reduces models without their loop; choose another method or order";
 

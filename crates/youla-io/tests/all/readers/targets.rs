@@ -12,11 +12,11 @@ use youla_io::{
     parquet_from_bytes,
 };
 use youla_link::{Frame, Kind, LARGEST_FRAME, PacketReader, Reply, Request, RowBlock};
-use youla_paper::rig::RigParameters;
 use youla_paper::study::{PaperSettings, Row};
 use youla_report::{ReportData, html};
 use youla_rig::{Description, Recorder, rotor};
 use youla_run::{ModelFile, RunSettings};
+use youla_twin::rig::RigParameters;
 
 /// A reader and its name, which is that of its fuzz target and of its folder of seeds.
 pub(crate) type Reader = (&'static str, fn(&[u8]));

@@ -10,7 +10,7 @@ use youla::identify::hansen::{HansenModel, hansen};
 use youla::identify::subspace::{Order, ResponseBand, Stability, SubspaceMethod, SubspaceOptions};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, Mode, StateSpace, frequency_response, simulate};
-use youla_paper::rig::degraded;
+use youla_twin::rig::degraded;
 
 /// The nominal model and the weights of the controller that is designed on it.
 #[derive(Debug, Clone, Copy)]
@@ -36,7 +36,7 @@ impl Loop {
     pub(crate) fn new(design: &Design) -> Self {
         let Design { a_factor, b_factor, input_weight, process_noise } = *design;
         let nominal =
-            sampled(&degraded(&youla_paper::rig::Bearing::default().plant().unwrap(), a_factor, b_factor).unwrap());
+            sampled(&degraded(&youla_twin::rig::Bearing::default().plant().unwrap(), a_factor, b_factor).unwrap());
         let weight = [1.0, 1.0, 10.0 / 1340f64.powi(2), 10.0 / 1340f64.powi(2), 0.0, 0.0];
         let q = Mat::from_fn(6, 6, |i, j| if i == j { weight[i] } else { 0.0 });
         let f = lqr(&nominal, &LqrWeights { q, r: eye(2) * Scale(input_weight), s: None }).unwrap().f;

@@ -10,7 +10,7 @@ use youla::identify::hansen::hansen;
 use youla::identify::subspace::{Experiment, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
-use youla_paper::rig::degraded;
+use youla_twin::rig::degraded;
 
 /// A plant under the observer-based controller of a nominal model with `0.97 A` of the uncoupled bearing and full weight on
 /// the displacements (rho = 1): feedback so strong that with noise of 1 um most of the input is fed-back noise.
@@ -24,7 +24,7 @@ pub(crate) struct Loop {
 
 impl Loop {
     pub(crate) fn new(cross_coupling: f64) -> Self {
-        let uncoupled = youla_paper::rig::Bearing::default().plant().unwrap();
+        let uncoupled = youla_twin::rig::Bearing::default().plant().unwrap();
         let nominal = sampled(&degraded(&uncoupled, 0.97, 1.0).unwrap());
         let weight = [1.0, 1.0, 10.0 / 1340f64.powi(2), 10.0 / 1340f64.powi(2), 0.0, 0.0];
         let q = Mat::from_fn(6, 6, |i, j| if i == j { weight[i] } else { 0.0 });

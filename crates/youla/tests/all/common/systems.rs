@@ -8,7 +8,7 @@ use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response, simulate};
 use youla::{Mat, MatRef};
-use youla_paper::rig::Bearing;
+use youla_twin::rig::Bearing;
 
 pub(crate) const TS: f64 = 1.0 / 5000.0;
 

@@ -1,5 +1,6 @@
 //! Twins that a host can talk to: the gas bearing at any level of fidelity, and any identified model, under the loop of a file.
 
+use crate::rig::{BearingRig, Fidelity, Rig, RigParameters};
 use crate::running::{LoopDescription, RunningLoop, padded};
 use crate::station::Q_STATES;
 use crate::{Error, Result};
@@ -15,7 +16,6 @@ use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::export::NamedModel;
 use youla_link::{LARGEST_BODY, Machine, Station};
-use youla_paper::rig::{BearingRig, Fidelity, Rig, RigParameters};
 use youla_rig::{Pace, Plant, RigChannel, Twin, serve};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices};
 
@@ -64,7 +64,7 @@ impl TwinPlant {
 /// not set.
 ///
 /// # Errors
-/// Those of the file; [`Error::Campaign`] for a plant that does not fit its loop; [`Error::Connection`].
+/// Those of the file; [`Error::Loop`] for a plant that does not fit its loop; [`Error::Connection`].
 pub fn serve_loop(
     socket: &UdpSocket,
     path: &Path,
@@ -102,7 +102,7 @@ struct Served<'a> {
 
 impl Served<'_> {
     fn refuse<T>(&self, problem: String) -> Result<T> {
-        Err(Error::Campaign { path: self.path.to_owned(), problem })
+        Err(Error::Loop { path: self.path.to_owned(), problem })
     }
 
     fn run<const M: usize, const P: usize>(&self, end: &impl Fn() -> bool) -> Result<()> {

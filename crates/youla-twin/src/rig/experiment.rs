@@ -87,13 +87,13 @@ pub struct ExperimentRecord {
 ///
 /// ```
 /// use youla::Mat;
-/// use youla_paper::rig::{BearingRig, Fidelity, OpenLoop, RigParameters, run_experiment};
+/// use youla_twin::rig::{BearingRig, Fidelity, OpenLoop, RigParameters, run_experiment};
 /// let parameters = RigParameters::shipped();
 /// let mut rig = BearingRig::new(&parameters, Fidelity::Instrumented, 1)?;
 /// let alpha = Mat::from_fn(500, 2, |k, _| if k < 250 { 0.5 } else { -0.5 });
 /// let log = run_experiment(&mut rig, &mut OpenLoop, alpha.as_ref(), &parameters.safety)?;
 /// assert_eq!((log.y.nrows(), log.aborted, log.saturated), (500, None, [0, 0]));
-/// # Ok::<(), youla_paper::Error>(())
+/// # Ok::<(), youla_twin::Error>(())
 /// ```
 pub fn run_experiment(
     rig: &mut impl Rig,

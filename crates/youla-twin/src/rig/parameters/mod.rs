@@ -16,7 +16,7 @@ use std::path::Path;
 /// Everything that the digital twin is made of; the tables of its TOML file.
 ///
 /// ```
-/// use youla_paper::rig::{Basis, RigParameters};
+/// use youla_twin::rig::{Basis, RigParameters};
 /// let parameters = RigParameters::shipped();
 /// assert_eq!(parameters.bearing.stiffness.basis, Basis::Paper);
 /// let copy = RigParameters::TOML.replacen("\"um\"", "\"mm\"", 1);

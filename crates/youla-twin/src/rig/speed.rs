@@ -20,11 +20,11 @@ use std::f64::consts::PI;
 /// [`youla::Error::OutOfRange`] for a speed outside of 0 to `rotation.max_speed`.
 ///
 /// ```
-/// use youla_paper::rig::{RigParameters, bearing_at_speed};
+/// use youla_twin::rig::{RigParameters, bearing_at_speed};
 /// let parameters = RigParameters::shipped();
 /// assert_eq!(bearing_at_speed(&parameters, 0.0)?, parameters.bearing.model());
 /// assert!(bearing_at_speed(&parameters, 1e5).is_err());
-/// # Ok::<(), youla_paper::Error>(())
+/// # Ok::<(), youla_twin::Error>(())
 /// ```
 pub fn bearing_at_speed(parameters: &RigParameters, rpm: f64) -> Result<Bearing> {
     let rotation = &parameters.rotation;

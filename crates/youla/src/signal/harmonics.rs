@@ -1,10 +1,10 @@
 //! Removal of what turns with the shaft: unbalance and run-out are lines at known frequencies, not noise.
 
 use crate::Result;
+use crate::linalg::least_squares;
+use crate::lti::Discrete;
+use faer::{Mat, MatRef};
 use std::f64::consts::TAU;
-use youla::linalg::least_squares;
-use youla::lti::Discrete;
-use youla::{Mat, MatRef};
 
 /// Subtracts from each channel (samples x channels) its mean and its first `harmonics` harmonics of the frequency `hz`,
 ///
@@ -16,16 +16,16 @@ use youla::{Mat, MatRef};
 /// excitation of long record has at exactly these frequencies goes too, one part in N of its power per coefficient.
 ///
 /// # Errors
-/// [`youla::Error::Shape`] and those of the least squares, for fewer samples than coefficients.
+/// [`crate::Error::Shape`] and those of the least squares, for fewer samples than coefficients.
 ///
 /// ```
 /// use youla::{Mat, lti::Discrete};
-/// use youla_paper::study::without_harmonics;
+/// use youla::signal::without_harmonics;
 /// let time = Discrete::new(1e-3)?;
 /// let run_out = Mat::from_fn(500, 1, |k, _| 3.0 + (0.2 * k as f64).sin() - 2.0 * (0.4 * k as f64).cos());
 /// let rest = without_harmonics(run_out.as_ref(), 0.2 / (2.0 * std::f64::consts::PI * 1e-3), 2, time)?;
 /// assert!(rest.norm_max() < 1e-12);
-/// # Ok::<(), youla_paper::Error>(())
+/// # Ok::<(), youla::Error>(())
 /// ```
 pub fn without_harmonics(signal: MatRef<'_, f64>, hz: f64, harmonics: usize, time: Discrete) -> Result<Mat<f64>> {
     let step = TAU * hz * time.ts();

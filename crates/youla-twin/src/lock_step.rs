@@ -1,16 +1,18 @@
 //! Controller and twin in lock-step, and the log of the rows that the controller sends.
 
-use crate::bench::LogRow;
+use crate::rig::{BearingRig, Rig};
 use crate::target::{Target, failed};
 use crate::{Error, Result};
 use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request, RowBlock, RowShape};
-use youla_paper::rig::{BearingRig, Rig};
 use youla_rt::{Phase, Status, Trip};
 
 const SHAPE: RowShape = RowShape { inputs: 2, outputs: 2 };
 
+/// A row: y, u, alpha, beta.
+pub type LogRow = [f64; 8];
+
 /// The controller with the twin.
-pub(crate) struct LockStep {
+pub struct LockStep {
     target: Target,
     plant: BearingRig,
     schema: u32,
@@ -28,7 +30,7 @@ impl LockStep {
     ///
     /// # Errors
     /// As [`LockStep::ask`].
-    pub(crate) fn new(target: Target, plant: BearingRig) -> Result<Self> {
+    pub fn new(target: Target, plant: BearingRig) -> Result<Self> {
         let mut bench = LockStep {
             target,
             plant,
@@ -88,7 +90,7 @@ impl LockStep {
     ///
     /// # Errors
     /// [`Error::Controller`] for a controller that stops or sends what cannot be read.
-    pub(crate) fn run(&mut self, samples: usize) -> Result<()> {
+    pub fn run(&mut self, samples: usize) -> Result<()> {
         let until = self.rows.len() + samples;
         while self.rows.len() < until {
             self.sample(&[])?;
@@ -97,7 +99,7 @@ impl LockStep {
     }
 
     /// As [`LockStep::run`], until the guard ends the excitation.
-    pub(crate) fn excite(&mut self, samples: usize) -> Result<()> {
+    pub fn excite(&mut self, samples: usize) -> Result<()> {
         let until = self.rows.len() + samples;
         while self.rows.len() < until && self.trip().is_none() {
             self.sample(&[])?;
@@ -109,7 +111,7 @@ impl LockStep {
     ///
     /// # Errors
     /// [`Error::Controller`] where it is refused.
-    pub(crate) fn ask(&mut self, request: &Request<'_>) -> Result<Status> {
+    pub fn ask(&mut self, request: &Request<'_>) -> Result<Status> {
         self.sequence += 1;
         let mut body = [0; 4 * LARGEST_CHUNK + 8];
         let too_long = || failed("takes no request of this length");
@@ -129,12 +131,12 @@ impl LockStep {
     }
 
     /// The rows since the last call.
-    pub(crate) fn take_rows(&mut self) -> Vec<LogRow> {
+    pub fn take_rows(&mut self) -> Vec<LogRow> {
         std::mem::take(&mut self.rows)
     }
 
     /// What the guard found, while it has tripped.
-    pub(crate) fn trip(&self) -> Option<Trip> {
+    pub fn trip(&self) -> Option<Trip> {
         self.status.filter(|status| status.phase() == Phase::Tripped)?.trip()
     }
 }

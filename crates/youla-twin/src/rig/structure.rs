@@ -9,12 +9,12 @@ use youla_greybox::{Matrix, Slope, Structure};
 ///
 /// ```
 /// use youla_greybox::Structure;
-/// use youla_paper::BearingStructure;
-/// use youla_paper::rig::Bearing;
+/// use youla_twin::BearingStructure;
+/// use youla_twin::rig::Bearing;
 /// let theta = BearingStructure::parameters(&Bearing::default());
 /// assert_eq!(BearingStructure.names()[13], "actuator_pole_v");
 /// assert_eq!(BearingStructure::bearing(&theta)?, Bearing::default());
-/// # Ok::<(), youla_paper::Error>(())
+/// # Ok::<(), youla_twin::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct BearingStructure;

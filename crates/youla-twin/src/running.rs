@@ -25,7 +25,7 @@ impl LoopDescription {
     ///
     /// # Errors
     /// [`youla_io::Error::Settings`] with line and key.
-    pub(crate) fn of_file(path: &Path) -> Result<Self> {
+    pub fn of_file(path: &Path) -> Result<Self> {
         #[derive(Deserialize)]
         struct Tables {
             nominal: NominalModel,
@@ -39,29 +39,39 @@ impl LoopDescription {
 }
 
 /// The same as systems.
-pub(crate) struct RunningLoop {
-    pub(crate) description: LoopDescription,
-    pub(crate) nominal: StateSpace<Discrete>,
-    pub(crate) f: Mat<f64>,
-    pub(crate) l: Mat<f64>,
-    pub(crate) factors: CoprimeFactors<Discrete>,
+#[derive(Debug)]
+pub struct RunningLoop {
+    /// The two tables of its file.
+    pub description: LoopDescription,
+    /// The nominal model, states scaled.
+    pub nominal: StateSpace<Discrete>,
+    /// State feedback.
+    pub f: Mat<f64>,
+    /// Observer gain.
+    pub l: Mat<f64>,
+    /// Factors of nominal model and controller.
+    pub factors: CoprimeFactors<Discrete>,
     /// Largest order of Q.
-    pub(crate) q_states: usize,
+    pub q_states: usize,
 }
 
 impl RunningLoop {
     /// Reads a file.
     ///
     /// # Errors
-    /// [`Error::Campaign`] where the firmware cannot run this loop.
-    pub(crate) fn read(path: &Path, time: Discrete) -> Result<Self> {
+    /// [`Error::Loop`] where the firmware cannot run this loop.
+    pub fn read(path: &Path, time: Discrete) -> Result<Self> {
         let text = std::fs::read_to_string(path)
             .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
         let description: LoopDescription = toml_file::parse(&text, path)?;
         Self::new(description, path, time)
     }
 
-    pub(crate) fn new(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
+    /// The loop of a description; matrices in files are beside `path`.
+    ///
+    /// # Errors
+    /// As [`RunningLoop::read`].
+    pub fn new(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let running = Self::of_any_size(description, path, time)?;
         let nominal = &running.nominal;
         if nominal.order() > STATES || (nominal.inputs(), nominal.outputs()) != (2, 2) {
@@ -72,7 +82,7 @@ impl RunningLoop {
                 nominal.inputs(),
                 nominal.outputs()
             );
-            return Err(Error::Campaign { path: path.to_owned(), problem });
+            return Err(Error::Loop { path: path.to_owned(), problem });
         }
         Ok(running)
     }
@@ -81,24 +91,24 @@ impl RunningLoop {
     ///
     /// # Errors
     /// As [`RunningLoop::read`].
-    pub(crate) fn of_machine(path: &Path, time: Discrete, q_states: usize) -> Result<Self> {
+    pub fn of_machine(path: &Path, time: Discrete, q_states: usize) -> Result<Self> {
         let running = Self::of_any_size(LoopDescription::of_file(path)?, path, time)?;
         let ports = (running.nominal.inputs(), running.nominal.outputs());
         if ports != (2, 2) {
             let problem =
                 format!("a campaign takes 2 inputs and 2 outputs; the nominal model has {} and {}", ports.0, ports.1);
-            return Err(Error::Campaign { path: path.to_owned(), problem });
+            return Err(Error::Loop { path: path.to_owned(), problem });
         }
         Ok(RunningLoop { q_states, ..running })
     }
 
     /// A loop that need not fit the firmware of a campaign.
-    pub(crate) fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
+    pub fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let nominal = description.nominal.realise(folder, time)?;
         let RealisedController::Observer { f, l } = description.controller.realise(folder, time)? else {
             let problem = "the controller of the firmware is an observer; give [controller.observer]".into();
-            return Err(Error::Campaign { path: path.to_owned(), problem });
+            return Err(Error::Loop { path: path.to_owned(), problem });
         };
         let scale = nominal.state_scales()?;
         let balanced = nominal.with_scaled_states(&scale);
@@ -108,8 +118,8 @@ impl RunningLoop {
         Ok(RunningLoop { description, nominal: balanced, f, l, factors, q_states: Q_STATES })
     }
 
-    /// What [`crate::station::station`] takes.
-    pub(crate) fn numbers(&self, limits: &[f64; 8], counts: [u16; 3]) -> Vec<f32> {
+    /// What [`crate::Target::start`] takes: limits of y, beta, u and change of u, each for two channels; samples clipped, stuck and of the ramp.
+    pub fn numbers(&self, limits: &[f64; 8], counts: [u16; 3]) -> Vec<f32> {
         let g = &self.nominal;
         let mut numbers = Vec::with_capacity(NUMBERS);
         let parts = [
@@ -128,7 +138,7 @@ impl RunningLoop {
 }
 
 /// A matrix by rows, filled up with zeros.
-pub(crate) fn padded(m: MatRef<'_, f64>, rows: usize, columns: usize) -> Vec<f32> {
+pub fn padded(m: MatRef<'_, f64>, rows: usize, columns: usize) -> Vec<f32> {
     let entry = |i: usize, j: usize| if i < m.nrows() && j < m.ncols() { m[(i, j)] as f32 } else { 0.0 };
     (0..rows * columns).map(|k| entry(k / columns, k % columns)).collect()
 }

@@ -9,6 +9,7 @@ mod parameters;
 mod piezo;
 mod sensor;
 mod speed;
+mod structure;
 #[cfg(test)]
 mod tests;
 mod twin;
@@ -23,4 +24,5 @@ pub use parameters::{
 };
 pub use piezo::Piezo;
 pub use speed::bearing_at_speed;
+pub use structure::BearingStructure;
 pub use twin::{BearingRig, Fidelity, Rig};

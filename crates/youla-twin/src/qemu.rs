@@ -1,6 +1,5 @@
 //! The image of the firmware in QEMU, in lock-step through two pipes.
 
-use crate::record::io;
 use crate::target::failed;
 use crate::{Error, Result};
 use std::fs::{self, File, OpenOptions};
@@ -38,7 +37,7 @@ impl Qemu {
     pub(crate) fn start(image: &Path, numbers: &[f32]) -> Result<Self> {
         static COUNT: AtomicUsize = AtomicUsize::new(0);
         let image = image.canonicalize().map_err(|source| io(image, source))?;
-        let name = format!("youla-commission-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let name = format!("youla-twin-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let folder = std::env::temp_dir().join(name);
         fs::create_dir_all(&folder).map_err(|source| io(&folder, source))?;
         let started = Self::connected(&image, &folder);
@@ -97,6 +96,10 @@ impl Drop for Qemu {
         let _ = self.child.kill().and_then(|()| self.child.wait());
         let _ = fs::remove_dir_all(&self.folder);
     }
+}
+
+fn io(path: &Path, source: std::io::Error) -> Error {
+    Error::File(youla_io::Error::Io { path: path.to_owned(), source })
 }
 
 fn stopped() -> Error {

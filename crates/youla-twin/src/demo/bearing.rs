@@ -1,5 +1,6 @@
 //! The demonstration: the paper's gas bearing, simulated in closed loop, with a nominal model that is half wrong.
 
+use super::Demo;
 use crate::rig::{Bearing, degraded};
 use crate::{Error, Result};
 use faer::Scale;
@@ -39,15 +40,6 @@ const HOLD: (usize, usize) = (5, 40);
 /// Factor on all entries of A of the nominal model: the paper's second experiment.
 const A_FACTOR: f64 = 0.5;
 
-/// Settings and simulated records of the demonstration.
-#[derive(Debug, Clone)]
-pub struct Demo {
-    /// The settings for `youla identify`.
-    pub settings: RunSettings,
-    /// What the rig would have logged.
-    pub records: RunRecords,
-}
-
 /// Simulates the bearing (1)-(12) at 5 kHz under the observer-based controller of Fig. 3, designed on the nominal model
 /// `0.5 A`, excited by square waves on alpha, with white output noise; one record to identify from, one to verify on.
 ///
@@ -55,7 +47,7 @@ pub struct Demo {
 ///
 /// # Errors
 /// Never for the parameters of the paper.
-pub fn demo(seed: u64) -> Result<Demo> {
+pub(super) fn bearing(seed: u64) -> Result<Demo> {
     let time = Discrete::new(TS)?;
     let bearing = Bearing::default().plant()?;
     let plant = bearing.zoh(time)?;

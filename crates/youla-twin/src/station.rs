@@ -6,7 +6,7 @@ use youla_rt::{Controller, ExcitedLoop, Limits, Matrices};
 /// Largest order of the nominal model; a smaller one is filled up with states that are zero.
 pub(crate) const STATES: usize = 6;
 /// Largest order of Q.
-pub(crate) const Q_STATES: usize = 20;
+pub const Q_STATES: usize = 20;
 /// Numbers of which a station is made: A, B, C, D, F, L, limits, ramp.
 pub(crate) const NUMBERS: usize = STATES * STATES + 8 * STATES + 4 + 8 + 3;
 /// Rows of a frame.

@@ -70,7 +70,7 @@ units! {
 /// Reading refuses any other unit: nothing is converted silently.
 ///
 /// ```
-/// use youla_paper::rig::{Micrometres, Quantity};
+/// use youla_twin::rig::{Micrometres, Quantity};
 /// let noise: Quantity<Micrometres> = toml::from_str("value = 0.3\nunit = 'um'\nbasis = 'assumption'").unwrap();
 /// assert_eq!(noise.value, 0.3);
 /// let wrong = toml::from_str::<Quantity<Micrometres>>("value = 0.3\nunit = 'mm'\nbasis = 'assumption'");

@@ -6,7 +6,8 @@
 //! The case is chosen for its message: more than half of u is fed-back noise, so that subspace identification on (u, y) is
 //! biased. On the low-noise bearing (`--machine bearing`) direct identification is as good as the scheme.
 
-use crate::output::Failure;
+use super::Demo;
+use crate::Result;
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -44,7 +45,7 @@ const EXPERIMENTS: [Recording; 2] = [
 ];
 
 /// Settings and records; the same seed gives the same records.
-pub(super) fn levitation(seed: u64) -> Result<(RunSettings, RunRecords), Failure> {
+pub(super) fn levitation(seed: u64) -> Result<Demo> {
     let settings = RunSettings { seed: Some(seed), ..RunSettings::parse(SETTINGS, Path::new("demo"))? };
     let time = Discrete::new(settings.data.sample_time.unwrap_or(1e-3))?;
     let plant = plant()?.zoh(time)?;
@@ -68,7 +69,7 @@ pub(super) fn levitation(seed: u64) -> Result<(RunSettings, RunRecords), Failure
         measured: None,
         true_plant: Some(plant),
     };
-    Ok((settings, records))
+    Ok(Demo { settings, records })
 }
 
 /// States: position, velocity, current.
@@ -81,7 +82,7 @@ fn plant() -> youla::Result<StateSpace<Continuous>> {
 }
 
 /// One experiment from rest, sample by sample.
-fn record(plant: &StateSpace<Discrete>, experiment: &Recording, rng: &mut impl Rng) -> Result<LoopRecord, Failure> {
+fn record(plant: &StateSpace<Discrete>, experiment: &Recording, rng: &mut impl Rng) -> Result<LoopRecord> {
     let &Recording { name, samples, amplitude } = experiment;
     let waves = SquareWaves { amplitude, hold_min: 2, hold_max: 20 };
     let d = Excitation::SquareWaves(waves).generate(samples, 1, plant.time(), rng)?;

@@ -46,12 +46,12 @@ pub trait Rig {
 /// moves in substeps, 20 us with the parameters that ship.
 ///
 /// ```
-/// use youla_paper::rig::{BearingRig, Fidelity, Rig, RigParameters};
+/// use youla_twin::rig::{BearingRig, Fidelity, Rig, RigParameters};
 /// let mut rig = BearingRig::new(&RigParameters::shipped(), Fidelity::Rotating { rpm: 2500.0 }, 1)?;
 /// let y = rig.measure();
 /// let step = rig.actuate([-0.1 * y[0], 7.0]);
 /// assert_eq!((step.applied[1], step.saturated), (5.0, [false, true]));
-/// # Ok::<(), youla_paper::Error>(())
+/// # Ok::<(), youla_twin::Error>(())
 /// ```
 #[derive(Debug, Clone)]
 pub struct BearingRig {

@@ -48,9 +48,9 @@ impl Bearing {
     /// [`youla::Error::NotFinite`] for parameters that are not numbers.
     ///
     /// ```
-    /// let modes = youla_paper::rig::Bearing::default().plant()?;
+    /// let modes = youla_twin::rig::Bearing::default().plant()?;
     /// assert_eq!((modes.order(), modes.inputs(), modes.outputs()), (6, 2, 2));
-    /// # Ok::<(), youla_paper::Error>(())
+    /// # Ok::<(), youla_twin::Error>(())
     /// ```
     pub fn plant(&self) -> Result<StateSpace<Continuous>> {
         let square = |x: &[[f64; 2]; 2]| Mat::from_fn(2, 2, |i, j| x[i][j]);

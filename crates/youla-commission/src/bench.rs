@@ -1,11 +1,20 @@
 //! What a point works with: the twin in lock-step, or a machine over its link.
 
 use crate::Result;
+use crate::campaign::{Campaign, OperatingPoint};
 use crate::link::Link;
 use crate::parameter::LoadedQ;
+use std::path::Path;
 use youla_link::{LARGEST_CHUNK, Request};
 use youla_rt::{Checksum, Trip};
-use youla_twin::{LockStep, LogRow, Q_STATES};
+use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
+use youla_twin::{LockStep, LogRow, Q_STATES, RunningLoop, Target};
+
+/// Samples of the ramp of an excitation.
+pub(crate) const RAMP: u16 = 500;
+/// Consecutive samples for which an input may be clipped, and equal values after which an output counts as stuck.
+const CLIPPED: u16 = 50;
+const STUCK: u16 = 50;
 
 /// A machine with its controller.
 pub(crate) enum Bench {
@@ -16,6 +25,29 @@ pub(crate) enum Bench {
 }
 
 impl Bench {
+    /// Controller and machine at an operating point, at rest.
+    ///
+    /// # Errors
+    /// [`crate::Error::Controller`].
+    pub(crate) fn start(
+        campaign: &Campaign,
+        at: &OperatingPoint,
+        running: &RunningLoop,
+        image: Option<&Path>,
+    ) -> Result<Self> {
+        let limits = &campaign.limits;
+        if let Some(address) = &campaign.machine {
+            return Ok(Bench::Link(Link::connect(address, [limits.output, limits.input, limits.residual])?));
+        }
+        let mut parameters = RigParameters::shipped();
+        parameters.rotation.cross_coupling.value = at.cross_coupling;
+        let plant = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, campaign.seed)?;
+        let [y, beta, u, rate] = [limits.output, limits.residual, limits.input, 2.0 * limits.input];
+        let of_guard = [y, y, beta, beta, u, u, rate, rate];
+        let target = Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?;
+        Ok(Bench::Twin(Box::new(LockStep::new(target, plant)?)))
+    }
+
     /// Runs so many samples, rounded up to whole frames.
     ///
     /// # Errors

@@ -2,81 +2,19 @@
 
 use crate::bench::Bench;
 use crate::campaign::{Campaign, OperatingPoint};
-use crate::commission::{log_text, start};
 use crate::error::refuse;
-use crate::figures::{LoopState, Sizes};
+use crate::figures::Sizes;
 use crate::parameter::{LoadedQ, loaded};
 use crate::point::{FIRST, Operator, Point};
 use crate::q_table::{point_q, point_s};
-use crate::record::{PointRecord, PointStatus, io, read_json, write_json, write_text};
+use crate::record::{
+    BetweenRecord, Evidence, PointRecord, PointStatus, io, log_text, read_json, way_name, write_json, write_text,
+};
 use crate::{Error, Result};
-use serde::{Deserialize, Serialize};
 use std::fs;
 use std::path::Path;
 use youla_loop::schedule::{BetweenPoints, between_points, q_between};
 use youla_twin::{LogRow, RunningLoop};
-
-/// Two neighbouring speeds with the same running loop.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct BetweenRecord {
-    /// The point of the lower speed.
-    pub from: String,
-    /// The point of the higher speed.
-    pub to: String,
-    /// How it ended.
-    pub status: PointStatus,
-    /// Why it was stopped or taken back.
-    pub reason: Option<String>,
-    /// Evidence that all loops between the points are stable.
-    pub evidence: Option<Evidence>,
-    /// Speed of the check, halfway, revolutions per minute.
-    pub rpm: f64,
-    /// Least damping that is expected there: the lower bound of either point.
-    pub expected: Option<f64>,
-    /// The loop with the Q halfway, measured.
-    pub reached: Option<LoopState>,
-    /// States of the Q halfway.
-    pub q_order: Option<usize>,
-    /// Switches of Q.
-    pub switches: usize,
-    /// Switches after which the guard ended the excitation or the loop was not measured as stable.
-    pub unstable_switches: usize,
-}
-
-impl BetweenRecord {
-    /// Both points by their names; also its folder.
-    pub fn name(&self) -> String {
-        way_name(&self.from, &self.to)
-    }
-}
-
-fn way_name(from: &str, to: &str) -> String {
-    format!("{from} to {to}")
-}
-
-/// Figures of the evidence, see [`youla_loop::schedule`].
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct Evidence {
-    /// Largest small-gain figure, below 1.
-    pub gain: f64,
-    /// How far S may depart from the line between the points, H-infinity norm.
-    pub room: f64,
-    /// How far S moves from point to point.
-    pub change: f64,
-    /// How far S may depart within its region at a point.
-    pub region: f64,
-    /// How far Q may depart from the mean of both instead.
-    pub q_room: f64,
-    /// Error of the Q halfway by its reduction, an upper bound.
-    pub q_error: f64,
-}
-
-impl Evidence {
-    /// Whether S has room for its region and Q for its error.
-    pub fn holds(&self) -> bool {
-        self.gain < 1.0 && self.region < self.room && self.q_error < self.q_room
-    }
-}
 
 /// Points next to each other in speed, with the same running loop and the same film: places in the campaign.
 pub(crate) fn pairs(campaign: &Campaign, loops: &[RunningLoop]) -> Vec<[usize; 2]> {
@@ -153,7 +91,7 @@ fn examined(
     let mut rows = Vec::new();
     let ended = (|| {
         let q = evidence(ends, out, &mut record)?;
-        let bench = start(campaign, &halfway, ends.running, image)?;
+        let bench = Bench::start(campaign, &halfway, ends.running, image)?;
         checked(campaign, (ends, &halfway, bench, &q), operator, (&mut record, &mut rows))
     })();
     match ended {

@@ -1,30 +1,26 @@
 //! The campaign: its points in their order, what is kept of each, and the summary.
 
 use crate::bench::Bench;
-use crate::between::{BetweenRecord, Ends, between, pairs};
+use crate::between::{Ends, between, pairs};
 use crate::campaign::{Campaign, OperatingPoint};
-use crate::link::Link;
-use crate::point::{Operator, Point, PointFiles, RAMP};
+use crate::point::{Operator, Point, PointFiles};
 use crate::q_table::write_tables;
-use crate::record::{CampaignSummary, PointRecord, PointStatus, io, read_json, write_json, write_text};
+use crate::record::{
+    BetweenRecord, CampaignSummary, PointRecord, PointStatus, io, log_text, read_json, write_json, write_text,
+};
 use crate::report::report;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
-use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use youla::lti::Discrete;
 use youla_io::SystemMatrices;
 use youla_io::export::ExportedController;
 use youla_run::{StageClock, write_run};
-use youla_twin::rig::{BearingRig, Fidelity, RigParameters};
-use youla_twin::{LockStep, LogRow, LoopDescription, RunningLoop, Target};
+use youla_twin::{LoopDescription, RunningLoop, Target};
 
 /// Sample time of the twin, seconds.
 const TS: f64 = 2e-4;
-/// Consecutive samples for which an input may be clipped, and equal values after which an output counts as stuck.
-const CLIPPED: u16 = 50;
-const STUCK: u16 = 50;
 
 /// Runs a campaign, or what is left of it, and writes `out`: a folder for each point and each way between two, report.html, summary.json
 /// and q_table.json. What is done is kept. The campaign ends at the first point that is not done.
@@ -139,32 +135,10 @@ fn one_point(
     operator: &mut dyn Operator,
 ) -> Result<PointRecord> {
     operator.notes(&at.name);
-    let (record, files) = Point::new(campaign, at, running, start(campaign, at, running, image)?).run(operator)?;
+    let (record, files) =
+        Point::new(campaign, at, running, Bench::start(campaign, at, running, image)?).run(operator)?;
     write_point(place, running, &record, files)?;
     Ok(record)
-}
-
-/// Controller and machine at an operating point, at rest.
-///
-/// # Errors
-/// [`Error::Controller`].
-pub(crate) fn start(
-    campaign: &Campaign,
-    at: &OperatingPoint,
-    running: &RunningLoop,
-    image: Option<&Path>,
-) -> Result<Bench> {
-    let limits = &campaign.limits;
-    if let Some(address) = &campaign.machine {
-        return Ok(Bench::Link(Link::connect(address, [limits.output, limits.input, limits.residual])?));
-    }
-    let mut parameters = RigParameters::shipped();
-    parameters.rotation.cross_coupling.value = at.cross_coupling;
-    let plant = BearingRig::new(&parameters, Fidelity::Rotating { rpm: at.rpm }, campaign.seed)?;
-    let [y, beta, u, rate] = [limits.output, limits.residual, limits.input, 2.0 * limits.input];
-    let of_guard = [y, y, beta, beta, u, u, rate, rate];
-    let target = Target::start(image, &running.numbers(&of_guard, [CLIPPED, STUCK, RAMP]))?;
-    Ok(Bench::Twin(Box::new(LockStep::new(target, plant)?)))
 }
 
 /// The record last: a point without it is run again.
@@ -205,18 +179,4 @@ fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files:
         write_run(&found, &place.join("identification"), true, &mut StageClock::new(&mut silent))?;
     }
     write_json(&place.join("point.json"), record)
-}
-
-/// Rows as CSV.
-pub(crate) fn log_text(rows: &[LogRow], ts: f64) -> String {
-    let mut text = String::from("t,y_h,y_v,u_h,u_v,alpha_1,alpha_2,beta_1,beta_2\n");
-    for (k, row) in rows.iter().enumerate() {
-        // Writing to a string cannot fail.
-        let _ = write!(text, "{:?}", k as f64 * ts);
-        for value in row {
-            let _ = write!(text, ",{:?}", *value as f32);
-        }
-        text.push('\n');
-    }
-    text
 }

@@ -20,14 +20,13 @@ mod record;
 mod rehearse;
 mod report;
 
-pub use between::{BetweenRecord, Evidence};
 pub use campaign::{Campaign, CampaignLimits, Goal, OperatingPoint};
 pub use commission::commission;
 pub use error::{Error, Result};
 pub use figures::LoopState;
 pub use point::Operator;
 pub use q_table::{QAtSpeed, QTable};
-pub use record::{CampaignSummary, DampingFigures, PointRecord, PointStatus};
+pub use record::{BetweenRecord, CampaignSummary, DampingFigures, Evidence, PointRecord, PointStatus};
 pub use rehearse::{LEVEL, Prediction};
 
 #[cfg(test)]

@@ -20,6 +20,17 @@ impl LoadedQ {
     }
 }
 
+/// A new controller with its Q.
+pub(crate) struct NewLoop {
+    /// `u = K y`, positive feedback.
+    pub(crate) controller: StateSpace<Discrete>,
+    pub(crate) q: LoadedQ,
+    /// Models within the region of S that it stabilises, all of them.
+    pub(crate) models: usize,
+    /// Largest magnitude of a closed-loop pole over them.
+    pub(crate) worst_pole: f64,
+}
+
 /// Q from beta to alpha with K(Q) = `controller`, `J_G` closed with it; its order is the sum of both.
 ///
 /// # Errors

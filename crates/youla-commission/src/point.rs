@@ -1,6 +1,6 @@
 //! One operating point: check, small excitation, record, proposal, switch, verification.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, RAMP};
 use crate::campaign::{Campaign, OperatingPoint};
 use crate::error::refuse;
 use crate::figures::{LoopState, Sizes};
@@ -26,8 +26,6 @@ const SMALL_SHARE: f64 = 0.1;
 const USED: f64 = 0.8;
 /// Relative difference of residuals above which the machine runs another loop than stated; single precision makes less than 1e-4.
 const ANOTHER_LOOP: f64 = 0.01;
-/// Samples of the ramp.
-pub(crate) const RAMP: u16 = 500;
 /// Order of the register of the excitation, and seconds of each of its values: power up to 625 Hz.
 const ORDER: u8 = 18;
 const HOLD: f64 = 1.6e-3;

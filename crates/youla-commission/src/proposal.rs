@@ -4,25 +4,13 @@ use crate::campaign::Goal;
 use crate::error::refuse;
 use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, identified, loop_response};
-use crate::parameter::{LoadedQ, parameter_of};
+use crate::parameter::{NewLoop, parameter_of};
 use crate::rehearse::{Prediction, on_model, predict};
 use crate::{Error, Result};
 use youla::identify::likelihood::Recommendation;
-use youla::lti::{Discrete, StateSpace};
 use youla_loop::redesign::{DeviationRegion, Redesign, RedesignOptions, RedesignProblem, redesign};
 use youla_run::{Identification, ModeEntry, shown_modes};
 use youla_twin::RunningLoop;
-
-/// A new controller with its Q.
-pub(crate) struct NewLoop {
-    /// `u = K y`, positive feedback.
-    pub(crate) controller: StateSpace<Discrete>,
-    pub(crate) q: LoadedQ,
-    /// Models within the region of S that it stabilises, all of them.
-    pub(crate) models: usize,
-    /// Largest magnitude of a closed-loop pole over them.
-    pub(crate) worst_pole: f64,
-}
 
 /// What a record gives.
 pub(crate) struct Proposal {

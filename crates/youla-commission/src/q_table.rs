@@ -1,9 +1,8 @@
 //! q_table.json: Q over the speed, for `youla rig load --speed`.
 
-use crate::between::{BetweenRecord, Evidence};
 use crate::campaign::Campaign;
 use crate::error::refuse;
-use crate::record::{PointStatus, read_json, write_json};
+use crate::record::{BetweenRecord, Evidence, PointStatus, read_json, write_json};
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use std::path::Path;

@@ -1,13 +1,14 @@
 //! What a campaign leaves: one record for each point, kept for an interrupted campaign, and summary.json.
 
-use crate::between::BetweenRecord;
 use crate::figures::LoopState;
 use crate::rehearse::Prediction;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
+use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 use youla_run::ModeEntry;
+use youla_twin::LogRow;
 
 /// How a point ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -54,6 +55,68 @@ pub struct PointRecord {
     pub switches: usize,
     /// Switches after which the guard ended the excitation or the loop was not measured as stable.
     pub unstable_switches: usize,
+}
+
+/// Two neighbouring speeds with the same running loop.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct BetweenRecord {
+    /// The point of the lower speed.
+    pub from: String,
+    /// The point of the higher speed.
+    pub to: String,
+    /// How it ended.
+    pub status: PointStatus,
+    /// Why it was stopped or taken back.
+    pub reason: Option<String>,
+    /// Evidence that all loops between the points are stable.
+    pub evidence: Option<Evidence>,
+    /// Speed of the check, halfway, revolutions per minute.
+    pub rpm: f64,
+    /// Least damping that is expected there: the lower bound of either point.
+    pub expected: Option<f64>,
+    /// The loop with the Q halfway, measured.
+    pub reached: Option<LoopState>,
+    /// States of the Q halfway.
+    pub q_order: Option<usize>,
+    /// Switches of Q.
+    pub switches: usize,
+    /// Switches after which the guard ended the excitation or the loop was not measured as stable.
+    pub unstable_switches: usize,
+}
+
+impl BetweenRecord {
+    /// Both points by their names; also its folder.
+    pub fn name(&self) -> String {
+        way_name(&self.from, &self.to)
+    }
+}
+
+pub(crate) fn way_name(from: &str, to: &str) -> String {
+    format!("{from} to {to}")
+}
+
+/// Figures of the evidence, see [`youla_loop::schedule`].
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Evidence {
+    /// Largest small-gain figure, below 1.
+    pub gain: f64,
+    /// How far S may depart from the line between the points, H-infinity norm.
+    pub room: f64,
+    /// How far S moves from point to point.
+    pub change: f64,
+    /// How far S may depart within its region at a point.
+    pub region: f64,
+    /// How far Q may depart from the mean of both instead.
+    pub q_room: f64,
+    /// Error of the Q halfway by its reduction, an upper bound.
+    pub q_error: f64,
+}
+
+impl Evidence {
+    /// Whether S has room for its region and Q for its error.
+    pub fn holds(&self) -> bool {
+        self.gain < 1.0 && self.region < self.room && self.q_error < self.q_room
+    }
 }
 
 /// Least damping at a point.
@@ -151,4 +214,18 @@ pub(crate) fn write_json(path: &Path, value: &impl Serialize) -> Result<()> {
 
 pub(crate) fn io(path: &Path, source: std::io::Error) -> Error {
     Error::File(youla_io::Error::Io { path: path.to_owned(), source })
+}
+
+/// Rows as CSV.
+pub(crate) fn log_text(rows: &[LogRow], ts: f64) -> String {
+    let mut text = String::from("t,y_h,y_v,u_h,u_v,alpha_1,alpha_2,beta_1,beta_2\n");
+    for (k, row) in rows.iter().enumerate() {
+        // Writing to a string cannot fail.
+        let _ = write!(text, "{:?}", k as f64 * ts);
+        for value in row {
+            let _ = write!(text, ",{:?}", *value as f32);
+        }
+        text.push('\n');
+    }
+    text
 }

@@ -2,8 +2,7 @@
 
 use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, response_to};
-use crate::parameter::at_plant_input;
-use crate::proposal::NewLoop;
+use crate::parameter::{NewLoop, at_plant_input};
 use crate::{Error, Result};
 use faer::Side;
 use rand::{RngExt, SeedableRng};

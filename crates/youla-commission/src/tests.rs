@@ -1,8 +1,8 @@
 //! The circle on the twin: on the host in every run, over seeds in QEMU on request.
 
-use crate::bench::Bench;
+use crate::bench::{Bench, RAMP};
 use crate::parameter::parameter_of;
-use crate::point::{Operator, Point, PointFiles, RAMP};
+use crate::point::{Operator, Point, PointFiles};
 use crate::{
     Campaign, CampaignSummary, DampingFigures, Error, OperatingPoint, PointRecord, PointStatus, QTable, commission,
 };

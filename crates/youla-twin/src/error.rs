@@ -49,3 +49,8 @@ impl Error {
         }
     }
 }
+
+/// The controller does not do what it was asked for.
+pub(crate) fn failed(problem: &str) -> Error {
+    Error::Controller { problem: problem.into() }
+}

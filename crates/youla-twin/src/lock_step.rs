@@ -1,7 +1,8 @@
 //! Controller and twin in lock-step, and the log of the rows that the controller sends.
 
+use crate::error::failed;
 use crate::rig::{BearingRig, Rig};
-use crate::target::{Target, failed};
+use crate::target::Target;
 use crate::{Error, Result};
 use youla_link::{Frame, Kind, LARGEST_CHUNK, LARGEST_FRAME, Outcome, Reply, Request, RowBlock, RowShape};
 use youla_rt::{Phase, Status, Trip};

@@ -1,6 +1,6 @@
 //! The image of the firmware in QEMU, in lock-step through two pipes.
 
-use crate::target::failed;
+use crate::error::failed;
 use crate::{Error, Result};
 use std::fs::{self, File, OpenOptions};
 use std::io::{Read, Write};

@@ -1,8 +1,9 @@
 //! The controller of a campaign: the loop of the firmware, one sample at a time.
 
+use crate::Result;
+use crate::error::failed;
 use crate::qemu::Qemu;
 use crate::station::{CampaignStation, station};
-use crate::{Error, Result};
 use std::path::Path;
 use youla_link::LARGEST_FRAME;
 
@@ -78,8 +79,4 @@ impl Target {
             Place::Qemu(qemu) => qemu.send(y, request),
         }
     }
-}
-
-pub(crate) fn failed(problem: &str) -> Error {
-    Error::Controller { problem: problem.into() }
 }

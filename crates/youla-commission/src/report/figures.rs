@@ -2,10 +2,9 @@
 
 use super::{BEFORE, HALFWAY, PREDICTED, REACHED};
 use crate::Result;
-use crate::between::BetweenRecord;
 use crate::campaign::Campaign;
 use crate::q_table::point_s;
-use crate::record::{CampaignSummary, PointRecord};
+use crate::record::{BetweenRecord, CampaignSummary, PointRecord};
 use std::f64::consts::TAU;
 use std::path::Path;
 use youla::lti::{Discrete, StateSpace, frequency_response};

@@ -1,8 +1,7 @@
 //! Points, modes, and what is known between the points.
 
 use super::{BEFORE, REACHED};
-use crate::between::BetweenRecord;
-use crate::record::{CampaignSummary, PointRecord, PointStatus};
+use crate::record::{BetweenRecord, CampaignSummary, PointRecord, PointStatus};
 use youla_report::story::{Row, Table, plain};
 
 fn number(value: Option<f64>, digits: usize) -> String {
@@ -91,7 +90,7 @@ pub(super) fn between(summary: &CampaignSummary) -> Table {
         "reached halfway",
     ];
     let row = |way: &BetweenRecord| {
-        let of = |figure: fn(&crate::between::Evidence) -> f64| way.evidence.as_ref().map(figure);
+        let of = |figure: fn(&crate::record::Evidence) -> f64| way.evidence.as_ref().map(figure);
         let small = |value: Option<f64>| value.map_or("-".into(), |v| format!("{v:.1e}"));
         Row {
             method: super::figures::way_key(way),

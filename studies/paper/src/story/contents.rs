@@ -1,15 +1,14 @@
 //! The page.
 
 use super::claims::paper_claims;
+use super::sections::{experiments, rig, settings, study, timing};
 use super::tables::{plain, row};
 use super::words::{count, short};
-use super::{section_experiments, section_rig, section_settings, section_study, section_timing};
 use crate::Result;
 use crate::study::{Method, Paper};
 use youla_report::data;
 use youla_report::figure::Figure;
-pub(super) use youla_report::story::section;
-use youla_report::story::{Block, Section, Story, Table};
+use youla_report::story::{Block, Section, Story, Table, section};
 
 /// The section whose tables differ from run to run.
 const TIMING: &str = "timing";
@@ -50,15 +49,15 @@ pub fn paper_story(paper: &Paper) -> Result<Story> {
         methods: story_methods(),
         sections: vec![
             brief(paper),
-            section_rig::rig(paper),
-            section_rig::controller(paper),
-            section_rig::nominal(paper)?,
-            section_study::study(paper),
-            section_study::map(paper),
-            section_experiments::experiments(paper)?,
-            section_experiments::reduction(paper)?,
-            section_timing::timing(paper, TIMING),
-            section_settings::settings(paper),
+            rig::rig(paper),
+            rig::controller(paper),
+            rig::nominal(paper)?,
+            study::study(paper),
+            study::map(paper),
+            experiments::experiments(paper)?,
+            experiments::reduction(paper)?,
+            timing::timing(paper, TIMING),
+            settings::settings(paper),
         ],
     })
 }

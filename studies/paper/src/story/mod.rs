@@ -2,8 +2,8 @@
 //!
 //! | file | holds |
 //! |---|---|
-//! | `story` | the page: its sections in order |
-//! | `section_*` | one section each |
+//! | `contents` | the page: its sections in order |
+//! | `sections` | one section each |
 //! | `figures*`, `map` | the figures as data |
 //! | `tables*`, `modes` | the tables |
 //! | `claims*` | what the paper claims and what comes out |
@@ -23,11 +23,7 @@ mod map;
 mod modes;
 mod open;
 mod order;
-mod section_experiments;
-mod section_rig;
-mod section_settings;
-mod section_study;
-mod section_timing;
+mod sections;
 mod summary;
 mod tables;
 mod tables_experiments;

@@ -1,13 +1,13 @@
 //! Everything that was chosen.
 
-use super::contents::section;
-use super::open::choices;
+use crate::story::open::choices;
 use crate::study::Paper;
 use serde::Serialize;
+use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
 /// What the paper leaves open, and both settings files.
-pub(super) fn settings(paper: &Paper) -> Section {
+pub(in crate::story) fn settings(paper: &Paper) -> Section {
     let text = format!(
         "The seed is {}; the same settings, rig file and seed give the same results bit by bit, whatever the number of threads. The \
          paper leaves open the following, which was chosen once for all experiments and models:",

@@ -1,15 +1,15 @@
 //! The rig, the controller and the nominal model.
 
-use super::contents::section;
-use super::order::lacking_in_words;
-use super::words::{and, both, count, percent, short};
-use super::{figures_experiments, figures_study, tables_nominal, tables_rig};
 use crate::Result;
+use crate::story::order::lacking_in_words;
+use crate::story::words::{and, both, count, percent, short};
+use crate::story::{figures_experiments, figures_study, tables_nominal, tables_rig};
 use crate::study::{Method, Paper, Row, Status};
+use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
 /// The digital twin and its excitation.
-pub(super) fn rig(paper: &Paper) -> Section {
+pub(in crate::story) fn rig(paper: &Paper) -> Section {
     let rig = &paper.rig;
     let text = format!(
         "A disc on a flexible shaft is held by an active gas bearing: two piezo valves let air in, two sensors measure the \
@@ -41,7 +41,7 @@ pub(super) fn rig(paper: &Paper) -> Section {
 }
 
 /// How a controller is chosen.
-pub(super) fn controller(paper: &Paper) -> Section {
+pub(in crate::story) fn controller(paper: &Paper) -> Section {
     let c = &paper.settings.controller;
     let design = format!(
         "Each controller is LQG on its nominal model, discretised at the sample time: state feedback with weights {} per um^2 on \
@@ -85,7 +85,7 @@ fn chosen(paper: &Paper) -> String {
 }
 
 /// The open-loop fit at rest.
-pub(super) fn nominal(paper: &Paper) -> Result<Section> {
+pub(in crate::story) fn nominal(paper: &Paper) -> Result<Section> {
     let found = &paper.experiments.nominal.found;
     let fit = [found.fit[0], found.fit[1]];
     let text = format!(

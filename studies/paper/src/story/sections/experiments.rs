@@ -1,17 +1,17 @@
 //! The experiments and the reduction.
 
-use super::contents::section;
-use super::order::{differences, lacking_in_words};
-use super::section_study::points;
-use super::words::{both, count, excitation, short};
-use super::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
+use super::study::points;
 use crate::Result;
+use crate::story::order::{differences, lacking_in_words};
+use crate::story::words::{both, count, excitation, short};
+use crate::story::{claims_experiments, figures_experiments as figures, tables_experiments as tables};
 use crate::study::{Method, Paper, StudyExperiment};
 use youla_report::figure::Figure;
+use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
 /// Table 1 and Figures 6 to 10.
-pub(super) fn experiments(paper: &Paper) -> Result<Section> {
+pub(in crate::story) fn experiments(paper: &Paper) -> Result<Section> {
     let e = &paper.settings.experiments;
     let text = format!(
         "The nominal model is made worse in three ways, a controller is designed on it, and the digital twin runs under it: {} to \
@@ -89,7 +89,7 @@ fn local_minimum(paper: &Paper, x: &StudyExperiment) -> String {
 }
 
 /// Before and after reduction.
-pub(super) fn reduction(paper: &Paper) -> Result<Section> {
+pub(in crate::story) fn reduction(paper: &Paper) -> Result<Section> {
     let orders: Vec<usize> = paper
         .experiments
         .list

@@ -1,21 +1,21 @@
 //! The simulation study and the crossover map.
 
-use super::claims::Claim;
-use super::contents::section;
-use super::words::{count, range, short};
-use super::{claims_study, figures_study, map as crossover, tables_study};
+use crate::story::claims::Claim;
+use crate::story::words::{count, range, short};
+use crate::story::{claims_study, figures_study, map as crossover, tables_study};
 use crate::study::{Method, Paper, Row};
+use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
 /// The claims as points.
-pub(super) fn points(claims: Vec<Claim>) -> Block {
+pub(in crate::story) fn points(claims: Vec<Claim>) -> Block {
     Block::List(
         claims.into_iter().map(|c| format!("{}: {} Here it {}. {}", c.source, c.claim, verdict(&c), c.text)).collect(),
     )
 }
 
 fn verdict(claim: &Claim) -> &'static str {
-    use super::claims::ClaimOutcome::{Fails, Holds, Partly, Unknown};
+    use crate::story::claims::ClaimOutcome::{Fails, Holds, Partly, Unknown};
     match claim.outcome {
         Holds => "comes out",
         Partly => "comes out in part",
@@ -25,7 +25,7 @@ fn verdict(claim: &Claim) -> &'static str {
 }
 
 /// Figures 4 and 5.
-pub(super) fn study(paper: &Paper) -> Section {
+pub(in crate::story) fn study(paper: &Paper) -> Section {
     let s = &paper.settings.study;
     let loops = format!(
         "{} are drawn with theta uniform from {}: A_model = (1 - theta) A before discretisation (27), which scales the poles by \
@@ -76,7 +76,7 @@ fn where_pem_arrives(paper: &Paper) -> Option<String> {
 }
 
 /// Which method under which conditions.
-pub(super) fn map(paper: &Paper) -> Section {
+pub(in crate::story) fn map(paper: &Paper) -> Section {
     let grid = &paper.settings.crossover;
     let text = format!(
         "The paper asks under which conditions each method should be used. A single box plot cannot say: direct identification is \

@@ -1,14 +1,14 @@
 //! How long it took.
 
-use super::contents::section;
-use super::tables::{method_row, plain, row};
-use super::tables_experiments::seconds;
-use super::words::{count, short};
+use crate::story::tables::{method_row, plain, row};
+use crate::story::tables_experiments::seconds;
+use crate::story::words::{count, short};
 use crate::study::{Method, Paper};
+use youla_report::story::section;
 use youla_report::story::{Block, Section};
 
 /// The stages, and one loop and method on average.
-pub(super) fn timing(paper: &Paper, key: &str) -> Section {
+pub(in crate::story) fn timing(paper: &Paper, key: &str) -> Section {
     let t = &paper.timing;
     let text = format!(
         "Times of this call on {}; what an earlier call had found is not in them. {}",

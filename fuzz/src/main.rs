@@ -2,7 +2,7 @@
 #![no_main]
 
 #[allow(dead_code)]
-#[path = "../../crates/youla-io/tests/all/readers/targets.rs"]
+#[path = "../../tests/files/readers/targets.rs"]
 mod readers;
 
 use libfuzzer_sys::fuzz_target;

@@ -3,13 +3,24 @@
 
 pub(crate) mod bearing_loop;
 pub(crate) mod feedback;
+#[path = "../../crates/youla/tests/all/common.rs"]
 mod systems;
 
 pub(crate) use systems::*;
 use youla::control::{closed_loop, with_input_port};
 use youla::factor::CoprimeFactors;
-use youla::lti::{Discrete, StateSpace, TimeDomain, frequency_response};
+use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response};
 use youla::{Mat, MatRef, c64};
+use youla_twin::rig::Bearing;
+
+/// The bearing at 0 rpm, states balanced; `cross_coupling` adds a skew share of the stiffness (0.25 makes it unstable).
+pub(crate) fn bearing(cross_coupling: f64) -> StateSpace<Continuous> {
+    let mut b = Bearing::default();
+    let k = cross_coupling * 1.8e6;
+    b.stiffness[0][1] += k;
+    b.stiffness[1][0] -= k;
+    b.plant().unwrap().balanced().unwrap()
+}
 
 /// Angular frequencies over four decades around the given centre.
 pub(crate) fn grid(centre: f64, count: usize) -> Vec<f64> {
@@ -79,10 +90,10 @@ pub(crate) fn check_star_product<T: TimeDomain>(
     assert!(error <= 1e-6, "{name}: hidden modes of the star product miss by {error:.1e}");
 }
 
-/// The measured data: the folder in `YOULA_DATA`, or `../shared/data` beside the workspace.
-pub(crate) fn data_folder() -> std::path::PathBuf {
-    let beside = || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data");
-    let folder = std::env::var_os("YOULA_DATA").map_or_else(beside, Into::into);
-    assert!(folder.is_dir(), "{} is not a folder: set YOULA_DATA to the measured data", folder.display());
-    folder
+/// A file or folder of the measured data: below `YOULA_DATA`, else below `../shared/data` beside the repository.
+pub(crate) fn data(name: &str) -> std::path::PathBuf {
+    let beside = || std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let path = std::env::var_os("YOULA_DATA").map_or_else(beside, Into::into).join(name);
+    assert!(path.exists(), "{} does not exist; set YOULA_DATA to the folder of the measured data", path.display());
+    path
 }

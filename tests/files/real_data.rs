@@ -10,7 +10,7 @@ use youla_run::{
 
 /// The settings of an example with its data in place, and its folder.
 fn example(name: &str) -> (RunSettings, PathBuf) {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
     let beside = || root.join("../shared/data");
     let data = std::env::var_os("YOULA_DATA").map_or_else(beside, PathBuf::from);
     let data = data.canonicalize().unwrap_or_else(|e| panic!("the measured data at {}: {e}", data.display()));

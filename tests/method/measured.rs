@@ -1,7 +1,7 @@
 //! Published figures on measured data: the example of SLICOT's IB01AD, IB01BD and IB01CD (a hair dryer), and the errors
 //! `||y - yhat||_1 / ||y||_1` of table 7 in SLICOT working note 2000-4.
 
-use crate::common::data_folder;
+use crate::common::data;
 use std::f64::consts::TAU;
 use youla::Mat;
 use youla::identify::subspace::{
@@ -21,7 +21,7 @@ fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
 
 /// Input and output columns of a file of the measured data.
 fn load(file: &str, inputs: usize) -> (Mat<f64>, Mat<f64>) {
-    let text = std::fs::read_to_string(data_folder().join(file)).unwrap();
+    let text = std::fs::read_to_string(data(file)).unwrap();
     let rows: Vec<Vec<f64>> =
         text.lines().map(|line| line.split_whitespace().map(|v| v.parse().unwrap()).collect()).collect();
     let columns = rows[0].len();
@@ -172,7 +172,7 @@ fn slicot_dryer_example() {
 #[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn the_flexible_drive_resonates_where_it_should() {
     let channels = ["d", "u", "y"].map(|n| ChannelSpec::from(n, ChannelRef::Name(format!("Data.signals.{n}")), ""));
-    let file = read_mat(data_folder().join("flexible_drive/fs2000/cycle1.mat")).unwrap();
+    let file = read_mat(data("flexible_drive/fs2000/cycle1.mat")).unwrap();
     let record = file.record(&channels, &TimeSource::ts(5e-4)).unwrap();
     let [d, u, y] = ["d", "u", "y"].map(|n| record.matrix(&[n]).unwrap());
     let welch = Welch { window: 4000, ..Welch::default() };

@@ -1,14 +1,14 @@
 //! A physical structure of a measured machine: the flexible drive with two inertias, estimated in its loop, against the scheme that
 //! knows nothing of its physics. The data are not part of this project.
 
-use super::common::data;
+use crate::common::data;
 use std::path::Path;
 use youla::identify::subspace::{ModeBand, Uncertainty};
 use youla_run::{Identification, Method, RunSettings, StageClock, identify, read_records};
 
 fn run() -> Identification {
     data("flexible_drive");
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../examples/flexible-drive/two-inertia.toml");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../examples/flexible-drive/two-inertia.toml");
     let (settings, folder) = (RunSettings::read(&path).unwrap(), path.parent().unwrap());
     let records = read_records(&settings.data, folder).unwrap();
     identify(settings, records, folder, &mut StageClock::new(&mut |_| ())).unwrap()

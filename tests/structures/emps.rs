@@ -7,7 +7,7 @@
 //! Coulomb friction enters as an input of known shape, `tanh(v / v_s)` of the measured velocity, with the v_s of least
 //! criterion; the offset as a constant input. The joint integrates, so that it is simulated in its loop.
 
-use super::common::data;
+use crate::common::data;
 use youla::Mat;
 use youla::identify::subspace::Experiment;
 use youla::lti::{Continuous, Discrete, Partitioned, StateSpace};

@@ -1,6 +1,6 @@
 //! No reader panics on, or lets itself be talked into memory by, what a user may hand in: the seeds of the fuzz targets
 //! (`fuzz/`), seeded mutations of them, and bombs that announce far more than they hold.
-//! `YOULA_MUTATIONS=1000000 cargo test -p youla-io --test all readers` tries more of them for each reader.
+//! `YOULA_MUTATIONS=1000000 cargo test -p youla-tests readers` tries more of them for each reader.
 
 mod bombs;
 mod memory;

@@ -11,7 +11,7 @@ mod speed;
 #[path = "../timing/mod.rs"]
 mod timing;
 
-#[path = "../../../youla/tests/all/common/mod.rs"]
+#[path = "../../../../tests/common/mod.rs"]
 mod common;
 
 use std::path::Path;

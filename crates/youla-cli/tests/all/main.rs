@@ -2,7 +2,6 @@
 #![allow(missing_docs)]
 #![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, clippy::print_stderr)]
 
-mod architecture;
 mod book;
 mod browser;
 mod check;

@@ -4,6 +4,5 @@
 
 mod common;
 mod controllers;
-mod factors;
 mod models;
 mod settings;

@@ -8,7 +8,6 @@ use youla::control::{LqrWeights, NoiseCovariance, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::lti::{Continuous, Discrete, StateSpace, TimeDomain, frequency_response, simulate};
 use youla::{Mat, MatRef};
-use youla_twin::rig::Bearing;
 
 pub(crate) const TS: f64 = 1.0 / 5000.0;
 
@@ -18,15 +17,6 @@ pub(crate) fn rng(seed: u64) -> ChaCha8Rng {
 
 pub(crate) fn normal(rng: &mut ChaCha8Rng, rows: usize, cols: usize) -> Mat<f64> {
     Mat::from_fn(rows, cols, |_, _| rng.sample(StandardNormal))
-}
-
-/// The bearing at 0 rpm, states balanced; `cross_coupling` adds a skew share of the stiffness (0.25 makes it unstable).
-pub(crate) fn bearing(cross_coupling: f64) -> StateSpace<Continuous> {
-    let mut b = Bearing::default();
-    let k = cross_coupling * 1.8e6;
-    b.stiffness[0][1] += k;
-    b.stiffness[1][0] -= k;
-    b.plant().unwrap().balanced().unwrap()
 }
 
 pub(crate) fn sampled(plant: &StateSpace<Continuous>) -> StateSpace<Discrete> {

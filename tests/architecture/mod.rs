@@ -1,0 +1,5 @@
+//! What docs/architecture.md promises of the whole project.
+
+mod arrows;
+mod circles;
+mod files;

@@ -1,0 +1,3 @@
+//! Runs on the demonstrations.
+
+mod factors;

@@ -25,9 +25,9 @@ fn circles_of_modules_are_small() {
 #[test]
 fn a_circle_is_found() {
     let text = [
-        ("", "mod a; mod b; mod c; mod d; pub use b::Second;"),
+        ("", "mod a; mod b; mod c; mod d; pub use b::{First, Second,};"),
         ("a", "use crate::Second as S; // use crate::d::D;"),
-        ("b", "use super::{c::{self, Third}, d}; fn f() { \"crate::a::x\" }"),
+        ("b", "use super::{c::{self, Third,}, d,}; fn f() { \"crate::a::x\" }"),
         ("c", "fn f() { crate::a::g(); }"),
         ("d", "use crate::Absent; #[cfg(test)] mod tests { use crate::b; }"),
     ];
@@ -83,10 +83,11 @@ fn tree(tokens: &[String], mut place: usize, prefix: &[String]) -> (Vec<(String,
         match at(place) {
             "{" => {
                 let mut all = Vec::new();
-                while at(place) != "}" && !at(place).is_empty() {
-                    let (found, behind) = tree(tokens, place + 1, &path);
+                place += 1;
+                while !["}", ""].contains(&at(place)) {
+                    let (found, behind) = tree(tokens, place, &path);
                     all.extend(found);
-                    place = behind;
+                    place = behind + usize::from(at(behind) == ",");
                 }
                 return (all, place + 1);
             }

@@ -9,6 +9,13 @@ use std::{fs, iter};
 /// Modules in a circle cannot be understood one after the other; of three a reader keeps track.
 const LARGEST: usize = 3;
 
+/// Larger circles, by a module in them, with their size and what holds them together. The list only shrinks.
+const KNOWN: [(&str, usize, &str); 3] = [
+    ("identify/subspace/options", 20, "the options hold those of the intervals"),
+    ("robust", 4, "options and result hold loss and report"),
+    ("stages", 4, "stages make entries of the summary"),
+];
+
 /// A module by its path below the crate.
 type Module = Vec<String>;
 
@@ -17,7 +24,9 @@ fn circles_of_modules_are_small() {
     for folder in members() {
         let sources = modules(&folder.join("src"));
         for circle in circles(&sources) {
-            assert!(circle.len() <= LARGEST, "{}: a circle of {} modules: {circle:?}", folder.display(), circle.len());
+            let known = KNOWN.iter().find(|(module, ..)| circle.iter().any(|name| name == module));
+            let most = known.map_or(LARGEST, |(_, size, _)| *size);
+            assert!(circle.len() <= most, "{}: a circle of {} modules: {circle:?}", folder.display(), circle.len());
         }
     }
 }

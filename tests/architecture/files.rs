@@ -59,12 +59,16 @@ fn no_file_is_too_long() {
 
 /// Files of the largest folder of sources; one with more is split by what its files hold.
 const MOST: usize = 20;
+/// Folders with more, which only shrink.
+const FULL: [(&str, usize); 3] =
+    [("youla/src/identify/subspace", 35), ("youla/src/linalg", 26), ("youla-greybox/src", 29)];
 
 #[test]
 fn no_folder_is_too_full() {
     for folder in members().iter().flat_map(|folder| folders(&folder.join("src"))) {
         let files = entries(&folder).iter().filter(|path| path.is_file()).count();
-        assert!(files <= MOST, "{} has {files} files, at most {MOST}", folder.display());
+        let most = FULL.iter().find(|(full, _)| folder.ends_with(full)).map_or(MOST, |(_, most)| *most);
+        assert!(files <= most, "{} has {files} files, at most {most}", folder.display());
     }
 }
 
@@ -87,4 +91,27 @@ fn one_version_everywhere() {
     let text = |name: &str| fs::read_to_string(project().join(name)).expect("readable");
     assert!(text("CITATION.cff").lines().any(|line| line == format!("version: {version}")));
     assert!(text("CHANGELOG.md").contains(&format!("\n## [{version}]\n")));
+}
+
+/// What a published package states: it inherits the address of the project, and holds both licences.
+#[test]
+fn every_package_states_what_it_is() {
+    let workspace = manifest(&project());
+    let package = workspace["workspace"]["package"].as_table().expect("a table");
+    assert_eq!(package["repository"], package["homepage"]);
+    for folder in members() {
+        let manifest = manifest(&folder);
+        let package = manifest["package"].as_table().expect("a table");
+        if package.get("publish").is_some() {
+            continue;
+        }
+        assert!(package["description"].is_str(), "{}", folder.display());
+        for key in ["license", "readme", "repository", "homepage", "keywords", "version"] {
+            assert_eq!(package[key]["workspace"].as_bool(), Some(true), "{}: {key}", folder.display());
+        }
+        for licence in ["LICENSE-MIT", "LICENSE-APACHE"] {
+            let text = |folder: &Path| fs::read_to_string(folder.join(licence)).expect("a licence");
+            assert_eq!(text(&folder), text(&project()), "{}: {licence}", folder.display());
+        }
+    }
 }

@@ -112,7 +112,7 @@ impl<T: Real, const N: usize, const M: usize, const P: usize> Controller<T, N, M
     /// Both phases, for actuators that apply every command as it is: `J_K: (y, alpha) -> (u, beta)`.
     ///
     /// Equal to `J_K` of the library in closed loop over 1e6 samples to 1e-12 in `f64`, and to 1e-5 in `f32`, relative to
-    /// the largest value of each signal (`crates/youla/tests/real_time.rs`).
+    /// the largest value of each signal (`tests/running_loop/real_time.rs`).
     ///
     /// ```
     /// use youla_rt::{Controller, Matrices, State};

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.metadata
 import json
 import shutil
 import subprocess
@@ -44,3 +45,10 @@ def test_binstall_takes_what_cargo_dist_makes() -> None:
         override = binstall["overrides"][target]
         assert (override["pkg-fmt"], override["bin-dir"]) == (formats[dist["windows-archive"]], "{ bin }{ binary-ext }")
     assert "{ repo }/" in binstall["pkg-url"]
+
+
+def test_the_wheel_states_the_address_of_the_workspace() -> None:
+    tomllib = pytest.importorskip("tomllib")  # Python 3.11 and later
+    package = tomllib.loads((ROOT / "Cargo.toml").read_text())["workspace"]["package"]
+    assert package["homepage"] == package["repository"]
+    assert importlib.metadata.metadata("youla")["Home-page"] == package["homepage"]

@@ -124,14 +124,14 @@ impl Bench {
         without_harmonics(later, RPM / 60.0, 5, Discrete::new(2e-4).unwrap()).unwrap()
     }
 
-    /// Of order six, which the controllers of this test have as their number of states.
+    /// Six states, as the controllers of this test have: none of a dead time.
     fn identify(&self, seed: u64) -> (Identified, ExperimentRecord) {
         let log = self.record(&mut self.running(), seed);
         let [u, y, alpha] = [&log.u_applied, &log.y, &log.alpha].map(|signal| self.clean(signal.as_ref()));
         let record = LoopRecord::new(Discrete::new(2e-4).unwrap(), u, y).unwrap().with_alpha(alpha).unwrap();
         let nominal = self.factors.nominal();
         let controller = RunningController::observer(nominal, self.f.clone(), self.l.clone()).unwrap();
-        let options = LikelihoodOptions { order: Some(6), ..LikelihoodOptions::default() };
+        let options = LikelihoodOptions { order: Some(6), dead_time: Some(vec![0, 0]), ..LikelihoodOptions::default() };
         (youla::identify(&[record], &[], &controller, Some(nominal), &options).unwrap(), log)
     }
 

@@ -29,7 +29,7 @@ impl Target {
     /// The loop of these numbers ([`crate::RunningLoop::numbers`]), there.
     ///
     /// # Errors
-    /// [`Error::Controller`] for numbers that are not valid, or an image that does not start.
+    /// [`crate::Error::Controller`] for numbers that are not valid, or an image that does not start.
     pub fn start(image: Option<&Path>, numbers: &[f32]) -> Result<Self> {
         match image {
             Some(path) if Self::place(image) != "host" => Ok(Target(Place::Qemu(Qemu::start(path, numbers)?))),
@@ -40,7 +40,7 @@ impl Target {
     /// The host's build of the loop.
     ///
     /// # Errors
-    /// [`Error::Controller`] for numbers that are not valid.
+    /// [`crate::Error::Controller`] for numbers that are not valid.
     fn host(numbers: &[f32]) -> Result<Self> {
         let station = station(numbers).ok_or_else(|| failed("does not accept its matrices and limits"))?;
         Ok(Target(Place::Host { station: Box::new(station), u: [0.0; 2], frame: Vec::new() }))

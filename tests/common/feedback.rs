@@ -60,7 +60,7 @@ impl Loop {
     /// Six states from u and y.
     pub(crate) fn identify(&self, method: SubspaceMethod, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let past = if method.is_for_closed_loops() { 100 } else { 30 };
-        let horizon = Horizon::Fixed { future: 30, past };
+        let horizon = Horizon { future: 30, past };
         let options = SubspaceOptions { method, horizon, order: Order::Fixed(6), ..options() };
         let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
         subspace(&experiment, self.plant.time(), &options).unwrap().model
@@ -70,7 +70,7 @@ impl Loop {
     pub(crate) fn hansen(&self, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let signals = self.factors.signals(u.as_ref(), y.as_ref()).unwrap();
         let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-        hansen(&self.factors, &[signals], &options.into()).unwrap().plant
+        hansen(&self.factors, &[signals], &options).unwrap().plant
     }
 
     /// Root of the summed squared error of the frequency response from 20 to 600 Hz, relative.

@@ -1,7 +1,6 @@
 //! The examples on measured data. The data are not part of this project: `YOULA_DATA`, or `../shared/data` beside the workspace.
 
 use std::path::{Path, PathBuf};
-use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::lti::{FrequencyResponse, frequency_response};
 use youla::signal::Detrend;
 use youla_run::{
@@ -56,13 +55,6 @@ fn flexible_drive() {
     let (resonance, anti) = (extreme(45.0, 70.0, 1.0), extreme(30.0, 50.0, -1.0));
     assert!((53.0..=56.5).contains(&resonance), "resonance at {resonance} Hz");
     assert!((39.0..=43.0).contains(&anti), "anti-resonance at {anti} Hz");
-    // The first resonance, in the loop with the controller for S, settles in both diagrams.
-    let settled = |diagram: &youla_run::Result<StabilisationDiagram>, from, to| {
-        let clusters = &diagram.as_ref().unwrap().clusters;
-        clusters.iter().filter(|c| (from..to).contains(&c.hz) && (0.004..0.04).contains(&c.zeta)).count()
-    };
-    assert_eq!(settled(&found.scheme().unwrap().diagram, 57.5, 59.5), 1);
-    assert_eq!(settled(found.direct_diagram.as_ref().unwrap(), 53.0, 56.5), 1);
     let verdict = found.verdict.of(Method::Hansen).unwrap();
     assert!(verdict.certificate.stable, "the logged controller stabilises G(S)");
     assert!(found.controller_mismatch().unwrap() < 1e-3, "the logged controller is the declared one");
@@ -82,8 +74,8 @@ fn rotary_pendulum() {
     let unstable: Vec<_> = verdict.poles.iter().filter(|p| p.norm() >= 1.0).collect();
     assert_eq!(unstable.len(), 1, "{unstable:?}");
     assert!(unstable[0].im == 0.0 && (1.02..1.04).contains(&unstable[0].re), "{unstable:?}");
-    assert!(verdict.certificate.stable && found.scheme().unwrap().hansen.deviation.stability.stable);
-    assert!(found.scheme().unwrap().hansen.deviation.stability.moved.is_empty(), "no pole was moved");
+    assert!(verdict.certificate.stable && found.scheme().unwrap().deviation.stability.stable);
+    assert!(found.scheme().unwrap().deviation.stability.moved.is_empty(), "no pole was moved");
     for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
         for (h, n) in hansen.fit.iter().zip(&nominal.fit) {
             assert!(h > &(n + 5.0), "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);

@@ -3,24 +3,9 @@
 
 use crate::common::feedback::{Loop, options};
 use youla::Mat;
-use youla::identify::hansen::{HansenData, HansenOptions, hansen};
-use youla::identify::innovation_form::{Convergence, InnovationOptions, NoiseForm};
-use youla::identify::subspace::{Experiment, Horizon, Order, SubspaceMethod, SubspaceOptions, lines, subspace};
-use youla::linalg::{block, least_squares};
+use youla::identify::hansen::hansen;
+use youla::identify::subspace::{Order, SubspaceMethod, SubspaceOptions, lines};
 use youla::lti::{Discrete, StateSpace};
-
-/// Errors of G(S) with S of twelve states, free and in innovation form.
-fn free_and_innovation(rig: &Loop, samples: usize, noise: f64, seed: u64) -> [f64; 2] {
-    let (u, y) = rig.record(samples, noise, seed);
-    let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-    let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-    let data = HansenData::new(&rig.factors, &signals, &options).unwrap();
-    [options.clone().into(), innovation(&options)].map(|options| {
-        let found = data.identify(&options).unwrap();
-        assert!(found.innovation_form.is_none_or(|form| form.stop == Convergence::Converged));
-        rig.error(&found.plant)
-    })
-}
 
 fn median(mut values: [f64; 3]) -> f64 {
     values.sort_by(f64::total_cmp);
@@ -90,93 +75,11 @@ fn known_unbalance_takes_no_states() {
             let disturbed = signals(rig.record_with(8000, 0.1, seed, &unbalance));
             let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(order), ..options() };
             let known = disturbed.clone().with_disturbance(w.clone()).unwrap();
-            let options = options.into();
             [clean, known, disturbed]
                 .map(|signals| rig.error(&hansen(&rig.factors, &[signals], &options).unwrap().plant))
         });
         let [clean, known, unknown] = [0, 1, 2].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
         assert!(known < 1.05 * clean, "order {order}: {known:.4} with known lines, {clean:.4} without lines");
         assert!(unknown > 2.0 * clean, "order {order}: {unknown:.4} with unknown lines, {clean:.4} without lines");
-    }
-}
-
-fn innovation(subspace: &SubspaceOptions) -> HansenOptions {
-    HansenOptions { subspace: subspace.clone(), noise: NoiseForm::Innovation(InnovationOptions::default()) }
-}
-
-/// For exact data the gain of S is `[0; -L]` in the coordinates of plant and observer, and refitting changes nothing.
-#[test]
-fn the_gain_of_the_exact_deviation_system() {
-    let rig = Loop::new(0.0);
-    let (u, y) = rig.record(4000, 0.0, 1);
-    let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-    let options = SubspaceOptions { order: Order::Fixed(12), ..options() };
-    let found = hansen(&rig.factors, &signals, &innovation(&options)).unwrap();
-    let form = found.innovation_form.as_ref().unwrap();
-    // Theory: x+ = At x + Bt F xh, xh+ = -L Ct x + (A + B F + L C) xh; beta = Ct x - C xh.
-    let (g, g0) = (&rig.plant, rig.factors.nominal());
-    let a = block(&[
-        &[g.a(), (g.b() * &rig.f).as_ref()],
-        &[(-(&rig.l * g.c())).as_ref(), (g0.a() + g0.b() * &rig.f + &rig.l * g0.c()).as_ref()],
-    ]);
-    let c = block(&[&[g.c(), (-g0.c()).as_ref()]]);
-    let exact_gain = block(&[&[Mat::zeros(6, 2).as_ref()], &[(-&rig.l).as_ref()]]);
-    let observability = |a: &Mat<f64>, c: &Mat<f64>| {
-        let mut gamma = Mat::zeros(120, 12);
-        let mut row = c.clone();
-        for i in 0..60 {
-            gamma.as_mut().subrows_mut(2 * i, 2).copy_from(&row);
-            row = row * a;
-        }
-        gamma
-    };
-    let s = &found.deviation.model;
-    let (gamma, exact) = (observability(&s.a().to_owned(), &s.c().to_owned()), observability(&a, &c));
-    let t = least_squares("the similarity", gamma.as_ref(), exact.as_ref()).unwrap().x;
-    let expected = t * exact_gain;
-    let error = (&form.gain - &expected).norm_l2() / expected.norm_l2();
-    assert!(error < 1e-8, "{error:.1e}");
-    assert_eq!(form.stop, Convergence::Converged);
-}
-
-/// The noise of beta is modelled as it is: less error than from the simulated beta, at any signal-to-noise ratio.
-#[test]
-fn innovation_form_is_better_in_noise() {
-    let rig = Loop::new(0.0);
-    for (samples, noise) in [(4000, 0.1), (4000, 1.0), (16_000, 1.0)] {
-        let errors = [1, 2, 3].map(|seed| free_and_innovation(&rig, samples, noise, seed));
-        let [free, form] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 3.0);
-        assert!(form < 0.9 * free, "{samples} samples, {noise} um: {form:.3}, free {free:.3}");
-    }
-}
-
-#[test]
-fn innovation_form_refuses_an_unstable_plant() {
-    let rig = Loop::new(0.25);
-    let (u, y) = rig.record(8000, 0.1, 1);
-    let signals = [rig.factors.signals(u.as_ref(), y.as_ref()).unwrap()];
-    let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(12), ..options() };
-    let refused = hansen(&rig.factors, &signals, &innovation(&options)).unwrap_err().to_string();
-    assert!(refused.contains("A - K_s C of S"), "{refused}");
-}
-
-/// The horizons from the data: with noise of 1 um fed back and 16000 samples the predictor gets more than 30 lags, and the
-/// models are within 1.4 times the error of those with 100 lags, chosen by someone who knows the plant (means of 5 seeds).
-#[test]
-fn automatic_horizons_do_nearly_as_well_as_known_ones() {
-    let bearing = Loop::new(0.0);
-    for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
-        let horizon = Horizon::Auto { max_past: 150 };
-        let options = SubspaceOptions { method, horizon, order: Order::Fixed(6), ..options() };
-        let errors = [1, 2, 3, 4, 5].map(|seed| {
-            let (u, y) = bearing.record(16_000, 1.0, seed);
-            let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
-            let found = subspace(&experiment, bearing.plant.time(), &options).unwrap();
-            assert!(found.past > 30, "{method:?}: {}", found.past);
-            [bearing.error(&found.model), bearing.error(&bearing.identify(method, &u, &y))]
-        });
-        let [automatic, known] = [0, 1].map(|k| errors.iter().map(|e| e[k]).sum::<f64>() / 5.0);
-        println!("{method:?}: {automatic:.3} against {known:.3}");
-        assert!(automatic < 1.4 * known, "{method:?}: {automatic:.3} against {known:.3}");
     }
 }

@@ -7,4 +7,3 @@ mod measured;
 mod paper;
 mod reduction;
 mod stages;
-mod uncertainty;

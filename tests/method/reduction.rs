@@ -12,7 +12,6 @@ fn identified(seed: u64) -> Identification {
     let mut demo = demo(Machine::Bearing, seed).unwrap();
     demo.settings.reduction = None;
     demo.settings.direct = None;
-    demo.settings.hansen.uncertainty = Default::default();
     identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut |_| ())).unwrap()
 }
 
@@ -47,7 +46,7 @@ fn raw_factors(factors: &CoprimeFactors<Discrete>, s: &StateSpace<Discrete>, ord
 fn methods_rank_as_expected() {
     let found = identified(1);
     let factors = &found.filtered.as_ref().unwrap().factorisation.factors;
-    let s = &found.scheme().unwrap().hansen.deviation.model;
+    let s = &found.scheme().unwrap().deviation.model;
     let model = ReductionLoop::new(factors, s).unwrap();
     assert_eq!(model.plant().order(), 16);
     let scales = (Some(vec![3.3; 2]), Some(vec![1.0; 2]));

@@ -78,7 +78,7 @@ fn a_record_without_noise_gives_the_parameters_by_projection_alone() {
     let log = bearing.log(0.0, 1);
     let (options, signals) = (options(), bearing.signals(&log));
     assert_eq!(options.hansen.order, Order::Fixed(12));
-    let found = hansen(&bearing.design.factors, &signals, &options.hansen.clone().into()).unwrap();
+    let found = hansen(&bearing.design.factors, &signals, &options.hansen).unwrap();
     let target = projection_target(&bearing.design.factors, &found.deviation.model, &signals, &options).unwrap();
     let projected = project(&BearingStructure, &target, &[], &options.projection).unwrap();
     let truth = BearingStructure::parameters(&Bearing::default());
@@ -185,7 +185,7 @@ fn records_that_do_not_fit_are_refused() {
     let bearing = Loop::new(0.5);
     let log = bearing.log(0.2, 1);
     let signals = bearing.signals(&log);
-    let found = hansen(&bearing.design.factors, &signals, &options().hansen.into()).unwrap();
+    let found = hansen(&bearing.design.factors, &signals, &options().hansen).unwrap();
     let short = [YoulaSignals::new(signals[0].alpha().subrows(0, 40), signals[0].beta().subrows(0, 40)).unwrap()];
     let target = projection_target(&bearing.design.factors, &found.deviation.model, &short, &options());
     assert!(

@@ -18,9 +18,7 @@ use youla::identify::likelihood::{
     LikelihoodOptions, MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response,
 };
 use youla::lti::Discrete;
-use youla::signal::{
-    ExcitedRecord, LocalModel, PeriodicExperiment, Welch, indirect_response, line_response, local_response,
-};
+use youla::signal::{ExcitedRecord, PeriodicExperiment, Welch, indirect_response, line_response, local_response};
 
 const SAMPLES: usize = 1_000_000;
 const PERIOD: usize = 10_000;
@@ -30,7 +28,7 @@ fn main() {
     let (d, z) = record();
     let experiment = [PeriodicExperiment { d: d.as_ref(), z: z.as_ref() }];
     println!("lines of 1e6 samples x 4: {:.3} s", median(|| line_response(&experiment, time).unwrap()));
-    let local = || local_response(&experiment, time, LocalModel::Polynomial, 1000).unwrap();
+    let local = || local_response(&experiment, time, 1000).unwrap();
     println!("local polynomials over 1000 lines: {:.3} s", median(local));
     let excited = [ExcitedRecord { d: d.as_ref(), u: z.subcols(0, 2), y: z.subcols(2, 2) }];
     println!("Welch: {:.3} s", median(|| indirect_response(&excited, time, &Welch::default()).unwrap()));

@@ -18,7 +18,7 @@ fn main() -> Result<()> {
 
     let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
     let options = |order| SubspaceOptions { horizon: 80.into(), order: Order::Fixed(order), ..Default::default() };
-    let scheme = hansen(&machine.factors, &[signals], &options(4).into())?;
+    let scheme = hansen(&machine.factors, &[signals], &options(4))?;
     let record = [Experiment::new(log.u.as_ref(), log.y.as_ref())];
     // An unstable estimate is refused unless it is asked for.
     let n4sid = SubspaceOptions { method: SubspaceMethod::N4sid, stability: Stability::Allow, ..options(2) };

@@ -100,7 +100,7 @@ fn write_records(folder: &Path) -> Result<()> {
                 method: SubspaceMethod::PbsidOpt,
                 order: Order::Fixed(system.plant.order()),
                 stability: Stability::Allow,
-                horizon: Horizon::Fixed { future: 20, past: 80 },
+                horizon: Horizon { future: 20, past: 80 },
                 ..SubspaceOptions::default()
             };
             let experiment = Experiment::new(u.subrows(0, kept), y.subrows(0, kept));

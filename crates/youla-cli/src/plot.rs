@@ -20,7 +20,7 @@ pub(crate) struct PlotArgs {
     /// A run folder.
     #[arg(value_name = "RUN")]
     run: PathBuf,
-    /// data, signals, order, stabilisation, verification, residuals, bode, nyquist, singular-values, poles, hankel, reduction, redesign, or all; without
+    /// data, signals, order, verification, residuals, bode, nyquist, singular-values, poles, hankel, reduction, redesign, or all; without
     /// one, those that the run has are listed.
     #[arg(value_name = "FIGURE")]
     figure: Option<String>,

@@ -10,7 +10,6 @@ use youla_run::{Identification, WrittenRun, cautions};
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     let mut text = format!("{}\n\n", found.settings.name);
     text += &fitted(&rows(found), terminal::width().unwrap_or(usize::MAX));
-    text += &modes(found);
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);
     }
@@ -19,20 +18,6 @@ pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
     }
     let folder = &written.folder;
     let _ = write!(text, "\nrun folder: {}\nreport:     {}", folder.display(), folder.join("report.html").display());
-    text
-}
-
-/// Modes of G(S) with their standard deviations, where these were asked for.
-fn modes(found: &Identification) -> String {
-    let mut text = String::new();
-    let Some(plant) = found.uncertainty(youla_run::Method::Hansen) else { return text };
-    let verdict = found.verdict.of(youla_run::Method::Hansen);
-    let shown = |pole| verdict.is_none_or(|v| v.visible_residue(pole).is_some());
-    for band in plant.modes.iter().filter(|band| band.mode.pole.im > 0.0 && shown(band.mode.pole)) {
-        let (mode, hz, zeta) = (band.mode, band.hz_deviation, band.zeta_deviation);
-        let _ =
-            write!(text, "\nmode of G(S): {:.2} +- {hz:.2} Hz, damping ratio {:.4} +- {zeta:.4}", mode.hz, mode.zeta);
-    }
     text
 }
 

@@ -3,9 +3,7 @@
 use crate::Result;
 use crate::parameter::{LoadedQ, at_plant_input};
 use std::path::Path;
-use youla::identify::subspace::{
-    Experiment, InitialState, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, subspace,
-};
+use youla::identify::subspace::{Experiment, InitialState, SubspaceMethod, SubspaceOptions, subspace};
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::signal::without_harmonics;
@@ -38,7 +36,7 @@ impl CleanRows {
     }
 }
 
-/// The run of a record: recommended model, scheme with the region of S, verdict.
+/// The run of a record: recommended model, scheme, verdict.
 pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) -> Result<Identification> {
     let spec = |name: &str, unit: &str| ChannelSpec::from(name, ChannelRef::Name(name.into()), unit);
     let specs = |names: [&str; 2], unit: &str| names.map(|name| spec(name, unit)).to_vec();
@@ -49,8 +47,7 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
         ..DataSettings::new(specs(["u_h", "u_v"], "V"), specs(["y_h", "y_v"], "um"), vec![file])
     };
     let description = running.description.clone();
-    let mut settings = RunSettings::new(name.into(), data, description.nominal, description.controller);
-    settings.hansen.uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
+    let settings = RunSettings::new(name.into(), data, description.nominal, description.controller);
     let time = running.nominal.time();
     let channels = |names: [&str; 2], unit: &str| names.map(|name| Channel::new(name, unit)).to_vec();
     let record = LoopRecord {

@@ -1,6 +1,6 @@
 //! Checks of what belongs to the data and the structure.
 
-use super::structure::Structure;
+use crate::structure::Structure;
 use crate::{Error, Result};
 use youla::MatRef;
 use youla::identify::subspace::Experiment;

@@ -10,7 +10,7 @@
 //! are those of a stable loop, whatever the model alone does (I. D. Landau and A. Karimi, Automatica 33 (1997), 1499, for the
 //! first).
 
-use super::sampled::SampledSlope;
+use crate::prediction::sampled::SampledSlope;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use youla::linalg::block;

@@ -2,8 +2,7 @@
 
 use crate::{Error, Result};
 use youla::Mat;
-use youla::identify::subspace::Experiment;
-use youla::identify::subspace::delay::Delays;
+use youla::identify::subspace::{Delays, Experiment};
 use youla::linalg::check_shape;
 
 /// The records as the structure without delays sees them.

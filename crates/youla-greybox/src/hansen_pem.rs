@@ -13,16 +13,16 @@
 //! spurious lightly damped modes of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
 //! S errs by `(Mt + S Ut) n / alpha`, the error has the same size at all frequencies.
 
-pub use super::projected_pem::{PemRun, PemStart, SUSPICION_POINTS};
+pub use crate::projected_pem::{PemRun, PemStart, SUSPICION_POINTS};
 
-use super::projected_pem::{Grid, Searches, Task, falls_behind, fit_of, pem_from_targets, plant_target};
 use crate::Result;
+use crate::projected_pem::{Grid, Searches, Task, falls_behind, fit_of, pem_from_targets, plant_target};
 use crate::{FrequencyTarget, GreyBoxModel, GreyBoxOptions, Problem, ProjectionOptions, StructureFit, decayed};
 use serde::{Deserialize, Serialize};
 use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::identify::direct::direct;
 use youla::identify::hansen::{HansenModel, hansen};
-use youla::identify::subspace::{Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyOptions};
+use youla::identify::subspace::{Order, Stability, SubspaceMethod, SubspaceOptions};
 use youla::lti::{Discrete, StateSpace, frequency_response};
 
 /// Choices of [`hansen_pem`]. The initial states of `hansen` and `pem` are separate choices.
@@ -118,7 +118,7 @@ pub fn hansen_pem(
     nominal: Option<&[f64]>,
     options: &HansenPemOptions,
 ) -> Result<HansenPem> {
-    let found = hansen(data.factors, data.signals, &options.hansen.clone().into())?;
+    let found = hansen(data.factors, data.signals, &options.hansen)?;
     pem_from_hansen(found, data, problem, nominal, options)
 }
 
@@ -155,7 +155,6 @@ fn direct_target(
         method: SubspaceMethod::PbsidOpt,
         order: Order::Fixed(structure.model(&probe)?.order()),
         stability: Stability::Allow,
-        uncertainty: UncertaintyOptions::default(),
         delays: options.pem.delays.clone(),
         ..options.hansen.clone()
     };

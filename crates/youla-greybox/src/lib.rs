@@ -36,70 +36,53 @@
 //! | predictors of noise models | `noise`, `predictor`, `whitening`, `simulated` |
 //! | sensitivities and their triangular factor | `sensitivity`, `sensitivity_bank`, `small_qr` |
 //! | criterion, initial states | `criterion`, `steady`, `linearisation` |
-//! | search within bounds, robust loss | `levenberg`, `bounds`, `robust`, `options` |
+//! | search within bounds | `levenberg`, `bounds`, `options` |
 //! | result, covariance, undetermined parameters | `estimate`, `result`, `uncertainty`, `identifiability` |
 //! | intervals, test of the residuals, comparison of structures | `intervals` |
 //! | projection of a frequency response on a structure | `projection` |
 //! | searches from a projection | [`projected_pem`], [`hansen_pem`] |
 
-mod bounds;
 mod checks;
 mod closure;
-mod cost;
-mod criterion;
 mod declared;
 mod delays;
 mod error;
-mod estimate;
 pub mod hansen_pem;
-mod identifiability;
 mod intervals;
-mod levenberg;
-mod linearisation;
-mod noise;
 mod options;
-mod predictor;
+mod prediction;
 mod problem;
 pub mod projected_pem;
 mod projection;
 mod result;
-mod robust;
-mod sampled;
-mod sensitivity;
-mod sensitivity_bank;
-mod simulated;
-mod small_qr;
-mod steady;
+mod search;
 mod structure;
 #[cfg(test)]
 mod tests;
-mod uncertainty;
-mod whitening;
 
-pub use bounds::{AtBound, Side};
 pub use closure::LoopOutput;
-pub use cost::greybox_cost;
 pub use declared::{
     Declaration, DeclaredStructure, DerivedValue, Entry, NamedExpression, Parameter, ParameterDeclaration, Template,
 };
 pub use error::{Error, Result};
-pub use identifiability::{Combination, Part, Undetermined};
 pub use intervals::{
-    ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ParameterInterval,
-    ResidualAssumption, ResidualTest, compare, greybox_intervals, likelihood_ratio,
+    ComparedStructure, CrossCorrelation, GreyBoxIntervals, IntervalOptions, LikelihoodRatio, ModeBand,
+    ParameterInterval, ResidualAssumption, ResidualTest, ResponseBand, compare, greybox_intervals, likelihood_ratio,
 };
-pub use noise::{InnovationStart, NoiseFilter, NoiseKind, NoiseModel};
 pub use options::GreyBoxOptions;
+pub use prediction::noise::{InnovationStart, NoiseFilter, NoiseKind, NoiseModel};
 pub use problem::Problem;
 pub(crate) use projection::decayed;
 pub use projection::{
     FrequencyTarget, Origin, ProjectionOptions, StructureFit, logarithmic_grid, project, projections,
 };
 pub use result::{GreyBoxModel, Stop};
-pub use robust::{Loss, RobustReport};
+pub use search::bounds::{AtBound, Side};
+pub use search::cost::greybox_cost;
+pub use search::identifiability::{Combination, Part, Undetermined};
 pub use structure::{Matrix, Slope, Structure};
 
-use estimate::estimate;
+use search::estimate::estimate;
 
 /// Estimates the parameters of a structure by the prediction-error method.
 ///

@@ -1,12 +1,11 @@
 //! Choices of the search.
 
-use super::noise::NoiseModel;
-use super::robust::Loss;
+use crate::prediction::noise::NoiseModel;
 use crate::{Error, Result};
 use serde::{Deserialize, Serialize};
 use youla::identify::subspace::InitialState;
 
-/// Choices of [`super::greybox`].
+/// Choices of [`crate::greybox`].
 ///
 /// ```
 /// use youla::identify::subspace::InitialState;
@@ -35,8 +34,6 @@ pub struct GreyBoxOptions {
     pub output_deviations: Vec<f64>,
     /// Known delay of each input in whole samples, beyond the zero-order hold; none when empty.
     pub delays: Vec<usize>,
-    /// How residuals count.
-    pub loss: Loss,
 }
 
 impl Default for GreyBoxOptions {
@@ -50,7 +47,6 @@ impl Default for GreyBoxOptions {
             noise: NoiseModel::default(),
             output_deviations: Vec::new(),
             delays: Vec::new(),
-            loss: Loss::default(),
         }
     }
 }

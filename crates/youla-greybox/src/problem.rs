@@ -1,7 +1,7 @@
 //! What every estimator of this crate takes: the structure, the records, and what is simulated around the plant.
 
-use super::closure::{Closure, LoopOutput};
-use super::structure::Structure;
+use crate::closure::{Closure, LoopOutput};
+use crate::structure::Structure;
 use crate::{Error, Result};
 use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, Partitioned};

@@ -1,10 +1,11 @@
-//! From a frequency response to the prediction-error method: the steps of [`super::hansen_pem`], and of the closed-loop search of a run.
+//! From a frequency response to the prediction-error method: the steps of [`crate::hansen_pem`], and of the closed-loop search of a run.
 //!
 //! ```text
 //! theta_0 = arg min sum_k |(Y - G_theta U) W_k|^2          W_jj^2 = Phi_jj domega, the noise-free part of what follows
 //! theta   = arg min 1/2 sum_k |y(k) - yhat(k; theta)|^2    from theta_0 of each response, and from nominal parameters
 //! ```
 
+use crate::search::fit::reproduction;
 use crate::{Error, Result};
 use crate::{
     FrequencyTarget, GreyBoxModel, GreyBoxOptions, Problem, ProjectionOptions, Structure, StructureFit, decayed,
@@ -12,7 +13,6 @@ use crate::{
 };
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
-use youla::identify::fit::reproduction;
 use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate, simulate_best};
 use youla::signal::{Welch, cross_spectrum};

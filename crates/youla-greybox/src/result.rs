@@ -1,8 +1,7 @@
 //! What an estimate holds.
 
-use super::bounds::AtBound;
-use super::identifiability::Undetermined;
-use super::robust::RobustReport;
+use crate::search::bounds::AtBound;
+use crate::search::identifiability::Undetermined;
 use serde::{Deserialize, Serialize};
 use youla::Mat;
 use youla::lti::{Continuous, Discrete, StateSpace};
@@ -21,10 +20,10 @@ pub enum Stop {
     Iterations,
 }
 
-/// Result of [`super::greybox`].
+/// Result of [`crate::greybox`].
 #[derive(Debug, Clone)]
 pub struct GreyBoxModel {
-    /// Estimated parameters, in the order of [`super::Structure::names`].
+    /// Estimated parameters, in the order of [`crate::Structure::names`].
     pub parameters: Vec<f64>,
     /// Their covariance, q x q, for white residuals, whatever the gain of the innovation form is; `None` where the data do not determine them all. Parameters that a
     /// bound holds back count as known: their rows and columns are zero.
@@ -40,8 +39,7 @@ pub struct GreyBoxModel {
     /// State at the first sample of each experiment that was used (the first of all, or that of the longest delay), n numbers
     /// and those of the delays each.
     pub initial_states: Vec<Vec<f64>>,
-    /// Half the sum of squares of the residuals, each divided by the deviation of its output, with their weights under the
-    /// loss of Huber.
+    /// Half the sum of squares of the residuals, each divided by the deviation of its output.
     pub cost: f64,
     /// `100 (1 - |y - yhat| / |y - mean y|)` per output over all experiments, percent, eq. (26), yhat the prediction that the
     /// criterion compares: the simulation for output error, else the prediction one step ahead.
@@ -72,8 +70,6 @@ pub struct GreyBoxModel {
     pub undetermined: Undetermined,
     /// Parameters that ended at a bound.
     pub at_bounds: Vec<AtBound>,
-    /// Weights of the residuals, `None` where all count by their square.
-    pub robust: Option<RobustReport>,
 }
 
 impl GreyBoxModel {

@@ -61,17 +61,10 @@ impl Subspace {
         (self.found.horizon, self.found.past)
     }
 
-    /// The response with its region where an uncertainty was asked for.
+    /// The response.
     fn response<'py>(&self, py: Python<'py>, hz: PyReadonlyArray1<'py, f64>) -> PyResult<RegionOut<'py>> {
         let hz: Vec<f64> = hz.as_array().to_vec();
-        let of = || {
-            let band = self.found.uncertainty.as_ref().map(|u| u.response(&crate::region::omega(&hz)));
-            match band.transpose()?.flatten() {
-                Some(band) => Ok::<_, Failure>(Region::band(band)),
-                None => Region::none(&self.found.model, &hz),
-            }
-        };
-        Ok(py.detach(of)?.out(py))
+        Ok(py.detach(|| Region::none(&self.found.model, &hz))?.out(py))
     }
 }
 

@@ -6,8 +6,8 @@ use numpy::{Complex64, IntoPyArray, PyArray3, PyArray4};
 use pyo3::prelude::*;
 use std::f64::consts::TAU;
 use youla::identify::likelihood::Recommendation;
-use youla::identify::subspace::ResponseBand;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
+use youla_greybox::ResponseBand;
 
 /// 95 % quantile of chi-square with two degrees of freedom, and of the normal distribution.
 const ELLIPSE: f64 = 5.991_464_547_107_979;

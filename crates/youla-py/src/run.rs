@@ -223,7 +223,7 @@ impl Run {
         let scheme = self.found.scheme();
         match key {
             "controller" => Some(&self.found.declared.controller),
-            "deviation" => Some(&scheme?.hansen.deviation.model),
+            "deviation" => Some(&scheme?.deviation.model),
             "new_controller" => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
             key => Some(&self.found.verdict.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
         }
@@ -231,20 +231,12 @@ impl Run {
 
     fn region(&self, key: &str, hz: &[f64]) -> Result<Region> {
         let omega = crate::region::omega(hz);
-        let scheme = self.found.scheme();
         let band = match key {
             "likelihood" => {
                 if let Ok(found) = &self.found.recommended {
                     return Region::recommended(found, hz);
                 }
                 None
-            }
-            "hansen" | "deviation" => {
-                let of = |s: &youla_run::SchemeRun| match key {
-                    "hansen" => s.hansen.uncertainty.clone(),
-                    _ => s.hansen.deviation.uncertainty.clone(),
-                };
-                scheme.and_then(of).map(|u| u.response(&omega)).transpose()?.flatten()
             }
             "grey_box" => {
                 let run = self.found.grey_box.as_ref();

@@ -44,7 +44,7 @@ def nominal() -> youla.Model:
 
 @pytest.fixture(scope="session")
 def run(record: youla.Record, fresh: youla.Record, nominal: youla.Model) -> youla.Run:
-    hansen = {"order": 2, "horizon": 10, "uncertainty": {"method": "delta"}}
+    hansen = {"order": 2, "horizon": 10}
     response = {"window": 512}
     return youla.identify(
         record, nominal=nominal, controller=2.0, verify=fresh, hansen=hansen, frequency_response=response

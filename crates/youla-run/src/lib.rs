@@ -40,14 +40,14 @@ pub use page::notes::cautions;
 pub use page::page;
 pub use records::segments::RecordSegment;
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory};
-pub use result::{Filtered, Identification, Refusal, SchemeRun};
+pub use result::{Filtered, Identification, Refusal};
 pub use schema::reference::settings_reference;
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{
-    AlternativeStructure, ControllerSettings, DataFile, DataSettings, DeviationSettings, Discretisation,
-    DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
-    NominalModel, ParallelPid, Polynomials, Prediction, RealisedController, RunSettings, TachoUnit,
-    VerificationSettings, parse_subspace_options, parse_table,
+    AlternativeStructure, ControllerSettings, DataFile, DataSettings, Discretisation, DisturbanceSettings, Domain,
+    FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid, NominalModel, ParallelPid,
+    Polynomials, Prediction, RealisedController, RunSettings, TachoUnit, VerificationSettings, parse_subspace_options,
+    parse_table,
 };
 pub use stages::certificate::{CertificateEntry, RunCertificate};
 pub use stages::clock::{Stage, StageClock, StageTimes};
@@ -60,7 +60,7 @@ pub use stages::pipeline::identify;
 pub use stages::redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry, entry as redesign_entry};
 pub use stages::reduction::{ReductionEntry, RunReduction};
 pub use stages::signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
-pub use stages::uncertainty::{EvidenceEntry, RunUncertainty, SystemUncertainty, UncertaintyEntry};
+pub use stages::uncertainty::SystemUncertainty;
 pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
 pub use stages::validate::robustness::LoopRobustness;
 pub use stages::validate::{ModelVerdict, RecordVerdict, Verdict};

@@ -10,13 +10,12 @@ use crate::stages::grey_box::GreyBoxRun;
 use crate::stages::nonparametric::LinesOfRun;
 use crate::stages::reduction::RunReduction;
 use crate::stages::signals::DeviationSignals;
-use crate::stages::uncertainty::{RunUncertainty, SystemUncertainty};
+use crate::stages::uncertainty::SystemUncertainty;
 use crate::stages::validate::Verdict;
 use crate::{Error, Result};
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
-use youla::identify::subspace::stabilisation::StabilisationDiagram;
 use youla::signal::IndirectResponse;
 use youla_loop::redesign::Redesign;
 
@@ -35,8 +34,8 @@ pub struct Identification {
     pub recommended: Result<Recommendation>,
     /// The coprime factors, with alpha and beta of the estimation records.
     pub filtered: Result<Filtered>,
-    /// The modified Hansen scheme and what rests on it; `None` where alpha and beta do not exist.
-    pub scheme: Option<Result<SchemeRun>>,
+    /// S and G(S) of the modified Hansen scheme; `None` where alpha and beta do not exist.
+    pub hansen: Option<Result<HansenModel>>,
     /// The loop of the recommended plant: the exact test by S, the region, margins; `None` without factors.
     pub certificate: Option<Result<RunCertificate>>,
     /// The reduced plant in its loop where it was asked for.
@@ -49,8 +48,6 @@ pub struct Identification {
     pub redesign: Option<Result<Redesign>>,
     /// The direct model where it was asked for.
     pub direct: Option<Result<SubspaceModel>>,
-    /// The stabilisation diagram of the direct model.
-    pub direct_diagram: Option<Result<StabilisationDiagram>>,
     /// The non-parametric response of the plant where an excitation is known.
     pub indirect: Option<Result<IndirectResponse>>,
     /// The plant without a model, where an excitation is known: at its lines, or in windows.
@@ -70,17 +67,6 @@ pub struct Filtered {
     pub signals: DeviationSignals,
 }
 
-/// The modified Hansen scheme and what rests on it.
-#[derive(Debug)]
-pub struct SchemeRun {
-    /// S and G(S).
-    pub hansen: HansenModel,
-    /// The stabilisation diagram of S.
-    pub diagram: Result<StabilisationDiagram>,
-    /// The uncertainty of S and of G(S).
-    pub uncertainty: RunUncertainty,
-}
-
 /// Something that was asked for but is impossible; the run goes on without it.
 #[derive(Debug, Clone, Copy)]
 pub struct Refusal<'a> {
@@ -95,17 +81,14 @@ pub struct Refusal<'a> {
 impl Identification {
     /// What was asked for but is impossible, with the reasons.
     pub fn refusals(&self) -> Vec<Refusal<'_>> {
-        let scheme = self.scheme();
         [
             refusal("recommended", "recommended model", Some(&self.recommended)),
             refusal("factors", "coprime factorisation, and so no Hansen scheme", Some(&self.filtered)),
-            refusal(Method::Hansen.key(), "model by the Hansen scheme", self.scheme.as_ref()),
+            refusal(Method::Hansen.key(), "model by the Hansen scheme", self.hansen.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
             refusal(Method::HansenReduced.key(), "reduced model", self.reduction.as_ref()),
             refusal("certificate", "certificate of the loop", self.certificate.as_ref()),
             refusal(Method::GreyBox.key(), "grey-box model", self.grey_box.as_ref()),
-            refusal("stabilisation", "stabilisation diagram of S", scheme.map(|s| &s.diagram)),
-            refusal("stabilisation_direct", "stabilisation diagram of the direct model", self.direct_diagram.as_ref()),
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
             refusal("lines", "response at the lines of the excitation", self.lines.as_ref()),
             refusal("redesign", "new controller", self.redesign.as_ref()),
@@ -116,8 +99,8 @@ impl Identification {
     }
 
     /// The scheme, where it gave a model.
-    pub fn scheme(&self) -> Option<&SchemeRun> {
-        found(self.scheme.as_ref())
+    pub fn scheme(&self) -> Option<&HansenModel> {
+        found(self.hansen.as_ref())
     }
 
     /// The direct model, where there is one.
@@ -145,13 +128,9 @@ impl Identification {
         found(self.redesign.as_ref())
     }
 
-    /// The uncertainty of the model that a method of the scheme gave.
+    /// The uncertainty of a model beside the recommended one.
     pub fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
-        match method {
-            Method::Hansen => self.scheme()?.uncertainty.plant.as_ref(),
-            Method::GreyBox => self.grey_box_uncertainty.as_ref(),
-            _ => None,
-        }
+        self.grey_box_uncertainty.as_ref().filter(|_| method == Method::GreyBox)
     }
 
     /// Whether and how well the declared controller explains the inputs; see [`DeviationSignals::controller_mismatch`].

@@ -91,7 +91,7 @@
 //! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
 //! let signals = factors.signals(u.as_ref(), y.as_ref())?;
 //! let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(4), ..Default::default() };
-//! let found = hansen(&factors, &[signals], &options.into())?; // (25): S; (17): G(S)
+//! let found = hansen(&factors, &[signals], &options)?; // (25): S; (17): G(S)
 //! let modes = found.plant.modes()?;
 //! assert!(modes.iter().any(|mode| (mode.hz - 10.0).abs() < 0.1)); // the nominal model says 9 Hz
 //! # Ok::<(), youla::Error>(())
@@ -109,19 +109,17 @@
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!
-//! 7. Uncertainty of a frequency response
+//! 7. Interval of a frequency response
 //!
 //! ```
 #![doc = include_str!("../assets/docs/loop.txt")]
-//! use youla::identify::{Order, SubspaceOptions, UncertaintyMethod, UncertaintyOptions, hansen};
-//! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
-//! # let signals = factors.signals(u.as_ref(), y.as_ref())?;
-//! let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
-//! let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(4), uncertainty, ..Default::default() };
-//! let found = hansen(&factors, &[signals], &options.into())?;
-//! let band = found.uncertainty.as_ref().and_then(|known| known.response(&[60.0]).transpose()).transpose()?;
-//! let [low, high] = band.map_or([0.0; 2], |band| band.magnitude[0]); // of G(S) at 60 rad/s, 95 %
-//! assert!(0.0 < low && low < high);
+//! use youla::{control::RunningController, lti::frequency_response, signal::LoopRecord};
+//! let record = LoopRecord::new(time, u, y)?.with_alpha(alpha)?;
+//! let controller = RunningController::observer(&nominal, f, l)?;
+//! let found = youla::identify(&[record], &[], &controller, Some(&nominal), &Default::default())?.model;
+//! let g = frequency_response(&found.plant, &[60.0])?.at(0)[(0, 0)];
+//! let deviation = found.region.at(60.0 / std::f64::consts::TAU).of_magnitude(g, (0, 0));
+//! assert!(0.0 < deviation && deviation < 0.1 * g.norm());
 //! # Ok::<(), youla::Error>(())
 //! ```
 //!

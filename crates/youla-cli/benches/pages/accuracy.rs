@@ -1,22 +1,20 @@
-//! How exact results are: residuals of equations and factors, what noise-free and noisy records give back, coverage.
+//! How exact results are: residuals of equations and factors, what noise-free and noisy records give back.
 
-use crate::common::bearing_loop::{self, Coverage, Design, Loop};
+use crate::common::bearing_loop::{Design, Loop};
 use crate::equations::{Equation, KINDS};
 use crate::page::{head, table};
 use crate::timing::middle;
 use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{
-    Horizon, Order, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
-};
+use youla::identify::subspace::{Horizon, Order, SubspaceMethod, SubspaceOptions};
 use youla::lti::{Discrete, FrequencyResponse, frequency_response};
 
 /// The page.
 pub(crate) fn page() -> Result<String> {
     let about = "How exact results are, on seeded random problems and on the simulated gas bearing. The accuracy that the tests \
                  check is documented at each function; these are measured figures.";
-    Ok(head("Accuracy", about) + &equations()? + &bezout()? + &plants()? + &coverage())
+    Ok(head("Accuracy", about) + &equations()? + &bezout()? + &plants()?)
 }
 
 fn equations() -> Result<String> {
@@ -64,8 +62,7 @@ fn plants() -> Result<String> {
             order,
             method: SubspaceMethod::Moesp,
             ..Default::default()
-        }
-        .into();
+        };
         let errors = (0..5)
             .map(|seed| {
                 let found = hansen(&bearing.factors, &[bearing.record(20_000, noise, seed)], &options)?;
@@ -77,32 +74,6 @@ fn plants() -> Result<String> {
     let about = "Largest error of the response of G(S) over 10 to 600 Hz, relative to the largest response, from 20 000 samples of the loop \
                  around the bearing whose nominal model has all entries of A halved; five seeds each. The outputs are about 1 um.";
     Ok(table("The plant from noisy records", about, &["output noise", "median", "largest"], &rows))
-}
-
-fn coverage() -> String {
-    const RUNS: u64 = 200;
-    let bearing = Loop::new(&Design { a_factor: 0.97, b_factor: 1.0, input_weight: 20.0, process_noise: 0.25 });
-    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, blocks: Some(40), ..Default::default() };
-    let options =
-        SubspaceOptions { horizon: 16.into(), order: Order::Fixed(12), uncertainty, ..bearing_loop::options() };
-    let mut found = Coverage::default();
-    for seed in 0..RUNS {
-        found.add(&bearing, &bearing.record(6000, 0.1, seed), &options);
-    }
-    let share = |value: f64| format!("{:.1} %", 100.0 * value);
-    let rows = [
-        ("regions of S", found.deviation),
-        ("regions of G(S)", found.plant),
-        ("intervals of the magnitude", found.magnitude),
-        ("intervals of frequencies", found.hz),
-        ("intervals of damping ratios", found.zeta),
-    ]
-    .map(|(name, value)| vec![name.to_owned(), share(value)]);
-    let about = format!(
-        "How often 95 % regions and intervals hold the truth over {RUNS} records of 6000 samples (nominal A times 0.97, output noise 0.1 um, S of order 12). \
-         The deviation of such a share by chance is about 1.5 %. More loops: [uncertainty](../uncertainty.md)."
-    );
-    table("Coverage", &about, &["what", "held"], &rows)
 }
 
 fn distance(truth: &FrequencyResponse, found: &FrequencyResponse) -> f64 {

@@ -51,9 +51,8 @@ fn steps() -> Result<String> {
     let f = Mat::zeros(2, 6);
     let factors = CoprimeFactors::observer(&nominal, f.as_ref(), f.transpose())?;
     let signals = [factors.signals(u.as_ref(), y.as_ref())?];
-    let options = |horizon| {
-        SubspaceOptions { horizon: Horizon::from(horizon), order: Order::Fixed(12), ..Default::default() }.into()
-    };
+    let options =
+        |horizon| SubspaceOptions { horizon: Horizon::from(horizon), order: Order::Fixed(12), ..Default::default() };
     let omega: Vec<f64> = (1..=1000).map(|k| 0.999 * PI / TS * f64::from(k) / 1000.0).collect();
     hansen(&factors, &signals, &options(10))?;
     let row = |name: &str, seconds: f64| vec![name.to_owned(), milliseconds(seconds)];

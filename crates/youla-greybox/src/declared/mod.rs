@@ -25,9 +25,9 @@ pub use declaration::{Declaration, Entry, ParameterDeclaration};
 pub use named::NamedExpression;
 pub use template::Template;
 
-use super::checks::check_time;
-use super::{Matrix, Slope, Structure};
+use crate::checks::check_time;
 use crate::{Error, Result};
+use crate::{Matrix, Slope, Structure};
 use dual::Dual;
 use expression::Expression;
 use names::finite;

@@ -9,7 +9,7 @@
 //! Statist. 6 (1978), 461). Nested: the smaller structure is the larger one with some parameters fixed. Where that puts them
 //! at a bound, the probability is an upper bound. Coloured residuals make differences of V look more certain than they are.
 
-use super::super::GreyBoxModel;
+use crate::GreyBoxModel;
 use crate::{Error, Result};
 use serde::Serialize;
 use youla::statistics::chi_square_tail;

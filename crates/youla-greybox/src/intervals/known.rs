@@ -1,12 +1,12 @@
 //! What follows from the covariance of the parameters: responses, modes and zeros, and the verdict in words.
 
-use super::super::delays::Shifted;
-use super::super::sampled::SampledSlope;
 use super::GreyBoxIntervals;
-use crate::{Error, Result};
+use super::response::{ModeBand, Reach, ResponseBand, SystemSlope, mode_change, response_changes};
+use super::zeros::zero_changes;
+use crate::Result;
+use crate::delays::Shifted;
+use crate::prediction::sampled::SampledSlope;
 use youla::Mat;
-use youla::identify::subspace::uncertainty::{Reach, mode_change, response_changes, zero_changes};
-use youla::identify::subspace::{BlockInfluence, ModeBand, ResponseBand};
 use youla::lti::{Discrete, Eigen, Mode, StateSpace, frequency_response};
 use youla::statistics::{ellipse, two_sided_student};
 
@@ -19,7 +19,7 @@ impl GreyBoxIntervals {
         let response = frequency_response(&self.model, omega)?;
         let reach = Reach { student: self.half_width(), ellipse: ellipse(self.level, self.degrees_of_freedom as f64) };
         let changes = |w: f64| response_changes(&self.model, &self.slopes, w);
-        ResponseBand::by_changes(response, changes, |slopes| self.variances(slopes), reach).map_err(Error::from)
+        Ok(ResponseBand::by_changes(response, changes, |slopes| self.variances(slopes), reach))
     }
 
     /// The modes of the plant with their intervals, in the order of [`StateSpace::modes`]; those of delays have none.
@@ -29,8 +29,7 @@ impl GreyBoxIntervals {
     pub fn modes(&self) -> Result<Vec<ModeBand>> {
         let eigen = Eigen::new(&self.model)?;
         let slopes = |mode: &Mode| -> Vec<[f64; 2]> {
-            let of =
-                |slope: &BlockInfluence| mode_change(mode.pole, eigen.change(mode.pole, &slope.a), self.model.time());
+            let of = |slope: &SystemSlope| mode_change(mode.pole, eigen.change(mode.pole, &slope.a), self.model.time());
             self.slopes.iter().map(of).collect()
         };
         Ok(self.model.modes()?.into_iter().map(|mode| self.band(mode, &slopes(&mode))).collect())
@@ -101,7 +100,7 @@ pub(super) fn slopes_with_delays(
     plant: &StateSpace<Discrete>,
     slopes: &[SampledSlope],
     shifted: &Shifted<'_>,
-) -> Result<Vec<BlockInfluence>> {
+) -> Result<Vec<SystemSlope>> {
     let (n, m, p) = (plant.order(), plant.inputs(), plant.outputs());
     let system = |part: &dyn Fn(usize, usize, usize) -> f64| {
         let matrix = |which: usize, rows, columns| Mat::from_fn(rows, columns, |i, j| part(which, i, j));
@@ -117,7 +116,13 @@ pub(super) fn slopes_with_delays(
             2 => slope.outputs[(i, j)],
             _ => slope.outputs[(i, n + j)],
         };
-        Ok(BlockInfluence::between(0, &unmoved, &system(&entry)?))
+        let moved = system(&entry)?;
+        Ok(SystemSlope {
+            a: moved.a() - unmoved.a(),
+            b: moved.b() - unmoved.b(),
+            c: moved.c() - unmoved.c(),
+            d: moved.d() - unmoved.d(),
+        })
     };
     slopes.iter().map(change).collect()
 }

@@ -1,7 +1,7 @@
 //! Signals with a past, taken in piece by piece, and sums of their products over lags: memory independent of the record.
 
-use super::super::sensitivity::PIECE;
-use super::super::small_qr::dot;
+use crate::prediction::sensitivity::PIECE;
+use crate::prediction::small_qr::dot;
 
 /// The latest piece of several signals and `lags` samples before it; zero before the start.
 pub(super) struct History {

@@ -8,48 +8,21 @@
 //! the window of Parzen, so that the sum stays positive. J are the sensitivities without the part that the initial states can
 //! remove. Beside the records, memory goes with the number of lags.
 
-use super::super::GreyBoxModel;
-use super::super::criterion::{Criterion, Point, Slopes};
-use super::super::robust::LIMIT;
-use super::super::sensitivity::{condense, rows};
-use super::super::sensitivity_bank::InitialCondition;
-use super::super::small_qr::dot;
-use super::super::uncertainty::{Information, spread};
 use super::lags::History;
 use super::residuals::ResidualSums;
+use crate::GreyBoxModel;
+use crate::prediction::sensitivity::{condense, rows};
+use crate::prediction::sensitivity_bank::InitialCondition;
+use crate::prediction::small_qr::dot;
+use crate::search::criterion::{Criterion, Point, Slopes};
+use crate::search::uncertainty::{Information, spread};
 use crate::{Error, Result};
 use faer::Scale;
 use youla::Mat;
 use youla::linalg::{leading_rank, least_squares};
 
-/// Residuals as the estimate sees them: cut off where the loss of Huber does.
-pub(super) struct Counted {
-    /// Largest magnitude per output, in the units of the criterion.
-    limits: Vec<f64>,
-}
-
-impl Counted {
-    /// Where the loss of Huber cuts residuals off; nowhere under least squares.
-    pub(super) fn new(found: &GreyBoxModel, deviations: &[f64], outputs: usize) -> Self {
-        let limits = match &found.robust {
-            None => vec![f64::INFINITY; outputs],
-            Some(robust) => {
-                let scale = |i: usize| deviations.get(i).copied().unwrap_or(1.0);
-                let limit = |(i, deviation): (usize, &f64)| LIMIT * deviation / scale(i);
-                robust.deviations.iter().enumerate().map(limit).collect()
-            }
-        };
-        Counted { limits }
-    }
-}
-
 /// First pass: lagged products of residuals and inputs, over `lags` lags.
-pub(super) fn residual_sums(
-    criterion: &Criterion<'_>,
-    point: &Point,
-    counted: &Counted,
-    lags: usize,
-) -> Result<ResidualSums> {
+pub(super) fn residual_sums(criterion: &Criterion<'_>, point: &Point, lags: usize) -> Result<ResidualSums> {
     let (p, m) = (criterion.outputs(), point.sampled.inputs());
     let mut found = ResidualSums::new(p, m, lags);
     for (samples, x0) in criterion.experiments.iter().zip(&point.initial_states) {
@@ -60,7 +33,7 @@ pub(super) fn residual_sums(
             let count = count / p;
             let u = &samples.u[first * m..];
             let value = |signal: usize, k: usize| match signal.checked_sub(p) {
-                None => piece[k * p + signal].clamp(-counted.limits[signal], counted.limits[signal]),
+                None => piece[k * p + signal],
                 Some(input) => u[k * m + input],
             };
             found.sums.take(count, value);
@@ -147,10 +120,8 @@ pub(super) fn coloured(
         return Err(Error::Undetermined { sentences: found.undetermined.sentences() });
     };
     let inner = Mat::from_fn(free.len(), free.len(), |i, j| middle[(free[i], free[j])]);
-    // As for white residuals: what the unknowns took from the residuals, and what the loss of Huber took from the slope.
-    let rows = found.residuals as f64;
-    let beyond = found.robust.as_ref().map_or(0, |robust| robust.beyond.iter().sum::<usize>()) as f64;
-    let factor = rows / criterion.degrees_of_freedom as f64 / (1.0 - beyond / rows).powi(2);
+    // As for white residuals: what the unknowns took from the residuals.
+    let factor = found.residuals as f64 / criterion.degrees_of_freedom as f64;
     let all = spread((&inverse * inner * &inverse).as_ref(), &free, criterion.parameters);
     Ok(Scale(factor) * all.as_ref().submatrix(0, 0, own, own))
 }

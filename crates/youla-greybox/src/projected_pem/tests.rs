@@ -5,7 +5,7 @@ use crate::tests::{bearing, truth};
 use crate::{DeclaredStructure, Structure, Template};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
-use youla::identify::subspace::delay::Delays;
+use youla::identify::subspace::Delays;
 use youla::signal::{Excitation, SquareWaves};
 
 fn time() -> Discrete {

@@ -4,7 +4,7 @@
 //! two decades around its value. All ranges are logarithmic. Up to 64 points make a full grid; more parameters take the
 //! points of J. H. Halton (Numerische Mathematik 2 (1960), 84).
 
-use super::super::structure::{Matrix, Structure};
+use crate::structure::{Matrix, Structure};
 
 /// Points of a grid along one parameter.
 const LEVELS: usize = 5;

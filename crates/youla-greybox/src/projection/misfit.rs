@@ -6,10 +6,10 @@
 //! ```
 //! with the exact derivatives of the zero-order hold (`../sampled.rs`).
 
-use super::super::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
-use super::super::small_qr::SmallQr;
-use super::super::structure::Structure;
 use super::target::FrequencyTarget;
+use crate::prediction::sampled::{Coordinates, Sample, SampledSlope, sample, sampled_slopes};
+use crate::prediction::small_qr::SmallQr;
+use crate::structure::Structure;
 use crate::{Error, Result};
 use faer::linalg::solvers::Solve;
 use faer::{Mat, MatRef, c64};

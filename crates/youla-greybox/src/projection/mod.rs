@@ -23,10 +23,10 @@ mod tests;
 pub(crate) use target::decayed;
 pub use target::{FrequencyTarget, logarithmic_grid};
 
-use super::checks::check_time;
-use super::options::require_positive;
-use super::{Stop, Structure};
+use crate::checks::check_time;
+use crate::options::require_positive;
 use crate::{Error, Result};
+use crate::{Stop, Structure};
 use design::decades;
 use faer::{Mat, MatRef, c64};
 use misfit::{Misfit, Point};

@@ -1,10 +1,10 @@
 //! Levenberg-Marquardt on the weighted misfit.
 
-use super::super::Stop;
-use super::super::levenberg::length;
 use super::ProjectionOptions;
 use super::misfit::{Misfit, Point};
 use crate::Result;
+use crate::Stop;
+use crate::search::levenberg::length;
 use faer::MatRef;
 use youla::linalg::{Damping, Trial, damped_step, decrease, leading_rank};
 

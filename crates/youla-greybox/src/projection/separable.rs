@@ -16,9 +16,9 @@
 //! The equation is that of continuous time, the response that of the sampled model, `G_d = sum_k h(s_k) G(s_k)` with
 //! `h(s) = (1 - exp(-s ts)) / (s ts)` and `s_k = s + 2 pi j k / ts`. The aliases (k not 0) are those of the iteration before.
 
-use super::super::structure::{Matrix, Slope, Structure};
 use super::design::{Range, design};
 use super::misfit::{Misfit, Point};
+use crate::structure::{Matrix, Slope, Structure};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, c64};
 use youla::linalg::regress;

@@ -1,8 +1,8 @@
 //! Exact responses, other structures, input that does not fit.
 
-use super::super::tests::{bearing, truth};
-use super::super::{Matrix, Slope, Stop, Structure};
 use super::*;
+use crate::tests::{bearing, truth};
+use crate::{Matrix, Slope, Stop, Structure};
 use youla::lti::Continuous;
 
 fn time() -> Discrete {

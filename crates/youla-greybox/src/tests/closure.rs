@@ -1,10 +1,10 @@
 //! The loop around the model: derivatives against differences, and a plant that is unstable by itself.
 
-use super::super::closure::Closure;
-use super::super::criterion::{Comparison, Criterion};
-use super::super::{GreyBoxOptions, LoopOutput, Matrix, NoiseModel, Problem, Slope, Stop, Structure, greybox};
 use super::gradient::{comparison, gradient_error};
+use crate::closure::Closure;
+use crate::search::criterion::{Comparison, Criterion};
 use crate::{Error, Result};
+use crate::{GreyBoxOptions, LoopOutput, Matrix, NoiseModel, Problem, Slope, Stop, Structure, greybox};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

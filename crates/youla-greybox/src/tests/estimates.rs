@@ -1,7 +1,7 @@
 //! What the estimates are worth.
 
-use super::super::{GreyBoxModel, GreyBoxOptions, Problem, Stop, greybox};
 use super::{bearing, off, open_loop, time, truth};
+use crate::{GreyBoxModel, GreyBoxOptions, Problem, Stop, greybox};
 use rayon::prelude::*;
 use youla::identify::subspace::InitialState;
 

@@ -1,10 +1,10 @@
 //! Derivatives against differences.
 
-use super::super::criterion::{Comparison, Criterion};
-use super::super::sampled::{Coordinates, sample, sampled_slopes};
-use super::super::{Matrix, NoiseModel, Slope, Structure};
 use super::{bearing, off, open_loop, time, truth};
 use crate::Result;
+use crate::prediction::sampled::{Coordinates, sample, sampled_slopes};
+use crate::search::criterion::{Comparison, Criterion};
+use crate::{Matrix, NoiseModel, Slope, Structure};
 use faer::Mat;
 use youla::identify::subspace::InitialState;
 use youla::linalg::eye;

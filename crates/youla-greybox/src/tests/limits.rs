@@ -1,8 +1,8 @@
 //! Starts that are bad, structures that are not identifiable, input that does not fit.
 
-use super::super::{GreyBoxOptions, Matrix, Problem, Slope, Stop, Structure, greybox};
 use super::{bearing, open_loop, time, truth};
 use crate::{Error, Result};
+use crate::{GreyBoxOptions, Matrix, Problem, Slope, Stop, Structure, greybox};
 use faer::Mat;
 use youla::identify::subspace::{Experiment, InitialState};
 use youla::linalg::eye;

@@ -6,7 +6,7 @@ mod noise;
 
 pub(super) use gradient::{comparison, gradient_error};
 
-use super::{DeclaredStructure, Structure, Template};
+use crate::{DeclaredStructure, Structure, Template};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

@@ -1,11 +1,11 @@
 //! Predictors of noise models and steady starts: derivatives against differences, and what the estimates are worth.
 
-use super::super::criterion::Criterion;
-use super::super::{
-    GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseFilter, NoiseModel, Problem, Stop, Structure, greybox,
-};
 use super::gradient::{Everything, comparison, gradient_error};
 use crate::Error;
+use crate::search::criterion::Criterion;
+use crate::{
+    GreyBoxModel, GreyBoxOptions, InnovationStart, NoiseFilter, NoiseModel, Problem, Stop, Structure, greybox,
+};
 use faer::Mat;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;

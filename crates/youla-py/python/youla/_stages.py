@@ -148,7 +148,7 @@ class SubspaceEstimate:
         Returns
         -------
         FrequencyResponse
-            Values of the shape (n, p, m), with a region where ``uncertainty`` was asked for.
+            Values of the shape (n, p, m).
         """
         w = frequencies(omega)
         values, known = self._found.response(w / (2 * np.pi))
@@ -168,7 +168,7 @@ def subspace(record: Records, **options: Any) -> SubspaceEstimate:
     **options
         Keys of ``[direct]`` of run.toml: ``method`` (``"n4sid"``, ``"moesp"``, ``"cva"``; for closed loops ``"ssarx"``,
         ``"pbsid-opt"``, ``"parsim-s"``), ``order`` (states), ``horizon`` and ``past`` (samples), ``feedthrough``, ``delays``,
-        ``stability``, ``uncertainty``.
+        ``stability``.
 
     Returns
     -------

@@ -80,14 +80,6 @@ pub struct SingularValue {
     /// Its values, dB.
     #[serde(with = "numbers::seven_digits")]
     pub value_db: Vec<f64>,
-    /// Probability with which the bounds should hold the truth, at each frequency; absent without bounds.
-    pub level: Option<f64>,
-    /// Lower bound, dB, NaN where it is magnitude zero; empty without bounds.
-    #[serde(with = "numbers::seven_digits")]
-    pub low_db: Vec<f64>,
-    /// Upper bound, dB.
-    #[serde(with = "numbers::seven_digits")]
-    pub high_db: Vec<f64>,
 }
 
 /// Bounds of the response of one model from one input to one output.

@@ -72,9 +72,6 @@ pub struct ReportData {
     pub experiments: Vec<DrawnExperiment>,
     /// How orders were chosen.
     pub orders: Vec<OrderChoice>,
-    /// Poles over orders.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub stabilisation: Vec<Stabilisation>,
     /// Measured against predicted.
     pub verification: Vec<Verification>,
     /// Tests of the residuals on the verification records.

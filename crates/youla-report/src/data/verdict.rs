@@ -16,8 +16,6 @@ pub enum ReportPart {
     Signals,
     /// Singular values.
     Order,
-    /// Stabilisation diagram.
-    Stabilisation,
     /// Measured against predicted.
     Verification,
     /// Tests of the residuals.

@@ -98,7 +98,6 @@ impl FigureChoice {
     fn keep_methods(&self, data: &mut ReportData) {
         let Some(keys) = &self.methods else { return };
         data.orders.retain(|choice| keys.contains(&choice.method));
-        data.stabilisation.retain(|diagram| keys.contains(&diagram.method));
         let outputs = data.verification.iter_mut().flat_map(|record| &mut record.outputs);
         outputs.for_each(|output| output.predictions.retain(|prediction| keys.contains(&prediction.method)));
         data.residuals.iter_mut().for_each(|residuals| residuals.tests.retain(|test| keys.contains(&test.method)));

@@ -4,7 +4,6 @@
 //! |---|---|
 //! | `time` | signals over time |
 //! | `order` | singular values and Hankel singular values |
-//! | `stabilisation` | poles over orders |
 //! | `verification` | measured, predicted, residual |
 //! | `residuals` | correlations with the band of noise |
 //! | `bode`, `nyquist` | frequency responses |
@@ -24,7 +23,6 @@ mod poles;
 mod reduction;
 mod residuals;
 mod singular;
-mod stabilisation;
 #[cfg(test)]
 mod tests;
 mod time;
@@ -47,8 +45,6 @@ pub enum RunFigure {
     Signals,
     /// Singular values from which orders were chosen.
     Order,
-    /// Poles over orders.
-    Stabilisation,
     /// Measured against predicted.
     Verification,
     /// Correlations of the residuals.
@@ -73,7 +69,7 @@ pub enum RunFigure {
 
 impl RunFigure {
     /// All of them, in the order of the page.
-    pub const ALL: [RunFigure; 14] = [
+    pub const ALL: [RunFigure; 13] = [
         RunFigure::Bode,
         RunFigure::Nyquist,
         RunFigure::Levels,
@@ -82,7 +78,6 @@ impl RunFigure {
         RunFigure::Verification,
         RunFigure::Residuals,
         RunFigure::Poles,
-        RunFigure::Stabilisation,
         RunFigure::Order,
         RunFigure::Hankel,
         RunFigure::Reduction,
@@ -96,7 +91,6 @@ impl RunFigure {
             RunFigure::Data => "data",
             RunFigure::Signals => "signals",
             RunFigure::Order => "order",
-            RunFigure::Stabilisation => "stabilisation",
             RunFigure::Verification => "verification",
             RunFigure::Residuals => "residuals",
             RunFigure::Bode => "bode",
@@ -114,7 +108,7 @@ impl RunFigure {
     pub fn chosen_by(self) -> &'static [&'static str] {
         match self {
             RunFigure::Data | RunFigure::Signals => &["record"],
-            RunFigure::Order | RunFigure::Stabilisation | RunFigure::SingularValues | RunFigure::Poles => &["methods"],
+            RunFigure::Order | RunFigure::SingularValues | RunFigure::Poles => &["methods"],
             RunFigure::Verification | RunFigure::Residuals => &["record", "output", "methods"],
             RunFigure::Bode | RunFigure::Nyquist | RunFigure::Levels => &["output", "input", "methods"],
             RunFigure::Hankel | RunFigure::Reduction | RunFigure::Redesign => &[],
@@ -127,7 +121,6 @@ impl RunFigure {
             RunFigure::Data => "signals of the records from which the models were identified",
             RunFigure::Signals => "alpha and beta, from which S was identified",
             RunFigure::Order => "singular values from which orders were chosen",
-            RunFigure::Stabilisation => "poles of the models of all orders",
             RunFigure::Verification => "measured, predicted and the residuals beneath",
             RunFigure::Residuals => "correlations of the residuals with the 99 % band of noise",
             RunFigure::Bode => "magnitude with bands, phase, and the coherence of the indirect response",
@@ -183,7 +176,6 @@ fn drawings(chosen: &Chosen, kind: RunFigure) -> Vec<RunDrawing> {
         RunFigure::Data => time::data(chosen),
         RunFigure::Signals => time::signals(chosen),
         RunFigure::Order => order::singular_values(chosen),
-        RunFigure::Stabilisation => stabilisation::figures(chosen),
         RunFigure::Verification => verification::figures(chosen),
         RunFigure::Residuals => residuals::figures(chosen),
         RunFigure::Bode => bode::figures(chosen),

@@ -81,16 +81,6 @@ fn report() -> ReportData {
         high_db: hz.iter().map(|f| 2.0 - 0.4 * f).collect(),
         region: hz.iter().flat_map(|_| [4e-4, 1e-4, 2e-4]).collect(),
     };
-    let pole = |order: usize, hz: f64, standing| StabilisationPole {
-        order,
-        hz,
-        zeta: 0.02,
-        hz_deviation: Some(0.1),
-        zeta_deviation: None,
-        stable: true,
-        standing,
-        cluster: Some(0),
-    };
     let row = |order: usize| ReductionOrder {
         order,
         bound: Some(8.0 / order as f64),
@@ -112,24 +102,6 @@ fn report() -> ReportData {
             values: vec![4.0, 2.0, 0.1, 0.05],
             chosen: 2,
         }],
-        stabilisation: vec![Stabilisation {
-            method: "hansen".into(),
-            label: "S".into(),
-            orders: vec![1, 2, 3],
-            chosen: 2,
-            poles: vec![pole(2, 12.0, PoleStability::New), pole(3, 12.1, PoleStability::Stable)],
-            clusters: vec![StabilisationCluster {
-                hz: 12.05,
-                zeta: 0.02,
-                hz_spread: 0.1,
-                zeta_spread: 0.001,
-                hz_deviation: None,
-                zeta_deviation: None,
-                orders: 2,
-                stable_orders: 1,
-                shape: vec![],
-            }],
-        }],
         verification: vec![Verification {
             record: "second".into(),
             prediction: "simulated".into(),
@@ -148,14 +120,7 @@ fn report() -> ReportData {
                 noise_db: vec![-40.0, -41.0],
                 ..LineLevels::default()
             }],
-            singular: vec![SingularValue {
-                method: "hansen".into(),
-                value_db: vec![3.0; hz.len()],
-                level: Some(0.95),
-                low_db: vec![2.0; hz.len()],
-                high_db: vec![4.0; hz.len()],
-                ..SingularValue::default()
-            }],
+            singular: vec![SingularValue { method: "hansen".into(), place: 0, value_db: vec![3.0; hz.len()] }],
         }),
         poles: vec![Poles {
             method: "hansen".into(),
@@ -250,7 +215,6 @@ fn responses_are_those_of_the_report() {
     }
     let singular = &drawn(RunFigure::SingularValues, &FigureChoice::default())[0].figure;
     assert_eq!(curves(singular, 0)[0].y, frequency.singular[0].value_db);
-    assert_eq!(singular.panels[0].regions[0].low, frequency.singular[0].low_db);
     let levels = drawn(RunFigure::Levels, &FigureChoice::default());
     assert_eq!((levels.len(), &curves(&levels[0].figure, 0).last().unwrap().y), (1, &frequency.lines[0].noise_db));
 }
@@ -294,23 +258,6 @@ fn orders_poles_and_errors_are_those_of_the_report() {
     let [zeros, own] = curves(poles, 0) else { panic!("zeros and poles") };
     assert_eq!((&own.x[..], &own.y[..]), (&[0.9, 0.9, 0.5][..], &[0.3, -0.3, 0.0][..]));
     assert_eq!((zeros.note.as_str(), &zeros.x[..]), ("zeros", &[0.2][..]));
-    let diagram = &drawn(RunFigure::Stabilisation, &FigureChoice::default())[0].figure;
-    assert_eq!(
-        (&of(curves(diagram, 1), "hansen").along[..], &of(curves(diagram, 1), "new pole").along[..]),
-        (&[3.0][..], &[2.0][..])
-    );
-    assert_eq!(of(curves(diagram, 0), "two standard deviations").x[..2], [12.1 - 0.2, 12.1 + 0.2]);
-}
-
-#[test]
-fn the_poles_of_the_plant_come_before_those_of_the_loop() {
-    let mut data = report();
-    data.methods.push(Method::direct());
-    let of_plant = Stabilisation { method: "direct".into(), ..data.stabilisation[0].clone() };
-    data.stabilisation.push(of_plant);
-    let found = run_drawings(&data, RunFigure::Stabilisation, &FigureChoice::default()).unwrap();
-    let keys: Vec<&str> = found.iter().map(|drawing| drawing.figure.key.as_str()).collect();
-    assert_eq!(keys, ["stabilisation-direct", "stabilisation-hansen"]);
 }
 
 #[test]

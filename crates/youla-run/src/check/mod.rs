@@ -165,8 +165,8 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
 }
 
 fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
-    let horizons = (!hansen.horizon.is_auto()).then(|| hansen.horizon.past().saturating_add(hansen.horizon.future()));
-    CheckOptions { excitation_order: options.excitation_order.or(horizons), ..options.clone() }
+    let horizons = hansen.horizon.past.saturating_add(hansen.horizon.future);
+    CheckOptions { excitation_order: options.excitation_order.or(Some(horizons)), ..options.clone() }
 }
 
 /// What stands for a record in findings on the settings.

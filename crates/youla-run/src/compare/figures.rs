@@ -51,7 +51,6 @@ fn singular(run: &FinishedRun, response: &FrequencyResponse, length: usize) -> R
         method: run.key.clone(),
         place,
         value_db: gains.iter().map(|at| decibel(at[place])).chain(beyond.clone()).collect(),
-        ..draw::SingularValue::default()
     };
     Ok((0..count).map(one).collect())
 }

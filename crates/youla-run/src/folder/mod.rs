@@ -7,12 +7,11 @@ pub(crate) mod write;
 mod files;
 
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
-use crate::folder::subspace_details::{DeviationDetails, SubspaceDetails};
+use crate::folder::subspace_details::SubspaceDetails;
 use crate::records::LoopRecord;
-use crate::result::{Filtered, Identification, SchemeRun};
+use crate::result::{Filtered, Identification};
 use crate::stages::redesign;
 use crate::stages::reduction;
-use crate::stages::stabilisation::{DiagramFile, as_csv};
 use crate::stages::uncertainty::SystemUncertainty;
 use crate::summary::entries::Refused;
 use crate::summary::physical::PhysicalDetails;
@@ -21,7 +20,7 @@ use crate::{Error, Result};
 use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile};
 use serde::Serialize;
 use youla::MatRef;
-use youla::identify::subspace::stabilisation::StabilisationDiagram;
+use youla::identify::HansenModel;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::folder::RunFolder;
@@ -138,15 +137,13 @@ impl Writer<'_> {
             }
             Err(e) => self.refused(recommended::FILE, e)?,
         }
-        let y = &found.records.outputs;
         match &found.direct {
             Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))?,
             Some(Err(e)) => self.refused("4-identify/direct.json", e)?,
             None => {}
         }
-        self.diagram("4-identify/stabilisation_direct", found.direct_diagram.as_ref(), y)?;
         self.grey_box()?;
-        match &found.scheme {
+        match &found.hansen {
             Some(Ok(scheme)) => self.scheme(scheme),
             Some(Err(e)) => self.refused("4-identify/deviation.json", e),
             None => Ok(()),
@@ -164,20 +161,14 @@ impl Writer<'_> {
     }
 
     /// What the scheme gave.
-    fn scheme(&self, scheme: &SchemeRun) -> Result<()> {
+    fn scheme(&self, scheme: &HansenModel) -> Result<()> {
         let (u, y) = (&self.found.records.inputs, &self.found.records.outputs);
         let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
             channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
         };
-        let s = &scheme.hansen.deviation;
-        let details = DeviationDetails::new(&scheme.hansen);
+        let (s, details) = (&scheme.deviation, SubspaceDetails::from(&scheme.deviation));
         self.model_with("4-identify/hansen_deviation", &s.model, (named("alpha", u), named("beta", y)), &details)?;
-        self.diagram("4-identify/stabilisation_deviation", Some(&scheme.diagram), &named("beta", y))?;
-        self.model("5-recombine/hansen", &scheme.hansen.plant, &())?;
-        let known = &scheme.uncertainty;
-        self.uncertainty("4-identify/uncertainty.json", &known.deviation)?;
-        self.uncertainty("5-recombine/uncertainty.json", &known.plant)?;
-        Ok(())
+        self.model("5-recombine/hansen", &scheme.plant, &())
     }
 
     /// S of the recommended plant.
@@ -200,18 +191,6 @@ impl Writer<'_> {
                 Ok(self.folder.text("6-reduce/sweep.csv", &reduction::as_csv(&r.found.sweep))?)
             }
             Some(Err(e)) => self.refused("6-reduce/hansen_reduced.json", e),
-            None => Ok(()),
-        }
-    }
-
-    /// A stabilisation diagram, or why there is none.
-    fn diagram(&self, name: &str, diagram: Option<&Result<StabilisationDiagram>>, outputs: &[Channel]) -> Result<()> {
-        match diagram {
-            Some(Ok(diagram)) => {
-                self.json(&format!("{name}.json"), DiagramFile::new(diagram, outputs))?;
-                Ok(self.folder.text(&format!("{name}.csv"), &as_csv(diagram))?)
-            }
-            Some(Err(e)) => self.refused(&format!("{name}.json"), e),
             None => Ok(()),
         }
     }

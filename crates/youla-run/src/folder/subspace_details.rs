@@ -2,9 +2,7 @@
 
 use crate::summary::entries::pair;
 use serde::Serialize;
-use youla::identify::hansen::HansenModel;
-use youla::identify::innovation_form::{Convergence, InnovationForm};
-use youla::identify::subspace::{DataFactor, HorizonReport, LineAmplitude, OrderReport, SubspaceModel, amplitudes};
+use youla::identify::subspace::{DataFactor, LineAmplitude, OrderReport, SubspaceModel, amplitudes};
 
 /// Horizons, order, excitation, moved poles, disturbances.
 #[derive(Serialize)]
@@ -12,7 +10,6 @@ pub(crate) struct SubspaceDetails<'a> {
     order: usize,
     horizon: usize,
     past: usize,
-    automatic_horizon: Option<&'a HorizonReport>,
     order_choice: &'a OrderReport,
     columns: usize,
     singular_values: &'a [f64],
@@ -31,7 +28,6 @@ impl<'a> From<&'a SubspaceModel> for SubspaceDetails<'a> {
             order: s.order.order,
             horizon: s.horizon,
             past: s.past,
-            automatic_horizon: s.automatic_horizon.as_ref(),
             order_choice: &s.order,
             columns: s.columns,
             singular_values: &s.singular_values,
@@ -42,46 +38,6 @@ impl<'a> From<&'a SubspaceModel> for SubspaceDetails<'a> {
             initial_states: &s.initial_states,
             delays: &s.delays,
             disturbances: s.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect(),
-        }
-    }
-}
-
-/// The same of S, with its innovation form.
-#[derive(Serialize)]
-pub(crate) struct DeviationDetails<'a> {
-    #[serde(flatten)]
-    subspace: SubspaceDetails<'a>,
-    #[serde(skip_serializing_if = "Option::is_none")]
-    innovation_form: Option<InnovationFormEntry>,
-}
-
-impl<'a> DeviationDetails<'a> {
-    /// Of S.
-    pub(crate) fn new(hansen: &'a HansenModel) -> Self {
-        let innovation_form = hansen.innovation_form.as_ref().map(InnovationFormEntry::from);
-        DeviationDetails { subspace: SubspaceDetails::from(&hansen.deviation), innovation_form }
-    }
-}
-
-#[derive(Serialize)]
-struct InnovationFormEntry {
-    gain: Vec<Vec<f64>>,
-    iterations: usize,
-    stop: Convergence,
-    change: f64,
-    misfit: f64,
-    from_kalman: Option<f64>,
-}
-
-impl From<&InnovationForm> for InnovationFormEntry {
-    fn from(form: &InnovationForm) -> Self {
-        InnovationFormEntry {
-            gain: form.gain.row_iter().map(|row| row.iter().copied().collect()).collect(),
-            iterations: form.iterations,
-            stop: form.stop,
-            change: form.change,
-            misfit: form.misfit,
-            from_kalman: form.from_kalman,
         }
     }
 }

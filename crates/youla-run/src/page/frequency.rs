@@ -96,18 +96,11 @@ fn singular(found: &Identification, responses: &[(Method, FrequencyResponse)]) -
     let mut all = Vec::new();
     for (method, response) in responses {
         let gains = response.gains()?;
-        let known = found.uncertainty(*method);
         for place in 0..places {
-            let (low_db, high_db) = known.map_or_else(Default::default, |k| {
-                bounds_db(k.response.gains.iter().map(|at| [at[place][1], at[place][2]]))
-            });
             all.push(draw::SingularValue {
                 method: method.key().into(),
                 place,
                 value_db: gains.iter().map(|at| decibel(at[place])).collect(),
-                level: known.map(|k| k.level),
-                low_db,
-                high_db,
             });
         }
     }

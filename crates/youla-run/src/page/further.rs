@@ -4,7 +4,6 @@ use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
 use youla::control::IsoZone;
-use youla::identify::subspace::DeviationEvidence;
 use youla_greybox::hansen_pem::PemStart;
 use youla_report::data::{ReportPart, Status, Verdict};
 
@@ -100,43 +99,17 @@ fn factor_line(summary: &Summary) -> Option<Verdict> {
     Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }
 
-/// Order and fit of S and, where its uncertainty is computed, whether it differs from noise.
+/// Order and fit of S. Stability of S is no evidence that S is right.
 fn deviation_line(found: &Identification) -> Option<Verdict> {
-    let hansen = &found.scheme()?.hansen;
-    let s = &hansen.deviation;
+    let s = &found.scheme()?.deviation;
     let stable = if s.stability.stable { "stable" } else { "unstable" };
     let fit: Vec<String> = s.fit.percent.iter().map(|f| format!("{f:.1} %")).collect();
-    let text = format!("S has order {}, is {stable} and fits beta to {}", s.model.order(), fit.join(", "));
-    // Stability of S is no evidence that S is right.
-    let of_stability = if s.stability.stable { Status::Info } else { Status::Bad };
-    let (more, of_evidence) = match hansen.evidence.as_ref().and_then(|e| e.as_ref().ok()) {
-        Some(evidence) => information(evidence),
-        None => (".".into(), Status::Info),
-    };
-    Some(Verdict { status: of_stability.max(of_evidence), text: text + &more, evidence: ReportPart::Order })
+    let text = format!("S has order {}, is {stable} and fits beta to {}.", s.model.order(), fit.join(", "));
+    let status = if s.stability.stable { Status::Info } else { Status::Bad };
+    Some(Verdict { status, text, evidence: ReportPart::Order })
 }
 
-fn information(evidence: &DeviationEvidence) -> (String, Status) {
-    let figures = format!(
-        "t = {:.1}, threshold {:.1} at {:.0} %",
-        evidence.statistic,
-        evidence.threshold,
-        100.0 * evidence.level
-    );
-    if evidence.against_nominal() {
-        (
-            format!("; models from each half of the data agree: the data contradict the nominal model ({figures})."),
-            Status::Good,
-        )
-    } else {
-        let text = format!(
-            "; models from each half of the data do not agree: S may be noise, there is no evidence against the nominal model ({figures})."
-        );
-        (text, Status::Caution)
-    }
-}
-
-/// Whether the controller stabilises every model within the region of S, where an uncertainty was asked for.
+/// Whether the controller stabilises every plant within the region of the recommended model.
 fn region_line(found: &Identification) -> Option<Verdict> {
     let certificate = found.certified()?;
     let text = certificate.band_sentence();

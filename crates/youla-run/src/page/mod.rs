@@ -15,7 +15,6 @@ use crate::Result;
 use crate::method::Method;
 use crate::result::Identification;
 use crate::stages::redesign;
-use crate::stages::stabilisation::drawn;
 use crate::summary::Summary;
 use crate::summary::entries::OrRefused;
 use crate::summary::model::ModelEntry;
@@ -55,7 +54,6 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         findings: records::findings(found),
         experiments: records::experiments(found)?,
         orders: orders(found),
-        stabilisation: diagrams(found),
         verification: records::verification(found)?,
         residuals: residuals::drawn(found),
         frequency: Some(frequency::drawn(found)?),
@@ -100,16 +98,7 @@ fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
     if let Some(direct) = found.direct() {
         all.push(choice(Method::Direct, "plant from u to y", direct));
     }
-    all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.hansen.deviation)));
-    all
-}
-
-fn diagrams(found: &Identification) -> Vec<draw::Stabilisation> {
-    let scheme = found.scheme().and_then(|s| Some((s.diagram.as_ref().ok()?, s.hansen.deviation.order.order)));
-    let mut all = Vec::new();
-    let direct = found.direct_diagram.as_ref().and_then(|d| d.as_ref().ok()).zip(found.direct().map(|d| d.order.order));
-    all.extend(direct.map(|(d, order)| drawn(d, Method::Direct.key(), "plant from u to y", order)));
-    all.extend(scheme.map(|(d, order)| drawn(d, Method::Hansen.key(), "S from alpha to beta", order)));
+    all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.deviation)));
     all
 }
 

@@ -7,9 +7,8 @@ use crate::records::LoopRecord;
 use crate::records::segments::RecordSegment;
 use crate::result::Identification;
 use crate::summary::Summary;
-use youla::identify::innovation_form::Convergence;
 use youla::identify::likelihood::SHORTEST_RECORD;
-use youla::identify::subspace::{SubspaceModel, Uncertainty, amplitudes};
+use youla::identify::subspace::{SubspaceModel, amplitudes};
 use youla_report::data::{Note, ReportPart, Status};
 
 /// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.
@@ -26,11 +25,9 @@ pub fn cautions(found: &Identification, summary: &Summary) -> Vec<String> {
 pub(crate) fn notes(found: &Identification, summary: &Summary) -> Vec<Note> {
     [
         refusals(found),
-        uncertainty(found),
         structure(found),
         moved_poles(found),
         diverged(found, summary),
-        innovation_form(found),
         records(found),
         disturbance(found),
         settling(found),
@@ -52,15 +49,6 @@ fn refusals(found: &Identification) -> Vec<Note> {
     found.refusals().iter().map(|r| info(format!("There is no {}: {}.", r.what, r.error))).collect()
 }
 
-fn uncertainty(found: &Identification) -> Vec<Note> {
-    let Some(hansen) = found.scheme().map(|s| &s.hansen) else { return Vec::new() };
-    let refused = hansen.uncertainty.as_ref().and_then(Uncertainty::refusal);
-    let refused = refused.map(|reason| caution(format!("There is no uncertainty of S and G(S): {reason}.")));
-    let untested = hansen.evidence.as_ref().and_then(|e| e.as_ref().err());
-    let untested = untested.map(|reason| caution(format!("S = 0 was not tested: {reason}.")));
-    refused.into_iter().chain(untested).collect()
-}
-
 fn structure(found: &Identification) -> Vec<Note> {
     let Some(model) = found.structure().map(|run| &run.found.model) else { return Vec::new() };
     let undetermined = model.undetermined.sentences().into_iter().map(|s| caution(format!("Grey box: {s}.")));
@@ -75,7 +63,7 @@ fn moved_poles(found: &Identification) -> Vec<Note> {
         let text = format!("{count} unstable poles of {name} were reflected, because stability = \"constrain\".");
         (count > 0).then(|| caution(text))
     };
-    let s = found.scheme().map(|s| &s.hansen.deviation);
+    let s = found.scheme().map(|s| &s.deviation);
     [moved("S", s), moved("the direct model", found.direct())].into_iter().flatten().collect()
 }
 
@@ -85,25 +73,6 @@ fn diverged(found: &Identification, summary: &Summary) -> Vec<Note> {
         records.map(move |(r, reason)| caution(format!("{} has no prediction of {r}: {reason}.", method.label())))
     };
     found.verdict.models.iter().flat_map(|v| of(v.method)).collect()
-}
-
-fn innovation_form(found: &Identification) -> Vec<Note> {
-    let Some(form) = found.scheme().and_then(|s| s.hansen.innovation_form.as_ref()) else { return Vec::new() };
-    let (status, converged) = match form.stop {
-        Convergence::Converged => (Status::Info, "converged"),
-        Convergence::Iterations => (Status::Caution, "did not converge"),
-    };
-    let kalman = form.from_kalman.map_or(String::new(), |x| {
-        format!(" The Kalman gain of the subspace method differs from K_s by {:.0} %.", 100.0 * x)
-    });
-    let text = format!(
-        "S is in innovation form: its gain K_s {converged} within {} refits (last relative change {:.1e}); it differs from the response of \
-         beta to output noise by {:.1} %.{kalman}",
-        form.iterations,
-        form.change,
-        100.0 * form.misfit
-    );
-    vec![Note { status, text }]
 }
 
 /// Records that are parts of files, and those that are too short for the recommended model.
@@ -127,7 +96,7 @@ fn records(found: &Identification) -> Vec<Note> {
 /// The known lines that were removed from beta, with their amplitudes in each output, largest over the records.
 fn disturbance(found: &Identification) -> Vec<Note> {
     let (Some(of_data), Some(scheme)) = (&found.settings.data.disturbance, found.scheme()) else { return Vec::new() };
-    let all: Vec<_> = scheme.hansen.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
+    let all: Vec<_> = scheme.deviation.disturbances.iter().map(|a| amplitudes(a.as_ref())).collect();
     let of_line = |(j, label): (usize, &String)| {
         let largest = |i: usize| all.iter().map(|lines| lines[j][i].amplitude).fold(0.0, f64::max);
         let outputs = found.records.outputs.iter().enumerate();

@@ -19,7 +19,7 @@ pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
 pub use models::{Domain, NominalModel, Polynomials};
-pub use options::{DeviationSettings, FactorSettings, FrequencySettings, Prediction, VerificationSettings};
+pub use options::{FactorSettings, FrequencySettings, Prediction, VerificationSettings};
 pub use pid::{Discretisation, IdealPid, ParallelPid};
 
 use crate::{Error, Result};
@@ -59,9 +59,6 @@ pub struct RunSettings {
     #[serde(default, with = "shown")]
     #[schemars(with = "SubspaceTable")]
     pub hansen: SubspaceOptions,
-    /// What is known of S beforehand.
-    #[serde(default)]
-    pub deviation: DeviationSettings,
     /// Direct identification from (u, y), for comparison; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
     #[schemars(with = "Option<SubspaceTable>")]
@@ -101,7 +98,6 @@ impl RunSettings {
             recommended: LikelihoodOptions::default(),
             factors: FactorSettings::default(),
             hansen: SubspaceOptions::default(),
-            deviation: DeviationSettings::default(),
             direct: None,
             reduction: None,
             grey_box: None,
@@ -245,11 +241,7 @@ pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: 
 /// # Errors
 /// [`youla_io::Error::Settings`] with line, column and key.
 pub fn parse_subspace_options(text: &str, path: &Path) -> Result<SubspaceOptions> {
-    let refused = |problem: &str| {
-        let (path, problem) = (path.to_owned(), problem.to_owned());
-        Error::File(youla_io::Error::Settings { path, at: None, problem })
-    };
-    parse_table::<SubspaceTable>(text, path, "direct")?.try_into().map_err(refused)
+    Ok(parse_table::<SubspaceTable>(text, path, "direct")?.into())
 }
 
 /// Whether a file that should be a run.toml is data: not named so, and no TOML.

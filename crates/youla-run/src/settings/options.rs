@@ -1,7 +1,6 @@
 //! Options of single stages: factors, S, verification, frequency responses.
 
 use serde::{Deserialize, Serialize};
-use youla::identify::innovation_form::{InnovationOptions, NoiseForm};
 
 /// Options of the coprime factors.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -60,34 +59,5 @@ pub struct FrequencySettings {
 impl Default for FrequencySettings {
     fn default() -> Self {
         FrequencySettings { window: 4096, from_hz: None }
-    }
-}
-
-/// How the noise of beta is modelled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum DeviationStructure {
-    /// Not at all for a stable S: B and D from the simulated beta.
-    #[default]
-    Free,
-    /// As white noise at the outputs of a stable plant, through S itself.
-    Innovation,
-}
-
-/// What is known of S before it is identified.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct DeviationSettings {
-    /// How the noise of beta is modelled.
-    pub structure: DeviationStructure,
-}
-
-impl DeviationSettings {
-    /// The form of the noise of beta.
-    pub fn noise(&self) -> NoiseForm {
-        match self.structure {
-            DeviationStructure::Free => NoiseForm::Free,
-            DeviationStructure::Innovation => NoiseForm::Innovation(InnovationOptions::default()),
-        }
     }
 }

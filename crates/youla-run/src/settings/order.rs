@@ -1,11 +1,11 @@
 //! Orders in run.toml: a number, a word, or a table with one key.
 
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{DeserializeOwned, Error, MapAccess, Unexpected, Visitor};
+use serde::de::{DeserializeOwned, Error, IgnoredAny, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 use std::marker::PhantomData;
-use youla::identify::subspace::{AutoOrder, Order, OrderRule};
+use youla::identify::subspace::Order;
 use youla::reduce::ReducedOrder;
 
 /// An order as run.toml writes it.
@@ -77,13 +77,8 @@ impl<'de, T: Written> Visitor<'de> for OrderVisitor<T> {
 pub(in crate::settings) enum OrderForm {
     /// This order.
     Number(usize),
-    /// What the default rule proposes, at most 12.
+    /// What the singular value criterion proposes, at most 12.
     Word(AutoWord),
-    /// What a rule proposes.
-    Rule {
-        /// The rule and its limit.
-        auto: AutoTable,
-    },
 }
 
 /// The word for a choice by the program.
@@ -94,60 +89,24 @@ pub(in crate::settings) enum AutoWord {
     Auto,
 }
 
-/// Choice of the order by a rule.
-#[derive(Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub(in crate::settings) struct AutoTable {
-    /// Largest order to consider; the horizon may allow less.
-    max: usize,
-    /// The rule.
-    rule: OrderRule,
-}
-
-impl Default for AutoTable {
-    fn default() -> Self {
-        AutoOrder::default().into()
-    }
-}
-
-impl From<AutoOrder> for AutoTable {
-    fn from(AutoOrder { max, rule, .. }: AutoOrder) -> Self {
-        AutoTable { max, rule }
-    }
-}
-
 impl From<Order> for OrderForm {
     fn from(order: Order) -> Self {
         match order {
             Order::Fixed(order) => OrderForm::Number(order),
-            Order::Auto(auto) if auto == AutoOrder::default() => OrderForm::Word(AutoWord::Auto),
-            Order::Auto(auto) => OrderForm::Rule { auto: auto.into() },
+            Order::Auto(_) => OrderForm::Word(AutoWord::Auto),
         }
     }
 }
 
-/// `fixed` is the long form of a number, in which version 0.1 wrote it.
-#[derive(Deserialize)]
-#[serde(deny_unknown_fields)]
-pub(in crate::settings) struct OrderKeys {
-    fixed: Option<usize>,
-    auto: Option<AutoTable>,
-}
-
 impl Written for Order {
     type Form = OrderForm;
-    type Keys = OrderKeys;
-    const MUST: &'static str = "a whole number, \"auto\", or a table with the key auto";
+    type Keys = IgnoredAny;
+    const MUST: &'static str = "a whole number or \"auto\"";
 
-    fn read(value: Value<'_, OrderKeys>) -> Option<Self> {
+    fn read(value: Value<'_, IgnoredAny>) -> Option<Self> {
         match value {
-            Value::Number(order) | Value::Table(OrderKeys { fixed: Some(order), auto: None }) => {
-                Some(Order::Fixed(order))
-            }
+            Value::Number(order) => Some(Order::Fixed(order)),
             Value::Word("auto") => Some(Order::default()),
-            Value::Table(OrderKeys { fixed: None, auto: Some(AutoTable { max, rule }) }) => {
-                Some(Order::Auto(AutoOrder { max, rule, ..AutoOrder::default() }))
-            }
             _ => None,
         }
     }

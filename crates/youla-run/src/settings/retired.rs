@@ -3,25 +3,18 @@
 use toml::de::{DeTable, DeValue};
 
 /// Tables that held the key, the key (with a dot where it was a table and is none now), and what to do instead.
-const RETIRED: [(&str, &str, &str); 30] = [
-    ("", "stabilisation", "the program chooses the orders and criteria of the diagrams; leave the table out"),
+const RETIRED: [(&str, &str, &str); 23] = [
+    ("", "stabilisation deviation", "it was removed; leave the table out"),
+    ("hansen direct", "uncertainty", "the intervals are those of the recommended model; leave the table out"),
     ("data", "time_tolerance", "a time step may deviate by 0.1 % of the sample time; leave the key out"),
     ("nominal", "bearing", "give the matrices of the model in [nominal.state_space]"),
     ("nominal controller", "mat_file", "write `model_file`"),
     ("factors", "construction", "the program chooses the construction of the factors; leave the key out"),
     ("factors", "output_noise", "it belonged to construction = \"shifted\"; leave the key out"),
     ("hansen direct", "weight", "write `method`"),
-    ("hansen direct", "automatic_horizon", "write `horizon = \"auto\"`"),
     ("hansen direct", "factorisation", "the program chooses it by the condition of the data; leave the key out"),
     ("hansen direct", "scaling", "channels are scaled by their rms; leave the key out"),
     ("hansen direct", "initial_state", "that of each experiment is estimated; leave the key out"),
-    ("hansen.order.auto direct.order.auto", "leading", "two thirds of each experiment are taken; leave the key out"),
-    ("hansen.order.auto direct.order.auto", "tolerance", "it is 0.2 percentage points of fit; leave the key out"),
-    ("hansen.uncertainty direct.uncertainty", "blocks", "the program chooses their number; leave the key out"),
-    ("hansen.uncertainty direct.uncertainty", "replicates", "the bootstrap simulates 200 records; leave the key out"),
-    ("hansen.uncertainty direct.uncertainty", "seed", "the seed is fixed; leave the key out"),
-    ("deviation", "iterations", "the innovation form is refitted at most 20 times; leave the key out"),
-    ("deviation", "tolerance", "the relative change of K_s must fall below 1e-6; leave the key out"),
     ("certificate redesign", "band", "500 models are drawn with a fixed seed; leave the key out"),
     ("certificate", "gain_error", "a gain error of 5 % is tried; leave the key out"),
     ("certificate", "saturation", "a limit of 90 % of the largest u is tried; leave the key out"),
@@ -33,11 +26,7 @@ const RETIRED: [(&str, &str, &str); 30] = [
     ("reduction", "output_scale input_scale", "the program chooses the scales of the channels; leave the key out"),
     ("grey_box", "start_from_initial", "the initial values are always a second start; leave the key out"),
     ("grey_box", "pem", "write its `noise` and `delays` in [grey_box]; the program chooses the rest of it"),
-    (
-        "grey_box",
-        "intervals",
-        "write their `level` in [hansen.uncertainty]; the program tests the colour of the residuals",
-    ),
+    ("grey_box", "intervals", "their level is 95 %; the program tests the colour of the residuals"),
 ];
 
 /// The first key of an earlier version: its position, and a sentence. The top level of the text is the table `at` of run.toml.

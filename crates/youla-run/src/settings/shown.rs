@@ -5,9 +5,7 @@ use super::order::{self, OrderForm, ReducedForm};
 use serde::de::{DeserializeOwned, Error, Unexpected};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use youla::identify::likelihood::LikelihoodOptions;
-use youla::identify::subspace::{
-    Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
-};
+use youla::identify::subspace::{Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions};
 use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
 
 /// Options with the table that shows them.
@@ -44,9 +42,7 @@ pub(crate) struct SubspaceTable {
     /// The method: it sets the weights of the singular value decomposition.
     method: SubspaceMethod,
     /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the slowest mode.
-    #[serde(with = "number_or_auto")]
-    #[schemars(with = "HorizonForm")]
-    horizon: Option<usize>,
+    horizon: usize,
     /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the predictor and
     /// should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable plant K is small, and this is
     /// the decay of the plant itself.
@@ -64,9 +60,6 @@ pub(crate) struct SubspaceTable {
     delays: Vec<usize>,
     /// What to do with an unstable estimate.
     stability: Stability,
-    /// Whether and how the uncertainty of the estimate is found.
-    #[serde(skip_serializing_if = "UncertaintyTable::is_none")]
-    uncertainty: UncertaintyTable,
 }
 
 impl Default for SubspaceTable {
@@ -81,84 +74,29 @@ impl Shown for SubspaceOptions {
 
 impl From<SubspaceOptions> for SubspaceTable {
     fn from(options: SubspaceOptions) -> Self {
-        let SubspaceOptions { method, horizon, order, feedthrough, delays, stability, uncertainty, .. } = options;
-        let (horizon, past) = match horizon {
-            Horizon::Fixed { future, past } => (Some(future), (past != future).then_some(past)),
-            Horizon::Auto { .. } => (None, None),
-        };
-        let uncertainty = UncertaintyTable { method: uncertainty.method, level: uncertainty.level };
-        SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty }
+        let SubspaceOptions { method, horizon, order, feedthrough, delays, stability, .. } = options;
+        let Horizon { future, past } = horizon;
+        let past = (past != future).then_some(past);
+        SubspaceTable { method, horizon: future, past, order, feedthrough, delays, stability }
     }
 }
 
-impl TryFrom<SubspaceTable> for SubspaceOptions {
-    type Error = &'static str;
-
-    fn try_from(table: SubspaceTable) -> Result<Self, Self::Error> {
-        let SubspaceTable { method, horizon, past, order, feedthrough, delays, stability, uncertainty } = table;
-        let horizon = match (horizon, past) {
-            (Some(future), past) => Horizon::Fixed { future, past: past.unwrap_or(future) },
-            (None, None) => Horizon::AUTO,
-            (None, Some(_)) => return Err("horizon = \"auto\" chooses `past` too; leave `past` out"),
-        };
-        Ok(SubspaceOptions {
-            method,
-            horizon,
-            order,
-            feedthrough,
-            delays,
-            stability,
-            uncertainty: UncertaintyOptions {
-                method: uncertainty.method,
-                level: uncertainty.level,
-                ..UncertaintyOptions::default()
-            },
-            ..SubspaceOptions::default()
-        })
+impl From<SubspaceTable> for SubspaceOptions {
+    fn from(table: SubspaceTable) -> Self {
+        let SubspaceTable { method, horizon: future, past, order, feedthrough, delays, stability } = table;
+        let horizon = Horizon { future, past: past.unwrap_or(future) };
+        SubspaceOptions { method, horizon, order, feedthrough, delays, stability, ..SubspaceOptions::default() }
     }
-}
-
-/// Uncertainty of an estimate.
-#[derive(PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-struct UncertaintyTable {
-    /// The method.
-    method: UncertaintyMethod,
-    /// Probability with which an interval or region should hold the truth.
-    level: f64,
-}
-
-impl UncertaintyTable {
-    fn is_none(&self) -> bool {
-        *self == Self::default()
-    }
-}
-
-impl Default for UncertaintyTable {
-    fn default() -> Self {
-        let UncertaintyOptions { method, level, .. } = UncertaintyOptions::default();
-        UncertaintyTable { method, level }
-    }
-}
-
-/// A number of block rows.
-#[derive(Serialize, schemars::JsonSchema)]
-#[serde(untagged)]
-enum HorizonForm {
-    /// This number.
-    Number(usize),
-    /// Past and future from the data, by the order of a vector autoregression of at most 60 block rows.
-    Word(order::AutoWord),
 }
 
 /// A number, or `"auto"`, which is `None`.
 mod number_or_auto {
-    use super::{Deserializer, Error, HorizonForm, Serialize, Serializer, Unexpected, order};
+    use super::{Deserializer, Error, Serialize, Serializer, StatesForm, Unexpected, order};
     use serde::de::Visitor;
     use std::fmt;
 
     pub(super) fn serialize<S: Serializer>(rows: &Option<usize>, s: S) -> Result<S::Ok, S::Error> {
-        rows.map_or(HorizonForm::Word(order::AutoWord::Auto), HorizonForm::Number).serialize(s)
+        rows.map_or(StatesForm::Word(order::AutoWord::Auto), StatesForm::Number).serialize(s)
     }
 
     pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Option<usize>, D::Error> {
@@ -209,7 +147,6 @@ pub(in crate::settings) struct RecommendedTable {
 /// A number of states.
 #[derive(Serialize, schemars::JsonSchema)]
 #[serde(untagged)]
-#[allow(dead_code, reason = "the schema is made of it")]
 enum StatesForm {
     /// This number.
     Number(usize),

@@ -15,6 +15,5 @@ pub(crate) mod redesign;
 pub(crate) mod reduction;
 pub(crate) mod responses;
 pub(crate) mod signals;
-pub(crate) mod stabilisation;
 pub(crate) mod uncertainty;
 pub(crate) mod validate;

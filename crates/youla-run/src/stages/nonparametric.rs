@@ -4,7 +4,7 @@ use crate::records::LoopRecord;
 use crate::stages::context::RunContext;
 use crate::stages::responses::is_constant;
 use crate::{Error, Result};
-use youla::signal::{LineResponse, LocalModel, PeriodicExperiment, detect_period, line_response, local_response};
+use youla::signal::{LineResponse, PeriodicExperiment, detect_period, line_response, local_response};
 use youla::{Error as Method, Mat};
 
 /// The loop and its plant without a model.
@@ -37,7 +37,7 @@ pub(crate) fn lines(run: RunContext<'_>) -> Option<Result<LinesOfRun>> {
         true => line_response(&experiments, time),
         false => {
             let longest = records.iter().map(LoopRecord::samples).max()?;
-            local_response(&experiments, time, LocalModel::Polynomial, longest.div_ceil(2 * WINDOWS))
+            local_response(&experiments, time, longest.div_ceil(2 * WINDOWS))
         }
     };
     let found = closed.and_then(|closed| Ok(LinesOfRun { plant: closed.plant()?, closed, periodic }));

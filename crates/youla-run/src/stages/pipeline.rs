@@ -3,7 +3,7 @@
 use crate::check::check_records;
 use crate::error::no_model::NoModel;
 use crate::records::RunRecords;
-use crate::result::{Filtered, Identification, SchemeRun, found};
+use crate::result::{Filtered, Identification, found};
 use crate::settings::RunSettings;
 use crate::stages::certificate::certificate;
 use crate::stages::clock::{Stage, StageClock};
@@ -12,18 +12,19 @@ use crate::stages::direct::direct;
 use crate::stages::factors::{declared_loop, factorise_run};
 use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
-use crate::stages::hansen::{Scheme, require_length, scheme};
+use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
 use crate::stages::recommend::recommend;
 use crate::stages::redesign::redesigned;
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
 use crate::stages::signals::deviation_signals;
-use crate::stages::uncertainty::{run_uncertainty, structure_uncertainty};
+use crate::stages::uncertainty::structure_uncertainty;
 use crate::stages::validate::{Candidates, verify};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::ErrorKind;
+use youla::identify::{HansenModel, hansen};
 
 /// Identifies the plant of a loop from its records: the recommended model by maximum likelihood, and beside it the modified
 /// Hansen scheme, direct identification and what else was asked for.
@@ -47,7 +48,7 @@ pub fn identify(
     let context =
         filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
     let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(&declared.controller)))?;
-    let (recommended, (s, (direct, direct_diagram))) = clock.run(Stage::Identify, || {
+    let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
             None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
             Some(_) => Default::default(),
@@ -62,7 +63,7 @@ pub fn identify(
     });
     let candidates = Candidates {
         recommended: recommended.as_ref().ok(),
-        hansen: found(s.as_ref()).map(|s| &s.hansen),
+        hansen: found(s.as_ref()),
         direct: found(direct.as_ref()),
         reduction: found(reduction.as_ref()),
         grey_box: found(grey_box.as_ref()),
@@ -91,11 +92,6 @@ pub fn identify(
     })?;
     let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
     let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
-    let scheme = match (s, context) {
-        (Some(Ok(s)), Some(context)) => Some(Ok(judged(context, s, &hz)?)),
-        (Some(Err(reason)), _) => Some(Err(reason)),
-        _ => None,
-    };
     let certificate =
         clock.run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?)));
     let redesign =
@@ -107,14 +103,13 @@ pub fn identify(
         declared,
         recommended,
         filtered,
-        scheme,
+        hansen: s,
         certificate,
         reduction,
         grey_box,
         grey_box_uncertainty,
         redesign,
         direct,
-        direct_diagram,
         indirect,
         lines,
         hz,
@@ -149,26 +144,21 @@ fn filtered(
 fn structures(
     run: RunContext<'_>,
     context: Option<SchemeContext<'_>>,
-) -> (Option<Result<Scheme>>, Option<Result<GreyBoxRun>>) {
+) -> (Option<Result<HansenModel>>, Option<Result<GreyBoxRun>>) {
     let s = context.map(of_scheme);
     let start = found(s.as_ref()).zip(context).map(|(s, context)| SchemeStart {
         factors: &context.factorisation.factors,
         signals: context.signals,
-        hansen: &s.hansen,
+        hansen: s,
     });
     let grey_box = grey_box(run, start);
     (s, grey_box)
 }
 
-fn of_scheme(context: SchemeContext<'_>) -> Result<Scheme> {
-    let SchemeContext { run, signals, .. } = context;
+/// S and G(S).
+fn of_scheme(context: SchemeContext<'_>) -> Result<HansenModel> {
+    let SchemeContext { run, factorisation, signals } = context;
     require_length(&run.settings.hansen, run.records, signals.settle)?;
-    scheme(context).map_err(|e| e.within(signals.context()))
-}
-
-/// Region of G(S).
-fn judged(context: SchemeContext<'_>, s: Scheme, hz: &[f64]) -> Result<SchemeRun> {
-    let Scheme { hansen, diagram } = s;
-    let uncertainty = run_uncertainty(&hansen, hz, context.run.settings.hansen.uncertainty.level)?;
-    Ok(SchemeRun { hansen, diagram, uncertainty })
+    let found = hansen(&factorisation.factors, &signals.experiments, &run.settings.hansen);
+    found.map_err(|e| Error::from(e).within(signals.context()))
 }

@@ -1,13 +1,11 @@
-//! The uncertainty of the models of a run: regions of their frequency responses and intervals of their modes.
+//! The uncertainty of the physical structure: regions of its frequency response and intervals of its modes.
 
 use crate::Result;
 use crate::stages::responses::ports;
-use crate::summary::entries::{ModeEntry, OrRefused, finite};
-use serde::{Deserialize, Serialize};
+use crate::summary::entries::ModeEntry;
+use serde::Serialize;
 use std::f64::consts::TAU;
-use youla::identify::hansen::HansenModel;
-use youla::identify::subspace::{ModeBand, ResponseBand, Uncertainty, UncertaintyMethod, UncertaintyOptions};
-use youla_greybox::GreyBoxIntervals;
+use youla_greybox::{GreyBoxIntervals, ModeBand, ResponseBand};
 
 /// The uncertainty of one system.
 #[derive(Debug, Clone)]
@@ -18,29 +16,6 @@ pub struct SystemUncertainty {
     pub response: ResponseBand,
     /// Modes with their intervals, in the order of the modes of the system.
     pub modes: Vec<ModeBand>,
-}
-
-/// The uncertainty that a run found, each where it was asked for and can be had.
-#[derive(Debug, Clone, Default)]
-pub struct RunUncertainty {
-    /// Of S.
-    pub deviation: Option<SystemUncertainty>,
-    /// Of G(S).
-    pub plant: Option<SystemUncertainty>,
-}
-
-/// On the frequencies in Hz, that of S and G(S) at `level`.
-///
-/// # Errors
-/// Those of the frequency responses and eigenvalues.
-pub(crate) fn run_uncertainty(hansen: &HansenModel, hz: &[f64], level: f64) -> Result<RunUncertainty> {
-    let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
-    let of = |uncertainty: &Option<Uncertainty>| -> Result<Option<SystemUncertainty>> {
-        let Some(uncertainty) = uncertainty else { return Ok(None) };
-        let Some(response) = uncertainty.response(&omega)? else { return Ok(None) };
-        Ok(Some(SystemUncertainty { level, response, modes: uncertainty.modes()? }))
-    };
-    Ok(RunUncertainty { deviation: of(&hansen.deviation.uncertainty)?, plant: of(&hansen.uncertainty)? })
 }
 
 /// That of the physical structure.
@@ -97,76 +72,4 @@ struct ResponseEntry {
     imaginary: Vec<f64>,
     magnitude: Vec<[f64; 2]>,
     covariance: Vec<[f64; 3]>,
-}
-
-/// What summary.json says of the uncertainty beside the modes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct UncertaintyEntry {
-    /// How the uncertainty was found.
-    pub method: UncertaintyMethod,
-    /// Confidence level.
-    pub level: f64,
-    /// The test of S = 0, or the reason why there is none.
-    pub evidence: Option<OrRefused<EvidenceEntry>>,
-    /// Blocks of the data, of the delta method.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub blocks: Option<usize>,
-    /// Replicates of a bootstrap.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub replicates: Option<usize>,
-    /// Resampled records that gave an unstable S.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub unstable: Option<usize>,
-    /// Resampled records that gave no S.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failed: Option<usize>,
-    /// Why there is no uncertainty.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub refused: Option<String>,
-}
-
-/// Whether S is more than noise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
-pub struct EvidenceEntry {
-    /// Whether the data contradict the nominal model.
-    pub against_nominal: bool,
-    /// The statistic.
-    pub statistic: Option<f64>,
-    /// Its threshold.
-    pub threshold: Option<f64>,
-}
-
-impl UncertaintyEntry {
-    /// `None` where it was not asked for.
-    pub(crate) fn new(hansen: &HansenModel, options: &UncertaintyOptions) -> Option<Self> {
-        let uncertainty = hansen.uncertainty.as_ref()?;
-        let evidence = hansen.evidence.as_ref().map(|evidence| {
-            OrRefused::new(evidence.as_ref().map(|e| EvidenceEntry {
-                against_nominal: e.against_nominal(),
-                statistic: finite(e.statistic),
-                threshold: finite(e.threshold),
-            }))
-        });
-        let (method, level) = (options.method, options.level);
-        let none = UncertaintyEntry {
-            method,
-            level,
-            evidence,
-            blocks: None,
-            replicates: None,
-            unstable: None,
-            failed: None,
-            refused: None,
-        };
-        Some(match uncertainty {
-            Uncertainty::Delta(delta) => UncertaintyEntry { blocks: Some(delta.blocks.len()), ..none },
-            Uncertainty::Bootstrap(bootstrap) => UncertaintyEntry {
-                replicates: Some(bootstrap.replicates.len()),
-                unstable: Some(bootstrap.unstable),
-                failed: Some(bootstrap.failed),
-                ..none
-            },
-            Uncertainty::Refused { reason } => UncertaintyEntry { refused: Some(reason.to_string()), ..none },
-        })
-    }
 }

@@ -7,9 +7,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla::c64;
 use youla::identify::likelihood::Interval;
-use youla::identify::subspace::ModeBand;
 use youla::lti::Mode;
 use youla::validate::BandCertificate;
+use youla_greybox::ModeBand;
 
 /// Real and imaginary part.
 pub(crate) fn pair(pole: c64) -> [f64; 2] {

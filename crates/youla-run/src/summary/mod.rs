@@ -13,7 +13,6 @@ use crate::stages::certificate::CertificateEntry;
 use crate::stages::clock::StageTimes;
 use crate::stages::redesign::{self, RedesignEntry};
 use crate::stages::reduction::ReductionEntry;
-use crate::stages::uncertainty::UncertaintyEntry;
 use crate::{Error, Result};
 use entries::{OrRefused, finite};
 use model::ModelEntry;
@@ -65,9 +64,6 @@ pub struct Summary {
     /// The reduction, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionEntry>,
-    /// The uncertainty of S, where it was asked for.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub uncertainty: Option<UncertaintyEntry>,
 }
 
 /// The summary of a run.
@@ -96,7 +92,6 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         certificate: run.certified().map(|c| c.entry()),
         redesign: run.new_controller().map(redesign::entry),
         reduction: run.reduced().map(|reduction| reduction.entry()),
-        uncertainty: run.scheme().and_then(|s| UncertaintyEntry::new(&s.hansen, &run.settings.hansen.uncertainty)),
     })
 }
 

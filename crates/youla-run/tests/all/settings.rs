@@ -63,16 +63,9 @@ fn keys_of_version_0_1_name_their_successors() {
 /// Every form of an order, in run.toml and in the options of the Python `subspace`; what is written reads back.
 #[test]
 fn orders_are_numbers_words_or_rules() {
-    use youla::identify::subspace::{AutoOrder, Order, OrderRule};
+    use youla::identify::subspace::Order;
     use youla::reduce::ReducedOrder;
-    let rule = AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(9) };
-    for (text, order) in [
-        ("8", Order::Fixed(8)),
-        ("{ fixed = 8 }", Order::Fixed(8)),
-        ("\"auto\"", Order::default()),
-        ("{ auto = {} }", Order::default()),
-        ("{ auto = { max = 9, rule = \"aic\" } }", Order::Auto(rule)),
-    ] {
+    for (text, order) in [("8", Order::Fixed(8)), ("\"auto\"", Order::default())] {
         let settings = parse(&format!("{MINIMAL}\n[hansen]\norder = {text}\n")).unwrap();
         assert_eq!(settings.hansen.order, order);
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
@@ -94,9 +87,6 @@ fn orders_are_numbers_words_or_rules() {
         assert_eq!(settings.reduction.as_ref().unwrap().order, order);
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
     }
-    let horizon = parse(&format!("{MINIMAL}\n[hansen]\nhorizon = \"auto\"\n")).unwrap();
-    assert!(horizon.hansen.horizon.is_auto());
-    assert_eq!(parse(&horizon.to_toml().unwrap()).unwrap(), horizon);
 }
 
 /// A first-order plant with a pole at 0.9 under u = d - y; d and the noise of the measured y are uniform.

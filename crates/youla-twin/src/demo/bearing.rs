@@ -9,9 +9,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
-use youla::identify::subspace::{
-    Order, Stability, SubspaceMethod, SubspaceOptions, UncertaintyMethod, UncertaintyOptions,
-};
+use youla::identify::subspace::{Order, Stability, SubspaceMethod, SubspaceOptions};
 use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::reduce::{ReducedOrder, ReductionOptions};
@@ -23,8 +21,7 @@ use youla_loop::check::CheckOptions;
 use youla_loop::redesign::RedesignOptions;
 use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
-    DataFile, DataSettings, DeviationSettings, FactorSettings, FrequencySettings, Prediction, RunSettings,
-    VerificationSettings,
+    DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings, VerificationSettings,
 };
 use youla_run::{LoopRecord, RunRecords, SourceFile};
 
@@ -146,7 +143,6 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         order: Order::Fixed(10),
         ..SubspaceOptions::default()
     };
-    let uncertainty = UncertaintyOptions { method: UncertaintyMethod::Delta, ..Default::default() };
     RunSettings {
         recommended: Default::default(),
         name: "demo: gas bearing".into(),
@@ -181,8 +177,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         },
         factors: FactorSettings { settle: Some(0), ..FactorSettings::default() },
         direct: Some(SubspaceOptions { order: Order::Fixed(6), stability: Stability::Allow, ..subspace.clone() }),
-        hansen: SubspaceOptions { uncertainty, ..subspace },
-        deviation: DeviationSettings::default(),
+        hansen: subspace,
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         grey_box: None,
         redesign: Some(RedesignOptions::default()),

@@ -12,7 +12,8 @@ mod real_time;
 mod running_controller;
 
 pub use closed_loop::{closed_loop, with_input_port};
-pub use gap::{ChannelScales, NuGap, coprime_margin, normalised_left_factors, normalised_right_factors, nu_gap};
+pub(crate) use gap::normalised_right_factors;
+pub use gap::{ChannelScales, NuGap, coprime_margin, nu_gap};
 pub use kalman::{NoiseCovariance, ObserverGain, kalman};
 pub use lqr::{LqrWeights, StateFeedback, flip_feedback_sign, lqr};
 pub use margin::peak_sensitivity;

@@ -68,7 +68,7 @@ impl RunningController {
     }
 
     /// The observer from `[u; y]` to `F x^`: stable, whatever the plant.
-    pub fn observer_law(&self) -> Option<&StateSpace<Discrete>> {
+    pub(crate) fn observer_law(&self) -> Option<&StateSpace<Discrete>> {
         self.observer.as_ref().map(|o| &o.law)
     }
 

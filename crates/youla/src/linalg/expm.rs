@@ -5,7 +5,7 @@
 //! `exp(A) = r_m(A / 2^s)^(2^s)` with `r_m = q_m^-1 p_m`. Degree m and s follow from `||A^k||^(1/k)`, which for matrices
 //! far from normal is much smaller than `||A||`.
 
-use super::{check_finite, check_shape, eye};
+use crate::linalg::{check_finite, check_shape, eye};
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{Mat, MatRef};
@@ -27,7 +27,7 @@ const LARGEST_NORM: f64 = 1e30;
 ///
 /// Backward stable up to the squarings: relative error near machine precision times the condition number of the
 /// exponential (held by `inverse_is_the_exponential_of_the_negative` and `rotation_and_decay_have_closed_forms`). Balance
-/// badly scaled matrices first ([`super::balance`]).
+/// badly scaled matrices first ([`crate::linalg::eigen::balance`]).
 ///
 /// # Errors
 /// [`Error::Shape`] unless square; [`Error::NotFinite`] for a bad entry, also where the exponential overflows;

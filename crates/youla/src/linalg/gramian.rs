@@ -15,24 +15,15 @@
 //! ```
 //! where `v = ||b|| / alpha`, `e = b / ||b||`. The complex factor F becomes real by `X = Re F Re F' + Im F Im F'`.
 
-use super::complex_schur::{ComplexSchur, complex, complex_schur};
-use super::lyapunov::{Domain, residual};
-use super::{check_finite, check_shape};
+use crate::linalg::eigen::complex_schur::{ComplexSchur, complex, complex_schur};
+use crate::linalg::lyapunov::Domain;
+use crate::linalg::{check_finite, check_shape};
 use crate::{Error, Result};
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::prelude::*;
 use faer::{Mat, MatRef, Par, c64};
 
-/// Square-root solution of a stable Lyapunov equation.
-#[derive(Debug, Clone)]
-pub struct GramianFactor {
-    /// Lower triangular L with `X = L L'`, n x n.
-    pub l: Mat<f64>,
-    /// Relative residual of the equation with `X = L L'`.
-    pub residual: f64,
-}
-
-/// Factor of the solution of `A X + X A' + B B' = 0`, A (n x n) stable, B (n x m). The observability Gramian is that of the
+/// Lower triangular factor L of the solution `X = L L'` of `A X + X A' + B B' = 0`, A (n x n) stable, B (n x m). The observability Gramian is that of the
 /// dual: `gramian_factor(A', C')`.
 ///
 /// Relative residual below 1e-14 n (held by `factors_satisfy_their_equations`); unlike a factor of the computed Gramian it
@@ -40,14 +31,7 @@ pub struct GramianFactor {
 ///
 /// # Errors
 /// [`Error::Unstable`] with the pole; [`Error::Shape`], [`Error::NotFinite`], [`Error::NoConvergence`].
-///
-/// ```
-/// use youla::linalg::{eye, gramian_factor};
-/// let a = eye(2) * faer::Scale(-2.0);
-/// assert!((gramian_factor(a.as_ref(), eye(2).as_ref())?.l[(0, 0)].abs() - 0.5).abs() < 1e-15);
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn gramian_factor(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<GramianFactor> {
+pub(crate) fn gramian_factor(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     factor(Domain::Continuous, a, b)
 }
 
@@ -55,28 +39,18 @@ pub fn gramian_factor(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<GramianF
 ///
 /// # Errors
 /// [`Error::Unstable`] with the pole; [`Error::Shape`], [`Error::NotFinite`], [`Error::NoConvergence`].
-///
-/// ```
-/// use youla::linalg::{discrete_gramian_factor, eye};
-/// let a = eye(2) * faer::Scale(0.6);
-/// assert!((discrete_gramian_factor(a.as_ref(), eye(2).as_ref())?.l[(0, 0)].abs() - 1.25).abs() < 1e-15);
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn discrete_gramian_factor(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<GramianFactor> {
+pub(crate) fn discrete_gramian_factor(a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     factor(Domain::Discrete, a, b)
 }
 
-fn factor(domain: Domain, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<GramianFactor> {
+fn factor(domain: Domain, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     check_shape("the input matrix of the Gramian", b, (a.nrows(), b.ncols()))?;
     check_finite("the input matrix of the Gramian", b)?;
     let form = complex_schur("the state matrix of the Gramian", a)?;
     require_stable(domain, &form)?;
     let ComplexSchur { q, t } = form;
     let u = triangular(domain, &t, q.adjoint() * complex(b));
-    let l = real_factor(&(q * u));
-    let x = &l * l.transpose();
-    let residual = residual(domain, a, x.as_ref(), (b * b.transpose()).as_ref());
-    Ok(GramianFactor { l, residual })
+    Ok(real_factor(&(q * u)))
 }
 
 fn require_stable(domain: Domain, form: &ComplexSchur) -> Result<()> {
@@ -163,11 +137,12 @@ fn real_factor(f: &Mat<c64>) -> Mat<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::linalg::lyapunov::residual;
     use rand::SeedableRng;
     use rand_chacha::ChaCha8Rng;
     use rand_distr::{Distribution, StandardNormal};
 
-    type Factor = fn(MatRef<'_, f64>, MatRef<'_, f64>) -> Result<GramianFactor>;
+    type Factor = fn(MatRef<'_, f64>, MatRef<'_, f64>) -> Result<Mat<f64>>;
 
     fn random(rows: usize, columns: usize, rng: &mut ChaCha8Rng) -> Mat<f64> {
         Mat::from_fn(rows, columns, |_, _| StandardNormal.sample(rng))
@@ -184,9 +159,12 @@ mod tests {
                 let shrunk = Scale(1.0 / size) * &a;
                 let continuous = gramian_factor(shifted.as_ref(), b.as_ref()).unwrap();
                 let discrete = discrete_gramian_factor(shrunk.as_ref(), b.as_ref()).unwrap();
-                for factor in [continuous, discrete] {
-                    assert!(factor.residual <= 1e-14 * n as f64, "n = {n}, m = {m}: {}", factor.residual);
-                    assert!((0..n).all(|j| (0..j).all(|i| factor.l[(i, j)] == 0.0)));
+                let cases = [(Domain::Continuous, shifted, continuous), (Domain::Discrete, shrunk, discrete)];
+                for (domain, a, l) in cases {
+                    let (x, input) = (&l * l.transpose(), &b * b.transpose());
+                    let residual = residual(domain, a.as_ref(), x.as_ref(), input.as_ref());
+                    assert!(residual <= 1e-14 * n as f64, "n = {n}, m = {m}: {residual}");
+                    assert!((0..n).all(|j| (0..j).all(|i| l[(i, j)] == 0.0)));
                 }
             }
         }
@@ -205,7 +183,7 @@ mod tests {
         ] {
             let a = &q * poles * q.transpose();
             let result = factor(a.as_ref(), (&q * &b).as_ref()).unwrap();
-            let singular = result.l.singular_values().unwrap();
+            let singular = result.singular_values().unwrap();
             assert!((singular[1] / exact - 1.0).abs() < 1e-2, "{} {exact}", singular[1]);
         }
     }
@@ -214,7 +192,7 @@ mod tests {
     fn unstable_systems_are_refused_with_their_pole() {
         let a = Mat::from_fn(2, 2, |i, j| [[0.5, 0.0], [0.0, -1.25]][i][j]);
         let b = Mat::zeros(2, 1);
-        let pole = |result: Result<GramianFactor>| match result {
+        let pole = |result: Result<Mat<f64>>| match result {
             Err(Error::Unstable { pole, .. }) => pole.re,
             other => panic!("{other:?}"),
         };

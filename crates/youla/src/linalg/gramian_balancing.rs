@@ -5,25 +5,16 @@
 //! ```
 //! (A. J. Laub, M. T. Heath, C. C. Paige and R. C. Ward, IEEE Trans. Automatic Control 32 (1987), 115).
 
-use super::discrete_gramian_factor;
+use crate::linalg::discrete_gramian_factor;
 use faer::{Mat, MatRef};
 
 /// T and its inverse, n x n, that balance a stable system of discrete time: A (n x n), B (n x m), C (p x n).
 ///
 /// `None` unless A is stable and the smallest Hankel singular value is above `negligible` times the largest: a state that is neither
 /// reached nor seen has no balanced coordinate.
-///
-/// ```
-/// use youla::linalg::{eye, gramian_balancing};
-/// let (a, b) = (eye(1) * faer::Scale(0.5), eye(1) * faer::Scale(4.0));
-/// let [t, inverse] = gramian_balancing([a.as_ref(), b.as_ref(), eye(1).as_ref()], 1e-10).ok_or("not minimal")?;
-/// // B and C are 2 in balanced states.
-/// assert!((inverse[(0, 0)] * 4.0 - 2.0).abs() < 1e-14 && (t[(0, 0)] - 2.0).abs() < 1e-14);
-/// # Ok::<(), &str>(())
-/// ```
-pub fn gramian_balancing([a, b, c]: [MatRef<'_, f64>; 3], negligible: f64) -> Option<[Mat<f64>; 2]> {
-    let reached = discrete_gramian_factor(a, b).ok()?.l;
-    let seen = discrete_gramian_factor(a.transpose(), c.transpose()).ok()?.l;
+pub(crate) fn gramian_balancing([a, b, c]: [MatRef<'_, f64>; 3], negligible: f64) -> Option<[Mat<f64>; 2]> {
+    let reached = discrete_gramian_factor(a, b).ok()?;
+    let seen = discrete_gramian_factor(a.transpose(), c.transpose()).ok()?;
     let svd = (seen.transpose() * &reached).svd().ok()?;
     let sigma: Vec<f64> = svd.S().column_vector().iter().copied().collect();
     let (largest, smallest) = (sigma.first()?, sigma.last()?);

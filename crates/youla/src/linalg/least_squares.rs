@@ -3,7 +3,7 @@
 //! The columns of A are brought to unit length first, so that units do not decide what counts as dependent; then the
 //! singular value decomposition is truncated (Golub, Van Loan, Matrix Computations, section 5.5).
 
-use super::triangular_condition;
+use crate::linalg::triangular_condition;
 use crate::{Error, Result};
 use faer::linalg::solvers::SolveLstsq;
 use faer::{Mat, MatRef};

@@ -4,7 +4,7 @@
 //! `log(A) = 2^k log(A^(1/2^k))`. Square roots of the triangular factor are taken until it is near to I; then the diagonal
 //! Padé approximant of `log(I + X)` is the Gauss-Legendre rule of `integral_0^1 X (I + x X)^-1 dx`.
 
-use super::complex_schur::{ComplexSchur, complex_schur, real_part};
+use crate::linalg::eigen::complex_schur::{ComplexSchur, complex_schur, real_part};
 use crate::{Error, Result};
 use faer::linalg::triangular_solve::solve_upper_triangular_in_place;
 use faer::prelude::*;
@@ -33,14 +33,7 @@ const MOST_ROOTS: usize = 100;
 /// # Errors
 /// [`Error::NoLogarithm`] where an eigenvalue is zero or real and negative; [`Error::Shape`], [`Error::NotFinite`] and
 /// [`Error::NoConvergence`] naming `what`.
-///
-/// ```
-/// use youla::{Mat, linalg::logm};
-/// let rotation = Mat::from_fn(2, 2, |i, j| [[0.0, -1.0], [1.0, 0.0]][i][j]);
-/// assert!((logm("A", rotation.as_ref())?[(1, 0)] - std::f64::consts::FRAC_PI_2).abs() < 1e-14);
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn logm(what: &str, a: MatRef<'_, f64>) -> Result<Mat<f64>> {
+pub(crate) fn logm(what: &str, a: MatRef<'_, f64>) -> Result<Mat<f64>> {
     let form = complex_schur(what, a)?;
     if let Some(pole) = form.eigenvalues().find(|p| p.im == 0.0 && p.re <= 0.0) {
         return Err(Error::NoLogarithm { pole });

@@ -2,8 +2,8 @@
 //! Stewart, Commun. ACM 15 (1972), 820; G. Kitagawa, Int. J. Control 25 (1977), 745. They are Sylvester equations
 //! whose two coefficients share one real Schur form.
 
-use super::sylvester::{Form, solve_on_schur_forms, solve_symmetric};
-use super::{check_finite, check_shape, real_schur};
+use crate::linalg::sylvester::{Form, solve_on_schur_forms, solve_symmetric};
+use crate::linalg::{check_finite, check_shape, real_schur};
 use crate::{Error, Result};
 use faer::{Mat, MatRef};
 

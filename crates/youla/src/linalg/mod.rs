@@ -3,54 +3,45 @@
 //!
 //! Everything here runs on one thread: the matrices are small, and results must not depend on the number of threads.
 
-mod balance;
-mod bulge_chasing;
-mod complex_eigenvalues;
-mod complex_schur;
 mod definite;
-mod eigenvectors;
+mod eigen;
 mod expm;
-mod francis;
 mod gramian;
 mod gramian_balancing;
-mod hessenberg;
 mod kronecker;
 mod least_squares;
 mod levenberg;
 mod logm;
 mod lyapunov;
-mod reflector;
-mod reorder;
 mod riccati;
-mod schur;
 mod sequential_qr;
-mod shifts;
 mod square;
 mod substitution;
 mod sylvester;
 
-pub use balance::{Balanced, balance};
-pub(crate) use complex_eigenvalues::complex_eigenvalues;
 pub(crate) use definite::check_semidefinite;
-pub(crate) use eigenvectors::{Eigenvectors, Group};
+pub use eigen::balance::{Balanced, balance};
+pub(crate) use eigen::complex_eigenvalues::complex_eigenvalues;
+pub(crate) use eigen::eigenvectors::{Eigenvectors, Group};
+pub(crate) use eigen::hessenberg::hessenberg;
+pub use eigen::reorder::OrderedSchur;
+pub use eigen::schur::{RealSchur, real_schur};
 pub use expm::expm;
-pub use gramian::{GramianFactor, discrete_gramian_factor, gramian_factor};
-pub use gramian_balancing::gramian_balancing;
-pub use hessenberg::{Hessenberg, hessenberg};
+pub(crate) use gramian::{discrete_gramian_factor, gramian_factor};
+pub(crate) use gramian_balancing::gramian_balancing;
 pub use least_squares::regress;
 pub use least_squares::{LeastSquares, least_squares};
 pub use levenberg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
-pub use logm::logm;
+pub(crate) use logm::logm;
 pub use lyapunov::{Lyapunov, discrete_lyapunov, lyapunov};
-pub use reorder::OrderedSchur;
 pub use riccati::{RiccatiProblem, RiccatiSolution, care, dare};
-pub use schur::{RealSchur, real_schur};
 pub use sequential_qr::SequentialQr;
-pub use sequential_qr::{leading_rank, triangular_condition};
+pub use sequential_qr::leading_rank;
+pub(crate) use sequential_qr::triangular_condition;
 pub use sylvester::{SylvesterSolution, discrete_sylvester, sylvester};
 
 #[cfg(test)]
-mod levels;
+mod level_tests;
 
 use crate::{Error, Result};
 use faer::prelude::*;
@@ -144,7 +135,7 @@ pub(crate) fn solve_in_any_units(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f
 ///
 /// # Errors
 /// [`Error::Singular`] naming `what`.
-pub fn solve_right(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
+pub(crate) fn solve_right(what: &str, a: MatRef<'_, f64>, b: MatRef<'_, f64>) -> Result<Mat<f64>> {
     Ok(solve(what, a.transpose(), b.transpose())?.transpose().to_owned())
 }
 
@@ -165,19 +156,7 @@ pub fn reciprocal_condition(a: MatRef<'_, f64>) -> f64 {
 /// # Errors
 /// [`Error::NoConvergence`], [`Error::NotFinite`] and [`Error::Shape`] naming `what`.
 pub fn eigenvalues(what: &str, a: MatRef<'_, f64>) -> Result<Vec<c64>> {
-    schur::eigenvalues(what, balance(what, a)?.a.as_ref())
-}
-
-/// `[C; C A; ...; C A^(blocks-1)]`.
-pub(crate) fn observability(a: MatRef<'_, f64>, c: MatRef<'_, f64>, blocks: usize) -> Mat<f64> {
-    let p = c.nrows();
-    let mut gamma = Mat::zeros(p * blocks, a.nrows());
-    let mut row = c.to_owned();
-    for i in 0..blocks {
-        gamma.as_mut().subrows_mut(i * p, p).copy_from(&row);
-        row = &row * a;
-    }
-    gamma
+    eigen::schur::eigenvalues(what, balance(what, a)?.a.as_ref())
 }
 
 /// Fails with the position of the first entry that is NaN or infinite.

@@ -99,7 +99,7 @@ pub fn leading_rank(r: MatRef<'_, f64>, columns: usize) -> usize {
 
 /// Ratio of the largest to the smallest singular value of a lower triangular matrix whose rows have unit length, by inverse
 /// iteration: at most the true one, and close to it.
-pub fn triangular_condition(lower: MatRef<'_, f64>) -> f64 {
+pub(crate) fn triangular_condition(lower: MatRef<'_, f64>) -> f64 {
     let columns: Vec<Vec<f64>> =
         lower.col_iter().enumerate().map(|(j, column)| column.iter().skip(j).copied().collect()).collect();
     let largest = largest_singular(columns.len(), |v| {

@@ -2,8 +2,8 @@
 //! most of the work is matrix products (I. Jonsson and B. Kågström, Recursive blocked algorithms for solving triangular systems, ACM
 //! Trans. Math. Softw. 28 (2002), 392), and at last block by block.
 
-use super::kronecker::{Entries, SmallSolution, solve_product, solve_sum};
-use super::schur::{DiagonalBlock, blocks};
+use crate::linalg::eigen::schur::{DiagonalBlock, blocks};
+use crate::linalg::kronecker::{Entries, SmallSolution, solve_product, solve_sum};
 use crate::{Error, Result};
 use faer::prelude::*;
 use faer::{MatMut, MatRef};

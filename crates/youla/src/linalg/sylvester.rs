@@ -2,11 +2,11 @@
 //! real Schur forms `A = U T U'` and `B' = V S V'` turn them into `T Y + Y S' = D` and `T Y S' - Y = D` with `D = U' C V`,
 //! which are solved block by block from the lower right corner; then `X = U Y V'`.
 
-use super::schur::{RealSchur, real_schur};
-pub(super) use super::substitution::Form;
-use super::substitution::{substitute, substitute_symmetric};
-use super::{check_finite, check_shape};
 use crate::Result;
+use crate::linalg::eigen::schur::{RealSchur, real_schur};
+pub(super) use crate::linalg::substitution::Form;
+use crate::linalg::substitution::{substitute, substitute_symmetric};
+use crate::linalg::{check_finite, check_shape};
 use faer::{Mat, MatRef};
 
 /// Solution of a Sylvester equation.

@@ -19,11 +19,11 @@ mod zeros;
 
 pub use eigen::Eigen;
 pub use eigen::SharedMode;
-pub(crate) use gains::{Gains, largest_singular_value};
+pub(crate) use gains::largest_singular_value;
 pub use initial::simulate_best;
 pub use modes::Mode;
 pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings};
-pub use norms::{PeakGain, PeakOptions, h2_norm, hankel_norm, hinf_norm, linf_norm};
+pub use norms::{PeakGain, PeakOptions, h2_norm, hinf_norm, linf_norm};
 pub use partitioned::Partitioned;
 pub use response::{FrequencyResponse, frequency_response};
 pub(crate) use simulate::simulate_joined;

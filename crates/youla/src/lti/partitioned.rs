@@ -47,7 +47,7 @@ impl<T: TimeDomain> Partitioned<T> {
     ///
     /// # Errors
     /// [`Error::Ports`], [`Error::SampleTimeMismatch`], [`Error::AlgebraicLoop`].
-    pub fn upper_lft(&self, s: &StateSpace<T>) -> Result<StateSpace<T>> {
+    pub(crate) fn upper_lft(&self, s: &StateSpace<T>) -> Result<StateSpace<T>> {
         Ok(Partitioned::new(s.clone(), 0, 0)?.star(self)?.system)
     }
 

@@ -68,7 +68,7 @@ pub(super) fn factor<T: TimeDomain>(time: T, a: MatRef<'_, f64>, b: MatRef<'_, f
         Some(_) => discrete_gramian_factor,
         None => gramian_factor,
     };
-    Ok(factor(a, b)?.l)
+    factor(a, b)
 }
 
 /// Orthonormal basis of the span of the columns.

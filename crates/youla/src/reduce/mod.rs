@@ -29,7 +29,7 @@ mod loop_tests;
 mod options;
 mod reducer;
 #[cfg(test)]
-mod reference;
+mod reference_tests;
 mod split;
 mod sweep;
 #[cfg(test)]
@@ -98,7 +98,7 @@ impl<T: TimeDomain> Reduction<T> {
 ///
 /// The Gramian factors come from Hammarling's method and are never squared; the projections are balancing-free (A. Varga,
 /// Efficient minimal realization procedure based on balancing, 1991), so that exact cancellations do no harm. The bounds
-/// hold (test `error_stays_below_its_bound`); the published examples are met to their printed digits (`reference`).
+/// hold (test `error_stays_below_its_bound`); the published examples are met to their printed digits (`reference_tests`).
 ///
 /// # Errors
 /// [`crate::Error::Unstable`] with the pole where a method needs a stable system: nothing is split off or reflected silently.
@@ -118,24 +118,6 @@ impl<T: TimeDomain> Reduction<T> {
 /// ```
 pub fn reduce<T: TimeDomain>(system: &StateSpace<T>, options: &ReductionOptions) -> Result<Reduction<T>> {
     let reducer = Reducer::new(system, None, options)?;
-    reducer.reduction(reducer.choose(options.order)?)
-}
-
-/// Reduces a system with weights at its outputs and inputs, whatever `options.method` says, by balanced truncation.
-///
-/// With weights of 1 it is [`reduce`] (`tests::unit_weights_change_nothing`); the example of SLICOT's AB09ID is met
-/// (`reference`). Whether the reduced part is stable is data, [`Reduction::unstable_pole`]: with weights on both sides it need
-/// not be.
-///
-/// # Errors
-/// As [`reduce`]; [`crate::Error::Unstable`] for an unstable weight, [`crate::Error::Unsupported`] for an order by bound.
-pub fn reduce_weighted<T: TimeDomain>(
-    system: &StateSpace<T>,
-    weights: &FrequencyWeights<T>,
-    options: &ReductionOptions,
-) -> Result<Reduction<T>> {
-    let options = ReductionOptions { method: ReductionMethod::Weighted, ..options.clone() };
-    let reducer = Reducer::new(system, Some(weights), &options)?;
     reducer.reduction(reducer.choose(options.order)?)
 }
 

@@ -52,7 +52,7 @@ pub enum ReducedOrder {
     ClosedLoop(f64),
 }
 
-/// Choices of [`super::reduce`], [`super::reduce_weighted`] and [`super::reduce_in_loop`].
+/// Choices of [`super::reduce`] and [`super::reduce_in_loop`].
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]

@@ -57,23 +57,23 @@ impl ReductionSweep {
     }
 
     /// The smallest order that the controller stabilises.
-    pub fn smallest_stabilised(&self) -> Option<usize> {
+    pub(crate) fn smallest_stabilised(&self) -> Option<usize> {
         self.stabilised_from(0)
     }
 
     /// The smallest order that the controller stabilises, from `order` on.
-    pub fn stabilised_from(&self, order: usize) -> Option<usize> {
+    pub(crate) fn stabilised_from(&self, order: usize) -> Option<usize> {
         self.rows.iter().find(|row| row.order >= order && row.stabilised).map(|row| row.order)
     }
 
     /// The smallest order that the controller stabilises with a relative closed-loop error of at most `limit`.
-    pub fn smallest_within(&self, limit: f64) -> Option<usize> {
+    pub(crate) fn smallest_within(&self, limit: f64) -> Option<usize> {
         let within = |row: &&SweepRow| row.stabilised && row.closed_loop.is_some_and(|error| error <= limit);
         self.rows.iter().find(within).map(|row| row.order)
     }
 
     /// The lowest closed-loop error of all orders that the controller stabilises.
-    pub fn lowest_closed_loop_error(&self) -> Option<f64> {
+    pub(crate) fn lowest_closed_loop_error(&self) -> Option<f64> {
         self.rows.iter().filter_map(|row| row.closed_loop).min_by(f64::total_cmp)
     }
 }

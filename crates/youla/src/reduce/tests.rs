@@ -16,6 +16,17 @@ use rand_distr::{Distribution, StandardNormal};
 
 const METHODS: [ReductionMethod; 2] = [ReductionMethod::BalancedTruncation, ReductionMethod::SingularPerturbation];
 
+/// Reduces with given weights, without a loop that they come from.
+pub(super) fn reduce_weighted<T: TimeDomain>(
+    system: &StateSpace<T>,
+    weights: &FrequencyWeights<T>,
+    options: &ReductionOptions,
+) -> Result<Reduction<T>> {
+    let options = ReductionOptions { method: ReductionMethod::Weighted, ..options.clone() };
+    let reducer = Reducer::new(system, Some(weights), &options)?;
+    reducer.reduction(reducer.choose(options.order)?)
+}
+
 pub(super) fn random(rows: usize, columns: usize, rng: &mut ChaCha8Rng) -> Mat<f64> {
     Mat::from_fn(rows, columns, |_, _| StandardNormal.sample(rng))
 }

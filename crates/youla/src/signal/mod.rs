@@ -19,8 +19,7 @@ pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, Squar
 pub use harmonics::without_harmonics;
 pub use loop_record::LoopRecord;
 pub use periodic::{
-    DetectionLines, ExcitationPeriod, LineGroup, LineResponse, LocalModel, PeriodicExperiment, detect_period,
-    detection_lines, line_response, local_response,
+    ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response, local_response,
 };
 pub(crate) use periodic::{Excited, inverse, output_rest};
 pub use persistency::{Persistency, persistency, persistency_order};

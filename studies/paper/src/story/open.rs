@@ -8,7 +8,7 @@ use youla::reduce::ReducedOrder;
 /// One sentence each.
 pub(super) fn choices(paper: &Paper) -> Vec<String> {
     let (rig, s) = (&paper.rig, &paper.settings);
-    let subspace = |o: &SubspaceOptions| format!("{} and {} block rows", order(&o.order), o.horizon.future());
+    let subspace = |o: &SubspaceOptions| format!("{} and {} block rows", order(&o.order), o.horizon.future);
     let reduced = match s.reduction.order {
         ReducedOrder::Minimal => "the minimal order".into(),
         ReducedOrder::Fixed(n) => format!("order {n}"),
@@ -60,7 +60,7 @@ pub(super) fn choices(paper: &Paper) -> Vec<String> {
 fn order(order: &Order) -> String {
     match order {
         Order::Fixed(n) => format!("order {n}"),
-        Order::Auto(auto) => format!("an order of at most {} chosen from the data", auto.max),
+        Order::Auto(max) => format!("an order of at most {max} chosen from the data"),
     }
 }
 

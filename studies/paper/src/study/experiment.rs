@@ -178,7 +178,7 @@ fn require_rest(record: &ExperimentRecord, settle: usize) -> Result<()> {
 
 /// Persistency up to the block rows that the identification of S needs.
 fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
-    let order = settings.hansen.horizon.future().saturating_add(settings.hansen.horizon.past());
+    let order = settings.hansen.horizon.future.saturating_add(settings.hansen.horizon.past);
     // At least eight half-overlapping windows, of a record of 20 000 samples those of the default.
     let welch = Welch::default();
     let window = welch.window.min(record.alpha.nrows() / 4).max(2);
@@ -243,7 +243,7 @@ impl Data<'_> {
 
     fn hansen(&self) -> Result<HansenModel, String> {
         let options = SubspaceOptions { initial_state: self.initial_state, ..self.settings.hansen.clone() };
-        hansen(&self.design.factors, std::slice::from_ref(&self.signals), &options.into()).map_err(text)
+        hansen(&self.design.factors, std::slice::from_ref(&self.signals), &options).map_err(text)
     }
 
     fn pem(&self, factor: f64) -> Result<GreyBoxModel, String> {

@@ -244,7 +244,7 @@ impl LoopData<'_> {
     }
 
     fn hansen(&self, settings: &PaperSettings) -> Result<&HansenModel, String> {
-        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen.clone().into()).map_err(text);
+        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen).map_err(text);
         self.hansen.get_or_init(found).as_ref().map_err(String::clone)
     }
 

@@ -124,7 +124,7 @@ fn without_most(mut report: Value) -> Value {
     for key in ["residuals", "reduction", "redesign", "bezout_residual"] {
         report[key] = Value::Null;
     }
-    for key in ["stabilisation", "margins", "findings", "loop_tables", "orders", "further"] {
+    for key in ["margins", "findings", "loop_tables", "orders", "further"] {
         report[key] = json!([]);
     }
     for key in ["indirect", "bands", "singular"] {

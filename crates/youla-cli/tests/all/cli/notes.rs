@@ -1,6 +1,6 @@
 //! Notes of a run that must say what the record holds, and no more.
 
-use crate::common::{SETTINGS, csv, log, loop_folder, settings, youla};
+use crate::common::{SETTINGS, csv, log, loop_folder, youla};
 
 /// Of the variance of y the noise, uniform within 0.025, is 26.2 dB below; the loop amplifies it by a few dB. A model explains 99 % of y,
 /// so that a ratio below 18 dB cannot be right. Notes that are alike are one.
@@ -33,14 +33,13 @@ fn a_residual_of_rounding_depends_on_nothing() {
     assert!(!text.contains("depends on past excitation"), "{text}");
 }
 
-/// The largest pole of the models in the region, and the interval of that of G(S), differ: the sentence says why.
+/// The largest pole of the models in the region, and the interval of that of the plant, differ: the sentence says why.
 #[test]
 fn a_region_reaches_further_than_an_interval() {
-    let text = settings("order = 3", "order = 3\nuncertainty = { method = \"delta\" }");
-    let folder = loop_folder("region", &[("run.toml", text.as_bytes())]);
+    let folder = loop_folder("region", &[("run.toml", SETTINGS.as_bytes())]);
     assert_eq!(youla(&folder, &["identify", "run.toml", "--out", "out", "--quiet"]).code, Some(0));
     let report = std::fs::read_to_string(folder.join("out/report.json")).expect("written");
-    let (_, sentence) = report.split_once("confidence region of S; ").expect("the sentence");
+    let (_, sentence) = report.split_once("confidence region of the plant; ").expect("the sentence");
     let sentence = sentence.split_once('"').expect("its end").0;
     assert!(sentence.contains("for this figure alone; the region holds all parameters at once"), "{sentence}");
 }

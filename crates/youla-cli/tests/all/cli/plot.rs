@@ -25,7 +25,6 @@ fn every_figure_of_a_run_is_written_in_every_format() {
         "data",
         "signals",
         "order",
-        "stabilisation",
         "verification",
         "residuals",
         "bode",

@@ -1,13 +1,13 @@
 //! Structures of discrete time: `x(k+1) = A x(k) + B u(k)` with declared entries.
 
-use super::super::super::criterion::Criterion;
-use super::super::super::tests::{comparison, gradient_error};
-use super::super::super::{
+use super::super::{Declaration, DeclaredStructure};
+use crate::Error;
+use crate::search::criterion::Criterion;
+use crate::tests::{comparison, gradient_error};
+use crate::{
     FrequencyTarget, GreyBoxOptions, InnovationStart, NoiseModel, Problem, ProjectionOptions, Structure, greybox,
     logarithmic_grid, project,
 };
-use super::super::{Declaration, DeclaredStructure};
-use crate::Error;
 use youla::Mat;
 use youla::identify::subspace::{Experiment, InitialState};
 use youla::lti::{Discrete, simulate};

@@ -1,9 +1,9 @@
 //! Parameters of declared structures from simulated records.
 
-use super::super::super::tests::off;
-use super::super::super::{GreyBoxModel, GreyBoxOptions, Loss, Problem, Side, Stop, Structure, greybox};
 use super::super::DeclaredStructure;
 use super::declared;
+use crate::tests::off;
+use crate::{GreyBoxModel, GreyBoxOptions, Problem, Side, Stop, Structure, greybox};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -178,44 +178,6 @@ fn parameters_that_the_data_do_not_excite_are_named() {
     let data = records(&rotor, 1e-3, 10.0, 1e-6, 10);
     let found = estimate(&rotor, &rotor.start(), &data);
     assert_eq!(found.undetermined.without_effect, ["polar_inertia"]);
-}
-
-/// Every fiftieth sample is off by 100 deviations: the loss of Huber keeps the parameters within its own deviations, which
-/// are a fraction of those of least squares.
-#[test]
-fn outliers_do_not_count_for_much() {
-    let mass = declared(MASS).unwrap();
-    let mut data = records(&mass, 5e-3, 10.0, 2e-4, 11);
-    (0..data.y.nrows()).step_by(50).for_each(|k| data.y[(k, 0)] += 2e-2);
-    let huber = GreyBoxOptions { loss: Loss::Huber, ..Default::default() };
-    let found = estimate_with(&mass, &off(&mass.start(), 0.2, 4), &data, huber);
-    within_four_deviations(&mass, &found);
-    let report = found.robust.unwrap();
-    assert!((report.deviations[0] / 2e-4 - 1.0).abs() < 0.1, "{report:?}");
-    // The 80, and of the 3920 others those beyond 1.345 * 1.033 = 1.39 deviations (the outliers widen the estimate of the
-    // deviation by 3 %), 16.5 %: 645 +- 23.
-    assert!((80 + 645 - 92..80 + 645 + 92).contains(&report.beyond[0]), "{report:?}");
-    let squares = estimate(&mass, &mass.start(), &data);
-    for (huber, squares) in
-        found.covariance.unwrap().diagonal().column_vector().iter().zip(squares.standard_deviations().unwrap())
-    {
-        assert!(huber.sqrt() < 0.2 * squares);
-    }
-}
-
-/// Efficiency of 95 %: deviations 2.6 % above those of least squares, and nearly its parameters.
-#[test]
-fn normal_noise_costs_the_loss_of_huber_little() {
-    let mass = declared(MASS).unwrap();
-    let data = records(&mass, 5e-3, 10.0, 2e-4, 12);
-    let huber = GreyBoxOptions { loss: Loss::Huber, ..Default::default() };
-    let found = estimate_with(&mass, &mass.start(), &data, huber);
-    let squares = estimate(&mass, &mass.start(), &data);
-    let (one, other) = (found.standard_deviations().unwrap(), squares.standard_deviations().unwrap());
-    for j in 0..3 {
-        assert!((1.005..1.05).contains(&(one[j] / other[j])), "{}", one[j] / other[j]);
-        assert!((found.parameters[j] - squares.parameters[j]).abs() < other[j]);
-    }
 }
 
 /// The input arrives three samples late: as known, the same parameters as without delay, and a model with three more states.

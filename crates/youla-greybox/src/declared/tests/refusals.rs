@@ -1,7 +1,7 @@
 //! Every bad declaration, with its sentence.
 
-use super::super::super::Structure;
 use super::declared;
+use crate::Structure;
 
 /// A structure of one state; `b`, the rate and what follows it may be replaced.
 fn lag(b: &str, rate: &str, rest: &str) -> String {

@@ -1,9 +1,9 @@
 //! What comes with the library, read as the files of a user.
 
-use super::super::super::tests::off;
-use super::super::super::{Matrix, Structure};
 use super::super::{Declaration, DeclaredStructure, Template};
 use super::declared;
+use crate::tests::off;
+use crate::{Matrix, Structure};
 use faer::c64;
 use youla::lti::{Continuous, StateSpace, frequency_response};
 

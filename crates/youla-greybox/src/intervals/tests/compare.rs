@@ -1,8 +1,8 @@
 //! The likelihood ratio has the distribution that its probability says.
 
-use super::super::super::{GreyBoxModel, GreyBoxOptions, Problem, greybox};
 use super::super::{compare, likelihood_ratio};
 use super::*;
+use crate::{GreyBoxModel, GreyBoxOptions, Problem, greybox};
 use rayon::prelude::*;
 use youla::identify::subspace::InitialState;
 

@@ -1,10 +1,10 @@
 //! Derivatives against difference quotients, and the sandwich against its definition in dense matrices.
 
-use super::super::super::tests::{bearing, truth};
-use super::super::super::{GreyBoxOptions, Problem, Slope, Structure, greybox};
 use super::super::{IntervalOptions, ResidualAssumption, greybox_intervals};
 use super::*;
 use crate::Result;
+use crate::tests::{bearing, truth};
+use crate::{GreyBoxOptions, Problem, Slope, Structure, greybox};
 use std::f64::consts::TAU;
 use youla::identify::subspace::InitialState;
 use youla::lti::{Continuous, frequency_response};
@@ -185,7 +185,7 @@ fn bounds_and_what_is_not_determined() {
             Ok(StateSpace::new(number(-3.0), number(t[0] * t[1]), number(1.0), number(0.0), Continuous)?)
         }
         fn slopes(&self, t: &[f64], j: usize) -> Vec<Slope> {
-            vec![Slope { matrix: super::super::super::Matrix::B, row: 0, column: 0, value: t[1 - j] }]
+            vec![Slope { matrix: crate::Matrix::B, row: 0, column: 0, value: t[1 - j] }]
         }
     }
     let log = open_loop(300, NOISE, 0.0, 1);

@@ -5,7 +5,7 @@ mod coverage;
 mod exact;
 mod work;
 
-use super::super::{DeclaredStructure, Structure, Template};
+use crate::{DeclaredStructure, Structure, Template};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;

@@ -1,7 +1,7 @@
 //! What seeded searches take: iterations, values of the criterion, rejected points.
 
-use super::super::super::{GreyBoxOptions, LoopOutput, Loss, Problem, greybox};
 use super::*;
+use crate::{GreyBoxOptions, LoopOutput, Problem, greybox};
 
 /// Another number here means that the search does other work than before: to be looked at, and explained.
 #[test]
@@ -11,7 +11,7 @@ fn work_of_seeded_searches() {
     let (near, far) = (start([1.1, 0.8, 0.95]), start([0.5, 4.0, 1.6]));
     let log = open_loop(500, 2e-5, 0.0, 1);
     let [direct, from_outside] = in_loop(500, 2e-5, 0.0, 8000.0, 2);
-    let (options, huber) = (GreyBoxOptions::default(), GreyBoxOptions { loss: Loss::Huber, ..Default::default() });
+    let options = GreyBoxOptions::default();
     let search = |theta: &[f64], log: &Log, options: &GreyBoxOptions| {
         let found = greybox(&Problem::new(&structure, &[log.experiment()], time()), theta, options).unwrap();
         (found.iterations, found.evaluations, found.diverged)
@@ -30,8 +30,7 @@ fn work_of_seeded_searches() {
         search(&near, &log, &options),
         search(&far, &log, &options),
         search(&near, &direct, &options),
-        search(&near, &log, &huber),
         through_the_loop,
     ];
-    assert_eq!(work, [(6, 7, 0), (11, 17, 0), (5, 6, 0), (14, 21, 0), (4, 5, 0)]);
+    assert_eq!(work, [(6, 7, 0), (11, 17, 0), (5, 6, 0), (4, 5, 0)]);
 }

@@ -242,59 +242,8 @@ fn report(plan: &Plan) -> ReportData {
     for (method, label) in [("hansen", "S from alpha to beta"), ("direct", "G from u to y")] {
         let values = (0..24).map(|k| if k < 8 { 40.0 * 0.55f64.powi(k) } else { 0.04 * 0.96f64.powi(k) }).collect();
         data.orders.push(OrderChoice { method: method.into(), label: label.into(), values, chosen: 8 });
-        data.stabilisation.push(diagram(plan, method, label));
     }
     data
-}
-
-/// Every mode from order 2 on, beside one pole per order that wanders.
-fn diagram(plan: &Plan, method: &str, label: &str) -> Stabilisation {
-    let mut poles = Vec::new();
-    for order in 1..=20usize {
-        for (k, (hz, zeta, _)) in plan.plant.modes.iter().enumerate().filter(|(k, _)| order >= 2 * k + 2) {
-            let change = 0.02 / order as f64 * if order % 2 == 0 { 1.0 } else { -1.0 };
-            poles.push(StabilisationPole {
-                order,
-                hz: hz * (1.0 + change),
-                zeta: zeta * (1.0 + 3.0 * change),
-                hz_deviation: Some(0.01 * hz),
-                zeta_deviation: None,
-                stable: true,
-                standing: if order < 2 * k + 4 { PoleStability::New } else { PoleStability::Stable },
-                cluster: Some(k),
-            });
-        }
-        let wandering = (order as f64 * 0.7).sin();
-        poles.push(StabilisationPole {
-            order,
-            hz: plan.band.1 * 10f64.powf(wandering - 1.0),
-            zeta: 0.3 * wandering,
-            hz_deviation: None,
-            zeta_deviation: None,
-            stable: wandering > 0.0,
-            standing: PoleStability::New,
-            cluster: None,
-        });
-    }
-    let cluster = |(hz, zeta, _): &(f64, f64, Vec<Vec<f64>>)| StabilisationCluster {
-        hz: *hz,
-        zeta: *zeta,
-        hz_spread: 0.002 * hz,
-        zeta_spread: 0.05 * zeta,
-        hz_deviation: Some(0.003 * hz),
-        zeta_deviation: Some(0.08 * zeta),
-        orders: 17,
-        stable_orders: 15,
-        shape: (0..plan.outputs.len()).map(|k| [1.0 / (k + 1) as f64, -20.0 * k as f64]).collect(),
-    };
-    Stabilisation {
-        method: method.into(),
-        label: label.into(),
-        orders: (1..=20).collect(),
-        chosen: 8,
-        poles,
-        clusters: plan.plant.modes.iter().map(cluster).collect(),
-    }
 }
 
 fn verdict() -> Vec<Verdict> {

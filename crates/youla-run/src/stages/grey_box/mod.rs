@@ -42,8 +42,7 @@ fn estimate(run: RunContext<'_>, start: Option<SchemeStart<'_>>, asked: &GreyBox
         Ok((structure, found))
     };
     let (structure, found) = of(&asked.structure)?;
-    let levels = IntervalOptions { level: run.settings.hansen.uncertainty.level, ..IntervalOptions::default() };
-    let intervals = criterion.intervals(&structure, &found.model, &levels);
+    let intervals = criterion.intervals(&structure, &found.model, &IntervalOptions::default());
     let others = asked.alternative.iter().map(|other| (other, of(&other.structure).map(|(_, found)| found)));
     let compared = if asked.alternative.is_empty() { Vec::new() } else { table(&found, &others.collect::<Vec<_>>())? };
     Ok(GreyBoxRun { structure, found, intervals, compared })

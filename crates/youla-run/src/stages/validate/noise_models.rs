@@ -62,8 +62,7 @@ pub(crate) fn noise_of_hansen(
     factors: &CoprimeFactors<Discrete>,
     hansen: &HansenModel,
 ) -> Result<Option<StateSpace<Discrete>>> {
-    let form = hansen.innovation_form.as_ref().map(|form| form.gain.as_ref());
-    let gain = form.or_else(|| hansen.deviation.innovation.gain()).filter(|_| prediction == Prediction::OpenLoop);
+    let gain = hansen.deviation.innovation.gain().filter(|_| prediction == Prediction::OpenLoop);
     let Some(gain) = gain else { return Ok(None) };
     let s = &hansen.deviation.model;
     Ok(factors.noise_of(s, &innovations(s, gain)?).map(Some)?)

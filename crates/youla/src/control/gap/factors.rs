@@ -19,7 +19,7 @@ use faer::Side;
 ///
 /// # Errors
 /// [`Error::NotStabilisable`], [`Error::NotDetectable`] with the mode, and those of the Riccati equation.
-pub fn normalised_right_factors<T: TimeDomain>(plant: &StateSpace<T>) -> Result<StateSpace<T>> {
+pub(crate) fn normalised_right_factors<T: TimeDomain>(plant: &StateSpace<T>) -> Result<StateSpace<T>> {
     let plant = plant.balanced()?;
     let (m, p) = (plant.inputs(), plant.outputs());
     let (a, b, c, d) = (plant.a(), plant.b(), plant.c(), plant.d());
@@ -48,7 +48,7 @@ pub fn normalised_right_factors<T: TimeDomain>(plant: &StateSpace<T>) -> Result<
 ///
 /// # Errors
 /// As for [`normalised_right_factors`], in the words of the dual.
-pub fn normalised_left_factors<T: TimeDomain>(plant: &StateSpace<T>) -> Result<StateSpace<T>> {
+pub(crate) fn normalised_left_factors<T: TimeDomain>(plant: &StateSpace<T>) -> Result<StateSpace<T>> {
     let swap = |error: Error| match error {
         Error::NotStabilisable { what, pole, distance } => Error::NotDetectable { what, pole, distance },
         Error::NotDetectable { what, pole, distance } => Error::NotStabilisable { what, pole, distance },

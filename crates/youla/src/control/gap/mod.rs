@@ -16,12 +16,12 @@
 
 mod factors;
 #[cfg(test)]
-mod reference;
+mod reference_tests;
 mod scales;
 #[cfg(test)]
 mod tests;
 
-pub use factors::{normalised_left_factors, normalised_right_factors};
+pub(crate) use factors::{normalised_left_factors, normalised_right_factors};
 pub use scales::ChannelScales;
 
 use super::margins::Loop;

@@ -7,7 +7,7 @@
 //! (Van Overschee and De Moor, section 3.4). The residuals are those of a filter that has seen s samples: the gain is biased
 //! where `(A - K C)^s` is not small. Where no stabilising solution exists this is said, and no gain is returned.
 
-use super::output_pair::OutputPair;
+use crate::identify::subspace::output_pair::OutputPair;
 use crate::linalg::{RiccatiProblem, dare};
 use crate::{Error, Result};
 use faer::{Mat, MatRef, Side};
@@ -41,8 +41,6 @@ pub enum NoInnovation {
     NoiseFree,
     /// The Riccati equation has no solution for which A - K C is stable; the equation's own words.
     NotSolvable(String),
-    /// The model was refined without a model of its noise.
-    Refined,
 }
 
 impl Innovation {

@@ -11,70 +11,42 @@
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
-mod channels;
-mod condense;
-pub mod delay;
-mod disturbance;
-mod experiment;
-mod factorisation;
-mod gram;
-mod hankel;
-mod hankel_layout;
 mod horizon;
-mod horizons;
 mod innovation;
-mod modal;
-mod modal_sums;
+mod inputs;
 mod open_loop;
 mod options;
 mod order;
-mod order_models;
-mod output_error;
 mod output_pair;
-mod parsim;
-mod pbsid;
 mod predictor_form;
 mod projected;
-mod projection;
-mod realisation;
-mod row_map;
-mod sensitivity;
-mod ssarx;
-pub mod stabilisation;
+pub(crate) mod records;
 mod stability;
-mod statistics;
 #[cfg(test)]
 mod tests;
-pub mod uncertainty;
-mod varx;
-mod view;
+mod triangle;
 
-pub use disturbance::{LineAmplitude, amplitudes, harmonics, lines};
-pub use experiment::Experiment;
 pub use horizon::Horizon;
-pub use horizons::{HorizonReport, ScannedModel};
 pub use innovation::{Innovation, NoInnovation};
+pub use inputs::output_error::{InputFit, OutputFit};
 pub use options::{
-    AutoOrder, ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, OrderRule, Stability,
-    SubspaceMethod, SubspaceOptions,
+    ChannelScaling, DataFactor, Factorisation, Feedthrough, InitialState, Order, Stability, SubspaceMethod,
+    SubspaceOptions,
 };
-pub use order::{OrderCandidate, OrderReport, OrderValue};
-pub use output_error::{InputFit, OutputFit};
+pub use order::OrderReport;
+pub use records::delay::Delays;
+pub use records::disturbance::{LineAmplitude, amplitudes, harmonics, lines};
+pub use records::experiment::Experiment;
 pub use stability::{MovedPole, StabilityReport};
-pub(crate) use uncertainty::check as check_uncertainty;
-pub use uncertainty::{
-    BlockInfluence, Bootstrap, Delta, DeviationEvidence, Draw, Interval, ModeBand, NoUncertainty, ResponseBand,
-    Uncertainty, UncertaintyMethod, UncertaintyOptions,
-};
 
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Result};
-use channels::{Channels, check_blocks};
-use factorisation::HankelLq;
-use faer::{Mat, MatRef, c64};
-use hankel_layout::HankelLayout;
-use output_error::{Base, Fitted};
+use faer::{Mat, c64};
+use inputs::output_error::Fitted;
 use projected::{Estimate, Projected};
+use records::channels::{Channels, check_blocks};
+use triangle::factorisation::HankelLq;
+use triangle::hankel_layout::HankelLayout;
 
 /// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon
 /// has orthonormal columns (with output scaling: of the scaled outputs); those of PBSIDopt and PARSIM-S those in which the
@@ -93,7 +65,7 @@ pub struct SubspaceModel {
     /// Singular values of the weighted projection, horizon x p of them: cosines of canonical angles for CVA and SSARX, else
     /// unnormalised.
     pub singular_values: Vec<f64>,
-    /// The order, without the states of delays, and what other criteria would have proposed.
+    /// The order, without the states of delays, and what it was chosen by.
     pub order: OrderReport,
     /// Delay of each input in samples, as given; its states are behind the others, input by input, newest first.
     pub delays: Vec<usize>,
@@ -105,16 +77,12 @@ pub struct SubspaceModel {
     pub horizon: usize,
     /// Block rows of the past.
     pub past: usize,
-    /// How both were found, where that was asked for.
-    pub automatic_horizon: Option<HorizonReport>,
     /// Columns of the block-Hankel matrices, over all experiments, less the directions that known disturbances take.
     pub columns: usize,
     /// Smallest over largest singular value of the block-Hankel matrix of the inputs with rows of unit length.
     pub excitation_rcond: f64,
     /// How the data were factored.
     pub factor: DataFactor,
-    /// What is known of the error of the model, where it was asked for.
-    pub uncertainty: Option<Uncertainty>,
 }
 
 impl SubspaceModel {
@@ -200,11 +168,7 @@ pub struct SubspaceData<'a> {
     channels: Channels<'a>,
     triangle: HankelLq,
     time: Discrete,
-    /// With the horizons that were found, where that was asked for.
     factored: SubspaceOptions,
-    /// The horizon as it was asked for.
-    asked: Horizon,
-    automatic_horizon: Option<HorizonReport>,
 }
 
 impl<'a> SubspaceData<'a> {
@@ -220,27 +184,10 @@ impl<'a> SubspaceData<'a> {
 
     fn factored(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
         let channels = Channels::new(experiments, options)?;
-        let arrangement = HankelLayout::of(options);
-        let automatic_horizon = match options.horizon {
-            Horizon::Auto { max_past } => Some(horizons::find(&channels, max_past, options)?),
-            Horizon::Fixed { .. } => None,
-        };
-        let horizon = automatic_horizon.as_ref().map_or(options.horizon, HorizonReport::chosen);
-        let blocks = (horizon.past(), horizon.future());
-        channels.check_lengths(blocks)?;
-        let triangle = HankelLq::new(&channels, blocks, arrangement, options.factorisation)?;
-        let factored = SubspaceOptions { horizon, ..options.clone() };
-        Ok(SubspaceData { channels, triangle, time, factored, asked: options.horizon, automatic_horizon })
-    }
-
-    /// The same inputs with other outputs, in scaled units, factored alike.
-    fn with_outputs(&self, outputs: Vec<Mat<f64>>) -> Result<SubspaceData<'_>> {
-        let channels = self.channels.with_outputs(outputs);
-        let options = &self.factored;
-        let blocks = (options.horizon.past(), options.horizon.future());
-        let triangle = HankelLq::new(&channels, blocks, self.triangle.arrangement(), options.factorisation)?;
-        let factored = options.clone();
-        Ok(SubspaceData { channels, triangle, time: self.time, factored, asked: self.asked, automatic_horizon: None })
+        let Horizon { future, past } = options.horizon;
+        channels.check_lengths((past, future))?;
+        let triangle = HankelLq::new(&channels, (past, future), HankelLayout::of(options), options.factorisation)?;
+        Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
     }
 
     /// The model for other options with the same data: weight, order, D, stability and initial states are free, horizon and
@@ -250,44 +197,33 @@ impl<'a> SubspaceData<'a> {
     /// As [`subspace`]; [`crate::Error::OutOfRange`] for a longer horizon or past, [`crate::Error::Unsupported`] for another
     /// scaling, factorisation or delays.
     pub fn identify(&self, options: &SubspaceOptions) -> Result<SubspaceModel> {
-        let options = self.checked(options)?;
-        in_pool(|| self.model(&self.project(&options)?, &options))
+        self.check(options)?;
+        in_pool(|| self.model(&Projected::new(&self.triangle, options)?, options))
     }
 
-    /// Options that these data serve, with the horizons that were found where they ask for that.
-    fn checked(&self, options: &SubspaceOptions) -> Result<SubspaceOptions> {
+    /// Refuses options that these data do not serve.
+    fn check(&self, options: &SubspaceOptions) -> Result<()> {
         let held = &self.factored;
-        let automatic = options.horizon.is_auto();
         if (options.scaling, options.factorisation, &options.delays) != (held.scaling, held.factorisation, &held.delays)
-            || automatic && options.horizon != self.asked
         {
             return Err(Error::Unsupported {
-                what: "another scaling, factorisation, delay or automatic horizon than that of the factored data",
+                what: "another scaling, factorisation or delay than that of the factored data",
                 instead: "factor the records again",
             });
         }
         check_blocks(options)?;
-        options.feedthrough.check(self.channels.inputs, self.channels.outputs)?;
-        check_uncertainty(options)?;
-        let horizon = if automatic { held.horizon } else { options.horizon };
-        Ok(SubspaceOptions { horizon, ..options.clone() })
-    }
-
-    /// What all orders share.
-    fn project(&self, options: &SubspaceOptions) -> Result<Projected> {
-        Projected::new(&self.triangle, options)
+        options.feedthrough.check(self.channels.inputs, self.channels.outputs)
     }
 
     fn model(&self, projected: &Projected, options: &SubspaceOptions) -> Result<SubspaceModel> {
-        let by_models = |auto: &AutoOrder, max| order_models::choose(self, projected, auto, max, options);
         let Order::Fixed(order) = options.order else {
-            let order = order::choose(options.order, projected.evidence()?, by_models)?;
+            let order = order::choose(options.order, projected.evidence()?)?;
             let scaled = self.scaled_model(projected, order.order, options)?;
             return self.finished(projected, order, scaled, options);
         };
         order::check(order)?;
         let (evidence, scaled) = rayon::join(|| projected.evidence(), || self.scaled_model(projected, order, options));
-        let order = order::choose(options.order, evidence?, by_models)?;
+        let order = order::choose(options.order, evidence?)?;
         self.finished(projected, order, scaled?, options)
     }
 
@@ -301,18 +237,12 @@ impl<'a> SubspaceData<'a> {
     ) -> Result<SubspaceModel> {
         let ScaledModel { estimate, fitted } = scaled;
         let (factor, columns) = projected.data();
-        let base = || {
-            let gain = estimate.innovation.gain();
-            Base::new(&self.channels, &estimate.pair, gain, &estimate.stability, options, &fitted)
-        };
         let (delays, delayed) = (&self.channels.delays, &self.channels.delayed);
         let model = self.channels.unscale_model(&estimate.pair, &fitted.b, &fitted.d, self.time)?;
-        let uncertainty = uncertainty::find(self, options, base, &estimate.innovation, &model);
         let mut stability = estimate.stability;
         stability.poles.extend(vec![c64::new(0.0, 0.0); delays.states()]);
         Ok(SubspaceModel {
             model: delays.put_before(model)?,
-            uncertainty,
             innovation: estimate.innovation.unscale(self.channels.y_scale()).beside_delays(delays.states()),
             initial_states: fitted.initial_states.into_iter().zip(delayed).map(|(x, z)| [&x[..], z].concat()).collect(),
             disturbances: self.channels.unscale_disturbances(fitted.disturbances),
@@ -321,9 +251,8 @@ impl<'a> SubspaceData<'a> {
             delays: options.delays.clone(),
             stability,
             fit: fitted.quality,
-            horizon: options.horizon.future(),
-            past: options.horizon.past(),
-            automatic_horizon: self.automatic_horizon.clone().filter(|found| found.chosen() == options.horizon),
+            horizon: options.horizon.future,
+            past: options.horizon.past,
             columns,
             excitation_rcond: projected.excitation_rcond(),
             factor,
@@ -334,29 +263,8 @@ impl<'a> SubspaceData<'a> {
     fn scaled_model(&self, projected: &Projected, order: usize, options: &SubspaceOptions) -> Result<ScaledModel> {
         let estimate = projected.estimate(order, options.stability, self.time)?;
         let gain = estimate.innovation.gain();
-        let fitted = output_error::fit(&self.channels, &estimate.pair, gain, &estimate.stability, options)?;
+        let fitted = inputs::output_error::fit(&self.channels, &estimate.pair, gain, &estimate.stability, options)?;
         Ok(ScaledModel { estimate, fitted })
-    }
-}
-
-impl SubspaceData<'_> {
-    /// The model with B, D, initial states and disturbances from the one-step predictions with another gain (n x p); A, C
-    /// and the innovation stay. For models without delays.
-    pub(crate) fn refit(
-        &self,
-        model: SubspaceModel,
-        gain: MatRef<'_, f64>,
-        options: &SubspaceOptions,
-    ) -> Result<SubspaceModel> {
-        let (pair, gain) = self.channels.scale_predictor(&model.model, gain);
-        let fitted = output_error::fit_predictions(&self.channels, &pair, gain.as_ref(), options)?;
-        Ok(SubspaceModel {
-            model: self.channels.unscale_model(&pair, &fitted.b, &fitted.d, self.time)?,
-            initial_states: fitted.initial_states,
-            disturbances: self.channels.unscale_disturbances(fitted.disturbances),
-            fit: fitted.quality,
-            ..model
-        })
     }
 }
 

@@ -1,9 +1,9 @@
-//! The choices of [`super::subspace`], one plain struct for library, run.toml and artefacts.
+//! The choices of [`crate::identify::subspace::subspace`], one plain struct for library, run.toml and artefacts.
 
-use super::{Horizon, UncertaintyOptions};
+use crate::identify::subspace::Horizon;
 use crate::{Error, Result};
 
-/// Choices of [`super::subspace`].
+/// Choices of [`crate::identify::subspace::subspace`].
 ///
 /// ```
 /// use youla::identify::subspace::{Order, SubspaceOptions, SubspaceMethod};
@@ -17,9 +17,9 @@ use crate::{Error, Result};
 pub struct SubspaceOptions {
     /// The method: it sets the weights of the singular value decomposition.
     pub method: SubspaceMethod,
-    /// Block rows of past and future: a number for both, `{ future, past }`, or `{ max_past }` for a choice by the data.
+    /// Block rows of past and future: a number for both, or `{ future, past }`.
     pub horizon: Horizon,
-    /// Order of the model, of S in `[hansen]`; a rule proposes one when absent.
+    /// Order of the model, of S in `[hansen]`; the singular value criterion proposes one when absent.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,
@@ -35,19 +35,6 @@ pub struct SubspaceOptions {
     pub scaling: ChannelScaling,
     /// The state at the first sample of each experiment.
     pub initial_state: InitialState,
-    /// Whether and how the uncertainty of the estimate is found.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "UncertaintyOptions::is_default"))]
-    pub uncertainty: UncertaintyOptions,
-}
-
-impl SubspaceOptions {
-    /// Largest order that is asked for.
-    pub fn largest_order(&self) -> usize {
-        match self.order {
-            Order::Fixed(order) => order,
-            Order::Auto(auto) => auto.max,
-        }
-    }
 }
 
 /// The method: weight `W1 O W2` of the projection O of the future outputs along the past, and the way to A and C.
@@ -90,82 +77,20 @@ impl SubspaceMethod {
 }
 
 /// How the order is found.
-///
-/// ```
-/// use youla::identify::subspace::{AutoOrder, Order, OrderRule, SubspaceOptions};
-/// let aic = Order::Auto(AutoOrder { rule: OrderRule::Aic, ..AutoOrder::up_to(8) });
-/// assert_eq!(SubspaceOptions { order: aic, ..Default::default() }.order, aic);
-/// ```
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(rename_all = "kebab-case", deny_unknown_fields))]
 pub enum Order {
     /// The order given.
     Fixed(usize),
-    /// The order that a rule proposes.
-    Auto(AutoOrder),
+    /// By the singular value criterion, at most this; the horizon may allow less.
+    Auto(usize),
 }
 
 impl Default for Order {
     fn default() -> Self {
-        Order::Auto(AutoOrder::default())
-    }
-}
-
-/// Choice of the order by a rule.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
-pub struct AutoOrder {
-    /// Largest order to consider; the horizon may allow less.
-    pub max: usize,
-    /// The rule.
-    pub rule: OrderRule,
-    /// Cross-validation only: part of each experiment, from its start, from which the models are found.
-    pub leading: f64,
-    /// Cross-validation only: the lowest order counts whose fit is below the best one by no more than this, percentage
-    /// points.
-    pub tolerance: f64,
-}
-
-impl Default for AutoOrder {
-    fn default() -> Self {
-        AutoOrder { max: 12, rule: OrderRule::default(), leading: 2.0 / 3.0, tolerance: 0.2 }
-    }
-}
-
-impl AutoOrder {
-    /// Orders up to `max`, all else as by default.
-    pub fn up_to(max: usize) -> Self {
-        AutoOrder { max, ..Self::default() }
-    }
-}
-
-/// A rule that proposes an order; the formulas are in `order.rs` and `order_models.rs`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
-pub enum OrderRule {
-    /// Singular value criterion: the first canonical correlation that is left out, squared, and `d(n) log(T) / T`.
-    #[default]
-    Svc,
-    /// As SVC, with the sum over all canonical correlations that are left out.
-    Nic,
-    /// Largest ratio of neighbouring singular values of the chosen weight.
-    Gap,
-    /// Akaike's criterion of the one-step prediction errors of the models of all orders, `log det Lambda + 2 d(n) / N`.
-    Aic,
-    /// Models of all orders from the leading part of each experiment; the order with the best simulated fit on the rest.
-    CrossValidation,
-}
-
-impl OrderRule {
-    /// Whether the rule needs the models of all orders; the others need the singular values only.
-    pub fn needs_models(self) -> bool {
-        matches!(self, OrderRule::Aic | OrderRule::CrossValidation)
+        Order::Auto(12)
     }
 }
 

@@ -4,9 +4,9 @@ use faer::Mat;
 
 /// The matrices through which the states are seen.
 #[derive(Clone)]
-pub(super) struct OutputPair {
+pub(crate) struct OutputPair {
     /// State matrix, n x n.
-    pub(super) a: Mat<f64>,
+    pub(crate) a: Mat<f64>,
     /// Output matrix, p x n.
-    pub(super) c: Mat<f64>,
+    pub(crate) c: Mat<f64>,
 }

@@ -1,14 +1,14 @@
 //! What all orders of one method share: the projection with its singular values, from which a model of any order follows.
 
-use super::factorisation::HankelLq;
-use super::innovation::Innovation;
-use super::open_loop::OpenLoop;
-use super::order::Evidence;
-use super::output_pair::OutputPair;
-use super::predictor_form::PredictorForm;
-use super::stability::{self, StabilityReport};
-use super::{DataFactor, Stability, SubspaceOptions};
 use crate::Result;
+use crate::identify::subspace::innovation::Innovation;
+use crate::identify::subspace::open_loop::OpenLoop;
+use crate::identify::subspace::order::Evidence;
+use crate::identify::subspace::output_pair::OutputPair;
+use crate::identify::subspace::predictor_form::PredictorForm;
+use crate::identify::subspace::stability::{self, StabilityReport};
+use crate::identify::subspace::triangle::factorisation::HankelLq;
+use crate::identify::subspace::{DataFactor, Stability, SubspaceOptions};
 use crate::lti::Discrete;
 
 /// The projection of one method.
@@ -36,7 +36,7 @@ impl Projected {
     }
 
     /// What the choice of the order depends on.
-    pub(super) fn evidence(&self) -> Result<Evidence<'_>> {
+    pub(super) fn evidence(&self) -> Result<Evidence> {
         match self {
             Projected::OpenLoop(shared) => shared.evidence(),
             Projected::Predictor(shared) => Ok(shared.evidence()),

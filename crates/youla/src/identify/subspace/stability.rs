@@ -3,8 +3,8 @@
 //! A reflected pole is `z -> 1 / conj(z)`, which keeps its frequency and the magnitude of its response. Only the unstable
 //! modes change: with right and left eigenvectors v, w of A, `A+ = A + sum (z+ - z) v w' / (w' v)`.
 
-use super::Stability;
-use super::output_pair::OutputPair;
+use crate::identify::subspace::Stability;
+use crate::identify::subspace::output_pair::OutputPair;
 use crate::linalg::{Eigenvectors, check_finite, eigenvalues};
 use crate::lti::{Discrete, TimeDomain};
 use crate::{Error, Result};

@@ -100,12 +100,12 @@ fn reach(equation: Equation, distance: f64, a: MatRef<'_, f64>, b: MatRef<'_, f6
     Ok(match equation {
         Equation::Continuous => {
             let backwards = Mat::from_fn(n, n, |i, j| -a[(i, j)] - if i == j { moved } else { 0.0 });
-            gramian_factor(backwards.as_ref(), b)?.l
+            gramian_factor(backwards.as_ref(), b)?
         }
         Equation::Discrete => {
             let both = solve("the modes that need feedback", a, block(&[&[eye(n).as_ref(), b]]).as_ref())?;
             let (backwards, b) = both.as_ref().split_at_col(n);
-            discrete_gramian_factor((Scale(1.0 - moved.min(0.5)) * backwards).as_ref(), b)?.l
+            discrete_gramian_factor((Scale(1.0 - moved.min(0.5)) * backwards).as_ref(), b)?
         }
     })
 }

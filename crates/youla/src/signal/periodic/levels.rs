@@ -1,7 +1,7 @@
 //! Noise, total variance and distortion as curves over the lines.
 
 use super::LineResponse;
-use faer::{Mat, MatRef, Side, c64};
+use faer::{Mat, Side, c64};
 
 impl LineResponse {
     /// Variance `E |dT_ij|^2` by the noise, at each line.
@@ -31,14 +31,6 @@ impl LineResponse {
         let total = self.total_variance(i, j)?;
         let both = total.iter().zip(self.noise_variance(i, j));
         Some(both.map(|(total, noise)| realisations * (total - noise).max(0.0)).collect())
-    }
-
-    /// Covariance of `vec T` (column-major) by the noise at line number `k`, q m x q m.
-    ///
-    /// # Panics
-    /// If there is no line `k`.
-    pub fn noise_covariance(&self, k: usize) -> Mat<c64> {
-        kronecker(self.excitation[k].as_ref(), self.noise[k].as_ref())
     }
 
     /// Signals at line number `k` as columns whose errors are independent of each other, with the excitation of each.
@@ -73,10 +65,4 @@ pub(crate) struct Excited {
     pub(crate) outputs: Mat<c64>,
     /// Of each column of the signals.
     pub(crate) covariance: Mat<c64>,
-}
-
-/// `M^T (x) C`.
-fn kronecker(m: MatRef<c64>, c: MatRef<c64>) -> Mat<c64> {
-    let (q, inputs) = (c.nrows(), m.nrows());
-    Mat::from_fn(q * inputs, q * inputs, |a, b| m[(b / q, a / q)] * c[(a % q, b % q)])
 }

@@ -1,15 +1,13 @@
-//! The response from records of any excitation: a local model of response and transient over the lines of a window.
+//! The response from records of any excitation: a polynomial model of response and transient over the lines of a window.
 //!
 //! With r the distance from the middle of the window, the transforms of a record obey
 //! ```text
-//! A(r) Z = B(r) D + T(r) + V,    B, T polynomials of degree R,    A = 1 (polynomial) or of degree R, A(0) = 1 (rational)
+//! Z = B(r) D + T(r) + V,    B, T polynomials of degree R
 //! ```
 //! T is what both ends of the record leave; it is smooth like the response and so needs no window function. `B(0)` is the response
-//! in the middle. A is common to all channels of z, which share the poles of the loop: it is found by least squares of the channels
-//! together, B and T eliminated, and keeps the method free of error at a resonance that is narrower than the window.
+//! in the middle.
 //!
-//! Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. (2012), section 7.2; T. McKelvey,
-//! G. Guerin, Non-parametric frequency response estimation using a local rational model, 16th IFAC SYSID (2012), 49.
+//! Source: R. Pintelon, J. Schoukens, System Identification: A Frequency Domain Approach, 2nd ed. (2012), section 7.2.
 
 use super::gather::check_experiment;
 use super::{LineResponse, PeriodicExperiment, invertible};
@@ -27,18 +25,6 @@ const SPARE: usize = 8;
 /// Power of the excitation relative to that of the strongest window, below which a window holds none.
 const EXCITED: f64 = 1e-10;
 
-/// Rest of a channel relative to its power that is rounding.
-const ROUNDING: f64 = 1e-24;
-
-/// What describes the response over a window.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum LocalModel {
-    /// A polynomial: best where the response is smooth over the window.
-    Polynomial,
-    /// A ratio of polynomials: for resonances as narrow as the window.
-    Rational,
-}
-
 /// Transform of one record: `exp(-i omega t)` sums over the root of the number of samples.
 struct Transform {
     samples: usize,
@@ -53,27 +39,22 @@ struct Transform {
 ///
 /// A window has as many lines as leave 8 degrees of freedom where `width` is smaller. `lines` of the result are those in the middle
 /// of the windows; there is no total variance, as one record does not tell distortion from noise. Stated over observed variance, held by
-/// a test: 1.01 for the polynomial, 0.85 for the ratio where the response is smooth.
+/// a test: 1.01.
 ///
 /// # Errors
 /// [`Error::Ports`] without a record, [`Error::Shape`], [`Error::NotFinite`]; [`Error::TooFewSamples`] where no record fills a window;
 /// [`Error::NotExcited`] where no window is excited.
 ///
 /// ```
-/// use youla::{Mat, lti::Discrete, signal::{LocalModel, PeriodicExperiment, local_response}};
+/// use youla::{Mat, lti::Discrete, signal::{PeriodicExperiment, local_response}};
 /// let d = Mat::from_fn(800, 1, |k, _| (1e-3 * (k * k) as f64).sin()); // a swept sine
 /// let z = Mat::from_fn(800, 1, |k, _| if k < 3 { 0.0 } else { 2.0 * d[(k - 3, 0)] });
 /// let record = PeriodicExperiment { d: d.as_ref(), z: z.as_ref() };
-/// let found = local_response(&[record], Discrete::new(1.0)?, LocalModel::Polynomial, 15)?;
+/// let found = local_response(&[record], Discrete::new(1.0)?, 15)?;
 /// assert!((found.response.at(3)[(0, 0)].norm() - 2.0).abs() < 0.01);
 /// # Ok::<(), youla::Error>(())
 /// ```
-pub fn local_response(
-    experiments: &[PeriodicExperiment],
-    time: Discrete,
-    model: LocalModel,
-    width: usize,
-) -> Result<LineResponse> {
+pub fn local_response(experiments: &[PeriodicExperiment], time: Discrete, width: usize) -> Result<LineResponse> {
     let Some(first) = experiments.first() else {
         return Err(Error::Ports { what: "the number of experiments".into(), expected: 1, found: 0 });
     };
@@ -94,7 +75,7 @@ pub fn local_response(
     let windows: Vec<Window> = centres.par_iter().map(window).collect();
     let strongest = windows.iter().map(|w| w.power).fold(0.0, f64::max);
     let estimate = |(centre, w): (&usize, &Window)| {
-        (w.power > EXCITED * strongest).then(|| w.estimate(m, model)).flatten().map(|found| (*centre, found))
+        (w.power > EXCITED * strongest).then(|| w.estimate(m)).flatten().map(|found| (*centre, found))
     };
     let found: Vec<(usize, Local)> = centres.par_iter().zip(&windows).filter_map(estimate).collect();
     if found.is_empty() {
@@ -155,8 +136,6 @@ struct Window {
     theta: Mat<c64>,
     /// z, columns are lines.
     z: Mat<c64>,
-    /// r
-    distance: Vec<f64>,
     power: f64,
 }
 
@@ -192,101 +171,20 @@ impl Window {
         });
         let z = Mat::from_fn(q, rows.len(), |i, l| transforms[rows[l].0].z[(rows[l].1, i)]);
         let power = rows.iter().map(|(e, k, _)| transforms[*e].d.row(*k).squared_norm_l2()).sum();
-        Window { theta, z, distance: rows.iter().map(|(.., r)| *r).collect(), power }
+        Window { theta, z, power }
     }
 
     /// `None` where the lines do not excite the inputs independently.
-    fn estimate(&self, m: usize, model: LocalModel) -> Option<Local> {
+    fn estimate(&self, m: usize) -> Option<Local> {
         let inverse = invertible(&self.theta * self.theta.adjoint())?;
-        let fitted = |z: &Mat<c64>| z * self.theta.adjoint() * &inverse;
-        let rest = |z: &Mat<c64>| z - fitted(z) * &self.theta;
-        let denominator = match model {
-            LocalModel::Polynomial => None,
-            LocalModel::Rational => Some(self.denominator(&rest)?),
-        };
-        let spent = if denominator.is_some() { DEGREE as f64 / self.z.nrows() as f64 } else { 0.0 };
-        let spare = self.theta.ncols() as f64 - self.theta.nrows() as f64 - spent;
+        let spare = self.theta.ncols() as f64 - self.theta.nrows() as f64;
         if spare < 1.0 {
             return None;
         }
-        // The noise in A Z is A V: its variance goes with |A|^2, which is one in the middle.
-        let gains = denominator.as_ref().map_or_else(|| vec![c64::ONE; self.z.ncols()], |d| self.gains(&d.a));
-        let z = Mat::from_fn(self.z.nrows(), self.z.ncols(), |i, l| self.z[(i, l)] * gains[l]);
-        let (all, left) = (fitted(&z), rest(&z));
-        let mean = gains.iter().map(|a| a.norm_sqr()).sum::<f64>() / gains.len() as f64;
-        let c = &left * left.adjoint() * Scale(c64::new(1.0 / (spare * mean), 0.0));
-        let weighed = Mat::from_fn(self.theta.nrows(), self.theta.ncols(), |i, l| self.theta[(i, l)] * gains[l].norm());
-        let sandwich = &inverse * (&weighed * weighed.adjoint()) * &inverse;
-        let of_numerator = sandwich.submatrix(0, 0, m, m).to_owned();
-        let more = denominator.map_or(1.0, |d| {
-            let slopes = |s: usize| fitted(&self.power(s)).subcols(0, m).to_owned();
-            d.inflation(&(1..=DEGREE).map(slopes).collect::<Vec<_>>(), &c, &of_numerator)
-        });
-        Some(Local { t: all.subcols(0, m).to_owned(), m: of_numerator * Scale(c64::new(more, 0.0)), c, spare })
-    }
-
-    /// `r^s Z`
-    fn power(&self, s: usize) -> Mat<c64> {
-        Mat::from_fn(self.z.nrows(), self.z.ncols(), |i, l| self.z[(i, l)] * self.distance[l].powi(s as i32))
-    }
-
-    /// A at each line.
-    fn gains(&self, a: &Mat<c64>) -> Vec<c64> {
-        let of = |r: &f64| (1..=DEGREE).fold(c64::ONE, |sum, s| sum + a[(s - 1, 0)] * r.powi(s as i32));
-        self.distance.iter().map(of).collect()
-    }
-
-    /// The A whose rest is smallest, each channel in units of its own rest.
-    fn denominator(&self, rest: &dyn Fn(&Mat<c64>) -> Mat<c64>) -> Option<Denominator> {
-        let (q, lines) = (self.z.nrows(), self.z.ncols());
-        let powers: Vec<Mat<c64>> = (0..=DEGREE).map(|s| rest(&self.power(s))).collect();
-        let (mut normal, mut right) = (Mat::<c64>::zeros(DEGREE, DEGREE), Mat::<c64>::zeros(DEGREE, 1));
-        let weights: Vec<f64> = (0..q)
-            .map(|i| {
-                let (left, all) = (powers[0].row(i).squared_norm_l2(), self.z.row(i).squared_norm_l2());
-                if left > ROUNDING * all { left } else { f64::INFINITY }
-            })
-            .collect();
-        for (i, weight) in weights.iter().enumerate() {
-            let product = |a: usize, b: usize| -> c64 {
-                (0..lines).map(|l| powers[a][(i, l)].conj() * powers[b][(i, l)]).sum::<c64>() / weight
-            };
-            for a in 1..=DEGREE {
-                right[(a - 1, 0)] -= product(a, 0);
-                (1..=DEGREE).for_each(|b| normal[(a - 1, b - 1)] += product(a, b));
-            }
-        }
-        // where nothing is left, the polynomial is exact
-        let inverse = invertible(normal).unwrap_or_else(|| Mat::zeros(DEGREE, DEGREE));
-        Some(Denominator { a: &inverse * right, inverse, weights })
-    }
-}
-
-/// The polynomial A.
-struct Denominator {
-    /// Its coefficients without that of degree zero, which is one.
-    a: Mat<c64>,
-    /// Their covariance in units of the rest over its weight.
-    inverse: Mat<c64>,
-    /// Of the channels.
-    weights: Vec<f64>,
-}
-
-impl Denominator {
-    /// By how much the errors of A increase the variance of the response, mean over its entries; `slopes` are those of the response in
-    /// the coefficients.
-    fn inflation(&self, slopes: &[Mat<c64>], c: &Mat<c64>, of_numerator: &Mat<c64>) -> f64 {
-        let (q, m) = (c.nrows(), of_numerator.nrows());
-        let share = (0..q).map(|i| c[(i, i)].re / self.weights[i]).fold(0.0, f64::max);
-        let of = |(i, j): (usize, usize)| {
-            let pairs = (0..DEGREE).flat_map(|a| (0..DEGREE).map(move |b| (a, b)));
-            let more: c64 =
-                pairs.map(|(a, b)| slopes[a][(i, j)] * self.inverse[(a, b)] * slopes[b][(i, j)].conj()).sum();
-            share * more.re / (c[(i, i)].re * of_numerator[(j, j)].re).max(f64::MIN_POSITIVE)
-        };
-        let determined: Vec<usize> = (0..q).filter(|i| self.weights[*i].is_finite()).collect();
-        let all = determined.iter().flat_map(|i| (0..m).map(|j| of((*i, j)))).sum::<f64>();
-        1.0 + all / (determined.len() * m).max(1) as f64
+        let all = &self.z * self.theta.adjoint() * &inverse;
+        let left = &self.z - &all * &self.theta;
+        let c = &left * left.adjoint() * Scale(c64::new(1.0 / spare, 0.0));
+        Some(Local { t: all.subcols(0, m).to_owned(), m: inverse.submatrix(0, 0, m, m).to_owned(), c, spare })
     }
 }
 
@@ -325,51 +223,30 @@ mod tests {
         ([d, z], plant)
     }
 
-    fn response(d: &Mat<f64>, z: &Mat<f64>, model: LocalModel, width: usize) -> LineResponse {
+    fn response(d: &Mat<f64>, z: &Mat<f64>, width: usize) -> LineResponse {
         let record = PeriodicExperiment { d: d.as_ref(), z: z.as_ref() };
-        local_response(&[record], Discrete::new(1.0).unwrap(), model, width).unwrap()
-    }
-
-    /// Damping 0.003, the width of the mode at half power 1.5 lines of the record, no noise: what is left is leakage.
-    #[test]
-    fn a_ratio_of_polynomials_follows_a_narrow_mode() {
-        let (mut polynomial, mut rational) = (0.0f64, 0.0f64);
-        for seed in 0..10 {
-            let ([d, z], plant) = record(4096, 0.003, (0.0, 0.0), seed);
-            let worst = |model: LocalModel| {
-                let found = response(&d, &z, model, 15).plant().unwrap().response;
-                let exact = frequency_response(&plant, &found.omega).unwrap();
-                let size = exact.iter().map(|g| g[(0, 0)].norm()).fold(0.0, f64::max);
-                found.iter().zip(exact.iter()).map(|(a, b)| (a[(0, 0)] - b[(0, 0)]).norm() / size).fold(0.0, f64::max)
-            };
-            polynomial += worst(LocalModel::Polynomial) / 10.0;
-            rational += worst(LocalModel::Rational) / 10.0;
-        }
-        assert!(rational < polynomial / 3.0, "{rational} {polynomial}");
+        local_response(&[record], Discrete::new(1.0).unwrap(), width).unwrap()
     }
 
     /// In a loop with noise, well damped: stated over observed variance of the closed loop and of the plant.
     #[test]
     fn the_stated_variance_is_the_observed_one() {
-        // The errors of A are counted to first order only, which states a sixth too little.
-        for (model, noise, least) in [(LocalModel::Polynomial, 0.5, 0.85), (LocalModel::Rational, 0.05, 0.75)] {
-            let mut sums = [[0.0; 2]; 2];
-            for seed in 0..40 {
-                let ([d, z], plant) = record(3000, 0.5, (noise, -0.4), seed);
-                let closed = response(&d, &z, model, 15);
-                let found = closed.plant().unwrap();
-                let exact = frequency_response(&plant, &found.response.omega).unwrap();
-                let of_loop: Vec<c64> = exact.iter().map(|g| g[(0, 0)] / (1.0 + 0.4 * g[(0, 0)])).collect();
-                for k in 0..found.lines.len() {
-                    sums[0][0] += closed.noise_variance(1, 0)[k];
-                    sums[0][1] += (closed.response.at(k)[(1, 0)] - of_loop[k]).norm_sqr();
-                    sums[1][0] += found.noise_variance(0, 0)[k];
-                    sums[1][1] += (found.response.at(k)[(0, 0)] - exact.at(k)[(0, 0)]).norm_sqr();
-                }
+        let mut sums = [[0.0; 2]; 2];
+        for seed in 0..40 {
+            let ([d, z], plant) = record(3000, 0.5, (0.5, -0.4), seed);
+            let closed = response(&d, &z, 15);
+            let found = closed.plant().unwrap();
+            let exact = frequency_response(&plant, &found.response.omega).unwrap();
+            let of_loop: Vec<c64> = exact.iter().map(|g| g[(0, 0)] / (1.0 + 0.4 * g[(0, 0)])).collect();
+            for k in 0..found.lines.len() {
+                sums[0][0] += closed.noise_variance(1, 0)[k];
+                sums[0][1] += (closed.response.at(k)[(1, 0)] - of_loop[k]).norm_sqr();
+                sums[1][0] += found.noise_variance(0, 0)[k];
+                sums[1][1] += (found.response.at(k)[(0, 0)] - exact.at(k)[(0, 0)]).norm_sqr();
             }
-            let ratios = sums.map(|[stated, observed]| stated / observed);
-            assert!(ratios.iter().all(|r| (least..1.15).contains(r)), "{model:?} {ratios:?}");
         }
+        let ratios = sums.map(|[stated, observed]| stated / observed);
+        assert!(ratios.iter().all(|r| (0.85..1.15).contains(r)), "{ratios:?}");
     }
 
     #[test]
@@ -381,8 +258,8 @@ mod tests {
             PeriodicExperiment { d: short.as_ref(), z: of_short.as_ref() },
         ];
         let time = Discrete::new(1.0).unwrap();
-        let both = local_response(&records, time, LocalModel::Polynomial, 15).unwrap();
-        let one = local_response(&records[..1], time, LocalModel::Polynomial, 15).unwrap();
+        let both = local_response(&records, time, 15).unwrap();
+        let one = local_response(&records[..1], time, 15).unwrap();
         assert!(both.noise_variance(1, 0)[5] < one.noise_variance(1, 0)[5]);
         let exact = frequency_response(&plant, &both.response.omega).unwrap();
         let error =
@@ -390,7 +267,7 @@ mod tests {
         assert!((0..both.lines.len()).all(|k| error(k) < 5.0));
         let says = |d: &Mat<f64>, z: &Mat<f64>, part: &str| {
             let record = PeriodicExperiment { d: d.as_ref(), z: z.as_ref() };
-            let message = local_response(&[record], time, LocalModel::Polynomial, 15).unwrap_err().to_string();
+            let message = local_response(&[record], time, 15).unwrap_err().to_string();
             assert!(message.contains(part), "{message}");
         };
         says(&Mat::zeros(100, 1), &Mat::zeros(100, 1), "have no power, or depend on each other, around");

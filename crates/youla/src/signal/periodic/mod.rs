@@ -14,7 +14,6 @@
 //! J. Schoukens, K. Godfrey, M. Schoukens, IEEE Control Syst. Mag. 38(4) (2018), 49.
 
 mod agreement;
-mod detection;
 mod gather;
 mod interpolate;
 mod levels;
@@ -23,9 +22,8 @@ mod period;
 mod settling;
 
 pub use agreement::LineGroup;
-pub use detection::{DetectionLines, detection_lines};
 pub(crate) use levels::Excited;
-pub use local::{LocalModel, local_response};
+pub use local::local_response;
 pub use period::{ExcitationPeriod, detect_period};
 
 use crate::lti::{Discrete, FrequencyResponse};

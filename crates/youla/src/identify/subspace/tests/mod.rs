@@ -1,11 +1,9 @@
 mod closed_loop;
 mod disturbance;
-mod horizons;
 mod options;
 mod orders;
 mod properties;
 mod recovery;
-mod stabilisation;
 mod structure;
 mod sums;
 
@@ -92,17 +90,4 @@ fn fixed(order: usize, horizon: usize) -> SubspaceOptions {
         feedthrough: Feedthrough::Estimated,
         ..Default::default()
     }
-}
-
-/// The bearing of the paper at 5 kHz, in open loop: inputs of +-0.5 V held for 8 samples, white output noise (um).
-fn bearing_record(samples: usize, noise: f64, seed: u64) -> (Mat<f64>, Mat<f64>, Discrete) {
-    use rand_distr::StandardNormal;
-    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
-    let time = Discrete::new(1.0 / 5000.0).unwrap();
-    let plant = crate::fixtures::bearing().balanced().unwrap().zoh(time).unwrap();
-    let levels = Mat::from_fn(samples.div_ceil(8), 2, |_, _| if rng.random::<bool>() { 0.5 } else { -0.5 });
-    let u = Mat::from_fn(samples, 2, |k, j| levels[(k / 8, j)]);
-    let clean = crate::lti::simulate(&plant, u.as_ref(), &[0.0; 6]).unwrap();
-    let y = Mat::from_fn(samples, 2, |k, j| clean[(k, j)] + noise * rng.sample::<f64, _>(StandardNormal));
-    (u, y, time)
 }

@@ -108,10 +108,7 @@ fn options_read_from_a_table_and_refuse_unknown_names() {
         ..Default::default()
     };
     assert_eq!(options, expected);
-    assert_eq!(
-        toml::from_str::<SubspaceOptions>("order = { auto = { max = 6 } }").unwrap().order,
-        Order::Auto(AutoOrder::up_to(6))
-    );
+    assert_eq!(toml::from_str::<SubspaceOptions>("order = { auto = 6 }").unwrap().order, Order::Auto(6));
     assert!(toml::from_str::<SubspaceOptions>("wieght = 'cva'").is_err());
     assert!(toml::from_str::<SubspaceOptions>("method = 'cav'").is_err());
 }

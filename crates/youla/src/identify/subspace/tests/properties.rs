@@ -19,7 +19,7 @@ const HORIZON: usize = 8;
 fn options(method: SubspaceMethod) -> SubspaceOptions {
     SubspaceOptions {
         method,
-        horizon: Horizon::Fixed { future: HORIZON, past: PAST },
+        horizon: Horizon { future: HORIZON, past: PAST },
         feedthrough: Feedthrough::None,
         ..fixed(4, HORIZON)
     }

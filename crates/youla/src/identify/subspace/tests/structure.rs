@@ -34,7 +34,7 @@ fn marked_entries_of_d_are_found_and_the_others_stay_zero() {
         for method in WEIGHTS {
             let feedthrough = Feedthrough::Entries(marks());
             let options =
-                SubspaceOptions { method, horizon: Horizon::Fixed { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
+                SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap().model;
             let error = distance(&found, &system);
             let limit = if noise > 0.0 { 0.1 } else { 1e-8 };
@@ -53,8 +53,7 @@ fn all_entries_or_none_are_the_other_choices() {
     let u = uniform(700, 2, rng);
     let y = respond(&system, &u, 0.3, None) + 0.1 * uniform(700, 3, rng);
     let with = |method, feedthrough| {
-        let options =
-            SubspaceOptions { method, horizon: Horizon::Fixed { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
+        let options = SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
         subspace(&one(&u, &y), clock(), &options).map(|found| found.model)
     };
     for method in WEIGHTS {
@@ -86,12 +85,8 @@ fn delays_are_states_of_the_model() {
         let u = uniform(900, 2, rng);
         let delayed = Mat::from_fn(900, 2, |k, j| if j == 0 && k >= 3 { u[(k - 3, 0)] } else { u[(k, 1)] * j as f64 });
         let y = respond(&system, &delayed, 0.3, None);
-        let options = SubspaceOptions {
-            method,
-            horizon: Horizon::Fixed { future: 6, past: 9 },
-            delays: vec![3, 0],
-            ..fixed(4, 6)
-        };
+        let options =
+            SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, delays: vec![3, 0], ..fixed(4, 6) };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!((found.order.order, found.model.order(), found.delays.clone()), (4, 7, vec![3, 0]));
         assert_eq!((found.columns, found.poles().len()), (900 - 3 - 14, 7));
@@ -124,7 +119,7 @@ fn unfit_delays_are_refused() {
 fn the_deviation_system_may_be_delayed() {
     let delayed = |seed| {
         let plain = random_system(&[0.8], 1, 1, false, seed);
-        super::super::delay::Delays::new(&[2], 1).unwrap().put_before(plain).unwrap()
+        Delays::new(&[2], 1).unwrap().put_before(plain).unwrap()
     };
     let (plant, nominal) = (delayed(31), delayed(32));
     let f = Mat::from_fn(1, 4, |_, j| [0.05, -0.04, 0.1, 0.05][j]);
@@ -137,7 +132,7 @@ fn the_deviation_system_may_be_delayed() {
     let signals = factors.signals(z.as_ref().subcols(0, 1), z.as_ref().subcols(1, 1)).unwrap();
     let feedthrough = Feedthrough::None;
     let options = SubspaceOptions { delays: vec![2], feedthrough, stability: Stability::Allow, ..fixed(8, 14) };
-    let found = crate::identify::hansen::hansen(&factors, &[signals], &options.into()).unwrap();
+    let found = crate::identify::hansen::hansen(&factors, &[signals], &options).unwrap();
     assert_eq!(found.deviation.model.order(), 10);
     let error = distance(&found.plant, &plant);
     assert!(error < 1e-5, "{error:.1e}");

@@ -45,10 +45,9 @@ fn pieces_leave_no_seam() {
     let options = SubspaceOptions { scaling: ChannelScaling::None, ..fixed(4, 3) };
     for factorisation in [Factorisation::Gram, Factorisation::Qr] {
         let options = SubspaceOptions { factorisation, ..options.clone() };
-        let channels = super::super::channels::Channels::new(&experiments, &options).unwrap();
-        let layout = super::super::hankel_layout::HankelLayout::of(&options);
-        let triangle =
-            super::super::factorisation::HankelLq::new(&channels, (3, 3), layout, options.factorisation).unwrap();
+        let channels = Channels::new(&experiments, &options).unwrap();
+        let layout = HankelLayout::of(&options);
+        let triangle = HankelLq::new(&channels, (3, 3), layout, options.factorisation).unwrap();
         let hankel: Vec<Mat<f64>> = records
             .iter()
             .map(|(u, y)| {
@@ -62,7 +61,7 @@ fn pieces_leave_no_seam() {
             })
             .collect();
         let gram = hankel.iter().fold(Mat::zeros(24, 24), |sum, h| sum + h.transpose() * h);
-        let r = triangle.arranged(super::super::hankel_layout::HankelLayout::InputsFirst, 3, 3).unwrap();
+        let r = triangle.arranged(HankelLayout::InputsFirst, 3, 3).unwrap();
         let error = (r.transpose() * &r - &gram).norm_max() / gram.norm_max();
         assert!(error < 1e-12, "{factorisation:?}: {error:.1e}");
     }

@@ -24,7 +24,7 @@ Records = Record | Sequence[Record]
 
 #: Tables of run.toml that are keywords.
 OPTIONS = (
-    "recommended", "factors", "hansen", "deviation", "direct", "reduction", "grey_box", "certificate", "redesign",
+    "recommended", "factors", "hansen", "direct", "reduction", "grey_box", "certificate", "redesign",
     "verification", "check", "frequency_response", "data",
 )  # fmt: skip
 
@@ -71,7 +71,7 @@ def identify(
         Name of the machine; that of the first record when absent.
     **options : mapping
         Tables of run.toml as keywords: ``recommended``, ``hansen``, ``direct``, ``reduction``, ``grey_box``,
-        ``certificate``, ``redesign``, ``verification``, ``check``, ``factors``, ``deviation``, ``frequency_response``, and
+        ``certificate``, ``redesign``, ``verification``, ``check``, ``factors``, ``frequency_response``, and
         ``data`` for ``detrend`` and ``disturbance``.
 
     Returns

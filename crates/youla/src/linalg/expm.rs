@@ -27,7 +27,7 @@ const LARGEST_NORM: f64 = 1e30;
 ///
 /// Backward stable up to the squarings: relative error near machine precision times the condition number of the
 /// exponential (held by `inverse_is_the_exponential_of_the_negative` and `rotation_and_decay_have_closed_forms`). Balance
-/// badly scaled matrices first ([`crate::linalg::eigen::balance`]).
+/// badly scaled matrices first ([`crate::linalg::balance`]).
 ///
 /// # Errors
 /// [`Error::Shape`] unless square; [`Error::NotFinite`] for a bad entry, also where the exponential overflows;

@@ -1,18 +1,16 @@
 """Runs the program on mutated inputs under limits of memory and time, and reports every exit code but those documented.
 
-    python3 fuzz/programs.py target/debug/youla [runs] [first seed]      needs numpy, scipy, h5py and pyarrow
+    python3 fuzz/programs.py target/debug/youla [runs] [first seed]      needs numpy, scipy and h5py
 
 Each run takes a small log in one of its formats, a run.toml, a run folder or a model, changes it, and starts a verb on it with 1 GB
 of memory (`ulimit -v`) and 20 s. Allowed are the exit codes 0, 2 and 3, and 1 of `check`."""
 import gzip, json, os, pathlib, random, resource, shutil, subprocess, sys, tempfile, time
 import h5py
 import numpy as np
-import pyarrow as pa
-import pyarrow.parquet as pq
 from scipy.io import savemat
 
 MEMORY, SECONDS, ROWS = 1_000_000 << 10, 20, 700
-FORMATS = {'csv': '', 'csv.gz': '', 'npz': '', 'mat': '', 'h5': '', 'parquet': ''}
+FORMATS = {'csv': '', 'csv.gz': '', 'npz': '', 'mat': '', 'h5': ''}
 NUMBERS = ['0', '-1', '1', '2', '1e300', '-1e300', '1e-300', '5e-324', '1e308', 'nan', 'inf', '-inf', '100000', '1000000000', '18446744073709551615', '-0.0', '0.5',
            'true', '""', '[]', '{}', '"\\u001b[2J"', '[[]]', '[1e300]', '[nan]', '[0.0]']
 VALUES = [np.nan, np.inf, -np.inf, 1e300, -1e300, 1e308, 5e-324, 1e-300, 0.0, 1e30, -1e17]
@@ -60,7 +58,6 @@ def write(path, data, form):
     elif form == 'csv.gz': path.write_bytes(gzip.compress(text(), 1))
     elif form == 'npz': np.savez_compressed(path, **{n: data[:, j] for j, n in enumerate(names)})
     elif form == 'mat': savemat(path, {n: data[:, j] for j, n in enumerate(names)}, do_compression=True)
-    elif form == 'parquet': pq.write_table(pa.table({n: data[:, j] for j, n in enumerate(names)}), path)
     else:
         with h5py.File(path, 'w') as file:
             for j, n in enumerate(names):

@@ -1,11 +1,8 @@
 """Writes the seeds of the fuzz targets to crates/youla-io/tests/seeds: synthetic, a few hundred bytes each.
-Needs numpy, scipy, h5py, pyarrow and polars; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
+Needs numpy, scipy and h5py; the folders run_toml, paper_toml, rig_toml and structure also take what ships with the project."""
 import gzip, hashlib, io, json, math, pathlib, struct
 import h5py
 import numpy as np
-import polars
-import pyarrow as pa
-import pyarrow.parquet as pq
 from scipy.io import savemat
 
 root = pathlib.Path(__file__).resolve().parent.parent
@@ -45,11 +42,6 @@ def classed(group, name, data, matlab_class, **options):
     dataset.attrs['MATLAB_class'] = np.bytes_(matlab_class)
     return dataset
 
-
-def parquet(table, **options):
-    out = io.BytesIO()
-    pq.write_table(table, out, store_schema=False, **options)
-    return out.getvalue()
 
 
 def array(data):
@@ -100,24 +92,6 @@ model = {'a': np.eye(2) / 2, 'b': np.ones((2, 1)), 'c': np.ones((1, 2)), 'd': np
 put('model', 'model.mat', matlab({**model, 'inputs': np.array([['u']], dtype=object)}, False))
 put('npz', 'two.npz', saved(u=np.arange(4.0), y=np.arange(4, dtype=np.float32).reshape(2, 2)))
 put('npz', 'text.npz', saved(names=np.array(['u', 'y']), n=np.int16(3)))
-k = np.arange(40)
-log = pa.table({
-    't': pa.array(1763000000123456789 + 1000000 * k, pa.timestamp('ns')), 'u [V]': k**2 / 8, 'y.1': (k / 4).astype(np.float32),
-    'gap': pa.array(k * 1.0, mask=k == 30), 'count': np.full(40, 2**32 - 1, dtype=np.uint32), 'whole': 1000 - 7 * k, 'on': k % 2 == 1,
-    'note': ['x'] * 40, 'none': pa.nulls(40, pa.float64())})
-put('parquet', 'snappy.parquet', parquet(log, compression='snappy', row_group_size=25, write_statistics=False))
-put('parquet', 'plain.parquet', parquet(log, compression='none', use_dictionary=False, write_statistics=False))
-put('parquet', 'lz4.parquet', parquet(log, compression='lz4', data_page_version='2.0', write_page_checksum=True))
-put('parquet', 'brotli.parquet', parquet(log.select(['u [V]']), compression='brotli'))
-# What `bombs.rs` makes more of: eight megabytes in one page.
-put('bombs', 'zeros.parquet', parquet(pa.table({'x': np.zeros(1_000_000)}), compression='zstd', use_dictionary=False,
-                                      max_rows_per_page=1_000_000, data_page_size=1 << 24))
-encodings = {'u [V]': 'BYTE_STREAM_SPLIT', 'y.1': 'BYTE_STREAM_SPLIT', 'whole': 'DELTA_BINARY_PACKED', 'count': 'DELTA_BINARY_PACKED',
-             't': 'DELTA_BINARY_PACKED', 'on': 'RLE'}
-put('parquet', 'gzip.parquet', parquet(log, compression='gzip', use_dictionary=False, column_encoding=encodings, data_page_version='2.0'))
-out = io.BytesIO()
-polars.from_arrow(log).write_parquet(out, compression='zstd')
-put('parquet', 'zstd.parquet', out.getvalue())
 put('run_toml', 'drive.toml', (root / 'examples/flexible-drive/run.toml').read_bytes())
 put('subspace_toml', 'options.toml', 'horizon = 20\nmethod = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
 put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = 4\nstability = "allow"\n')

@@ -68,6 +68,6 @@ fn methods_rank_as_expected() {
     let raw = raw_factors(factors, s, 6);
     let (open, _) = errors(&model, &raw);
     assert!(open > 1.0, "{open}");
-    let loop_poles = certify(&raw, &found.declared.controller).unwrap();
+    let loop_poles = certify(&raw, found.declared.controller()).unwrap();
     assert!(!loop_poles.stable, "{:?}", loop_poles.worst_pole);
 }

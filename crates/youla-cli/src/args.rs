@@ -97,11 +97,7 @@ pub(crate) enum Command {
     #[command(
         after_help = "Example:\n  youla schema > run.schema.json\n\nand, as the first line of run.toml: #:schema run.schema.json"
     )]
-    Schema {
-        /// Print the reference of all keys in Markdown instead.
-        #[arg(long)]
-        markdown: bool,
-    },
+    Schema,
     /// Draw report.html of a run again from its report.json.
     #[command(after_help = "Example:\n  youla report runs/demo-levitated-mass-001")]
     Report {

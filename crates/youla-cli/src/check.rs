@@ -22,7 +22,7 @@ Exit codes: 0 no defect, 1 a defect was found, 2 the input cannot be read, 3 a t
 /// What is to be checked.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
-    /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one record each.
+    /// A run.toml; or, with --input and --output, text, MATLAB or NumPy files, one record each.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]

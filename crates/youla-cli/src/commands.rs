@@ -8,8 +8,8 @@ use crate::{check, commission, compare, excite, export, init, paper, plot, rig, 
 use std::path::Path;
 use youla_io::folder::{NumberedFolder, RunFolder};
 use youla_run::{
-    RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_reference,
-    settings_schema, signal_records, write_run, write_signals,
+    RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_schema,
+    signal_records, write_run, write_signals,
 };
 
 /// Runs the verb that was asked for; false where a check found a defect or a campaign stopped.
@@ -32,7 +32,7 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
             let (settings, folder) = args.settings()?;
             identify_and_write(form, &args.output_folder, &folder, settings, |s| read_records(&s.data, &folder))
         }
-        Command::Schema { markdown } => schema(*markdown),
+        Command::Schema => say(&format!("{:#}", settings_schema())),
         Command::Init(args) => init::init(form, args),
         Command::Signals { settings, out } => signals(form, settings, out),
         Command::Report { run } => report(form, run),
@@ -62,8 +62,7 @@ fn identify_and_write(
     RunFolder::check(target, output.force)?;
     let progress = Progress::new(form.is_silent());
     let mut announce = |stage: Stage| {
-        let position = 1 + Stage::ALL.iter().position(|s| *s == stage).unwrap_or_default();
-        progress.show(&format!("[{position}/{}] {}", Stage::ALL.len(), stage.name()));
+        progress.show(&format!("[{}/{}] {}", stage as usize + 1, Stage::COUNT, stage.name()));
     };
     let mut clock = StageClock::new(&mut announce);
     let records = clock.run(Stage::Record, || read(&settings))?;
@@ -89,13 +88,6 @@ fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {
         || written.iter().map(|(samples, file)| serde_json::json!({ "file": file, "samples": samples })).collect(),
         || written.iter().map(|(samples, file)| format!("{file} ({samples} samples)")).collect::<Vec<_>>().join("\n"),
     )
-}
-
-fn schema(markdown: bool) -> Result<(), Failure> {
-    match markdown {
-        true => say(settings_reference().trim_end()),
-        false => say(&format!("{:#}", settings_schema())),
-    }
 }
 
 fn report(form: Form, run: &Path) -> Result<(), Failure> {

@@ -20,7 +20,7 @@ The controller may also be JSON as [controller] of run.toml:
 /// What is to be identified.
 #[derive(Debug, Args)]
 pub(crate) struct IdentifyArgs {
-    /// A run.toml; or, with --input and --output, text, MATLAB, NumPy or Parquet files, one estimation record each.
+    /// A run.toml; or, with --input and --output, text, MATLAB or NumPy files, one estimation record each.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
     #[command(flatten)]

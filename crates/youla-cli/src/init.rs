@@ -18,7 +18,7 @@ Example:
 /// What is known of a log.
 #[derive(Debug, Args)]
 pub(crate) struct InitArgs {
-    /// The log: text, MATLAB, NumPy or Parquet.
+    /// The log: text, MATLAB or NumPy.
     #[arg(value_name = "LOG")]
     log: PathBuf,
     /// Inputs of the plant, by name or as #3 for the third column, separated by commas.

@@ -12,15 +12,14 @@
 //! | [`read_npz`] | NumPy archives |
 //! | [`read_uff58`] | universal files, dataset 58: measured responses |
 //! | [`read_response`] | tables of measured responses |
-//! | [`read_parquet`], `ParquetWriter` | Parquet, with the feature `parquet` |
-//! | [`Variables`] | the contents of a MATLAB, NumPy or Parquet file, by path |
+//! | [`Variables`] | the contents of a MATLAB or NumPy file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
 //! | [`ModelFile`] | the JSON form of a discrete-time model |
 //! | [`export`] | models, controllers and sequences for C, Python, MATLAB; import of models |
 //! | [`folder`] | a folder of results that appears only when it is complete |
 //! | [`toml_file`] | settings in TOML, with errors that state line, column and key |
 //!
-//! The features `mat73` and `parquet` are off by default; a file of a disabled format is refused with the name of its feature.
+//! The feature `mat73` is off by default; without it a file of version 7.3 is refused with the name of the feature.
 //!
 //! ```
 //! use youla_io::{ChannelSpec, CsvOptions, TimeSource, csv_from_bytes};
@@ -36,22 +35,20 @@
 mod assemble;
 mod choose;
 mod csv;
-#[cfg(not(all(feature = "mat73", feature = "parquet")))]
+#[cfg(not(feature = "mat73"))]
 mod disabled;
 mod error;
 pub mod export;
 pub mod folder;
 #[cfg(feature = "mat73")]
 mod hdf;
-#[cfg(any(feature = "mat73", feature = "parquet"))]
+#[cfg(feature = "mat73")]
 mod limits;
 mod matfile;
 mod matrices;
 mod model_file;
 mod npz;
 mod open;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod response;
 #[cfg(test)]
 pub(crate) mod scratch;
@@ -66,17 +63,12 @@ pub use choose::{ChannelRef, ChannelSpec};
 pub use csv::{CsvOptions, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
 #[cfg(not(feature = "mat73"))]
 use disabled::hdf;
-#[cfg(not(feature = "parquet"))]
-use disabled::parquet;
 pub use error::{CorruptAt, Error, Result, TextPosition};
 pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
 pub use matrices::{Rows, SystemMatrices};
 pub use model_file::ModelFile;
 pub use npz::{npz_from_bytes, read_npz};
 pub use open::{open, read_text};
-#[cfg(feature = "parquet")]
-pub use parquet::{ColumnValues, ParquetWriter};
-pub use parquet::{parquet_from_bytes, read_parquet};
 pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};

@@ -7,7 +7,6 @@ use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::read_npz;
 use crate::open::open;
-use crate::parquet;
 use crate::time::TimeSource;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -19,7 +18,7 @@ use youla::signal::Record;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// By the first bytes of the file (MATLAB, HDF5, zip, Parquet), else text.
+    /// By the first bytes of the file (MATLAB, HDF5, zip), else text.
     #[default]
     Detect,
     /// Text, see [`crate::read_csv`].
@@ -28,8 +27,6 @@ pub enum Format {
     Mat,
     /// NumPy archive, see [`read_npz`].
     Npz,
-    /// Parquet, see [`crate::read_parquet`].
-    Parquet,
 }
 
 /// A file, its clock and the channels to take from it.
@@ -84,11 +81,6 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
     let variables = match resolve(source)? {
         Format::Mat => read_mat(&source.path)?,
         Format::Npz => read_npz(&source.path)?,
-        Format::Parquet => {
-            let references: Vec<_> =
-                source.channels.iter().map(ChannelSpec::source).chain(source.time.column.clone()).collect();
-            parquet::read_columns(&source.path, &references)?
-        }
         Format::Csv | Format::Detect => {
             return read_csv_parts(&source.path, &source.channels, &source.time, &source.csv);
         }
@@ -133,7 +125,10 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
     read.map_err(|e| Error::Io { path: source.path.clone(), source: e })?;
     Ok(match &start[..] {
         [b'P', b'K', 3, 4, ..] => Format::Npz,
-        start if start.starts_with(b"PAR1") => Format::Parquet,
+        start if start.starts_with(b"PAR1") => {
+            let remedy = "save the data as CSV or NPZ, or read it by the Python package";
+            return Err(Error::FormatNotRead { path: source.path.clone(), found: "a Parquet file", remedy });
+        }
         start if start.starts_with(b"MATLAB") || start.starts_with(b"\x89HDF") => Format::Mat,
         _ if source.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("mat")) => Format::Mat,
         _ => Format::Csv,

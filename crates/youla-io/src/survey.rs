@@ -5,7 +5,6 @@ use crate::csv::{CsvOptions, column_names, read_csv};
 use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::read_npz;
-use crate::parquet::read_parquet;
 use crate::source::{Format, Source, resolve};
 use crate::time::TimeSource;
 use crate::values::{Value, Variables};
@@ -66,7 +65,6 @@ pub fn survey(path: impl AsRef<Path>, csv: &CsvOptions) -> Result<Vec<SurveyedCo
     match resolve(&source)? {
         Format::Mat => Ok(of_variables(&read_mat(path)?)),
         Format::Npz => Ok(of_variables(&read_npz(path)?)),
-        Format::Parquet => Ok(of_variables(&read_parquet(path)?)),
         Format::Csv | Format::Detect => of_text(path, csv),
     }
 }

@@ -35,7 +35,7 @@ pub(crate) fn records(py: Python<'_>, logs: Vec<Log<'_>>) -> PyResult<Vec<Record
 /// A record that was read: rows, sample time, names and units.
 type ReadLog<'py> = (Bound<'py, numpy::PyArray2<f64>>, f64, Vec<(String, String)>);
 
-/// Reads a file: text, MATLAB, NumPy or Parquet. Channels are name, place in the file and unit.
+/// Reads a file: text, MATLAB or NumPy. Channels are name, place in the file and unit.
 #[pyfunction]
 #[pyo3(signature = (path, channels, time, dt))]
 pub(crate) fn read_log<'py>(

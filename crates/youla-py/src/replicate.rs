@@ -86,7 +86,7 @@ fn closed(chosen: &RunSettings, records: &RunRecords, predictor: &[Mat<f64>; 6])
     let (n, m, p) = (a.nrows(), b.ncols(), c.nrows());
     let declared = declared_loop(chosen, records, Path::new("."))?;
     let controller = match chosen.data.alpha.is_empty() {
-        true => with_input_port(&declared.controller)?,
+        true => with_input_port(declared.controller())?,
         false => factorise_run(chosen, records, Path::new("."))?.factors.j_k()?,
     };
     // The controller sees (y - r, alpha) and commands u less d.

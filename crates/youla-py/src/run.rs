@@ -16,7 +16,7 @@ use youla::signal::Channel;
 use youla::{Mat, c64};
 use youla_run::{
     Identification, Method, RunRecords, RunSettings, Stage, StageClock, StageTimes, page, read_records,
-    records_in_memory, redesign_entry, redesign_of, summary, write_run,
+    records_in_memory, redesign_of, summary, write_run,
 };
 
 /// The result of a run.
@@ -209,7 +209,7 @@ impl Run {
     fn redesign<'py>(&self, py: Python<'py>, chosen: String) -> PyResult<(String, ModelOut<'py>)> {
         let found = self.found.clone();
         let new = worker::run(py, false, move |_| Ok(redesign_of(&found, &options(&chosen, "redesign")?)?))?;
-        let promised = serde_json::to_string(&redesign_entry(&new)).map_err(Failure::from)?;
+        let promised = serde_json::to_string(&youla_run::RedesignEntry::from(&new)).map_err(Failure::from)?;
         Ok((promised, model_out(py, &new.controller.system)))
     }
 }
@@ -222,7 +222,7 @@ impl Run {
     fn model_of(&self, key: &str) -> Option<&StateSpace<Discrete>> {
         let scheme = self.found.scheme();
         match key {
-            "controller" => Some(&self.found.declared.controller),
+            "controller" => Some(self.found.declared.controller()),
             "deviation" => Some(&scheme?.deviation.model),
             "new_controller" => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
             key => Some(&self.found.verdict.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),

@@ -83,3 +83,16 @@ def test_an_absent_package_names_its_extra(
     with pytest.raises(youla.InputError, match=rf"is not installed.*pip install 'youla\[{extra}\]'"):
         call(fleet)
     assert not Path("nowhere").exists()
+
+
+def test_a_record_from_parquet(tmp_path: Path) -> None:
+    """The columns that are named, with dates as seconds from the first row."""
+    data = loop(7, 400)
+    clock = pd.to_datetime("2026-11-24") + pd.to_timedelta(0.01 * np.arange(400), unit="s")
+    file = tmp_path / "log.parquet"
+    pd.DataFrame({"t": clock, "u": data[:, 0], "y": data[:, 1], "note": "x"}).to_parquet(file)
+    log = youla.Record(file, inputs="u", outputs="y", time="t")
+    assert log.dt == pytest.approx(0.01) and log.samples == 400
+    assert np.array_equal(log.u[:, 0], data[:, 0]) and np.array_equal(log.y[:, 0], data[:, 1])
+    with pytest.raises(youla.InputError, match="which is no channel; the channels are t, u, y, note"):
+        youla.Record(file, inputs="v", outputs="y", time="t")

@@ -1,7 +1,7 @@
 //! The numbers behind a figure or a table, for other programs.
 
 use super::data::Method;
-use super::figure::{Cells, Content, Curve, Figure, Panel, Region, Sample};
+use super::figure::{Cell, Cells, Content, Curve, Figure, Panel, Region, Sample};
 use super::story::Table;
 
 /// All columns that a figure may have; a file holds those of the kinds of panel that the figure has.
@@ -10,8 +10,8 @@ const COLUMNS: [&str; 15] = [
     "text", "detail",
 ];
 
-/// One line of a file, by the places of its columns.
-type Line = Vec<(usize, String)>;
+/// One line of a file: names of columns and what stands in them.
+type Line = Vec<(&'static str, String)>;
 
 /// The numbers of a figure as CSV.
 ///
@@ -36,14 +36,14 @@ pub fn figure_csv(figure: &Figure, methods: &[Method]) -> String {
         None => key.to_owned(),
     };
     let names = panel_names(&figure.panels);
-    let lines = figure.panels.iter().zip(&names).flat_map(|(panel, name)| lines(panel, name, &label));
-    let present = |place: &usize| figure.panels.iter().any(|panel| columns(panel).contains(place));
-    let kept: Vec<usize> = (0..COLUMNS.len()).filter(present).collect();
-    let header = kept.iter().map(|&place| COLUMNS[place].to_owned()).collect();
-    written(std::iter::once(header).chain(lines.map(|line| {
-        let field = |place: &usize| line.iter().find(|(column, _)| column == place).map(|(_, text)| text.clone());
-        kept.iter().map(|place| field(place).unwrap_or_default()).collect()
-    })))
+    let panels = figure.panels.iter().zip(&names);
+    let lines: Vec<Line> = panels.flat_map(|(panel, name)| lines(panel, name, &label)).collect();
+    let has = |column: &&str| lines.iter().flatten().any(|(name, _)| name == column);
+    let kept: Vec<&str> = COLUMNS.into_iter().filter(has).collect();
+    let header = kept.iter().map(|column| (*column).to_owned()).collect();
+    let field = |line: &Line, column: &str| line.iter().find(|(name, _)| *name == column).map(|(_, text)| text.clone());
+    let row = |line: &Line| kept.iter().map(|column| field(line, column).unwrap_or_default()).collect();
+    written(std::iter::once(header).chain(lines.iter().map(row)))
 }
 
 /// A table as CSV; a heading below a group is written `group: heading`.
@@ -84,77 +84,51 @@ fn panel_names(panels: &[Panel]) -> Vec<String> {
     panels.iter().enumerate().map(name).collect()
 }
 
-/// Places of the columns that a kind of panel has.
-fn columns(panel: &Panel) -> Vec<usize> {
-    let mut places = of_content(&panel.content).to_vec();
-    if matches!(&panel.content, Content::Curves(curves) if curves.iter().any(|curve| !curve.along.is_empty())) {
-        places.push(5);
-    }
-    if !panel.regions.is_empty() {
-        places.extend(OF_REGIONS);
-    }
-    places
-}
-
-fn of_content(content: &Content) -> &'static [usize] {
-    match content {
-        Content::Curves(_) => &[0, 1, 2, 3, 4],
-        Content::Boxes(_) => &[0, 1, 2, 8],
-        Content::Cells(_) => &[0, 9, 10, 11, 12, 13, 14],
-    }
-}
-
-const OF_REGIONS: [usize; 6] = [0, 1, 2, 3, 6, 7];
-
 fn lines(panel: &Panel, name: &str, label: &dyn Fn(&str) -> String) -> Vec<Line> {
-    let fields: Vec<Vec<String>> = match &panel.content {
+    let mut lines = match &panel.content {
         Content::Curves(curves) => curves.iter().flat_map(|curve| points(curve, label)).collect(),
         Content::Boxes(samples) => samples.iter().flat_map(|sample| values(sample, label)).collect(),
         Content::Cells(cells) => map(cells, label),
     };
-    let regions = panel.regions.iter().flat_map(|region| edges(region, label));
-    let line = |places: &[usize], fields: Vec<String>| -> Line {
-        places.iter().copied().zip(std::iter::once(name.to_owned()).chain(fields)).collect()
-    };
-    // A fifth field belongs to a point of a curve.
-    let places: Vec<usize> = match of_content(&panel.content) {
-        places @ [0, 1, 2, 3, 4] => places.iter().copied().chain([5]).collect(),
-        places => places.to_vec(),
-    };
-    fields.into_iter().map(|f| line(&places, f)).chain(regions.map(|f| line(&OF_REGIONS, f))).collect()
+    lines.extend(panel.regions.iter().flat_map(|region| edges(region, label)));
+    lines.iter_mut().for_each(|line| line.push(("panel", name.to_owned())));
+    lines
 }
 
-fn points(curve: &Curve, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
+fn points(curve: &Curve, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     let along = curve.along.iter().copied().map(Some).chain(std::iter::repeat(None));
     let line = |((x, y), along): ((&f64, &f64), Option<f64>)| {
-        let point = [number(*x), number(*y)].into_iter().chain(along.map(number));
-        [label(&curve.method), curve.note.clone()].into_iter().chain(point).collect()
+        let point = [("x", number(*x)), ("y", number(*y))];
+        of(label(&curve.method), &curve.note, point.into_iter().chain(along.map(|value| ("along", number(value)))))
     };
     curve.x.iter().zip(&curve.y).zip(along).map(line).collect()
 }
 
-fn edges(region: &Region, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
-    let edges = region.low.iter().zip(&region.high);
+fn edges(region: &Region, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     let line = |(x, (low, high)): (&f64, (&f64, &f64))| {
-        vec![label(&region.method), region.note.clone(), number(*x), number(*low), number(*high)]
+        of(label(&region.method), &region.note, [("x", number(*x)), ("low", number(*low)), ("high", number(*high))])
     };
-    region.x.iter().zip(edges).map(line).collect()
+    region.x.iter().zip(region.low.iter().zip(&region.high)).map(line).collect()
 }
 
-fn values(sample: &Sample, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
-    let line = |value: &f64| vec![label(&sample.method), sample.note.clone(), number(*value)];
+fn values(sample: &Sample, label: &dyn Fn(&str) -> String) -> Vec<Line> {
+    let line = |value: &f64| of(label(&sample.method), &sample.note, [("value", number(*value))]);
     sample.values.iter().map(line).collect()
 }
 
-fn map(cells: &Cells, label: &dyn Fn(&str) -> String) -> Vec<Vec<String>> {
+fn of(method: String, note: &str, rest: impl IntoIterator<Item = (&'static str, String)>) -> Line {
+    [("method", method), ("note", note.to_owned())].into_iter().chain(rest).collect()
+}
+
+fn map(cells: &Cells, label: &dyn Fn(&str) -> String) -> Vec<Line> {
     let places = cells.rows.iter().flat_map(|row| cells.columns.iter().map(move |column| (row, column)));
-    places
-        .zip(&cells.cells)
-        .map(|((row, column), cell)| {
-            let winner = if cell.method.is_empty() { String::new() } else { label(&cell.method) };
-            vec![row.clone(), column.clone(), winner, number(cell.strength), cell.text.clone(), cell.detail.clone()]
-        })
-        .collect()
+    let line = |((row, column), cell): ((&String, &String), &Cell)| {
+        let winner = if cell.method.is_empty() { String::new() } else { label(&cell.method) };
+        let (row, column) = (("row", row.clone()), ("column", column.clone()));
+        let texts = [("text", cell.text.clone()), ("detail", cell.detail.clone())];
+        [row, column, ("winner", winner), ("strength", number(cell.strength))].into_iter().chain(texts).collect()
+    };
+    places.zip(&cells.cells).map(line).collect()
 }
 
 fn number(value: f64) -> String {
@@ -177,7 +151,6 @@ fn written(lines: impl Iterator<Item = Vec<String>>) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::figure::Cell;
     use super::super::story::Row;
     use super::*;
 

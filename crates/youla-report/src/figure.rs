@@ -79,10 +79,10 @@ pub struct Region {
     /// Where; ascending.
     pub x: Vec<f64>,
     /// Lower edge, NaN where the area is open below.
-    #[serde(with = "super::numbers")]
+    #[serde(deserialize_with = "super::numbers::many")]
     pub low: Vec<f64>,
     /// Upper edge, NaN where there is no area.
-    #[serde(with = "super::numbers")]
+    #[serde(deserialize_with = "super::numbers::many")]
     pub high: Vec<f64>,
 }
 
@@ -178,7 +178,7 @@ pub struct Curve {
     pub x: Vec<f64>,
     /// Values, NaN where there is none: a gap in a line; in a cloud a point of its own shape at the lower edge, as for a
     /// model that could not be identified.
-    #[serde(with = "super::numbers")]
+    #[serde(deserialize_with = "super::numbers::many")]
     pub y: Vec<f64>,
     /// What else belongs to each point and is written beside it, for example the frequency along a locus; mostly empty.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -212,7 +212,7 @@ pub struct Sample {
     /// Added to the label of the method; mostly empty.
     pub note: String,
     /// All values, NaN where there is none.
-    #[serde(with = "super::numbers")]
+    #[serde(deserialize_with = "super::numbers::many")]
     pub values: Vec<f64>,
 }
 

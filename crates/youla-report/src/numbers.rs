@@ -1,68 +1,38 @@
 //! Numbers in the JSON of a report: `null` stands for a value that is not finite, both ways.
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde::{Deserialize, Deserializer};
 
-/// Vectors as they are.
-pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
+/// A vector as it is.
+pub fn many<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let values = Vec::<Option<f64>>::deserialize(deserializer)?;
     Ok(values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
 }
 
-/// Vectors as they are.
-pub fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
-    values.serialize(serializer)
-}
-
 /// One number.
-pub(super) mod one {
-    use super::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-        Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
-    }
-
-    pub(in super::super) fn serialize<S: Serializer>(value: &f64, serializer: S) -> Result<S::Ok, S::Error> {
-        value.serialize(serializer)
-    }
+pub(super) fn one<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
 }
 
 /// Pairs of numbers.
-pub(super) mod pairs {
-    use super::{Deserialize, Deserializer, Serialize, Serializer};
-
-    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
-        let values = Vec::<[Option<f64>; 2]>::deserialize(deserializer)?;
-        Ok(values.into_iter().map(|pair| pair.map(|value| value.unwrap_or(f64::NAN))).collect())
-    }
-
-    pub(in super::super) fn serialize<S: Serializer>(values: &[[f64; 2]], serializer: S) -> Result<S::Ok, S::Error> {
-        values.serialize(serializer)
-    }
+pub(super) fn pairs<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<[f64; 2]>, D::Error> {
+    let values = Vec::<[Option<f64>; 2]>::deserialize(deserializer)?;
+    Ok(values.into_iter().map(known).collect())
 }
 
-/// A pair of numbers that may be absent.
-pub(super) mod optional_pair {
-    use super::{Deserialize, Deserializer, Serialize, Serializer};
+/// A pair that may be absent.
+pub(super) fn optional_pair<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<[f64; 2]>, D::Error> {
+    Ok(Option::<[Option<f64>; 2]>::deserialize(deserializer)?.map(known))
+}
 
-    pub(in super::super) fn deserialize<'de, D: Deserializer<'de>>(
-        deserializer: D,
-    ) -> Result<Option<[f64; 2]>, D::Error> {
-        let values = Option::<[Option<f64>; 2]>::deserialize(deserializer)?;
-        Ok(values.map(|pair| pair.map(|value| value.unwrap_or(f64::NAN))))
-    }
-
-    pub(in super::super) fn serialize<S: Serializer>(
-        value: &Option<[f64; 2]>,
-        serializer: S,
-    ) -> Result<S::Ok, S::Error> {
-        value.serialize(serializer)
-    }
+fn known(pair: [Option<f64>; 2]) -> [f64; 2] {
+    pair.map(|value| value.unwrap_or(f64::NAN))
 }
 
 /// Vectors to seven significant digits, more than any figure shows.
 pub(super) mod seven_digits {
-    pub(in super::super) use super::deserialize;
-    use super::{Serializer, rounded};
+    pub(in super::super) use super::many as deserialize;
+    use super::rounded;
+    use serde::Serializer;
 
     pub(in super::super) fn serialize<S: Serializer>(values: &[f64], serializer: S) -> Result<S::Ok, S::Error> {
         serializer.collect_seq(values.iter().map(|&value| rounded(value, decimals(value))))

@@ -111,7 +111,7 @@ pub struct Trace {
     /// Rows from each point to the next; the first counts from row 0.
     pub steps: Vec<usize>,
     /// Values, rounded to 1e-5 of themselves or of the range of the curve, whichever is finer; NaN makes a gap.
-    #[serde(with = "numbers")]
+    #[serde(deserialize_with = "numbers::many")]
     pub values: Vec<f64>,
 }
 
@@ -119,7 +119,7 @@ pub struct Trace {
 #[derive(Deserialize)]
 struct TraceNumbers {
     steps: Vec<usize>,
-    #[serde(with = "numbers")]
+    #[serde(deserialize_with = "numbers::many")]
     values: Vec<f64>,
 }
 

@@ -41,32 +41,32 @@ pub use page::page;
 pub use records::segments::RecordSegment;
 pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory};
 pub use result::{Filtered, Identification, Refusal};
-pub use schema::reference::settings_reference;
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{
     AlternativeStructure, ControllerSettings, DataFile, DataSettings, Discretisation, DisturbanceSettings, Domain,
     FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid, NominalModel, ParallelPid,
-    Polynomials, Prediction, RealisedController, RunSettings, TachoUnit, VerificationSettings, parse_subspace_options,
-    parse_table,
+    Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings, parse_subspace_options, parse_table,
 };
-pub use stages::certificate::{CertificateEntry, RunCertificate};
+pub use stages::certificate::RunCertificate;
 pub use stages::clock::{Stage, StageClock, StageTimes};
-pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise, factorise_run};
+pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise_run};
 pub use stages::grey_box::GreyBoxRun;
 pub use stages::grey_box::criterion::StructureSearch;
 pub use stages::nonparametric::LinesOfRun;
 pub use stages::parts::{recommend_alone, redesign_of};
 pub use stages::pipeline::identify;
-pub use stages::redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry, entry as redesign_entry};
-pub use stages::reduction::{ReductionEntry, RunReduction};
+pub use stages::reduction::RunReduction;
 pub use stages::signals::{DeviationSignals, deviation_signals, signal_records, write_signals};
 pub use stages::uncertainty::SystemUncertainty;
 pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
 pub use stages::validate::robustness::LoopRobustness;
 pub use stages::validate::{ModelVerdict, RecordVerdict, Verdict};
+pub use summary::certificate::CertificateEntry;
 pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
 pub use summary::model::{LargestEntry, ModelEntry, ResidualEntry};
 pub use summary::physical::PhysicalEntry;
 pub use summary::recommended::shown_modes;
+pub use summary::redesign::{ExactEntry, LoopEntry, RedesignEntry, SharedModeEntry};
+pub use summary::reduction::ReductionEntry;
 pub use summary::robustness::ScalesEntry;
 pub use summary::{SUMMARY_SCHEMA, Summary, summary};

@@ -8,7 +8,7 @@ use youla::factor::CoprimeFactors;
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
 use youla_io::toml_file;
-use youla_run::{ControllerSettings, NominalModel, RealisedController};
+use youla_run::{ControllerSettings, NominalModel};
 
 /// The file of a loop: `[nominal]` and `[controller]` as in run.toml.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -106,7 +106,8 @@ impl RunningLoop {
     pub fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let nominal = description.nominal.realise(folder, time)?;
-        let RealisedController::Observer { f, l } = description.controller.realise(folder, time)? else {
+        let running = description.controller.realise(&nominal, folder)?;
+        let Some([f, l]) = running.gains() else {
             let problem = "the controller of the firmware is an observer; give [controller.observer]".into();
             return Err(Error::Loop { path: path.to_owned(), problem });
         };

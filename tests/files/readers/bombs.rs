@@ -58,13 +58,6 @@ pub(crate) fn of(name: &str) -> Vec<(&'static str, Vec<u8>)> {
             .chain([("zeros", npz(&[npy("(3000000,)"), vec![0; 24 << 20]].concat()))])
             .chain([("entries that share their bytes", shared(40))])
             .collect(),
-        "parquet" => vec![
-            ("zeros in one page", super::seeds::file("bombs", "zeros.parquet")),
-            ("a page of 128 MB", parquet(&[0x90, 0xc8, 0xd0, 0x07], &[0xfe, 0xff, 0xff, 0x7f])),
-            ("2^40 rows", parquet(&[0x80, 0x89, 0x7a], &[0x80, 0x80, 0x80, 0x80, 0x80, 0x40])),
-            ("2^31 groups of rows", parquet(&[0x19, 0x1c, 0x19], &[0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 7, 0x19])),
-            ("2^31 columns", parquet(&[0x19, 0x2c, 0x35], &[0x19, 0xfc, 0xff, 0xff, 0xff, 0xff, 7, 0x35])),
-        ],
         "structure" => [
             nested("a"),
             vec![
@@ -149,24 +142,6 @@ fn hdf(sizes: &[u64], chunk: Option<u32>) -> Vec<u8> {
         }
     }
     file
-}
-
-/// A million zeros with other bytes in their place: in the header of the page as many as there were, in the footer any number.
-fn parquet(old: &[u8], new: &[u8]) -> Vec<u8> {
-    let file = super::seeds::file("bombs", "zeros.parquet");
-    let tail = file.len() - 8;
-    let length = u32::from_le_bytes(file[tail..tail + 4].try_into().unwrap()) as usize;
-    let replaced = |part: &[u8]| {
-        let mut out = part.to_vec();
-        let places: Vec<usize> = (0..part.len()).filter(|at| part[*at..].starts_with(old)).collect();
-        places.iter().rev().for_each(|at| drop(out.splice(*at..at + old.len(), new.iter().copied())));
-        (out, places.len())
-    };
-    let (pages, in_pages) =
-        if old.len() == new.len() { replaced(&file[..tail - length]) } else { (file[..tail - length].to_vec(), 0) };
-    let (footer, in_footer) = replaced(&file[tail - length..tail]);
-    assert!(in_pages + in_footer > 0, "the file holds {old:?}");
-    [&pages, &footer, &(footer.len() as u32).to_le_bytes()[..], &file[tail + 4..]].concat()
 }
 
 fn npz(array: &[u8]) -> Vec<u8> {

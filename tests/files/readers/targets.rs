@@ -9,7 +9,6 @@ use youla_greybox::{Declaration, DeclaredStructure};
 use youla_io::export::ExportedController;
 use youla_io::{
     ChannelRef, CsvOptions, DecimalSign, TimeSource, Variables, csv_from_bytes, mat_from_bytes, npz_from_bytes,
-    parquet_from_bytes,
 };
 use youla_link::{Frame, Kind, LARGEST_FRAME, PacketReader, Reply, Request, RowBlock};
 use youla_paper::study::{PaperSettings, Row};
@@ -22,13 +21,12 @@ use youla_twin::rig::RigParameters;
 pub(crate) type Reader = (&'static str, fn(&[u8]));
 
 /// All of them.
-pub(crate) const READERS: [Reader; 19] = [
+pub(crate) const READERS: [Reader; 18] = [
     ("csv", csv),
     ("mat", mat),
     ("mat73", mat),
     ("model", model),
     ("npz", npz),
-    ("parquet", parquet),
     ("run_toml", run_toml),
     ("paper_toml", paper_toml),
     ("rig_toml", rig_toml),
@@ -72,13 +70,6 @@ pub(crate) fn model(bytes: &[u8]) {
 /// A NumPy archive, and everything that is in it.
 pub(crate) fn npz(bytes: &[u8]) {
     if let Ok(variables) = npz_from_bytes(bytes, path()) {
-        look_at(&variables);
-    }
-}
-
-/// A Parquet file, and everything that is in it.
-pub(crate) fn parquet(bytes: &[u8]) {
-    if let Ok(variables) = parquet_from_bytes(bytes, path()) {
         look_at(&variables);
     }
 }

@@ -105,7 +105,7 @@ pub(crate) struct ExciteArgs {
     /// csv, c, mat, separated by commas.
     #[arg(long, value_name = "FORMATS", value_delimiter = ',', default_value = "csv", value_parser = format)]
     to: Vec<SequenceFormat>,
-    /// Folder for alpha.csv, alpha.h, alpha.mat and excite.svg; made if need be.
+    /// Folder for alpha.csv, alpha.h and alpha.mat; made if need be.
     #[arg(long, value_name = "DIR", default_value = "excite")]
     out: PathBuf,
     /// Replace the files if there are any.
@@ -148,7 +148,7 @@ pub(crate) fn make(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
         PortName::Alpha => ExcitationPort::Alpha,
         PortName::Input => ExcitationPort::Input,
     });
-    youla_io::folder::require_place(&args.out.join("excite.svg"))?;
+    youla_io::folder::require_place(&args.out.join("alpha.csv"))?;
     let found = excite_run(&settings, &folder, &options(args)?, port, args.noise_record.as_deref())?;
     let files = write_excitation(&found, &args.to, &args.out, args.force)?;
     let about = || {

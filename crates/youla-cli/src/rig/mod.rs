@@ -1,7 +1,6 @@
 //! `youla rig`: a machine that speaks youla-link, over UDP or a serial line.
 
 mod load;
-mod log_file;
 mod record;
 mod twin;
 

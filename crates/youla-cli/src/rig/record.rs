@@ -1,6 +1,5 @@
 //! `youla rig record` and `youla rig excite`: a log in which every row is there or reported missing, and its run.toml.
 
-use super::log_file::ParquetLog;
 use super::{ADDRESS, refused, seconds};
 use crate::output::{Failure, Form};
 use crate::progress::Progress;
@@ -14,11 +13,11 @@ use youla_rig::{Answer, LogReport, Phase, PlotStream, Recorder, Request, Rig, Ro
 
 pub(super) const RECORD_EXAMPLE: &str = "\
 Example:
-  youla rig record udp://127.0.0.1:4000 --out log.parquet --duration 10";
+  youla rig record udp://127.0.0.1:4000 --out log.csv --duration 10";
 
 pub(super) const EXCITE_EXAMPLES: &str = "\
 Example:
-  youla rig excite udp://127.0.0.1:4000 --amplitude 0.5 --out log.parquet --duration 10
+  youla rig excite udp://127.0.0.1:4000 --amplitude 0.5 --out log.csv --duration 10
   youla identify run.toml                      the run.toml beside the log";
 
 /// Time between two heartbeats, and between two states of the line of figures.
@@ -29,7 +28,7 @@ const BEAT: Duration = Duration::from_millis(100);
 pub(crate) struct RecordArgs {
     #[arg(help = ADDRESS)]
     address: String,
-    /// The log: .csv or .parquet.
+    /// The log, a CSV file.
     #[arg(long, value_name = "LOG")]
     out: PathBuf,
     /// Seconds.
@@ -107,12 +106,11 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
 
 fn recorder(args: &RecordArgs, rig: &Rig) -> Result<Recorder, Failure> {
     let machine = rig.description();
-    let ending = args.out.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
-    let mut sinks: Vec<Box<dyn RowSink>> = match ending {
-        "parquet" => vec![Box::new(ParquetLog::create(&args.out, machine)?)],
-        "csv" => vec![Box::new(youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?)],
-        _ => return Err(refused(format!("--out {}: a log is a .csv or a .parquet file", args.out.display()))),
-    };
+    if args.out.extension().is_none_or(|ending| ending != "csv") {
+        return Err(refused(format!("--out {}: a log is a .csv file", args.out.display())));
+    }
+    let log = youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?;
+    let mut sinks: Vec<Box<dyn RowSink>> = vec![Box::new(log)];
     if let Some(address) = &args.plotjuggler {
         let stream = PlotStream::open(address, machine)
             .map_err(|e| refused(format!("--plotjuggler {address}: {e}; give an address as 127.0.0.1:9870")))?;

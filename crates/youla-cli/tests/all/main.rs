@@ -11,4 +11,5 @@ mod contract;
 mod demo;
 mod examples;
 mod paper;
+mod reference;
 mod schema;

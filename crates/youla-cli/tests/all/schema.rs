@@ -1,4 +1,4 @@
-//! `youla schema`: run files validate, wrong ones do not, and the reference is that of the settings.
+//! `youla schema`: run files validate, wrong ones do not.
 
 use crate::common::{SETTINGS, csv, demo, empty_folder, log, settings, youla};
 use serde_json::Value;
@@ -6,7 +6,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-fn project() -> PathBuf {
+pub(crate) fn project() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..")
 }
 
@@ -175,20 +175,4 @@ fn wrong_files_do_not_validate() {
     for text in refused {
         assert!(problem(&schema, &schema, &toml(&text), "run.toml").is_some(), "{text}");
     }
-}
-
-/// `YOULA_BLESS=1` writes it.
-#[test]
-fn the_reference_is_that_of_the_settings() {
-    let found = youla(&empty_folder("schema-reference"), &["schema", "--markdown"]);
-    assert!(found.code == Some(0) && found.stderr.is_empty(), "{}", found.stderr);
-    let path = project().join("docs/book/reference.md");
-    if std::env::var_os("YOULA_BLESS").is_some() {
-        fs::write(&path, &found.stdout).expect("written");
-    }
-    let written = fs::read_to_string(&path).unwrap_or_default();
-    assert!(
-        written == found.stdout,
-        "docs/book/reference.md is stale: write it by `youla schema --markdown > docs/book/reference.md`"
-    );
 }

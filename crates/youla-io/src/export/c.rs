@@ -2,7 +2,7 @@
 
 use super::NamedModel;
 use super::precision::{DOUBLE, Round, SINGLE, SingleError, add, noise, samples_for};
-use super::text::{heading, identifier, rows};
+use super::text::{heading_of, identifier, rows};
 use crate::error::{Error, Result};
 use youla::lti::{Discrete, StateSpace};
 use youla::{Mat, MatRef};
@@ -19,7 +19,7 @@ pub(super) fn c(model: &NamedModel) -> Result<String> {
     let matrices =
         [("a", g.a()), ("b", g.b()), ("c", g.c()), ("d", g.d())].map(|(l, m)| constant(&name, l, m)).concat();
     let text = TEMPLATE
-        .replace("@heading@", &comment(&heading(model)))
+        .replace("@heading@", &comment(&heading_of(model)))
         .replace("@single@", &single_error(g)?.sentence())
         .replace("@matrices@", &matrices)
         .replace("@output@", &[products(&name, "c", "s->x", n), products(&name, "d", "u", m)].concat())

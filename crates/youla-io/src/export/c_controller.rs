@@ -11,7 +11,7 @@
 
 use super::c::{check_ports, comment, constant, finished, products, update};
 use super::precision::{DOUBLE, Round, SAMPLES, SINGLE, SingleError, add, noise};
-use super::text::{PROGRAM, identifier, labels, number, plain};
+use super::text::{self, identifier, number};
 use crate::error::{Error, Result};
 use faer::Scale;
 use faer::linalg::solvers::Solve;
@@ -236,18 +236,7 @@ fn heading(export: &ControllerExport, law: &Law) -> Vec<String> {
         Some(q) => format!("Controller J_K(Q) with a Q of {} states", q.order()),
         None => "Controller J_K".to_owned(),
     };
-    let mut lines = vec![
-        format!(
-            "{what}, {} states, sample time {} s, positive feedback u = K y.",
-            law.a.nrows(),
-            number(law.time.ts())
-        ),
-        format!("Measured y:  {}", labels(&export.measured)),
-        format!("Commanded u: {}", labels(&export.commanded)),
-        format!("Written by {PROGRAM}."),
-    ];
-    if !export.origin.is_empty() {
-        lines.push(format!("From {}.", plain(&export.origin)));
-    }
-    lines
+    let (n, ts) = (law.a.nrows(), number(law.time.ts()));
+    let what = format!("{what}, {n} states, sample time {ts} s, positive feedback u = K y.");
+    text::heading(what, [("Measured y:  ", &export.measured), ("Commanded u: ", &export.commanded)], &export.origin)
 }

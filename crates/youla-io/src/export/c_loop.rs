@@ -3,7 +3,7 @@
 
 use super::ObserverData;
 use super::c::{check_ports, comment, constant, finished};
-use super::text::{PROGRAM, identifier, labels, number, plain};
+use super::text::{heading, identifier, number};
 use crate::error::Result;
 use crate::matrices::matrix;
 use youla::lti::Discrete;
@@ -76,14 +76,10 @@ pub fn c_loop(export: &LoopExport) -> Result<String> {
         text = text.replace(&format!("@{letter}@"), &row);
         constants += &written;
     }
-    let lines = [
-        format!("Loop of a firmware, {n} states, sample time {} s, positive feedback u = K y.", number(export.ts)),
-        format!("Measured y:  {}", labels(&export.measured)),
-        format!("Commanded u: {}", labels(&export.commanded)),
-        format!("Written by {PROGRAM}."),
-        format!("From {}.", plain(&export.origin)),
-    ];
-    let lines = if export.origin.is_empty() { &lines[..4] } else { &lines[..] };
-    let text = text.replace("@heading@", &comment(lines)).replace("@matrices@", &constants);
+    let what =
+        format!("Loop of a firmware, {n} states, sample time {} s, positive feedback u = K y.", number(export.ts));
+    let ports: [(&str, &[Channel]); 2] = [("Measured y:  ", &export.measured), ("Commanded u: ", &export.commanded)];
+    let lines = heading(what, ports, &export.origin);
+    let text = text.replace("@heading@", &comment(&lines)).replace("@matrices@", &constants);
     Ok(finished(&text, &name, n, m, p))
 }

@@ -2,7 +2,7 @@
 
 use super::NamedModel;
 use super::predictor::script;
-use super::text::{heading, matrix_of, number, rows};
+use super::text::{heading_of, matrix_of, number, rows};
 use youla::MatRef;
 use youla::signal::Channel;
 
@@ -10,7 +10,7 @@ const TEMPLATE: &str = include_str!("../../assets/export/model.m");
 const PREDICT: &str = include_str!("../../assets/export/predict.m");
 
 pub(super) fn matlab(model: &NamedModel) -> String {
-    let comment: Vec<String> = heading(model).iter().map(|line| format!("% {line}")).collect();
+    let comment: Vec<String> = heading_of(model).iter().map(|line| format!("% {line}")).collect();
     let (predictor, predict) = script(model, matrix, PREDICT);
     TEMPLATE
         .replace("@heading@", &comment.join("\n"))

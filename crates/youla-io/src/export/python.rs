@@ -2,7 +2,7 @@
 
 use super::NamedModel;
 use super::predictor::script;
-use super::text::{heading, identifier, matrix_of, number, rows};
+use super::text::{heading_of, identifier, matrix_of, number, rows};
 use youla::MatRef;
 use youla::signal::Channel;
 
@@ -13,7 +13,7 @@ pub(super) fn python(model: &NamedModel) -> String {
     let g = &model.system;
     let (predictor, predict) = script(model, array, PREDICT);
     TEMPLATE
-        .replace("@heading@", &heading(model).join("\n"))
+        .replace("@heading@", &heading_of(model).join("\n"))
         .replace("@matrices@", &["a", "b", "c", "d"].map(|name| array(name, matrix_of(model, name))).concat())
         .replace("@ts@", &number(g.time().ts()))
         .replace("@name@", &identifier(&model.name))

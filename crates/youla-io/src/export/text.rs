@@ -48,17 +48,16 @@ pub(super) fn labels(channels: &[Channel]) -> String {
     plain(&channels.iter().map(Channel::label).collect::<Vec<_>>().join(", "))
 }
 
-/// The heading of every script and header, one sentence per line.
-pub(super) fn heading(model: &NamedModel) -> Vec<String> {
+/// Lines of a heading: what it is, its ports, who wrote it and from what.
+pub(super) fn heading(what: String, ports: [(&str, &[Channel]); 2], origin: &str) -> Vec<String> {
+    let ports = ports.map(|(name, channels)| format!("{name}{}", labels(channels)));
+    let from = (!origin.is_empty()).then(|| format!("From {}.", plain(origin)));
+    [what].into_iter().chain(ports).chain([format!("Written by {PROGRAM}.")]).chain(from).collect()
+}
+
+/// That of a model.
+pub(super) fn heading_of(model: &NamedModel) -> Vec<String> {
     let g = &model.system;
-    let mut lines = vec![
-        format!("Model {}, {} states, sample time {} s.", plain(&model.name), g.order(), number(g.time().ts())),
-        format!("Inputs:  {}", labels(&model.inputs)),
-        format!("Outputs: {}", labels(&model.outputs)),
-        format!("Written by {PROGRAM}."),
-    ];
-    if !model.origin.is_empty() {
-        lines.push(format!("From {}.", plain(&model.origin)));
-    }
-    lines
+    let what = format!("Model {}, {} states, sample time {} s.", plain(&model.name), g.order(), number(g.time().ts()));
+    heading(what, [("Inputs:  ", &model.inputs), ("Outputs: ", &model.outputs)], &model.origin)
 }

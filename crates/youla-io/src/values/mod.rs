@@ -1,4 +1,4 @@
-//! The contents of a MATLAB, NumPy or Parquet file, and records from them.
+//! The contents of a MATLAB or NumPy file, and records from them.
 
 mod path;
 

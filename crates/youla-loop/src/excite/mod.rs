@@ -33,13 +33,13 @@ pub use guard::ModelErrorEffect;
 pub use information::ModeAccuracy;
 pub use noise::output_noise;
 pub use options::{ExciteOptions, InputOrder, Length, Notch, Shape};
-pub use summary::{ExcitedInput, ExcitedSpectrum, ExcitedSummary, NotchEnergy, PredictedPeak};
+pub use summary::{ExcitedInput, ExcitedSummary, NotchEnergy, PredictedPeak};
 
 use crate::error::{Error, Result};
 use energy::Energy;
 use faer::Scale;
 use options::spread;
-use summary::{inputs, needed, notches, predicted, spectrum};
+use summary::{inputs, needed, notches, predicted};
 use youla::Mat;
 use youla::lti::{Discrete, Partitioned, StateSpace};
 use youla::signal::Channel;
@@ -69,8 +69,6 @@ pub struct Excited {
     pub u: Mat<f64>,
     /// Predicted output, samples x p, as long as `u`.
     pub y: Mat<f64>,
-    /// Energy density of each input over frequency.
-    pub spectrum: ExcitedSpectrum,
     /// The figures.
     pub summary: ExcitedSummary,
 }
@@ -153,8 +151,7 @@ pub fn excite(on: &ExcitedLoop, options: &ExciteOptions) -> Result<Excited> {
         damping_deviation: options.damping_deviation,
         needed,
     };
-    let spectrum = spectrum(&energies, options);
-    Ok(Excited { alpha: sequence.alpha, time, u: response.u, y: response.y, spectrum, summary })
+    Ok(Excited { alpha: sequence.alpha, time, u: response.u, y: response.y, summary })
 }
 
 /// The limits of inputs and outputs.

@@ -7,15 +7,6 @@ use serde::Serialize;
 use youla::Mat;
 use youla::signal::Channel;
 
-/// Energy densities of the whole sequence.
-#[derive(Debug, Clone, PartialEq)]
-pub struct ExcitedSpectrum {
-    /// Frequencies, Hz, from 0 on in equal steps.
-    pub hz: Vec<f64>,
-    /// One density for each input, over the mean density of that input in the band, dB.
-    pub decibels: Vec<Vec<f64>>,
-}
-
 /// The figures of an excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ExcitedSummary {
@@ -145,17 +136,4 @@ pub(super) fn predicted(
         }
     }
     all
-}
-
-pub(super) fn spectrum(energies: &[Energy], options: &ExciteOptions) -> ExcitedSpectrum {
-    let step = energies.first().map_or(0.0, |e| e.step);
-    let lines = energies.first().map_or(0, |e| e.density.len());
-    let relative = |e: &Energy| {
-        let mean = e.mean(options.band);
-        e.density.iter().map(|d| 10.0 * (d / mean).log10()).collect()
-    };
-    ExcitedSpectrum {
-        hz: (0..lines).map(|k| k as f64 * step).collect(),
-        decibels: energies.iter().map(relative).collect(),
-    }
 }

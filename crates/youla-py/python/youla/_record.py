@@ -37,7 +37,7 @@ class Record:
         - mapping from names to columns, pandas or polars data frame: by name;
         - `control.TimeResponseData` (which holds channels x time and is recognised by its type, never by its shape): by
           label; its inputs and outputs are taken where `inputs` and `outputs` are absent;
-        - path of a text, MATLAB, NumPy or Parquet file: by name or column number.
+        - path of a text, MATLAB or NumPy file: by name or column number; of a Parquet file, which pyarrow reads: by name.
     inputs, outputs : str, int or list of them
         Plant inputs u as applied, after saturation, and measured outputs y.
     excitation : str, int or list of them, optional

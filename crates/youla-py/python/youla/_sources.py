@@ -14,6 +14,7 @@ from . import _native
 from ._arrays import Array, as_floats
 from ._checks import kind
 from ._errors import InputError
+from ._optional import need
 
 
 @dataclass(frozen=True)
@@ -176,6 +177,8 @@ def _of_response(data: Any, time: str | int | None, dt: float | None) -> Source:
 def _of_file(
     path: str | os.PathLike[str], chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None
 ) -> Source:
+    if _is_parquet(path):
+        return _of_parquet(path, chosen, time, dt)
     places = list(dict.fromkeys(place for group in chosen.values() for place in group))
     channels = [(str(p), p, "") if isinstance(p, str) else (f"column {p}", f"#{p + 1}", "") for p in places]
     clock = time if time is None or isinstance(time, str) else f"#{time + 1}"
@@ -189,6 +192,28 @@ def _of_file(
     source = _File(data, found, ["" if isinstance(p, int) else p for p in places], [""] * len(places))
     source.places.extend(places)
     return source
+
+
+def _is_parquet(path: str | os.PathLike[str]) -> bool:
+    try:
+        with open(path, "rb") as file:
+            return file.read(4) == b"PAR1"
+    except OSError:
+        return False  # the reader of the other files says why
+
+
+def _of_parquet(
+    path: str | os.PathLike[str], chosen: dict[str, list[str | int]], time: str | int | None, dt: float | None
+) -> Source:
+    parquet = need("pyarrow.parquet")
+    names = _needed(parquet.read_schema(path).names, chosen, time)
+    table = parquet.read_table(path, columns=names)
+    return _of_columns({name: _seconds(table.column(name).to_numpy()) for name in names}, time, dt)
+
+
+def _seconds(values: Any) -> Any:
+    """Dates as seconds from the first row; other values as they are."""
+    return (values - values[0]) / np.timedelta64(1, "s") if values.dtype.kind == "M" and len(values) else values
 
 
 @dataclass(frozen=True)

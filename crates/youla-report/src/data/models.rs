@@ -1,5 +1,6 @@
 //! Orders, poles, modes and the reduction of models.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::numbers;
@@ -12,7 +13,7 @@ pub struct OrderChoice {
     /// What was identified, for example "S from alpha to beta".
     pub label: String,
     /// Singular values, falling.
-    #[serde(with = "numbers")]
+    #[serde(deserialize_with = "numbers::many")]
     pub values: Vec<f64>,
     /// The order that was taken.
     pub chosen: usize,
@@ -24,10 +25,10 @@ pub struct Poles {
     /// Key of the method.
     pub method: String,
     /// Real and imaginary parts.
-    #[serde(with = "numbers::pairs")]
+    #[serde(deserialize_with = "numbers::pairs")]
     pub poles: Vec<[f64; 2]>,
     /// Those of the finite invariant zeros, where the model has as many inputs as outputs.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "numbers::pairs")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "numbers::pairs")]
     pub zeros: Vec<[f64; 2]>,
 }
 
@@ -37,16 +38,16 @@ pub struct Mode {
     /// Key of the method.
     pub method: String,
     /// Natural frequency, Hz.
-    #[serde(with = "numbers::one")]
+    #[serde(deserialize_with = "numbers::one")]
     pub hz: f64,
     /// Damping ratio; negative where the mode is unstable.
-    #[serde(with = "numbers::one")]
+    #[serde(deserialize_with = "numbers::one")]
     pub zeta: f64,
     /// Standard deviations of both, where they are known.
-    #[serde(default, skip_serializing_if = "Option::is_none", with = "numbers::optional_pair")]
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "numbers::optional_pair")]
     pub deviation: Option<[f64; 2]>,
     /// Residue, output by output the values of all inputs, real and imaginary parts; empty where it is not known.
-    #[serde(default, skip_serializing_if = "Vec::is_empty", with = "numbers::pairs")]
+    #[serde(default, skip_serializing_if = "Vec::is_empty", deserialize_with = "numbers::pairs")]
     pub residue: Vec<[f64; 2]>,
 }
 
@@ -67,7 +68,7 @@ pub struct Reduction {
     /// What was reduced and how, for example "G(S) by balanced truncation".
     pub label: String,
     /// Hankel singular values, falling.
-    #[serde(with = "numbers")]
+    #[serde(deserialize_with = "numbers::many")]
     pub hankel: Vec<f64>,
     /// Order that was kept.
     pub chosen: usize,
@@ -91,22 +92,22 @@ pub struct Reduction {
 }
 
 /// One order of a reduction.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ReductionOrder {
-    /// The order.
+    /// States of the reduced model, those with the kept poles included.
     pub order: usize,
-    /// A-priori bound of the error.
-    pub bound: Option<f64>,
-    /// Largest gain of the error over frequency.
-    pub open_loop: Option<f64>,
-    /// The same over that of the model.
+    /// Bound of the error: in the H-infinity norm, for normalised coprime factors in the gap metric; absent where there is none.
+    pub error_bound: Option<f64>,
+    /// Largest singular value of the error over frequency, in output units per input unit.
+    pub open_loop_error: Option<f64>,
+    /// The same over that of the full model.
     pub open_loop_relative: Option<f64>,
-    /// Error of the closed loop from alpha to y over the closed loop.
+    /// Relative error of the closed loop from alpha to y.
     pub closed_loop_relative: Option<f64>,
-    /// Whether the controller stabilises the model of this order.
-    pub stabilised: bool,
+    /// Whether the controller stabilises the reduced model.
+    pub stabilised_by_controller: bool,
     /// Closed-loop pole nearest to or farthest beyond the boundary of stability.
-    pub worst_pole: Option<[f64; 2]>,
+    pub worst_closed_loop_pole: Option<[f64; 2]>,
     /// Why there is no model of this order.
     pub failure: Option<String>,
 }

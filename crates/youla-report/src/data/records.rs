@@ -131,7 +131,7 @@ pub struct ResidualTest {
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Correlation {
     /// Values; one that does not exist is not a number here and `null` in JSON.
-    #[serde(with = "numbers")]
+    #[serde(deserialize_with = "numbers::many")]
     pub values: Vec<f64>,
     /// Band of a single value at 99 %.
     pub band: f64,

@@ -91,7 +91,7 @@ pub struct DataFinding {
 }
 
 /// A table of evidence, in words.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct EvidenceTable {
     /// Title.
     pub title: String,
@@ -103,4 +103,12 @@ pub struct EvidenceTable {
     pub rows: Vec<Vec<String>>,
     /// Caption below it.
     pub caption: String,
+}
+
+impl EvidenceTable {
+    /// A table without text and caption.
+    pub fn new(title: &str, columns: &[&str], rows: Vec<Vec<String>>) -> Self {
+        let columns = columns.iter().map(|name| (*name).to_owned()).collect();
+        EvidenceTable { title: title.to_owned(), columns, rows, ..EvidenceTable::default() }
+    }
 }

@@ -16,8 +16,11 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
     if curves.is_empty() {
         return Vec::new();
     }
-    let shades: Vec<[f64; 2]> =
-        rows.iter().filter(|row| !row.stabilised).map(|row| [row.order as f64 - 0.5, row.order as f64 + 0.5]).collect();
+    let shades: Vec<[f64; 2]> = rows
+        .iter()
+        .filter(|row| !row.stabilised_by_controller)
+        .map(|row| [row.order as f64 - 0.5, row.order as f64 + 0.5])
+        .collect();
     let shaded = if shades.is_empty() { "" } else { " Shaded: the controller does not stabilise the reduced model." };
     let taken = Guide {
         kind: GuideKind::Level,
@@ -45,7 +48,7 @@ pub(super) fn figure(chosen: &Chosen) -> Vec<Figure> {
 }
 
 fn curves(reduction: &Reduction, rows: &[&ReductionOrder]) -> Vec<Curve> {
-    let bound = |row: &ReductionOrder| match (row.bound?, reduction.bound_is_gap, reduction.plant_norm) {
+    let bound = |row: &ReductionOrder| match (row.error_bound?, reduction.bound_is_gap, reduction.plant_norm) {
         (bound, true, _) => Some(bound),
         (bound, false, Some(norm)) if norm > 0.0 => Some(bound / norm),
         _ => None,

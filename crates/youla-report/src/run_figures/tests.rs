@@ -83,10 +83,10 @@ fn report() -> ReportData {
     };
     let row = |order: usize| ReductionOrder {
         order,
-        bound: Some(8.0 / order as f64),
+        error_bound: Some(8.0 / order as f64),
         open_loop_relative: Some(0.5 / order as f64),
         closed_loop_relative: Some(0.3 / order as f64),
-        stabilised: order > 1,
+        stabilised_by_controller: order > 1,
         ..ReductionOrder::default()
     };
     ReportData {

@@ -11,8 +11,8 @@ pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
 use crate::records::computed::ComputedChannels;
 use crate::records::{LoopRecord, RunRecords};
-use crate::settings::{DataFile, RunSettings, labelled};
-use crate::stages::factors::{declared_controller, declared_loop};
+use crate::settings::{DataFile, DataSettings, RunSettings};
+use crate::stages::factors::{DeclaredLoop, declared_loop};
 use crate::{Error, Result};
 use files::{Job, check_all, collected, logged, names};
 use rayon::prelude::*;
@@ -21,7 +21,7 @@ use std::path::{Path, PathBuf};
 use youla::ErrorKind;
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::{Discrete, StateSpace};
-use youla_io::{ChannelRef, ChannelSpec, CsvOptions, TimeSource};
+use youla_io::{ChannelRef, ChannelSpec, CsvOptions};
 use youla_loop::check::{CheckOptions, Finding, Severity, Test, by_severity, check_record};
 
 /// Files to check without a run.toml; channels by name or number.
@@ -53,15 +53,8 @@ pub struct CheckedFiles {
 pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     settings.check()?;
     let d = &settings.data;
-    let job = Job {
-        groups: [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].map(Clone::clone),
-        computed: ComputedChannels::new(d)?,
-        time: TimeSource { column: d.time_column.clone(), ts: d.sample_time, gaps: d.gaps, ..Default::default() },
-        csv: d.csv.clone(),
-        options: with_order(&settings.check, &settings.hansen),
-        estimation: d.estimation.len(),
-    };
-    let controller = |time: Discrete| Ok(Some(declared_controller(settings, folder, time)?.0));
+    let job = job(d, with_order(&settings.check, &settings.hansen))?;
+    let controller = |time: Discrete| Ok(Some(DeclaredLoop::new(settings, folder, time)?.controller().clone()));
     let mut found = check_all(&job, &d.labelled(), folder, &controller)?;
     found.findings.extend(method_finding(settings));
     by_severity(&mut found.findings);
@@ -82,25 +75,30 @@ pub fn check_files(files: &CheckedFiles, options: &CheckOptions) -> Result<DataC
             return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
         }
     }
-    let job = Job {
-        groups: [
-            ChannelSpec::chosen(&files.inputs),
-            ChannelSpec::chosen(&files.outputs),
-            ChannelSpec::chosen(&files.input_excitation),
-            ChannelSpec::chosen(&files.reference),
-            Vec::new(),
-        ],
-        computed: ComputedChannels::default(),
-        time: TimeSource { column: files.time_column.clone(), ts: files.sample_time, ..Default::default() },
-        csv: files.csv.clone(),
-        options: options.clone(),
-        estimation: files.files.len(),
-    };
     let file = |path: &PathBuf| DataFile { file: path.clone(), skip: 0, take: None, segments: Vec::new(), name: None };
-    let all: Vec<DataFile> = files.files.iter().map(file).collect();
-    let mut found = check_all(&job, &labelled(&all.iter().collect::<Vec<_>>()), Path::new(""), &|_| Ok(None))?;
+    let [inputs, outputs] = [&files.inputs, &files.outputs].map(|chosen| ChannelSpec::chosen(chosen));
+    let data = DataSettings {
+        sample_time: files.sample_time,
+        time_column: files.time_column.clone(),
+        input_excitation: ChannelSpec::chosen(&files.input_excitation),
+        reference: ChannelSpec::chosen(&files.reference),
+        csv: files.csv.clone(),
+        ..DataSettings::new(inputs, outputs, files.files.iter().map(file).collect())
+    };
+    let mut found = check_all(&job(&data, options.clone())?, &data.labelled(), Path::new(""), &|_| Ok(None))?;
     by_severity(&mut found.findings);
     Ok(found)
+}
+
+fn job(data: &DataSettings, options: CheckOptions) -> Result<Job> {
+    Ok(Job {
+        groups: data.groups().map(Clone::clone),
+        computed: ComputedChannels::new(data)?,
+        time: data.clock(),
+        csv: data.csv.clone(),
+        options,
+        estimation: data.estimation.len(),
+    })
 }
 
 /// Checks the records of a run as it uses them, with its controller where `controller` says so; paths are relative to `folder`.
@@ -115,11 +113,8 @@ pub fn check_in_memory(
 ) -> Result<DataCheck> {
     settings.check()?;
     settings.check.check()?;
-    let declared = match controller {
-        true => Some(declared_loop(settings, records, folder)?.controller),
-        false => None,
-    };
-    check_records(settings, records, declared.as_ref())
+    let declared = controller.then(|| declared_loop(settings, records, folder)).transpose()?;
+    check_records(settings, records, declared.as_ref().map(DeclaredLoop::controller))
 }
 
 /// The same tests on the records of a run as it uses them, for its report; `controller` with positive feedback.
@@ -129,12 +124,11 @@ pub(super) fn check_records(
     controller: Option<&StateSpace<Discrete>>,
 ) -> Result<DataCheck> {
     let d = &settings.data;
-    let names = names([&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha]);
+    let names = names(d.groups());
     let options = with_order(&settings.check, &settings.hansen);
     let all: Vec<&LoopRecord> = records.estimation.iter().chain(&records.verification).collect();
     let computed = ComputedChannels::new(d)?;
-    let channels: Vec<&ChannelSpec> =
-        [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha].into_iter().flatten().collect();
+    let channels: Vec<&ChannelSpec> = d.groups().into_iter().flatten().collect();
     let one = |record: &&LoopRecord| {
         let (file, first) = place(settings, records, &record.name);
         let logged = logged(record, first);

@@ -2,7 +2,7 @@
 
 use super::run::FinishedRun;
 use crate::Result;
-use crate::stages::responses::{decibel, drawn};
+use crate::page::decibels::{decibel, drawn};
 use std::f64::consts::{PI, TAU};
 use youla::lti::{FrequencyResponse, TimeDomain, frequency_response};
 use youla_report::data as draw;

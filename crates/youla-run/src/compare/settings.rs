@@ -23,13 +23,9 @@ pub(super) fn differences(runs: &[FinishedRun]) -> Result<EvidenceTable> {
         std::iter::once(key.clone()).chain(all.iter().map(value)).collect()
     };
     let rows: Vec<Vec<String>> = keys.iter().filter(differs).map(|key| row(key)).collect();
-    Ok(EvidenceTable {
-        title: "Settings that differ".into(),
-        text: if rows.is_empty() { "None: all runs have the same settings.".into() } else { String::new() },
-        columns: std::iter::once("Setting".into()).chain(runs.iter().map(|r| r.name.clone())).collect(),
-        rows,
-        caption: String::new(),
-    })
+    let text = if rows.is_empty() { "None: all runs have the same settings.".into() } else { String::new() };
+    let columns: Vec<&str> = std::iter::once("Setting").chain(runs.iter().map(|r| r.name.as_str())).collect();
+    Ok(EvidenceTable { text, ..EvidenceTable::new("Settings that differ", &columns, rows) })
 }
 
 fn flat(run: &FinishedRun) -> Result<Flat> {

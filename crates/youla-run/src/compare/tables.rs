@@ -17,13 +17,9 @@ pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
             mean_fit(run).map_or("\u{2013}".into(), |fit| format!("{fit:.1} %")),
         ]
     };
-    EvidenceTable {
-        title: "Runs".into(),
-        text: String::new(),
-        columns: ["Run", "Machine", "Can it be trusted?", "Order", "Sample time", "Mean fit"].map(str::to_owned).into(),
-        rows: runs.iter().map(row).collect(),
-        caption: "The mean fit is that over all verification records and outputs of a run.".into(),
-    }
+    let columns = ["Run", "Machine", "Can it be trusted?", "Order", "Sample time", "Mean fit"];
+    let caption = "The mean fit is that over all verification records and outputs of a run.".into();
+    EvidenceTable { caption, ..EvidenceTable::new("Runs", &columns, runs.iter().map(row).collect()) }
 }
 
 fn verdict(report: &ReportData) -> String {

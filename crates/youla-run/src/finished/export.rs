@@ -2,7 +2,7 @@
 
 use crate::folder::artefacts::{Provenance, SCHEMA};
 use crate::records::SourceFile;
-use crate::settings::{RealisedController, RunSettings};
+use crate::settings::RunSettings;
 use crate::{Error, Result};
 use std::io::Read;
 use std::path::{Path, PathBuf};
@@ -90,7 +90,8 @@ fn loop_of_run(run: &Path) -> Result<LoopExport> {
     let (path, settings) = (run.join("2-factor/nominal.json"), RunSettings::read(&run.join("run.toml"))?);
     let nominal = read_model(&path)?;
     let time = nominal.system.time();
-    let RealisedController::Observer { f, l } = settings.controller.realise(run, time)? else {
+    let running = settings.controller.realise(&nominal.system, run)?;
+    let Some([f, l]) = running.gains() else {
         let problem = "the controller of this run is no observer with gains; the loop of the firmware needs [controller.observer], and \
                        --to c-controller exports any controller";
         return Err(not(run, problem));

@@ -15,6 +15,9 @@ use std::collections::BTreeMap;
 use youla::control::Margins;
 use youla::signal::Channel;
 use youla::validate::RESIDUAL_LAGS;
+use youla_io::SystemMatrices;
+use youla_io::export::{ExportedController, ObserverData};
+use youla_loop::redesign::Redesign;
 
 /// What a stage found, and where it comes from.
 #[derive(Serialize)]
@@ -106,5 +109,20 @@ impl<'a> From<&'a [ModelVerdict]> for ResidualsFile<'a> {
         };
         let models = models.iter().map(|v| (v.method.key(), tests(v))).collect();
         ResidualsFile { lags: RESIDUAL_LAGS, steps: step_keys(), models }
+    }
+}
+
+/// The controller as `youla-rt` takes it.
+pub(crate) fn exported(records: &RunRecords, redesign: &Redesign) -> ExportedController {
+    let (u, y) = (records.inputs.clone(), records.outputs.clone());
+    let new = &redesign.controller;
+    ExportedController {
+        method: redesign.method.key().into(),
+        ts: new.system.time().ts(),
+        measured: y,
+        commanded: u,
+        controller: SystemMatrices::new(&new.system),
+        observer: new.gains.as_ref().map(|g| ObserverData::new(&g.model, g.f.as_ref(), g.l.as_ref())),
+        q: new.q.as_ref().map(SystemMatrices::new),
     }
 }

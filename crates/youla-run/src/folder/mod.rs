@@ -8,16 +8,18 @@ mod files;
 
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
 use crate::folder::subspace_details::SubspaceDetails;
+use crate::page::redesign::{figure, loops};
 use crate::records::LoopRecord;
 use crate::result::{Filtered, Identification};
-use crate::stages::redesign;
-use crate::stages::reduction;
 use crate::stages::uncertainty::SystemUncertainty;
+use crate::summary::certificate::CertificateEntry;
 use crate::summary::entries::Refused;
 use crate::summary::physical::PhysicalDetails;
 use crate::summary::recommended::{self, RecommendedDetails};
+use crate::summary::redesign::RedesignEntry;
+use crate::summary::reduction::{ReductionDetails, SweepFile, as_csv as sweep_csv, orders};
 use crate::{Error, Result};
-use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile};
+use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile, exported};
 use serde::Serialize;
 use youla::MatRef;
 use youla::identify::HansenModel;
@@ -92,7 +94,7 @@ impl Writer<'_> {
     fn factors(&self) -> Result<()> {
         let declared = &self.found.declared;
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
-        self.model_with("2-factor/controller", &declared.controller, (y, u), &())?;
+        self.model_with("2-factor/controller", declared.controller(), (y, u), &())?;
         self.model("2-factor/nominal", &declared.nominal, &())?;
         let f = match &self.found.filtered {
             Ok(filtered) => &filtered.factorisation,
@@ -130,34 +132,23 @@ impl Writer<'_> {
     /// `4-identify/`, `5-recombine/`, `6-reduce/`: the models.
     fn models(&self) -> Result<()> {
         let found = self.found;
-        match &found.recommended {
-            Ok(model) => {
-                let name = recommended::FILE.trim_end_matches(".json");
-                self.model(name, &model.plant, &RecommendedDetails::new(model))?;
-            }
-            Err(e) => self.refused(recommended::FILE, e)?,
-        }
-        match &found.direct {
-            Some(Ok(direct)) => self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))?,
-            Some(Err(e)) => self.refused("4-identify/direct.json", e)?,
-            None => {}
-        }
+        self.outcome(recommended::FILE, Some(&found.recommended), |model| {
+            let name = recommended::FILE.trim_end_matches(".json");
+            self.model(name, &model.plant, &RecommendedDetails::new(model))
+        })?;
+        self.outcome("4-identify/direct.json", found.direct.as_ref(), |direct| {
+            self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))
+        })?;
         self.grey_box()?;
-        match &found.hansen {
-            Some(Ok(scheme)) => self.scheme(scheme),
-            Some(Err(e)) => self.refused("4-identify/deviation.json", e),
-            None => Ok(()),
-        }
+        self.outcome("4-identify/deviation.json", found.hansen.as_ref(), |scheme| self.scheme(scheme))
     }
 
     /// The physical structure.
     fn grey_box(&self) -> Result<()> {
         self.uncertainty("4-identify/grey_box_uncertainty.json", &self.found.grey_box_uncertainty)?;
-        match &self.found.grey_box {
-            Some(Ok(run)) => self.model("4-identify/grey_box", &run.found.model.model, &PhysicalDetails::new(run)?),
-            Some(Err(e)) => self.refused("4-identify/grey_box.json", e),
-            None => Ok(()),
-        }
+        self.outcome("4-identify/grey_box.json", self.found.grey_box.as_ref(), |run| {
+            self.model("4-identify/grey_box", &run.found.model.model, &PhysicalDetails::new(run)?)
+        })
     }
 
     /// What the scheme gave.
@@ -184,43 +175,32 @@ impl Writer<'_> {
 
     /// `6-reduce/`: the reduced plant and what every order costs.
     fn reduction(&self) -> Result<()> {
-        match &self.found.reduction {
-            Some(Ok(r)) => {
-                self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &r.details())?;
-                self.json("6-reduce/sweep.json", r.file())?;
-                Ok(self.folder.text("6-reduce/sweep.csv", &reduction::as_csv(&r.found.sweep))?)
-            }
-            Some(Err(e)) => self.refused("6-reduce/hansen_reduced.json", e),
-            None => Ok(()),
-        }
+        self.outcome("6-reduce/hansen_reduced.json", self.found.reduction.as_ref(), |r| {
+            self.model("6-reduce/hansen_reduced", &r.found.reduction.model, &ReductionDetails::from(r))?;
+            self.json("6-reduce/sweep.json", SweepFile::from(r))?;
+            Ok(self.folder.text("6-reduce/sweep.csv", &sweep_csv(&orders(r)))?)
+        })
     }
 
     /// `7-validate/certificate.json`.
     fn certificate(&self) -> Result<()> {
-        match &self.found.certificate {
-            Some(Ok(certificate)) => self.json("7-validate/certificate.json", certificate.entry()),
-            Some(Err(e)) => self.refused("7-validate/certificate.json", e),
-            None => Ok(()),
-        }
+        let file = "7-validate/certificate.json";
+        self.outcome(file, self.found.certificate.as_ref(), |found| self.json(file, CertificateEntry::from(found)))
     }
 
     /// `8-redesign/`: the new controller as model, as data and as source for `youla-rt`, and what it promises.
     fn redesign(&self) -> Result<()> {
-        match &self.found.redesign {
-            Some(Ok(new)) => {
-                let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
-                self.model_with("8-redesign/new_controller", &new.controller.system, (y, u), &())?;
-                let exported = redesign::exported(&self.found.records, new);
-                self.folder.text("8-redesign/controller.rs", &exported.rust())?;
-                self.folder.json("8-redesign/controller.json", &exported)?;
-                let (figure, loops) = (redesign::figure(new)?, redesign::loops());
-                self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &loops))?;
-                self.folder.text("8-redesign/response.svg", &svg(&figure, &loops)?)?;
-                self.json("8-redesign/redesign.json", redesign::entry(new))
-            }
-            Some(Err(e)) => self.refused("8-redesign/redesign.json", e),
-            None => Ok(()),
-        }
+        self.outcome("8-redesign/redesign.json", self.found.redesign.as_ref(), |new| {
+            let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+            self.model_with("8-redesign/new_controller", &new.controller.system, (y, u), &())?;
+            let exported = exported(&self.found.records, new);
+            self.folder.text("8-redesign/controller.rs", &exported.rust())?;
+            self.folder.json("8-redesign/controller.json", &exported)?;
+            let (figure, loops) = (figure(new)?, loops());
+            self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &loops))?;
+            self.folder.text("8-redesign/response.svg", &svg(&figure, &loops)?)?;
+            self.json("8-redesign/redesign.json", RedesignEntry::from(new))
+        })
     }
 
     /// `7-validate/verdict.json`, `7-validate/residuals.json` and the predictions.
@@ -275,6 +255,15 @@ impl Writer<'_> {
     /// A file of a stage with the provenance of the run.
     fn json(&self, name: &str, content: impl Serialize) -> Result<()> {
         Ok(self.folder.json(name, &Artefact { content, provenance: &self.provenance })?)
+    }
+
+    /// What a stage gave, or in its `file` why it gave nothing; no file where it was not asked for.
+    fn outcome<T>(&self, file: &str, found: Option<&Result<T>>, write: impl FnOnce(&T) -> Result<()>) -> Result<()> {
+        match found {
+            Some(Ok(found)) => write(found),
+            Some(Err(reason)) => self.refused(file, reason),
+            None => Ok(()),
+        }
     }
 
     /// The reason why there is no such file.

@@ -3,8 +3,9 @@
 use super::nonparametric;
 use crate::Result;
 use crate::method::Method;
+use crate::page::decibels::{self, bounds_db, decibel, magnitude, phase};
 use crate::result::Identification;
-use crate::stages::responses::{self, bounds_db, decibel, magnitude, model_responses, phase};
+use crate::stages::responses::{self, model_responses};
 use crate::stages::uncertainty::SystemUncertainty;
 use std::f64::consts::TAU;
 use youla::c64;
@@ -21,7 +22,7 @@ const ELLIPSE: f64 = 5.991_464_547_107_979;
 
 pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let responses = model_responses(&found.verdict, &found.hz)?;
-    let models = responses.iter().flat_map(|(method, r)| responses::drawn(method.key(), r)).collect();
+    let models = responses.iter().flat_map(|(method, r)| decibels::drawn(method.key(), r)).collect();
     let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty(*method)?)));
     let of_scheme = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port)));
     let bands = recommended(found, &responses).into_iter().chain(of_scheme).collect();

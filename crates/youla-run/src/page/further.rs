@@ -1,5 +1,6 @@
 //! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
 
+use super::{certificate, redesign, reduction};
 use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
@@ -11,10 +12,10 @@ use youla_report::data::{ReportPart, Status, Verdict};
 pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
     let lines = [
         deviation_line(found),
-        region_line(found),
+        found.certified().map(certificate::line),
         margin_line(found, summary),
-        redesign_line(found),
-        reduction_line(found),
+        found.new_controller().map(redesign::line),
+        found.reduced().map(reduction::line),
         grey_box_line(found),
         factor_line(summary),
     ];
@@ -24,7 +25,7 @@ pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Ve
 /// Margins of the loop of the recommended model, of G(S) where there is none; nothing where the loop is unstable, which the answer
 /// states, and where no controller ran.
 fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
-    if found.declared.controller.is_zero() {
+    if found.declared.controller().is_zero() {
         return None;
     }
     let recommended = summary.model(Method::Likelihood).map(|m| (m, "the recommended model"));
@@ -46,17 +47,6 @@ fn margin_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         IsoZone::D => Status::Bad,
     };
     Some(Verdict { status, text, evidence: ReportPart::Margins })
-}
-
-fn redesign_line(found: &Identification) -> Option<Verdict> {
-    let new = found.new_controller()?;
-    let status = if new.gains_damping() { Status::Good } else { Status::Caution };
-    Some(Verdict { status, text: crate::stages::redesign::sentence(new), evidence: ReportPart::Redesign })
-}
-
-/// Whether the controller stabilises the reduced model, and the error of the reduction in the loop.
-fn reduction_line(found: &Identification) -> Option<Verdict> {
-    Some(found.reduced()?.verdict())
 }
 
 /// The fit of the physical structure against that of G(S).
@@ -107,12 +97,4 @@ fn deviation_line(found: &Identification) -> Option<Verdict> {
     let text = format!("S has order {}, is {stable} and fits beta to {}.", s.model.order(), fit.join(", "));
     let status = if s.stability.stable { Status::Info } else { Status::Bad };
     Some(Verdict { status, text, evidence: ReportPart::Order })
-}
-
-/// Whether the controller stabilises every plant within the region of the recommended model.
-fn region_line(found: &Identification) -> Option<Verdict> {
-    let certificate = found.certified()?;
-    let text = certificate.band_sentence();
-    let status = if certificate.band.holds() { Status::Good } else { Status::Caution };
-    Some(Verdict { status, text, evidence: ReportPart::Certificate })
 }

@@ -1,20 +1,23 @@
 //! What the report of a run shows: plain data, drawn by [`youla_report`].
 
+pub(crate) mod decibels;
 pub(crate) mod further;
 pub(crate) mod models;
 pub(crate) mod notes;
 pub(crate) mod recommended;
+pub(crate) mod redesign;
 pub(crate) mod verdict;
 
+mod certificate;
 mod frequency;
 mod nonparametric;
 mod records;
+mod reduction;
 mod residuals;
 
 use crate::Result;
 use crate::method::Method;
 use crate::result::Identification;
-use crate::stages::redesign;
 use crate::summary::Summary;
 use crate::summary::entries::OrRefused;
 use crate::summary::model::ModelEntry;
@@ -41,7 +44,7 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),
         run: run.to_owned(),
         settings: found.settings.to_toml()?,
-        sources: records::sources(found),
+        sources: found.records.sources.clone(),
         inputs: found.records.inputs.clone(),
         outputs: found.records.outputs.clone(),
         sample_time: Some(found.records.time.ts()),
@@ -62,11 +65,11 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         unlisted: all().filter_map(|(key, model)| models::unlisted(key, model)).collect(),
         parameters: structure.map_or_else(Vec::new, |of| of.parameters.clone()),
         physical: structure.map(|of| of.estimate.clone()),
-        reduction: found.reduced().map(|reduction| reduction.drawn()),
+        reduction: found.reduced().map(reduction::drawn),
         certificates: all().map(|(key, model)| models::certificate(key, model)).collect(),
-        loop_tables: found.certified().map_or_else(Vec::new, |c| c.tables()),
+        loop_tables: found.certified().map_or_else(Vec::new, certificate::tables),
         recommended: recommended::tables(found),
-        redesign: redesign(found)?,
+        redesign: found.new_controller().map(redesign::drawn).transpose()?,
         margins: all().map(|(key, model)| models::margins(key, model)).collect(),
         margins_caption: margins_caption(found, summary),
         bezout_residual: summary.bezout_residual,
@@ -100,13 +103,6 @@ fn orders(found: &Identification) -> Vec<draw::OrderChoice> {
     }
     all.extend(found.scheme().map(|s| choice(Method::Hansen, "S from alpha to beta", &s.deviation)));
     all
-}
-
-/// The present and the predicted loop.
-fn redesign(found: &Identification) -> Result<Option<draw::Redesign>> {
-    let Some(new) = found.new_controller() else { return Ok(None) };
-    let (loops, figure) = (redesign::loops().to_vec(), redesign::figure(new)?);
-    Ok(Some(draw::Redesign { loops, figure, tables: redesign::tables(new) }))
 }
 
 /// The scales with their channels.

@@ -1,9 +1,10 @@
 //! The plant without a model: levels for the figure, and what they say of the recommended model.
 
+use crate::page::decibels::{decibel, magnitude};
 use crate::records::measured::MeasuredTable;
 use crate::result::Identification;
 use crate::stages::nonparametric::LinesOfRun;
-use crate::stages::responses::{decibel, magnitude, ports};
+use crate::stages::responses::ports;
 use std::f64::consts::TAU;
 use youla::identify::likelihood::ResponseVariance;
 use youla::lti::frequency_response;

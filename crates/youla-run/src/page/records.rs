@@ -1,7 +1,7 @@
 //! The records of a run on its page: files, findings, signals, predictions.
 
 use crate::Result;
-use crate::records::{LoopRecord, SourceFile, channels_of};
+use crate::records::{LoopRecord, channels_of};
 use crate::result::Identification;
 use crate::settings::Prediction;
 use youla::MatRef;
@@ -14,7 +14,7 @@ use youla_report::{Timeline, Trace};
 pub(crate) fn summary_sentence(found: &Identification) -> String {
     let records = &found.records;
     let samples: usize = records.estimation.iter().map(LoopRecord::samples).sum();
-    let how = match found.declared.controller.is_zero() {
+    let how = match found.declared.controller().is_zero() {
         true => "in open loop",
         false => "in closed loop",
     };
@@ -35,13 +35,6 @@ pub(crate) fn summary_sentence(found: &Identification) -> String {
 
 fn counted(count: usize, what: &str) -> String {
     format!("{count} {what}{}", if count == 1 { "" } else { "s" })
-}
-
-/// Files that were read.
-pub(crate) fn sources(found: &Identification) -> Vec<draw::Source> {
-    let source =
-        |s: &SourceFile| draw::Source { path: s.path.clone(), purpose: s.purpose.clone(), sha256: s.sha256.clone() };
-    found.records.sources.iter().map(source).collect()
 }
 
 /// What the check of the data found, the most serious first.

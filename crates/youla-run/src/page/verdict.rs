@@ -90,7 +90,7 @@ fn fit_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
 /// Without a known excitation: which errors the run has no means to notice.
 fn unnoticed_line(found: &Identification) -> Option<Verdict> {
     let of_plant = found.records.measured.as_ref().is_some_and(|m| !m.of_loop);
-    let unknown = !found.settings.data.excitation_is_known() && !of_plant && !found.declared.controller.is_zero();
+    let unknown = !found.settings.data.excitation_is_known() && !of_plant && !found.declared.controller().is_zero();
     let text = "No excitation is declared, so these errors could not be noticed: a wrong gain, sign or delay of [controller]; u and y \
                 shifted against each other; exchanged channels; noise taken for excitation. Declare `input_excitation` or `reference` \
                 in [data].";
@@ -169,7 +169,7 @@ fn data_line(found: &Identification) -> Option<Verdict> {
 
 /// What the check of the data says of the declared controller.
 fn controller_sentence(found: &Identification) -> (String, Status) {
-    if found.declared.controller.is_zero() {
+    if found.declared.controller().is_zero() {
         return ("No controller ran.".into(), Status::Good);
     }
     let Some(finding) = found.data.controller() else { return of_alpha(found) };
@@ -210,7 +210,7 @@ fn loop_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         true => (Status::Good, "stabilises", "stable"),
         false => (Status::Bad, "does not stabilise", "unstable"),
     };
-    let text = match found.declared.controller.is_zero() {
+    let text = match found.declared.controller().is_zero() {
         true => format!("Stability: {name} is {adjective}; its largest pole has |z| = {worst:.5}."),
         false => format!("The controller that ran {verb} {name}: the largest pole of the loop has |z| = {worst:.5}."),
     };

@@ -12,7 +12,6 @@ use crate::records::segments::{Part, RecordSegment, parts};
 use crate::settings::{DataFile, DataSettings, DisturbanceSettings};
 use crate::{Error, Result};
 use rayon::prelude::*;
-use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
 use youla::Mat;
@@ -21,6 +20,7 @@ use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::signal::Record;
 use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256, sha256_of};
+pub use youla_report::data::Source as SourceFile;
 
 /// One record of a machine under feedback, samples x channels each.
 #[derive(Debug, Clone)]
@@ -41,17 +41,6 @@ pub struct LoopRecord {
     pub alpha: Option<Mat<f64>>,
     /// Cosine and sine of each known line in the outputs, samples x 2 per line.
     pub disturbance: Option<Mat<f64>>,
-}
-
-/// A file that was read.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct SourceFile {
-    /// Path as given in run.toml.
-    pub path: String,
-    /// `estimation` or `verification`.
-    pub purpose: String,
-    /// SHA-256 of its bytes; empty for simulated records.
-    pub sha256: String,
 }
 
 /// All records of a run.
@@ -225,20 +214,13 @@ fn read_file(
     file: &DataFile,
 ) -> Result<FileRecords> {
     let path = folder.join(&file.file);
-    let groups =
-        [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
     let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
     let computed = ComputedChannels::new(settings)?;
-    let wanted: Vec<ChannelSpec> = groups.iter().flat_map(|g| g.iter().cloned()).chain(tacho).collect();
+    let wanted: Vec<ChannelSpec> = settings.groups().into_iter().flatten().cloned().chain(tacho).collect();
     let source = Source {
         path: path.clone(),
         format: Format::Detect,
-        time: TimeSource {
-            column: settings.time_column.clone(),
-            ts: settings.sample_time,
-            gaps: settings.gaps,
-            ..TimeSource::default()
-        },
+        time: settings.clock(),
         channels: computed.to_read(&wanted),
         csv: settings.csv.clone(),
     };
@@ -267,8 +249,6 @@ struct FileOfRun<'a> {
 
 /// The records of a file from its parts without gaps: cut, without known lines, detrended.
 fn file_records(settings: &DataSettings, of: FileOfRun<'_>, read: Vec<Record>) -> Result<FileRecords> {
-    let groups =
-        [&settings.inputs, &settings.outputs, &settings.input_excitation, &settings.reference, &settings.alpha];
     let path = of.file.file.display().to_string();
     let (mut records, mut segments, mut all_rows) = (Vec::new(), Vec::new(), Vec::new());
     for Part { record, name, rows, cut } in parts(of.file, of.label, read)? {
@@ -278,13 +258,34 @@ fn file_records(settings: &DataSettings, of: FileOfRun<'_>, read: Vec<Record>) -
         if cut {
             segments.push(RecordSegment { record: name.clone(), file: path.clone(), rows });
         }
-        records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, groups)? });
+        records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, settings.groups())? });
     }
     let source = SourceFile { path, purpose: of.purpose.to_owned(), sha256: of.sha256 };
     Ok(FileRecords { records, rows: all_rows, source, segments })
 }
 
 impl LoopRecord {
+    /// The record as the method takes it.
+    ///
+    /// # Errors
+    /// [`youla::Error::NotFinite`] for records in memory.
+    pub(crate) fn of_method(&self) -> youla::Result<youla::signal::LoopRecord> {
+        let mut record = youla::signal::LoopRecord::new(self.time, self.u.clone(), self.y.clone())?.named(&self.name);
+        if let Some(d) = &self.input_excitation {
+            record = record.with_input_excitation(d.clone())?;
+        }
+        if let Some(r) = &self.reference {
+            record = record.with_reference(r.clone())?;
+        }
+        if let Some(alpha) = &self.alpha {
+            record = record.with_alpha(alpha.clone())?;
+        }
+        if let Some(lines) = &self.disturbance {
+            record = record.with_disturbance(lines.clone())?;
+        }
+        Ok(record)
+    }
+
     pub(crate) fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
         let matrix = |group: &[ChannelSpec]| {
             let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();

@@ -9,6 +9,7 @@ use faer::Scale;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use youla::Mat;
+use youla::control::RunningController;
 use youla::linalg::eye;
 use youla::lti::{Continuous, Discrete, StateSpace};
 
@@ -122,20 +123,6 @@ pub enum ControllerSettings {
     },
 }
 
-/// A controller in the library's convention, positive feedback.
-#[derive(Debug, Clone, PartialEq)]
-pub enum RealisedController {
-    /// `u = K y`.
-    System(StateSpace<Discrete>),
-    /// `u = F x` with observer gain L, `A + B F` and `A + L C` stable.
-    Observer {
-        /// m x n.
-        f: Mat<f64>,
-        /// n x p.
-        l: Mat<f64>,
-    },
-}
-
 impl ControllerSettings {
     /// Reads a JSON file that holds what `[controller]` of run.toml holds, `{"pid": {"feedback": "negative", ..}}`; `None` for a file
     /// that is no such table, for example a model.
@@ -165,12 +152,12 @@ impl ControllerSettings {
         }
     }
 
-    /// The controller with positive feedback.
+    /// The controller that ran, in positive feedback; `nominal` is the model of an observer, paths are relative to `folder`.
     ///
     /// # Errors
-    /// Whatever is wrong with the matrices, polynomials or file.
-    pub fn realise(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
-        self.controller(folder, time).map_err(|e| e.within("[controller]"))
+    /// Whatever is wrong with the values or the file.
+    pub fn realise(&self, nominal: &StateSpace<Discrete>, folder: &Path) -> Result<RunningController> {
+        self.controller(nominal, folder).map_err(|e| e.within("[controller]"))
     }
 
     /// What the types allow and no controller is, in one sentence.
@@ -184,8 +171,9 @@ impl ControllerSettings {
         }
     }
 
-    fn controller(&self, folder: &Path, time: Discrete) -> Result<RealisedController> {
+    fn controller(&self, nominal: &StateSpace<Discrete>, folder: &Path) -> Result<RunningController> {
         refuse(self.problem(), Path::new("run.toml"))?;
+        let time = nominal.time();
         let (feedback, delay, system) = match self {
             Self::DifferenceEquation { feedback, numerator, denominator, delay } => {
                 let (p, m) = numerator.shape();
@@ -219,11 +207,11 @@ impl ControllerSettings {
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
-                return Ok(RealisedController::Observer { f, l: sign * matrix("observer_gain", observer_gain)? });
+                return Ok(RunningController::observer(nominal, f, sign * matrix("observer_gain", observer_gain)?)?);
             }
         };
         let system = if *feedback == Feedback::Negative { system.negated() } else { system };
-        Ok(RealisedController::System(delayed(system, delay)?))
+        Ok(RunningController::new(delayed(system, delay)?))
     }
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use youla::signal::Detrend;
-use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
+use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps, TimeSource};
 
 /// Records and the meaning of their channels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -128,7 +128,7 @@ impl DataFile {
 }
 
 /// Files with their names in reports.
-pub(crate) fn labelled<'a>(files: &[&'a DataFile]) -> Vec<(String, &'a DataFile)> {
+fn labelled<'a>(files: &[&'a DataFile]) -> Vec<(String, &'a DataFile)> {
     let unnamed = |stem: &str| files.iter().filter(|f| f.name.is_none() && f.stem() == stem).count();
     let mut counted: HashMap<String, usize> = HashMap::new();
     let mut label = |file: &DataFile| {
@@ -148,6 +148,16 @@ impl DataSettings {
     /// of the file. Entries of one file without declared names are numbered.
     pub fn labelled(&self) -> Vec<(String, &DataFile)> {
         labelled(&self.estimation.iter().chain(&self.verification).collect::<Vec<_>>())
+    }
+
+    /// Inputs, outputs, input excitation, reference and alpha.
+    pub(crate) fn groups(&self) -> [&Vec<ChannelSpec>; 5] {
+        [&self.inputs, &self.outputs, &self.input_excitation, &self.reference, &self.alpha]
+    }
+
+    /// The clock of the files.
+    pub(crate) fn clock(&self) -> TimeSource {
+        TimeSource { column: self.time_column.clone(), ts: self.sample_time, gaps: self.gaps, ..TimeSource::default() }
     }
 
     /// Whether an excitation or a reference is known.
@@ -230,8 +240,7 @@ impl DataSettings {
     fn channel_problem(&self) -> Option<String> {
         let d = self;
         let mut names = HashSet::new();
-        let groups = [&d.inputs, &d.outputs, &d.input_excitation, &d.reference, &d.alpha];
-        if let Some(twice) = groups.into_iter().flatten().find(|c| !names.insert(&c.name)) {
+        if let Some(twice) = d.groups().into_iter().flatten().find(|c| !names.insert(&c.name)) {
             return Some(format!("[data] has more than one channel named {:?}", twice.name));
         }
         for (key, channels) in [("inputs", &d.inputs), ("outputs", &d.outputs)] {

@@ -9,11 +9,9 @@ mod models;
 mod options;
 mod order;
 mod pid;
-mod retired;
 mod shown;
 
-pub use controller::{ControllerSettings, Feedback, Hold, RealisedController};
-pub(crate) use data::labelled;
+pub use controller::{ControllerSettings, Feedback, Hold};
 pub use data::{DataFile, DataSettings};
 pub(crate) use disturbance::TACHO;
 pub use disturbance::{DisturbanceSettings, TachoUnit};
@@ -24,7 +22,6 @@ pub use pid::{Discretisation, IdealPid, ParallelPid};
 
 use crate::{Error, Result};
 use explain::{explain, problem_at};
-use retired::retired;
 use serde::{Deserialize, Serialize};
 use shown::{RecommendedTable, ReductionTable, SubspaceTable};
 use std::io::Read;
@@ -227,13 +224,9 @@ impl RunSettings {
 /// Reads a text whose top level is the table `at` of run.toml, the whole of it where `at` is empty.
 ///
 /// # Errors
-/// [`youla_io::Error::Settings`] with line and column: keys of earlier versions with what to write instead, misspelt ones with the
-/// nearest known key.
+/// [`youla_io::Error::Settings`] with line and column, misspelt keys with the nearest known one.
 pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: &str) -> Result<T> {
-    match retired(text, at) {
-        Some((start, problem)) => Err(problem_at(path, text, start, problem)),
-        None => toml::from_str(text).map_err(|e| explain(&e, text, path, at)),
-    }
+    toml::from_str(text).map_err(|e| explain(&e, text, path, at))
 }
 
 /// Parses options of a subspace identification, with the keys of `[direct]`; `path` is named in errors.

@@ -1,92 +1,42 @@
 //! Orders in run.toml: a number, a word, or a table with one key.
 
-use serde::de::value::MapAccessDeserializer;
-use serde::de::{DeserializeOwned, Error, IgnoredAny, MapAccess, Unexpected, Visitor};
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use std::fmt;
-use std::marker::PhantomData;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use youla::identify::subspace::Order;
 use youla::reduce::ReducedOrder;
 
-/// An order as run.toml writes it.
-pub(in crate::settings) trait Written: Sized {
-    /// What is written for it.
-    type Form: Serialize + From<Self>;
-    /// The keys of its table.
-    type Keys: DeserializeOwned;
-    /// What a value must be, for messages.
-    const MUST: &'static str;
-    /// `None` for an unknown word, and unless exactly one key of a table is given.
-    fn read(value: Value<'_, Self::Keys>) -> Option<Self>;
-}
-
-/// What may stand for an order.
-pub(in crate::settings) enum Value<'a, K> {
-    Number(usize),
-    Word(&'a str),
-    Table(K),
-}
-
-impl<T: Written> OrderVisitor<T> {
-    fn read<E: Error>(self, value: Value<'_, T::Keys>, unexpected: Unexpected<'_>) -> Result<T, E> {
-        T::read(value).ok_or_else(|| E::invalid_value(unexpected, &self))
-    }
-}
-
-pub(in crate::settings) fn serialize<T: Written + Copy, S: Serializer>(order: &T, s: S) -> Result<S::Ok, S::Error> {
-    T::Form::from(*order).serialize(s)
-}
-
-pub(in crate::settings) fn deserialize<'de, T: Written, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
-    d.deserialize_any(OrderVisitor(PhantomData))
-}
-
-struct OrderVisitor<T>(PhantomData<T>);
-
-impl<'de, T: Written> Visitor<'de> for OrderVisitor<T> {
-    type Value = T;
-
-    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(T::MUST)
-    }
-
-    fn visit_i64<E: Error>(self, value: i64) -> Result<T, E> {
-        let order = usize::try_from(value).map_err(|_| E::invalid_value(Unexpected::Signed(value), &self))?;
-        self.read(Value::Number(order), Unexpected::Signed(value))
-    }
-
-    fn visit_u64<E: Error>(self, value: u64) -> Result<T, E> {
-        let order = usize::try_from(value).map_err(|_| E::invalid_value(Unexpected::Unsigned(value), &self))?;
-        self.read(Value::Number(order), Unexpected::Unsigned(value))
-    }
-
-    fn visit_str<E: Error>(self, value: &str) -> Result<T, E> {
-        self.read(Value::Word(value), Unexpected::Str(value))
-    }
-
-    fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<T, A::Error> {
-        let keys = T::Keys::deserialize(MapAccessDeserializer::new(map))?;
-        self.read(Value::Table(keys), Unexpected::Map)
-    }
-}
-
 /// The order of a model.
-#[derive(Serialize, schemars::JsonSchema)]
-#[serde(untagged)]
-#[schemars(deny_unknown_fields)]
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a whole number, zero or positive, or \"auto\"")]
 pub(in crate::settings) enum OrderForm {
     /// This order.
     Number(usize),
-    /// What the singular value criterion proposes, at most 12.
+    /// The order that the records ask for.
     Word(AutoWord),
 }
 
 /// The word for a choice by the program.
-#[derive(Serialize, schemars::JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(in crate::settings) enum AutoWord {
     /// The program chooses.
     Auto,
+}
+
+impl OrderForm {
+    /// The number, where one is given.
+    pub(in crate::settings) fn number(&self) -> Option<usize> {
+        match self {
+            OrderForm::Number(order) => Some(*order),
+            OrderForm::Word(AutoWord::Auto) => None,
+        }
+    }
+}
+
+impl From<Option<usize>> for OrderForm {
+    fn from(order: Option<usize>) -> Self {
+        order.map_or(OrderForm::Word(AutoWord::Auto), OrderForm::Number)
+    }
 }
 
 impl From<Order> for OrderForm {
@@ -98,24 +48,19 @@ impl From<Order> for OrderForm {
     }
 }
 
-impl Written for Order {
-    type Form = OrderForm;
-    type Keys = IgnoredAny;
-    const MUST: &'static str = "a whole number or \"auto\"";
-
-    fn read(value: Value<'_, IgnoredAny>) -> Option<Self> {
-        match value {
-            Value::Number(order) => Some(Order::Fixed(order)),
-            Value::Word("auto") => Some(Order::default()),
-            _ => None,
-        }
+impl From<OrderForm> for Order {
+    fn from(form: OrderForm) -> Self {
+        form.number().map_or_else(Order::default, Order::Fixed)
     }
 }
 
 /// The order of a reduced model.
-#[derive(Serialize, schemars::JsonSchema)]
-#[serde(untagged)]
-#[schemars(deny_unknown_fields)]
+#[derive(Serialize, Deserialize, JsonSchema)]
+#[serde(
+    untagged,
+    deny_unknown_fields,
+    expecting = "expected a whole number, \"minimal\", \"auto\", or a table with the key bound or closed-loop"
+)]
 pub(in crate::settings) enum ReducedForm {
     /// This number of states, with those of the poles that are kept apart.
     Number(usize),
@@ -135,7 +80,7 @@ pub(in crate::settings) enum ReducedForm {
 }
 
 /// A reduced order that needs no number.
-#[derive(Serialize, schemars::JsonSchema)]
+#[derive(Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub(in crate::settings) enum ReducedWord {
     /// All states that are controllable and observable to working precision: only exact cancellations are removed.
@@ -160,32 +105,14 @@ impl From<ReducedOrder> for ReducedForm {
     }
 }
 
-#[derive(Deserialize)]
-#[serde(rename_all = "kebab-case", deny_unknown_fields)]
-pub(in crate::settings) struct ReducedKeys {
-    fixed: Option<usize>,
-    bound: Option<f64>,
-    closed_loop: Option<f64>,
-}
-
-impl Written for ReducedOrder {
-    type Form = ReducedForm;
-    type Keys = ReducedKeys;
-    const MUST: &'static str = "a whole number, \"minimal\", \"auto\", or a table with the key bound or closed-loop";
-
-    fn read(value: Value<'_, ReducedKeys>) -> Option<Self> {
-        let keys = match value {
-            Value::Number(order) => return Some(ReducedOrder::Fixed(order)),
-            Value::Word("minimal") => return Some(ReducedOrder::Minimal),
-            Value::Word("auto") => return Some(ReducedOrder::ClosedLoop(AUTO_ERROR)),
-            Value::Word(_) => return None,
-            Value::Table(keys) => (keys.fixed, keys.bound, keys.closed_loop),
-        };
-        match keys {
-            (Some(order), None, None) => Some(ReducedOrder::Fixed(order)),
-            (None, Some(bound), None) => Some(ReducedOrder::Bound(bound)),
-            (None, None, Some(error)) => Some(ReducedOrder::ClosedLoop(error)),
-            _ => None,
+impl From<ReducedForm> for ReducedOrder {
+    fn from(form: ReducedForm) -> Self {
+        match form {
+            ReducedForm::Number(order) => ReducedOrder::Fixed(order),
+            ReducedForm::Word(ReducedWord::Minimal) => ReducedOrder::Minimal,
+            ReducedForm::Word(ReducedWord::Auto) => ReducedOrder::ClosedLoop(AUTO_ERROR),
+            ReducedForm::Bound { bound } => ReducedOrder::Bound(bound),
+            ReducedForm::ClosedLoop { closed_loop } => ReducedOrder::ClosedLoop(closed_loop),
         }
     }
 }

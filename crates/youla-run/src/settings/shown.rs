@@ -1,17 +1,17 @@
 //! The options of the library's methods as run.toml shows them: the choices of a user. Options that no user sets keep their defaults,
 //! and are not written.
 
-use super::order::{self, OrderForm, ReducedForm};
-use serde::de::{DeserializeOwned, Error, Unexpected};
+use super::order::{OrderForm, ReducedForm};
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use youla::identify::likelihood::LikelihoodOptions;
-use youla::identify::subspace::{Feedthrough, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions};
-use youla::reduce::{ReducedOrder, ReductionMethod, ReductionOptions};
+use youla::identify::subspace::{Feedthrough, Horizon, Stability, SubspaceMethod, SubspaceOptions};
+use youla::reduce::{ReductionMethod, ReductionOptions};
 
 /// Options with the table that shows them.
 pub(in crate::settings) trait Shown: Sized + Clone {
     /// What run.toml says of them.
-    type Table: Serialize + DeserializeOwned + From<Self> + TryInto<Self, Error: std::fmt::Display>;
+    type Table: Serialize + DeserializeOwned + From<Self> + Into<Self>;
 }
 
 pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(options: &T, s: S) -> Result<S::Ok, S::Error> {
@@ -19,19 +19,19 @@ pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(options: &T, s: S)
 }
 
 pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<T, D::Error> {
-    T::Table::deserialize(d)?.try_into().map_err(D::Error::custom)
+    T::Table::deserialize(d).map(Into::into)
 }
 
 /// The same of a table that may be absent.
 pub(in crate::settings) mod optional {
-    use super::{Deserialize, Deserializer, Error, Serialize, Serializer, Shown};
+    use super::{Deserialize, Deserializer, Serialize, Serializer, Shown};
 
     pub(in crate::settings) fn serialize<T: Shown, S: Serializer>(o: &Option<T>, s: S) -> Result<S::Ok, S::Error> {
         o.clone().map(T::Table::from).serialize(s)
     }
 
     pub(in crate::settings) fn deserialize<'de, T: Shown, D: Deserializer<'de>>(d: D) -> Result<Option<T>, D::Error> {
-        Option::<T::Table>::deserialize(d)?.map(|table| table.try_into().map_err(D::Error::custom)).transpose()
+        Ok(Option::<T::Table>::deserialize(d)?.map(Into::into))
     }
 }
 
@@ -49,9 +49,7 @@ pub(crate) struct SubspaceTable {
     #[serde(skip_serializing_if = "Option::is_none")]
     past: Option<usize>,
     /// Order of the model, of S in `[hansen]`.
-    #[serde(with = "order")]
-    #[schemars(with = "OrderForm")]
-    order: Order,
+    order: OrderForm,
     /// Whether there is a direct path from u to y in the same sample.
     feedthrough: Feedthrough,
     /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model has them as
@@ -77,7 +75,7 @@ impl From<SubspaceOptions> for SubspaceTable {
         let SubspaceOptions { method, horizon, order, feedthrough, delays, stability, .. } = options;
         let Horizon { future, past } = horizon;
         let past = (past != future).then_some(past);
-        SubspaceTable { method, horizon: future, past, order, feedthrough, delays, stability }
+        SubspaceTable { method, horizon: future, past, order: order.into(), feedthrough, delays, stability }
     }
 }
 
@@ -85,43 +83,14 @@ impl From<SubspaceTable> for SubspaceOptions {
     fn from(table: SubspaceTable) -> Self {
         let SubspaceTable { method, horizon: future, past, order, feedthrough, delays, stability } = table;
         let horizon = Horizon { future, past: past.unwrap_or(future) };
-        SubspaceOptions { method, horizon, order, feedthrough, delays, stability, ..SubspaceOptions::default() }
-    }
-}
-
-/// A number, or `"auto"`, which is `None`.
-mod number_or_auto {
-    use super::{Deserializer, Error, Serialize, Serializer, StatesForm, Unexpected, order};
-    use serde::de::Visitor;
-    use std::fmt;
-
-    pub(super) fn serialize<S: Serializer>(rows: &Option<usize>, s: S) -> Result<S::Ok, S::Error> {
-        rows.map_or(StatesForm::Word(order::AutoWord::Auto), StatesForm::Number).serialize(s)
-    }
-
-    pub(super) fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Option<usize>, D::Error> {
-        d.deserialize_any(Rows)
-    }
-
-    struct Rows;
-
-    impl Visitor<'_> for Rows {
-        type Value = Option<usize>;
-
-        fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-            f.write_str("a whole number, zero or positive, or \"auto\"")
-        }
-
-        fn visit_i64<E: Error>(self, value: i64) -> Result<Option<usize>, E> {
-            usize::try_from(value).map(Some).map_err(|_| E::invalid_value(Unexpected::Signed(value), &self))
-        }
-
-        fn visit_u64<E: Error>(self, value: u64) -> Result<Option<usize>, E> {
-            usize::try_from(value).map(Some).map_err(|_| E::invalid_value(Unexpected::Unsigned(value), &self))
-        }
-
-        fn visit_str<E: Error>(self, value: &str) -> Result<Option<usize>, E> {
-            if value == "auto" { Ok(None) } else { Err(E::invalid_value(Unexpected::Str(value), &self)) }
+        SubspaceOptions {
+            method,
+            horizon,
+            order: order.into(),
+            feedthrough,
+            delays,
+            stability,
+            ..SubspaceOptions::default()
         }
     }
 }
@@ -131,9 +100,7 @@ mod number_or_auto {
 #[serde(default, deny_unknown_fields)]
 pub(in crate::settings) struct RecommendedTable {
     /// Number of states, those of the dead time not counted.
-    #[serde(with = "number_or_auto")]
-    #[schemars(with = "StatesForm")]
-    order: Option<usize>,
+    order: OrderForm,
     /// Dead time of each input in samples, beyond the one sample of a plant without feedthrough; chosen when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     dead_time: Option<Vec<usize>>,
@@ -142,16 +109,6 @@ pub(in crate::settings) struct RecommendedTable {
     feedthrough: Option<bool>,
     /// Largest order that is tried.
     largest_order: usize,
-}
-
-/// A number of states.
-#[derive(Serialize, schemars::JsonSchema)]
-#[serde(untagged)]
-enum StatesForm {
-    /// This number.
-    Number(usize),
-    /// The number that the evidence of the records asks for.
-    Word(order::AutoWord),
 }
 
 impl Default for RecommendedTable {
@@ -166,13 +123,13 @@ impl Shown for LikelihoodOptions {
 
 impl From<LikelihoodOptions> for RecommendedTable {
     fn from(LikelihoodOptions { order, dead_time, feedthrough, largest_order }: LikelihoodOptions) -> Self {
-        RecommendedTable { order, dead_time, feedthrough, largest_order }
+        RecommendedTable { order: order.into(), dead_time, feedthrough, largest_order }
     }
 }
 
 impl From<RecommendedTable> for LikelihoodOptions {
     fn from(RecommendedTable { order, dead_time, feedthrough, largest_order }: RecommendedTable) -> Self {
-        LikelihoodOptions { order, dead_time, feedthrough, largest_order }
+        LikelihoodOptions { order: order.number(), dead_time, feedthrough, largest_order }
     }
 }
 
@@ -183,9 +140,7 @@ pub(in crate::settings) struct ReductionTable {
     /// How states are removed.
     method: ReductionMethod,
     /// Number of states that are kept.
-    #[serde(with = "order")]
-    #[schemars(with = "ReducedForm")]
-    order: ReducedOrder,
+    order: ReducedForm,
     /// Poles at or beyond this modulus, from 0 to 1, are kept as they are and only the rest is reduced. Absent: everything is reduced,
     /// and must be stable but for normalised coprime factors.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -204,12 +159,12 @@ impl Shown for ReductionOptions {
 
 impl From<ReductionOptions> for ReductionTable {
     fn from(ReductionOptions { method, order, stability_boundary, .. }: ReductionOptions) -> Self {
-        ReductionTable { method, order, stability_boundary }
+        ReductionTable { method, order: order.into(), stability_boundary }
     }
 }
 
 impl From<ReductionTable> for ReductionOptions {
     fn from(ReductionTable { method, order, stability_boundary }: ReductionTable) -> Self {
-        ReductionOptions { method, order, stability_boundary, ..ReductionOptions::default() }
+        ReductionOptions { method, order: order.into(), stability_boundary, ..ReductionOptions::default() }
     }
 }

@@ -32,36 +32,16 @@ pub enum Stage {
 }
 
 impl Stage {
-    /// All stages in order.
-    pub const ALL: [Stage; 11] = [
-        Stage::Record,
-        Stage::Factor,
-        Stage::Signals,
-        Stage::Check,
-        Stage::Identify,
-        Stage::Reduce,
-        Stage::Validate,
-        Stage::Certify,
-        Stage::Redesign,
-        Stage::Write,
-        Stage::Report,
-    ];
+    /// Number of stages.
+    pub const COUNT: usize = Stage::Report as usize + 1;
 
     /// Name in summary.json and in reports.
     pub fn name(self) -> &'static str {
-        match self {
-            Stage::Record => "record",
-            Stage::Factor => "factor",
-            Stage::Check => "check",
-            Stage::Signals => "signals",
-            Stage::Identify => "identify",
-            Stage::Reduce => "reduce",
-            Stage::Validate => "validate",
-            Stage::Certify => "certify",
-            Stage::Redesign => "redesign",
-            Stage::Write => "write",
-            Stage::Report => "report",
-        }
+        const NAMES: [&str; Stage::COUNT] = [
+            "record", "factor", "signals", "check", "identify", "reduce", "validate", "certify", "redesign", "write",
+            "report",
+        ];
+        NAMES[self as usize]
     }
 }
 

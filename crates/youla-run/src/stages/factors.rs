@@ -1,12 +1,12 @@
 //! From nominal model and controller of a run to its coprime factors, with balanced states.
 
 use crate::records::RunRecords;
-use crate::settings::{FactorSettings, RealisedController, RunSettings};
+use crate::settings::{FactorSettings, RunSettings};
 use crate::{Error, Result};
 use std::path::Path;
-use youla::Mat;
-use youla::control::{LqrWeights, closed_loop, lqr, observer_controller, with_input_port};
-use youla::factor::CoprimeFactors;
+use youla::MatRef;
+use youla::control::{ChannelScales, RunningController, closed_loop, with_input_port};
+use youla::factor::{CoprimeFactors, loop_factors};
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace};
 
@@ -15,10 +15,21 @@ use youla::lti::{Discrete, StateSpace};
 pub struct DeclaredLoop {
     /// The nominal model in its own states.
     pub nominal: StateSpace<Discrete>,
+    /// The controller that ran.
+    pub running: RunningController,
+}
+
+impl DeclaredLoop {
+    /// Realises both; paths are relative to `folder`.
+    pub(crate) fn new(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<Self> {
+        let nominal = settings.nominal.realise(folder, time)?;
+        Ok(DeclaredLoop { running: settings.controller.realise(&nominal, folder)?, nominal })
+    }
+
     /// The controller that ran, `u = K y` (positive feedback).
-    pub controller: StateSpace<Discrete>,
-    /// State feedback F, m x n, and observer gain L, n x p, where the controller is given by them.
-    pub gains: Option<[Mat<f64>; 2]>,
+    pub fn controller(&self) -> &StateSpace<Discrete> {
+        self.running.system()
+    }
 }
 
 /// The factors of a loop.
@@ -35,95 +46,55 @@ pub struct LoopFactors {
 /// # Errors
 /// Whatever is wrong with the given model or controller; [`youla::Error::Ports`] where they do not fit the records.
 pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<DeclaredLoop> {
-    let nominal = settings.nominal.realise(folder, records.time)?;
-    for (what, expected, found) in [
-        ("the number of inputs of the nominal model", records.inputs.len(), nominal.inputs()),
-        ("the number of outputs of the nominal model", records.outputs.len(), nominal.outputs()),
-    ] {
-        if expected != found {
-            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
+    let declared = DeclaredLoop::new(settings, folder, records.time)?;
+    let (m, p) = (records.inputs.len(), records.outputs.len());
+    let systems = [("the nominal model", &declared.nominal, (m, p)), ("the controller", declared.controller(), (p, m))];
+    for (name, system, ports) in systems {
+        for (side, expected, found) in [("inputs", ports.0, system.inputs()), ("outputs", ports.1, system.outputs())] {
+            if expected != found {
+                let what = format!("the number of {side} of {name}");
+                return Err(Error::Method(youla::Error::Ports { what, expected, found }));
+            }
         }
     }
-    let (controller, gains) = declared_controller(settings, folder, records.time)?;
-    for (what, expected, found) in [
-        ("the number of inputs of the controller", records.outputs.len(), controller.inputs()),
-        ("the number of outputs of the controller", records.inputs.len(), controller.outputs()),
-    ] {
-        if expected != found {
-            return Err(Error::Method(youla::Error::Ports { what: what.into(), expected, found }));
-        }
-    }
-    Ok(DeclaredLoop { nominal, controller, gains })
-}
-
-/// A controller, and its gains F and L where it is given by them.
-type WithGains = (StateSpace<Discrete>, Option<[Mat<f64>; 2]>);
-
-/// The declared controller `u = K y` (positive feedback).
-pub(crate) fn declared_controller(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<WithGains> {
-    match settings.controller.realise(folder, time)? {
-        RealisedController::System(k) => Ok((k, None)),
-        RealisedController::Observer { f, l } => {
-            let nominal = settings.nominal.realise(folder, time)?;
-            check_gains(&nominal, &f, &l)?;
-            let k = observer_controller(&nominal, f.as_ref(), l.as_ref()).map_err(|e| e.within("[controller]"))?;
-            Ok((k, Some([f, l])))
-        }
-    }
+    Ok(declared)
 }
 
 /// Builds the factors that the settings of a run describe; paths in them are relative to `folder`.
 ///
 /// # Errors
-/// As [`factorise`], and whatever is wrong with the given model or controller.
+/// As [`loop_factors`], with the likely cause where the controller does not stabilise the nominal model, and whatever is wrong with the
+/// given model or controller.
 pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<LoopFactors> {
-    let nominal = settings.nominal.realise(folder, records.time)?;
-    let controller = settings.controller.realise(folder, records.time)?;
-    factorise(&nominal, &controller, records, &settings.factors)
+    factorise(&declared_loop(settings, records, folder)?, records.sizes(), &settings.factors)
 }
 
-fn check_gains(nominal: &StateSpace<Discrete>, f: &Mat<f64>, l: &Mat<f64>) -> Result<()> {
-    youla::linalg::check_shape("[controller] state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
-    Ok(youla::linalg::check_shape("[controller] observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?)
-}
-
-/// Builds the factors of the nominal model and the controller. States are scaled by powers of two first: entries of
-/// physical models span 1e6, which would cost three to six digits of (15).
-///
-/// # Errors
-/// [`youla::Error::NotStabilising`] with the pole when the controller does not stabilise the nominal model, shapes, and
-/// the conditions of the Riccati equations.
-pub fn factorise(
-    nominal: &StateSpace<Discrete>,
-    controller: &RealisedController,
-    records: &RunRecords,
+/// The factors of a loop whose channels have these sizes.
+pub(crate) fn factorise(
+    declared: &DeclaredLoop,
+    (inputs, outputs): (Vec<f64>, Vec<f64>),
     settings: &FactorSettings,
 ) -> Result<LoopFactors> {
-    let scale = nominal.state_scales()?;
-    let balanced = nominal.with_scaled_states(&scale);
-    let factors = match controller {
-        RealisedController::Observer { f, l } => {
-            check_gains(nominal, f, l)?;
-            let f = Mat::from_fn(f.nrows(), f.ncols(), |i, j| f[(i, j)] * scale[j]);
-            let l = Mat::from_fn(l.nrows(), l.ncols(), |i, j| l[(i, j)] / scale[i]);
-            let made = CoprimeFactors::observer(&balanced, f.as_ref(), l.as_ref());
-            made.map_err(|e| wrong_gain(e, &balanced, &f, &l))?
-        }
-        RealisedController::System(k) => {
-            let f = state_feedback(&balanced, records, settings.input_weight)?;
-            let made = CoprimeFactors::stacked(&balanced, k, f.as_ref(), controller_feedback(k)?.as_ref());
-            made.map_err(|e| likely_cause(e, &balanced, k))?
-        }
-    };
+    let weight = settings.input_weight.sqrt();
+    let sizes = ChannelScales::new(inputs.iter().map(|size| size / weight).collect(), outputs)?;
+    let DeclaredLoop { nominal, running } = declared;
+    let factors = loop_factors(nominal, running, &sizes).map_err(|e| match (e, running.gains()) {
+        (youla::Error::Unstable { pole, .. }, Some(gains)) => not_stabilised(pole, wrong_gain(nominal, gains)),
+        (youla::Error::NotStabilising { pole, .. }, _) => not_stabilised(pole, likely_cause(nominal, running.system())),
+        (other, _) => other.into(),
+    })?;
     let bezout_residual = factors.bezout_residual(&grid_to_nyquist(nominal.time(), 200))?;
     Ok(LoopFactors { factors, bezout_residual })
 }
 
+fn not_stabilised(pole: youla::c64, cause: String) -> Error {
+    Error::NotStabilised { pole: youla::error::Pole(pole).to_string(), cause }
+}
+
 /// The closed-loop poles of an observer-based controller are those of A + B F and A + L C: which of the gains is wrong, and whether its
 /// sign is.
-fn wrong_gain(error: youla::Error, nominal: &StateSpace<Discrete>, f: &Mat<f64>, l: &Mat<f64>) -> Error {
-    let youla::Error::Unstable { pole, .. } = error else { return error.into() };
-    let largest = |matrix: Mat<f64>| {
+fn wrong_gain(nominal: &StateSpace<Discrete>, [f, l]: [MatRef<'_, f64>; 2]) -> String {
+    let largest = |matrix: youla::Mat<f64>| {
         let poles = youla::linalg::eigenvalues("A with a gain", matrix.as_ref()).unwrap_or_default();
         poles.iter().map(|p| p.norm()).fold(0.0, f64::max)
     };
@@ -139,14 +110,12 @@ fn wrong_gain(error: youla::Error, nominal: &StateSpace<Discrete>, f: &Mat<f64>,
                   nominal model"
             .to_owned(),
     };
-    let cause = format!("it comes from {gain} in [controller.observer]; {remedy}");
-    Error::NotStabilised { pole: youla::error::Pole(pole).to_string(), cause }
+    format!("it comes from {gain} in [controller.observer]; {remedy}")
 }
 
-/// The refusal of a nominal model that the controller does not stabilise, with the change of the controller's gain that would make it
+/// Why the controller does not stabilise the nominal model: the change of the controller's gain that would make it
 /// stabilise: the sign, then the size, the nearest first, with either sign.
-fn likely_cause(error: youla::Error, nominal: &StateSpace<Discrete>, k: &StateSpace<Discrete>) -> Error {
-    let youla::Error::NotStabilising { pole, .. } = error else { return error.into() };
+fn likely_cause(nominal: &StateSpace<Discrete>, k: &StateSpace<Discrete>) -> String {
     let stabilises = |factor: f64| {
         let scaled = k.map_output(&(eye(k.outputs()) * faer::Scale(factor)));
         with_input_port(&scaled)
@@ -159,7 +128,7 @@ fn likely_cause(error: youla::Error, nominal: &StateSpace<Discrete>, k: &StateSp
         [1.0 / size, size, -1.0 / size, -size]
     });
     let found = std::iter::once(-1.0).chain(sizes).find(|factor| stabilises(*factor));
-    let cause = match found {
+    match found {
         Some(-1.0) => "with the opposite sign it would: check the sign, `feedback` in [controller]".to_owned(),
         Some(factor) if factor < 0.0 => format!(
             "{factor:.3e} times the controller would stabilise it: check the sign, `feedback` in [controller], the units of the \
@@ -171,9 +140,7 @@ fn likely_cause(error: youla::Error, nominal: &StateSpace<Discrete>, k: &StateSp
         ),
         None => "no other sign or gain of the controller would: check the dynamics in [nominal], its domain, and the sample time"
             .to_owned(),
-    };
-    let pole = youla::error::Pole(pole).to_string();
-    Error::NotStabilised { pole, cause }
+    }
 }
 
 /// Steps of a quarter of a decade in which a gain is tried, up to a million: units differ by no more. Chosen, not measured.
@@ -183,27 +150,4 @@ const STEPS: i32 = 24;
 fn grid_to_nyquist(time: Discrete, count: usize) -> Vec<f64> {
     let nyquist = std::f64::consts::PI / time.ts();
     (0..count).map(|k| nyquist * 10f64.powf(-4.0 + 4.0 * k as f64 / count as f64)).collect()
-}
-
-/// LQR with weights `1 / rms(y)^2` on the outputs and `input_weight / rms(u)^2` on the inputs, rms on the estimation records.
-fn state_feedback(plant: &StateSpace<Discrete>, records: &RunRecords, input_weight: f64) -> Result<Mat<f64>> {
-    let (u, y) = records.sizes();
-    let outputs = diagonal(y.iter().map(|s| 1.0 / (s * s)));
-    let inputs = diagonal(u.iter().map(|s| input_weight / (s * s)));
-    let gain = || Ok(lqr(plant, &LqrWeights::on_outputs(plant, outputs.as_ref(), inputs.as_ref())?)?.f);
-    gain().map_err(|e: Error| e.within("state feedback F of the nominal model"))
-}
-
-fn diagonal(values: impl Iterator<Item = f64>) -> Mat<f64> {
-    let values: Vec<f64> = values.collect();
-    Mat::from_fn(values.len(), values.len(), |i, j| if i == j { values[i] } else { 0.0 })
-}
-
-/// Feedback of the controller's right factors: zero for a stable controller (U = K, V = I), else an LQR of its own.
-fn controller_feedback(k: &StateSpace<Discrete>) -> Result<Mat<f64>> {
-    if k.is_stable()? {
-        return Ok(Mat::zeros(k.inputs(), k.order()));
-    }
-    let weights = LqrWeights { q: eye(k.order()), r: eye(k.inputs()), s: None };
-    Ok(lqr(k, &weights).map_err(|e| e.within("state feedback of the controller's factors"))?.f)
 }

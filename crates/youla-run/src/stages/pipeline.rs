@@ -9,7 +9,7 @@ use crate::stages::certificate::certificate;
 use crate::stages::clock::{Stage, StageClock};
 use crate::stages::context::{RunContext, SchemeContext};
 use crate::stages::direct::direct;
-use crate::stages::factors::{declared_loop, factorise_run};
+use crate::stages::factors::{DeclaredLoop, declared_loop, factorise};
 use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
@@ -42,12 +42,12 @@ pub fn identify(
     settings.check()?;
     check_grid(&settings.frequency_response, records.time)?;
     let declared = declared_loop(&settings, &records, folder)?;
-    let filtered = own_line(filtered(&settings, &records, folder, clock))?;
+    let filtered = own_line(filtered(&settings, &records, &declared, clock))?;
     let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
     let context =
         filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
-    let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(&declared.controller)))?;
+    let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
             None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
@@ -130,10 +130,10 @@ fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
 fn filtered(
     settings: &RunSettings,
     records: &RunRecords,
-    folder: &Path,
+    declared: &DeclaredLoop,
     clock: &mut StageClock<'_>,
 ) -> Result<Filtered> {
-    let factorisation = clock.run(Stage::Factor, || factorise_run(settings, records, folder))?; // (13)-(15)
+    let factorisation = clock.run(Stage::Factor, || factorise(declared, records.sizes(), &settings.factors))?; // (13)-(15)
     let settle = settings.factors.settle;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(&factorisation.factors, &records.estimation, settle))?; // (28)

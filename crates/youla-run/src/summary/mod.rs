@@ -1,22 +1,25 @@
 //! summary.json: the contract for scripts, as one type.
 
+pub(crate) mod certificate;
 pub(crate) mod entries;
 pub(crate) mod model;
 pub(crate) mod physical;
 pub(crate) mod recommended;
+pub(crate) mod redesign;
+pub(crate) mod reduction;
 pub(crate) mod robustness;
 
 use crate::check::DataCheckEntry;
 use crate::method::Method;
 use crate::result::Identification;
-use crate::stages::certificate::CertificateEntry;
 use crate::stages::clock::StageTimes;
-use crate::stages::redesign::{self, RedesignEntry};
-use crate::stages::reduction::ReductionEntry;
 use crate::{Error, Result};
+use certificate::CertificateEntry;
 use entries::{OrRefused, finite};
 use model::ModelEntry;
 use recommended::RecommendedEntry;
+use redesign::RedesignEntry;
+use reduction::ReductionEntry;
 use robustness::ScalesEntry;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -89,9 +92,9 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         seconds: seconds.iter().map(|(stage, seconds)| (stage.name().to_owned(), *seconds)).collect(),
         true_plant,
         channel_scales: robustness::scales(run),
-        certificate: run.certified().map(|c| c.entry()),
-        redesign: run.new_controller().map(redesign::entry),
-        reduction: run.reduced().map(|reduction| reduction.entry()),
+        certificate: run.certified().map(CertificateEntry::from),
+        redesign: run.new_controller().map(RedesignEntry::from),
+        reduction: run.reduced().map(ReductionEntry::from),
     })
 }
 

@@ -3,8 +3,8 @@
 use crate::common::Folder;
 use std::path::Path;
 use youla::Mat;
-use youla::lti::{Discrete, simulate};
-use youla_run::{ControllerSettings, RealisedController, RunSettings};
+use youla::lti::{Discrete, StateSpace, simulate};
+use youla_run::{ControllerSettings, RunSettings};
 
 const TS: f64 = 1e-3;
 
@@ -16,12 +16,12 @@ fn error() -> Vec<f64> {
 /// `u` of the controller `text` in positive feedback, from rest.
 fn response(text: &str) -> Vec<f64> {
     let settings: ControllerSettings = toml::from_str(text).unwrap();
-    let RealisedController::System(k) = settings.realise(Path::new("/"), Discrete::new(TS).unwrap()).unwrap() else {
-        panic!("a system")
-    };
+    let nominal = StateSpace::gain(Mat::zeros(1, 1), Discrete::new(TS).unwrap()).unwrap();
+    let running = settings.realise(&nominal, Path::new("/")).unwrap();
+    let k = running.system();
     let e = error();
     let input = Mat::from_fn(e.len(), 1, |i, _| e[i]);
-    simulate(&k, input.as_ref(), &vec![0.0; k.order()]).unwrap().col(0).iter().copied().collect()
+    simulate(k, input.as_ref(), &vec![0.0; k.order()]).unwrap().col(0).iter().copied().collect()
 }
 
 fn assert_close(text: &str, expected: &[f64]) {

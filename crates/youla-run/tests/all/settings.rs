@@ -47,19 +47,6 @@ fn settings_without_a_record_are_refused_not_run() {
     assert!(points.checked().unwrap_err().to_string().contains("[frequency_response] window is 1"));
 }
 
-#[test]
-fn keys_of_version_0_1_name_their_successors() {
-    for table in ["hansen", "direct"] {
-        let error = parse(&format!("{MINIMAL}\n[{table}]\nweight = \"moesp\"\n")).unwrap_err().to_string();
-        assert!(error.contains(&format!("`weight` is no longer a key of [{table}]: write `method`")), "{error}");
-    }
-    let options = parse_subspace_options("weight = \"moesp\"", Path::new("options.toml")).unwrap_err().to_string();
-    assert!(options.contains("`weight` is no longer a key of [direct]: write `method`"), "{options}");
-    let bearing = MINIMAL.replace("[nominal.transfer_function]", "[nominal.bearing]");
-    let error = parse(&bearing).unwrap_err().to_string();
-    assert!(error.contains("[nominal.state_space]"), "{error}");
-}
-
 /// Every form of an order, in run.toml and in the options of the Python `subspace`; what is written reads back.
 #[test]
 fn orders_are_numbers_words_or_rules() {

@@ -126,7 +126,7 @@ fn numbers_out_of_range() {
         (
             "order = 3",
             "order = 3\nscaling = \"none\"",
-            "run.toml:24:1: `scaling` is no longer a key of [hansen]: channels",
+            "run.toml:24:1: `scaling` is not a key of [hansen]; the keys are method",
         ),
         ("horizon = 10", "horizon = \"auto\"\npast = 3", "horizon = \"auto\" chooses `past` too"),
         ("[hansen]", "[factors]\ninput_weight = -1.0\n[hansen]", "[factors] input_weight is -1"),

@@ -41,7 +41,6 @@ fn files_read_back_bit_by_bit() {
         "{}",
         &text[..400]
     );
-    assert!(fs::read_to_string(out.join("excite.svg")).expect("written").contains("energy density"));
 }
 
 #[test]

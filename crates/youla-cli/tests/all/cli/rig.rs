@@ -71,7 +71,7 @@ fn identify_takes_the_record_as_it_is() {
     assert!(nobody.code == Some(2) && nobody.stderr.contains("does not answer"), "{}", nobody.stderr);
 }
 
-/// The gas bearing in the time of the requests, its log as Parquet; then the identified model as a twin under the same loop.
+/// The gas bearing in the time of the requests, then the identified model as a twin under the same loop.
 #[test]
 fn a_model_of_a_twin_is_a_twin() {
     let folder = empty_folder("rig-twins");
@@ -84,7 +84,7 @@ fn a_model_of_a_twin_is_a_twin() {
         assert_eq!((recorded.code, recorded.stderr.as_str()), (Some(0), ""));
         serde_json::from_str::<serde_json::Value>(&recorded.stdout).expect("JSON")
     };
-    let report = excite(&bearing.address, "log.parquet");
+    let report = excite(&bearing.address, "log.csv");
     assert!(report["rows"].as_u64() > Some(15_000), "{report}");
     let identified = youla(&folder, &["identify", "run.toml", "--out", "run", "--json"]);
     assert_eq!(identified.code, Some(0), "{}", identified.stderr);
@@ -126,7 +126,7 @@ fn a_twin_that_cannot_be_is_refused() {
     }
     let twin = Twin::start(&[]);
     let log = youla(&folder, &["rig", "record", &twin.address, "--out", "log.txt", "--duration", "1"]);
-    assert!(log.code == Some(2) && log.stderr.contains("a .csv or a .parquet file"), "{}", log.stderr);
+    assert!(log.code == Some(2) && log.stderr.contains("a log is a .csv file"), "{}", log.stderr);
     std::fs::write(
         folder.join("table.json"),
         r#"{"ts": 5e-5, "points": [

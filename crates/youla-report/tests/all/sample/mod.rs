@@ -263,12 +263,12 @@ fn reduced_to(order: usize) -> ReductionOrder {
     let error = 3.0 * 10f64.powi(-(order as i32));
     ReductionOrder {
         order,
-        bound: Some(120.0 * error),
-        open_loop: Some(60.0 * error),
+        error_bound: Some(120.0 * error),
+        open_loop_error: Some(60.0 * error),
         open_loop_relative: Some(error),
         closed_loop_relative: (order > 2).then_some(0.5 * error),
-        stabilised: order > 2,
-        worst_pole: Some([0.99, 0.01]),
+        stabilised_by_controller: order > 2,
+        worst_closed_loop_pole: Some([0.99, 0.01]),
         failure: (order == 6).then(|| "the reduced model must be stable".into()),
     }
 }

@@ -220,8 +220,7 @@ fn target(name: &str, data: &DataSettings) -> Target {
     if data.computed.contains_key(name) {
         return Target::Computed(name.to_owned());
     }
-    let groups = [&data.inputs, &data.outputs, &data.input_excitation, &data.reference, &data.alpha];
-    let channel = groups.into_iter().flatten().find(|c| c.name == name);
+    let channel = data.groups().into_iter().flatten().find(|c| c.name == name);
     // A text is always a name or a number of a column.
     let column = channel.map_or_else(|| name.parse().unwrap_or(ChannelRef::Column(0)), ChannelSpec::source);
     match column {

@@ -211,7 +211,7 @@ impl<'a> Criterion<'a> {
 
 impl Closed {
     fn new(run: RunContext<'_>) -> Result<Self> {
-        let (records, controller) = (run.records, &run.declared.controller);
+        let (records, controller) = (run.records, run.declared.controller());
         let with_alpha = records.estimation.iter().any(|r| r.alpha.is_some());
         let ports = match run.factorisation.filter(|_| with_alpha) {
             Some(factorisation) => factorisation.factors.j_k()?,

@@ -185,7 +185,7 @@ fn verify_model(
         poles: model.poles()?,
         modes: model.modes()?,
         visible: model.visible_modes().ok(),
-        certificate: certify(model, &run.declared.controller)?,
+        certificate: certify(model, run.declared.controller())?,
         robustness: robustness(run.declared, scales, recommended, model),
         records,
     })
@@ -204,7 +204,7 @@ pub(crate) fn verify_record(
         Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
         Prediction::ClosedLoop => {
             let factors = run.factorisation.filter(|_| record.alpha.is_some()).map(|f| &f.factors);
-            let ports = factors.map_or_else(|| with_input_port(&run.declared.controller), |f| f.j_k())?;
+            let ports = factors.map_or_else(|| with_input_port(run.declared.controller()), |f| f.j_k())?;
             let excitation = LoopExcitation {
                 input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
                 reference: record.reference.as_ref().map(|r| r.as_ref()),

@@ -64,7 +64,7 @@ pub(crate) fn residual_tests(
     let known: Vec<_> =
         known.into_iter().filter_map(|(x, specs)| x.as_ref().filter(|x| moving(x)).map(|x| (x, specs))).collect();
     // Without feedback the inputs come from outside.
-    let external = !known.is_empty() || run.declared.controller.is_zero();
+    let external = !known.is_empty() || run.declared.controller().is_zero();
     let (x, channels) = match known.is_empty() {
         false => {
             let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();

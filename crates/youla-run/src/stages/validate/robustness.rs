@@ -55,11 +55,12 @@ fn rms(records: &[LoopRecord], signal: impl Fn(&LoopRecord) -> &Mat<f64>) -> Vec
 
 /// The robustness of one model of a run; `recommended` is the recommended one.
 pub(crate) fn robustness(
-    DeclaredLoop { nominal, controller, .. }: &DeclaredLoop,
+    declared: &DeclaredLoop,
     scales: &Result<ChannelScales, String>,
     recommended: Option<&StateSpace<Discrete>>,
     model: &StateSpace<Discrete>,
 ) -> LoopRobustness {
+    let (nominal, controller) = (&declared.nominal, declared.controller());
     let scaled = |plant: &StateSpace<Discrete>| -> Result<StateSpace<Discrete>, String> {
         scales.as_ref().map_err(Clone::clone)?.plant(plant).map_err(|e| e.to_string())
     };

@@ -1,13 +1,15 @@
-//! The reference of run.toml as a page of text, from its schema.
+//! The reference of run.toml as a page of text, from its schema: `docs/book/reference.md`.
 
-use crate::schema::settings_schema;
+use crate::schema::project;
 use serde_json::{Map, Value};
 use std::collections::HashMap;
+use std::fs;
+use youla_run::settings_schema;
 
 const HEAD: &str = "\
 # All keys of run.toml
 
-<!-- Written by `youla schema --markdown`; do not edit. The texts are the doc comments of the settings. -->
+<!-- Written by the tests with YOULA_BLESS=1; do not edit. The texts are the doc comments of the settings. -->
 
 Every key with its type, its default and its meaning; [run.toml](../run-toml.md) explains which keys belong together. Alternatives are
 separated by commas. A table written in braces may also have a heading of its own. `youla schema` prints the same as a JSON schema, with
@@ -19,11 +21,7 @@ and, as the first line of run.toml, `#:schema run.schema.json` (taplo, Even Bett
 ";
 
 /// The reference, in Markdown: the only list of all keys, from the documentation of the structs that read them.
-///
-/// ```
-/// assert!(youla_run::settings_reference().contains("## `[data]`"));
-/// ```
-pub fn settings_reference() -> String {
+fn settings_reference() -> String {
     let schema = settings_schema();
     let none = Map::new();
     let defs = schema["$defs"].as_object().unwrap_or(&none);
@@ -326,21 +324,29 @@ fn toml_of(value: &Value) -> String {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::*;
+/// Keys of a user and thresholds of the check are apart, and the former are few: 80, and ten with which controllers in s and PIDs are
+/// written down, which no run needs that has other forms.
+#[test]
+fn keys_are_few() {
+    let page = settings_reference();
+    let (of_user, check) = page.split_once("\n# Thresholds of the check of the data\n").unwrap();
+    let tables = |line: &&str| line.contains("` | table |") || line.contains("` | list of table |");
+    let keys: Vec<&str> = of_user.lines().filter(|line| line.starts_with("| `") && !line.starts_with("| `[")).collect();
+    let count = keys.iter().filter(|line| !tables(line)).count();
+    assert!((40..=90).contains(&count), "{count} keys:\n{}", keys.join("\n"));
+    assert!(!of_user.contains("## `[check]`") && check.contains("## `[check]`"));
+}
 
-    /// Keys of a user and thresholds of the check are apart, and the former are few: 80, and ten with which controllers in s and PIDs are
-    /// written down, which no run needs that has other forms.
-    #[test]
-    fn keys_are_few() {
-        let page = settings_reference();
-        let (of_user, check) = page.split_once("\n# Thresholds of the check of the data\n").unwrap();
-        let tables = |line: &&str| line.contains("` | table |") || line.contains("` | list of table |");
-        let keys: Vec<&str> =
-            of_user.lines().filter(|line| line.starts_with("| `") && !line.starts_with("| `[")).collect();
-        let count = keys.iter().filter(|line| !tables(line)).count();
-        assert!((40..=90).contains(&count), "{count} keys:\n{}", keys.join("\n"));
-        assert!(!of_user.contains("## `[check]`") && check.contains("## `[check]`"));
+/// `YOULA_BLESS=1` writes it.
+#[test]
+fn the_reference_is_that_of_the_settings() {
+    let (path, now) = (project().join("docs/book/reference.md"), format!("{}\n", settings_reference().trim_end()));
+    if std::env::var_os("YOULA_BLESS").is_some() {
+        fs::write(&path, &now).expect("written");
     }
+    let written = fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        written == now,
+        "docs/book/reference.md is stale: `YOULA_BLESS=1 cargo test -p youla-cli --test all reference`"
+    );
 }

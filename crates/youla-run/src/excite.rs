@@ -1,23 +1,19 @@
 //! An excitation for the machine of a run.toml: its loop, the sequence, the files.
 
-pub(crate) mod figure;
-
 use crate::Result;
-use crate::excite::figure::figure;
-use crate::records::{RunRecords, channels_of, read_records};
-use crate::settings::{RealisedController, RunSettings};
-use crate::stages::factors::factorise;
+use crate::records::{channels_of, read_records};
+use crate::settings::RunSettings;
+use crate::stages::factors::{DeclaredLoop, factorise};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use youla::control::with_input_port;
-use youla::lti::{Discrete, Partitioned, StateSpace};
+use youla::control::{RunningController, with_input_port};
+use youla::lti::{Discrete, Partitioned};
 use youla::signal::Channel;
 use youla::signal::{Detrend, Record};
 use youla_io::export::{SequenceFormat, export_sequence};
 use youla_io::folder::{refuse_existing, replace_files};
-use youla_io::{Format, Source, TimeSource, read};
+use youla_io::{Format, Gaps, Source, TimeSource, read};
 use youla_loop::excite::{ExciteOptions, Excited, ExcitedLoop, excite, output_noise};
-use youla_report::svg;
 
 /// Where the excitation enters.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -74,24 +70,23 @@ pub fn excite_run(
     quiet: Option<&Path>,
 ) -> Result<RunExcitation> {
     let time = sample_time(settings, folder)?;
-    let nominal = settings.nominal.realise(folder, time)?;
-    let controller = settings.controller.realise(folder, time)?;
-    let port = port.unwrap_or_else(|| usual_port(settings, &controller));
+    let declared = DeclaredLoop::new(settings, folder, time)?;
+    let port = port.unwrap_or_else(|| usual_port(settings, &declared.running));
     let (inputs, outputs) = (channels_of(&settings.data.inputs), channels_of(&settings.data.outputs));
-    let ported = ported(settings, folder, &nominal, &controller, port)?;
-    let on = ExcitedLoop { nominal: &nominal, controller: &ported, inputs: &inputs, outputs: &outputs };
+    let ported = ported(settings, folder, &declared, port)?;
+    let on = ExcitedLoop { nominal: &declared.nominal, controller: &ported, inputs: &inputs, outputs: &outputs };
     let mut options = options.clone();
     if let Some(file) = quiet {
         options.noise = noise_of(settings, &on, file).map_err(|e| e.within(file.display().to_string()))?;
     }
     let excited = excite(&on, &options)?;
-    let declared = match port {
+    let channels = match port {
         ExcitationPort::Alpha => &settings.data.alpha,
         ExcitationPort::Input => &settings.data.input_excitation,
     };
-    let columns = match &declared[..] {
+    let columns = match &channels[..] {
         [] => inputs.iter().map(|c| Channel::new(format!("alpha_{}", c.name), &c.unit)).collect(),
-        declared => channels_of(declared),
+        channels => channels_of(channels),
     };
     Ok(RunExcitation { name: settings.name.clone(), port, columns, inputs, outputs, excited })
 }
@@ -106,9 +101,8 @@ fn sample_time(settings: &RunSettings, folder: &Path) -> Result<Discrete> {
     }
 }
 
-fn usual_port(settings: &RunSettings, controller: &RealisedController) -> ExcitationPort {
-    let observer = matches!(controller, RealisedController::Observer { .. });
-    match (settings.data.input_excitation.is_empty(), settings.data.alpha.is_empty(), observer) {
+fn usual_port(settings: &RunSettings, controller: &RunningController) -> ExcitationPort {
+    match (settings.data.input_excitation.is_empty(), settings.data.alpha.is_empty(), controller.gains().is_some()) {
         (false, ..) | (true, true, false) => ExcitationPort::Input,
         (true, false, _) | (true, true, true) => ExcitationPort::Alpha,
     }
@@ -118,47 +112,29 @@ fn usual_port(settings: &RunSettings, controller: &RealisedController) -> Excita
 fn ported(
     settings: &RunSettings,
     folder: &Path,
-    nominal: &StateSpace<Discrete>,
-    controller: &RealisedController,
+    declared: &DeclaredLoop,
     port: ExcitationPort,
 ) -> Result<Partitioned<Discrete>> {
-    let records = match (controller, port) {
-        (RealisedController::System(k), ExcitationPort::Input) => return Ok(with_input_port(k)?),
-        (RealisedController::System(_), ExcitationPort::Alpha) => {
+    if port == ExcitationPort::Input {
+        return Ok(with_input_port(declared.controller())?);
+    }
+    let sizes = match declared.running.gains() {
+        // The factors of observer gains do not depend on them.
+        Some(_) => (vec![1.0; declared.nominal.inputs()], vec![1.0; declared.nominal.outputs()]),
+        None => {
             let part = "the port alpha of a controller without observer gains rests on the estimation records (or take the port input)";
-            read_records(&settings.data, folder).map_err(|e| e.within(part))?
+            read_records(&settings.data, folder).map_err(|e| e.within(part))?.sizes()
         }
-        (RealisedController::Observer { .. }, _) => without_data(settings, nominal.time()),
     };
-    let factors = factorise(nominal, controller, &records, &settings.factors)?.factors;
-    match port {
-        ExcitationPort::Alpha => Ok(factors.j_k()?),
-        ExcitationPort::Input => Ok(with_input_port(&factors.controller()?)?),
-    }
-}
-
-/// Records of which only clock and channels are known; the factors of observer gains need no more.
-fn without_data(settings: &RunSettings, time: Discrete) -> RunRecords {
-    RunRecords {
-        time,
-        inputs: channels_of(&settings.data.inputs),
-        outputs: channels_of(&settings.data.outputs),
-        estimation: Vec::new(),
-        verification: Vec::new(),
-        sources: Vec::new(),
-        segments: Vec::new(),
-        measured: None,
-        true_plant: None,
-    }
+    Ok(factorise(declared, sizes, &settings.factors)?.factors.j_k()?)
 }
 
 fn noise_of(settings: &RunSettings, on: &ExcitedLoop, file: &Path) -> Result<Vec<f64>> {
     let data = &settings.data;
-    let clock = TimeSource { column: data.time_column.clone(), ts: data.sample_time, ..TimeSource::default() };
     let source = Source {
         path: file.to_owned(),
         format: Format::Detect,
-        time: clock,
+        time: TimeSource { gaps: Gaps::default(), ..data.clock() },
         channels: data.outputs.clone(),
         csv: data.csv.clone(),
     };
@@ -193,7 +169,7 @@ impl RunExcitation {
     }
 }
 
-/// Writes `alpha` in the formats asked for and the picture `excite.svg` to `folder`, which is made if need be.
+/// Writes `alpha` in the formats asked for to `folder`, which is made if need be.
 ///
 /// # Errors
 /// [`youla_io::Error::FileExists`] for a file that is there, unless `replace` is set; then nothing is written. [`youla_io::Error::Io`],
@@ -210,8 +186,6 @@ pub fn write_excitation(
     for format in formats {
         files.push((format!("alpha.{}", format.extension()), export_sequence(&record, *format, &about)?));
     }
-    let (figure, methods) = figure(found);
-    files.push(("excite.svg".to_owned(), svg(&figure, &methods)?.into_bytes()));
     if !replace {
         refuse_existing(folder, &files)?;
     }

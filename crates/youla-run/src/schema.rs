@@ -1,8 +1,6 @@
 //! The JSON schema of run.toml (draft 2020-12), from the structs that read it: doc comments are its descriptions, `Default` its
 //! defaults, `deny_unknown_fields` its `additionalProperties = false`.
 
-pub(crate) mod reference;
-
 use crate::settings::RunSettings;
 use crate::summary::Summary;
 use schemars::generate::SchemaSettings;

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use youla::Mat;
 use youla::control::RunningController;
-use youla::linalg::eye;
+use youla::linalg::{check_shape, eye};
 use youla::lti::{Continuous, Discrete, StateSpace};
 
 /// Which sign the controller was written down with; never guessed.
@@ -207,7 +207,10 @@ impl ControllerSettings {
             Self::Observer { feedback, state_feedback, observer_gain } => {
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
-                return Ok(RunningController::observer(nominal, f, sign * matrix("observer_gain", observer_gain)?)?);
+                let l = sign * matrix("observer_gain", observer_gain)?;
+                check_shape("state_feedback", f.as_ref(), (nominal.inputs(), nominal.order()))?;
+                check_shape("observer_gain", l.as_ref(), (nominal.order(), nominal.outputs()))?;
+                return Ok(RunningController::observer(nominal, f, l)?);
             }
         };
         let system = if *feedback == Feedback::Negative { system.negated() } else { system };

@@ -41,7 +41,7 @@ fn wrong_shapes_of_the_controller() {
         (
             "observer",
             "state_feedback = [[0.5, 1.0]]\nobserver_gain = [[1.0]]",
-            "[controller] state_feedback is 1 x 2, but must be 1 x 1",
+            "[controller]: state_feedback is 1 x 2, but must be 1 x 1",
         ),
         ("difference_equation", "numerator = [1.0]\ndenominator = [0.0]", "[controller]: the transfer function"),
     ];

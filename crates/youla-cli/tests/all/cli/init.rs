@@ -90,7 +90,8 @@ fn what_does_not_fit_the_log_is_refused() {
 fn a_parquet_log_is_refused() {
     let folder = loop_folder("init-parquet", &[]);
     fs::write(folder.join("log.parquet"), b"PAR1\0\0PAR1").expect("written");
-    let found = youla(&folder, &["init", "log.parquet", "--input", "u", "--output", "y", "--open-loop"]);
+    let found =
+        youla(&folder, &["init", "log.parquet", "--input", "u", "--output", "y", "--open-loop", "--out", "new.toml"]);
     assert_eq!(found.code, Some(2));
     for part in ["a Parquet file cannot be read", "CSV or NPZ", "Python"] {
         assert!(found.stderr.contains(part), "{part:?} is not in: {}", found.stderr);

@@ -123,7 +123,7 @@ const SETTINGS_OF_RUNS: [Mistake; 23] = [
     wrong(
         "a table of an earlier version",
         &[("[hansen]", "[hansen]\nweight = \"cva\"")],
-        &["`weight`", "write `method`"],
+        &["`weight`", "`weight` is not a key of [hansen]"],
     ),
     wrong("more rows than there are", &[("take = 1200", "take = 9000")], &["log.csv", "9000", "2000"]),
     wrong("a second header", &[("[direct]", "[hansen]")], &["run.toml:25", "hansen"]),

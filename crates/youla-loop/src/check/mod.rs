@@ -54,7 +54,6 @@ pub use excitation::{ExcitationCheck, excitation};
 pub use feedback::{FeedbackCheck, feedback};
 pub use finding::{Finding, Severity, Test, by_severity};
 pub use flatline::{Standstill, stuck};
-pub use lines::{SpectralLine, lines};
 pub use noise::{Noise, noise};
 pub use options::CheckOptions;
 pub use outliers::{Outliers, outliers};

@@ -4,7 +4,7 @@ use super::regression::Lagged;
 use super::{ChannelNames, CheckOptions, Finding, LoggedRecord, drift, excitation, lines, noise};
 use crate::error::Result;
 use youla::MatRef;
-use youla::signal::Channel;
+use youla::signal::{Channel, spectral_lines};
 
 /// Default of the required order of persistency.
 /// Past and future horizon of the default identification, 20 block rows each.
@@ -94,7 +94,7 @@ pub(super) fn of_lines(
     let known: Vec<&[f64]> = known.iter().map(Vec::as_slice).collect();
     let outputs = columns(record.y);
     let one = |(values, channel): (&Vec<f64>, &Channel)| {
-        lines::finding(&lines(values, &known, record.time, options), record.name, channel)
+        lines::finding(&spectral_lines(values, &known, record.time, options.line_false_alarm), record.name, channel)
     };
     outputs.iter().zip(&names.outputs).filter_map(one).collect()
 }

@@ -5,7 +5,7 @@ use crate::stages::validate::residue_at;
 use crate::summary::entries::{ModeEntry, finite, pairs};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Evidence, ModeEstimate, Predictor, Recommendation};
+use youla::identify::likelihood::{Evidence, ModeEstimate, Outcome, Predictor, Recommendation, RegionParts};
 use youla::lti::{Continuous, StateSpace};
 use youla::{Mat, MatRef};
 use youla_io::SystemMatrices;
@@ -35,8 +35,87 @@ pub struct RecommendedEntry {
     pub modes: Vec<ModeEntry>,
     /// Standard deviations of the frequency response.
     pub response_deviation: DeviationEntry,
-    /// Questions to the records, each with its figure and limit.
+    /// Bands in Hz in which the standard deviation of every entry is at most a tenth of it.
+    pub bands: Vec<[f64; 2]>,
+    /// The same for each entry, `[output][input]`.
+    pub entry_bands: Vec<Vec<Vec<[f64; 2]>>>,
+    /// The part of the margin of the loop that the 95 % region takes; absent for an open loop.
+    pub loop_ratio: Option<f64>,
+    /// Where it does so, Hz.
+    pub loop_ratio_hz: Option<f64>,
+    /// What causes the deviations of the response.
+    pub parts: PartsEntry,
+    /// The tests of the verdict.
+    pub tests: Vec<TestEntry>,
+    /// The figures of the tests with their limits.
     pub evidence: Vec<EvidenceFigure>,
+}
+
+/// Standard deviations of the frequency response by their causes, `[frequency][output][input]`, physical units; the squares sum to those of
+/// `response_deviation`.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct PartsEntry {
+    /// Noise of the records.
+    pub noise: Vec<Vec<Vec<Option<f64>>>>,
+    /// Models of other structure that the records do not tell from this one.
+    pub choice: Vec<Vec<Vec<Option<f64>>>>,
+    /// Differences between records and parts of records beyond their noise.
+    pub variation: Vec<Vec<Vec<Option<f64>>>>,
+    /// What the excitation causes and the model does not explain.
+    pub distortion: Vec<Vec<Vec<Option<f64>>>>,
+}
+
+impl From<&RegionParts> for PartsEntry {
+    fn from(parts: &RegionParts) -> Self {
+        let all = |part: &[Mat<f64>]| part.iter().map(|at| rows(at.as_ref())).collect();
+        PartsEntry {
+            noise: all(&parts.noise),
+            choice: all(&parts.choice),
+            variation: all(&parts.variation),
+            distortion: all(&parts.distortion),
+        }
+    }
+}
+
+/// A test of the verdict.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct TestEntry {
+    /// What was asked.
+    pub question: String,
+    /// `passed`, `failed` or `not-tested`.
+    pub outcome: String,
+    /// Whether the model is trusted only where the test is passed.
+    pub required: bool,
+    /// What was found.
+    pub figure: Option<f64>,
+    /// The largest figure that is accepted.
+    pub limit: f64,
+    /// By how many standard deviations the records show it beyond chance.
+    pub deviations: Option<f64>,
+    /// Where it was found, Hz.
+    pub hz: Option<[f64; 2]>,
+    /// What lies behind the figure, or why nothing was tested.
+    pub note: String,
+}
+
+impl From<&Evidence> for TestEntry {
+    fn from(e: &Evidence) -> Self {
+        let outcome = match e.outcome {
+            Outcome::Passed => "passed",
+            Outcome::Failed => "failed",
+            Outcome::NotTested => "not-tested",
+        };
+        TestEntry {
+            question: e.question.clone(),
+            outcome: outcome.into(),
+            required: e.required,
+            figure: finite(e.figure),
+            limit: e.limit,
+            deviations: e.significance.and_then(finite),
+            hz: e.hz,
+            note: e.note.clone(),
+        }
+    }
 }
 
 /// Standard deviations of the frequency response.
@@ -82,6 +161,12 @@ impl From<&Recommendation> for RecommendedEntry {
                 hz: deviation.hz.clone(),
                 absolute: deviation.absolute.iter().map(|at| rows(at.as_ref())).collect(),
             },
+            bands: found.bands.clone(),
+            entry_bands: found.entry_bands.clone(),
+            loop_ratio: found.loop_ratio.as_ref().and_then(|r| finite(r.largest)),
+            loop_ratio_hz: found.loop_ratio.as_ref().map(|r| r.largest_hz),
+            parts: PartsEntry::from(&deviation.parts),
+            tests: found.evidence.iter().map(TestEntry::from).collect(),
             evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
         }
     }

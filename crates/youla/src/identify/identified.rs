@@ -4,11 +4,12 @@ use super::likelihood::{
     self, Evidence, LikelihoodOptions, LoopKnowledge, LoopSignals, MeasuredResponse, Recommendation,
 };
 use super::subspace::Experiment;
-use crate::control::{RunningController, closed_loop, with_input_port};
+use super::verdict::limits::LARGEST_LINE;
+use crate::control::RunningController;
 use crate::factor::{CoprimeFactors, loop_factors};
 use crate::linalg::{block, least_squares};
 use crate::lti::{Discrete, StateSpace};
-use crate::signal::LoopRecord;
+use crate::signal::{LoopRecord, SpectralLine, take_out_lines};
 use crate::{Error, Mat, Result};
 
 /// The model that the records of a loop support, with everything that follows from it.
@@ -98,15 +99,16 @@ pub fn identify(
         false => Some(controller.system()),
     };
     let law = law.filter(|_| !controller.is_open_loop());
-    let known = LoopKnowledge::new(law, views(&estimation), views(&verification))?;
+    let feedback = Some(controller.system()).filter(|_| !controller.is_open_loop());
+    let known = LoopKnowledge::new(law, feedback, views(&estimation), views(&verification))?;
     let mut model = likelihood::recommend(
-        &experiments(records, &estimation),
-        &experiments(fresh, &verification),
+        &experiments(&estimation),
+        &experiments(&verification),
         Some(&known),
         first.time(),
         options,
     )?;
-    model.evidence.extend(stabilised(&model, controller.system())?);
+    model.evidence.extend(lines(estimation.iter().chain(&verification)));
     let deviation = deviation(nominal, controller, &model);
     Ok(Identified { model, deviation })
 }
@@ -160,7 +162,12 @@ fn same_time(what: &str, left: f64, right: f64) -> Result<()> {
 
 /// The signals of a record in the terms of the controller; see [`LoopSignals`].
 struct Signals {
+    /// Inputs as logged.
+    applied: Mat<f64>,
+    /// Inputs and outputs without the lines of a disturbance.
+    u: Mat<f64>,
     y: Mat<f64>,
+    lines: Vec<SpectralLine>,
     seen: Mat<f64>,
     explained: Mat<f64>,
     excitation: Option<Mat<f64>>,
@@ -169,22 +176,29 @@ struct Signals {
 
 impl Signals {
     fn new(r: &LoopRecord, controller: &RunningController) -> Result<Self> {
-        let y = without_lines(r)?;
-        if let (Some(_), Some(alpha)) = (controller.observer_law(), r.alpha()) {
-            let seen = block(&[&[r.u(), r.y()]]);
-            let excitation = Some(alpha.to_owned());
-            return Ok(Signals { y, seen, explained: r.u() - alpha, excitation, observer: true });
-        }
-        let seen = r.reference().map_or_else(|| r.y().to_owned(), |reference| r.y() - reference);
-        let explained = r.input_excitation().map_or_else(|| r.u().to_owned(), |d| r.u() - d);
-        // Without feedback the inputs come from outside.
-        let excitation = r.excitation().or_else(|| controller.is_open_loop().then(|| r.u().to_owned()));
-        Ok(Signals { y, seen, explained, excitation, observer: false })
+        let observer = controller.observer_law().is_some() && r.alpha().is_some();
+        let (seen, explained, excitation) = match (observer, r.alpha()) {
+            (true, Some(alpha)) => (block(&[&[r.u(), r.y()]]), r.u() - alpha, Some(alpha.to_owned())),
+            _ => {
+                let seen = r.reference().map_or_else(|| r.y().to_owned(), |reference| r.y() - reference);
+                let explained = r.input_excitation().map_or_else(|| r.u().to_owned(), |d| r.u() - d);
+                // Without feedback the inputs come from outside.
+                let open = || controller.is_open_loop().then(|| r.u().to_owned());
+                (seen, explained, r.excitation().or_else(open))
+            }
+        };
+        let (mut u, mut y) = (r.u().to_owned(), without_known(r)?);
+        let lines = match &excitation {
+            // Without a known excitation a line may be one.
+            None => Vec::new(),
+            Some(x) => take_out_lines((&mut u, &mut y), x.as_ref(), r.time(), FALSE_LINE),
+        };
+        Ok(Signals { applied: r.u().to_owned(), u, y, lines, seen, explained, excitation, observer })
     }
 
     fn view(&self) -> LoopSignals<'_> {
         let excitation = self.excitation.as_ref().map(|x| x.as_ref());
-        LoopSignals { seen: self.seen.as_ref(), explained: self.explained.as_ref(), excitation }
+        LoopSignals { seen: self.seen.as_ref(), explained: self.explained.as_ref(), applied: self.applied.as_ref(), excitation }
     }
 }
 
@@ -192,36 +206,38 @@ fn views(signals: &[Signals]) -> Vec<LoopSignals<'_>> {
     signals.iter().map(Signals::view).collect()
 }
 
-fn experiments<'a>(records: &'a [LoopRecord], signals: &'a [Signals]) -> Vec<Experiment<'a>> {
-    records.iter().zip(signals).map(|(r, s)| Experiment::new(r.u(), s.y.as_ref())).collect()
+fn experiments(signals: &[Signals]) -> Vec<Experiment<'_>> {
+    signals.iter().map(|s| Experiment::new(s.u.as_ref(), s.y.as_ref())).collect()
+}
+
+/// Probability that a record of noise has a line.
+const FALSE_LINE: f64 = 1e-3;
+/// Lines that are listed at most.
+const LISTED: usize = 6;
+
+/// The lines that were taken out, with the largest amplitude over the size of the outputs; nothing where there are none.
+fn lines<'a>(signals: impl Iterator<Item = &'a Signals> + Clone) -> Option<Evidence> {
+    let mut all: Vec<&SpectralLine> = signals.clone().flat_map(|s| &s.lines).collect();
+    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
+    let size = |s: &Signals| (s.y.squared_norm_l2() / s.y.nrows().max(1) as f64).sqrt();
+    let largest = all.first()?.amplitude / signals.map(size).fold(f64::MIN_POSITIVE, f64::max);
+    let mut hz: Vec<f64> = Vec::new();
+    for line in &all {
+        if hz.len() < LISTED && hz.iter().all(|hz| (hz / line.hz - 1.0).abs() > 1e-3) {
+            hz.push(line.hz);
+        }
+    }
+    let listed: Vec<String> = hz.iter().map(|hz| format!("{hz:.2}")).collect();
+    let question = "Largest amplitude of a line that no excitation has, over the size of the outputs (lines)";
+    let note = format!("taken out of inputs and outputs at {} Hz", listed.join(", "));
+    Some(Evidence::new(question, largest, LARGEST_LINE).reported().noted(note))
 }
 
 /// Outputs without the disturbances of known shape that explain them best, least squares.
-fn without_lines(r: &LoopRecord) -> Result<Mat<f64>> {
+fn without_known(r: &LoopRecord) -> Result<Mat<f64>> {
     let Some(w) = r.disturbance() else { return Ok(r.y().to_owned()) };
     let found = least_squares("the disturbances of known shape", w, r.y())?;
     Ok(r.y() - w * found.x)
-}
-
-/// Whether the controller stabilises the model, as it did the plant: the largest magnitude of a pole of the loop, by how many of its
-/// standard deviations it exceeds 1. Nothing is asked of an open loop.
-fn stabilised(model: &Recommendation, k: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
-    if k.is_zero() {
-        return Ok(None);
-    }
-    let ports = with_input_port(k)?;
-    let radius = |plant: &StateSpace<Discrete>| {
-        let poles = closed_loop(plant, &ports)?.poles()?;
-        Ok(vec![poles.iter().map(|p| p.norm()).fold(0.0, f64::max)])
-    };
-    let largest = radius(&model.plant)?[0];
-    let question = "Largest magnitude of a pole of the loop with the stated controller (stability)";
-    let evidence = Evidence::new(question, largest, 1.0);
-    if largest < 1.0 {
-        return Ok(Some(evidence));
-    }
-    let deviation = model.region.intervals(0.95, radius)?[0].deviation;
-    Ok(Some(evidence.beyond_chance((largest - 1.0) / deviation.max(f64::MIN_POSITIVE))))
 }
 
 fn deviation(

@@ -7,6 +7,7 @@ mod channel;
 mod detrend;
 mod excitation;
 mod harmonics;
+mod lines;
 mod loop_record;
 mod periodic;
 mod persistency;
@@ -17,6 +18,7 @@ pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
 pub use harmonics::without_harmonics;
+pub use lines::{SpectralLine, spectral_lines, take_out_lines};
 pub use loop_record::LoopRecord;
 pub use periodic::{
     ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response, local_response,

@@ -17,6 +17,8 @@ pub struct LoopSignals<'a> {
     pub seen: MatRef<'a, f64>,
     /// The inputs of the plant that it explains: u without the excitation that is added to it, N x m.
     pub explained: MatRef<'a, f64>,
+    /// The inputs of the plant as logged, N x m.
+    pub applied: MatRef<'a, f64>,
     /// The external excitation, wherever it enters, N x any number of channels; `None` where it is not known.
     pub excitation: Option<MatRef<'a, f64>>,
 }
@@ -25,18 +27,20 @@ pub struct LoopSignals<'a> {
 #[derive(Debug, Clone)]
 pub struct LoopKnowledge<'a> {
     pub(crate) controller: Option<&'a StateSpace<Discrete>>,
+    pub(crate) feedback: Option<&'a StateSpace<Discrete>>,
     pub(crate) estimation: Vec<LoopSignals<'a>>,
     pub(crate) verification: Vec<LoopSignals<'a>>,
 }
 
 impl<'a> LoopKnowledge<'a> {
-    /// From the controller (from what it sees to the inputs that it explains; `None` in open loop) and the signals of each record,
-    /// in the order of the experiments.
+    /// From the controller (from what it sees to the inputs that it explains; `None` in open loop), the feedback `u = K y` that it makes,
+    /// and the signals of each record in the order of the experiments.
     ///
     /// # Errors
     /// [`Error::Shape`] and [`Error::NotFinite`] with the record.
     pub fn new(
         controller: Option<&'a StateSpace<Discrete>>,
+        feedback: Option<&'a StateSpace<Discrete>>,
         estimation: Vec<LoopSignals<'a>>,
         verification: Vec<LoopSignals<'a>>,
     ) -> Result<Self> {
@@ -45,7 +49,7 @@ impl<'a> LoopKnowledge<'a> {
                 check(controller, record).map_err(|e| e.within(format!("{kind} record {}", k + 1)))?;
             }
         }
-        Ok(LoopKnowledge { controller, estimation, verification })
+        Ok(LoopKnowledge { controller, feedback, estimation, verification })
     }
 
     /// The same of some of the records, by their places.
@@ -54,6 +58,7 @@ impl<'a> LoopKnowledge<'a> {
             |all: &[LoopSignals<'a>], places: &[usize]| places.iter().filter_map(|k| all.get(*k).copied()).collect();
         LoopKnowledge {
             controller: self.controller,
+            feedback: self.feedback,
             estimation: some(&self.estimation, estimation),
             verification: some(&self.verification, verification),
         }
@@ -66,12 +71,6 @@ impl<'a> LoopKnowledge<'a> {
         // what it sees ends with y: y - r, or [u; y] for an observer
         let first = k.inputs().checked_sub(p)?;
         (k.outputs() == m).then(|| Mat::from_fn(m, p, |j, i| k.d()[(j, first + i)] * sizes.y[i] / sizes.u[j]))
-    }
-
-    /// The excitation of each estimation record, where all are known and one is not zero.
-    pub(crate) fn excitation(&self) -> Option<Vec<MatRef<'a, f64>>> {
-        let all: Vec<MatRef<'a, f64>> = self.estimation.iter().map(|r| r.excitation).collect::<Option<_>>()?;
-        all.iter().any(|x| x.norm_l2() > 0.0).then_some(all)
     }
 }
 

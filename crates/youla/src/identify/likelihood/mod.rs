@@ -33,13 +33,14 @@ mod tests;
 
 pub use super::subspace::Experiment;
 pub use deviation::mode_estimates::ModeEstimate;
-pub use deviation::region::{Draw, Interval, Region, ResponseError};
+pub use super::verdict::LoopRatio;
+pub use deviation::region::{Draw, Interval, Region, RegionParts, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
 pub use options::LikelihoodOptions;
-pub use recommendation::{Candidate, Evidence, Predictor, Recommendation};
+pub use recommendation::{Candidate, Evidence, Outcome, Predictor, Recommendation, figure};
 
-use super::verdict::{self, Parts};
+use super::verdict::{self, Judged, Judgement, Parts, Witness};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
@@ -106,26 +107,36 @@ pub fn recommend(
     let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
     let choice = &solution.chosen;
     let spectra = problem.spectra(&choice.delays);
-    let slow = deviation::slow(spectra.samples());
-    let shares = [slow.as_slice(), &deviation::grid(spectra.samples())].concat();
+    let shares = [deviation::slow(spectra.samples()), deviation::grid(spectra.samples())].concat();
     let parts = Parts::new(&problem, &solution, verification);
-    let excitation = known.and_then(LoopKnowledge::excitation);
-    let missed = excitation.map(|x| deviation::missed::missed(&spectra, choice, &x, problem.skip));
-    let directions = Directions::new(&spectra, &solution, parts.scatter, missed);
-    let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
-    let mut evidence = verdict::of_model(&spectra, &solution, &shares[slow.len()..], &variances[slow.len()..]);
-    evidence.extend(parts.evidence(&solution));
-    evidence.extend(verdict::of_loop(&spectra, &solution, known, directions.missed()));
+    let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
+    let witness = signals.and_then(|signals| Witness::new(&problem, &solution, signals, verification));
+    let directions = Directions::new(&spectra, &solution, parts.scatter, witness.clone());
     let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
+    let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
+    let judged = Judged {
+        problem: &problem,
+        spectra: &spectra,
+        solution: &solution,
+        known,
+        witness: witness.as_ref(),
+        parts: &parts,
+        plant: &plant,
+        region: &region,
+    };
+    let Judgement { evidence, loop_ratio, entry_bands, bands } = verdict::judge(&judged)?;
     Ok(Recommendation {
         predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
         plant,
         dead_time: choice.delays.clone(),
         order: choice.order(),
-        region: deviation::region::Region::new(problem.sizes.clone(), time, (&shares, &variances), directions),
+        region,
         modes: deviation::mode_estimates::modes(&spectra, choice, time),
         candidates,
         evidence,
+        loop_ratio,
+        entry_bands,
+        bands,
     })
 }
 
@@ -194,7 +205,9 @@ fn problem<'a>(
         return Err(Error::OutOfRange { what: "the order".into(), value: 0.0, must: "at least one" });
     }
     let sizes = Sizes::of(experiments);
-    let direct = known.and_then(|known| known.direct(&sizes)).filter(|_| options.feedthrough != Some(false));
+    // What is stated wrongly must not spoil what is logged rightly: the controller enters after it has passed.
+    let stated = known.filter(|known| verdict::explains(known));
+    let direct = stated.and_then(|known| known.direct(&sizes)).filter(|_| options.feedthrough != Some(false));
     Ok(Problem {
         experiments,
         direct,

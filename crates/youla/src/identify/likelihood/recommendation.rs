@@ -3,6 +3,8 @@
 use crate::Mat;
 use crate::identify::likelihood::deviation::mode_estimates::ModeEstimate;
 use crate::identify::likelihood::deviation::region::Region;
+use crate::identify::verdict::limits::BEYOND_CHANCE;
+use crate::identify::verdict::loop_ratio::LoopRatio;
 use crate::lti::{Discrete, StateSpace};
 
 /// The model that the records support, with its evidence.
@@ -22,17 +24,23 @@ pub struct Recommendation {
     pub predictor: Predictor,
     /// What was tried, in the order in which it was.
     pub candidates: Vec<Candidate>,
-    /// Questions to the records, each with its figure and limit.
+    /// Tests, each with its figure and limit.
     pub evidence: Vec<Evidence>,
+    /// What the region takes of the margin of the loop that ran; `None` for an open loop, and where the controller is not known.
+    pub loop_ratio: Option<LoopRatio>,
+    /// Bands in Hz in which the standard deviation of an entry is at most a tenth of it, output by output and input by input.
+    pub entry_bands: Vec<Vec<Vec<[f64; 2]>>>,
+    /// Bands in Hz in which this holds for every entry.
+    pub bands: Vec<[f64; 2]>,
 }
 
 impl Recommendation {
-    /// Whether every figure is within its limit.
+    /// Whether every required test is passed.
     pub fn trusted(&self) -> bool {
         self.evidence.iter().all(Evidence::holds)
     }
 
-    /// The questions whose figures are beyond their limits.
+    /// The required tests that are not passed.
     pub fn reasons(&self) -> Vec<String> {
         self.evidence.iter().filter(|e| !e.holds()).map(Evidence::to_string).collect()
     }
@@ -73,44 +81,109 @@ pub struct Candidate {
     pub steps: usize,
 }
 
-/// Figure and limit of a question to the records.
+/// What a test of the verdict says.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+pub enum Outcome {
+    /// The figure is within its limit, or chance explains it.
+    Passed,
+    /// It is not.
+    Failed,
+    /// The records cannot answer; `note` says why.
+    NotTested,
+}
+
+/// A test of the verdict: figure and limit of a question to the records.
 #[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Evidence {
     /// What was asked, in plain English.
     pub question: String,
-    /// What was found.
+    /// What was found; NaN where it was not tested.
     pub figure: f64,
     /// The largest figure that is accepted.
     pub limit: f64,
     /// By how many standard deviations the records show it beyond chance; `None` where that is no question. A figure that chance
     /// explains is accepted whatever its size.
     pub significance: Option<f64>,
+    /// Passed, failed or not tested.
+    pub outcome: Outcome,
+    /// Whether a model is trusted only where this test is passed; other tests name an imperfection with its size.
+    pub required: bool,
+    /// Where the figure was found, Hz.
+    pub hz: Option<[f64; 2]>,
+    /// What lies behind the figure, or why nothing was tested; empty where there is nothing to say.
+    pub note: String,
 }
 
-/// Standard deviations beyond chance up to which a figure is accepted whatever its size: of the 10^4 figures of many runs none
-/// exceeds it by chance.
-const BEYOND_CHANCE: f64 = 5.0;
-
 impl Evidence {
-    /// A figure with the largest that is accepted.
+    /// A required test: a figure with the largest that is accepted.
     pub fn new(question: impl Into<String>, figure: f64, limit: f64) -> Self {
-        Evidence { question: question.into(), figure, limit, significance: None }
+        let outcome = if figure <= limit { Outcome::Passed } else { Outcome::Failed };
+        let (question, note) = (question.into(), String::new());
+        Evidence { question, figure, limit, significance: None, outcome, required: true, hz: None, note }
+    }
+
+    /// A required test that the records cannot answer.
+    pub(crate) fn untested(question: impl Into<String>, limit: f64, why: impl Into<String>) -> Self {
+        let open = Evidence::new(question, f64::NAN, limit);
+        Evidence { outcome: Outcome::NotTested, note: why.into(), ..open }
     }
 
     pub(crate) fn beyond_chance(self, significance: f64) -> Self {
-        Evidence { significance: Some(significance), ..self }
+        let passed = self.outcome == Outcome::Passed || significance <= BEYOND_CHANCE;
+        let outcome = if passed { Outcome::Passed } else { Outcome::Failed };
+        Evidence { significance: Some(significance), outcome, ..self }
     }
 
-    /// Whether the figure is within its limit, or explained by chance.
+    /// The size of an imperfection, which decides nothing by itself: its consequence is in the region of the model.
+    #[must_use]
+    pub fn reported(self) -> Self {
+        Evidence { required: false, ..self }
+    }
+
+    #[must_use]
+    pub(crate) fn at(self, hz: [f64; 2]) -> Self {
+        Evidence { hz: Some(hz), ..self }
+    }
+
+    #[must_use]
+    pub(crate) fn noted(self, note: impl Into<String>) -> Self {
+        Evidence { note: note.into(), ..self }
+    }
+
+    /// Whether the test is passed, or is not required.
     pub fn holds(&self) -> bool {
-        self.figure <= self.limit || self.significance.is_some_and(|s| s <= BEYOND_CHANCE)
+        !self.required || self.outcome == Outcome::Passed
     }
 }
 
 impl std::fmt::Display for Evidence {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} {:.3} (limit {})", self.question, self.figure, self.limit)?;
-        self.significance.map_or(Ok(()), |s| write!(f, ", {s:.1} standard deviations beyond chance"))
+        if self.outcome == Outcome::NotTested {
+            return write!(f, "{}: not tested, {}", self.question, self.note);
+        }
+        write!(f, "{} {} (limit {})", self.question, figure(self.figure), self.limit)?;
+        if let Some([low, high]) = self.hz {
+            match low == high {
+                true => write!(f, " at {} Hz", figure(low))?,
+                false => write!(f, " from {} to {} Hz", figure(low), figure(high))?,
+            }
+        }
+        self.significance.map_or(Ok(()), |s| write!(f, ", {} standard deviations beyond chance", figure(s)))?;
+        if self.note.is_empty() { Ok(()) } else { write!(f, "; {}", self.note) }
+    }
+}
+
+/// Three significant digits; a power of ten from six digits on.
+pub fn figure(value: f64) -> String {
+    match value.abs() {
+        v if !v.is_finite() => "not finite".into(),
+        v if v >= 1e5 || v > 0.0 && v < 1e-4 => format!("{value:.1e}"),
+        v if v >= 100.0 => format!("{value:.0}"),
+        v if v >= 10.0 => format!("{value:.1}"),
+        v if v >= 1.0 => format!("{value:.2}"),
+        _ => format!("{value:.3}"),
     }
 }

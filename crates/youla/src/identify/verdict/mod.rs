@@ -1,49 +1,273 @@
-//! Whether the record supports the model: each figure has a limit, and a model is trusted where all hold.
+//! Whether the records support the model, in the metric of the loop that ran: tests with a figure, a limit and three outcomes.
 //!
-//! | figure | question |
-//! |---|---|
-//! | residual and excitation | does the excitation explain what the model leaves? |
-//! | parts | do the parts of the record, and fresh records, ask for the same parameters? |
-//! | noise of the parts | is the residual of fresh records as large as before? |
-//! | nonlinear | does a function of input or velocity, filtered by the model, explain what the model leaves? |
-//! | accuracy | how large is the stated deviation against the response? |
+//! | test | question | module |
+//! |---|---|---|
+//! | excitation | did anything but noise move the loop? | this one |
+//! | controller | is the stated controller the one that ran? | `controller` |
+//! | stability | does it stabilise the model, as it did the plant? | this one |
+//! | indirect response | does the model explain what the excitation causes? | `witness`, `local_error` |
+//! | information | does the excitation, not the noise, determine the model? | this one |
+//! | repeatability | do halves and fresh records ask for the same model? | `parts` |
+//! | region | which part of the margin does the 95 % region take? | `loop_ratio` |
+//! | nonlinearity, stationarity | sizes of imperfections; their consequences are in the region | `nonlinear`, `parts` |
+//!
+//! A model is trusted where every required test is passed. Limits: `limits`.
 
-mod loop_evidence;
+mod controller;
+pub(crate) mod limits;
+mod local_error;
+pub(crate) mod loop_ratio;
 mod nonlinear;
 mod parts;
+mod witness;
 
-pub(crate) use loop_evidence::of_loop;
+pub(crate) use controller::explains;
+pub(crate) use local_error::Excess;
+pub use loop_ratio::LoopRatio;
 pub(crate) use parts::Parts;
+pub(crate) use witness::Witness;
 
-use crate::identify::likelihood::Evidence;
-use crate::identify::likelihood::choose::problem::Solution;
-use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::deviation::response;
+use crate::control::{closed_loop, with_input_port};
+use crate::identify::likelihood::choose::problem::{Problem, Solution};
+use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::deviation::region::Region;
+use crate::identify::likelihood::deviation::{Directions, grid, slow};
+use crate::identify::likelihood::{Evidence, LoopKnowledge};
 use crate::linalg::TINY;
-use faer::c64;
+use crate::lti::{Discrete, StateSpace, frequency_response};
+use crate::statistics::median;
+use crate::Result;
+use limits::{
+    INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION,
+};
+use loop_ratio::{LoopAt, bands, entries, judged_hz, valid};
 
-/// What the model and its residual say.
-pub(crate) fn of_model(
-    spectra: &Spectra,
-    solution: &Solution,
-    shares: &[f64],
-    variances: &[Vec<f64>],
-) -> Vec<Evidence> {
-    let responses: Vec<_> = shares.iter().map(|s| response(&solution.chosen, *s)).collect();
-    vec![accuracy(&responses, variances), nonlinear::nonlinear(spectra, solution)]
+/// What the verdict rests on.
+pub(crate) struct Judged<'a> {
+    /// The records and the searches on them.
+    pub(crate) problem: &'a Problem<'a>,
+    /// Their lines.
+    pub(crate) spectra: &'a Spectra,
+    /// The model.
+    pub(crate) solution: &'a Solution,
+    /// What is known of the loop.
+    pub(crate) known: Option<&'a LoopKnowledge<'a>>,
+    /// What the excitation says.
+    pub(crate) witness: Option<&'a Witness>,
+    /// Parts of the records.
+    pub(crate) parts: &'a Parts,
+    /// The plant in physical units.
+    pub(crate) plant: &'a StateSpace<Discrete>,
+    /// Its region.
+    pub(crate) region: &'a Region,
 }
 
-/// Stated deviation against the response, median over the frequencies.
-pub(crate) fn accuracy(responses: &[Vec<c64>], variances: &[Vec<f64>]) -> Evidence {
-    let mut shares: Vec<f64> = responses
-        .iter()
-        .zip(variances)
-        .map(|(g, s)| {
-            let size = g.iter().map(|v| v.norm_sqr()).sum::<f64>().sqrt();
-            s.iter().sum::<f64>().sqrt() / size.max(TINY)
-        })
-        .collect();
-    shares.sort_by(f64::total_cmp);
-    let figure = shares.get(shares.len() / 2).copied().unwrap_or(f64::INFINITY);
-    Evidence::new("Stated standard deviation over the response, median over frequency (uncertainty)", figure, 1.0)
+/// Tests, the region in the metric of the loop, and bands of validity.
+pub(crate) struct Judgement {
+    pub(crate) evidence: Vec<Evidence>,
+    pub(crate) loop_ratio: Option<LoopRatio>,
+    pub(crate) entry_bands: Vec<Vec<Vec<[f64; 2]>>>,
+    pub(crate) bands: Vec<[f64; 2]>,
 }
+
+/// The loop of a region: its plant in the feedback, at the frequencies at which it is judged.
+struct Loops {
+    at: Vec<LoopAt>,
+}
+
+impl Loops {
+    /// `None` without feedback.
+    fn new(plant: &StateSpace<Discrete>, region: &Region, k: Option<&StateSpace<Discrete>>) -> Result<Option<Self>> {
+        let Some(k) = k.filter(|k| !k.is_zero()) else { return Ok(None) };
+        let mut poles = plant.poles()?;
+        poles.extend(closed_loop(plant, &with_input_port(k)?)?.poles()?);
+        let hz = judged_hz(region, &poles, plant.time().ts());
+        Ok(Some(Loops { at: LoopAt::all(plant, k, &hz)? }))
+    }
+
+    /// The loop at the judged frequency next to one.
+    fn near(&self, hz: f64) -> Option<&LoopAt> {
+        let next = self.at.partition_point(|at| at.hz < hz);
+        let around = self.at[next.saturating_sub(1)..(next + 1).min(self.at.len())].iter();
+        around.min_by(|a, b| (a.hz - hz).abs().total_cmp(&(b.hz - hz).abs()))
+    }
+}
+
+/// The judgement of a model from records.
+///
+/// # Errors
+/// Ports of the controller; a loop that is not well posed.
+pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
+    let ts = on.plant.time().ts();
+    let feedback = on.known.and_then(|known| known.feedback);
+    let loops = Loops::new(on.plant, on.region, feedback)?;
+    let mut evidence = vec![excitation(on)];
+    if let Some(known) = on.known {
+        evidence.extend(controller::controller(known, on.plant)?);
+    }
+    evidence.extend(feedback.map(|k| stability(on.plant, on.region, k)).transpose()?.flatten());
+    let weigh = |share: f64, squares: &[f64]| in_loop(loops.as_ref(), on, share / ts, squares);
+    if let Some(witness) = on.witness {
+        evidence.push(indirect(on, witness, &weigh));
+    }
+    let shown = of_region(on.plant, on.region, loops.as_ref())?;
+    if let (Some(witness), Some(loops)) = (on.witness, &loops) {
+        evidence.push(information(on, witness, loops));
+    }
+    let (repeatable, noise): (Vec<_>, Vec<_>) =
+        on.parts.evidence(on.solution, &weigh, ts).into_iter().partition(|test| test.required);
+    match on.witness.filter(|witness| !witness.variation.is_empty()) {
+        // What the excitation shows is no matter of the noise, of which disturbances make parts differ.
+        Some(witness) => evidence.push(repeatability(on, witness, &weigh)),
+        None => evidence.extend(repeatable),
+    }
+    evidence.extend(noise);
+    evidence.push(shown.0);
+    evidence.push(nonlinear::nonlinear(on.spectra, on.solution));
+    Ok(Judgement { evidence, ..shown.1 })
+}
+
+/// The test of the region, and what it says of the loop and of bands.
+///
+/// # Errors
+/// Frequencies on a pole.
+pub(crate) fn of_response(
+    plant: &StateSpace<Discrete>,
+    region: &Region,
+    feedback: Option<&StateSpace<Discrete>>,
+) -> Result<Judgement> {
+    let loops = Loops::new(plant, region, feedback)?;
+    let (test, judgement) = of_region(plant, region, loops.as_ref())?;
+    let mut evidence: Vec<Evidence> =
+        feedback.map(|k| stability(plant, region, k)).transpose()?.flatten().into_iter().collect();
+    evidence.push(test);
+    Ok(Judgement { evidence, ..judgement })
+}
+
+fn of_region(plant: &StateSpace<Discrete>, region: &Region, loops: Option<&Loops>) -> Result<(Evidence, Judgement)> {
+    let omega: Vec<f64> = region.hz.iter().map(|hz| std::f64::consts::TAU * hz).collect();
+    let g = frequency_response(plant, &omega)?;
+    let within = |k: usize, i: usize, j: usize| valid(region.absolute[k][(i, j)], g.at(k)[(i, j)]);
+    let (p, m) = (plant.outputs(), plant.inputs());
+    let of = |i: usize, j: usize| bands(&region.hz, |k| within(k, i, j));
+    let entry_bands = (0..p).map(|i| (0..m).map(|j| of(i, j)).collect()).collect();
+    let all = bands(&region.hz, |k| (0..p).all(|i| (0..m).all(|j| within(k, i, j))));
+    let loop_ratio = loops.map(|loops| LoopRatio::new(&loops.at, |hz| region.at(hz)));
+    let test = match &loop_ratio {
+        Some(r) => {
+            let question = "Part of the margin of the loop that the 95 % region takes, largest over frequency (region)";
+            let dominant = format!("mostly {} there", dominant(region, r.largest_hz));
+            Evidence::new(question, r.largest, LARGEST_RATIO_OF_LOOP).at([r.largest_hz; 2]).noted(dominant)
+        }
+        None => {
+            let relative = |k: usize| region.absolute[k].norm_l2() / g.at(k).norm_l2().max(TINY);
+            let question = "Stated standard deviation over the response, median over frequency (region)";
+            Evidence::new(question, median((0..region.hz.len()).map(relative)), LARGEST_DEVIATION)
+        }
+    };
+    let judgement = Judgement { evidence: Vec::new(), loop_ratio, entry_bands, bands: all };
+    Ok((test, judgement))
+}
+
+/// The largest part of the region at a frequency.
+pub(crate) fn dominant(region: &Region, hz: f64) -> &'static str {
+    let k = region.hz.partition_point(|f| *f < hz).min(region.hz.len() - 1);
+    let parts = region.parts.named();
+    let largest = parts.iter().max_by(|a, b| a.1[k].norm_l2().total_cmp(&b.1[k].norm_l2()));
+    largest.map_or("noise", |part| part.0)
+}
+
+/// Mean squares of entries in units of the channels as an error of the loop; relative to the response without a loop.
+fn in_loop(loops: Option<&Loops>, on: &Judged<'_>, hz: f64, squares: &[f64]) -> f64 {
+    let Sizes { u, y } = &on.problem.sizes;
+    let physical = |(at, s): (usize, &f64)| s * (y[at / u.len()] / u[at % u.len()]).powi(2);
+    let squares: Vec<f64> = squares.iter().enumerate().map(physical).collect();
+    match loops.and_then(|loops| loops.near(hz)) {
+        Some(at) => at.error(&entries(&squares, u.len()).collect::<Vec<_>>()),
+        None => {
+            let g = frequency_response(on.plant, &[std::f64::consts::TAU * hz]);
+            let size = g.map_or(0.0, |g| g.at(0).norm_l2());
+            (squares.iter().sum::<f64>()).sqrt() / size.max(TINY)
+        }
+    }
+}
+
+fn excitation(on: &Judged<'_>) -> Evidence {
+    let question = "No external excitation is known in the estimation records (1: none)";
+    Evidence::new(question, if on.witness.is_some() { 0.0 } else { 1.0 }, 0.0)
+}
+
+/// Whether the controller stabilises the model, as it did the plant: the largest magnitude of a pole of the loop, by how many of its
+/// standard deviations it exceeds 1.
+fn stability(plant: &StateSpace<Discrete>, region: &Region, k: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
+    if k.is_zero() {
+        return Ok(None);
+    }
+    let ports = with_input_port(k)?;
+    let radius = |plant: &StateSpace<Discrete>| {
+        let poles = closed_loop(plant, &ports)?.poles()?;
+        Ok(vec![poles.iter().map(|p| p.norm()).fold(0.0, f64::max)])
+    };
+    let largest = radius(plant)?[0];
+    let question = "Largest magnitude of a pole of the loop with the stated controller (stability)";
+    let evidence = Evidence::new(question, largest, 1.0);
+    if largest < 1.0 {
+        return Ok(Some(evidence));
+    }
+    let deviation = region.intervals(0.95, radius)?[0].deviation;
+    Ok(Some(evidence.noted(format!("its standard deviation is {deviation:.1e}"))))
+}
+
+/// The difference between the responses that the excitation shows in groups of records, in the loop, largest over frequency.
+fn repeatability(on: &Judged<'_>, witness: &Witness, weigh: &dyn Fn(f64, &[f64]) -> f64) -> Evidence {
+    let question = "Difference of the responses that the excitation shows in parts of the records and in fresh ones, in the loop, largest over frequency (repeatability)";
+    largest(on, &witness.variation, 0.0, question, weigh)
+}
+
+/// The error of the response that the excitation shows, in the loop, largest over frequency.
+fn indirect(on: &Judged<'_>, witness: &Witness, weigh: &dyn Fn(f64, &[f64]) -> f64) -> Evidence {
+    let question = "Error of the model against the response that the excitation shows, in the loop, largest over frequency (indirect response)";
+    if witness.distortion.is_empty() {
+        return Evidence::untested(question, LARGEST_LOOP_ERROR, "the excitation does not reach every input");
+    }
+    largest(on, &witness.distortion, witness.whole.significance.unwrap_or(0.0), question, weigh)
+}
+
+/// The largest excess over frequency as the loop weighs it.
+fn largest(
+    on: &Judged<'_>,
+    excess: &Excess,
+    significance: f64,
+    question: &str,
+    weigh: &dyn Fn(f64, &[f64]) -> f64,
+) -> Evidence {
+    let entries = on.spectra.inputs * on.spectra.outputs;
+    let (mut worst, mut significance) = ((0.0, 0.0), significance);
+    for share in grid(on.spectra.samples()) {
+        let (squares, deviations) = excess.near(share, entries);
+        significance = significance.max(deviations);
+        let figure = weigh(share, &squares);
+        if figure > worst.0 {
+            worst = (figure, share);
+        }
+    }
+    let ts = on.plant.time().ts();
+    Evidence::new(question, worst.0, LARGEST_LOOP_ERROR).beyond_chance(significance).at([worst.1 / ts; 2])
+}
+
+/// The region from what the excitation alone moves at the inputs: a model that rests on the noise that the feedback brings to the inputs
+/// rests on the model of that noise.
+fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
+    let question = "Part of the margin of the loop that the region takes where only what the excitation moves counts (information)";
+    let Some(excited) = witness.excited(on.spectra) else {
+        return Evidence::untested(question, INFORMATION_RATIO, "the excitation does not reach every input");
+    };
+    let alone = Solution { rivals: Vec::new(), ..on.solution.clone() };
+    let directions = Directions::new(&excited, &alone, 1.0, None);
+    let shares = [slow(on.spectra.samples()), grid(on.spectra.samples())].concat();
+    let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &shares, directions);
+    let r = LoopRatio::new(&loops.at, |hz| region.at(hz));
+    let evidence = Evidence::new(question, r.largest.min(NO_INFORMATION), INFORMATION_RATIO).at([r.largest_hz; 2]);
+    evidence.noted("excite the loop there, or longer")
+}
+

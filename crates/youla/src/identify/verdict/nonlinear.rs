@@ -6,21 +6,17 @@
 //! ```
 //! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
+use super::limits::LARGEST_NONLINEAR;
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
-use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::with_slope_of_unstable;
 use crate::linalg::TINY;
-use crate::statistics::chi_square_deviations;
 use faer::c64;
 use rustfft::FftPlanner;
 
-/// Largest share of a nonlinear function, both weighted by the inverse of the noise. The linear model takes up most of what a
-/// function does, so that little is left of much: dry friction of half the input's size left 0.7 % in a drive of two masses.
-const LARGEST_SHARE: f64 = 0.005;
 /// Functions of the input in units of its standard deviation: smooth ones, and what saturation takes away.
 const OF_INPUT: [fn(f64) -> f64; 5] =
     [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
@@ -29,7 +25,19 @@ const SMALL_VELOCITY: f64 = 0.1;
 /// Functions for each input.
 const FUNCTIONS: usize = OF_INPUT.len() + 1;
 
-/// Does a nonlinear function of the input, or of the velocity, act at the input?
+/// Names of the functions of the input.
+const NAMES: [&str; FUNCTIONS] =
+    ["u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations", "dry friction"];
+
+/// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
+struct Shaped {
+    /// Lines x p x functions.
+    columns: Vec<c64>,
+    /// Root mean square of each function without its part along the input or the velocity.
+    sizes: Vec<f64>,
+}
+
+/// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input?
 pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let found = &solution.chosen.found;
     let residuals = found.point.residuals(spectra);
@@ -37,8 +45,11 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
     let mut planner = FftPlanner::new();
     let pairs = spectra.records.iter().zip(&clean);
-    let values: Vec<Vec<c64>> =
-        pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
+    let shaped: Vec<Shaped> = pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
+    let sizes: Vec<f64> = (0..FUNCTIONS * spectra.inputs)
+        .map(|f| shaped.iter().map(|s| s.sizes[f]).sum::<f64>() / shaped.len().max(1) as f64)
+        .collect();
+    let values: Vec<Vec<c64>> = shaped.into_iter().map(|s| s.columns).collect();
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let count = FUNCTIONS * spectra.inputs;
     let extra = Extra { count, values: &values, quick: false };
@@ -47,22 +58,17 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let parameters = chart.parameters();
     let rows = parameters..(parameters + count).min(factor.nrows());
     let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, c)].powi(2)).sum::<f64>();
-    let distinct: Vec<usize> = rows.clone().filter(|i| factor[(*i, *i)].powi(2) > DISTINCT * length(*i)).collect();
-    let statistic: f64 = distinct.iter().map(|i| factor[(*i, parameters + count)].powi(2)).sum();
-    // the most telling single function
+    // Each function alone: its coefficient beside the parameters, with its deviation.
     let single = |f: usize| {
         let along: f64 = rows.clone().map(|i| factor[(i, parameters + f)] * factor[(i, parameters + count)]).sum();
         let own: f64 = rows.clone().map(|i| factor[(i, parameters + f)].powi(2)).sum();
-        if own > DISTINCT * length(parameters + f) { along.abs() / own.sqrt() } else { 0.0 }
+        if own > DISTINCT * length(parameters + f) { (along / own * sizes[f], along.abs() / own.sqrt()) } else { (0.0, 0.0) }
     };
-    let telling = (0..count).map(single).fold(0.0, f64::max);
-    let moved = energy(spectra, &clean, &found.noise).max(TINY);
-    Evidence::new(
-        "Output that a nonlinear function at the inputs explains, over what the model explains, beyond chance (nonlinearity)",
-        ((statistic - distinct.len() as f64).max(0.0) / moved).sqrt(),
-        LARGEST_SHARE,
-    )
-    .beyond_chance(chi_square_deviations(statistic, distinct.len() as f64).max(telling))
+    let telling = (0..count).map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+    let (f, (size, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
+    let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
+    let note = format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1);
+    Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance).reported()
 }
 
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.
@@ -75,12 +81,13 @@ fn columns(
     lines: &Lines,
     clean: &[c64],
     planner: &mut FftPlanner<f64>,
-) -> Vec<c64> {
+) -> Shaped {
     let (m, p, half) = (spectra.inputs, spectra.outputs, lines.z.len());
     let count = FUNCTIONS * m;
     let model = &solution.chosen.found.point.model;
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
+    let mut sizes = vec![0.0; count];
     for j in 0..m {
         let u = in_time(lines, planner, |k| lines.u[k * m + j]);
         // velocity of the output that this input moves most
@@ -92,6 +99,7 @@ fn columns(
         for f in 0..FUNCTIONS {
             let shaped =
                 |t: usize| OF_INPUT.get(f).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |of| of(u[t]));
+            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), if f < OF_INPUT.len() { u[t] } else { velocity[t] })));
             let root = (lines.samples as f64).sqrt();
             let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
             planner.plan_fft_forward(lines.samples).process(&mut work);
@@ -102,7 +110,17 @@ fn columns(
             }
         }
     }
-    columns
+    Shaped { columns, sizes }
+}
+
+/// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.
+fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let (mut count, mut mean, mut square, mut along) = (0.0, 0.0, 0.0, 0.0);
+    for (value, base) in pairs {
+        (count, mean, square, along) = (count + 1.0, mean + value, square + value * value, along + value * base);
+    }
+    let count = f64::max(count, 1.0);
+    (square / count - (mean / count).powi(2) - (along / count).powi(2)).max(0.0).sqrt()
 }
 
 /// A signal in time from its lines, without its mean and of unit size.

@@ -9,7 +9,8 @@
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
-use crate::identify::likelihood::deviation::inverse_root;
+use super::limits::{CHANCE_OF_TWO, LARGEST_LOOP_ERROR, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
+use crate::identify::likelihood::deviation::{grid, inverse_root};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
 use crate::identify::likelihood::search::point::energy;
@@ -21,15 +22,6 @@ use faer::{Mat, c64};
 
 /// Pieces of a record with at least so many samples each.
 const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
-/// Standard deviations beyond chance from which pieces differ.
-const BEYOND_CHANCE: f64 = 3.0;
-/// Largest relative difference of the responses that parts ask for.
-const LARGEST_DIFFERENCE: f64 = 0.1;
-/// Largest ratio of the powers of the noise.
-const LARGEST_RATIO: f64 = 3.0;
-/// Frequencies at which the responses of parts are compared, and the largest relative deviation at which they are.
-const COMPARED: (usize, f64) = (100, 0.3);
-
 /// Triangular factor of a part of the records at the model.
 struct Part {
     factor: Mat<f64>,
@@ -114,7 +106,7 @@ impl Parts {
             }
         }
         let pieces: Vec<&Part> = first.iter().chain(&second).collect();
-        let scatter = chow(&pieces, parameters).filter(|(significance, _)| *significance > BEYOND_CHANCE);
+        let scatter = chow(&pieces, parameters).filter(|(significance, _)| *significance > OVERALL_CHANCE);
         let refs = |parts: &'_ [Part]| Part::together(&parts.iter().collect::<Vec<_>>());
         Parts {
             halves: [refs(&first), refs(&second)],
@@ -125,56 +117,59 @@ impl Parts {
         }
     }
 
-    /// The questions whether halves and fresh records agree.
-    pub(crate) fn evidence(&self, solution: &Solution) -> Vec<Evidence> {
+    /// Whether halves and fresh records agree.
+    pub(crate) fn evidence(&self, solution: &Solution, judge: &dyn Fn(f64, &[f64]) -> f64, ts: f64) -> Vec<Evidence> {
         let mut out = Vec::new();
         if let [Some(a), Some(b)] = &self.halves {
-            out.extend(self.compared(a, b, solution, "the two halves of the records"));
+            out.extend(self.compared(a, b, "the two halves of the records", solution, judge, ts));
         }
         if let (Some(a), Some(b)) = (&self.whole, &self.fresh) {
-            out.extend(self.compared(a, b, solution, "the estimation and the verification records"));
+            out.extend(self.compared(a, b, "the estimation and the verification records", solution, judge, ts));
         }
         out
     }
 
-    fn compared(&self, a: &Part, b: &Part, solution: &Solution, which: &str) -> Vec<Evidence> {
+    fn compared(
+        &self,
+        a: &Part,
+        b: &Part,
+        which: &str,
+        solution: &Solution,
+        judge: &dyn Fn(f64, &[f64]) -> f64,
+        ts: f64,
+    ) -> Vec<Evidence> {
         let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
-        let difference = self.difference(a, b, solution);
+        let question = format!("Difference of the models from {which}, in the loop, largest over frequency (repeatability)");
+        let (figure, share) = self.difference(a, b, solution, judge);
+        let repeatable =
+            Evidence::new(question, figure, LARGEST_LOOP_ERROR).beyond_chance(significance).at([share / ts; 2]);
         let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(TINY);
-        let question =
-            format!("Difference of the responses from {which}, relative to them, beyond chance (repeatability)");
         let noise = format!("Ratio of the noise powers in {which} (stationarity)");
-        vec![
-            Evidence::new(question, difference, LARGEST_DIFFERENCE).beyond_chance(significance),
-            Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_RATIO),
-        ]
+        vec![repeatable, Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_NOISE_RATIO).reported()]
     }
 
-    /// Root mean square over frequency of the relative difference of the responses of two parts, less what chance explains, where
-    /// both know the response.
-    fn difference(&self, a: &Part, b: &Part, solution: &Solution) -> f64 {
+    /// The largest difference of the responses of two parts, less what chance explains, as `judge` weighs mean squares of the entries, and
+    /// where it is, a share of the sample rate.
+    fn difference(&self, a: &Part, b: &Part, solution: &Solution, judge: &dyn Fn(f64, &[f64]) -> f64) -> (f64, f64) {
         let found = &solution.chosen.found;
         let model = &found.point.model;
         let chart = Chart::new(model, found.feedthrough);
         let ((sa, ra), (sb, rb)) = (a.step(self.parameters), b.step(self.parameters));
-        let (mut sum, mut count) = (0.0, 0);
-        for k in 0..COMPARED.0 {
-            let share = 0.002 * (0.49_f64 / 0.002).powf(k as f64 / (COMPARED.0 - 1) as f64);
-            let z = c64::cis(std::f64::consts::TAU * share);
-            let slopes = chart.response_slopes(model, z);
-            let size: f64 = model.response(z).iter().map(|g| g.norm_sqr()).sum();
+        let mut worst = (0.0, 0.0);
+        for share in grid(solution.samples) {
+            let slopes = chart.response_slopes(model, c64::cis(std::f64::consts::TAU * share));
             let along = |i: usize, v: &dyn Fn(usize) -> f64| {
                 (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j)).norm_sqr()
             };
             let of = |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)])).sum::<f64>();
-            let entries = 0..slopes.nrows();
-            let variance: f64 = entries.clone().map(|i| of(&ra, i) + of(&rb, i)).sum();
-            if variance < COMPARED.1 * COMPARED.1 * size {
-                let apart: f64 = entries.map(|i| along(i, &|j| sa[j] - sb[j])).sum();
-                sum += (apart - variance) / size;
-                count += 1;
+            // What a mean square of two real numbers exceeds by chance in one of twenty cases.
+            let beyond = |i: usize| along(i, &|j| sa[j] - sb[j]) - CHANCE_OF_TWO * (of(&ra, i) + of(&rb, i));
+            let squares: Vec<f64> = (0..slopes.nrows()).map(|i| beyond(i).max(0.0)).collect();
+            let figure = judge(share, &squares);
+            if figure > worst.0 {
+                worst = (figure, share);
             }
         }
-        if count > 0 { (sum / count as f64).max(0.0).sqrt() } else { 0.0 }
+        worst
     }
 }

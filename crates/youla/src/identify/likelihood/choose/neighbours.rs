@@ -1,9 +1,10 @@
-//! Models one step away: another dead time, one pole or pair less, one mode more.
+//! Models one step away: another dead time, one pole or pair less, one mode more, two modes for one.
 
 use super::grow;
 use super::problem::{Choice, NOISE_ORDER, Problem, Task};
 use super::starts::THINNED;
 use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::{deviance, with_best_inputs};
 use faer::Mat;
@@ -15,6 +16,30 @@ const REACH: usize = 12;
 
 /// Pole from which the search of a lag in place of a sample of dead time starts; at zero both are the same.
 const FAST: f64 = 0.1;
+
+/// Damping ratio up to which a mode is tried as two.
+const LIGHTLY_DAMPED: f64 = 0.1;
+
+/// The model with two modes of half the damping in place of block k, apart by its width; `None` where that is not a lightly damped mode.
+fn halved(model: &Model, k: usize) -> Option<Model> {
+    let block = model.blocks.get(k).filter(|b| b.states == 2)?;
+    let pole = block.poles().into_iter().find(|p| p.im > 0.0)?;
+    let (decay, angle) = (-pole.norm().ln(), pole.arg());
+    if decay <= 0.0 || decay > LIGHTLY_DAMPED * angle {
+        return None;
+    }
+    let moved = |side: f64| {
+        // Turned and stretched in its own coordinates: A = T [re im; -im re] T^-1 keeps T.
+        let to = faer::c64::from_polar((-0.5 * decay).exp(), angle + side * decay);
+        let (scale, shift) = (to.im / pole.im, to.re - pole.re * to.im / pole.im);
+        let a = (0..4).map(|i| scale * block.a[i] + if i % 3 == 0 { shift } else { 0.0 }).collect();
+        Block { a, ..block.clone() }
+    };
+    let mut wider = model.clone();
+    wider.blocks[k] = moved(-1.0);
+    wider.blocks.push(moved(1.0));
+    Some(wider)
+}
 
 /// The lines for other delays.
 struct Around {
@@ -66,6 +91,7 @@ impl Problem<'_> {
         }
         if let Some(here) = around.last() {
             tasks.extend(self.one_more(best, &here.spectra));
+            tasks.extend(self.split(best, &parts, &here.spectra));
         }
         let sooner = around.iter().find(|a| a.delays.len() == 1 && a.delays[0] + 1 == best.delays[0]);
         tasks.extend(sooner.and_then(|sooner| self.pole_for_delay(best, sooner)));
@@ -146,6 +172,23 @@ impl Problem<'_> {
         let wider: Model = grow::with_block(model, block);
         let start = with_best_inputs(spectra, wider, noise, self.feedthrough);
         Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "one mode more".into() })
+    }
+
+    /// Two modes in place of a lightly damped one: what two resonances within each other's width leave looks like one mode of more damping,
+    /// and no further mode beside it explains the rest. Of all such modes the one whose halves lower the deviance most.
+    fn split(&self, best: &Choice, parts: &Model, spectra: &Arc<Spectra>) -> Option<Task> {
+        if self.order.is_some() || parts.order() + 2 > self.largest_order {
+            return None;
+        }
+        let (noise, thin) = (&best.found.noise, spectra.thinned(THINNED));
+        let halves = (0..parts.blocks.len()).filter_map(|k| halved(parts, k));
+        let judged = halves.map(|model| {
+            let point = with_best_inputs(&thin, model.clone(), noise, self.feedthrough);
+            (deviance(&thin, &point, NOISE_ORDER).0, model)
+        });
+        let (_, model) = judged.min_by(|a, b| a.0.total_cmp(&b.0))?;
+        let start = with_best_inputs(spectra, model, noise, self.feedthrough);
+        Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "two modes for one".into() })
     }
 
     /// Other delays, input by input: many of a single input, up to two samples away for several.

@@ -36,11 +36,14 @@ impl Choice {
 }
 
 /// The chosen model and those that the data do not tell from it.
+#[derive(Clone)]
 pub(crate) struct Solution {
     /// The model.
     pub(crate) chosen: Choice,
     /// Models whose likelihood is close.
     pub(crate) rivals: Vec<Choice>,
+    /// Samples of all records.
+    pub(crate) samples: usize,
 }
 
 /// A search to be done.

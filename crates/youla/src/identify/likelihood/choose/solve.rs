@@ -70,7 +70,7 @@ impl Problem<'_> {
         }
         let least = best(&tried)?.criterion;
         let rivals = tried.into_iter().filter(|c| c.criterion <= least + BESIDE).collect();
-        Some(Solution { chosen, rivals })
+        Some(Solution { chosen, rivals, samples })
     }
 
     /// Models one step away as long as the criterion falls.

@@ -7,19 +7,18 @@
 //! The weights are those of Schwarz's criterion, which approximates the posterior probability of a model.
 
 pub(crate) mod innovation;
-pub(crate) mod missed;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
 
-use crate::identify::likelihood::choose::problem::{Choice, Solution};
+use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
 use crate::linalg::TINY;
 use faer::{Mat, c64};
-use missed::Missed;
+use crate::identify::verdict::Witness;
 
 /// Rivals of less weight are left out.
 const LEAST_WEIGHT: f64 = 1e-12;
@@ -52,11 +51,6 @@ fn geometric(from: f64, to: f64, points: usize) -> Vec<f64> {
     (0..points).map(|k| from * (to / from).powf(k as f64 / (points - 1) as f64)).collect()
 }
 
-/// Response of a choice with its dead times, scaled channels.
-pub(crate) fn response(choice: &Choice, share: f64) -> Vec<c64> {
-    delayed(&choice.found.point.model, &choice.delays, share)
-}
-
 /// Response of a model with its dead times, scaled channels.
 pub(crate) fn delayed(model: &Model, delays: &[usize], share: f64) -> Vec<c64> {
     let z = c64::cis(std::f64::consts::TAU * share);
@@ -79,20 +73,43 @@ pub(crate) struct Directions {
     root: Mat<f64>,
     /// Models that the record does not distinguish, with the roots of their weights.
     rivals: Vec<(Model, Vec<usize>, f64)>,
+    /// Variance of the parameters by their scatter over pieces of the records, in units of that of the noise; it is in `root`.
+    scatter: f64,
     /// The error that the excitation shows.
-    missed: Option<Missed>,
+    witness: Option<Witness>,
+}
+
+/// Mean squares of the error of each entry, by what causes them.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct Parts {
+    /// Noise of the records.
+    pub(crate) noise: Vec<f64>,
+    /// Models of other structure that the records do not tell from the chosen one.
+    pub(crate) choice: Vec<f64>,
+    /// Differences between records and parts of records beyond their noise.
+    pub(crate) variation: Vec<f64>,
+    /// What the excitation causes and the model does not explain.
+    pub(crate) distortion: Vec<f64>,
+}
+
+impl Parts {
+    /// Their sum.
+    pub(crate) fn total(&self) -> Vec<f64> {
+        let all = [&self.noise, &self.choice, &self.variation, &self.distortion];
+        (0..self.noise.len()).map(|i| all.iter().map(|part| part[i]).sum()).collect()
+    }
 }
 
 impl Directions {
     /// `scatter` is the factor of the variance of the parameters by their scatter over pieces of the records.
-    pub(crate) fn new(spectra: &Spectra, solution: &Solution, scatter: f64, missed: Option<Missed>) -> Self {
+    pub(crate) fn new(spectra: &Spectra, solution: &Solution, scatter: f64, witness: Option<Witness>) -> Self {
         let found = &solution.chosen.found;
         let chart = Chart::new(&found.point.model, found.feedthrough);
         let linearised = linearise(spectra, &found.point, &chart, &found.noise);
         let root = inverse_root(&linearised.factor, chart.parameters()) * faer::Scale(scatter.sqrt());
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let rivals = solution.rivals.iter().map(|c| (c.found.point.model.clone(), c.delays.clone(), c.criterion));
-        Directions { missed, ..Directions::of_parts(model, chart, root, rivals.collect()) }
+        Directions { witness, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
     }
 
     /// A model with its delays, the roots of the covariance of its parameters, and rivals with their criteria.
@@ -109,7 +126,7 @@ impl Directions {
         let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(TINY);
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
-        Directions { model, delays, chart, root, rivals, missed: None }
+        Directions { model, delays, chart, root, rivals, scatter: 1.0, witness: None }
     }
 
     /// Independent errors of the parameters.
@@ -141,39 +158,73 @@ impl Directions {
         })
     }
 
-    /// The error that the excitation shows.
-    pub(crate) fn missed(&self) -> Option<&Missed> {
-        self.missed.as_ref()
-    }
-
     /// Errors of the entries of G, row by row, in independent directions of unit variance, column by column.
     pub(crate) fn at(&self, share: f64) -> Mat<c64> {
+        let parts = self.columns(share);
+        let beyond = parts.beyond();
+        let (entries, count) = (parts.parameters.nrows(), parts.parameters.ncols() + parts.rivals.ncols());
+        // What the excitation shows of an error is its size, not its phase.
+        let first = parts.parameters.ncols();
+        Mat::from_fn(entries, count + 2 * entries, |i, k| match k.checked_sub(count) {
+            None if k < first => parts.parameters[(i, k)],
+            None => parts.rivals[(i, k - first)],
+            Some(k) if k / 2 == i => {
+                let size = (0.5 * beyond[i]).sqrt();
+                if k % 2 == 0 { c64::new(size, 0.0) } else { c64::new(0.0, size) }
+            }
+            Some(_) => c64::ZERO,
+        })
+    }
+
+    /// Mean squares of the error of each entry by their causes.
+    pub(crate) fn parts(&self, share: f64) -> Parts {
+        let Columns { parameters, rivals, variation, distortion } = self.columns(share);
+        let squares = |m: &Mat<c64>, i: usize| (0..m.ncols()).map(|k| m[(i, k)].norm_sqr()).sum::<f64>();
+        let noise = |i: usize| squares(&parameters, i) / self.scatter;
+        let moved = |i: usize| (self.scatter - 1.0) * noise(i);
+        let all = 0..parameters.nrows();
+        Parts {
+            noise: all.clone().map(noise).collect(),
+            choice: all.clone().map(|i| squares(&rivals, i)).collect(),
+            variation: all.map(|i| moved(i) + variation[i]).collect(),
+            distortion,
+        }
+    }
+
+    fn columns(&self, share: f64) -> Columns {
         let z = c64::cis(std::f64::consts::TAU * share);
         let (entries, m) = (self.model.inputs * self.model.outputs, self.model.inputs);
         let (slopes, phases) = (self.chart.response_slopes(&self.model, z), phases(&self.delays, z));
         let g = delayed(&self.model, &self.delays, share);
-        let parameters = self.root.ncols();
         let others: Vec<_> = self.rivals.iter().map(|(model, delays, _)| delayed(model, delays, share)).collect();
-        let missed = self.missed.as_ref().map_or_else(Vec::new, |missed| missed.at_most(share, entries));
-        let of_rivals = parameters + others.len();
-        Mat::from_fn(entries, of_rivals + 2 * missed.len(), |i, k| match k {
-            k if k < parameters => {
-                let along = |sum: c64, j: usize| sum + slopes[(i, j)] * self.root[(j, k)];
-                (0..self.root.nrows()).fold(c64::ZERO, along) * phases[i % m]
-            }
-            k if k < of_rivals => (others[k - parameters][i] - g[i]) * self.rivals[k - parameters].2,
-            // What the excitation shows of the error is its size, not its phase.
-            k if (k - of_rivals) / 2 == i => {
-                let size = (0.5 * missed[i]).max(0.0).sqrt();
-                if (k - of_rivals).is_multiple_of(2) { c64::new(size, 0.0) } else { c64::new(0.0, size) }
-            }
-            _ => c64::ZERO,
-        })
+        let parameters = Mat::from_fn(entries, self.root.ncols(), |i, k| {
+            let along = |sum: c64, j: usize| sum + slopes[(i, j)] * self.root[(j, k)];
+            (0..self.root.nrows()).fold(c64::ZERO, along) * phases[i % m]
+        });
+        let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
+        let seen = |of: fn(&Witness) -> &crate::identify::verdict::Excess| {
+            self.witness.as_ref().map_or_else(|| vec![0.0; entries], |w| of(w).near(share, entries).0)
+        };
+        let (mut variation, distortion) = (seen(|w| &w.variation), seen(|w| &w.distortion));
+        // What moved parameters explain of the differences between records is not counted twice.
+        for (i, variation) in variation.iter_mut().enumerate() {
+            let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();
+            *variation = (*variation - moved * (1.0 - 1.0 / self.scatter)).max(0.0);
+        }
+        Columns { parameters, rivals, variation, distortion }
     }
+}
 
-    /// Mean square of the error of each entry.
-    pub(crate) fn variances(&self, share: f64) -> Vec<f64> {
-        let errors = self.at(share);
-        (0..errors.nrows()).map(|i| (0..errors.ncols()).map(|k| errors[(i, k)].norm_sqr()).sum()).collect()
+/// Errors at a frequency: columns of independent errors, and mean squares of what has no phase.
+struct Columns {
+    parameters: Mat<c64>,
+    rivals: Mat<c64>,
+    variation: Vec<f64>,
+    distortion: Vec<f64>,
+}
+
+impl Columns {
+    fn beyond(&self) -> Vec<f64> {
+        self.variation.iter().zip(&self.distortion).map(|(a, b)| a + b).collect()
     }
 }

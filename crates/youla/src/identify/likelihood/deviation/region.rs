@@ -7,7 +7,7 @@
 //! for what the excitation shows beyond both. Figures that depend on the response at one frequency take the directions
 //! there; figures of the poles take the directions of the parameters.
 
-use super::{Directions, physical};
+use super::{Directions, Parts, physical};
 use crate::control::ChannelScales;
 use crate::identify::likelihood::data::spectra::Sizes;
 use crate::lti::{Discrete, StateSpace};
@@ -54,6 +54,32 @@ pub struct Draw {
     pub distance: f64,
 }
 
+/// Root mean square of the error of each entry by its cause, in the form of [`Region::absolute`].
+#[derive(Debug, Clone, PartialEq)]
+pub struct RegionParts {
+    /// Noise of the records.
+    pub noise: Vec<Mat<f64>>,
+    /// Models of other structure that the records do not tell from this one.
+    pub choice: Vec<Mat<f64>>,
+    /// Differences between records, and between parts of records, beyond their noise: a machine that changes, or depends on its
+    /// operating point.
+    pub variation: Vec<Mat<f64>>,
+    /// What the excitation causes and a linear model of this order does not explain.
+    pub distortion: Vec<Mat<f64>>,
+}
+
+impl RegionParts {
+    /// Names of the parts, each with its deviations.
+    pub fn named(&self) -> [(&'static str, &[Mat<f64>]); 4] {
+        [
+            ("noise", &self.noise),
+            ("choice", &self.choice),
+            ("variation", &self.variation),
+            ("distortion", &self.distortion),
+        ]
+    }
+}
+
 /// The region of a model: stated deviations of its response, draws, and intervals of its figures.
 #[derive(Debug, Clone)]
 pub struct Region {
@@ -61,23 +87,29 @@ pub struct Region {
     pub hz: Vec<f64>,
     /// Root mean square of the complex error of each entry, p x m, one matrix per frequency, physical units.
     pub absolute: Vec<Mat<f64>>,
+    /// What causes it: the squares of the parts sum to that of `absolute`.
+    pub parts: RegionParts,
     sizes: Sizes,
     time: Discrete,
     directions: Directions,
 }
 
 impl Region {
-    /// `stated` are frequencies as shares of the sample rate and variances there, scaled channels.
-    pub(crate) fn new(
-        sizes: Sizes,
-        time: Discrete,
-        (shares, variances): (&[f64], &[Vec<f64>]),
-        directions: Directions,
-    ) -> Self {
+    /// Stated at frequencies that are shares of the sample rate.
+    pub(crate) fn new(sizes: Sizes, time: Discrete, shares: &[f64], directions: Directions) -> Self {
         let (m, p) = (sizes.u.len(), sizes.y.len());
-        let of = |v: &Vec<f64>| Mat::from_fn(p, m, |i, j| v[i * m + j].sqrt() * sizes.y[i] / sizes.u[j]);
+        let of = |v: &[f64]| Mat::from_fn(p, m, |i, j| v[i * m + j].max(0.0).sqrt() * sizes.y[i] / sizes.u[j]);
         let hz = shares.iter().map(|share| share / time.ts()).collect();
-        Region { hz, absolute: variances.iter().map(of).collect(), sizes, time, directions }
+        let parts: Vec<Parts> = shares.par_iter().map(|share| directions.parts(*share)).collect();
+        let all = |pick: fn(&Parts) -> &[f64]| parts.iter().map(|p| of(pick(p))).collect();
+        let absolute = parts.iter().map(|p| of(&p.total())).collect();
+        let parts = RegionParts {
+            noise: all(|p| &p.noise),
+            choice: all(|p| &p.choice),
+            variation: all(|p| &p.variation),
+            distortion: all(|p| &p.distortion),
+        };
+        Region { hz, absolute, parts, sizes, time, directions }
     }
 
     /// Sizes of the channels, root mean square over the records.

@@ -2,14 +2,8 @@
 
 use super::choose::{Fitted, Problem};
 use super::lines::WeighedLines;
-use crate::Result;
-use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Evidence;
-use crate::identify::likelihood::deviation::delayed;
-use crate::identify::verdict::accuracy;
-use crate::lti::{Discrete, StateSpace};
 use crate::statistics::f_deviations;
-use std::f64::consts::TAU;
 
 /// Lines of a group.
 const GROUP: usize = 8;
@@ -20,23 +14,13 @@ const LARGEST_CORRELATION: f64 = 0.3;
 /// Degrees of freedom that stand for a variance without error.
 const MANY: f64 = 1e9;
 
-/// Figures and limits.
-pub(super) fn of_lines(problem: &Problem<'_>, chosen: &Fitted, variances: &[Vec<f64>]) -> Vec<Evidence> {
-    let (response, lines) = (problem.response(), problem.weighed(chosen));
-    let of = |omega: &f64| delayed(&chosen.model, &chosen.delays, omega * response.time.ts() / TAU);
-    let responses: Vec<_> = response.omega.iter().map(of).collect();
-    let second = match response.degrees {
+/// What the model leaves of the lines.
+pub(super) fn of_lines(problem: &Problem<'_>, chosen: &Fitted) -> Evidence {
+    let lines = problem.weighed(chosen);
+    match problem.response().degrees {
         Some(degrees) => unexplained(&lines, chosen, degrees),
         None => correlation(&lines, chosen),
-    };
-    vec![accuracy(&responses, variances), second]
-}
-
-/// Whether the controller that ran stabilises the model, as it did the plant.
-pub(super) fn of_loop(plant: &StateSpace<Discrete>, controller: &StateSpace<Discrete>) -> Result<Evidence> {
-    let closed = closed_loop(plant, &with_input_port(controller)?)?;
-    let largest = closed.poles()?.iter().map(|p| p.norm()).fold(0.0, f64::max);
-    Ok(Evidence::new("Largest magnitude of a pole of the loop with the stated controller (stability)", largest, 1.0))
+    }
 }
 
 /// The group of neighbouring lines in which the model leaves most beyond the stated variance.

@@ -35,6 +35,7 @@ use super::LikelihoodOptions;
 use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::{Directions, inverse_root, mode_estimates, physical};
 use crate::identify::likelihood::recommendation::{Predictor, Recommendation};
+use crate::identify::verdict::of_response;
 use crate::lti::{Discrete, StateSpace};
 use crate::{Error, Mat, Result};
 use choose::Problem;
@@ -85,19 +86,22 @@ pub fn recommend_from_response(
     let others = rivals.iter().map(|c| (c.model.clone(), c.delays.clone(), c.criterion)).collect();
     let modes = mode_estimates::of_blocks(&chosen.model, &chart, &root, response.time);
     let directions = Directions::of_parts((chosen.model.clone(), chosen.delays.clone()), chart, root, others);
-    let variances: Vec<_> = shares.iter().map(|share| directions.variances(*share)).collect();
-    let mut evidence = evidence::of_lines(&problem, &chosen, &variances);
     let plant = physical::realised(&chosen.model, &chosen.delays, problem.sizes(), response.time)?;
-    evidence.extend(controller.map(|k| evidence::of_loop(&plant, k)).transpose()?);
+    let region = Region::new(problem.sizes().clone(), response.time, &shares, directions);
+    let judged = of_response(&plant, &region, controller)?;
+    let evidence = std::iter::once(evidence::of_lines(&problem, &chosen)).chain(judged.evidence).collect();
     Ok(Recommendation {
         predictor: without_noise(&plant),
         plant,
         dead_time: chosen.delays.clone(),
         order: chosen.model.order(),
-        region: Region::new(problem.sizes().clone(), response.time, (&shares, &variances), directions),
+        region,
         modes,
         candidates,
         evidence,
+        loop_ratio: judged.loop_ratio,
+        entry_bands: judged.entry_bands,
+        bands: judged.bands,
     })
 }
 

@@ -1,0 +1,231 @@
+//! Whether the stated controller is the one that ran, by what its difference lets the loop do.
+//!
+//! ```text
+//! e(t) = u_K - C x - D s,     x+ = A x + B s + L e        s: what the controller sees, u_K: the inputs that it explains
+//! dF   = A_L^-1 S_ex S_xx^-1 S_xs (S_sx S_xx^-1 S_xs)^-1,   A_L = I - C (z I - A + L C)^-1 L
+//! ```
+//! e is the residual of the controller's difference equation: what happened once (a saturated sample) stays where it happened, also
+//! behind an integrator. Samples of inputs at a limit, and those whose equation contains them, are left out. The error dF of the law counts as
+//! `|dF T (I - F T)^-1|` with `s = T u` in the loop: a wrong gain or delay where the loop gain is small harms nobody.
+
+use super::limits::{AS_STATED, AT_LIMIT, LARGEST_CONTROLLER_ERROR, NEARLY_EXACT};
+use super::local_error::{Channels, LocalErrors, RecordLines, band_count, hann};
+use super::loop_ratio::entries;
+use crate::identify::likelihood::data::spectra::lines_of;
+use crate::identify::likelihood::{Evidence, LoopKnowledge, LoopSignals};
+use crate::linalg::{RiccatiProblem, TINY, dare};
+use crate::lti::{Discrete, StateSpace, frequency_response, largest_singular_value};
+use crate::{Mat, MatRef, Result, c64};
+use faer::linalg::solvers::Solve;
+use std::f64::consts::TAU;
+
+/// Variance of the logged inputs against that of what drives the states, in the filter that takes e: small, so that e forgets within as many
+/// samples as the controller has states.
+const EXACT_LOG: f64 = 1e-9;
+
+const QUESTION: &str = "What the difference of the stated controller from the log does to the loop, largest over frequency (controller)";
+
+/// The test, with what share of the inputs the law leaves and how many samples were left out.
+pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
+    let Some(law) = known.controller else { return Ok(None) };
+    let all: Vec<&LoopSignals<'_>> = known.estimation.iter().chain(&known.verification).collect();
+    if all.iter().any(|r| r.excitation.is_none()) {
+        return Ok(Some(Evidence::untested(QUESTION, LARGEST_CONTROLLER_ERROR, "no external excitation is known")));
+    }
+    // An observer sees inputs and outputs, which the excitation moves together: its error counts per input of the plant, `dF T`.
+    let observer = law.inputs() > plant.outputs();
+    let gain = filter_gain(law, &all);
+    let residuals: Vec<Residual> = all.iter().map(|r| residual(law, &gain, r)).collect();
+    let share = rest(&residuals, &all);
+    if share < NEARLY_EXACT {
+        return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(format!(
+            "the stated controller reproduces the logged inputs to {:.1e}",
+            share
+        ))));
+    }
+    let lines: Vec<[Vec<c64>; 3]> = all
+        .iter()
+        .zip(&residuals)
+        .filter_map(|(r, e)| {
+            let windowed = |signal: MatRef<'_, f64>| hann(&lines_of(signal, 0), signal.ncols());
+            let moved = if observer { r.applied } else { r.seen };
+            Some([windowed(moved), windowed(e.values.as_ref()), windowed(r.excitation?)])
+        })
+        .collect();
+    let records: Vec<RecordLines<'_>> = lines.iter().map(|[u, v, x]| RecordLines { u, v, x }).collect();
+    let q = all.iter().filter_map(|r| r.excitation).map(|x| x.ncols()).max().unwrap_or(0);
+    let channels = Channels { m: if observer { plant.inputs() } else { law.inputs() }, p: law.outputs(), q };
+    let total: usize = records.iter().map(|r| r.v.len() / channels.p.max(1)).sum();
+    let excess = LocalErrors::new(&records, channels, band_count(total, channels), 0).excess();
+    if excess.is_empty() && share < AS_STATED {
+        let note = format!("the law leaves {:.2} % of the inputs, and the excitation moves too little of them to say more", 100.0 * share);
+        return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(note)));
+    }
+    if excess.is_empty() {
+        return Ok(Some(Evidence::untested(
+            QUESTION,
+            LARGEST_CONTROLLER_ERROR,
+            "the excitation does not reach everything that the controller sees",
+        )));
+    }
+    let worst = worst(law, &gain, plant, |share| excess.near(share, channels.m * channels.p))?;
+    let at_limit: usize = residuals.iter().map(|r| r.left_out).sum();
+    let samples: usize = all.iter().map(|r| r.seen.nrows()).sum();
+    let note = format!(
+        "the law leaves {:.2} % of the inputs; {:.2} % of the samples are at a limit and left out",
+        100.0 * share,
+        100.0 * at_limit as f64 / samples.max(1) as f64
+    );
+    let [figure, hz, significance] = worst;
+    let evidence = Evidence::new(QUESTION, figure, LARGEST_CONTROLLER_ERROR).noted(note).at([hz, hz]);
+    Ok(Some(evidence.beyond_chance(significance)))
+}
+
+/// Whether the stated controller reproduces the logged inputs closely enough to be used in the estimate.
+pub(crate) fn explains(known: &LoopKnowledge<'_>) -> bool {
+    let Some(law) = known.controller else { return true };
+    let all: Vec<&LoopSignals<'_>> = known.estimation.iter().collect();
+    let gain = filter_gain(law, &all);
+    let residuals: Vec<Residual> = all.iter().map(|r| residual(law, &gain, r)).collect();
+    rest(&residuals, &all) < AS_STATED
+}
+
+/// The largest error in the loop, its frequency in Hz and its standard deviations beyond chance.
+fn worst(
+    law: &StateSpace<Discrete>,
+    gain: &Mat<f64>,
+    plant: &StateSpace<Discrete>,
+    near: impl Fn(f64) -> (Vec<f64>, f64),
+) -> Result<[f64; 3]> {
+    let ts = law.time().ts();
+    let shares: Vec<f64> = (0..150).map(|k| 0.001 * 480.0_f64.powf(f64::from(k) / 149.0)).collect();
+    let omega: Vec<f64> = shares.iter().map(|share| TAU * share / ts).collect();
+    let whitening = StateSpace::new(
+        law.a() - gain * law.c(),
+        gain.clone(),
+        -law.c().to_owned(),
+        Mat::identity(law.outputs(), law.outputs()),
+        law.time(),
+    )?;
+    let [f, g, a] = [law, plant, &whitening].map(|s| frequency_response(s, &omega));
+    let (f, g, a) = (f?, g?, a?);
+    let mut worst = [0.0, 0.0, 0.0];
+    for (k, share) in shares.iter().enumerate() {
+        let (squares, significance) = near(*share);
+        if squares.iter().all(|s| *s == 0.0) {
+            worst[2] = significance.max(worst[2]);
+            continue;
+        }
+        let (m, p) = (g.at(k).ncols(), g.at(k).nrows());
+        let with_inputs = law.inputs() - p;
+        let seen = Mat::from_fn(law.inputs(), m, |i, j| match i.checked_sub(with_inputs) {
+            Some(i) => g.at(k)[(i, j)],
+            None if i == j => c64::ONE,
+            None => c64::ZERO,
+        });
+        let difference = Mat::<c64>::identity(m, m) - f.at(k) * &seen;
+        let sensitivity = difference.partial_piv_lu().solve(Mat::<c64>::identity(m, m));
+        let right = if with_inputs > 0 { sensitivity } else { &seen * sensitivity };
+        let left = a.at(k).to_owned().partial_piv_lu().solve(Mat::<c64>::identity(m, m));
+        let figure = entries(&squares, right.nrows())
+            .map(|e| largest_singular_value((&left * e * &right).as_ref()).unwrap_or(f64::INFINITY).powi(2))
+            .sum::<f64>()
+            .sqrt();
+        if figure > worst[0] {
+            worst = [figure, share / ts, significance.max(worst[2])];
+        }
+    }
+    Ok(worst)
+}
+
+/// L of the filter; zero for a static law, and where the Riccati equation has no solution.
+fn filter_gain(law: &StateSpace<Discrete>, records: &[&LoopSignals<'_>]) -> Mat<f64> {
+    let (n, m) = (law.order(), law.outputs());
+    let none = Mat::zeros(n, m);
+    if n == 0 {
+        return none;
+    }
+    let power = |column: &dyn Fn(&LoopSignals<'_>) -> f64| records.iter().map(|r| column(r)).sum::<f64>().max(TINY);
+    let seen = Mat::from_fn(law.inputs(), law.inputs(), |i, j| {
+        if i == j { power(&|r: &LoopSignals<'_>| r.seen.col(i).squared_norm_l2()) } else { 0.0 }
+    });
+    let noise = Mat::from_fn(m, m, |i, j| {
+        if i == j { EXACT_LOG * power(&|r: &LoopSignals<'_>| r.explained.col(i).squared_norm_l2()) } else { 0.0 }
+    });
+    let driven = law.b() * &seen * law.b().transpose();
+    let trace = (0..n).map(|i| driven[(i, i)]).sum::<f64>() / n as f64 * EXACT_LOG;
+    let driven = (&driven + driven.transpose()) * faer::Scale(0.5) + Mat::<f64>::identity(n, n) * faer::Scale(trace);
+    let dual = RiccatiProblem {
+        a: law.a().transpose(),
+        b: law.c().transpose(),
+        q: driven.as_ref(),
+        r: noise.as_ref(),
+        s: None,
+    };
+    dare("the filter of the controller", &dual).map_or(none, |found| found.gain.transpose().to_owned())
+}
+
+/// Residual of the law, and the samples that were left out.
+struct Residual {
+    values: Mat<f64>,
+    left_out: usize,
+}
+
+fn residual(law: &StateSpace<Discrete>, gain: &Mat<f64>, r: &LoopSignals<'_>) -> Residual {
+    let (rows, n, m, q) = (r.seen.nrows(), law.order(), law.outputs(), law.inputs());
+    let limited = at_limit(r);
+    let (mut x, mut values, mut left_out) = (vec![0.0; n], Mat::<f64>::zeros(rows, m), 0);
+    // The first samples show where the states started.
+    let mut blind = n;
+    for t in 0..rows {
+        let mut e = vec![0.0; m];
+        for (i, e) in e.iter_mut().enumerate() {
+            let states: f64 = (0..n).map(|k| law.c()[(i, k)] * x[k]).sum();
+            let direct: f64 = (0..q).map(|k| law.d()[(i, k)] * r.seen[(t, k)]).sum();
+            *e = r.explained[(t, i)] - states - direct;
+        }
+        let next = |k: usize| {
+            let states: f64 = (0..n).map(|l| law.a()[(k, l)] * x[l]).sum();
+            let inputs: f64 = (0..q).map(|l| law.b()[(k, l)] * r.seen[(t, l)]).sum();
+            states + inputs + (0..m).map(|i| gain[(k, i)] * e[i]).sum::<f64>()
+        };
+        x = (0..n).map(next).collect();
+        if limited[t] {
+            blind = n + 1;
+        }
+        if blind > 0 {
+            blind -= 1;
+            left_out += usize::from(limited[t]);
+            continue;
+        }
+        (0..m).for_each(|i| values[(t, i)] = e[i]);
+    }
+    Residual { values, left_out }
+}
+
+/// Samples in which an input is at its largest or least value, where it is so several times in a record.
+fn at_limit(r: &LoopSignals<'_>) -> Vec<bool> {
+    let mut out = vec![false; r.applied.nrows()];
+    for column in r.applied.col_iter() {
+        let values: Vec<f64> = column.iter().copied().collect();
+        let largest = values.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        let slack = 1e-6 * (largest - least);
+        for (limit, sign) in [(largest, 1.0), (least, -1.0)] {
+            let at = |v: &f64| sign * (limit - v) <= slack;
+            let count = values.iter().filter(|v| at(v)).count();
+            // An excitation of two values through a gain is at its limits half of the time; a limit that binds is rare or a plateau.
+            if (AT_LIMIT.0..=values.len() / AT_LIMIT.1).contains(&count) {
+                values.iter().zip(&mut out).for_each(|(v, out)| *out |= at(v));
+            }
+        }
+    }
+    out
+}
+
+/// Size of the residuals over that of the inputs that the law explains.
+fn rest(residuals: &[Residual], records: &[&LoopSignals<'_>]) -> f64 {
+    let left: f64 = residuals.iter().map(|r| r.values.squared_norm_l2()).sum();
+    let all: f64 = records.iter().map(|r| r.explained.squared_norm_l2()).sum();
+    (left / all.max(TINY)).sqrt()
+}

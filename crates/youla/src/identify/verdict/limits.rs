@@ -1,0 +1,65 @@
+//! Every constant that decides a verdict, with its unit and origin. Rates of false alarms and misses: `docs/accuracy.md`.
+
+/// Lines of a band for each channel of the excitation. Enough for the power of the noise within 16 % (`1 / sqrt(40)`); a band of 40 lines of a
+/// record of 12 000 samples is 0.3 % of the sample rate wide.
+pub(crate) const BAND_LINES: usize = 40;
+/// Lines under a Hann window that count as one: `sum of |correlation|^2 = 1 + 2 (2/3)^2 + 2 (1/6)^2`.
+pub(crate) const HANN_LOSS: f64 = 35.0 / 18.0;
+/// Directions of the excitation with less than this share of its mean power per band are left out: rounding of designed gaps.
+pub(crate) const WEAK_EXCITATION: f64 = 1e-4;
+/// Least singular value of the excited inputs over the largest from which a direction counts as excited: below it one per cent of leakage
+/// into the other direction is 30 % of it.
+pub(crate) const LEAST_DIRECTION: f64 = 0.03;
+/// Least power that the excitation moves along a direction of the inputs, over that of the noise there: the quotient of two sums is biased
+/// towards the inverse of the controller by its inverse, 3 %.
+pub(crate) const LEAST_MOVED: f64 = 30.0;
+/// Half width of the window over which bands are averaged, a ratio of frequencies: 1 dB, a third of an octave in all.
+pub(crate) const BAND_RATIO: f64 = 1.122;
+/// Least number of bands in a window.
+pub(crate) const LEAST_BANDS: usize = 5;
+/// Standard deviations beyond chance from which one of the windows of a record shows an error. Of 100 independent windows with the tails of
+/// chi-square of 10 degrees of freedom one exceeds 4.5 in one of 40 records.
+pub(crate) const LOCAL_CHANCE: f64 = 4.5;
+/// The same where the errors of all windows together exceed chance by as much.
+pub(crate) const OVERALL_CHANCE: f64 = 3.0;
+
+/// Standard deviations beyond chance up to which a figure is accepted whatever its size: of the 10^4 figures of many runs none
+/// exceeds it by chance.
+pub(crate) const BEYOND_CHANCE: f64 = 5.0;
+
+/// Largest part of the margin of the loop that the 95 % region may take: half of the margin is left.
+pub(crate) const LARGEST_RATIO_OF_LOOP: f64 = 0.5;
+/// Largest error that the excitation shows, as `|E K (I - G K)^-1|`: beside it the loop keeps its margins within 2 dB. Loops of the
+/// gauntlet with good models have a median of 0.026, with wrong ones of 0.28.
+pub(crate) const LARGEST_LOOP_ERROR: f64 = 0.2;
+/// Largest error of the stated controller, as `|(I - K G)^-1 dK G|`: a gain that is wrong by 20 % has 0.2 and more, a delay of one sample
+/// where the loop crosses over at a thirtieth of the sample rate less than 0.1.
+pub(crate) const LARGEST_CONTROLLER_ERROR: f64 = 0.15;
+/// Largest standard deviation of a response, relative to it, in a band of validity.
+pub(crate) const LARGEST_IN_BAND: f64 = 0.1;
+/// Radius of the 95 % region of a complex number over its root mean square: `sqrt(chi-square(0.95, 2) / 2)`.
+pub(crate) const EDGE: f64 = 1.731;
+/// Lowest frequency at which a loop is judged over the lowest at which the region is stated.
+pub(crate) const BELOW_ONE_PERIOD: f64 = 1.0;
+/// Residual of the controller's equation over its inputs up to which the log is that of the controller: rounding of nine digits in a log
+/// gives 1e-8, of five 1e-4.
+pub(crate) const NEARLY_EXACT: f64 = 1e-4;
+/// An input is at a limit where its extreme value occurs at least so often, and in at most one of so many samples.
+pub(crate) const AT_LIMIT: (usize, usize) = (3, 2);
+/// Mean square of two independent real numbers over its mean that chance exceeds in one of twenty cases: `chi-square(0.95, 2) / 2`.
+pub(crate) const CHANCE_OF_TWO: f64 = 2.996;
+/// Ratio of the noise powers of two parts of the records that is named.
+pub(crate) const LARGEST_NOISE_RATIO: f64 = 3.0;
+/// Standard deviation over the response, median over frequency, up to which a model of an open loop says anything.
+pub(crate) const LARGEST_DEVIATION: f64 = 1.0;
+/// Nonlinear part of the input, over the input, that is named.
+pub(crate) const LARGEST_NONLINEAR: f64 = 0.25;
+/// Largest part of the margin that the region may take where only what the excitation moves counts.
+pub(crate) const INFORMATION_RATIO: f64 = 1.0;
+/// A part of the margin beyond which its size says nothing more.
+pub(crate) const NO_INFORMATION: f64 = 1e3;
+/// Amplitude of a line of a disturbance, over the size of the outputs, that is named as large.
+pub(crate) const LARGEST_LINE: f64 = 1.0;
+/// Residual of the controller's equation over its inputs up to which the controller enters the estimate: it decides whether a direct path of
+/// the plant can be told from the feedback.
+pub(crate) const AS_STATED: f64 = 0.02;

@@ -1,0 +1,284 @@
+//! The error of a model as the excitation shows it, band by band, without a model of it.
+//!
+//! ```text
+//! E = S_vx S_xx^-1 S_xu (S_ux S_xx^-1 S_xu)^-1,      v = y - G u,   x the external excitation
+//! ```
+//! The excitation is an instrument: it is independent of the noise, so that E has mean zero where G is right, with variance
+//! `Phi_v (S_ux S_xx^-1 S_xu)^-1`. What exceeds this is error of the model. Phi_v is what x leaves of v in the band.
+//! All lines are those under a Hann window, under which the ends of a record leak nothing into bands without excitation.
+//! Neighbouring bands are averaged with the weights of their information, so that a band in which the excitation shows nothing does
+//! not speak.
+
+use super::limits::{BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION};
+use crate::linalg::TINY;
+use crate::statistics::chi_square_deviations;
+use faer::{Mat, Side, c64};
+
+/// One record: lines of the inputs, of what the model leaves, and of the excitation.
+pub(crate) struct RecordLines<'a> {
+    /// Lines x m.
+    pub(crate) u: &'a [c64],
+    /// Lines x p.
+    pub(crate) v: &'a [c64],
+    /// Lines x q.
+    pub(crate) x: &'a [c64],
+}
+
+/// The lines under a Hann window, `X_k - (X_{k-1} + X_{k+1}) / 2`; the first and the last, which lack a neighbour, are zero.
+pub(crate) fn hann(lines: &[c64], channels: usize) -> Vec<c64> {
+    let mut out = vec![c64::ZERO; lines.len()];
+    for k in channels..lines.len().saturating_sub(channels) {
+        out[k] = lines[k] - (lines[k - channels] + lines[k + channels]) * 0.5;
+    }
+    out
+}
+
+/// Numbers of channels: inputs, outputs, excitations.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Channels {
+    pub(crate) m: usize,
+    pub(crate) p: usize,
+    pub(crate) q: usize,
+}
+
+/// The error in one band.
+#[derive(Debug, Clone)]
+pub(crate) struct Band {
+    /// Middle of the band as a share of the sample rate.
+    pub(crate) share: f64,
+    /// Entries of E, row by row.
+    pub(crate) error: Vec<c64>,
+    /// Variance of each entry.
+    pub(crate) variance: Vec<f64>,
+}
+
+/// The errors of all bands; `None` where the excitation does not reach every input.
+#[derive(Debug, Clone)]
+pub(crate) struct LocalErrors {
+    pub(crate) bands: Vec<Option<Band>>,
+    /// By how many standard deviations the errors of all bands exceed chance; `None` where the bands have no more degrees of
+    /// freedom than the model has parameters.
+    pub(crate) significance: Option<f64>,
+}
+
+/// Mean squares over bands, beyond what chance explains.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Excess {
+    /// Middles of the bands, mean square of each entry there less its chance, and the variance of this difference's mean.
+    bands: Vec<(f64, Vec<f64>, Vec<f64>)>,
+    /// Standard deviations by which a mean must exceed chance.
+    least: f64,
+}
+
+/// Bands for so many lines.
+pub(crate) fn band_count(lines: usize, channels: Channels) -> usize {
+    (lines / (BAND_LINES * channels.q.max(1))).max(1)
+}
+
+impl LocalErrors {
+    /// In `count` bands of equal width; `parameters` of the model were fitted to the same records.
+    pub(crate) fn new(records: &[RecordLines<'_>], channels: Channels, count: usize, parameters: usize) -> Self {
+        let sums = sums(records, channels, count);
+        let power = |s: &Sums| (0..channels.q).map(|i| s.xx[(i, i)].re).sum::<f64>();
+        let least = WEAK_EXCITATION * sums.iter().map(power).sum::<f64>() / count as f64;
+        let (mut statistic, mut degrees, mut bands) = (0.0, -(parameters as f64), Vec::with_capacity(count));
+        for (k, sums) in sums.iter().enumerate() {
+            let found = error_of(sums, least, channels);
+            if let Some(found) = &found {
+                statistic += found.statistic;
+                degrees += found.degrees;
+            }
+            let whole = found.filter(|f| f.degrees == (2 * channels.m * channels.p) as f64);
+            let share = 0.5 * (k as f64 + 0.5) / count as f64;
+            bands.push(whole.map(|f| Band { share, error: f.error, variance: f.variance }));
+        }
+        let significance = (degrees > 0.0).then(|| chi_square_deviations(statistic, degrees));
+        LocalErrors { bands, significance }
+    }
+
+    /// Squares of the errors beyond their variances.
+    pub(crate) fn excess(&self) -> Excess {
+        let of = |b: &Band| {
+            let excess = b.error.iter().zip(&b.variance).map(|(e, v)| e.norm_sqr() - v).collect();
+            (b.share, excess, b.variance.iter().map(|v| v * v).collect())
+        };
+        let overall = self.significance.is_some_and(|s| s > OVERALL_CHANCE);
+        let least = if overall { OVERALL_CHANCE } else { LOCAL_CHANCE };
+        Excess { bands: self.bands.iter().flatten().map(of).collect(), least }
+    }
+
+    /// Scatter of the errors of several groups of records beyond their variances.
+    pub(crate) fn scatter(groups: &[LocalErrors]) -> Excess {
+        let count = groups.iter().map(|g| g.bands.len()).min().unwrap_or(0);
+        let bands = (0..count).filter_map(|k| {
+            let all: Vec<&Band> = groups.iter().filter_map(|g| g.bands[k].as_ref()).collect();
+            let entries = all.first().filter(|_| all.len() > 1)?.error.len();
+            let (excess, chance) = (0..entries).map(|i| scatter_of(&all, i)).unzip();
+            Some((all[0].share, excess, chance))
+        });
+        Excess { bands: bands.collect(), least: LOCAL_CHANCE }
+    }
+}
+
+/// `sum w |E_k - mean|^2` less its mean by chance over that of a unit scatter, and the variance of the quotient.
+fn scatter_of(groups: &[&Band], entry: usize) -> (f64, f64) {
+    let weights: Vec<f64> = groups.iter().map(|b| 1.0 / b.variance[entry].max(TINY)).collect();
+    let total: f64 = weights.iter().sum();
+    let mean = groups.iter().zip(&weights).fold(c64::ZERO, |s, (b, w)| s + b.error[entry] * *w) / total;
+    let spread: f64 = groups.iter().zip(&weights).map(|(b, w)| w * (b.error[entry] - mean).norm_sqr()).sum();
+    let freedom = groups.len() as f64 - 1.0;
+    let unit = total - weights.iter().map(|w| w * w).sum::<f64>() / total;
+    ((spread - freedom) / unit, freedom / (unit * unit))
+}
+
+impl Excess {
+    /// Whether any band speaks.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.bands.is_empty()
+    }
+
+    /// Mean square of each of `entries` near a frequency beyond chance, by how many standard deviations the largest exceeds it.
+    pub(crate) fn near(&self, share: f64, entries: usize) -> (Vec<f64>, f64) {
+        let near = self.window(share);
+        let (mut out, mut largest) = (vec![0.0; entries], 0.0_f64);
+        for (i, value) in out.iter_mut().enumerate() {
+            let (mut sum, mut weights) = (0.0, 0.0);
+            for (_, excess, chance) in near {
+                let weight = 1.0 / chance[i].max(TINY);
+                sum += weight * excess[i];
+                weights += weight;
+            }
+            let deviations = sum / weights.max(TINY).sqrt();
+            largest = largest.max(deviations);
+            *value = if deviations > self.least { sum / weights } else { 0.0 };
+        }
+        (out, largest)
+    }
+
+    /// The bands around a frequency; none where the nearest is farther away than the window is wide.
+    fn window(&self, share: f64) -> &[(f64, Vec<f64>, Vec<f64>)] {
+        let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
+        let mut first = self.bands.partition_point(|b| b.0 < from);
+        let mut end = self.bands.partition_point(|b| b.0 <= to);
+        while end - first < LEAST_BANDS.min(self.bands.len()) {
+            first = first.saturating_sub(1);
+            end = (end + 1).min(self.bands.len());
+        }
+        &self.bands[first..end]
+    }
+}
+
+/// Sums of products over the lines of a band.
+struct Sums {
+    lines: usize,
+    xx: Mat<c64>,
+    ux: Mat<c64>,
+    vx: Mat<c64>,
+    vv: Vec<f64>,
+    uu: Vec<f64>,
+}
+
+fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usize) -> Vec<Sums> {
+    let zeros = |rows: usize| Mat::<c64>::zeros(rows, q);
+    let empty = |_| Sums { lines: 0, xx: zeros(q), ux: zeros(m), vx: zeros(p), vv: vec![0.0; p], uu: vec![0.0; m] };
+    let mut all: Vec<Sums> = (0..count).map(empty).collect();
+    for r in records {
+        let total = r.v.len() / p.max(1);
+        for k in 0..total {
+            let sums = &mut all[(k * count / total).min(count - 1)];
+            sums.lines += 1;
+            (0..p).for_each(|i| sums.vv[i] += r.v[k * p + i].norm_sqr());
+            (0..m).for_each(|j| sums.uu[j] += r.u[k * m + j].norm_sqr());
+            for a in 0..q {
+                let xa = r.x[k * q + a].conj();
+                (0..q).for_each(|b| sums.xx[(b, a)] += r.x[k * q + b] * xa);
+                (0..m).for_each(|j| sums.ux[(j, a)] += r.u[k * m + j] * xa);
+                (0..p).for_each(|i| sums.vx[(i, a)] += r.v[k * p + i] * xa);
+            }
+        }
+    }
+    all
+}
+
+/// The inputs as far as the excitation explains them, lines x m for each record: `S_ux S_xx^-1 x` in each band, of the lines without a window
+/// (`plain`: inputs and excitation).
+pub(crate) fn explained_inputs(records: &[RecordLines<'_>], plain: &[[&[c64]; 2]], channels: Channels) -> Vec<Vec<c64>> {
+    let Channels { m, p, q } = channels;
+    let lines: usize = records.iter().map(|r| r.v.len() / p.max(1)).sum();
+    let count = band_count(lines, channels);
+    let all = sums(records, channels, count);
+    let power = |s: &Sums| (0..q).map(|i| s.xx[(i, i)].re).sum::<f64>();
+    let least = WEAK_EXCITATION * all.iter().map(power).sum::<f64>() / count as f64;
+    let gains: Vec<Option<Mat<c64>>> = all.iter().map(|s| gain(s, least)).collect();
+    let of = |[u, x]: &[&[c64]; 2]| {
+        let total = u.len() / m.max(1);
+        let mut out = vec![c64::ZERO; total * m];
+        for k in 0..total {
+            let Some(gain) = &gains[(k * count / total).min(count - 1)] else { continue };
+            for j in 0..m {
+                out[k * m + j] = (0..q).fold(c64::ZERO, |sum, a| sum + gain[(j, a)] * x[k * q + a]);
+            }
+        }
+        out
+    };
+    plain.iter().map(of).collect()
+}
+
+/// `S_ux S_xx^-1` along the strong directions of the excitation.
+fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
+    let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
+    let along = &sums.ux * eigen.U();
+    let inverse = |k: usize| if eigen.S()[k].re > least.max(TINY) { 1.0 / eigen.S()[k].re } else { 0.0 };
+    let scaled = Mat::from_fn(along.nrows(), along.ncols(), |i, k| along[(i, k)] * inverse(k));
+    Some(&scaled * eigen.U().adjoint())
+}
+
+/// Chi-square of a band, its degrees of freedom, the error of each entry and its variance.
+struct BandError {
+    statistic: f64,
+    degrees: f64,
+    error: Vec<c64>,
+    variance: Vec<f64>,
+}
+
+fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<BandError> {
+    let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
+    let strong: Vec<usize> = (0..sums.xx.nrows()).filter(|k| eigen.S()[*k].re > least.max(TINY)).collect();
+    let free = sums.lines as f64 / HANN_LOSS - strong.len() as f64;
+    if strong.is_empty() || free < 1.0 {
+        return None;
+    }
+    let root = |of: &Mat<c64>| {
+        let along = of * eigen.U();
+        Mat::from_fn(of.nrows(), strong.len(), |i, k| along[(i, strong[k])] / eigen.S()[strong[k]].re.sqrt())
+    };
+    let (u, v) = (root(&sums.ux), root(&sums.vx));
+    let explained = |of: &Mat<c64>, i: usize| (0..strong.len()).map(|k| of[(i, k)].norm_sqr()).sum::<f64>();
+    // Of correlated lines a sum has the variance of `HANN_LOSS` times as many.
+    let noise: Vec<f64> = (0..p).map(|i| ((sums.vv[i] - explained(&v, i)) / free).max(TINY)).collect();
+    let of_inputs: Vec<f64> = (0..m).map(|j| ((sums.uu[j] - explained(&u, j)) / free).max(0.0)).collect();
+    let svd = u.thin_svd().ok()?;
+    let sizes: Vec<f64> = (0..m.min(strong.len())).map(|k| svd.S()[k].re).collect();
+    // A direction of the inputs that the excitation hardly moves shows the noise that the feedback brings there: E would be that of K.
+    let moved = |k: usize| {
+        let noise: f64 = (0..m).map(|j| svd.U()[(j, k)].norm_sqr() * of_inputs[j]).sum();
+        sizes[k] > LEAST_DIRECTION * sizes[0] && sizes[k] * sizes[k] > LEAST_MOVED * noise
+    };
+    let rank = (0..sizes.len()).take_while(|k| moved(*k)).count();
+    // v V: the error along each direction of the excited inputs, with the variance of the noise
+    let along = &v * svd.V();
+    let degrees = (2 * rank * p) as f64;
+    let (mut error, mut variance) = (vec![c64::ZERO; p * m], vec![0.0; p * m]);
+    let mut statistic = 0.0;
+    for i in 0..p {
+        (0..rank).for_each(|k| statistic += 2.0 * along[(i, k)].norm_sqr() / noise[i]);
+        for j in 0..m {
+            let entry = |sum: c64, k: usize| sum + along[(i, k)] / sizes[k] * svd.U()[(j, k)].conj();
+            error[i * m + j] = (0..rank).fold(c64::ZERO, entry);
+            variance[i * m + j] = (0..rank).map(|k| noise[i] * (svd.U()[(j, k)].norm() / sizes[k]).powi(2)).sum();
+        }
+    }
+    // Mean of the square of Student's variable with `2 free` degrees of freedom.
+    statistic *= ((free - 1.0) / free).max(0.5);
+    (rank > 0).then_some(BandError { statistic, degrees, error, variance })
+}

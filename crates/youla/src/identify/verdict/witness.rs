@@ -1,0 +1,129 @@
+//! What the external excitation says of a model: its error, band by band, in all records, and how this error differs between groups of
+//! records.
+
+use super::local_error::{Channels, Excess, LocalErrors, RecordLines, band_count, explained_inputs, hann};
+use crate::identify::likelihood::LoopSignals;
+use crate::identify::likelihood::choose::problem::{Problem, Solution};
+use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
+use crate::identify::likelihood::search::with_best_ends;
+use crate::identify::subspace::Experiment;
+use faer::{MatRef, c64};
+
+/// Records that are a group each, at most; more are joined.
+const MOST_GROUPS: usize = 6;
+
+/// Records by their lines: inputs, what the model leaves of the outputs, and the excitation.
+struct Group {
+    /// Inputs, residuals and excitation of each record under a Hann window.
+    windowed: Vec<[Vec<c64>; 3]>,
+    /// Inputs and excitation as they are.
+    plain: Vec<[Vec<c64>; 2]>,
+}
+
+/// The error of the model as the excitation shows it.
+#[derive(Debug, Clone)]
+pub(crate) struct Witness {
+    /// In all records.
+    pub(crate) whole: LocalErrors,
+    /// Mean squares of these errors beyond chance.
+    pub(crate) distortion: Excess,
+    /// Mean squares of the differences between groups of records beyond chance.
+    pub(crate) variation: Excess,
+    /// Inputs of the estimation records as far as the excitation explains them, lines x m.
+    excited: Vec<Vec<c64>>,
+}
+
+type Pair<'a> = (Experiment<'a>, MatRef<'a, f64>);
+
+impl Group {
+    fn new(problem: &Problem<'_>, solution: &Solution, records: &[Pair<'_>]) -> Option<Self> {
+        let found = &solution.chosen.found;
+        let records: Vec<&Pair<'_>> = records.iter().filter(|(_, x)| long_enough(x.nrows(), problem.skip)).collect();
+        let experiments: Vec<Experiment<'_>> = records.iter().map(|(e, _)| *e).collect();
+        let spectra = Spectra::new(&experiments, &problem.sizes, &solution.chosen.delays, problem.skip);
+        if spectra.records.is_empty() {
+            return None;
+        }
+        let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
+        let residuals = point.residuals(&spectra);
+        let (m, p) = (spectra.inputs, spectra.outputs);
+        let (mut windowed, mut plain) = (Vec::new(), Vec::new());
+        for ((lines, v), (_, x)) in spectra.records.into_iter().zip(&residuals).zip(records) {
+            let excitation = lines_of(*x, problem.skip);
+            windowed.push([hann(&lines.u, m), hann(v, p), hann(&excitation, x.ncols())]);
+            plain.push([lines.u, excitation]);
+        }
+        Some(Group { windowed, plain })
+    }
+
+    fn lines(&self) -> impl Iterator<Item = RecordLines<'_>> {
+        self.windowed.iter().map(|[u, v, x]| RecordLines { u, v, x })
+    }
+}
+
+impl Witness {
+    /// From the records of estimation and the fresh ones with the signals of the loop; `None` where the excitation is not known.
+    pub(crate) fn new(
+        problem: &Problem<'_>,
+        solution: &Solution,
+        [estimation, fresh]: [&[LoopSignals<'_>]; 2],
+        verification: &[Experiment<'_>],
+    ) -> Option<Self> {
+        let of_records = pairs(problem.experiments, estimation)?;
+        let of_fresh = pairs(verification, fresh).unwrap_or_default();
+        if of_records.iter().all(|(_, x)| x.norm_l2() == 0.0) {
+            return None;
+        }
+        let group = |records: &[Pair<'_>]| Group::new(problem, solution, records);
+        let q = of_records.iter().map(|(_, x)| x.ncols()).max().unwrap_or(0);
+        let channels = Channels { m: problem.inputs(), p: problem.outputs(), q };
+        let (first, second) = (group(&of_records)?, group(&of_fresh));
+        let all: Vec<RecordLines<'_>> = first.lines().chain(second.iter().flat_map(Group::lines)).collect();
+        let lines = |all: &[RecordLines<'_>]| all.iter().map(|r| r.v.len() / channels.p).sum::<usize>();
+        let parameters = solution.chosen.found.parameters;
+        let whole = LocalErrors::new(&all, channels, band_count(lines(&all), channels), parameters);
+        let mut groups: Vec<Group> = split(&of_records, problem.skip).iter().filter_map(|g| group(g)).collect();
+        groups.extend(second);
+        let of_group = |g: &Group| g.lines().map(|r| r.v.len() / channels.p).sum::<usize>();
+        let shortest = groups.iter().map(of_group).min().unwrap_or(0);
+        let count = band_count(shortest, channels);
+        let errors: Vec<LocalErrors> = groups
+            .iter()
+            .map(|g| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0))
+            .collect();
+        let plain = first.plain.iter().map(|[u, x]| [u.as_slice(), x.as_slice()]).collect::<Vec<_>>();
+        let excited = explained_inputs(&first.lines().collect::<Vec<_>>(), &plain, channels);
+        Some(Witness { distortion: whole.excess(), variation: LocalErrors::scatter(&errors), whole, excited })
+    }
+}
+
+impl Witness {
+    /// The lines of the estimation records with the part of the inputs that the excitation explains; `None` where it does not reach all.
+    pub(crate) fn excited(&self, spectra: &Spectra) -> Option<Spectra> {
+        if self.whole.bands.iter().all(Option::is_none) || self.excited.len() != spectra.records.len() {
+            return None;
+        }
+        let mut out = spectra.clone();
+        out.records.iter_mut().zip(&self.excited).for_each(|(lines, u)| lines.u.clone_from(u));
+        Some(out)
+    }
+}
+
+/// Records with their excitation, where it is known of all.
+fn pairs<'a>(experiments: &[Experiment<'a>], signals: &[LoopSignals<'a>]) -> Option<Vec<Pair<'a>>> {
+    experiments.iter().zip(signals).map(|(e, s)| Some((*e, s.excitation?))).collect()
+}
+
+/// The halves of a single record; of several each record, of many several together.
+fn split<'a>(records: &[Pair<'a>], skip: usize) -> Vec<Vec<Pair<'a>>> {
+    if let [(e, x)] = records {
+        let (rows, half) = (e.u.nrows(), e.u.nrows() / 2);
+        let cut = |from: usize, to: usize| {
+            let rows = to - from;
+            (Experiment::new(e.u.subrows(from, rows), e.y.subrows(from, rows)), x.subrows(from, rows))
+        };
+        return vec![vec![cut(0, half)], vec![cut(half.saturating_sub(skip), rows)]];
+    }
+    let count = records.len().min(MOST_GROUPS);
+    (0..count).map(|g| records.iter().skip(g).step_by(count).copied().collect()).collect()
+}

@@ -41,10 +41,12 @@ fn identified(plant: &StateSpace<Discrete>, noise: f64, seed: u64) -> Recommenda
     let signals = |from: usize, count: usize| LoopSignals {
         seen: y.subrows(from, count),
         explained: own.subrows(from, count),
+        applied: u.subrows(from, count),
         excitation: Some(d.subrows(from, count)),
     };
     let record = |from: usize, count: usize| Experiment::new(u.subrows(from, count), y.subrows(from, count));
-    let known = LoopKnowledge::new(Some(&k), vec![signals(0, kept)], vec![signals(kept, samples - kept)]).unwrap();
+    let [estimation, fresh] = [vec![signals(0, kept)], vec![signals(kept, samples - kept)]];
+    let known = LoopKnowledge::new(Some(&k), Some(&k), estimation, fresh).unwrap();
     let (first, second) = ([record(0, kept)], [record(kept, samples - kept)]);
     recommend(&first, &second, Some(&known), time(), &LikelihoodOptions::default()).unwrap()
 }

@@ -8,7 +8,12 @@ use youla_run::{Identification, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
-    let mut text = format!("{}\n\n", found.settings.name);
+    let mut text = format!("{}\n", found.settings.name);
+    if let Ok(model) = &found.recommended {
+        text += &format!("{}\n", model.sentence());
+        model.reasons().iter().for_each(|reason| text += &format!("  {reason}\n"));
+    }
+    text.push('\n');
     text += &fitted(&rows(found), terminal::width().unwrap_or(usize::MAX));
     for refusal in found.refusals() {
         let _ = write!(text, "\nno {}: {}", refusal.what, refusal.error);

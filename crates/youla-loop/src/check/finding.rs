@@ -48,7 +48,7 @@ pub enum Test {
     Excitation,
     /// Signal-to-noise ratio of the outputs ([`super::noise()`]).
     Noise,
-    /// Narrow lines in the outputs ([`super::lines()`]).
+    /// Narrow lines in the outputs ([`youla::signal::spectral_lines`]).
     Lines,
     /// Whether the input depends on the output ([`super::feedback()`]).
     Feedback,

@@ -1,7 +1,7 @@
 //! The recommended model on the page: its tests, what the search chose and why, and the candidates.
 
 use crate::result::Identification;
-use youla::identify::likelihood::{Candidate, Evidence, LikelihoodOptions, Recommendation};
+use youla::identify::likelihood::{Candidate, Evidence, LikelihoodOptions, Outcome, Recommendation, figure};
 use youla::signal::Detrend;
 use youla_report::data::EvidenceTable;
 
@@ -17,24 +17,25 @@ pub(crate) fn tables(found: &Identification) -> Vec<EvidenceTable> {
 
 fn evidence(model: &Recommendation) -> EvidenceTable {
     let row = |e: &Evidence| {
-        let passed = if e.holds() { "yes" } else { "no" };
-        vec![e.question.clone(), figure(e.figure), e.limit.to_string(), passed.to_owned()]
+        let outcome = match e.outcome {
+            Outcome::Passed => "passed",
+            Outcome::Failed => "failed",
+            Outcome::NotTested => "not tested",
+        };
+        let required = if e.required { "yes" } else { "no" };
+        let at = e.hz.map_or(String::new(), |[low, _]| figure(low));
+        let value = if e.outcome == Outcome::NotTested { String::new() } else { figure(e.figure) };
+        let cells = [value, e.limit.to_string(), at, required.into(), outcome.into(), e.note.clone()];
+        std::iter::once(e.question.clone()).chain(cells).collect()
     };
     EvidenceTable {
         title: "Evidence on the recommended model".into(),
-        text: "The model is trusted where it passes every test: each figure is at most its limit.".into(),
-        columns: ["Test", "Figure", "Limit", "Passed"].map(String::from).to_vec(),
+        text: "The model is trusted where it passes every required test. A figure is at most its limit, or chance explains it; a test that \
+               is not required names an imperfection, whose consequence is in the region of the model."
+            .into(),
+        columns: ["Test", "Figure", "Limit", "Frequency, Hz", "Required", "Outcome", "Remark"].map(String::from).to_vec(),
         rows: model.evidence.iter().map(row).collect(),
         caption: String::new(),
-    }
-}
-
-/// Three decimals, or a power of ten where these are too many digits.
-pub(crate) fn figure(value: f64) -> String {
-    match value {
-        v if !v.is_finite() => "not finite".into(),
-        v if v.abs() >= 1e5 => format!("{v:.1e}"),
-        v => format!("{v:.3}"),
     }
 }
 

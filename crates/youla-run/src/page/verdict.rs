@@ -2,13 +2,12 @@
 //! the loop.
 
 use super::nonparametric;
-use super::recommended::figure;
 use crate::check::OF_SETTINGS;
 use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
 use crate::summary::model::{ModelEntry, ResidualEntry};
-use youla::identify::likelihood::Evidence;
+use youla::identify::likelihood::{Evidence, Outcome};
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{ReportPart, Status, Verdict};
 
@@ -37,13 +36,12 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
     };
     let what = format!("The recommended model has order {}{dead_time}", model.order);
     let failed: Vec<&Evidence> = model.evidence.iter().filter(|e| !e.holds()).collect();
-    let all = model.evidence.len();
-    let first = match failed.len() {
-        0 => line(Status::Good, format!("Trusted: all {all} tests of the recommended model are passed. {what}.")),
-        n => line(Status::Bad, format!("Not trusted: {n} of {all} tests of the recommended model failed. {what}.")),
-    };
-    let sentence = |e: &Evidence| format!("{}: {}, limit {}.", e.question, figure(e.figure), e.limit);
-    std::iter::once(first).chain(failed.into_iter().map(|e| line(Status::Bad, sentence(e)))).collect()
+    let status = if failed.is_empty() { Status::Good } else { Status::Bad };
+    let first = line(status, format!("{} {what}.", model.sentence()));
+    let named = model.evidence.iter().filter(|e| !e.required && e.outcome == Outcome::Failed);
+    let named = named.map(|e| line(Status::Caution, format!("{e}.")));
+    let failed = failed.into_iter().map(|e| line(Status::Bad, format!("{e}.")));
+    std::iter::once(first).chain(failed).chain(named).collect()
 }
 
 /// The model that the lines are about: the recommended one, else the first that was identified.

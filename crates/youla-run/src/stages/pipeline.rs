@@ -14,7 +14,7 @@ use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
-use crate::stages::recommend::recommend;
+use crate::stages::recommend::{defects, recommend};
 use crate::stages::redesign::redesigned;
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
@@ -56,7 +56,10 @@ pub fn identify(
         rayon::join(|| recommend(run), others)
     });
     let (s, grey_box) = s;
-    let (recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
+    let (mut recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
+    if let Ok(model) = &mut recommended {
+        model.evidence.extend(defects(&data));
+    }
     let reduction = clock.run(Stage::Reduce, || {
         let (model, options) = (recommended.as_ref().ok()?, settings.reduction.as_ref()?);
         Some(run_reduction(&factorisation?.factors, &model.plant, &records, options)) // (29)

@@ -1,10 +1,23 @@
 //! The recommended model of a run: [`identify`] on its records, with the controller that ran and the nominal model.
 
+use crate::check::{DataCheck, OF_SETTINGS};
 use crate::records::LoopRecord;
 use crate::stages::context::RunContext;
 use crate::{Error, Result};
-use youla::identify::likelihood::{self, Recommendation};
+use youla::identify::likelihood::{self, Evidence, Recommendation};
 use youla::identify::{Identified, identify};
+use youla_loop::check::{Finding, Severity, Test};
+
+/// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
+/// outliers have tests and consequences of their own.
+pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
+    let own = [Test::Controller, Test::Outliers];
+    let of_data = |f: &&Finding| f.severity == Severity::Defect && f.record != OF_SETTINGS && !own.contains(&f.test);
+    let found: Vec<&Finding> = data.findings.iter().filter(of_data).collect();
+    let first = found.first()?;
+    let question = "Defects that the check of the data found";
+    Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}", first.record, first.what)))
+}
 
 /// The recommended model of the records of a run, or of its measured response.
 ///

@@ -198,7 +198,12 @@ impl Signals {
 
     fn view(&self) -> LoopSignals<'_> {
         let excitation = self.excitation.as_ref().map(|x| x.as_ref());
-        LoopSignals { seen: self.seen.as_ref(), explained: self.explained.as_ref(), applied: self.applied.as_ref(), excitation }
+        LoopSignals {
+            seen: self.seen.as_ref(),
+            explained: self.explained.as_ref(),
+            applied: self.applied.as_ref(),
+            excitation,
+        }
     }
 }
 

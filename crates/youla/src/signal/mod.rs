@@ -5,6 +5,7 @@
 
 mod channel;
 mod detrend;
+mod disturbance_lines;
 mod excitation;
 mod harmonics;
 mod lines;
@@ -16,9 +17,10 @@ mod spectrum;
 
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
+pub use disturbance_lines::take_out_lines;
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
 pub use harmonics::without_harmonics;
-pub use lines::{SpectralLine, spectral_lines, take_out_lines};
+pub use lines::{SpectralLine, spectral_lines};
 pub use loop_record::LoopRecord;
 pub use periodic::{
     ExcitationPeriod, LineGroup, LineResponse, PeriodicExperiment, detect_period, line_response, local_response,

@@ -32,8 +32,8 @@ pub(super) mod search;
 mod tests;
 
 pub use super::subspace::Experiment;
-pub use deviation::mode_estimates::ModeEstimate;
 pub use super::verdict::LoopRatio;
+pub use deviation::mode_estimates::ModeEstimate;
 pub use deviation::region::{Draw, Interval, Region, RegionParts, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};

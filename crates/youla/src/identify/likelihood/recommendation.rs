@@ -40,6 +40,27 @@ impl Recommendation {
         self.evidence.iter().all(Evidence::holds)
     }
 
+    /// What the model is good for, in a sentence or two.
+    pub fn sentence(&self) -> String {
+        let failed = self.evidence.iter().filter(|e| !e.holds()).count();
+        let required = self.evidence.iter().filter(|e| e.required).count();
+        let first = match (failed, &self.loop_ratio) {
+            (0, Some(r)) => format!(
+                "Trusted for this loop: {:.0} % of the margin is left at {} Hz",
+                100.0 * (1.0 - r.largest),
+                figure(r.largest_hz)
+            ),
+            (0, None) => "Trusted".to_owned(),
+            (n, _) => format!("Not trusted: {n} of {required} tests of the recommended model failed"),
+        };
+        let bands: Vec<String> =
+            self.bands.iter().map(|[low, high]| format!("{} to {} Hz", figure(*low), figure(*high))).collect();
+        match bands.len() {
+            0 => format!("{first}. No band is valid to 10 %."),
+            _ => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
+        }
+    }
+
     /// The required tests that are not passed.
     pub fn reasons(&self) -> Vec<String> {
         self.evidence.iter().filter(|e| !e.holds()).map(Evidence::to_string).collect()
@@ -148,8 +169,9 @@ impl Evidence {
         Evidence { hz: Some(hz), ..self }
     }
 
+    /// With a remark on the figure.
     #[must_use]
-    pub(crate) fn noted(self, note: impl Into<String>) -> Self {
+    pub fn noted(self, note: impl Into<String>) -> Self {
         Evidence { note: note.into(), ..self }
     }
 

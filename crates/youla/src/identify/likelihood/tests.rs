@@ -243,8 +243,9 @@ fn unstable_loop(seed: u64) -> (StateSpace<Discrete>, [Mat<f64>; 3]) {
 fn poles_outside_the_unit_circle_are_found_outside() {
     let (k, [u, y, d]) = unstable_loop(7);
     let own = &u - &d;
-    let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), excitation: Some(d.as_ref()) };
-    let known = LoopKnowledge::new(Some(&k), vec![signals], Vec::new()).unwrap();
+    let (applied, excitation) = (u.as_ref(), Some(d.as_ref()));
+    let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), applied, excitation };
+    let known = LoopKnowledge::new(Some(&k), Some(&k), vec![signals], Vec::new()).unwrap();
     let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let found = recommend(&experiments, &[], Some(&known), time(), &LikelihoodOptions::default()).unwrap();
     assert_eq!((found.order, found.dead_time.as_slice()), (1, &[0][..]));
@@ -264,8 +265,9 @@ fn a_controller_that_did_not_run_costs_the_trust() {
     let (_, [u, y, d]) = unstable_loop(8);
     let wrong = StateSpace::gain(matrix([[-0.5]]), time()).unwrap();
     let own = &u - &d;
-    let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), excitation: Some(d.as_ref()) };
-    let known = LoopKnowledge::new(Some(&wrong), vec![signals], Vec::new()).unwrap();
+    let (applied, excitation) = (u.as_ref(), Some(d.as_ref()));
+    let signals = LoopSignals { seen: y.as_ref(), explained: own.as_ref(), applied, excitation };
+    let known = LoopKnowledge::new(Some(&wrong), Some(&wrong), vec![signals], Vec::new()).unwrap();
     let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
     let found = recommend(&experiments, &[], Some(&known), time(), &LikelihoodOptions::default()).unwrap();
     assert!(!found.trusted());

@@ -23,7 +23,8 @@ use std::f64::consts::TAU;
 /// samples as the controller has states.
 const EXACT_LOG: f64 = 1e-9;
 
-const QUESTION: &str = "What the difference of the stated controller from the log does to the loop, largest over frequency (controller)";
+const QUESTION: &str =
+    "What the difference of the stated controller from the log does to the loop, largest over frequency (controller)";
 
 /// The test, with what share of the inputs the law leaves and how many samples were left out.
 pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>) -> Result<Option<Evidence>> {
@@ -38,10 +39,10 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
     let residuals: Vec<Residual> = all.iter().map(|r| residual(law, &gain, r)).collect();
     let share = rest(&residuals, &all);
     if share < NEARLY_EXACT {
-        return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(format!(
-            "the stated controller reproduces the logged inputs to {:.1e}",
-            share
-        ))));
+        return Ok(Some(
+            Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR)
+                .noted(format!("the stated controller reproduces the logged inputs to {:.1e}", share)),
+        ));
     }
     let lines: Vec<[Vec<c64>; 3]> = all
         .iter()
@@ -58,7 +59,10 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
     let total: usize = records.iter().map(|r| r.v.len() / channels.p.max(1)).sum();
     let excess = LocalErrors::new(&records, channels, band_count(total, channels), 0).excess();
     if excess.is_empty() && share < AS_STATED {
-        let note = format!("the law leaves {:.2} % of the inputs, and the excitation moves too little of them to say more", 100.0 * share);
+        let note = format!(
+            "the law leaves {:.2} % of the inputs, and the excitation moves too little of them to say more",
+            100.0 * share
+        );
         return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(note)));
     }
     if excess.is_empty() {

@@ -9,7 +9,10 @@
 //! Neighbouring bands are averaged with the weights of their information, so that a band in which the excitation shows nothing does
 //! not speak.
 
-use super::limits::{BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION};
+use super::limits::{
+    BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE,
+    WEAK_EXCITATION,
+};
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, Side, c64};
@@ -202,7 +205,11 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
 
 /// The inputs as far as the excitation explains them, lines x m for each record: `S_ux S_xx^-1 x` in each band, of the lines without a window
 /// (`plain`: inputs and excitation).
-pub(crate) fn explained_inputs(records: &[RecordLines<'_>], plain: &[[&[c64]; 2]], channels: Channels) -> Vec<Vec<c64>> {
+pub(crate) fn explained_inputs(
+    records: &[RecordLines<'_>],
+    plain: &[[&[c64]; 2]],
+    channels: Channels,
+) -> Vec<Vec<c64>> {
     let Channels { m, p, q } = channels;
     let lines: usize = records.iter().map(|r| r.v.len() / p.max(1)).sum();
     let count = band_count(lines, channels);

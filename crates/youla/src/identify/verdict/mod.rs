@@ -19,6 +19,8 @@ mod local_error;
 pub(crate) mod loop_ratio;
 mod nonlinear;
 mod parts;
+#[cfg(test)]
+mod tests;
 mod witness;
 
 pub(crate) use controller::explains;
@@ -27,6 +29,7 @@ pub use loop_ratio::LoopRatio;
 pub(crate) use parts::Parts;
 pub(crate) use witness::Witness;
 
+use crate::Result;
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
@@ -36,10 +39,7 @@ use crate::identify::likelihood::{Evidence, LoopKnowledge};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
-use crate::Result;
-use limits::{
-    INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION,
-};
+use limits::{INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION};
 use loop_ratio::{LoopAt, bands, entries, judged_hz, valid};
 
 /// What the verdict rests on.
@@ -270,4 +270,3 @@ fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
     let evidence = Evidence::new(question, r.largest.min(NO_INFORMATION), INFORMATION_RATIO).at([r.largest_hz; 2]);
     evidence.noted("excite the loop there, or longer")
 }
-

@@ -45,7 +45,8 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
     let mut planner = FftPlanner::new();
     let pairs = spectra.records.iter().zip(&clean);
-    let shaped: Vec<Shaped> = pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
+    let shaped: Vec<Shaped> =
+        pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
     let sizes: Vec<f64> = (0..FUNCTIONS * spectra.inputs)
         .map(|f| shaped.iter().map(|s| s.sizes[f]).sum::<f64>() / shaped.len().max(1) as f64)
         .collect();
@@ -62,7 +63,11 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let single = |f: usize| {
         let along: f64 = rows.clone().map(|i| factor[(i, parameters + f)] * factor[(i, parameters + count)]).sum();
         let own: f64 = rows.clone().map(|i| factor[(i, parameters + f)].powi(2)).sum();
-        if own > DISTINCT * length(parameters + f) { (along / own * sizes[f], along.abs() / own.sqrt()) } else { (0.0, 0.0) }
+        if own > DISTINCT * length(parameters + f) {
+            (along / own * sizes[f], along.abs() / own.sqrt())
+        } else {
+            (0.0, 0.0)
+        }
     };
     let telling = (0..count).map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let (f, (size, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
@@ -99,7 +104,8 @@ fn columns(
         for f in 0..FUNCTIONS {
             let shaped =
                 |t: usize| OF_INPUT.get(f).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |of| of(u[t]));
-            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), if f < OF_INPUT.len() { u[t] } else { velocity[t] })));
+            sizes[f * m + j] =
+                beside((0..lines.samples).map(|t| (shaped(t), if f < OF_INPUT.len() { u[t] } else { velocity[t] })));
             let root = (lines.samples as f64).sqrt();
             let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
             planner.plan_fft_forward(lines.samples).process(&mut work);

@@ -6,10 +6,10 @@
 //! ```
 //! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
+use super::limits::{CHANCE_OF_TWO, LARGEST_LOOP_ERROR, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
-use super::limits::{CHANCE_OF_TWO, LARGEST_LOOP_ERROR, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
 use crate::identify::likelihood::deviation::{grid, inverse_root};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
@@ -139,7 +139,8 @@ impl Parts {
         ts: f64,
     ) -> Vec<Evidence> {
         let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
-        let question = format!("Difference of the models from {which}, in the loop, largest over frequency (repeatability)");
+        let question =
+            format!("Difference of the models from {which}, in the loop, largest over frequency (repeatability)");
         let (figure, share) = self.difference(a, b, solution, judge);
         let repeatable =
             Evidence::new(question, figure, LARGEST_LOOP_ERROR).beyond_chance(significance).at([share / ts; 2]);

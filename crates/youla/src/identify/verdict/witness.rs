@@ -87,10 +87,8 @@ impl Witness {
         let of_group = |g: &Group| g.lines().map(|r| r.v.len() / channels.p).sum::<usize>();
         let shortest = groups.iter().map(of_group).min().unwrap_or(0);
         let count = band_count(shortest, channels);
-        let errors: Vec<LocalErrors> = groups
-            .iter()
-            .map(|g| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0))
-            .collect();
+        let errors: Vec<LocalErrors> =
+            groups.iter().map(|g| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0)).collect();
         let plain = first.plain.iter().map(|[u, x]| [u.as_slice(), x.as_slice()]).collect::<Vec<_>>();
         let excited = explained_inputs(&first.lines().collect::<Vec<_>>(), &plain, channels);
         Some(Witness { distortion: whole.excess(), variation: LocalErrors::scatter(&errors), whole, excited })

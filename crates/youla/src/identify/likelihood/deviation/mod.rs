@@ -16,9 +16,9 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
+use crate::identify::verdict::Witness;
 use crate::linalg::TINY;
 use faer::{Mat, c64};
-use crate::identify::verdict::Witness;
 
 /// Rivals of less weight are left out.
 const LEAST_WEIGHT: f64 = 1e-12;

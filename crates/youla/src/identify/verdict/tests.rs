@@ -1,0 +1,133 @@
+//! Each test of the verdict with one planted fault that fires it, beside the same loop without the fault.
+
+use crate::control::{RunningController, closed_loop, with_input_port};
+use crate::identify::likelihood::{Evidence, LikelihoodOptions, Outcome};
+use crate::identify::{Identified, identify};
+use crate::linalg::block;
+use crate::lti::{Continuous, Discrete, StateSpace, simulate};
+use crate::signal::LoopRecord;
+use crate::{Mat, MatRef};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+fn time() -> Discrete {
+    Discrete::new(1e-3).unwrap()
+}
+
+/// A mode of 60 Hz with 3 % damping beside a lag of 5 Hz.
+fn plant(gain: f64) -> StateSpace<Discrete> {
+    let (w, slow) = (377.0, 31.4);
+    let entries = [[0.0, w, 0.0], [-w, -0.06 * w, 0.0], [0.0, 0.0, -slow]];
+    let a = Mat::from_fn(3, 3, |i, j| entries[i][j]);
+    let b = Mat::from_fn(3, 1, |i, _| [0.0, 0.3 * w, slow][i] * gain);
+    let c = Mat::from_fn(1, 3, |_, j| [1.0, 0.0, 1.0][j]);
+    StateSpace::new(a, b, c, Mat::zeros(1, 1), Continuous).unwrap().zoh(time()).unwrap()
+}
+
+/// `u = -0.8 y`, positive feedback.
+fn controller(gain: f64) -> StateSpace<Discrete> {
+    StateSpace::gain(Mat::from_fn(1, 1, |_, _| -0.8 * gain), time()).unwrap()
+}
+
+/// A loop with an excitation and noise of given size; the plant takes another gain in the second half.
+struct Planted {
+    noise: f64,
+    second_gain: f64,
+    samples: usize,
+    excitation: fn(usize, f64) -> f64,
+}
+
+const CLEAN: Planted = Planted { noise: 0.05, second_gain: 1.0, samples: 6000, excitation: |_, random| random };
+
+impl Planted {
+    fn record(&self, seed: u64) -> LoopRecord {
+        let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+        let half = |gain: f64, first: usize, rng: &mut ChaCha8Rng| {
+            let rig = closed_loop(&plant(gain), &with_input_port(&controller(1.0)).unwrap()).unwrap();
+            let rows = self.samples / 2;
+            let d = Mat::from_fn(rows, 1, |k, _| (self.excitation)(first + k, rng.sample(StandardNormal)));
+            let n = Mat::from_fn(rows, 1, |_, _| self.noise * rng.sample::<f64, _>(StandardNormal));
+            let log = simulate(&rig, block(&[&[d.as_ref(), n.as_ref()]]).as_ref(), &vec![0.0; rig.order()]).unwrap();
+            (log.subcols(0, 1).to_owned(), log.subcols(1, 1).to_owned(), d)
+        };
+        let (u, y, d) = half(1.0, 0, rng);
+        let (u2, y2, d2) = half(self.second_gain, self.samples / 2, rng);
+        let joined = |a: MatRef<'_, f64>, b: MatRef<'_, f64>| block(&[&[a], &[b]]);
+        let record = LoopRecord::new(time(), joined(u.as_ref(), u2.as_ref()), joined(y.as_ref(), y2.as_ref())).unwrap();
+        record.with_input_excitation(joined(d.as_ref(), d2.as_ref())).unwrap()
+    }
+
+    fn identified(&self, stated: f64, options: &LikelihoodOptions) -> Identified {
+        let running = RunningController::new(controller(stated));
+        identify(&[self.record(1)], &[], &running, None, options).unwrap()
+    }
+}
+
+fn outcome<'a>(found: &'a Identified, name: &str) -> &'a Evidence {
+    found.model.evidence.iter().find(|e| e.question.contains(name)).unwrap()
+}
+
+#[test]
+fn a_clean_loop_passes_every_test() {
+    let found = CLEAN.identified(1.0, &LikelihoodOptions::default());
+    assert!(found.trusted(), "{:?}", found.reasons());
+    assert!(found.model.evidence.iter().all(|e| e.outcome == Outcome::Passed), "{:?}", found.model.evidence);
+    let r = found.model.loop_ratio.as_ref().unwrap();
+    assert!(r.largest < 0.1 && r.ratio.iter().all(|ratio| *ratio <= r.largest), "{}", r.largest);
+    assert!(found.model.sentence().starts_with("Trusted for this loop: 9"), "{}", found.model.sentence());
+    // The squares of the parts sum to that of the whole.
+    let region = &found.model.region;
+    for k in 0..region.hz.len() {
+        let sum: f64 = region.parts.named().iter().map(|(_, part)| part[k][(0, 0)].powi(2)).sum();
+        assert!((sum.sqrt() / region.absolute[k][(0, 0)] - 1.0).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_controller_of_another_gain_is_noticed_and_does_not_spoil_the_model() {
+    let found = CLEAN.identified(1.4, &LikelihoodOptions::default());
+    assert_eq!(outcome(&found, "(controller)").outcome, Outcome::Failed);
+    let right = CLEAN.identified(1.0, &LikelihoodOptions::default());
+    let apart = (found.model.plant.d()[(0, 0)] - right.model.plant.d()[(0, 0)]).abs();
+    assert!(apart < 1e-6, "the direct path differs by {apart}");
+}
+
+#[test]
+fn a_missing_mode_is_named_with_its_frequency() {
+    let few = LikelihoodOptions { order: Some(1), ..Default::default() };
+    let found = CLEAN.identified(1.0, &few);
+    let test = outcome(&found, "(indirect response)");
+    assert_eq!(test.outcome, Outcome::Failed);
+    let [low, high] = test.hz.unwrap();
+    assert!(30.0 < low && high < 120.0, "{low} to {high} Hz, the mode is at 60 Hz");
+    assert!(!found.trusted());
+}
+
+#[test]
+fn a_machine_that_changes_is_not_repeatable() {
+    let changed = Planted { second_gain: 1.8, ..CLEAN };
+    let found = changed.identified(1.0, &LikelihoodOptions::default());
+    assert_eq!(outcome(&found, "(repeatability)").outcome, Outcome::Failed, "{:?}", found.model.evidence);
+    // The difference between the halves is in the region: at low frequency at least a quarter of the response.
+    let region = &found.model.region;
+    let k = region.hz.partition_point(|hz| *hz < 3.0);
+    assert!(region.parts.variation[k][(0, 0)] > 0.25, "{}", region.parts.variation[k][(0, 0)]);
+}
+
+#[test]
+fn noise_that_the_feedback_brings_to_the_inputs_is_no_excitation() {
+    let narrow = Planted { noise: 0.5, excitation: |k, _| 0.02 * (0.3 * k as f64).sin(), ..CLEAN };
+    let found = narrow.identified(1.0, &LikelihoodOptions::default());
+    assert!(!found.trusted());
+    let test = outcome(&found, "(information)");
+    assert_ne!(test.outcome, Outcome::Passed, "{test}");
+}
+
+#[test]
+fn a_region_wider_than_half_of_the_margin_is_no_evidence() {
+    let noisy = Planted { noise: 30.0, samples: 1200, ..CLEAN };
+    let found = noisy.identified(1.0, &LikelihoodOptions { order: Some(3), ..Default::default() });
+    let test = outcome(&found, "(region)");
+    assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
+}

@@ -26,7 +26,7 @@ from ._loop import (
 from ._model import FrequencyResponse, Mode, Model
 from ._plan import Study, study
 from ._record import Record
-from ._result import Evidence, Prediction, Run, Verdict
+from ._result import Evidence, Prediction, Run, Verdict, VerdictTest
 from ._stages import Check, SubspaceEstimate, check, greybox, subspace
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
@@ -56,6 +56,7 @@ __all__ = [
     "Study",
     "SubspaceEstimate",
     "Verdict",
+    "VerdictTest",
     "bootstrap",
     "certify",
     "check",

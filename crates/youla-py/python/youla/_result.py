@@ -31,25 +31,67 @@ class Evidence:
 
 
 @dataclass(frozen=True)
+class VerdictTest:
+    """A test of the verdict.
+
+    Attributes
+    ----------
+    question : str
+        What was asked.
+    outcome : str
+        ``passed``, ``failed`` or ``not-tested``.
+    required : bool
+        Whether the model is trusted only where the test is passed; other tests name an imperfection with its size.
+    figure, limit : float
+        What was found, ``None`` where nothing was tested, and the largest figure that is accepted.
+    deviations : float or None
+        By how many standard deviations the records show it beyond chance.
+    hz : tuple of float or None
+        Where it was found, Hz.
+    note : str
+        What lies behind the figure, or why nothing was tested.
+    """
+
+    question: str
+    outcome: str
+    required: bool
+    figure: float | None
+    limit: float
+    deviations: float | None
+    hz: tuple[float, float] | None
+    note: str
+
+
+@dataclass(frozen=True)
 class Verdict:
     """Whether the recommended model can be trusted.
 
     Attributes
     ----------
     trusted : bool
-        Whether every figure of the evidence is within its limit.
+        Whether every required test is passed.
     reasons : tuple of str
         Why the model is not trusted; empty where it is.
     evidence : tuple of Evidence
         Questions to the records.
     lines : tuple of str
         The verdict of the report, in sentences.
+    tests : tuple of VerdictTest
+        The tests, each with its outcome.
+    bands : tuple of (float, float)
+        Bands in Hz in which the standard deviation of every entry is at most a tenth of it.
+    loop_ratio, loop_ratio_hz : float or None
+        The part of the margin of the loop that the 95 % region takes, and where; ``None`` for an open loop.
     """
 
     trusted: bool
     reasons: tuple[str, ...]
     evidence: tuple[Evidence, ...]
     lines: tuple[str, ...]
+    tests: tuple[VerdictTest, ...] = ()
+    bands: tuple[tuple[float, float], ...] = ()
+    loop_ratio: float | None = None
+    loop_ratio_hz: float | None = None
 
     def __bool__(self) -> bool:
         return self.trusted
@@ -165,7 +207,10 @@ class Run:
         if found is None:
             return Verdict(False, (str(self.summary["refused"].get("recommended", "no model is recommended")),), (), lines)
         evidence = tuple(Evidence(e["question"], e["figure"], e["limit"], e["holds"]) for e in found["evidence"])
-        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines)
+        tests = tuple(VerdictTest(**{**test, "hz": test["hz"] and tuple(test["hz"])}) for test in found["tests"])
+        bands = tuple((low, high) for low, high in found["bands"])
+        ratio = (found["loop_ratio"], found["loop_ratio_hz"])
+        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio)
 
     @property
     def fits(self) -> dict[str, dict[str, list[float | None]]]:

@@ -18,6 +18,8 @@ const MOST_MODULATIONS: usize = 8;
 const HARMONICS: usize = 6;
 /// Steps of the golden section for the frequency of a line within a bin on each side: 1e-6 of a bin.
 const STEPS: usize = 30;
+/// What is left of an output below this share of it is rounding.
+const ROUNDING: f64 = 1e-9;
 /// Lines of the transform over which the response to the excitation is a polynomial, for each of its channels.
 const LOCAL: usize = 40;
 
@@ -46,14 +48,17 @@ pub fn take_out_lines(
     let mut taken: Vec<Wandering> = Vec::new();
     for _ in 0..ROUNDS {
         let (mut found, mut wandering): (Vec<SpectralLine>, Vec<usize>) = (Vec::new(), Vec::new());
-        for values in unexplained(y.as_ref(), known) {
-            let Some(spectrum) = Spectrum::new(&values) else { continue };
+        for (values, column) in unexplained(y.as_ref(), known).into_iter().zip(first_y.col_iter()) {
+            let left = values.iter().map(|v| v * v).sum::<f64>().sqrt();
+            let Some(spectrum) = Spectrum::new(&values).filter(|_| left > ROUNDING * column.norm_l2()) else {
+                continue;
+            };
             let threshold = spectrum.threshold(false_alarm);
-            let left = |w: &Wandering| {
+            let stays = |w: &Wandering| {
                 let at = (w.line.hz / bin) as usize;
                 (at.saturating_sub(SAME_LINE)..=at + SAME_LINE).any(|k| spectrum.ratio(k) > threshold)
             };
-            wandering.extend((0..taken.len()).filter(|k| left(&taken[*k])));
+            wandering.extend((0..taken.len()).filter(|k| stays(&taken[*k])));
             let lowest = taken.iter().map(|w| w.line.hz).fold(f64::INFINITY, f64::min);
             let harmonics = (2..=HARMONICS).filter_map(|m| spectrum.at(lowest * m as f64 / bin, threshold, m));
             let harmonics = harmonics.map(|line| SpectralLine { hz: line.hz * bin, ..line });

@@ -20,16 +20,18 @@ fn the_reduction_is_measured_at_every_order() {
         (&reduction["stabilised_by_controller"], &reduction["proposed_order"]),
         (&Value::Bool(true), &Value::Null)
     );
-    assert!(reduction["open_loop_error"].as_f64() <= reduction["error_bound"].as_f64());
+    // Nothing is left out: both are rounding.
+    let figure = |key: &str| reduction[key].as_f64().expect("a number");
+    assert!(figure("open_loop_error") <= figure("error_bound") + 1e-9, "{reduction}");
     let sweep = json(&demo().join("6-reduce/sweep.json"));
     let orders = sweep["orders"].as_array().expect("an array");
-    assert_eq!(orders.len(), 16);
+    assert_eq!(orders.len(), 6);
     assert_eq!(orders[5]["closed_loop_relative"], reduction["closed_loop_relative"]);
     assert_eq!(sweep["provenance"]["seed"], 1);
     let table = fs::read_to_string(demo().join("6-reduce/sweep.csv")).expect("readable");
     let header = "order,error_bound,open_loop_error,open_loop_relative,closed_loop_relative,stabilised_by_controller";
     assert!(table.starts_with(&format!("{header},worst_pole_re,worst_pole_im\n")), "{table}");
-    assert_eq!(table.lines().count(), 17);
+    assert_eq!(table.lines().count(), 7);
     let page = fs::read_to_string(demo().join("report.html")).expect("readable");
     assert!(page.contains("The controller stabilises the reduced model of order 6"));
 }

@@ -227,9 +227,9 @@ fn at_limit(r: &LoopSignals<'_>) -> Vec<bool> {
     out
 }
 
-/// Size of the residuals over that of the inputs that the law explains.
+/// Size of the residuals over that of the inputs, at most ten times these.
 fn rest(residuals: &[Residual], records: &[&LoopSignals<'_>]) -> f64 {
     let left: f64 = residuals.iter().map(|r| r.values.squared_norm_l2()).sum();
-    let all: f64 = records.iter().map(|r| r.explained.squared_norm_l2()).sum();
-    (left / all.max(TINY)).sqrt()
+    let all: f64 = records.iter().map(|r| r.explained.squared_norm_l2().max(r.applied.squared_norm_l2())).sum();
+    (left / all.max(TINY)).sqrt().min(10.0)
 }

@@ -9,7 +9,8 @@
 //! | information | does the excitation, not the noise, determine the model? | this one |
 //! | repeatability | do halves and fresh records ask for the same model? | `parts` |
 //! | region | which part of the margin does the 95 % region take? | `loop_ratio` |
-//! | nonlinearity, stationarity | sizes of imperfections; their consequences are in the region | `nonlinear`, `parts` |
+//! | nonlinearity, saturation | is what acts at the inputs nearly the inputs? | `nonlinear` |
+//! | stationarity | is the residual of fresh records as large as before? | `parts` |
 //!
 //! A model is trusted where every required test is passed. Limits: `limits`.
 
@@ -114,16 +115,12 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     if let (Some(witness), Some(loops)) = (on.witness, &loops) {
         evidence.push(information(on, witness, loops));
     }
-    let (repeatable, noise): (Vec<_>, Vec<_>) =
-        on.parts.evidence(on.solution, &weigh, ts).into_iter().partition(|test| test.required);
-    match on.witness.filter(|witness| !witness.variation.is_empty()) {
-        // What the excitation shows is no matter of the noise, of which disturbances make parts differ.
-        Some(witness) => evidence.push(repeatability(on, witness, &weigh)),
-        None => evidence.extend(repeatable),
+    evidence.extend(on.parts.evidence(on.solution));
+    if let Some(witness) = on.witness.filter(|witness| !witness.variation.is_empty()) {
+        evidence.push(repeatability(on, witness, &weigh));
     }
-    evidence.extend(noise);
     evidence.push(shown.0);
-    evidence.push(nonlinear::nonlinear(on.spectra, on.solution));
+    evidence.extend(nonlinear::nonlinear(on.spectra, on.solution));
     Ok(Judgement { evidence, ..shown.1 })
 }
 

@@ -6,14 +6,16 @@
 //! ```
 //! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
-use super::limits::LARGEST_NONLINEAR;
+use super::limits::{LARGEST_NONLINEAR, LARGEST_OF_INPUT};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
+use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::with_slope_of_unstable;
 use crate::linalg::TINY;
+use crate::statistics::chi_square_deviations;
 use faer::c64;
 use rustfft::FftPlanner;
 
@@ -22,12 +24,12 @@ const OF_INPUT: [fn(f64) -> f64; 5] =
     [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
 /// Velocity of which friction changes its sign, in standard deviations.
 const SMALL_VELOCITY: f64 = 0.1;
-/// Functions for each input.
+/// Functions for each input: friction first, so that what stands behind it is what friction does not explain.
 const FUNCTIONS: usize = OF_INPUT.len() + 1;
 
 /// Names of the functions of the input.
 const NAMES: [&str; FUNCTIONS] =
-    ["u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations", "dry friction"];
+    ["dry friction", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations"];
 
 /// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
 struct Shaped {
@@ -38,7 +40,7 @@ struct Shaped {
 }
 
 /// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input?
-pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
+pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Vec<Evidence> {
     let found = &solution.chosen.found;
     let residuals = found.point.residuals(spectra);
     let pairs = spectra.records.iter().zip(&residuals);
@@ -73,7 +75,17 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Evidence {
     let (f, (size, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
     let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
     let note = format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1);
-    Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance).reported()
+    let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance);
+    // Functions of the input behind friction.
+    let behind: Vec<usize> = rows
+        .filter(|i| *i >= parameters + spectra.inputs && factor[(*i, *i)].powi(2) > DISTINCT * length(*i))
+        .collect();
+    let statistic: f64 = behind.iter().map(|i| factor[(*i, parameters + count)].powi(2)).sum();
+    let moved = energy(spectra, &clean, &found.noise).max(TINY);
+    let share = ((statistic - behind.len() as f64).max(0.0) / moved).sqrt();
+    let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
+    let significance = chi_square_deviations(statistic, behind.len() as f64);
+    vec![of_size, Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance)]
 }
 
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.
@@ -102,10 +114,10 @@ fn columns(
         let moved = if model.unstable() > 0.0 { &lines.y } else { clean };
         let velocity = in_time(lines, planner, |k| moved[k * p + seen] * (c64::ONE - lines.z[k].conj()));
         for f in 0..FUNCTIONS {
-            let shaped =
-                |t: usize| OF_INPUT.get(f).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |of| of(u[t]));
-            sizes[f * m + j] =
-                beside((0..lines.samples).map(|t| (shaped(t), if f < OF_INPUT.len() { u[t] } else { velocity[t] })));
+            let shaped = |t: usize| {
+                f.checked_sub(1).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |f| OF_INPUT[f](u[t]))
+            };
+            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), if f > 0 { u[t] } else { velocity[t] })));
             let root = (lines.samples as f64).sqrt();
             let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
             planner.plan_fft_forward(lines.samples).process(&mut work);

@@ -6,7 +6,7 @@
 //! ```
 //! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
-use super::limits::{CHANCE_OF_TWO, LARGEST_LOOP_ERROR, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
+use super::limits::{KNOWN, LARGEST_DIFFERENCE, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
@@ -118,59 +118,50 @@ impl Parts {
     }
 
     /// Whether halves and fresh records agree.
-    pub(crate) fn evidence(&self, solution: &Solution, judge: &dyn Fn(f64, &[f64]) -> f64, ts: f64) -> Vec<Evidence> {
+    pub(crate) fn evidence(&self, solution: &Solution) -> Vec<Evidence> {
         let mut out = Vec::new();
         if let [Some(a), Some(b)] = &self.halves {
-            out.extend(self.compared(a, b, "the two halves of the records", solution, judge, ts));
+            out.extend(self.compared(a, b, "the two halves of the records", solution));
         }
         if let (Some(a), Some(b)) = (&self.whole, &self.fresh) {
-            out.extend(self.compared(a, b, "the estimation and the verification records", solution, judge, ts));
+            out.extend(self.compared(a, b, "the estimation and the verification records", solution));
         }
         out
     }
 
-    fn compared(
-        &self,
-        a: &Part,
-        b: &Part,
-        which: &str,
-        solution: &Solution,
-        judge: &dyn Fn(f64, &[f64]) -> f64,
-        ts: f64,
-    ) -> Vec<Evidence> {
+    fn compared(&self, a: &Part, b: &Part, which: &str, solution: &Solution) -> [Evidence; 2] {
         let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
-        let question =
-            format!("Difference of the models from {which}, in the loop, largest over frequency (repeatability)");
-        let (figure, share) = self.difference(a, b, solution, judge);
-        let repeatable =
-            Evidence::new(question, figure, LARGEST_LOOP_ERROR).beyond_chance(significance).at([share / ts; 2]);
+        let question = format!("Difference of the models from {which}, relative to them, beyond chance (same model)");
+        let same = Evidence::new(question, self.difference(a, b, solution), LARGEST_DIFFERENCE);
         let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(TINY);
         let noise = format!("Ratio of the noise powers in {which} (stationarity)");
-        vec![repeatable, Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_NOISE_RATIO).reported()]
+        [same.beyond_chance(significance), Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_NOISE_RATIO)]
     }
 
-    /// The largest difference of the responses of two parts, less what chance explains, as `judge` weighs mean squares of the entries, and
-    /// where it is, a share of the sample rate.
-    fn difference(&self, a: &Part, b: &Part, solution: &Solution, judge: &dyn Fn(f64, &[f64]) -> f64) -> (f64, f64) {
+    /// Root mean square over frequency of the relative difference of the responses of two parts, less what chance explains, where
+    /// both know the response.
+    fn difference(&self, a: &Part, b: &Part, solution: &Solution) -> f64 {
         let found = &solution.chosen.found;
         let model = &found.point.model;
         let chart = Chart::new(model, found.feedthrough);
         let ((sa, ra), (sb, rb)) = (a.step(self.parameters), b.step(self.parameters));
-        let mut worst = (0.0, 0.0);
+        let (mut sum, mut count) = (0.0, 0);
         for share in grid(solution.samples) {
-            let slopes = chart.response_slopes(model, c64::cis(std::f64::consts::TAU * share));
+            let z = c64::cis(std::f64::consts::TAU * share);
+            let slopes = chart.response_slopes(model, z);
+            let size: f64 = model.response(z).iter().map(|g| g.norm_sqr()).sum();
             let along = |i: usize, v: &dyn Fn(usize) -> f64| {
                 (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j)).norm_sqr()
             };
             let of = |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)])).sum::<f64>();
-            // What a mean square of two real numbers exceeds by chance in one of twenty cases.
-            let beyond = |i: usize| along(i, &|j| sa[j] - sb[j]) - CHANCE_OF_TWO * (of(&ra, i) + of(&rb, i));
-            let squares: Vec<f64> = (0..slopes.nrows()).map(|i| beyond(i).max(0.0)).collect();
-            let figure = judge(share, &squares);
-            if figure > worst.0 {
-                worst = (figure, share);
+            let entries = 0..slopes.nrows();
+            let variance: f64 = entries.clone().map(|i| of(&ra, i) + of(&rb, i)).sum();
+            if variance < KNOWN * KNOWN * size {
+                let apart: f64 = entries.map(|i| along(i, &|j| sa[j] - sb[j])).sum();
+                sum += (apart - variance) / size;
+                count += 1;
             }
         }
-        worst
+        if count > 0 { (sum / f64::from(count)).max(0.0).sqrt() } else { 0.0 }
     }
 }

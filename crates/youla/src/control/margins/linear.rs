@@ -181,8 +181,9 @@ mod tests {
     use super::*;
     use crate::lti::{Continuous, Discrete};
 
-    /// Place of the disk margin.
+    /// Places of the disk margin and of the coprime margin.
     const DISK: usize = 6;
+    const COPRIME: usize = 7;
 
     fn exact<T: TimeDomain>(plant: &StateSpace<T>, k: &StateSpace<T>, scales: &ChannelScales) -> [f64; FIGURES] {
         critical(plant, k, Some(scales)).unwrap().map(|margin| margin.map_or(f64::NAN, |m| m.value))
@@ -223,8 +224,13 @@ mod tests {
                 if direct.is_finite() {
                     compared[place] += 1;
                     let error = (deviation - direct).abs();
-                    // The disk margin is that of a bound of its peak, within 1e-4.
-                    let tolerance = if place == DISK { 1e-3 } else { 1e-5 };
+                    // The disk margin is that of a bound of its peak, within 1e-4; the coprime margin that of an upper bound within a
+                    // few 1e-9, which is a few 1e-5 of a difference over steps of 1e-4.
+                    let tolerance = match place {
+                        DISK => 1e-3,
+                        COPRIME => 1e-4,
+                        _ => 1e-5,
+                    };
                     assert!(error <= tolerance * direct, "seed {seed}, figure {place}: {deviation} against {direct}");
                 }
             }

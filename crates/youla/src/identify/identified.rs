@@ -1,15 +1,12 @@
 //! The entry to identification: records of a loop and its controller in, one model with region, deviation system and evidence out.
 
-use super::likelihood::{
-    self, Evidence, LikelihoodOptions, LoopKnowledge, LoopSignals, MeasuredResponse, Recommendation,
-};
+use super::likelihood::{self, LikelihoodOptions, LoopKnowledge, LoopSignals, MeasuredResponse, Recommendation};
 use super::subspace::Experiment;
-use super::verdict::limits::LARGEST_LINE;
 use crate::control::RunningController;
 use crate::factor::{CoprimeFactors, loop_factors};
 use crate::linalg::{block, least_squares};
 use crate::lti::{Discrete, StateSpace};
-use crate::signal::{LoopRecord, SpectralLine, take_out_lines};
+use crate::signal::LoopRecord;
 use crate::{Error, Mat, Result};
 
 /// The model that the records of a loop support, with everything that follows from it.
@@ -101,14 +98,13 @@ pub fn identify(
     let law = law.filter(|_| !controller.is_open_loop());
     let feedback = Some(controller.system()).filter(|_| !controller.is_open_loop());
     let known = LoopKnowledge::new(law, feedback, views(&estimation), views(&verification))?;
-    let mut model = likelihood::recommend(
+    let model = likelihood::recommend(
         &experiments(&estimation),
         &experiments(&verification),
         Some(&known),
         first.time(),
         options,
     )?;
-    model.evidence.extend(lines(estimation.iter().chain(&verification)));
     let deviation = deviation(nominal, controller, &model);
     Ok(Identified { model, deviation })
 }
@@ -162,12 +158,8 @@ fn same_time(what: &str, left: f64, right: f64) -> Result<()> {
 
 /// The signals of a record in the terms of the controller; see [`LoopSignals`].
 struct Signals {
-    /// Inputs as logged.
-    applied: Mat<f64>,
-    /// Inputs and outputs without the lines of a disturbance.
     u: Mat<f64>,
     y: Mat<f64>,
-    lines: Vec<SpectralLine>,
     seen: Mat<f64>,
     explained: Mat<f64>,
     excitation: Option<Mat<f64>>,
@@ -187,13 +179,7 @@ impl Signals {
                 (seen, explained, r.excitation().or_else(open))
             }
         };
-        let (mut u, mut y) = (r.u().to_owned(), without_known(r)?);
-        let lines = match &excitation {
-            // Without a known excitation a line may be one.
-            None => Vec::new(),
-            Some(x) => take_out_lines((&mut u, &mut y), x.as_ref(), r.time(), FALSE_LINE),
-        };
-        Ok(Signals { applied: r.u().to_owned(), u, y, lines, seen, explained, excitation, observer })
+        Ok(Signals { u: r.u().to_owned(), y: without_known(r)?, seen, explained, excitation, observer })
     }
 
     fn view(&self) -> LoopSignals<'_> {
@@ -201,7 +187,7 @@ impl Signals {
         LoopSignals {
             seen: self.seen.as_ref(),
             explained: self.explained.as_ref(),
-            applied: self.applied.as_ref(),
+            applied: self.u.as_ref(),
             excitation,
         }
     }
@@ -213,29 +199,6 @@ fn views(signals: &[Signals]) -> Vec<LoopSignals<'_>> {
 
 fn experiments(signals: &[Signals]) -> Vec<Experiment<'_>> {
     signals.iter().map(|s| Experiment::new(s.u.as_ref(), s.y.as_ref())).collect()
-}
-
-/// Probability that a record of noise has a line.
-const FALSE_LINE: f64 = 1e-3;
-/// Lines that are listed at most.
-const LISTED: usize = 6;
-
-/// The lines that were taken out, with the largest amplitude over the size of the outputs; nothing where there are none.
-fn lines<'a>(signals: impl Iterator<Item = &'a Signals> + Clone) -> Option<Evidence> {
-    let mut all: Vec<&SpectralLine> = signals.clone().flat_map(|s| &s.lines).collect();
-    all.sort_by(|a, b| b.amplitude.total_cmp(&a.amplitude));
-    let size = |s: &Signals| (s.y.squared_norm_l2() / s.y.nrows().max(1) as f64).sqrt();
-    let largest = all.first()?.amplitude / signals.map(size).fold(f64::MIN_POSITIVE, f64::max);
-    let mut hz: Vec<f64> = Vec::new();
-    for line in &all {
-        if hz.len() < LISTED && hz.iter().all(|hz| (hz / line.hz - 1.0).abs() > 1e-3) {
-            hz.push(line.hz);
-        }
-    }
-    let listed: Vec<String> = hz.iter().map(|hz| format!("{hz:.2}")).collect();
-    let question = "Largest amplitude of a line that no excitation has, over the size of the outputs (lines)";
-    let note = format!("taken out of inputs and outputs at {} Hz", listed.join(", "));
-    Some(Evidence::new(question, largest, LARGEST_LINE).reported().noted(note))
 }
 
 /// Outputs without the disturbances of known shape that explain them best, least squares.

@@ -105,7 +105,7 @@ fn lasts(values: &[f64], turns: f64) -> bool {
     least > LASTS * most
 }
 
-pub(super) struct Spectrum {
+struct Spectrum {
     power: Vec<f64>,
     /// Median of the neighbours, as the mean of exponential variables.
     floor: Vec<f64>,
@@ -116,7 +116,7 @@ pub(super) struct Spectrum {
 
 impl Spectrum {
     /// `None` for constant or short signals.
-    pub(super) fn new(values: &[f64]) -> Option<Self> {
+    fn new(values: &[f64]) -> Option<Self> {
         let n = values.len();
         let side = (n / 400).clamp(SIDE[0], SIDE[1]);
         let mean = values.iter().sum::<f64>() / n.max(1) as f64;
@@ -144,32 +144,17 @@ impl Spectrum {
     }
 
     /// Hann bins are correlated with their neighbours and a median wastes half of them: a quarter of the bins counts.
-    pub(super) fn threshold(&self, false_alarm: f64) -> f64 {
+    fn threshold(&self, false_alarm: f64) -> f64 {
         let nu = 0.5 * (self.side as f64 - 2.0);
         nu * ((self.power.len() as f64 / false_alarm).powf(1.0 / nu) - 1.0)
     }
 
-    pub(super) fn ratio(&self, k: usize) -> f64 {
+    fn ratio(&self, k: usize) -> f64 {
         match self.floor.get(k) {
             Some(floor) if *floor > 0.0 => self.power[k] / floor,
             Some(_) if self.power[k] > 0.0 => f64::INFINITY,
             _ => 0.0,
         }
-    }
-
-    /// A line at a place between bins, `hz` in bins; `None` where the power there is that of the neighbours.
-    pub(super) fn at(&self, bins: f64, threshold: f64, multiple: usize) -> Option<SpectralLine> {
-        let k = (bins.round() as usize).checked_sub(1).filter(|_| bins.is_finite())?;
-        let k = (k..=k + 2).max_by(|a, b| self.ratio(*a).total_cmp(&self.ratio(*b)))?;
-        let found = self.ratio(k) > threshold && k >= 2 && k + 2 < self.power.len();
-        let line = || SpectralLine {
-            hz: self.between(k),
-            amplitude: self.amplitude(k),
-            ratio: self.ratio(k),
-            threshold,
-            multiple: Some(multiple),
-        };
-        found.then(line)
     }
 
     /// Mean of the bins next to those that a line leaks into, which a resonance lifts.

@@ -5,7 +5,6 @@
 
 mod channel;
 mod detrend;
-mod disturbance_lines;
 mod excitation;
 mod harmonics;
 mod lines;
@@ -17,7 +16,6 @@ mod spectrum;
 
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
-pub use disturbance_lines::take_out_lines;
 pub use excitation::{Chirp, Excitation, Multisine, Prbs, RampedExcitation, SquareWaves, fade};
 pub use harmonics::without_harmonics;
 pub use lines::{SpectralLine, spectral_lines};

@@ -44,6 +44,7 @@ use super::verdict::{self, Judged, Judgement, Parts, Witness};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
+use choose::lines;
 use choose::problem::Problem;
 use data::spectra::Sizes;
 use deviation::Directions;
@@ -102,9 +103,14 @@ pub fn recommend(
     let [estimation, verification] = [(estimation, &estimating), (verification, &verifying)]
         .map(|(all, kept)| kept.iter().map(|k| all[*k]).collect::<Vec<_>>());
     let (estimation, verification, known) = (estimation.as_slice(), verification.as_slice(), known.as_ref());
-    let problem = problem(estimation, known, options)?;
+    let all = problem(estimation, known, options)?;
     let mut candidates = Vec::new();
-    let solution = problem.solve(&mut candidates).ok_or(Error::NoCandidate { samples: problem.samples().0 })?;
+    let found = lines::solve(&all, verification, &mut candidates);
+    let found = found.ok_or(Error::NoCandidate { samples: all.samples().0 })?;
+    let lines = found.evidence(estimation, time.ts());
+    let (estimation, verification) = (found.records(0, estimation), found.records(1, verification));
+    let (problem, verification) = (found.problem(&all, &estimation), verification.as_slice());
+    let solution = found.solution.clone();
     let choice = &solution.chosen;
     let spectra = problem.spectra(&choice.delays);
     let shares = [deviation::slow(spectra.samples()), deviation::grid(spectra.samples())].concat();
@@ -124,7 +130,8 @@ pub fn recommend(
         plant: &plant,
         region: &region,
     };
-    let Judgement { evidence, loop_ratio, entry_bands, bands } = verdict::judge(&judged)?;
+    let Judgement { mut evidence, loop_ratio, entry_bands, bands } = verdict::judge(&judged)?;
+    evidence.extend(lines);
     Ok(Recommendation {
         predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
         plant,
@@ -218,5 +225,6 @@ fn problem<'a>(
         order: options.order,
         dead_time: options.dead_time.clone(),
         largest_order: options.largest_order,
+        masked: Vec::new(),
     })
 }

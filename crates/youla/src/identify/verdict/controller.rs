@@ -16,12 +16,18 @@ use crate::identify::likelihood::{Evidence, LoopKnowledge, LoopSignals};
 use crate::linalg::{RiccatiProblem, TINY, dare};
 use crate::lti::{Discrete, StateSpace, frequency_response, largest_singular_value};
 use crate::{Mat, MatRef, Result, c64};
+use faer::Scale;
 use faer::linalg::solvers::Solve;
 use std::f64::consts::TAU;
 
 /// Variance of the logged inputs against that of what drives the states, in the filter that takes e: small, so that e forgets within as many
 /// samples as the controller has states.
 const EXACT_LOG: f64 = 1e-9;
+
+/// Share of a row of the observability matrix that must be new.
+const INDEPENDENT: f64 = 1e-10;
+/// Share that is left after as many samples as there are states: rounding.
+const FORGOTTEN: f64 = 1e-4;
 
 const QUESTION: &str =
     "What the difference of the stated controller from the log does to the loop, largest over frequency (controller)";
@@ -142,12 +148,64 @@ fn worst(
     Ok(worst)
 }
 
-/// L of the filter; zero for a static law, and where the Riccati equation has no solution.
+/// L after which e forgets within as many samples as the controller has states, `(A - L C)^n = 0`: then e is the residual of the difference
+/// equation. With q_i the vector of the chain of output i, `c_k A^j q_i = 0` for `j < nu_i - 1`, it is `L M = [A^nu_i q_i]`, `M = C [A^(nu_i - 1) q_i]`
+/// (Ackermann's formula for one output). `None` where rounding or different lengths of the chains leave a memory.
+fn deadbeat_gain(law: &StateSpace<Discrete>) -> Option<Mat<f64>> {
+    let (n, m) = (law.order(), law.outputs());
+    let mut chains: Vec<Vec<Mat<f64>>> = vec![Vec::new(); m];
+    let mut basis: Vec<Mat<f64>> = Vec::new();
+    let mut open: Vec<Option<Mat<f64>>> = (0..m).map(|i| Some(law.c().subrows(i, 1).to_owned())).collect();
+    while basis.len() < n && open.iter().any(Option::is_some) {
+        for i in 0..m {
+            let Some(row) = open[i].take().filter(|_| basis.len() < n) else { continue };
+            let mut rest = row.clone();
+            // Twice is enough (Kahan).
+            for _ in 0..2 {
+                for b in &basis {
+                    let along = (&rest * b.transpose())[(0, 0)];
+                    rest -= b * Scale(along);
+                }
+            }
+            let left = rest.norm_l2();
+            if left > INDEPENDENT * row.norm_l2() {
+                basis.push(rest * Scale(1.0 / left));
+                open[i] = Some(&row * law.a());
+                chains[i].push(row);
+            }
+        }
+    }
+    if basis.len() < n || chains.iter().any(Vec::is_empty) {
+        return None;
+    }
+    let rows: Vec<&Mat<f64>> = chains.iter().flatten().collect();
+    let seen = Mat::from_fn(n, n, |i, j| rows[i][(0, j)]);
+    let inverse = seen.partial_piv_lu().solve(Mat::<f64>::identity(n, n));
+    let mut last = 0;
+    let (mut ends, mut beyond) = (Mat::<f64>::zeros(n, m), Mat::<f64>::zeros(n, m));
+    for (i, chain) in chains.iter().enumerate() {
+        last += chain.len();
+        let mut q = inverse.subcols(last - 1, 1).to_owned();
+        (1..chain.len()).for_each(|_| q = law.a() * &q);
+        ends.col_mut(i).copy_from(q.col(0));
+        beyond.col_mut(i).copy_from((law.a() * &q).col(0));
+    }
+    let through = law.c() * &ends;
+    let gain = through.transpose().partial_piv_lu().solve(beyond.transpose()).transpose().to_owned();
+    let forgets = law.a() - &gain * law.c();
+    let memory = (1..n).fold(forgets.clone(), |power, _| &power * &forgets);
+    (memory.norm_l2() < FORGOTTEN * forgets.norm_l2()).then_some(gain)
+}
+
+/// L of [`deadbeat_gain`], else of a Kalman filter; zero for a static law, and where the Riccati equation has no solution.
 fn filter_gain(law: &StateSpace<Discrete>, records: &[&LoopSignals<'_>]) -> Mat<f64> {
     let (n, m) = (law.order(), law.outputs());
     let none = Mat::zeros(n, m);
     if n == 0 {
         return none;
+    }
+    if let Some(gain) = deadbeat_gain(law) {
+        return gain;
     }
     let power = |column: &dyn Fn(&LoopSignals<'_>) -> f64| records.iter().map(|r| column(r)).sum::<f64>().max(TINY);
     let seen = Mat::from_fn(law.inputs(), law.inputs(), |i, j| {
@@ -158,7 +216,7 @@ fn filter_gain(law: &StateSpace<Discrete>, records: &[&LoopSignals<'_>]) -> Mat<
     });
     let driven = law.b() * &seen * law.b().transpose();
     let trace = (0..n).map(|i| driven[(i, i)]).sum::<f64>() / n as f64 * EXACT_LOG;
-    let driven = (&driven + driven.transpose()) * faer::Scale(0.5) + Mat::<f64>::identity(n, n) * faer::Scale(trace);
+    let driven = (&driven + driven.transpose()) * Scale(0.5) + Mat::<f64>::identity(n, n) * Scale(trace);
     let dual = RiccatiProblem {
         a: law.a().transpose(),
         b: law.c().transpose(),

@@ -38,6 +38,8 @@ pub struct LoopRatio {
 pub(crate) struct LoopAt {
     /// Frequency, Hz.
     pub(crate) hz: f64,
+    /// (I - G K)^-1, p x p.
+    pub(crate) s: Mat<c64>,
     /// K (I - G K)^-1, m x p.
     pub(crate) ks: Mat<c64>,
     chordal: Vec<Chordal>,
@@ -65,7 +67,7 @@ impl LoopAt {
         let s = difference.partial_piv_lu().solve(identity(g.nrows()));
         let ks = k * &s;
         let chordal = UNITS.iter().filter_map(|unit| Chordal::new(&g, k, &s, *unit)).collect();
-        LoopAt { hz, ks, chordal }
+        LoopAt { hz, s, ks, chordal }
     }
 
     /// `kappa / rho` of independent errors of unit variance: the root of the largest mean square.

@@ -7,7 +7,8 @@
 //! | stability | does it stabilise the model, as it did the plant? | this one |
 //! | indirect response | does the model explain what the excitation causes? | `witness`, `local_error` |
 //! | information | does the excitation, not the noise, determine the model? | this one |
-//! | repeatability | do halves and fresh records ask for the same model? | `parts` |
+//! | repeatability | does the excitation show the same response in parts of the records? | `witness` |
+//! | same model | do halves and fresh records ask for the same model? | `parts` |
 //! | region | which part of the margin does the 95 % region take? | `loop_ratio` |
 //! | nonlinearity, saturation | is what acts at the inputs nearly the inputs? | `nonlinear` |
 //! | stationarity | is the residual of fresh records as large as before? | `parts` |
@@ -30,7 +31,6 @@ pub use loop_ratio::LoopRatio;
 pub(crate) use parts::Parts;
 pub(crate) use witness::Witness;
 
-use crate::Result;
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
@@ -40,6 +40,7 @@ use crate::identify::likelihood::{Evidence, LoopKnowledge};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
+use crate::{Mat, Result};
 use limits::{INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION};
 use loop_ratio::{LoopAt, bands, entries, judged_hz, valid};
 
@@ -115,7 +116,12 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
     if let (Some(witness), Some(loops)) = (on.witness, &loops) {
         evidence.push(information(on, witness, loops));
     }
-    evidence.extend(on.parts.evidence(on.solution));
+    let sizes = &on.problem.sizes.y;
+    let sensitivity = |share: f64| {
+        let at = loops.as_ref()?.near(share / ts)?;
+        Some(Mat::from_fn(sizes.len(), sizes.len(), |i, j| at.s[(i, j)] * (sizes[j] / sizes[i])))
+    };
+    evidence.extend(on.parts.evidence(ts, &sensitivity));
     if let Some(witness) = on.witness.filter(|witness| !witness.variation.is_empty()) {
         evidence.push(repeatability(on, witness, &weigh));
     }

@@ -6,15 +6,15 @@
 //! ```
 //! where one model holds for all parts (G. C. Chow, Econometrica 28 (1960), 591).
 
-use super::limits::{KNOWN, LARGEST_DIFFERENCE, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
+use super::limits::{BEYOND_CHANCE, KNOWN, LARGEST_DIFFERENCE, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
-use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::deviation::{grid, inverse_root};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
+use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
-use crate::identify::likelihood::search::{with_best_ends, with_slope_of_unstable};
+use crate::identify::likelihood::search::{search, with_best_ends, with_slope_of_unstable};
 use crate::identify::subspace::Experiment;
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
@@ -22,6 +22,10 @@ use faer::{Mat, c64};
 
 /// Pieces of a record with at least so many samples each.
 const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
+/// Frequencies of the grid over which a difference is averaged, a fifth of an octave on each side: a resonance that moved is wider.
+const WINDOW: usize = 5;
+/// Steps of a search on a part.
+const STEPS: usize = 15;
 /// Triangular factor of a part of the records at the model.
 struct Part {
     factor: Mat<f64>,
@@ -29,21 +33,29 @@ struct Part {
     samples: f64,
 }
 
-/// The parts of the records.
+/// The parts of the records against each other and against fresh ones.
 pub(crate) struct Parts {
-    halves: [Option<Part>; 2],
-    whole: Option<Part>,
-    fresh: Option<Part>,
-    parameters: usize,
+    comparisons: Vec<Comparison>,
     /// How many times the scatter of the parameters over the pieces exceeds what the information of the records says, where that is
     /// beyond chance; else 1.
     pub(crate) scatter: f64,
 }
 
+/// Two parts.
+struct Comparison {
+    which: &'static str,
+    /// Chow's statistic in standard deviations beyond chance.
+    significance: f64,
+    /// Differences of the responses of the models that were searched on each.
+    differences: Vec<At>,
+    /// Ratio of the noise powers.
+    noise: f64,
+}
+
 impl Part {
     fn new(problem: &Problem<'_>, solution: &Solution, experiments: &[Experiment<'_>]) -> Option<Part> {
         let found = &solution.chosen.found;
-        let spectra = Spectra::new(experiments, &problem.sizes, &solution.chosen.delays, problem.skip);
+        let spectra = problem.spectra_of(experiments, &solution.chosen.delays);
         if spectra.records.is_empty() {
             return None;
         }
@@ -94,74 +106,133 @@ impl Parts {
     pub(crate) fn new(problem: &Problem<'_>, solution: &Solution, fresh: &[Experiment<'_>]) -> Self {
         let found = &solution.chosen.found;
         let parameters = Chart::new(&found.point.model, found.feedthrough).parameters();
-        let (mut first, mut second) = (Vec::new(), Vec::new());
+        let mut halves = [Half::default(), Half::default()];
         for e in problem.experiments {
             let rows = e.u.nrows();
             let count = PIECES.iter().find(|(count, least)| rows >= count * least).map_or(2, |(count, _)| *count);
             for k in 0..count {
                 let (from, to) = ((k * rows / count).saturating_sub(problem.skip), (k + 1) * rows / count);
                 let piece = Experiment::new(e.u.subrows(from, to - from), e.y.subrows(from, to - from));
-                let part = Part::new(problem, solution, &[piece]);
-                if k < count / 2 { first.extend(part) } else { second.extend(part) }
+                halves[2 * k / count].add(problem, solution, piece);
             }
         }
-        let pieces: Vec<&Part> = first.iter().chain(&second).collect();
+        let pieces: Vec<&Part> = halves.iter().flat_map(|half| &half.parts).collect();
         let scatter = chow(&pieces, parameters).filter(|(significance, _)| *significance > OVERALL_CHANCE);
-        let refs = |parts: &'_ [Part]| Part::together(&parts.iter().collect::<Vec<_>>());
-        Parts {
-            halves: [refs(&first), refs(&second)],
-            whole: Part::together(&pieces),
-            fresh: if fresh.is_empty() { None } else { Part::new(problem, solution, fresh) },
-            parameters,
-            scatter: scatter.map_or(1.0, |(_, ratio)| ratio.max(1.0)),
-        }
+        let of = |half: &Half<'_>| Part::together(&half.parts.iter().collect::<Vec<_>>());
+        let compared = |which, [a, b]: [Option<&Part>; 2], records: [&[Experiment<'_>]; 2]| {
+            let (a, b) = (a?, b?);
+            let significance = chow(&[a, b], parameters).map_or(0.0, |(significance, _)| significance);
+            let differences = differences([a, b], records, problem, solution, significance > BEYOND_CHANCE);
+            let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(TINY);
+            Some(Comparison { which, significance, differences, noise: ratio.max(1.0 / ratio) })
+        };
+        let [first, second] = [of(&halves[0]), of(&halves[1])];
+        let [one, two] = [halves[0].records.as_slice(), halves[1].records.as_slice()];
+        let mut comparisons = Vec::new();
+        comparisons.extend(compared("the two halves of the records", [first.as_ref(), second.as_ref()], [one, two]));
+        let (whole, new) = (Part::together(&pieces), Part::new(problem, solution, fresh));
+        let which = "the estimation and the verification records";
+        comparisons.extend(compared(which, [whole.as_ref(), new.as_ref()], [problem.experiments, fresh]));
+        Parts { comparisons, scatter: scatter.map_or(1.0, |(_, ratio)| ratio.max(1.0)) }
     }
 
-    /// Whether halves and fresh records agree.
-    pub(crate) fn evidence(&self, solution: &Solution) -> Vec<Evidence> {
-        let mut out = Vec::new();
-        if let [Some(a), Some(b)] = &self.halves {
-            out.extend(self.compared(a, b, "the two halves of the records", solution));
-        }
-        if let (Some(a), Some(b)) = (&self.whole, &self.fresh) {
-            out.extend(self.compared(a, b, "the estimation and the verification records", solution));
-        }
-        out
-    }
-
-    fn compared(&self, a: &Part, b: &Part, which: &str, solution: &Solution) -> [Evidence; 2] {
-        let significance = chow(&[a, b], self.parameters).map_or(0.0, |(significance, _)| significance);
-        let question = format!("Difference of the models from {which}, relative to them, beyond chance (same model)");
-        let same = Evidence::new(question, self.difference(a, b, solution), LARGEST_DIFFERENCE);
-        let ratio = (b.energy / b.samples) / (a.energy / a.samples).max(TINY);
-        let noise = format!("Ratio of the noise powers in {which} (stationarity)");
-        [same.beyond_chance(significance), Evidence::new(noise, ratio.max(1.0 / ratio), LARGEST_NOISE_RATIO)]
-    }
-
-    /// Root mean square over frequency of the relative difference of the responses of two parts, less what chance explains, where
-    /// both know the response.
-    fn difference(&self, a: &Part, b: &Part, solution: &Solution) -> f64 {
-        let found = &solution.chosen.found;
-        let model = &found.point.model;
-        let chart = Chart::new(model, found.feedthrough);
-        let ((sa, ra), (sb, rb)) = (a.step(self.parameters), b.step(self.parameters));
-        let (mut sum, mut count) = (0.0, 0);
-        for share in grid(solution.samples) {
-            let z = c64::cis(std::f64::consts::TAU * share);
-            let slopes = chart.response_slopes(model, z);
-            let size: f64 = model.response(z).iter().map(|g| g.norm_sqr()).sum();
-            let along = |i: usize, v: &dyn Fn(usize) -> f64| {
-                (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j)).norm_sqr()
+    /// Whether halves and fresh records agree: `|S dG| / |G|` over a third of an octave, largest over frequency, `s` the sensitivity in units of the sizes.
+    pub(crate) fn evidence(&self, ts: f64, s: &dyn Fn(f64) -> Option<Mat<c64>>) -> Vec<Evidence> {
+        let of = |c: &Comparison| {
+            let question = format!(
+                "Difference of the models from {}, relative to them, where the feedback does not suppress it (same model)",
+                c.which
+            );
+            let squares = |at: &At| {
+                let through = s(at.share).map_or_else(|| at.apart.norm_l2(), |s| (s * &at.apart).norm_l2());
+                [through.powi(2) - (at.chance * at.size).powi(2), at.size * at.size, at.share / ts]
             };
-            let of = |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)])).sum::<f64>();
-            let entries = 0..slopes.nrows();
-            let variance: f64 = entries.clone().map(|i| of(&ra, i) + of(&rb, i)).sum();
-            if variance < KNOWN * KNOWN * size {
-                let apart: f64 = entries.map(|i| along(i, &|j| sa[j] - sb[j])).sum();
-                sum += (apart - variance) / size;
-                count += 1;
-            }
-        }
-        if count > 0 { (sum / f64::from(count)).max(0.0).sqrt() } else { 0.0 }
+            let squares: Vec<[f64; 3]> = c.differences.iter().map(squares).collect();
+            let sum = |window: &[[f64; 3]], k: usize| window.iter().map(|w| w[k]).sum::<f64>();
+            let of =
+                |window: &[[f64; 3]]| ((sum(window, 0) / sum(window, 1)).max(0.0).sqrt(), window[window.len() / 2][2]);
+            let figures = squares.windows(WINDOW.min(squares.len().max(1))).map(of);
+            let (largest, hz) = figures.fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+            let same = Evidence::new(question, largest, LARGEST_DIFFERENCE).beyond_chance(c.significance).at([hz; 2]);
+            let noise = format!("Ratio of the noise powers in {} (stationarity)", c.which);
+            [same, Evidence::new(noise, c.noise, LARGEST_NOISE_RATIO).reported()]
+        };
+        self.comparisons.iter().flat_map(of).collect()
     }
+}
+
+/// Half of the records in pieces.
+#[derive(Default)]
+struct Half<'a> {
+    records: Vec<Experiment<'a>>,
+    parts: Vec<Part>,
+}
+
+impl<'a> Half<'a> {
+    fn add(&mut self, problem: &Problem<'_>, solution: &Solution, piece: Experiment<'a>) {
+        if let Some(part) = Part::new(problem, solution, &[piece]) {
+            self.records.push(piece);
+            self.parts.push(part);
+        }
+    }
+}
+
+/// The difference of the responses of two parts at one frequency, in units of the sizes of the channels.
+struct At {
+    share: f64,
+    /// G of one less that of the other.
+    apart: Mat<c64>,
+    /// Its deviation by chance, relative to the response.
+    chance: f64,
+    /// Norm of the response.
+    size: f64,
+}
+
+/// The differences of the responses of two parts where both know the response. The models are those of a search on each part
+/// (`searched`), or the first step of it.
+fn differences(
+    [a, b]: [&Part; 2],
+    records: [&[Experiment<'_>]; 2],
+    problem: &Problem<'_>,
+    solution: &Solution,
+    searched: bool,
+) -> Vec<At> {
+    let found = &solution.chosen.found;
+    let model = &found.point.model;
+    let chart = Chart::new(model, found.feedthrough);
+    let parameters = chart.parameters();
+    let ((sa, ra), (sb, rb)) = (a.step(parameters), b.step(parameters));
+    let models = searched.then(|| records.map(|records| on(problem, solution, records)));
+    let (p, m) = (problem.outputs(), problem.inputs());
+    let matrix = |g: &[c64]| Mat::from_fn(p, m, |i, j| g[i * m + j]);
+    let at = |share: f64| {
+        let z = c64::cis(std::f64::consts::TAU * share);
+        let slopes = chart.response_slopes(model, z);
+        let along =
+            |i: usize, v: &dyn Fn(usize) -> f64| (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j));
+        let of =
+            |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)]).norm_sqr()).sum::<f64>();
+        let variance: f64 = (0..slopes.nrows()).map(|i| of(&ra, i) + of(&rb, i)).sum();
+        let g = model.response(z);
+        let norm = |g: &[c64]| g.iter().map(|g| g.norm_sqr()).sum::<f64>().sqrt();
+        let (apart, size) = match &models {
+            Some([Some(a), Some(b)]) => {
+                let (a, b) = (a.response(z), b.response(z));
+                (a.iter().zip(&b).map(|(a, b)| a - b).collect(), norm(&a).hypot(norm(&b)) / 2.0_f64.sqrt())
+            }
+            _ => ((0..slopes.nrows()).map(|i| along(i, &|j| sa[j] - sb[j])).collect::<Vec<_>>(), norm(&g)),
+        };
+        let known = variance < (KNOWN * norm(&g)).powi(2);
+        known.then(|| At { share, apart: matrix(&apart), chance: variance.sqrt() / size, size })
+    };
+    grid(solution.samples).into_iter().filter_map(at).collect()
+}
+
+/// The model of some records, from that of all.
+fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<Model> {
+    let choice = &solution.chosen;
+    let spectra = problem.spectra_of(records, &choice.delays);
+    let start = with_best_ends(&spectra, choice.found.point.model.clone(), &choice.found.noise);
+    let problem = problem.with_feedthrough(choice.found.feedthrough);
+    Some(search(&spectra, start, &problem.options(STEPS, 1.0, &choice.delays))?.point.model)
 }

@@ -30,15 +30,20 @@ fn controller(gain: f64) -> StateSpace<Discrete> {
     StateSpace::gain(Mat::from_fn(1, 1, |_, _| -0.8 * gain), time()).unwrap()
 }
 
-/// A loop with an excitation and noise of given size; the plant takes another gain in the second half.
+/// 50.01 Hz in rad per sample.
+const MAINS: f64 = std::f64::consts::TAU * 50.01e-3;
+
+/// A loop with an excitation, noise of given size and mains; the plant takes another gain in the second half.
 struct Planted {
     noise: f64,
+    mains: f64,
     second_gain: f64,
     samples: usize,
     excitation: fn(usize, f64) -> f64,
 }
 
-const CLEAN: Planted = Planted { noise: 0.05, second_gain: 1.0, samples: 6000, excitation: |_, random| random };
+const CLEAN: Planted =
+    Planted { noise: 0.05, mains: 0.0, second_gain: 1.0, samples: 6000, excitation: |_, random| random };
 
 impl Planted {
     fn record(&self, seed: u64) -> LoopRecord {
@@ -47,7 +52,8 @@ impl Planted {
             let rig = closed_loop(&plant(gain), &with_input_port(&controller(1.0)).unwrap()).unwrap();
             let rows = self.samples / 2;
             let d = Mat::from_fn(rows, 1, |k, _| (self.excitation)(first + k, rng.sample(StandardNormal)));
-            let n = Mat::from_fn(rows, 1, |_, _| self.noise * rng.sample::<f64, _>(StandardNormal));
+            let mains = |k: usize| self.mains * (MAINS * (first + k) as f64).sin();
+            let n = Mat::from_fn(rows, 1, |k, _| mains(k) + self.noise * rng.sample::<f64, _>(StandardNormal));
             let log = simulate(&rig, block(&[&[d.as_ref(), n.as_ref()]]).as_ref(), &vec![0.0; rig.order()]).unwrap();
             (log.subcols(0, 1).to_owned(), log.subcols(1, 1).to_owned(), d)
         };
@@ -129,5 +135,25 @@ fn a_region_wider_than_half_of_the_margin_is_no_evidence() {
     let noisy = Planted { noise: 30.0, samples: 1200, ..CLEAN };
     let found = noisy.identified(1.0, &LikelihoodOptions { order: Some(3), ..Default::default() });
     let test = outcome(&found, "(region)");
+    assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
+}
+
+#[test]
+fn mains_are_taken_out_and_are_no_mode_of_the_plant() {
+    let found = Planted { mains: 2.0, ..CLEAN }.identified(1.0, &LikelihoodOptions::default());
+    assert!(found.trusted(), "{:?}", found.reasons());
+    let test = outcome(&found, "(lines)");
+    let note = &test.note;
+    assert!(note.contains(" 50.01"), "{note}");
+    let modes: Vec<f64> = found.model.modes.iter().map(|m| m.mode.hz).collect();
+    assert!(found.model.order == 3 && modes.iter().all(|hz| !(49.0..51.0).contains(hz)), "{modes:?}");
+    let clean = CLEAN.identified(1.0, &LikelihoodOptions::default());
+    assert!(clean.model.evidence.iter().all(|e| !e.question.contains("(lines)")));
+}
+
+#[test]
+fn a_model_of_neither_half_is_no_model() {
+    let found = Planted { second_gain: 3.0, ..CLEAN }.identified(1.0, &LikelihoodOptions::default());
+    let test = outcome(&found, "(same model)");
     assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
 }

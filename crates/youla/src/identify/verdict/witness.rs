@@ -40,7 +40,7 @@ impl Group {
         let found = &solution.chosen.found;
         let records: Vec<&Pair<'_>> = records.iter().filter(|(_, x)| long_enough(x.nrows(), problem.skip)).collect();
         let experiments: Vec<Experiment<'_>> = records.iter().map(|(e, _)| *e).collect();
-        let spectra = Spectra::new(&experiments, &problem.sizes, &solution.chosen.delays, problem.skip);
+        let spectra = problem.spectra_of(&experiments, &solution.chosen.delays);
         if spectra.records.is_empty() {
             return None;
         }

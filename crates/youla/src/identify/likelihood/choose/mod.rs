@@ -2,6 +2,7 @@
 
 pub(crate) mod dead_time;
 pub(crate) mod grow;
+pub(crate) mod lines;
 pub(crate) mod neighbours;
 pub(crate) mod problem;
 pub(crate) mod resize;

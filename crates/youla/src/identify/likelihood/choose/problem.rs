@@ -1,7 +1,7 @@
 //! The records with what is fixed about the model, and the searches that are made on them.
 
 use crate::identify::likelihood::Candidate;
-use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
 use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{Found, SearchOptions, search};
 use crate::identify::subspace::Experiment;
@@ -80,12 +80,19 @@ pub(crate) struct Problem<'a> {
     pub(crate) dead_time: Option<Vec<usize>>,
     /// Largest order.
     pub(crate) largest_order: usize,
+    /// Bands of disturbances whose lines do not count.
+    pub(crate) masked: Vec<Mask>,
 }
 
 impl Problem<'_> {
     /// The lines for given delays.
     pub(crate) fn spectra(&self, delays: &[usize]) -> Spectra {
-        Spectra::new(self.experiments, &self.sizes, delays, self.skip)
+        self.spectra_of(self.experiments, delays)
+    }
+
+    /// The lines of other records in the same units.
+    pub(crate) fn spectra_of(&self, experiments: &[Experiment<'_>], delays: &[usize]) -> Spectra {
+        Spectra::new(experiments, &self.sizes, delays, self.skip).masked(&self.masked)
     }
 
     /// Options of a search.

@@ -35,11 +35,16 @@ impl Problem<'_> {
     /// The model that the records support; what was tried is noted in the table. `None` where no search ends.
     pub(crate) fn solve(&self, table: &mut Vec<Candidate>) -> Option<Solution> {
         let samples = self.samples().0;
-        let (mut tried, rounds) = if samples > LONG {
-            (vec![self.chosen_on_a_part(samples, table)?], 1)
-        } else {
-            (self.first(table), ROUNDS)
-        };
+        if samples > LONG {
+            return self.solve_from(vec![self.chosen_on_a_part(samples, table)?], table);
+        }
+        self.solve_from(self.first(table), table)
+    }
+
+    /// The model that is reached from some models.
+    pub(super) fn solve_from(&self, mut tried: Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Solution> {
+        let samples = self.samples().0;
+        let rounds = if samples > LONG { 1 } else { ROUNDS };
         let now = best(&tried)?.found.feedthrough;
         let mut at = self.with_feedthrough(now).improved(&mut tried, rounds, table)?;
         if self.direct.is_some() && !now {

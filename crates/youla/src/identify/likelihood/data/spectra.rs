@@ -17,6 +17,18 @@ use std::ops::Range;
 /// Lines of a record that are summed together: sums over parts in their order do not depend on the number of threads.
 const PART: usize = 8192;
 
+/// Least lines on each side of a disturbance that do not count: those into which it leaks where its amplitude is not that of a whole record.
+const LEAST_MASKED: f64 = 3.0;
+
+/// A band around a disturbance whose lines do not count.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Mask {
+    /// Its middle, share of the sample rate.
+    pub(crate) middle: f64,
+    /// Half of its width.
+    pub(crate) half: f64,
+}
+
 /// The parts of a record of so many lines.
 pub(crate) fn parts(lines: usize) -> impl IndexedParallelIterator<Item = Range<usize>> {
     (0..lines.div_ceil(PART)).into_par_iter().map(move |k| k * PART..((k + 1) * PART).min(lines))
@@ -81,6 +93,21 @@ impl Spectra {
             lines
         });
         Spectra { inputs: m, outputs: p, records: records.collect() }
+    }
+
+    /// Without the lines in some bands.
+    pub(crate) fn masked(mut self, masks: &[Mask]) -> Self {
+        for lines in &mut self.records {
+            let samples = lines.samples as f64;
+            for mask in masks {
+                let (at, half) = (mask.middle * samples, (mask.half * samples).max(LEAST_MASKED));
+                // The first line is that above zero.
+                let place = |line: f64| (line.max(1.0) as usize - 1).min(lines.weight.len());
+                let (first, end) = (place((at - half).ceil()), place((at + half).floor() + 1.0));
+                lines.weight[first..end].fill(0.0);
+            }
+        }
+        self
     }
 
     /// Every k-th line, for comparisons of starts.

@@ -1,0 +1,298 @@
+//! Modes that are lines of a disturbance.
+//!
+//! A mode narrower than a line of the transform is what a disturbance at one frequency leaves, or a pole on the unit circle. A disturbance
+//! acts on the outputs alone, `y = G u + cos, sin + v`: its amplitudes are those of the residual without the mode. What is left of the
+//! outputs, without the lines next to it (weight zero), says whether it was one: then the criterion is less without the mode.
+
+use super::problem::{Problem, Solution, Task};
+use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
+use crate::identify::likelihood::search::block::Block;
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::point::Point;
+use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
+use crate::identify::likelihood::{Candidate, Evidence};
+use crate::identify::subspace::Experiment;
+use crate::identify::verdict::limits::LARGEST_LINE;
+use crate::linalg::TINY;
+use faer::linalg::solvers::SolveLstsq;
+use faer::{Mat, c64};
+use rustfft::FftPlanner;
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+
+/// Rounds of modes that are left out.
+const ROUNDS: usize = 5;
+/// Slow changes of a disturbance, `cos(pi j t / N)` with `j` below the first number, and lines on each side that do not count: the first of
+/// these that are enough. A rotor whose speed wanders has sidebands.
+const SHAPES: [(usize, f64); 5] = [(1, 5.0), (9, 5.0), (9, 10.0), (9, 20.0), (9, 40.0)];
+/// Half width of a mode below which it is narrower than a line, in lines of the longest record: what a disturbance leaves has 0.005 to 0.04.
+const NARROW: f64 = 0.05;
+/// Largest half width of the band that does not count, over its middle.
+const WIDEST: f64 = 0.25;
+/// Lowest frequency of such a mode, in lines: below it a drift of the record is one.
+const LOWEST: f64 = 8.0;
+/// Half bands of a disturbance within which a mode may stand for its sidebands, and half width of such a mode, in lines of the longest record.
+const SIDEBANDS: f64 = 2.0;
+const SIDEBAND: f64 = 0.6;
+/// Lines on each side of a mode at which it is not asked what moves it.
+const AWAY: f64 = 5.0;
+/// Power of the free motion of a mode over that which the inputs cause, away from its frequency, from which it is a disturbance: both are alike
+/// for a mode on the unit circle that the inputs move. Modes of plants have 0.01 to 0.3, what unbalance and hum leave 3 to 8000.
+const UNMOVED: f64 = 2.0;
+/// Sweeps over the disturbances, which are nearly orthogonal.
+const SWEEPS: usize = 2;
+
+/// Ratio of two frequencies that are listed as one, and frequencies that are listed.
+const SAME: f64 = 1.05;
+const LISTED: usize = 6;
+
+/// A disturbance at one frequency.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Line {
+    /// Its frequency, and half of the band that does not count.
+    mask: Mask,
+    /// Slow changes of its amplitudes.
+    changes: usize,
+}
+
+impl Line {
+    /// Whether a frequency is that of its sidebands.
+    fn near(&self, turns: f64) -> bool {
+        (self.mask.middle - turns).abs() < SIDEBANDS * self.mask.half
+    }
+}
+
+/// Outputs of the estimation and of the fresh records.
+pub(crate) type Outputs = [Vec<Mat<f64>>; 2];
+
+/// A model and the outputs that it is the model of.
+pub(crate) struct WithoutLines {
+    /// The model.
+    pub(crate) solution: Solution,
+    /// What was taken out of the outputs.
+    pub(crate) lines: Vec<Line>,
+    /// The outputs without it; `None` where there is nothing.
+    pub(crate) outputs: Option<Outputs>,
+}
+
+impl WithoutLines {
+    /// The problem that its model solves, on records with its outputs.
+    pub(crate) fn problem<'a>(&self, all: &Problem<'a>, experiments: &'a [Experiment<'a>]) -> Problem<'a> {
+        let masked = self.lines.iter().map(|line| line.mask).collect();
+        Problem { experiments, masked, feedthrough: self.solution.chosen.found.feedthrough, ..all.clone() }
+    }
+
+    /// Records, those of estimation (0) or fresh (1), with its outputs.
+    pub(crate) fn records<'a>(&'a self, which: usize, records: &[Experiment<'a>]) -> Vec<Experiment<'a>> {
+        self.outputs.as_ref().map_or_else(|| records.to_vec(), |outputs| with_outputs(records, &outputs[which]))
+    }
+}
+
+impl WithoutLines {
+    /// The lines that were taken out, and their size over that of what is left of the outputs; `None` where there are none.
+    pub(crate) fn evidence(&self, records: &[Experiment<'_>], ts: f64) -> Option<Evidence> {
+        let [outputs, _] = self.outputs.as_ref()?;
+        let (mut taken, mut left) = (0.0, 0.0);
+        for (e, y) in records.iter().zip(outputs) {
+            taken += (e.y - y).squared_norm_l2();
+            left += y.col_iter().map(|c| c.iter().map(|v| v * v).sum::<f64>()).sum::<f64>();
+        }
+        let mut hz: Vec<f64> = self.lines.iter().map(|line| line.mask.middle / ts).collect();
+        hz.sort_by(f64::total_cmp);
+        hz.dedup_by(|b, a| *b < *a * SAME);
+        let listed: Vec<String> = hz.iter().take(LISTED).map(|hz| format!("{hz:.4}")).collect();
+        let more = hz.len().saturating_sub(LISTED);
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        let question = "Size of disturbances at single frequencies over that of the outputs without them (lines)";
+        let note = format!("taken out of the outputs at {} Hz{more}", listed.join(", "));
+        Some(Evidence::new(question, (taken / left.max(TINY)).sqrt(), LARGEST_LINE).reported().noted(note))
+    }
+}
+
+fn with_outputs<'a>(records: &[Experiment<'a>], outputs: &'a [Mat<f64>]) -> Vec<Experiment<'a>> {
+    records.iter().zip(outputs).map(|(e, y)| Experiment { y: y.as_ref(), ..*e }).collect()
+}
+
+/// The model that records support, and what it takes out of them.
+pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<WithoutLines> {
+    let mut now = WithoutLines { solution: all.solve(table)?, lines: Vec::new(), outputs: None };
+    for _ in 0..ROUNDS {
+        let Some(next) = less_lines(all, fresh, &now, table) else { break };
+        now = next;
+    }
+    Some(now)
+}
+
+/// `None` where no mode is narrower than a line, and where the outputs speak for it without its line.
+fn less_lines(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    now: &WithoutLines,
+    table: &mut Vec<Candidate>,
+) -> Option<WithoutLines> {
+    let clean = now.records(0, all.experiments);
+    let narrow = Narrow::of(&now.problem(all, &clean), now)?;
+    let choice = &now.solution.chosen;
+    let delays = &choice.delays;
+    for (changes, lines) in SHAPES {
+        let lowest = narrow.turns.iter().copied().fold(f64::INFINITY, f64::min);
+        if lines / narrow.longest > WIDEST * lowest {
+            break;
+        }
+        let mut taken = now.lines.clone();
+        narrow.turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
+        let lines = taken;
+        let outputs = [(0, all.experiments), (1, fresh)].map(|(k, records)| {
+            let clean = now.records(k, records);
+            narrow.outputs_without(&lines, &now.problem(all, &clean), now, records)
+        });
+        let mut next = WithoutLines { solution: now.solution.clone(), lines, outputs: Some(outputs) };
+        let records = next.records(0, all.experiments);
+        let problem = next.problem(all, &records);
+        let spectra = Arc::new(problem.spectra(delays));
+        let start = |model| with_best_inputs(&spectra, model, &choice.found.noise, problem.feedthrough);
+        // A search would move the modes in question to whatever else is there.
+        let still = problem.options(0, f64::INFINITY, delays);
+        let whole = search(&spectra, start(narrow.model.clone()), &still)?.criterion(spectra.samples());
+        let (less, origin) = (start(narrow.model.without(&narrow.places)), "without a line".into());
+        let task = Task { spectra: spectra.clone(), start: less, delays: delays.clone(), origin };
+        let less = problem.run(vec![task], f64::INFINITY, table);
+        if less.first()?.criterion < whole {
+            next.solution = problem.solve_from(less, table)?;
+            return Some(next);
+        }
+    }
+    None
+}
+
+/// Whether a mode is hardly moved by the inputs: away from its frequency `|C M B U|` is far below `|C M z t|`.
+fn unmoved(block: &Block, first: usize, turns: f64, spectra: &Spectra, point: &Point) -> bool {
+    let (m, s) = (spectra.inputs, block.states);
+    let mut inverse = [c64::ZERO; 4];
+    let (mut by_inputs, mut by_ends) = (0.0, 0.0);
+    for (lines, t) in spectra.records.iter().zip(&point.ends) {
+        let away = |k: &usize| (*k as f64 + 1.0 - turns * lines.samples as f64).abs() > AWAY;
+        for k in (0..lines.z.len()).filter(away) {
+            block.resolvent(lines.z[k], &mut inverse);
+            let weight = lines.weight[k] * lines.weight[k];
+            let through = |drive: &dyn Fn(usize) -> c64| {
+                let x = [0, 1].map(|i| inverse[2 * i] * drive(0) + inverse[2 * i + 1] * drive(1));
+                let outputs = block.c.chunks_exact(s).map(|c| (x[0] * c[0] + x[1] * c[1]).norm_sqr());
+                weight * outputs.sum::<f64>()
+            };
+            let input = |i: usize| (0..m).fold(c64::ZERO, |sum, j| sum + lines.u[k * m + j] * block.b[i * m + j]);
+            by_inputs += through(&input);
+            by_ends += through(&|i| lines.z[k] * t[first + i]);
+        }
+    }
+    by_ends > UNMOVED * by_inputs
+}
+
+/// Adds a disturbance, or widens one whose sidebands the mode stands for.
+fn beside(lines: &mut Vec<Line>, middle: f64, (changes, half): (usize, f64)) {
+    match lines.iter_mut().find(|line| line.near(middle)) {
+        Some(line) => {
+            let apart = (line.mask.middle - middle).abs();
+            line.mask.half = (apart + half).max(2.0 * line.mask.half);
+            line.changes = line.changes.max(changes);
+        }
+        None => lines.push(Line { mask: Mask { middle, half }, changes }),
+    }
+}
+
+/// The modes of a solution that are narrower than a line.
+struct Narrow {
+    /// The model with a block for each mode.
+    model: Model,
+    /// The blocks.
+    places: Vec<usize>,
+    /// Their frequencies, shares of the sample rate.
+    turns: Vec<f64>,
+    /// Samples of the longest record.
+    longest: f64,
+}
+
+impl Narrow {
+    fn of(problem: &Problem<'_>, now: &WithoutLines) -> Option<Self> {
+        let choice = &now.solution.chosen;
+        let model = choice.found.point.model.separated()?;
+        let longest = problem.experiments.iter().map(|e| e.u.nrows()).max()? as f64;
+        let mut first = 0;
+        let mut found: Vec<(usize, f64, usize)> = Vec::new();
+        for (k, block) in model.blocks.iter().enumerate() {
+            let pole = block.poles().into_iter().find(|pole| pole.im > 0.0);
+            let (width, turns) = pole.map_or((f64::MAX, 0.0), |z| (z.norm().ln().abs() / TAU, z.arg() / TAU));
+            let sideband = now.lines.iter().any(|line| line.near(turns)) && width * longest < SIDEBAND;
+            if (width * longest < NARROW || sideband) && turns * longest > LOWEST && block.states == 2 {
+                found.push((k, turns, first));
+            }
+            first += block.states;
+        }
+        if found.is_empty() || problem.order.is_some() {
+            return None;
+        }
+        let spectra = problem.spectra(&choice.delays);
+        let point = with_best_ends(&spectra, model.clone(), &choice.found.noise);
+        found.retain(|(k, turns, first)| unmoved(&model.blocks[*k], *first, *turns, &spectra, &point));
+        let (places, turns): (Vec<usize>, Vec<f64>) = found.into_iter().map(|(k, turns, _)| (k, turns)).unzip();
+        (!places.is_empty()).then_some(Narrow { model, places, turns, longest })
+    }
+
+    /// Outputs of some records less the lines of what the other modes leave of them. The ends of the records are those of the outputs as they
+    /// are without earlier lines (`clean`).
+    fn outputs_without(
+        &self,
+        lines: &[Line],
+        clean: &Problem<'_>,
+        now: &WithoutLines,
+        records: &[Experiment<'_>],
+    ) -> Vec<Mat<f64>> {
+        let choice = &now.solution.chosen;
+        let whole = with_best_ends(&clean.spectra(&choice.delays), self.model.clone(), &choice.found.noise);
+        let mut first = 0;
+        let mut left_out = Vec::new();
+        for (k, block) in self.model.blocks.iter().enumerate() {
+            if self.places.contains(&k) {
+                left_out.extend(first..first + block.states);
+            }
+            first += block.states;
+        }
+        let kept = |t: &Vec<f64>| (0..t.len()).filter(|i| !left_out.contains(i)).map(|i| t[i]).collect();
+        let point = Point { model: self.model.without(&self.places), ends: whole.ends.iter().map(kept).collect() };
+        let mut residuals = point.residuals(&clean.spectra_of(records, &choice.delays)).into_iter();
+        let of = |e: &Experiment<'_>| match long_enough(e.u.nrows(), clean.skip).then(|| residuals.next()).flatten() {
+            Some(v) => e.y - disturbance(clean, &v, e.y.nrows(), lines),
+            None => e.y.to_owned(),
+        };
+        records.iter().map(of).collect()
+    }
+}
+
+/// The lines of a residual by least squares, over all samples of its record.
+fn disturbance(problem: &Problem<'_>, v: &[c64], rows: usize, lines: &[Line]) -> Mat<f64> {
+    let (p, samples) = (problem.outputs(), rows - problem.skip);
+    let back = FftPlanner::new().plan_fft_inverse(samples);
+    let mut left = Mat::<f64>::zeros(samples, p);
+    for i in 0..p {
+        let mut work = vec![c64::ZERO; samples];
+        for k in 1..=v.len() / p {
+            work[k] = v[(k - 1) * p + i];
+            work[samples - k] = work[k].conj();
+        }
+        back.process(&mut work);
+        let size = problem.sizes.y[i] / (samples as f64).sqrt();
+        (0..samples).for_each(|t| left[(t, i)] = work[t].re * size);
+    }
+    let mut all = Mat::<f64>::zeros(rows, p);
+    for Line { mask, changes } in (0..SWEEPS).flat_map(|_| lines) {
+        let shapes = Mat::from_fn(rows, 2 * changes, |t, c| {
+            let (sin, cos) = (TAU * (mask.middle * t as f64).fract()).sin_cos();
+            let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
+            slow * if c % 2 == 0 { cos } else { sin }
+        });
+        let line = &shapes * shapes.subrows(problem.skip, samples).qr().solve_lstsq(&left);
+        left -= line.subrows(problem.skip, samples);
+        all += line;
+    }
+    all
+}

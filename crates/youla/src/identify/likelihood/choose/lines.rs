@@ -25,8 +25,8 @@ const ROUNDS: usize = 5;
 /// Slow changes of a disturbance, `cos(pi j t / N)` with `j` below the first number, and lines on each side that do not count: the first of
 /// these that are enough. A rotor whose speed wanders has sidebands.
 const SHAPES: [(usize, f64); 5] = [(1, 5.0), (9, 5.0), (9, 10.0), (9, 20.0), (9, 40.0)];
-/// Half width of a mode below which it is narrower than a line, in lines of the longest record: what a disturbance leaves has 0.005 to 0.04.
-const NARROW: f64 = 0.05;
+/// Half width of a mode below which it is narrower than a line, in lines of the longest record: what a disturbance leaves has 0.005 to 0.1.
+const NARROW: f64 = 0.3;
 /// Largest half width of the band that does not count, over its middle.
 const WIDEST: f64 = 0.25;
 /// Lowest frequency of such a mode, in lines: below it a drift of the record is one.

@@ -24,6 +24,8 @@ use faer::{Mat, c64};
 const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
 /// Frequencies of the grid over which a difference is averaged, a fifth of an octave on each side: a resonance that moved is wider.
 const WINDOW: usize = 5;
+/// Lines on which the models of parts are searched: their difference is asked for to a tenth.
+const COMPARED: usize = 10000;
 /// Steps of a search on a part.
 const STEPS: usize = 15;
 /// Triangular factor of a part of the records at the model.
@@ -232,6 +234,7 @@ fn differences(
 fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<Model> {
     let choice = &solution.chosen;
     let spectra = problem.spectra_of(records, &choice.delays);
+    let spectra = spectra.thinned((spectra.samples() / 2).div_ceil(COMPARED));
     let start = with_best_ends(&spectra, choice.found.point.model.clone(), &choice.found.noise);
     let problem = problem.with_feedthrough(choice.found.feedthrough);
     Some(search(&spectra, start, &problem.options(STEPS, 1.0, &choice.delays))?.point.model)

@@ -1,8 +1,8 @@
 //! Models one step away: another dead time, one pole or pair less, one mode more, two modes for one.
 
 use super::grow;
-use super::problem::{Choice, NOISE_ORDER, Problem, Task};
-use super::starts::THINNED;
+use super::problem::{Choice, LONG, NOISE_ORDER, Problem, Task};
+use super::starts::COMPARED;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
@@ -13,6 +13,9 @@ use std::sync::Arc;
 
 /// Largest change of the dead time of a single input in a step, samples.
 const REACH: usize = 12;
+
+/// The same for several inputs, and on long records, whose dead time was chosen on a part of them.
+const NEAR_REACH: usize = 2;
 
 /// Pole from which the search of a lag in place of a sample of dead time starts; at zero both are the same.
 const FAST: f64 = 0.1;
@@ -73,11 +76,13 @@ impl Problem<'_> {
         let start_of = |step: Step| step.without.map_or_else(|| model.clone(), |set| parts.without(&sets[set]));
         let per_order = (self.samples().0 as f64).ln() * (self.inputs() + self.outputs()) as f64;
         let judged = |step: Step| {
-            let thin = around[step.around].spectra.thinned(THINNED);
+            let spectra = &around[step.around].spectra;
+            let every = spectra.every(COMPARED);
+            let thin = spectra.thinned(every);
             let start = start_of(step);
             let states = start.order() as f64;
             let point = with_best_inputs(&thin, start, noise, self.feedthrough);
-            (deviance(&thin, &point, NOISE_ORDER).0 * THINNED as f64 + per_order * states, step)
+            (deviance(&thin, &point, NOISE_ORDER).0 * every as f64 + per_order * states, step)
         };
         let steps = self.steps(best, &around, &sets);
         let mut starts: Vec<(f64, Step)> = steps.into_par_iter().map(judged).collect();
@@ -180,7 +185,7 @@ impl Problem<'_> {
         if self.order.is_some() || parts.order() + 2 > self.largest_order {
             return None;
         }
-        let (noise, thin) = (&best.found.noise, spectra.thinned(THINNED));
+        let (noise, thin) = (&best.found.noise, spectra.thinned(spectra.every(COMPARED)));
         let halves = (0..parts.blocks.len()).filter_map(|k| halved(parts, k));
         let judged = halves.map(|model| {
             let point = with_best_inputs(&thin, model.clone(), noise, self.feedthrough);
@@ -191,12 +196,13 @@ impl Problem<'_> {
         Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "two modes for one".into() })
     }
 
-    /// Other delays, input by input: many of a single input, up to two samples away for several.
+    /// Other delays, input by input: many of a single input, up to two samples away for several and on long records.
     fn shifted(&self, delays: &[usize]) -> Vec<Vec<usize>> {
         if self.dead_time.is_some() {
             return Vec::new();
         }
-        let reach = if delays.len() == 1 { REACH } else { 2 };
+        let near = delays.len() > 1 || self.samples().0 > LONG;
+        let reach = if near { NEAR_REACH } else { REACH };
         let mut out = Vec::new();
         for j in 0..delays.len() {
             for d in delays[j].saturating_sub(reach)..=(delays[j] + reach).min(self.skip) {

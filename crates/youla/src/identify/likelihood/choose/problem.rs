@@ -2,8 +2,10 @@
 
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
+use crate::identify::likelihood::search::model::Model;
+use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
-use crate::identify::likelihood::search::{Found, SearchOptions, search};
+use crate::identify::likelihood::search::{Found, SearchOptions, search, with_best_ends};
 use crate::identify::subspace::Experiment;
 use faer::Mat;
 use rayon::prelude::*;
@@ -11,6 +13,12 @@ use std::sync::Arc;
 
 /// Largest order of the autoregression of the noise: noise at the inputs of a plant has zeros near the circle as well as poles.
 pub(crate) const NOISE_ORDER: usize = 40;
+
+/// Samples of all records above which order and dead time are first chosen on a part of them, and searches begin on some of the lines.
+pub(crate) const LONG: usize = 30000;
+/// About how many lines these are, and tasks that go on to all lines.
+const SEARCHED: usize = 10000;
+const KEPT: usize = 2;
 
 /// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less.
 const GROWTH: f64 = 2.0;
@@ -127,6 +135,32 @@ impl Problem<'_> {
         (rows().sum(), rows().min().unwrap_or(0))
     }
 
+    /// A search on every n-th line, about [`SEARCHED`] in all.
+    pub(crate) fn on_some_lines(&self, spectra: &Spectra, start: Model, options: &SearchOptions) -> Option<Found> {
+        let thin = spectra.thinned((self.samples().0 / 2).div_ceil(SEARCHED));
+        search(&thin, with_best_ends(&thin, start, &Noise::white(self.outputs())), options)
+    }
+
+    /// Of many tasks on long records those that reach the least criteria on some of the lines, with what they reach as start.
+    fn promising_tasks(&self, tasks: Vec<Task>) -> Vec<Task> {
+        let samples = self.samples().0;
+        if tasks.len() <= KEPT || samples <= LONG {
+            return tasks;
+        }
+        let reached = |mut task: Task| {
+            let found = self.on_some_lines(&task.spectra, task.start.model, &self.options(25, 0.3, &task.delays))?;
+            let share = samples as f64 / (2 * SEARCHED) as f64;
+            let criterion = found.criterion(samples) + (share.ceil() - 1.0) * found.deviance;
+            task.start = with_best_ends(&task.spectra, found.point.model, &found.noise);
+            Some((criterion, task))
+        };
+        let found: Vec<Option<(f64, Task)>> = tasks.into_par_iter().map(reached).collect();
+        let mut found: Vec<(f64, Task)> = found.into_iter().flatten().collect();
+        found.sort_by(|a, b| a.0.total_cmp(&b.0));
+        found.truncate(KEPT);
+        found.into_iter().map(|(_, task)| task).collect()
+    }
+
     /// Searches all tasks side by side and notes them in their order.
     pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let searched = |task: Task| {
@@ -135,6 +169,7 @@ impl Problem<'_> {
             let criterion = found.criterion(task.spectra.samples());
             Some(Choice { found, delays: task.delays, criterion, origin: task.origin })
         };
+        let tasks = self.promising_tasks(tasks);
         let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
         let found: Vec<Choice> = found.into_iter().flatten().collect();
         table.extend(found.iter().map(Candidate::of));

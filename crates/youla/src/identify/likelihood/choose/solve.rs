@@ -2,7 +2,7 @@
 //! criterion falls.
 
 use super::dead_time::dead_times;
-use super::problem::{Choice, Problem, Solution, Task};
+use super::problem::{Choice, LONG, Problem, Solution, Task};
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
@@ -11,8 +11,6 @@ use std::sync::Arc;
 
 /// Starts from long regressions that are searched without dead time.
 const FIRST: usize = 2;
-/// Samples of all records above which order and dead time are first chosen on a part of them.
-const LONG: usize = 30000;
 /// Samples of that part.
 const SHORT: usize = 15000;
 /// Least part of a record.
@@ -191,8 +189,10 @@ impl Problem<'_> {
         let chosen = part.solve(table)?.chosen;
         let spectra = self.spectra(&chosen.delays);
         let whole = self.with_feedthrough(chosen.found.feedthrough);
-        let start = with_best_ends(&spectra, chosen.found.point.model, &chosen.found.noise);
-        let found = search(&spectra, start, &whole.options(15, 0.3, &chosen.delays))?;
+        let options = whole.options(15, 0.3, &chosen.delays);
+        let on_some = whole.on_some_lines(&spectra, chosen.found.point.model, &options)?;
+        let start = with_best_ends(&spectra, on_some.point.model, &on_some.noise);
+        let found = search(&spectra, start, &options)?;
         let criterion = found.criterion(spectra.samples());
         Some(Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays })
     }

@@ -10,8 +10,9 @@ use crate::identify::likelihood::search::{deviance, with_best_ends, with_best_in
 use rayon::prelude::*;
 use std::sync::Arc;
 
-/// Starts are compared on every third line.
-pub(crate) const THINNED: usize = 3;
+/// Starts are compared on every so many lines that about as many are left, at least on every third. Enough to rank them: their order is
+/// decided by hundreds.
+pub(crate) const COMPARED: usize = 5000;
 /// Longest past of a regression, samples; and the most columns of it.
 const LONGEST_PAST: (usize, usize) = (120, 360);
 /// Largest order of a start; larger models grow from it where the records ask for them.
@@ -39,11 +40,12 @@ impl Problem<'_> {
     /// The most promising starts from long regressions, of different orders.
     pub(crate) fn first_tasks(&self, delays: &[usize], count: usize) -> Vec<Task> {
         let spectra = Arc::new(self.spectra(delays));
-        let thin = spectra.thinned(THINNED);
+        let every = spectra.every(COMPARED);
+        let thin = spectra.thinned(every);
         let sources = self.sources(delays);
         let orders = self.order.map_or(1..=self.largest_order.min(LARGEST_START), |n| n..=n);
         let trials: Vec<(usize, usize)> = orders.flat_map(|n| (0..sources.states.len()).map(move |s| (n, s))).collect();
-        let judged = |(order, source)| self.judged(&thin, &sources, order, source);
+        let judged = |(order, source)| self.judged((&thin, every), &sources, order, source);
         let mut starts: Vec<Judged> = trials.into_par_iter().filter_map(judged).collect();
         starts.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
         let white = Noise::white(self.outputs());
@@ -63,7 +65,13 @@ impl Problem<'_> {
     }
 
     /// A and C of a regression with B and the ends by least squares, twice: white, then weighted by the noise that is left.
-    fn judged(&self, thin: &Spectra, sources: &Sources, order: usize, source: usize) -> Option<Judged> {
+    fn judged(
+        &self,
+        (thin, every): (&Spectra, usize),
+        sources: &Sources,
+        order: usize,
+        source: usize,
+    ) -> Option<Judged> {
         let states = &sources.states[source].1;
         if states.singular.len() < order {
             return None;
@@ -80,7 +88,7 @@ impl Problem<'_> {
         let (second, _) = deviance(thin, &again, NOISE_ORDER);
         let (value, point) = if second < first { (second, again) } else { (first, point) };
         let per_order = (self.samples().0 as f64).ln() * (m + p) as f64;
-        let criterion = value * THINNED as f64 + per_order * order as f64;
+        let criterion = value * every as f64 + per_order * order as f64;
         value.is_finite().then_some(Judged { criterion, order, source, model: point.model })
     }
 

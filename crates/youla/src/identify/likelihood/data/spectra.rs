@@ -126,6 +126,11 @@ impl Spectra {
         Spectra { inputs: m, outputs: p, records: self.records.iter().map(of).collect() }
     }
 
+    /// Every how many lines leave about `count`, at least every third.
+    pub(crate) fn every(&self, count: usize) -> usize {
+        (self.samples() / 2).div_ceil(count).max(3)
+    }
+
     /// Number of samples of all records.
     pub(crate) fn samples(&self) -> usize {
         self.records.iter().map(|r| r.samples).sum()

@@ -49,7 +49,7 @@ function entriesOf(figure) {
   // Further lines of a method have dashes of their own, further clouds are hollow.
   const nth = (entry, kind) => list.filter(other => other.method === entry.method && other.kinds[kind]).indexOf(entry);
   for (const entry of list) {
-    entry.dash = entry.kinds.line && nth(entry, "line") > 0 ? [[1.2, 1.2], [4, 1, 1, 1], [7, 2]][(nth(entry, "line") - 1) % 3] : styleOf(entry.method).dash;
+    entry.dash = entry.kinds.line && nth(entry, "line") > 0 ? [[1.2, 1.2], [4, 1, 1, 1], [7, 2], [2.5, 2.5]][(nth(entry, "line") - 1) % 4] : styleOf(entry.method).dash;
     entry.hollow = entry.kinds.points && nth(entry, "points") > 0;
   }
   return list;

@@ -20,9 +20,45 @@ pub struct FrequencyResponse {
     pub lines: Vec<LineLevels>,
     /// Bounds of magnitudes on the grid of the models.
     pub bands: Vec<Band>,
+    /// Standard deviation of the recommended response by its causes, per output and input.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub deviations: Vec<Deviation>,
     /// Singular values of models with several inputs and outputs, on the grid of the models.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub singular: Vec<SingularValue>,
+}
+
+/// Standard deviation of the response of the recommended model from one input to one output, in per cent of its magnitude.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Deviation {
+    /// Output, by its place.
+    pub output: usize,
+    /// Input, by its place.
+    pub input: usize,
+    /// Frequencies, Hz.
+    #[serde(with = "numbers::seven_digits")]
+    pub hz: Vec<f64>,
+    /// In all.
+    #[serde(with = "numbers::seven_digits")]
+    pub total: Vec<f64>,
+    /// By cause; the squares sum to that of `total`. Causes without a share are absent.
+    pub parts: Vec<DeviationPart>,
+    /// Largest deviation of a band of validity, per cent.
+    pub limit: f64,
+    /// Bands of validity, Hz.
+    pub bands: Vec<[f64; 2]>,
+}
+
+/// The share of one cause in a [`Deviation`].
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct DeviationPart {
+    /// The cause.
+    pub cause: String,
+    /// Per cent of the magnitude.
+    #[serde(with = "numbers::seven_digits")]
+    pub percent: Vec<f64>,
 }
 
 /// Where the values of [`LineLevels`] come from.

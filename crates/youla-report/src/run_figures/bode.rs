@@ -3,7 +3,7 @@
 use super::choice::Chosen;
 use super::verification::channel;
 use super::{RunFigure, axis, choice, frequency_in_both_units, key, logarithmic, span};
-use crate::data::{Band, FrequencyResponse, Indirect, LineLevels, ModelResponse};
+use crate::data::{Band, Deviation, FrequencyResponse, Indirect, LineLevels, ModelResponse};
 use crate::figure::{Axis, Content, Curve, Drawn, Figure, Panel, Region};
 use crate::pretty_unit;
 
@@ -22,12 +22,13 @@ pub(super) struct Pair<'a> {
     pub(super) indirect: Vec<&'a Indirect>,
     pub(super) bands: Vec<&'a Band>,
     pub(super) lines: Option<&'a LineLevels>,
+    deviation: Option<&'a Deviation>,
 }
 
 /// All pairs of a run that have a response, by output, then by input.
 pub(super) fn pairs(chosen: &Chosen, figure: RunFigure) -> Vec<Pair<'_>> {
     let Some(response) = &chosen.data.frequency else { return Vec::new() };
-    let FrequencyResponse { hz, models, indirect, bands, lines, .. } = response;
+    let FrequencyResponse { hz, models, indirect, bands, lines, deviations, .. } = response;
     let mut places: Vec<(usize, usize)> = models.iter().map(|m| (m.output, m.input)).collect();
     places.extend(indirect.iter().map(|m| (m.output, m.input)));
     places.sort_unstable();
@@ -48,6 +49,7 @@ pub(super) fn pairs(chosen: &Chosen, figure: RunFigure) -> Vec<Pair<'_>> {
             indirect: indirect.iter().filter(|m| (m.output, m.input) == place).collect(),
             bands: bands.iter().filter(|b| (b.output, b.input) == place).collect(),
             lines: lines.iter().find(|l| (l.output, l.input) == place),
+            deviation: deviations.iter().find(|d| (d.output, d.input) == place),
         }
     };
     places.into_iter().map(pair).collect()
@@ -80,6 +82,8 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         let line = |measured: &&Indirect| Curve { drawn: Drawn::Line, ..points(measured, Part::Coherence, |_| true) };
         panels.push(panel(y, pair.indirect.iter().map(line).collect(), Some(0.4)));
     }
+    let ends = span(pair.hz.iter().copied()).unwrap_or([0.0, f64::INFINITY]);
+    panels.extend(pair.deviation.map(|deviation| Panel { x: x.clone(), ..of_deviation(deviation, ends) }));
     Figure {
         key: pair.key.clone(),
         title: format!("Frequency response, {}", pair.title),
@@ -87,6 +91,40 @@ fn figure(chosen: &Chosen, pair: &Pair) -> Figure {
         choice: choice(&[("View", "Bode"), ("Response of", &pair.title)]),
         panels,
         ..Figure::default()
+    }
+}
+
+/// The deviation and its causes over the frequencies of the models; filled below the limit where the response is valid.
+fn of_deviation(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
+    let places: Vec<usize> = (0..deviation.hz.len()).filter(|k| (first..=last).contains(&deviation.hz[*k])).collect();
+    let kept = |values: &[f64]| -> Vec<f64> { places.iter().map(|k| values[*k]).collect() };
+    let (hz, total) = (&kept(&deviation.hz), &kept(&deviation.total));
+    let Deviation { parts, limit, bands, .. } = deviation;
+    let line = |note: &str, y: &[f64]| Curve {
+        method: "likelihood".into(),
+        note: note.into(),
+        x: hz.clone(),
+        y: y.to_vec(),
+        ..Curve::default()
+    };
+    let curves =
+        std::iter::once(line("", total)).chain(parts.iter().map(|part| line(&part.cause, &kept(&part.percent))));
+    let valid = |hz: &f64| bands.iter().any(|[low, high]| (*low..=*high).contains(hz));
+    let edge = |value: f64| hz.iter().map(|hz| if valid(hz) { value } else { f64::NAN }).collect();
+    let floor = span(total.iter().copied().filter(|v| *v > 0.0)).map_or(0.1 * limit, |[low, _]| low.min(0.1 * limit));
+    let ceiling = span(total.iter().copied()).map_or(*limit, |[_, high]| high.clamp(2.0 * limit, 10.0 * limit));
+    Panel {
+        y: Axis { range: Some([0.3 * floor, ceiling]), ..logarithmic("Deviation", "%") },
+        content: Content::Curves(curves.collect()),
+        regions: vec![Region {
+            method: "likelihood".into(),
+            note: format!("valid to {limit} %"),
+            x: hz.clone(),
+            low: vec![f64::NAN; hz.len()],
+            high: edge(*limit),
+        }],
+        height: Some(0.6),
+        ..Panel::default()
     }
 }
 
@@ -104,6 +142,13 @@ fn caption(chosen: &Chosen, pair: &Pair) -> String {
         );
     } else if !pair.indirect.is_empty() {
         text += " Points: the response that was measured.";
+    }
+    if let Some(deviation) = pair.deviation {
+        text += &format!(
+            " Below: the standard deviation of the recommended response by its causes, in per cent of its magnitude; filled where it is at \
+             most {} %, the bands of validity.",
+            deviation.limit
+        );
     }
     if let Some(band) = pair.bands.first() {
         let name = |band: &&Band| {

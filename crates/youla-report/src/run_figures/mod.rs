@@ -123,7 +123,9 @@ impl RunFigure {
             RunFigure::Order => "singular values from which orders were chosen",
             RunFigure::Verification => "measured, predicted and the residuals beneath",
             RunFigure::Residuals => "correlations of the residuals with the 99 % band of noise",
-            RunFigure::Bode => "magnitude with bands, phase, and the coherence of the indirect response",
+            RunFigure::Bode => {
+                "magnitude with bands, phase, coherence of the indirect response, and deviation by its causes"
+            }
             RunFigure::Nyquist => "the same responses as loci, with their regions",
             RunFigure::Levels => "response without a model, with the levels of noise and distortion",
             RunFigure::SingularValues => "singular values of the whole response over frequency",

@@ -120,6 +120,14 @@ fn report() -> ReportData {
                 noise_db: vec![-40.0, -41.0],
                 ..LineLevels::default()
             }],
+            deviations: vec![Deviation {
+                hz: vec![hz[0] / 2.0, hz[1], hz[2], hz[3]],
+                total: vec![50.0, 20.0, 5.0, 4.0],
+                parts: vec![DeviationPart { cause: "noise".into(), percent: vec![50.0, 12.0, 4.0, 4.0] }],
+                limit: 10.0,
+                bands: vec![[hz[2], hz[3]]],
+                ..Deviation::default()
+            }],
             singular: vec![SingularValue { method: "hansen".into(), place: 0, value_db: vec![3.0; hz.len()] }],
         }),
         poles: vec![Poles {
@@ -194,6 +202,13 @@ fn responses_are_those_of_the_report() {
     let points: Vec<&Curve> = curves(figure, 0).iter().filter(|curve| curve.method == "indirect").collect();
     assert_eq!(points.iter().map(|curve| curve.x.len()).collect::<Vec<_>>(), [37, 23]);
     assert_eq!(figure.panels[0].shades.len(), 1);
+    // The deviation over the frequencies of the models, filled where it is within the limit.
+    let deviation = curves(figure, 3);
+    assert_eq!(deviation.iter().map(|c| c.note.as_str()).collect::<Vec<_>>(), ["", "noise"]);
+    assert_eq!(deviation[0].y, [20.0, 5.0, 4.0]);
+    let filled: Vec<bool> = figure.panels[3].regions[0].high.iter().map(|high| *high == 10.0).collect();
+    assert_eq!(filled, [false, true, true]);
+    assert_eq!(bode[1].figure.panels.len(), 3);
 
     let nyquist = &drawn(RunFigure::Nyquist, &FigureChoice::default())[0].figure;
     assert!(nyquist.panels[0].equal);

@@ -31,7 +31,7 @@ const AFTER: [(&str, Style); 5] = [
     ("bound", style("--ink", "#16191d", 0.7, &[1.2, 1.5], Marker::Down)),
 ];
 /// Dashes of further curves of one method, distinguished by their notes.
-const FURTHER_DASHES: [&[f64]; 3] = [&[1.2, 1.2], &[4.0, 1.0, 1.0, 1.0], &[7.0, 2.0]];
+const FURTHER_DASHES: [&[f64]; 4] = [&[1.2, 1.2], &[4.0, 1.0, 1.0, 1.0], &[7.0, 2.0], &[2.5, 2.5]];
 
 /// Most strength of an area, so that dark text on it stays legible.
 const STRONGEST: f64 = 0.7;

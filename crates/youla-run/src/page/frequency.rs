@@ -8,8 +8,9 @@ use crate::result::Identification;
 use crate::stages::responses::{self, model_responses};
 use crate::stages::uncertainty::SystemUncertainty;
 use std::f64::consts::TAU;
+use youla::Mat;
 use youla::c64;
-use youla::identify::likelihood::ResponseError;
+use youla::identify::likelihood::{LARGEST_IN_BAND, ResponseError};
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
 
@@ -28,7 +29,8 @@ pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
     let bands = recommended(found, &responses).into_iter().chain(of_scheme).collect();
     let singular = singular(found, &responses)?;
     let (indirect, lines) = (indirect(found), nonparametric::drawn(found));
-    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect, lines, bands, singular })
+    let deviations = deviations(found)?;
+    Ok(draw::FrequencyResponse { hz: found.hz.clone(), models, indirect, lines, bands, deviations, singular })
 }
 
 fn indirect(found: &Identification) -> Vec<draw::Indirect> {
@@ -54,6 +56,35 @@ fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
     let errors: Vec<_> = found.hz.iter().map(|f| model.region.at(*f)).collect();
     own.flat_map(|(_, r)| ports(found).map(|port| recommended_band(&errors, r, port)).collect::<Vec<_>>()).collect()
+}
+
+/// The deviations of the recommended model by their causes.
+fn deviations(found: &Identification) -> Result<Vec<draw::Deviation>> {
+    let Ok(model) = &found.recommended else { return Ok(Vec::new()) };
+    let region = &model.region;
+    let omega: Vec<f64> = region.hz.iter().map(|hz| TAU * hz).collect();
+    let response = youla::lti::frequency_response(&model.plant, &omega)?;
+    let entry = |(output, input): (usize, usize)| {
+        let size: Vec<f64> = response.entry(output, input).iter().map(|g| g.norm()).collect();
+        let percent = |all: &[Mat<f64>]| -> Vec<f64> {
+            all.iter().zip(&size).map(|(deviation, size)| 100.0 * deviation[(output, input)] / size).collect()
+        };
+        let part = |(cause, all): (&str, &[Mat<f64>])| {
+            let percent = percent(all);
+            let some = percent.iter().any(|value| *value > 0.0);
+            some.then(|| draw::DeviationPart { cause: cause.into(), percent })
+        };
+        draw::Deviation {
+            output,
+            input,
+            hz: region.hz.clone(),
+            total: percent(&region.absolute),
+            parts: region.parts.named().into_iter().filter_map(part).collect(),
+            limit: 100.0 * LARGEST_IN_BAND,
+            bands: model.entry_bands[output][input].clone(),
+        }
+    };
+    Ok(ports(found).map(entry).collect())
 }
 
 /// The 95 % region of the response from an input to an output, with the errors at its frequencies.

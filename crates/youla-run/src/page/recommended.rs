@@ -41,10 +41,14 @@ fn evidence(model: &Recommendation) -> EvidenceTable {
 
 fn candidates(model: &Recommendation) -> EvidenceTable {
     let mut sorted: Vec<&Candidate> = model.candidates.iter().collect();
-    sorted.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
+    sorted.sort_by(|a, b| b.stabilised.cmp(&a.stabilised).then(a.criterion.total_cmp(&b.criterion)));
     let least = sorted.first().map_or(0.0, |c| c.criterion);
+    let origin = |c: &Candidate| match c.stabilised {
+        true => c.origin.clone(),
+        false => format!("{}; the controller does not stabilise it", c.origin),
+    };
     let row = |c: &&Candidate| {
-        vec![c.order.to_string(), listed(&c.dead_time), format!("{:.1}", c.criterion - least), c.origin.clone()]
+        vec![c.order.to_string(), listed(&c.dead_time), format!("{:.1}", c.criterion - least), origin(c)]
     };
     EvidenceTable {
         title: "Candidates".into(),
@@ -133,7 +137,7 @@ fn means(kind: Detrend) -> Row {
 /// By how much the criterion of the best other candidate is larger.
 fn margin(model: &Recommendation, other: impl Fn(&Candidate) -> bool, what: &str) -> String {
     let least = |of: &dyn Fn(&&Candidate) -> bool| {
-        model.candidates.iter().filter(of).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+        model.candidates.iter().filter(|c| c.stabilised).filter(of).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     };
     let (Some(next), Some(chosen)) = (least(&|c| other(c)), least(&|c| !other(c))) else {
         return format!("no other {what} was tried");

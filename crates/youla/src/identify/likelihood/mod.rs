@@ -33,6 +33,7 @@ mod tests;
 
 pub use super::subspace::Experiment;
 pub use super::verdict::LoopRatio;
+pub use super::verdict::limits::LARGEST_IN_BAND;
 pub use deviation::mode_estimates::ModeEstimate;
 pub use deviation::region::{Draw, Interval, Region, RegionParts, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
@@ -189,7 +190,7 @@ fn check_moving(signal: &str, records: &[MatRef<'_, f64>]) -> Result<()> {
 
 fn problem<'a>(
     experiments: &'a [Experiment<'a>],
-    known: Option<&LoopKnowledge<'_>>,
+    known: Option<&'a LoopKnowledge<'a>>,
     options: &LikelihoodOptions,
 ) -> Result<Problem<'a>> {
     let (m, p) = experiments.first().map_or((0, 0), |e| (e.u.ncols(), e.y.ncols()));
@@ -226,5 +227,6 @@ fn problem<'a>(
         dead_time: options.dead_time.clone(),
         largest_order: options.largest_order,
         masked: Vec::new(),
+        feedback: stated.and_then(|known| known.feedback).filter(|k| !k.is_zero()),
     })
 }

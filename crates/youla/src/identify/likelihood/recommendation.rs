@@ -100,6 +100,8 @@ pub struct Candidate {
     pub criterion: f64,
     /// Steps of the search.
     pub steps: usize,
+    /// Whether the feedback stabilises it, as far as one is known that explains the records; others come before it whatever its criterion.
+    pub stabilised: bool,
 }
 
 /// What a test of the verdict says.

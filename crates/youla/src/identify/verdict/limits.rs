@@ -36,7 +36,7 @@ pub(crate) const LARGEST_LOOP_ERROR: f64 = 0.2;
 /// where the loop crosses over at a thirtieth of the sample rate less than 0.1.
 pub(crate) const LARGEST_CONTROLLER_ERROR: f64 = 0.15;
 /// Largest standard deviation of a response, relative to it, in a band of validity.
-pub(crate) const LARGEST_IN_BAND: f64 = 0.1;
+pub const LARGEST_IN_BAND: f64 = 0.1;
 /// Radius of the 95 % region of a complex number over its root mean square: `sqrt(chi-square(0.95, 2) / 2)`.
 pub(crate) const EDGE: f64 = 1.731;
 /// Lowest frequency at which a loop is judged over the lowest at which the region is stated.

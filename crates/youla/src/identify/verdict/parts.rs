@@ -205,6 +205,10 @@ fn differences(
     let parameters = chart.parameters();
     let ((sa, ra), (sb, rb)) = (a.step(parameters), b.step(parameters));
     let models = searched.then(|| records.map(|records| on(problem, solution, records)));
+    let every = match &models {
+        Some([Some(a), Some(b)]) => [a.1, b.1],
+        _ => [1.0; 2],
+    };
     let (p, m) = (problem.outputs(), problem.inputs());
     let matrix = |g: &[c64]| Mat::from_fn(p, m, |i, j| g[i * m + j]);
     let at = |share: f64| {
@@ -214,12 +218,12 @@ fn differences(
             |i: usize, v: &dyn Fn(usize) -> f64| (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j));
         let of =
             |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)]).norm_sqr()).sum::<f64>();
-        let variance: f64 = (0..slopes.nrows()).map(|i| of(&ra, i) + of(&rb, i)).sum();
+        let variance: f64 = (0..slopes.nrows()).map(|i| every[0] * of(&ra, i) + every[1] * of(&rb, i)).sum();
         let g = model.response(z);
         let norm = |g: &[c64]| g.iter().map(|g| g.norm_sqr()).sum::<f64>().sqrt();
         let (apart, size) = match &models {
             Some([Some(a), Some(b)]) => {
-                let (a, b) = (a.response(z), b.response(z));
+                let (a, b) = (a.0.response(z), b.0.response(z));
                 (a.iter().zip(&b).map(|(a, b)| a - b).collect(), norm(&a).hypot(norm(&b)) / 2.0_f64.sqrt())
             }
             _ => ((0..slopes.nrows()).map(|i| along(i, &|j| sa[j] - sb[j])).collect::<Vec<_>>(), norm(&g)),
@@ -230,12 +234,14 @@ fn differences(
     grid(solution.samples).into_iter().filter_map(at).collect()
 }
 
-/// The model of some records, from that of all.
-fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<Model> {
+/// The model of some records, from that of all, and of how many lines it sees one.
+fn on(problem: &Problem<'_>, solution: &Solution, records: &[Experiment<'_>]) -> Option<(Model, f64)> {
     let choice = &solution.chosen;
     let spectra = problem.spectra_of(records, &choice.delays);
-    let spectra = spectra.thinned((spectra.samples() / 2).div_ceil(COMPARED));
+    let every = (spectra.samples() / 2).div_ceil(COMPARED);
+    let spectra = spectra.thinned(every);
     let start = with_best_ends(&spectra, choice.found.point.model.clone(), &choice.found.noise);
     let problem = problem.with_feedthrough(choice.found.feedthrough);
-    Some(search(&spectra, start, &problem.options(STEPS, 1.0, &choice.delays))?.point.model)
+    let found = search(&spectra, start, &problem.options(STEPS, 1.0, &choice.delays))?;
+    Some((found.point.model, every as f64))
 }

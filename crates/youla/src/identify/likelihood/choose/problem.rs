@@ -1,12 +1,15 @@
 //! The records with what is fixed about the model, and the searches that are made on them.
 
+use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
+use crate::identify::likelihood::deviation::physical;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{Found, SearchOptions, search, with_best_ends};
 use crate::identify::subspace::Experiment;
+use crate::lti::{Discrete, StateSpace};
 use faer::Mat;
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -19,6 +22,9 @@ pub(crate) const LONG: usize = 30000;
 /// About how many lines these are, and tasks that go on to all lines.
 const SEARCHED: usize = 10000;
 const KEPT: usize = 2;
+
+/// More than any criterion of a record that fits into memory.
+const UNSTABLE: f64 = 1e12;
 
 /// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less.
 const GROWTH: f64 = 2.0;
@@ -90,6 +96,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) largest_order: usize,
     /// Bands of disturbances whose lines do not count.
     pub(crate) masked: Vec<Mask>,
+    /// The feedback that ran, where it explains the log: what it does not stabilise is not the plant.
+    pub(crate) feedback: Option<&'a StateSpace<Discrete>>,
 }
 
 impl Problem<'_> {
@@ -135,6 +143,19 @@ impl Problem<'_> {
         (rows().sum(), rows().min().unwrap_or(0))
     }
 
+    /// What is added to the criterion of a model that the feedback does not stabilise, so that any other comes before it.
+    pub(crate) fn instability(&self, choice: &Choice) -> f64 {
+        let radius = |k: &StateSpace<Discrete>| {
+            let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
+            let poles = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
+            Some(poles.iter().map(|p| p.norm()).fold(0.0, f64::max))
+        };
+        match self.feedback.and_then(radius) {
+            Some(radius) if radius >= 1.0 => UNSTABLE,
+            _ => 0.0,
+        }
+    }
+
     /// A search on every n-th line, about [`SEARCHED`] in all.
     pub(crate) fn on_some_lines(&self, spectra: &Spectra, start: Model, options: &SearchOptions) -> Option<Found> {
         let thin = spectra.thinned((self.samples().0 / 2).div_ceil(SEARCHED));
@@ -151,7 +172,10 @@ impl Problem<'_> {
             let found = self.on_some_lines(&task.spectra, task.start.model, &self.options(25, 0.3, &task.delays))?;
             let share = samples as f64 / (2 * SEARCHED) as f64;
             let criterion = found.criterion(samples) + (share.ceil() - 1.0) * found.deviance;
-            task.start = with_best_ends(&task.spectra, found.point.model, &found.noise);
+            let reached = Choice { found, delays: task.delays.clone(), criterion, origin: String::new() };
+            let criterion = criterion + self.instability(&reached);
+            let Found { point, noise, .. } = reached.found;
+            task.start = with_best_ends(&task.spectra, point.model, &noise);
             Some((criterion, task))
         };
         let found: Vec<Option<(f64, Task)>> = tasks.into_par_iter().map(reached).collect();
@@ -167,7 +191,8 @@ impl Problem<'_> {
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
             let found = search(&task.spectra, task.start, &options)?;
             let criterion = found.criterion(task.spectra.samples());
-            Some(Choice { found, delays: task.delays, criterion, origin: task.origin })
+            let choice = Choice { found, delays: task.delays, criterion, origin: task.origin };
+            Some(Choice { criterion: criterion + self.instability(&choice), ..choice })
         };
         let tasks = self.promising_tasks(tasks);
         let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
@@ -184,8 +209,9 @@ impl Candidate {
             dead_time: choice.delays.clone(),
             order: choice.order(),
             deviance: choice.found.deviance,
-            criterion: choice.criterion,
+            criterion: if choice.criterion < 0.5 * UNSTABLE { choice.criterion } else { choice.criterion - UNSTABLE },
             steps: choice.found.steps,
+            stabilised: choice.criterion < 0.5 * UNSTABLE,
         }
     }
 }

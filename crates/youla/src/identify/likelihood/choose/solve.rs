@@ -68,8 +68,11 @@ impl Problem<'_> {
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
         if let Some(found) = search(&spectra, chosen.found.point.clone(), &last.options(40, 0.01, &chosen.delays)) {
-            chosen.criterion = found.criterion(spectra.samples());
-            chosen.found = found;
+            let criterion = found.criterion(spectra.samples());
+            let last = Choice { found, criterion, ..chosen.clone() };
+            if self.instability(&last) <= self.instability(&chosen) {
+                chosen = last;
+            }
         }
         let least = best(&tried)?.criterion;
         let rivals = tried.into_iter().filter(|c| c.criterion <= least + BESIDE).collect();
@@ -194,7 +197,8 @@ impl Problem<'_> {
         let start = with_best_ends(&spectra, on_some.point.model, &on_some.noise);
         let found = search(&spectra, start, &options)?;
         let criterion = found.criterion(spectra.samples());
-        Some(Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays })
+        let choice = Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays };
+        Some(Choice { criterion: criterion + self.instability(&choice), ..choice })
     }
 }
 

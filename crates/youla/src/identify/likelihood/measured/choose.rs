@@ -309,6 +309,7 @@ impl Fitted {
             deviance: self.energy,
             criterion: self.criterion,
             steps: self.steps,
+            stabilised: true,
         }
     }
 }

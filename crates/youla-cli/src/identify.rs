@@ -88,7 +88,7 @@ impl IdentifyArgs {
             },
             None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
         };
-        Ok(RunSettings::new(name, data, nominal, controller))
+        Ok(RunSettings::new(name, data, nominal, controller).checked()?)
     }
 
     /// A file with what `[controller]` of run.toml holds states its sign itself; a model needs the flag.

@@ -112,10 +112,12 @@ pub fn records_in_memory(settings: &DataSettings, logs: Vec<Record>) -> Result<R
         let what = "the number of records in memory".into();
         return Err(Error::Method(youla::Error::Ports { what, expected: files.len(), found: logs.len() }));
     }
+    let computed = ComputedChannels::new(settings)?;
+    let wanted: Vec<ChannelSpec> = settings.groups().into_iter().flatten().cloned().collect();
     let of = |(k, ((label, file), log)): (usize, ((String, &DataFile), Record))| {
         let sha256 = sha256_of(log.columns());
         let named = FileOfRun { purpose: purpose(settings, k), label: &label, file, sha256 };
-        file_records(settings, named, vec![log])
+        file_records(settings, named, vec![computed.apply(&wanted, log, 1)?])
     };
     let read = files.into_iter().zip(logs).enumerate().map(of).collect::<Result<_>>()?;
     assembled(settings, read, None)

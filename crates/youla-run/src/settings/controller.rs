@@ -60,6 +60,10 @@ pub enum ControllerSettings {
         /// Dead time in whole samples, beyond what the controller itself delays.
         #[serde(default)]
         delay: usize,
+        /// Numerator from the reference, where it is another than that from the output: `denominator u = reference_numerator r - numerator y`
+        /// with negative feedback, `+ numerator y` with positive; the same where it is absent.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        reference_numerator: Option<Polynomials>,
     },
     /// `numerator / denominator` in descending powers of s or z; a single denominator is common to all entries.
     TransferFunction {
@@ -172,10 +176,12 @@ impl ControllerSettings {
     }
 
     fn controller(&self, nominal: &StateSpace<Discrete>, folder: &Path) -> Result<RunningController> {
-        refuse(self.problem(), Path::new("run.toml"))?;
+        let left = matches!(self, Self::DifferenceEquation { reference_numerator: Some(_), .. });
+        let unread = left.then(|| "reference_numerator belongs to settings that were `checked`".to_owned());
+        refuse(self.problem().or(unread), Path::new("run.toml"))?;
         let time = nominal.time();
         let (feedback, delay, system) = match self {
-            Self::DifferenceEquation { feedback, numerator, denominator, delay } => {
+            Self::DifferenceEquation { feedback, numerator, denominator, delay, .. } => {
                 let (p, m) = numerator.shape();
                 let (numerator, denominator) = (numerator.spread(p, m), denominator.spread(p, m));
                 (feedback, *delay, StateSpace::difference_equation(&numerator, &denominator, time)?)

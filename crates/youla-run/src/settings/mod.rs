@@ -9,6 +9,7 @@ mod models;
 mod options;
 mod order;
 mod pid;
+mod reference_path;
 mod shown;
 
 pub use controller::{ControllerSettings, Feedback, Hold};
@@ -134,17 +135,20 @@ impl RunSettings {
     /// [`youla_io::Error::Settings`].
     pub fn parse(text: &str, path: &Path) -> Result<Self> {
         let settings: Self = parse_table(text, path, "")?;
+        let settings = settings.with_reference_path().map_err(|problem| refused(problem, path))?;
         refuse(settings.problem(), path)?;
         Ok(settings)
     }
 
-    /// Settings built in code, if they are valid: the checks that [`RunSettings::parse`] makes of a file.
+    /// Settings built in code, if they are valid, as [`RunSettings::parse`] makes them of a file: a path of the reference is a known
+    /// excitation.
     ///
     /// # Errors
     /// [`youla_io::Error::Settings`] with the key and what it must be, under the name run.toml.
     pub fn checked(self) -> Result<Self> {
-        self.check()?;
-        Ok(self)
+        let settings = self.with_reference_path().map_err(|problem| refused(problem, Path::new("run.toml")))?;
+        settings.check()?;
+        Ok(settings)
     }
 
     /// Checks values that the types allow and the method does not; every function that takes settings calls it.
@@ -248,6 +252,10 @@ fn is_log(path: &Path, bytes: &[u8]) -> bool {
 fn refuse(problem: Option<String>, path: &Path) -> Result<()> {
     match problem {
         None => Ok(()),
-        Some(problem) => Err(Error::File(youla_io::Error::Settings { path: path.to_owned(), at: None, problem })),
+        Some(problem) => Err(refused(problem, path)),
     }
+}
+
+fn refused(problem: String, path: &Path) -> Error {
+    Error::File(youla_io::Error::Settings { path: path.to_owned(), at: None, problem })
 }

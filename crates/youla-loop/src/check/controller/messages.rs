@@ -14,6 +14,10 @@ const NO_EXCITATION: f64 = 1e-5;
 /// A wrong controller leaves the most of the excitation; another signal explains 7 lags over the samples. Chosen, not measured.
 const CONTAINED: f64 = 0.1;
 
+/// What to do where a reference moves that may enter by a path of its own.
+const PATH: &str = "If the reference enters by another path than the output (two degrees of freedom, feedforward), declare it: \
+                    reference_numerator in [controller.difference_equation]";
+
 /// Factors that are known from units: degrees and radians, revolutions, thousands.
 const UNITS: [(f64, &str); 4] = [
     (57.295_779_513_082_32, "180 / pi, degrees against radians"),
@@ -127,7 +131,12 @@ impl ControllerCheck {
                  gain, shift or channel order explains it"
                     .into()
             }
+            None if self.guided => format!("Log what else is added to the input. {PATH}"),
             None => "Log the excitation; without it the controller cannot be checked".into(),
+        };
+        let advice = match &self.change {
+            None if self.excited && self.guided => format!("{advice}. {PATH}"),
+            _ => advice,
         };
         let mut finding = Finding::new(Test::Controller, severity, record, what).number("residual", self.residual);
         if let Some((change, left)) = &self.change {

@@ -181,7 +181,10 @@ impl ComputedChannels {
             .iter()
             .map(|operand| match operand {
                 Operand::Computed(earlier) => Ok(values[earlier].as_slice()),
-                Operand::Column(column) => Ok(read.column(&name_of(column))?),
+                // A record in memory has its columns by their own names.
+                Operand::Column(column) => {
+                    Ok(read.column(&name_of(column)).or_else(|_| read.column(&column.to_string()))?)
+                }
             })
             .collect::<Result<Vec<&[f64]>>>()?;
         let row = |k: usize| operands.iter().map(|x| x[k]).collect::<Vec<f64>>();

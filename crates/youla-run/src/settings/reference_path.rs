@@ -1,0 +1,157 @@
+//! Two degrees of freedom: the path from the reference, where it is another than that from the output.
+//!
+//! ```text
+//! R u = T r - S y + R d = S (r - y) + (T - S) r + R d        negative feedback
+//! ```
+//! `(T - S) / R r` is one more known signal at the plant input: a computed channel beside the excitation d. A root at 1 that T - S and R
+//! share is left out, so that an integrator does not ramp.
+
+use super::RunSettings;
+use super::controller::{ControllerSettings, Feedback};
+use youla_io::ChannelSpec;
+
+/// Sum of coefficients over the sum of their magnitudes that is zero but for rounding.
+const ROUNDING: f64 = 1e-9;
+
+const KEY: &str = "[controller.difference_equation] reference_numerator";
+
+impl RunSettings {
+    /// The same settings with the path from the reference as a known excitation of the inputs.
+    ///
+    /// # Errors
+    /// What the path lacks, in a sentence.
+    pub(super) fn with_reference_path(mut self) -> Result<Self, String> {
+        let ControllerSettings::DifferenceEquation { feedback, numerator, denominator, delay, reference_numerator } =
+            &mut self.controller
+        else {
+            return Ok(self);
+        };
+        let Some(path) = reference_numerator.take() else { return Ok(self) };
+        let data = &mut self.data;
+        let (m, p) = numerator.shape();
+        if path.shape() != (m, p) {
+            let (rows, columns) = path.shape();
+            return Err(format!("{KEY} has {rows} x {columns} entries, but numerator has {m} x {p}"));
+        }
+        if data.reference.len() != p || data.inputs.len() != m {
+            let (r, u) = (data.reference.len(), data.inputs.len());
+            return Err(format!(
+                "{KEY} has {m} x {p} entries, but [data] has {u} inputs and {r} reference channels: name a reference for each output"
+            ));
+        }
+        if !data.input_excitation.is_empty() && data.input_excitation.len() != m {
+            return Err(format!("{KEY} needs as many input_excitation channels as inputs, {m}, or none"));
+        }
+        let (own, other, common) = (numerator.spread(m, p), path.spread(m, p), denominator.spread(m, p));
+        // With positive feedback K (y - r) the reference enters with the other sign.
+        let sign = if *feedback == Feedback::Negative { -1.0 } else { 1.0 };
+        let mut excitation = Vec::with_capacity(m);
+        for j in 0..m {
+            let mut terms = Vec::new();
+            for i in 0..p {
+                let (b, a) = filter(&other[j][i], &own[j][i], &common[j][i], sign)
+                    .ok_or_else(|| format!("{KEY} and numerator have other sums of their coefficients from reference {} to input {}, and the denominator has an integrator: the signal from the reference alone would ramp. Make the sums equal, as they are in a controller whose output settles", i + 1, j + 1))?;
+                if b.iter().any(|b| *b != 0.0) {
+                    let name = format!("reference_path_{}_{}", j + 1, i + 1);
+                    let b = [vec![0.0; *delay], b].concat();
+                    let text = format!("filter('{}', {b:?}, {a:?})", data.reference[i].source());
+                    data.computed.insert(name.clone(), text);
+                    terms.push(name);
+                }
+            }
+            let logged = data.input_excitation.get(j);
+            terms.extend(logged.map(|d| format!("'{}'", d.source())));
+            let (name, unit) = match logged {
+                Some(d) => (format!("{} and path of the reference", d.name), d.unit.clone()),
+                None => (format!("path of the reference to {}", data.inputs[j].name), data.inputs[j].unit.clone()),
+            };
+            let sum = format!("reference_path_{}", j + 1);
+            let text = if terms.is_empty() { "0".into() } else { terms.join(" + ") };
+            data.computed.insert(sum.clone(), text);
+            excitation.push(ChannelSpec::from(name, youla_io::ChannelRef::Name(sum), unit));
+        }
+        data.input_excitation = excitation;
+        Ok(self)
+    }
+}
+
+/// `(T + sign S) / R` without the roots at 1 that both share; `None` where R has one that is left.
+fn filter(t: &[f64], s: &[f64], r: &[f64], sign: f64) -> Option<(Vec<f64>, Vec<f64>)> {
+    let at = |c: &[f64], k: usize| c.get(k).copied().unwrap_or(0.0);
+    let mut b: Vec<f64> = (0..t.len().max(s.len())).map(|k| at(t, k) + sign * at(s, k)).collect();
+    let mut a = r.to_vec();
+    let size = |c: &[f64]| c.iter().map(|c| c.abs()).sum::<f64>();
+    let scale = size(t) + size(s);
+    let vanishes = |c: &[f64], scale: f64| c.iter().sum::<f64>().abs() <= ROUNDING * scale;
+    while a.len() > 1 && vanishes(&a, size(&a)) {
+        if !vanishes(&b, scale) {
+            return None;
+        }
+        (a, b) = (without_root(&a), without_root(&b));
+    }
+    if size(&b) <= ROUNDING * scale {
+        b = vec![0.0];
+    }
+    Some((b, a))
+}
+
+/// The quotient by `1 - z^-1`.
+fn without_root(c: &[f64]) -> Vec<f64> {
+    let sums = c.iter().scan(0.0, |sum, c| {
+        *sum += c;
+        Some(*sum)
+    });
+    let quotient: Vec<f64> = sums.take(c.len().saturating_sub(1)).collect();
+    if quotient.is_empty() { vec![0.0] } else { quotient }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::records_in_memory;
+    use std::path::Path;
+    use youla::Mat;
+    use youla::lti::Discrete;
+    use youla::signal::{Channel, Record};
+
+    fn settings(keys: &str) -> crate::Result<RunSettings> {
+        let text = format!(
+            "name = \"rst\"\n[data]\nsample_time = 0.1\ninputs = [{{ name = \"u\" }}]\noutputs = [{{ name = \"y\" }}]\n\
+             reference = [{{ name = \"r\" }}]\n[[data.estimation]]\nfile = \"log.csv\"\n\
+             [nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [1.0]\ndenominator = [1.0, -0.9]\n\
+             [controller.difference_equation]\nfeedback = \"negative\"\n{keys}"
+        );
+        RunSettings::parse(&text, Path::new("run.toml"))
+    }
+
+    /// `u = I(r - y) + P (b r - y)`: the integrator cancels, and the known signal is `P (b - 1) r`.
+    #[test]
+    fn the_weight_of_a_set_point_is_a_known_signal_that_does_not_ramp() {
+        let keys = "numerator = [2.3, -2.0]\ndenominator = [1.0, -1.0]\nreference_numerator = [0.9, -0.6]\n";
+        let chosen = settings(keys).unwrap();
+        let column = |values: [f64; 20]| values.to_vec();
+        let r: Vec<f64> = (0..20).map(|k| if k < 5 { 0.0 } else { 1.0 }).collect();
+        let all = [column([0.0; 20]), column([0.0; 20]), r.clone()];
+        let data = Mat::from_fn(20, 3, |k, j| all[j][k]);
+        let channels = ["u", "y", "r"].map(|name| Channel::new(name, "")).to_vec();
+        let log = Record::new("log", channels, data, Discrete::new(0.1).unwrap()).unwrap();
+        let mut none = chosen.data.clone();
+        none.detrend = youla::signal::Detrend::None;
+        let records = records_in_memory(&none, vec![log]).unwrap();
+        let d = records.estimation[0].input_excitation.as_ref().unwrap();
+        for k in 0..20 {
+            assert!((d[(k, 0)] + 1.4 * r[k]).abs() < 1e-12, "row {k}: {}", d[(k, 0)]);
+        }
+        assert_eq!(
+            chosen.controller,
+            settings("numerator = [2.3, -2.0]\ndenominator = [1.0, -1.0]\n").unwrap().controller
+        );
+    }
+
+    #[test]
+    fn a_path_that_would_ramp_is_refused_by_name() {
+        let keys = "numerator = [2.3, -2.0]\ndenominator = [1.0, -1.0]\nreference_numerator = [0.9, -0.7]\n";
+        let error = settings(keys).unwrap_err().to_string();
+        assert!(error.contains("reference_numerator") && error.contains("would ramp"), "{error}");
+    }
+}

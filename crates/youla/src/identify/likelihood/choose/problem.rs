@@ -26,7 +26,8 @@ const KEPT: usize = 2;
 /// More than any criterion of a record that fits into memory.
 const UNSTABLE: f64 = 1e12;
 
-/// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less.
+/// Largest growth of a mode over all records of an open loop, and of a closed one that its feedback stabilises, as a logarithm: an integrator, or a
+/// disturbance at one frequency, is not told from less.
 const GROWTH: f64 = 2.0;
 
 /// A found model with the delays it was found for.
@@ -151,7 +152,7 @@ impl Problem<'_> {
             Some(poles.iter().map(|p| p.norm()).fold(0.0, f64::max))
         };
         match self.feedback.and_then(radius) {
-            Some(radius) if radius >= 1.0 => UNSTABLE,
+            Some(radius) if radius.ln() * self.samples().0 as f64 > GROWTH => UNSTABLE,
             _ => 0.0,
         }
     }

@@ -68,12 +68,12 @@ fn sizes_formats_and_places_are_as_asked_for() {
         let name = |line: &str| Path::new(line).file_name().expect("a file").to_string_lossy().into_owned();
         stdout.lines().map(name).collect()
     };
-    let one = ["plot", run, "bode", "--output", "y_h", "--input", "u_v", "--height", "9", "--out", "."];
+    let one = ["plot", run, "bode", "--output", "y_h", "--input", "u_v", "--height", "12", "--out", "."];
     let found = youla(&folder, &one);
     done(&found);
     assert_eq!(names(&found.stdout), ["bode-y_h-from-u_v.svg", "bode-y_h-from-u_v.csv"]);
     let svg = fs::read_to_string(folder.join("bode-y_h-from-u_v.svg")).expect("written");
-    assert_eq!((millimetres(&svg, "width"), millimetres(&svg, "height")), (170.0, 90.0));
+    assert_eq!((millimetres(&svg, "width"), millimetres(&svg, "height")), (170.0, 120.0));
 
     done(&youla(&folder, &one));
     assert!(fs::read_to_string(folder.join("bode-y_h-from-u_v.svg")).expect("written") == svg, "the same bytes");

@@ -135,7 +135,7 @@ fn summary_describes_every_method() {
 #[test]
 fn frequency_responses_share_one_grid() {
     let response = &json(&demo().join("response.json"));
-    assert_eq!(keys(response), ["bands", "hz", "indirect", "lines", "models", "singular"]);
+    assert_eq!(keys(response), ["bands", "deviations", "hz", "indirect", "lines", "models", "singular"]);
     let hz = numbers(&response["hz"]);
     assert!(hz.len() > 100 && hz.windows(2).all(|w| w[0] < w[1]));
     // Two inputs and two outputs of six models.

@@ -10,7 +10,7 @@ use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{Found, SearchOptions, search, with_best_ends};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
-use faer::Mat;
+use faer::{Mat, c64};
 use rayon::prelude::*;
 use std::sync::Arc;
 
@@ -26,8 +26,8 @@ const KEPT: usize = 2;
 /// More than any criterion of a record that fits into memory.
 const UNSTABLE: f64 = 1e12;
 
-/// Largest growth of a mode over all records of an open loop, and of a closed one that its feedback stabilises, as a logarithm: an integrator, or a
-/// disturbance at one frequency, is not told from less.
+/// Largest growth of a mode over all records of an open loop, as a logarithm: an integrator is not told from less, nor a disturbance at one
+/// frequency in a closed one.
 const GROWTH: f64 = 2.0;
 
 /// A found model with the delays it was found for.
@@ -145,14 +145,19 @@ impl Problem<'_> {
     }
 
     /// What is added to the criterion of a model that the feedback does not stabilise, so that any other comes before it.
+    ///
+    /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`.
     pub(crate) fn instability(&self, choice: &Choice) -> f64 {
-        let radius = |k: &StateSpace<Discrete>| {
+        let unstable = |k: &StateSpace<Discrete>| {
             let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
-            let poles = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
-            Some(poles.iter().map(|p| p.norm()).fold(0.0, f64::max))
+            let (own, of_loop) =
+                (plant.poles().ok()?, closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?);
+            let least = GROWTH / self.samples().0 as f64;
+            let stays = |z: &c64| z.norm().ln() <= least && own.iter().any(|p| (p - z).norm() <= least);
+            Some(of_loop.iter().any(|z| z.norm() >= 1.0 && !stays(z)))
         };
-        match self.feedback.and_then(radius) {
-            Some(radius) if radius.ln() * self.samples().0 as f64 > GROWTH => UNSTABLE,
+        match self.feedback.and_then(unstable) {
+            Some(true) => UNSTABLE,
             _ => 0.0,
         }
     }

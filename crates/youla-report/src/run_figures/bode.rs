@@ -110,7 +110,6 @@ fn of_deviation(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
     let curves =
         std::iter::once(line("", total)).chain(parts.iter().map(|part| line(&part.cause, &kept(&part.percent))));
     let valid = |hz: &f64| bands.iter().any(|[low, high]| (*low..=*high).contains(hz));
-    let edge = |value: f64| hz.iter().map(|hz| if valid(hz) { value } else { f64::NAN }).collect();
     let floor = span(total.iter().copied().filter(|v| *v > 0.0)).map_or(0.1 * limit, |[low, _]| low.min(0.1 * limit));
     let ceiling = span(total.iter().copied()).map_or(*limit, |[_, high]| high.clamp(2.0 * limit, 10.0 * limit));
     Panel {
@@ -121,7 +120,7 @@ fn of_deviation(deviation: &Deviation, [first, last]: [f64; 2]) -> Panel {
             note: format!("valid to {limit} %"),
             x: hz.clone(),
             low: vec![f64::NAN; hz.len()],
-            high: edge(*limit),
+            high: hz.iter().map(|hz| if valid(hz) { *limit } else { f64::NAN }).collect(),
         }],
         height: Some(0.6),
         ..Panel::default()

@@ -131,13 +131,11 @@ impl ControllerCheck {
                  gain, shift or channel order explains it"
                     .into()
             }
-            None if self.guided => format!("Log what else is added to the input. {PATH}"),
+            None if self.guided => "Log what else is added to the input".into(),
             None => "Log the excitation; without it the controller cannot be checked".into(),
         };
-        let advice = match &self.change {
-            None if self.excited && self.guided => format!("{advice}. {PATH}"),
-            _ => advice,
-        };
+        let own_path = self.change.is_none() && self.guided;
+        let advice = if own_path { format!("{advice}. {PATH}") } else { advice };
         let mut finding = Finding::new(Test::Controller, severity, record, what).number("residual", self.residual);
         if let Some((change, left)) = &self.change {
             let (key, value) = change.number();

@@ -4,7 +4,7 @@
 //! acts on the outputs alone, `y = G u + cos, sin + v`: its amplitudes are those of the residual without the mode. What is left of the
 //! outputs, without the lines next to it (weight zero), says whether it was one: then the criterion is less without the mode.
 
-use super::problem::{Problem, Solution, Task};
+use super::problem::{Choice, Problem, Solution, Task};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
@@ -39,6 +39,8 @@ const AWAY: f64 = 5.0;
 /// Power of the free motion of a mode over that which the inputs cause, away from its frequency, from which it is a disturbance: both are alike
 /// for a mode on the unit circle that the inputs move. Modes of plants have 0.01 to 0.3, what unbalance and hum leave 3 to 8000.
 const UNMOVED: f64 = 2.0;
+/// Samples of a record for each slow change at least.
+const SAMPLES_PER_CHANGE: usize = 8;
 /// Sweeps over the disturbances, which are nearly orthogonal.
 const SWEEPS: usize = 2;
 
@@ -62,17 +64,14 @@ impl Line {
     }
 }
 
-/// Outputs of the estimation and of the fresh records.
-pub(crate) type Outputs = [Vec<Mat<f64>>; 2];
-
 /// A model and the outputs that it is the model of.
 pub(crate) struct WithoutLines {
     /// The model.
     pub(crate) solution: Solution,
     /// What was taken out of the outputs.
     pub(crate) lines: Vec<Line>,
-    /// The outputs without it; `None` where there is nothing.
-    pub(crate) outputs: Option<Outputs>,
+    /// The outputs without it, of the estimation and of the fresh records; `None` where there is nothing.
+    pub(crate) outputs: Option<[Vec<Mat<f64>>; 2]>,
 }
 
 impl WithoutLines {
@@ -84,18 +83,17 @@ impl WithoutLines {
 
     /// Records, those of estimation (0) or fresh (1), with its outputs.
     pub(crate) fn records<'a>(&'a self, which: usize, records: &[Experiment<'a>]) -> Vec<Experiment<'a>> {
-        self.outputs.as_ref().map_or_else(|| records.to_vec(), |outputs| with_outputs(records, &outputs[which]))
+        let Some(outputs) = &self.outputs else { return records.to_vec() };
+        records.iter().zip(&outputs[which]).map(|(e, y)| Experiment { y: y.as_ref(), ..*e }).collect()
     }
-}
 
-impl WithoutLines {
     /// The lines that were taken out, and their size over that of what is left of the outputs; `None` where there are none.
     pub(crate) fn evidence(&self, records: &[Experiment<'_>], ts: f64) -> Option<Evidence> {
         let [outputs, _] = self.outputs.as_ref()?;
         let (mut taken, mut left) = (0.0, 0.0);
         for (e, y) in records.iter().zip(outputs) {
             taken += (e.y - y).squared_norm_l2();
-            left += y.col_iter().map(|c| c.iter().map(|v| v * v).sum::<f64>()).sum::<f64>();
+            left += y.squared_norm_l2();
         }
         let mut hz: Vec<f64> = self.lines.iter().map(|line| line.mask.middle / ts).collect();
         hz.sort_by(f64::total_cmp);
@@ -107,10 +105,6 @@ impl WithoutLines {
         let note = format!("taken out of the outputs at {} Hz{more}", listed.join(", "));
         Some(Evidence::new(question, (taken / left.max(TINY)).sqrt(), LARGEST_LINE).reported().noted(note))
     }
-}
-
-fn with_outputs<'a>(records: &[Experiment<'a>], outputs: &'a [Mat<f64>]) -> Vec<Experiment<'a>> {
-    records.iter().zip(outputs).map(|(e, y)| Experiment { y: y.as_ref(), ..*e }).collect()
 }
 
 /// The model that records support, and what it takes out of them.
@@ -134,19 +128,25 @@ fn less_lines(
     let narrow = Narrow::of(&now.problem(all, &clean), now)?;
     let choice = &now.solution.chosen;
     let delays = &choice.delays;
+    let residuals = [(0, all.experiments), (1, fresh)].map(|(k, records)| {
+        let clean = now.records(k, records);
+        narrow.residuals(&now.problem(all, &clean), choice, records)
+    });
+    let lowest = narrow.turns.iter().copied().fold(f64::INFINITY, f64::min);
     for (changes, lines) in SHAPES {
-        let lowest = narrow.turns.iter().copied().fold(f64::INFINITY, f64::min);
         if lines / narrow.longest > WIDEST * lowest {
             break;
         }
         let mut taken = now.lines.clone();
         narrow.turns.iter().for_each(|middle| beside(&mut taken, *middle, (changes, lines / narrow.longest)));
-        let lines = taken;
-        let outputs = [(0, all.experiments), (1, fresh)].map(|(k, records)| {
-            let clean = now.records(k, records);
-            narrow.outputs_without(&lines, &now.problem(all, &clean), now, records)
+        let outputs = [(all.experiments, &residuals[0]), (fresh, &residuals[1])].map(|(records, residuals)| {
+            let of = |(e, left): (&Experiment<'_>, &Option<Mat<f64>>)| match left {
+                Some(left) => e.y - disturbance(left, e.y.nrows(), &taken),
+                None => e.y.to_owned(),
+            };
+            records.iter().zip(residuals).map(of).collect()
         });
-        let mut next = WithoutLines { solution: now.solution.clone(), lines, outputs: Some(outputs) };
+        let mut next = WithoutLines { solution: now.solution.clone(), lines: taken, outputs: Some(outputs) };
         let records = next.records(0, all.experiments);
         let problem = next.problem(all, &records);
         let spectra = Arc::new(problem.spectra(delays));
@@ -238,16 +238,9 @@ impl Narrow {
         (!places.is_empty()).then_some(Narrow { model, places, turns, longest })
     }
 
-    /// Outputs of some records less the lines of what the other modes leave of them. The ends of the records are those of the outputs as they
-    /// are without earlier lines (`clean`).
-    fn outputs_without(
-        &self,
-        lines: &[Line],
-        clean: &Problem<'_>,
-        now: &WithoutLines,
-        records: &[Experiment<'_>],
-    ) -> Vec<Mat<f64>> {
-        let choice = &now.solution.chosen;
+    /// What the other modes leave of the outputs of some records, samples x p behind the first that are skipped; `None` for a record that has no
+    /// lines. The ends of the records are those of the outputs as they are without earlier lines (`clean`).
+    fn residuals(&self, clean: &Problem<'_>, choice: &Choice, records: &[Experiment<'_>]) -> Vec<Option<Mat<f64>>> {
         let whole = with_best_ends(&clean.spectra(&choice.delays), self.model.clone(), &choice.found.noise);
         let mut first = 0;
         let mut left_out = Vec::new();
@@ -260,38 +253,47 @@ impl Narrow {
         let kept = |t: &Vec<f64>| (0..t.len()).filter(|i| !left_out.contains(i)).map(|i| t[i]).collect();
         let point = Point { model: self.model.without(&self.places), ends: whole.ends.iter().map(kept).collect() };
         let mut residuals = point.residuals(&clean.spectra_of(records, &choice.delays)).into_iter();
-        let of = |e: &Experiment<'_>| match long_enough(e.u.nrows(), clean.skip).then(|| residuals.next()).flatten() {
-            Some(v) => e.y - disturbance(clean, &v, e.y.nrows(), lines),
-            None => e.y.to_owned(),
+        let of = |e: &Experiment<'_>| {
+            let rows = e.y.nrows();
+            let v = long_enough(rows, clean.skip).then(|| residuals.next()).flatten()?;
+            Some(in_time(&v, rows - clean.skip, &clean.sizes.y))
         };
         records.iter().map(of).collect()
     }
 }
 
-/// The lines of a residual by least squares, over all samples of its record.
-fn disturbance(problem: &Problem<'_>, v: &[c64], rows: usize, lines: &[Line]) -> Mat<f64> {
-    let (p, samples) = (problem.outputs(), rows - problem.skip);
+/// A signal in time, samples x channels of some sizes, from its lines.
+fn in_time(v: &[c64], samples: usize, sizes: &[f64]) -> Mat<f64> {
+    let p = sizes.len();
     let back = FftPlanner::new().plan_fft_inverse(samples);
-    let mut left = Mat::<f64>::zeros(samples, p);
-    for i in 0..p {
+    let mut out = Mat::<f64>::zeros(samples, p);
+    for (i, size) in sizes.iter().enumerate() {
         let mut work = vec![c64::ZERO; samples];
         for k in 1..=v.len() / p {
             work[k] = v[(k - 1) * p + i];
             work[samples - k] = work[k].conj();
         }
         back.process(&mut work);
-        let size = problem.sizes.y[i] / (samples as f64).sqrt();
-        (0..samples).for_each(|t| left[(t, i)] = work[t].re * size);
+        let size = size / (samples as f64).sqrt();
+        (0..samples).for_each(|t| out[(t, i)] = work[t].re * size);
     }
-    let mut all = Mat::<f64>::zeros(rows, p);
+    out
+}
+
+/// Disturbances by least squares from what is left of the last samples of a record, over all its rows.
+fn disturbance(residual: &Mat<f64>, rows: usize, lines: &[Line]) -> Mat<f64> {
+    let (mut left, samples) = (residual.clone(), residual.nrows());
+    let mut all = Mat::<f64>::zeros(rows, residual.ncols());
     for Line { mask, changes } in (0..SWEEPS).flat_map(|_| lines) {
+        // A short record determines no more.
+        let changes = (*changes).min(samples / SAMPLES_PER_CHANGE).max(1);
         let shapes = Mat::from_fn(rows, 2 * changes, |t, c| {
             let (sin, cos) = (TAU * (mask.middle * t as f64).fract()).sin_cos();
             let slow = (PI * (c / 2 * t) as f64 / rows as f64).cos();
             slow * if c % 2 == 0 { cos } else { sin }
         });
-        let line = &shapes * shapes.subrows(problem.skip, samples).qr().solve_lstsq(&left);
-        left -= line.subrows(problem.skip, samples);
+        let line = &shapes * shapes.subrows(rows - samples, samples).qr().solve_lstsq(&left);
+        left -= line.subrows(rows - samples, samples);
         all += line;
     }
     all

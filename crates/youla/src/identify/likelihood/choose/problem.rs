@@ -44,6 +44,11 @@ pub(crate) struct Choice {
 }
 
 impl Choice {
+    /// Whether the feedback stabilises it, as far as one explains the log.
+    pub(crate) fn stabilised(&self) -> bool {
+        self.criterion < 0.5 * UNSTABLE
+    }
+
     /// States without those of the delays.
     pub(crate) fn order(&self) -> usize {
         self.found.point.model.order()
@@ -147,7 +152,7 @@ impl Problem<'_> {
     /// What is added to the criterion of a model that the feedback does not stabilise, so that any other comes before it.
     ///
     /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`.
-    pub(crate) fn instability(&self, choice: &Choice) -> f64 {
+    fn instability(&self, choice: &Choice) -> f64 {
         let unstable = |k: &StateSpace<Discrete>| {
             let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
             let (own, of_loop) =
@@ -160,6 +165,13 @@ impl Problem<'_> {
             Some(true) => UNSTABLE,
             _ => 0.0,
         }
+    }
+
+    /// What a search found on so many samples.
+    pub(crate) fn choice(&self, found: Found, samples: usize, delays: Vec<usize>, origin: String) -> Choice {
+        let criterion = found.criterion(samples);
+        let choice = Choice { found, delays, criterion, origin };
+        Choice { criterion: criterion + self.instability(&choice), ..choice }
     }
 
     /// A search on every n-th line, about [`SEARCHED`] in all.
@@ -196,9 +208,7 @@ impl Problem<'_> {
         let searched = |task: Task| {
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
             let found = search(&task.spectra, task.start, &options)?;
-            let criterion = found.criterion(task.spectra.samples());
-            let choice = Choice { found, delays: task.delays, criterion, origin: task.origin };
-            Some(Choice { criterion: criterion + self.instability(&choice), ..choice })
+            Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
         };
         let tasks = self.promising_tasks(tasks);
         let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
@@ -215,9 +225,9 @@ impl Candidate {
             dead_time: choice.delays.clone(),
             order: choice.order(),
             deviance: choice.found.deviance,
-            criterion: if choice.criterion < 0.5 * UNSTABLE { choice.criterion } else { choice.criterion - UNSTABLE },
+            criterion: if choice.stabilised() { choice.criterion } else { choice.criterion - UNSTABLE },
             steps: choice.found.steps,
-            stabilised: choice.criterion < 0.5 * UNSTABLE,
+            stabilised: choice.stabilised(),
         }
     }
 }

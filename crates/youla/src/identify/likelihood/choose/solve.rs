@@ -68,9 +68,8 @@ impl Problem<'_> {
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
         if let Some(found) = search(&spectra, chosen.found.point.clone(), &last.options(40, 0.01, &chosen.delays)) {
-            let criterion = found.criterion(spectra.samples());
-            let last = Choice { found, criterion, ..chosen.clone() };
-            if self.instability(&last) <= self.instability(&chosen) {
+            let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
+            if last.stabilised() || !chosen.stabilised() {
                 chosen = last;
             }
         }
@@ -196,9 +195,7 @@ impl Problem<'_> {
         let on_some = whole.on_some_lines(&spectra, chosen.found.point.model, &options)?;
         let start = with_best_ends(&spectra, on_some.point.model, &on_some.noise);
         let found = search(&spectra, start, &options)?;
-        let criterion = found.criterion(spectra.samples());
-        let choice = Choice { found, criterion, origin: "first part of the records".into(), delays: chosen.delays };
-        Some(Choice { criterion: criterion + self.instability(&choice), ..choice })
+        Some(self.choice(found, spectra.samples(), chosen.delays, "first part of the records".into()))
     }
 }
 

@@ -10,15 +10,15 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use youla::identify::likelihood::{Experiment, LikelihoodOptions, Predictor, Recommendation, recommend};
+use youla::identify::likelihood::{Predictor, Recommendation};
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
+use youla_loop::redesign;
 use youla_twin::RunningLoop;
 
-/// Rehearsals, and stretches of the record that are identified each for itself.
+/// Rehearsals.
 const REHEARSALS: usize = 12;
-const STRETCHES: usize = 6;
 /// Relative standard deviation of a measured damping by what the linear model does not hold. On the twin the scatter over seeds is 1.8 %
 /// with the hysteresis of its valves and 0.6 % without, as rehearsed.
 const UNMODELLED: f64 = 0.015;
@@ -63,7 +63,7 @@ pub(crate) fn predict(
         .collect();
     let measured: Vec<f64> = measured.into_iter().collect::<Result<_>>()?;
     let (mean, spread) = moments(&measured);
-    let of_model = model_deviation(model, new, rows, sizes);
+    let of_model = model_deviation(model, new, sizes)?;
     // A further measurement beside the mean of the rehearsals, the error of the model, and what it does not hold.
     let of_rest = UNMODELLED * state.damping;
     let deviation =
@@ -78,7 +78,7 @@ pub(crate) fn predict(
 pub(crate) fn on_model(
     plant: &StateSpace<Discrete>,
     controller: &StateSpace<Discrete>,
-) -> Result<StateSpace<Discrete>> {
+) -> youla::Result<StateSpace<Discrete>> {
     let ports = youla::control::with_input_port(controller)?;
     let closed = youla::control::closed_loop(plant, &ports)?;
     let (m, p) = (plant.inputs(), plant.outputs());
@@ -111,24 +111,14 @@ fn rehearsed(noisy: &StateSpace<Discrete>, v: MatRef<'_, f64>, covariance: &Mat<
     Ok(simulate(noisy, signals.as_ref(), &vec![0.0; noisy.order()])?)
 }
 
-/// Standard deviation of the predicted damping by the error of the model: stretches of the record identified each for itself, with the
-/// order of the whole. Infinite where a stretch gives no stable loop.
-fn model_deviation(model: &Recommendation, new: &NewLoop, rows: &CleanRows, sizes: Sizes<'_>) -> f64 {
-    let options = LikelihoodOptions {
-        order: Some(model.order),
-        dead_time: Some(model.dead_time.clone()),
-        ..LikelihoodOptions::default()
+/// Standard deviation of the predicted damping by the error of the model, over the region of the model.
+fn model_deviation(model: &Recommendation, new: &NewLoop, sizes: Sizes<'_>) -> Result<f64> {
+    let damping = |plant: &StateSpace<Discrete>| {
+        let response = on_model(plant, &new.controller)?.in_units(sizes.input, sizes.output);
+        Ok(vec![redesign::least_damping(&redesign::loop_modes(&response)?)])
     };
-    let length = rows.y.nrows() / STRETCHES;
-    let damping = |stretch: usize| -> Result<f64> {
-        let part = |m: &Mat<f64>| m.subrows(stretch * length, length).to_owned();
-        let (u, y) = (part(&rows.u), part(&rows.y));
-        let time = new.controller.time();
-        let found = recommend(&[Experiment::new(u.as_ref(), y.as_ref())], &[], None, time, &options)?;
-        least_damping(&on_model(&found.plant, &new.controller)?.in_units(sizes.input, sizes.output))
-    };
-    let found: Result<Vec<f64>> = (0..STRETCHES).into_par_iter().map(damping).collect();
-    found.map_or(f64::INFINITY, |all| moments(&all).1 / (STRETCHES as f64).sqrt())
+    let intervals = model.region.intervals(LEVEL, damping)?;
+    Ok(intervals.iter().map(|damping| damping.deviation).sum())
 }
 
 /// Mean and standard deviation.

@@ -54,7 +54,7 @@ impl LoopFigures {
 ///
 /// # Errors
 /// As [`StateSpace::shared_modes`].
-pub fn loop_modes(response: &StateSpace<Discrete>) -> Result<Vec<SharedMode>> {
+pub fn loop_modes(response: &StateSpace<Discrete>) -> youla::Result<Vec<SharedMode>> {
     let nyquist = 0.5 / response.time().ts();
     let mut modes = response.shared_modes()?;
     modes.retain(|m| m.mode.hz <= nyquist);

@@ -22,7 +22,7 @@ const INDISTINCT: f64 = 8.0;
 /// Difference of the criterion up to which a model with fewer states may owe it to a wrong dead time. Two samples cost 23 with
 /// 12 000 samples of 10 dB; distinctly wrong orders cost hundreds.
 const WRONG_DELAY: f64 = 60.0;
-/// Differences of the criterion up to which a model counts beside the best: weights of e^-6.
+/// Differences of the criterion of rivals up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 
 fn best(tried: &[Choice]) -> Option<&Choice> {
@@ -44,7 +44,13 @@ impl Problem<'_> {
         let samples = self.samples().0;
         let rounds = if samples > LONG { 1 } else { ROUNDS };
         let now = best(&tried)?.found.feedthrough;
-        let mut at = self.with_feedthrough(now).improved(&mut tried, rounds, table)?;
+        let here = self.with_feedthrough(now);
+        let mut at = here.improved(&mut tried, rounds, table)?;
+        // Searched to the end: rivals count by what they reach.
+        tried.extend(here.run(here.apart(&at), f64::INFINITY, table));
+        if best(&tried)?.criterion < at.criterion {
+            at = here.improved(&mut tried, rounds, table)?;
+        }
         if self.direct.is_some() && !now {
             let wider = self.with_feedthrough(true);
             // a dead time that the record does not tell from none hides what acts in the same sample
@@ -73,8 +79,8 @@ impl Problem<'_> {
                 chosen = last;
             }
         }
-        let least = best(&tried)?.criterion;
-        let rivals = tried.into_iter().filter(|c| c.criterion <= least + BESIDE).collect();
+        let least = tried.iter().map(|c| c.as_rival(samples)).fold(f64::INFINITY, f64::min);
+        let rivals = tried.into_iter().filter(|c| c.as_rival(samples) <= least + BESIDE).collect();
         Some(Solution { chosen, rivals, samples })
     }
 

@@ -4,14 +4,16 @@
 //! ```text
 //! var G = slopes (J'J)^-1 slopes^* + sum of w_c |G_c - G|^2,     w_c ~ exp(-criterion / 2)
 //! ```
-//! The weights are those of Schwarz's criterion, which approximates the posterior probability of a model.
+//! The weights are those of Schwarz's criterion, which approximates the posterior probability of a model, with Akaike's penalty for lags
+//! (Burnham and Anderson, Model selection and multimodel inference, section 2.9): with Schwarz's, 95 % intervals of a 2 x 2 plant of four lags
+//! under slow noise held 60 %, as two poles for four were the better choice, and wrong.
 
 pub(crate) mod innovation;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
 
-use crate::identify::likelihood::choose::problem::Solution;
+use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
@@ -108,7 +110,8 @@ impl Directions {
         let linearised = linearise(spectra, &found.point, &chart, &found.noise);
         let root = inverse_root(&linearised.factor, chart.parameters()) * faer::Scale(scatter.sqrt());
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
-        let rivals = solution.rivals.iter().map(|c| (c.found.point.model.clone(), c.delays.clone(), c.criterion));
+        let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
+        let rivals = solution.rivals.iter().map(of);
         Directions { witness, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
     }
 

@@ -45,6 +45,6 @@ impl LoopState {
 ///
 /// # Errors
 /// [`youla::Error::Unstable`].
-pub(crate) fn least_damping(response: &StateSpace<Discrete>) -> Result<f64> {
+pub(crate) fn least_damping(response: &StateSpace<Discrete>) -> youla::Result<f64> {
     Ok(redesign::least_damping(&redesign::loop_modes(response)?))
 }

@@ -14,7 +14,6 @@ use youla::identify::likelihood::{Predictor, Recommendation};
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
-use youla_loop::redesign;
 use youla_twin::RunningLoop;
 
 /// Rehearsals.
@@ -58,7 +57,8 @@ pub(crate) fn predict(
         .into_par_iter()
         .map(|seed| {
             let y = rehearsed(&noisy, v.as_ref(), &model.predictor.covariance, seed)?;
-            least_damping(&response_to(v.as_ref(), y.as_ref(), noisy.time())?.in_units(sizes.input, sizes.output))
+            let measured = response_to(v.as_ref(), y.as_ref(), noisy.time())?.in_units(sizes.input, sizes.output);
+            Ok(least_damping(&measured)?)
         })
         .collect();
     let measured: Vec<f64> = measured.into_iter().collect::<Result<_>>()?;
@@ -114,11 +114,10 @@ fn rehearsed(noisy: &StateSpace<Discrete>, v: MatRef<'_, f64>, covariance: &Mat<
 /// Standard deviation of the predicted damping by the error of the model, over the region of the model.
 fn model_deviation(model: &Recommendation, new: &NewLoop, sizes: Sizes<'_>) -> Result<f64> {
     let damping = |plant: &StateSpace<Discrete>| {
-        let response = on_model(plant, &new.controller)?.in_units(sizes.input, sizes.output);
-        Ok(vec![redesign::least_damping(&redesign::loop_modes(&response)?)])
+        Ok(vec![least_damping(&on_model(plant, &new.controller)?.in_units(sizes.input, sizes.output))?])
     };
     let intervals = model.region.intervals(LEVEL, damping)?;
-    Ok(intervals.iter().map(|damping| damping.deviation).sum())
+    Ok(intervals.first().map_or(f64::INFINITY, |damping| damping.deviation))
 }
 
 /// Mean and standard deviation.

@@ -54,6 +54,9 @@ fn with_own_poles(model: &Model, ratio: f64) -> Option<Model> {
     let (m, p) = (model.inputs, model.outputs);
     let by_output = m == 1 || (2..=m).contains(&p);
     let copies = if by_output { p } else { m };
+    if copies < 2 || model.blocks.iter().all(|block| block.states > 1) {
+        return None;
+    }
     let of_real = |block: &Block| -> Vec<Block> {
         let copy = |k: usize| {
             let (b, c): (Vec<f64>, Vec<f64>) = if by_output {
@@ -66,8 +69,7 @@ fn with_own_poles(model: &Model, ratio: f64) -> Option<Model> {
         };
         if block.states == 1 { (0..copies).map(copy).collect() } else { vec![block.clone()] }
     };
-    let blocks: Vec<Block> = model.blocks.iter().flat_map(of_real).collect();
-    (blocks.len() > model.blocks.len()).then(|| Model { blocks, ..model.clone() })
+    Some(Model { blocks: model.blocks.iter().flat_map(of_real).collect(), ..model.clone() })
 }
 
 /// The lines for other delays.

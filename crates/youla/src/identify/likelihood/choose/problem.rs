@@ -49,22 +49,25 @@ impl Choice {
         self.criterion < 0.5 * UNSTABLE
     }
 
-    /// The criterion by which it counts beside the chosen model: for the states of lags, damping ratio 0.7 and more, Akaike's two per parameter.
-    ///
-    /// Schwarz's criterion, which chooses, takes lags that are hardly seen for none rather than for wrong ones; whether they are there is for
-    /// Akaike's to say. Of oscillating modes the best of all frequencies is tried, of which one always gains more than two per parameter: with
-    /// Akaike's for all states 5 of 28 good models were refused for poles that are not there.
+    /// The criterion by which it counts beside the chosen model.
     pub(crate) fn as_rival(&self, samples: usize) -> f64 {
-        let model = &self.found.point.model;
-        let lags = model.poles().iter().filter(|pole| -pole.norm().ln() >= pole.arg().abs()).count();
-        let per_state = (model.inputs + model.outputs) as f64;
-        self.criterion - ((samples.max(2) as f64).ln() - 2.0) * per_state * lags as f64
+        self.criterion - credit_of_lags(&self.found.point.model, samples)
     }
 
     /// States without those of the delays.
     pub(crate) fn order(&self) -> usize {
         self.found.point.model.order()
     }
+}
+
+/// What Akaike's criterion takes off that of Schwarz for the states of lags: damping ratio 0.7 and more on either side of the unit circle.
+///
+/// Schwarz's criterion, which chooses, takes lags that are hardly seen for none rather than for wrong ones; whether they are there is for
+/// Akaike's to say. Of oscillating modes the best of all frequencies is tried, of which one always gains more than two per parameter: with
+/// Akaike's for all states 5 of 28 good models were refused for poles that are not there.
+pub(crate) fn credit_of_lags(model: &Model, samples: usize) -> f64 {
+    let lags = model.poles().iter().filter(|pole| pole.norm().ln().abs() >= pole.arg().abs()).count();
+    ((samples.max(2) as f64).ln() - 2.0) * ((model.inputs + model.outputs) * lags) as f64
 }
 
 /// The chosen model and those that the data do not tell from it.

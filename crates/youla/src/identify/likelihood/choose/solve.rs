@@ -2,7 +2,7 @@
 //! criterion falls.
 
 use super::dead_time::dead_times;
-use super::problem::{Choice, LONG, Problem, Solution, Task};
+use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
@@ -46,8 +46,9 @@ impl Problem<'_> {
         let now = best(&tried)?.found.feedthrough;
         let here = self.with_feedthrough(now);
         let mut at = here.improved(&mut tried, rounds, table)?;
-        // Searched to the end: rivals count by what they reach.
-        tried.extend(here.run(here.apart(&at), f64::INFINITY, table));
+        let tasks = here.apart(&at);
+        let credit = tasks.iter().map(|task| credit_of_lags(&task.start.model, samples)).fold(0.0, f64::max);
+        tried.extend(here.run(tasks, at.as_rival(samples) + BESIDE + credit, table));
         if best(&tried)?.criterion < at.criterion {
             at = here.improved(&mut tried, rounds, table)?;
         }

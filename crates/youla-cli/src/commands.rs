@@ -6,10 +6,10 @@ use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
 use crate::{check, commission, compare, excite, export, init, paper, plot, rig, table};
 use std::path::Path;
-use youla_io::folder::{NumberedFolder, RunFolder};
+use youla_io::folder::RunFolder;
 use youla_run::{
     RunRecords, RunSettings, Stage, StageClock, factorise_run, identify, read_records, redraw, settings_schema,
-    signal_records, write_run, write_signals,
+    signal_records, write_into, write_signals,
 };
 
 /// Runs the verb that was asked for; false where a check found a defect or a campaign stopped.
@@ -53,13 +53,11 @@ fn identify_and_write(
     settings: RunSettings,
     read: impl FnOnce(&RunSettings) -> youla_run::Result<RunRecords>,
 ) -> Result<(), Failure> {
-    // Made before the computation, so that two runs at once have numbers of their own.
-    let numbered = match &output.out {
-        Some(_) => None,
-        None => Some(NumberedFolder::claim(Path::new("."), &settings.name)?),
+    // Claimed before the computation, so that of two runs at once none removes the result of the other.
+    let place = match &output.out {
+        Some(target) => RunFolder::create(target, output.force)?,
+        None => RunFolder::numbered(Path::new(""), &settings.name)?,
     };
-    let target = output.out.as_deref().or(numbered.as_ref().map(NumberedFolder::path)).unwrap_or(Path::new("run"));
-    RunFolder::check(target, output.force)?;
     let progress = Progress::new(form.is_silent());
     let mut announce = |stage: Stage| {
         progress.show(&format!("[{}/{}] {}", stage as usize + 1, Stage::COUNT, stage.name()));
@@ -67,7 +65,7 @@ fn identify_and_write(
     let mut clock = StageClock::new(&mut announce);
     let records = clock.run(Stage::Record, || read(&settings))?;
     let found = identify(settings, records, folder, &mut clock)?;
-    let written = write_run(&found, target, output.force, &mut clock)?;
+    let written = write_into(&found, place, &mut clock)?;
     progress.clear();
     form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))
 }

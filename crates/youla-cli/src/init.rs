@@ -6,6 +6,7 @@ use crate::output::{Failure, Form, ask_line, say};
 use clap::Args;
 use std::io::IsTerminal;
 use std::path::{Path, PathBuf};
+use youla::error::short;
 use youla_io::{ChannelRef, SurveyedColumn, survey};
 use youla_run::{Draft, DraftClock, Feedback, path_from};
 
@@ -196,9 +197,10 @@ fn read_name(text: &str) -> ChannelRef {
 
 /// The columns with their range.
 fn table(columns: &[SurveyedColumn]) -> String {
-    let width = columns.iter().map(|c| c.from.chars().count()).max().unwrap_or(0).max(6);
+    let names: Vec<String> = columns.iter().map(|c| short(&c.from)).collect();
+    let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(6);
     let mut text = format!("{:width$}  {:>9}  {:>12}  {:>12}\n", "column", "rows", "lowest", "highest");
-    for SurveyedColumn { from, content } in columns {
+    for (from, SurveyedColumn { content, .. }) in names.iter().zip(columns) {
         match content {
             Ok(c) => {
                 let clock = c.step.map_or(String::new(), |step| format!("  even steps of {step:.6e}: a clock?"));

@@ -109,7 +109,7 @@ pub(crate) fn say(text: &str) -> Result<(), Failure> {
 
 /// Prints a file that a command has written.
 pub(crate) fn say_file(path: &Path) -> Result<(), Failure> {
-    say(std::fs::read_to_string(path).map_err(|e| Failure::io(path, e))?.trim_end())
+    say(youla_io::read_text(path)?.trim_end())
 }
 
 fn print(text: &str) -> Result<(), Failure> {

@@ -2,13 +2,14 @@
 
 use crate::terminal;
 use std::fmt::Write;
+use youla::error::short;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
 use youla_run::{Identification, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
-    let mut text = format!("{}\n", found.settings.name);
+    let mut text = format!("{}\n", short(&found.settings.name));
     if let Ok(model) = &found.recommended {
         text += &format!("{}\n", model.sentence());
         model.reasons().iter().for_each(|reason| text += &format!("  {reason}\n"));
@@ -66,7 +67,7 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
                 _ => format!("{fit:.2}"),
             };
             let fits = models.iter().map(|v| percent(v.records[k].fit[i])).collect();
-            rows.push(row(&format!("{}, {}", record.name, output.name), fits));
+            rows.push(row(&format!("{}, {}", short(&record.name), short(&output.name)), fits));
         }
     }
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
@@ -125,9 +126,11 @@ pub(crate) fn aligned(rows: &[Vec<String>]) -> String {
     let widths: Vec<usize> = (0..columns).map(width).collect();
     let mut text = String::new();
     for row in rows {
-        let _ = write!(text, "{:<w$}", row[0], w = widths[0]);
+        // Not by the width of a format, which ends at 65535.
+        let blanks = |cell: &str, w: usize| " ".repeat(w - cell.chars().count());
+        text += &format!("{}{}", row[0], blanks(&row[0], widths[0]));
         for (cell, w) in row.iter().zip(&widths).skip(1) {
-            let _ = write!(text, "  {cell:>w$}");
+            text += &format!("  {}{cell}", blanks(cell, *w));
         }
         text.push('\n');
     }
@@ -140,6 +143,14 @@ mod tests {
 
     fn table(cells: &[&[&str]]) -> Vec<Vec<String>> {
         cells.iter().map(|row| row.iter().map(|cell| (*cell).to_owned()).collect()).collect()
+    }
+
+    /// A format ends in a panic there.
+    #[test]
+    fn names_may_be_longer_than_the_width_of_a_format() {
+        let long = "x".repeat(70_000);
+        let text = aligned(&table(&[&["a", "1"], &[&long, "2"]]));
+        assert_eq!(text.lines().map(str::len).collect::<Vec<_>>(), [70_003; 2]);
     }
 
     #[test]

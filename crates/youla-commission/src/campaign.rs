@@ -86,8 +86,7 @@ impl Campaign {
     /// # Errors
     /// [`youla_io::Error::Settings`] with line and key; [`Error::Campaign`] for a value out of its range.
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_text(path)?;
         Self::parse(&text, path)
     }
 

@@ -39,7 +39,7 @@ impl QTable {
     /// # Errors
     /// [`Error::Campaign`] for a file that is no such table; [`youla_io::Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path).map_err(|source| crate::record::io(path, source))?;
+        let text = youla_io::read_text(path)?;
         Self::parse(&text, path)
     }
 

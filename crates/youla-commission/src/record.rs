@@ -184,9 +184,9 @@ impl CampaignSummary {
 /// # Errors
 /// [`youla_io::Error::Io`]; [`Error::Campaign`] for a file that does not hold it.
 pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<Option<T>> {
-    let text = match fs::read_to_string(path) {
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => return Ok(None),
-        other => other.map_err(|source| io(path, source))?,
+    let text = match youla_io::read_text(path) {
+        Err(youla_io::Error::MissingFile { .. }) => return Ok(None),
+        other => other?,
     };
     serde_json::from_str(&text).map(Some).map_err(|e| Error::Campaign {
         path: path.to_owned(),

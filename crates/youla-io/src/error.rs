@@ -1,7 +1,7 @@
 //! The errors of reading and writing files.
 
 use std::path::PathBuf;
-use youla::error::Seconds;
+use youla::error::{Seconds, short};
 
 /// Result of every fallible function of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -36,6 +36,14 @@ pub enum Error {
     OutputExists {
         /// The folder.
         path: PathBuf,
+    },
+    /// Another run writes the same folder.
+    #[error("{} is being written by another run, in {}; wait for it or choose another --out, and remove that folder if no run is left", path.display(), partial.display())]
+    BeingWritten {
+        /// The folder.
+        path: PathBuf,
+        /// Where the other run writes.
+        partial: PathBuf,
     },
     /// The output folder is not a run that may be replaced.
     #[error("{} is not replaced: {problem}; choose another output folder, or move what is there", path.display())]
@@ -104,7 +112,7 @@ pub enum Error {
         problem: &'static str,
     },
     /// A cell of a text file is not a finite number.
-    #[error("{}, line {line}, column {column}: {text:?} is not a finite number{}", path.display(), cell_remedy(text, *decimal))]
+    #[error("{}, line {line}, column {}: {text:?} is not a finite number{}", path.display(), short(column), cell_remedy(text, *decimal))]
     Cell {
         /// The file.
         path: PathBuf,
@@ -158,7 +166,7 @@ pub enum Error {
         remedy: &'static str,
     },
     /// The channels of one record have different lengths.
-    #[error("{what}: channel {channel:?} has {found} samples, the channels before it have {expected}")]
+    #[error("{what}: channel {:?} has {found} samples, the channels before it have {expected}", short(channel))]
     UnequalLength {
         /// The record or file.
         what: String,
@@ -170,7 +178,7 @@ pub enum Error {
         expected: usize,
     },
     /// A variable of a file has the wrong type or size, or cannot be written.
-    #[error("{}: {name} is {found}, but must be {must}", path.display())]
+    #[error("{}: {} is {}, but must be {must}", path.display(), short(name), short(found))]
     WrongVariable {
         /// The file.
         path: PathBuf,
@@ -221,7 +229,7 @@ pub enum Error {
 youla::error_context! {
     sources: Method;
     numerical: Json;
-    bad_input: Settings OutputExists NotReplaced Unwritable FileExists NotAModel NotAResponse Io MissingFile NoData Cell FieldCount
+    bad_input: Settings OutputExists BeingWritten NotReplaced Unwritable FileExists NotAModel NotAResponse Io MissingFile NoData Cell FieldCount
         Delimiter Corrupt
         FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit SampleTimeMissing;
 }

@@ -1,6 +1,7 @@
 //! The run folder: written beside its final place and renamed when whole, so that nothing half-written looks finished.
 
 use crate::error::{Error, Result};
+use crate::open::{open, read_text};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::fs;
@@ -19,6 +20,7 @@ pub struct RunFolder {
     partial: PathBuf,
     /// Folders above that did not exist before, innermost first.
     parents: Vec<PathBuf>,
+    replace: bool,
     lock: Option<fs::File>,
     finished: bool,
 }
@@ -48,26 +50,56 @@ impl RunFolder {
         }
     }
 
-    /// Begins a folder that will be `target`, under the conditions of [`RunFolder::check`]. What a killed program left of the same
-    /// folder is removed.
+    /// Begins a folder that will be `target`, under the conditions of [`RunFolder::check`]; until it is finished or dropped no other
+    /// run can begin the same. What a killed program left of it is removed.
     ///
     /// # Errors
-    /// Those of [`RunFolder::check`].
+    /// Those of [`RunFolder::check`]; [`Error::BeingWritten`].
     pub fn create(target: &Path, replace: bool) -> Result<Self> {
         Self::check_free(target, replace)?;
         let name = target.file_name().map_or_else(|| "run".into(), |n| n.to_string_lossy().into_owned());
         let prefix = format!(".{name}.partial-");
-        remove_left_over(target.parent().unwrap_or(Path::new("")), &prefix);
+        let taken = |partial: PathBuf| Error::BeingWritten { path: target.to_owned(), partial };
+        if let Some(partial) = remove_left_over(target.parent().unwrap_or(Path::new("")), &prefix) {
+            return Err(taken(partial));
+        }
         let partial = target.with_file_name(format!("{prefix}{}", std::process::id()));
         let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
         let parents = target.ancestors().skip(1).take_while(new).map(Path::to_owned).collect();
         let io = |source| Error::Unwritable { path: target.to_owned(), source };
-        let mut folder = RunFolder { target: target.to_owned(), partial, parents, lock: None, finished: false };
-        fs::create_dir_all(&folder.partial).map_err(io)?;
+        let mut folder =
+            RunFolder { target: target.to_owned(), partial, parents, replace, lock: None, finished: false };
+        let above = folder.partial.parent().filter(|p| !p.as_os_str().is_empty());
+        let made = above.map_or(Ok(()), fs::create_dir_all).and_then(|()| fs::create_dir(&folder.partial));
+        if let Err(source) = made {
+            // It is another's: nothing of it is removed.
+            folder.finished = source.kind() == ErrorKind::AlreadyExists;
+            return Err(if folder.finished { taken(folder.partial.clone()) } else { io(source) });
+        }
         let lock = fs::File::create(folder.partial.join(LOCK)).map_err(io)?;
         // A file system without locks: then nothing is ever taken for left over.
         folder.lock = lock.try_lock().is_ok().then_some(lock);
         Ok(folder)
+    }
+
+    /// Begins the first folder `runs/<name>-<number>` below `parent` that is not there or empty and that no other run writes.
+    ///
+    /// # Errors
+    /// [`Error::Unwritable`] where it cannot be made.
+    pub fn numbered(parent: &Path, name: &str) -> Result<Self> {
+        let (runs, slug) = (parent.join("runs"), slug(name));
+        for k in 1..u32::MAX {
+            match Self::create(&runs.join(format!("{slug}-{k:03}")), false) {
+                Err(Error::OutputExists { .. } | Error::BeingWritten { .. }) => {}
+                other => return other,
+            }
+        }
+        Err(Error::OutputExists { path: runs })
+    }
+
+    /// Where it will be.
+    pub fn target(&self) -> &Path {
+        &self.target
     }
 
     /// Writes a file by `write`, which is called with its temporary path; creates its folder. Errors state the final path.
@@ -120,6 +152,7 @@ impl RunFolder {
     /// # Errors
     /// [`Error::Io`]; those of [`RunFolder::check`] where the place has changed since.
     pub fn finish(mut self) -> Result<PathBuf> {
+        Self::check_free(&self.target, self.replace)?;
         let io = |source| Error::Io { path: self.target.clone(), source };
         self.lock = None;
         fs::remove_file(self.partial.join(LOCK)).map_err(io)?;
@@ -175,7 +208,7 @@ fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
 fn own_files(folder: &Path) -> Result<Vec<PathBuf>> {
     let io = |source| Error::Io { path: folder.to_owned(), source };
     let refused = |problem: String| Error::NotReplaced { path: folder.to_owned(), problem };
-    let Ok(list) = fs::read_to_string(folder.join(FILES)) else {
+    let Ok(list) = read_text(&folder.join(FILES)) else {
         return Err(refused(format!("it has no {FILES}, which every run of this version writes")));
     };
     let listed: HashSet<PathBuf> = list.lines().chain([FILES]).map(PathBuf::from).collect();
@@ -198,17 +231,29 @@ fn remove_own(folder: &Path) -> Result<()> {
     Ok(())
 }
 
-/// Removes unfinished folders whose writer has ended without removing them. Best effort: they disturb nothing.
-fn remove_left_over(parent: &Path, prefix: &str) {
+/// Removes unfinished folders whose writer has ended without removing them, and returns one whose writer has not, or of which the
+/// system does not tell.
+fn remove_left_over(parent: &Path, prefix: &str) -> Option<PathBuf> {
     let parent = if parent.as_os_str().is_empty() { Path::new(".") } else { parent };
+    let mut written = None;
     for entry in fs::read_dir(parent).into_iter().flatten().flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
-        let number = name.strip_prefix(prefix).is_some_and(|rest| rest.parse::<u32>().is_ok());
-        let abandoned = || fs::File::open(entry.path().join(LOCK)).is_ok_and(|lock| lock.try_lock().is_ok());
-        if number && abandoned() {
-            let _ = fs::remove_dir_all(entry.path());
+        if name.strip_prefix(prefix).is_none_or(|rest| rest.parse::<u32>().is_err()) {
+            continue;
+        }
+        let abandoned = match open(&entry.path().join(LOCK)) {
+            Ok(lock) => lock.try_lock().is_ok(),
+            // Its writer is between two steps, or was killed there: a step takes far less than a minute.
+            Err(_) => {
+                entry.metadata().and_then(|m| m.modified()).is_ok_and(|t| t.elapsed().is_ok_and(|t| t.as_secs() > 60))
+            }
+        };
+        let removed = abandoned && fs::remove_dir_all(entry.path()).is_ok();
+        if !removed {
+            written = Some(entry.path());
         }
     }
+    written
 }
 
 /// Writes a text beside its final place and moves it there when whole; an older file stays until then.
@@ -252,7 +297,7 @@ pub fn require_place(path: &Path) -> Result<()> {
 /// [`Error::Io`].
 pub fn add_to_list(run: &Path, files: &[PathBuf]) -> Result<()> {
     let path = run.join(FILES);
-    let Ok(list) = fs::read_to_string(&path) else { return Ok(()) };
+    let Ok(list) = read_text(&path) else { return Ok(()) };
     let mut names: Vec<String> = list.lines().map(str::to_owned).collect();
     let inside = files.iter().filter_map(|file| file.strip_prefix(run).ok());
     for name in inside.map(|name| name.display().to_string()) {
@@ -304,47 +349,6 @@ pub fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<P
         files.iter().for_each(|(name, _)| drop(fs::remove_file(partial(name))));
         let _ = parents.iter().try_for_each(fs::remove_dir);
     })
-}
-
-/// A numbered folder that no other run can take. Dropped while it is empty, it is removed.
-#[derive(Debug)]
-pub struct NumberedFolder {
-    path: PathBuf,
-}
-
-impl NumberedFolder {
-    /// Makes the first folder `runs/<name>-<number>` below `parent` that does not exist yet.
-    ///
-    /// # Errors
-    /// [`Error::Io`] where it cannot be made.
-    pub fn claim(parent: &Path, name: &str) -> Result<Self> {
-        let (runs, slug) = (parent.join("runs"), slug(name));
-        fs::create_dir_all(&runs).map_err(|source| Error::Io { path: runs.clone(), source })?;
-        for k in 1..u32::MAX {
-            let path = runs.join(format!("{slug}-{k:03}"));
-            match fs::create_dir(&path) {
-                Ok(()) => return Ok(NumberedFolder { path }),
-                Err(e) if e.kind() == ErrorKind::AlreadyExists => {}
-                Err(source) => return Err(Error::Io { path, source }),
-            }
-        }
-        Err(Error::OutputExists { path: runs })
-    }
-
-    /// Where it is.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-}
-
-impl Drop for NumberedFolder {
-    fn drop(&mut self) {
-        // Only empty folders go.
-        let runs = self.path.parent().map(Path::to_owned);
-        if fs::remove_dir(&self.path).is_ok() {
-            let _ = runs.map(fs::remove_dir);
-        }
-    }
 }
 
 /// The name as part of a file name.

@@ -68,7 +68,7 @@ pub use matfile::{Packing, mat_from_bytes, read_mat, write_mat};
 pub use matrices::{Rows, SystemMatrices};
 pub use model_file::ModelFile;
 pub use npz::{npz_from_bytes, read_npz};
-pub use open::{open, read_text};
+pub use open::{open, read_bytes, read_text};
 pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};

@@ -21,6 +21,7 @@ use crate::time::TimeSource;
 use crate::uff::{UffKind, is_uff, read_uff58};
 use std::f64::consts::TAU;
 use std::path::Path;
+use youla::error::Names;
 use youla::identify::likelihood::{ResponseTable, ResponseVariance};
 use youla::lti::Discrete;
 use youla::signal::{Channel, Record};
@@ -177,7 +178,7 @@ impl Layout {
             "the columns hold no response; the plant has \"{output}/{input} re\" and \"{output}/{input} im\" for every output and input, the \
              loop \"{input}/{d} re\", \"{output}/{d} re\" and so on with the excitation that [data] names; abs or dB with deg instead of re \
              with im. The columns are {}",
-            columns.iter().map(|c| format!("{c:?}")).collect::<Vec<_>>().join(", ")
+            Names(columns)
         ))
     }
 

@@ -88,9 +88,10 @@ fn of_text(path: &Path, csv: &CsvOptions) -> Result<Vec<SurveyedColumn>> {
     // Another kind of file: its text is nobody's business.
     match columns.iter().any(|c| c.content.is_ok()) {
         true => Ok(columns),
-        false => {
-            Err(Error::NoData { path: path.to_owned(), problem: "no column of it holds numbers; this is not a log" })
-        }
+        false => Err(Error::NoData {
+            path: path.to_owned(),
+            problem: "no column of it holds numbers; for decimal commas add --decimal comma (csv = { decimal = \"comma\" } in [data]), put # before a line of units; else it is not a log",
+        }),
     }
 }
 
@@ -165,5 +166,20 @@ mod tests {
         assert_eq!(columns.iter().map(|c| c.from.as_str()).collect::<Vec<_>>(), ["x(:,1)", "x(:,2)"]);
         assert_eq!(columns[0].content.as_ref().unwrap().step, Some(1.0));
         assert_eq!(columns[1].content, Err("row 2 is not a finite number".into()));
+    }
+
+    /// A German log with a line of units: what mends it is said.
+    #[test]
+    fn decimal_commas_and_a_line_of_units_are_named() {
+        let file = scratch("csv");
+        let refused = |text: &str, csv: &CsvOptions| {
+            std::fs::write(file.path(), text).unwrap();
+            survey(file.path(), csv).map(|_| ()).map_err(|e| e.to_string())
+        };
+        let message = refused("t;u\n0,1;3,5\n0,2;4,5\n", &CsvOptions::default()).unwrap_err();
+        assert!(message.contains("--decimal comma") && message.contains("# before a line of units"), "{message}");
+        let comma = CsvOptions { decimal: crate::DecimalSign::Comma, ..CsvOptions::default() };
+        assert!(refused("t;u\ns;V\n0,1;3,5\n0,2;4,5\n", &comma).is_err());
+        assert_eq!(refused("t;u\n# s;V\n0,1;3,5\n0,2;4,5\n", &comma), Ok(()));
     }
 }

@@ -1,5 +1,6 @@
 //! The sample time of a file: declared, taken from a time column, or both, in which case they must agree.
 
+use crate::assemble::assemble;
 use crate::choose::ChannelRef;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
@@ -63,6 +64,15 @@ impl TimeSource {
     /// [`youla::Error::SampleTimeMismatch`] where column and declaration disagree.
     pub fn of_column(&self, what: &str, times: &[f64]) -> Result<Discrete> {
         Ok(self.resolve(what, Some(times))?.time)
+    }
+
+    /// A record cut and timed by a time column in memory, as a file is by a column of its own.
+    ///
+    /// # Errors
+    /// Those of [`TimeSource::of_column`].
+    pub fn cut(&self, record: &youla::signal::Record, times: &[f64]) -> Result<Vec<youla::signal::Record>> {
+        let columns: Vec<Vec<f64>> = record.columns().map(<[f64]>::to_vec).collect();
+        assemble(record.name(), record.channels().to_vec(), &columns, self.resolve(record.name(), Some(times))?)
     }
 
     /// Refuses a time column whose name states another unit than the second, as `t_ms`, `time [ms]` and `Time(us)` do: a sample time

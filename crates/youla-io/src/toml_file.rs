@@ -5,7 +5,7 @@ use crate::error::{Error, Result};
 use serde::de::DeserializeOwned;
 use std::path::Path;
 use toml::de::{DeTable, DeValue};
-use youla::error::misspelt;
+use youla::error::{misspelt, short};
 
 /// Reads the text of a settings file; `path` is named in errors.
 ///
@@ -30,14 +30,15 @@ fn in_words(error: &toml::de::Error, text: &str, path: &Path) -> Error {
 fn unknown_name(message: &str) -> Option<String> {
     let (unknown, nearest) = misspelt(message)?;
     let hint = nearest.map(|nearest| format!("; did you mean `{nearest}`?")).unwrap_or_default();
-    Some(format!("`{unknown}` is not known here{hint} ({message})"))
+    let listed = message.split_once("`, ").map_or(message, |(_, rest)| rest);
+    Some(format!("`{}` is not known here{hint} ({listed})", short(unknown)))
 }
 
 /// The dotted key of the value at this position of the text.
 fn key_at(text: &str, offset: usize) -> Option<String> {
     let document = DeTable::parse(text).ok()?;
     let keys = path_to(document.get_ref(), offset)?;
-    Some(keys.join("."))
+    Some(short(&keys.join(".")))
 }
 
 /// The keys that lead to the innermost value around `offset`. The span of a table under a header is its header, so that

@@ -66,13 +66,8 @@ pub fn is_uff(path: &Path) -> Result<bool> {
 /// [`Error::MissingFile`], [`Error::Io`]; [`Error::Corrupt`] with the line; [`Error::FormatNotRead`] for binary data and files above
 /// 256 MB; [`Error::NoData`] without a dataset 58.
 pub fn read_uff58(path: &Path) -> Result<Vec<UffFunction>> {
-    let mut bytes = Vec::new();
-    let read = open(path)?.take(LARGEST + 1).read_to_end(&mut bytes);
-    read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
+    let bytes = crate::open::whole(path, LARGEST, "a universal file of more than 256 MB")?;
     let refused = |found, remedy| Err(Error::FormatNotRead { path: path.to_owned(), found, remedy });
-    if bytes.len() as u64 > LARGEST {
-        return refused("a universal file of more than 256 MB", "export the functions that are needed");
-    }
     // labels may be in any encoding; numbers are not
     let text = String::from_utf8_lossy(&bytes);
     let lines: Vec<&str> = text.lines().collect();

@@ -245,7 +245,11 @@ impl Run {
             _ => None,
         };
         let model = self.model_of(key).ok_or_else(|| {
-            Failure::input(format!("this run has no model {key:?}; it has {}", self.models().join(", ")))
+            Failure::input(format!(
+                "this run has no model {:?}; it has {}",
+                youla::error::short(key),
+                self.models().join(", ")
+            ))
         })?;
         band.map_or_else(|| Region::none(model, hz), |band| Ok(Region::band(band)))
     }

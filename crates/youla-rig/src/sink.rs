@@ -1,8 +1,8 @@
 //! Where the rows of a log go: a CSV file, and a stream for PlotJuggler. Other files are made by whoever has a writer for them.
 
 use crate::Description;
-use std::fs::File;
-use std::io::{BufWriter, Result, Write};
+use std::fs::{File, TryLockError};
+use std::io::{BufWriter, Error, ErrorKind, Result, Write};
 use std::net::UdpSocket;
 use std::path::Path;
 use youla_rt::Status;
@@ -37,12 +37,21 @@ pub trait RowSink: Send {
 pub struct CsvLog(BufWriter<File>);
 
 impl CsvLog {
-    /// Begins a file.
+    /// Begins a file. It is locked until it is whole, so that no other recorder empties it.
     ///
     /// # Errors
-    /// Of the file.
+    /// Of the file; for one that another recorder writes, and for what is no regular file.
     pub fn create(path: &Path, machine: &Description) -> Result<Self> {
-        let mut file = BufWriter::new(File::create(path)?);
+        let refused = |kind, why| Err(Error::new(kind, why));
+        if path.metadata().is_ok_and(|found| !found.is_file()) {
+            return refused(ErrorKind::InvalidInput, "it is no regular file; choose another place for the log");
+        }
+        let file = File::options().write(true).create(true).truncate(false).open(path)?;
+        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+            return refused(ErrorKind::ResourceBusy, "another recorder writes it; choose another place for the log");
+        }
+        file.set_len(0)?;
+        let mut file = BufWriter::new(file);
         writeln!(file, "{}", machine.columns().join(","))?;
         Ok(CsvLog(file))
     }
@@ -114,6 +123,25 @@ mod tests {
     use super::*;
     use crate::RigChannel;
     use std::time::Duration;
+
+    /// Rows of the first recorder were lost, and both reported a whole log.
+    #[test]
+    fn a_second_recorder_does_not_empty_a_log() {
+        let path = std::env::temp_dir().join(format!("youla-log-{}.csv", std::process::id()));
+        let machine = Description::default();
+        let mut first = CsvLog::create(&path, &machine).unwrap();
+        let row = LogRow { time: 0.0, values: &[0.5], status: Status::from_bits(0) };
+        first.take(&row).unwrap();
+        first.0.flush().unwrap();
+        let refused = CsvLog::create(&path, &machine).err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(refused.contains("another recorder"), "{refused}");
+        assert!(std::fs::read_to_string(&path).unwrap().ends_with("0.0,0.5,0\n"));
+        drop(first);
+        drop(CsvLog::create(&path, &machine).unwrap());
+        assert_eq!(std::fs::read_to_string(&path).unwrap(), "t,status\n");
+        std::fs::remove_file(&path).unwrap();
+        assert!(CsvLog::create(&std::env::temp_dir(), &machine).is_err());
+    }
 
     #[test]
     fn a_plot_gets_a_row_each_millisecond() {

@@ -32,7 +32,7 @@ pub use finished::export::{controller_for_export, loop_for_export, model_for_exp
 pub use finished::plot::{Plot, plot, plottable, write_plots};
 pub use finished::redraw::redraw;
 pub use folder::artefacts::{ModelFile, Provenance, SCHEMA};
-pub use folder::write::{WrittenRun, write_run};
+pub use folder::write::{WrittenRun, write_into, write_run};
 pub use folder::write_artefacts;
 pub use init::{Draft, DraftClock, path_from};
 pub use method::Method;

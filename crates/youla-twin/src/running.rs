@@ -31,8 +31,7 @@ impl LoopDescription {
             nominal: NominalModel,
             controller: ControllerSettings,
         }
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_text(path)?;
         let Tables { nominal, controller } = toml_file::parse(&text, path)?;
         Ok(LoopDescription { nominal, controller })
     }
@@ -61,8 +60,7 @@ impl RunningLoop {
     /// # Errors
     /// [`Error::Loop`] where the firmware cannot run this loop.
     pub fn read(path: &Path, time: Discrete) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_text(path)?;
         let description: LoopDescription = toml_file::parse(&text, path)?;
         Self::new(description, path, time)
     }

@@ -2,6 +2,7 @@
 
 use crate::table::aligned;
 use std::fmt::Write;
+use youla::identify::likelihood::figure;
 use youla_run::RunExcitation;
 
 /// What the excitation is, what the loop will do under it and how well the modes will be known.
@@ -69,14 +70,14 @@ fn accuracy(found: &RunExcitation) -> String {
     let mut rows = vec![header];
     for (k, mode) in s.modes.iter().enumerate() {
         let digits = |x: Option<f64>| x.map_or("not determined".to_owned(), |x| format!("{x:.2e}"));
-        let mut row = vec![(k + 1).to_string(), format!("{:.2}", mode.hz), digits(mode.hz_deviation)];
-        row.extend([format!("{:.5}", mode.zeta), digits(mode.zeta_deviation)]);
+        let mut row = vec![(k + 1).to_string(), figure(mode.hz), digits(mode.hz_deviation)];
+        row.extend([figure(mode.zeta), digits(mode.zeta_deviation)]);
         if s.damping_deviation.is_some() {
-            row.push(mode.needed.map_or("-".to_owned(), |needed| format!("{needed:.2} s")));
+            row.push(mode.needed.map_or("-".to_owned(), |needed| format!("{} s", figure(needed))));
         }
         rows.push(row);
     }
-    let noise: Vec<String> = s.noise.iter().map(|n| format!("{n:.4}")).collect();
+    let noise: Vec<String> = s.noise.iter().map(|n| figure(*n)).collect();
     let mut text = format!("\n{}", aligned(&rows));
     let _ = writeln!(text, "The best that an unbiased estimate can reach with output noise of {}.", noise.join(", "));
     text

@@ -51,7 +51,7 @@ pub(super) fn load(form: Form, args: &LoadArgs) -> Result<(), Failure> {
 }
 
 fn exported(path: &Path) -> Result<ExportedController, Failure> {
-    let text = std::fs::read_to_string(path).map_err(|e| Failure::io(path, e))?;
+    let text = youla_io::read_text(path)?;
     if serde_json::from_str::<QTable>(&text).is_ok() {
         return Err(refused(format!("{}: this is a table of Q over speed; add --speed RPM", path.display())));
     }

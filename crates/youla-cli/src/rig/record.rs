@@ -78,12 +78,11 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
             return Err(refused(format!("{} exists already; choose another --out or add --force", path.display())));
         }
     }
-    let read = |path: &PathBuf| std::fs::read_to_string(path).map_err(|e| Failure::io(path, e));
-    let base = args.settings.as_ref().map(read).transpose()?;
+    let base = args.settings.as_deref().map(youla_io::read_text).transpose()?;
     let mut rig = Rig::connect(&args.address)?;
     // Settings that cannot be read are refused before the experiment.
     settings(rig.description(), "log.csv", 1, base.as_deref())?;
-    let mut recorder = recorder(args, &rig)?;
+    let mut recorder = recorder(args, &run_file, &rig)?;
     let begun = match &start {
         None => Ok(()),
         Some(start) => rig.ask(&Request::Arm).and_then(|_| rig.ask(start)).map(drop),
@@ -104,17 +103,24 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
     Ok(())
 }
 
-fn recorder(args: &RecordArgs, rig: &Rig) -> Result<Recorder, Failure> {
+fn recorder(args: &RecordArgs, run_file: &Path, rig: &Rig) -> Result<Recorder, Failure> {
     let machine = rig.description();
     if args.out.extension().is_none_or(|ending| ending != "csv") {
         return Err(refused(format!("--out {}: a log is a .csv file", args.out.display())));
     }
-    let log = youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?;
-    let mut sinks: Vec<Box<dyn RowSink>> = vec![Box::new(log)];
+    let mut sinks: Vec<Box<dyn RowSink>> = Vec::new();
     if let Some(address) = &args.plotjuggler {
         let stream = PlotStream::open(address, machine)
             .map_err(|e| refused(format!("--plotjuggler {address}: {e}; give an address as 127.0.0.1:9870")))?;
         sinks.push(Box::new(stream));
+    }
+    // Last, because it empties an older log.
+    let log = youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?;
+    sinks.push(Box::new(log));
+    // An older one would describe another log if this program were killed.
+    match std::fs::remove_file(run_file) {
+        Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Failure::io(run_file, e)),
+        _ => {}
     }
     Ok(Recorder::with(sinks, &args.out, machine, rig.schema()))
 }

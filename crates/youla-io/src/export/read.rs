@@ -29,7 +29,7 @@ use youla::signal::Channel;
 /// ```
 pub fn read_model(path: impl AsRef<Path>) -> Result<NamedModel> {
     let path = path.as_ref();
-    model_from_bytes(&crate::open::bytes(path)?, path)
+    model_from_bytes(&crate::open::read_bytes(path)?, path)
 }
 
 /// The same of a file that is in memory; `path` is named in errors.

@@ -71,15 +71,54 @@ fn what_a_killed_run_left_is_removed() {
 #[test]
 fn numbers_are_taken_once() {
     let place = Place::new("numbers");
-    let claimed: Vec<PathBuf> = std::thread::scope(|scope| {
-        let claim = || NumberedFolder::claim(&place.0, "A rig!").unwrap();
-        let threads: Vec<_> = (0..8).map(|_| scope.spawn(claim)).collect();
-        let all: Vec<NumberedFolder> = threads.into_iter().map(|t| t.join().unwrap()).collect();
-        write(all[0].path(), false, &["summary.json"]).unwrap();
-        all.iter().map(|f| f.path().to_owned()).collect()
+    // What a run of an earlier version left.
+    fs::create_dir_all(place.0.join("runs/a-rig-001")).unwrap();
+    let mut claimed: Vec<RunFolder> = std::thread::scope(|scope| {
+        let threads: Vec<_> =
+            (0..8).map(|_| scope.spawn(|| RunFolder::numbered(&place.0, "A rig!").unwrap())).collect();
+        threads.into_iter().map(|t| t.join().unwrap()).collect()
     });
-    assert_eq!(claimed.iter().collect::<HashSet<_>>().len(), 8);
-    assert!(claimed.iter().all(|p| p.to_string_lossy().contains("a-rig-00")));
-    // Those that stayed empty are gone.
-    assert_eq!(fs::read_dir(place.0.join("runs")).unwrap().count(), 1);
+    let targets: HashSet<PathBuf> = claimed.iter().map(|f| f.target().to_owned()).collect();
+    assert_eq!(targets.len(), 8);
+    assert!(targets.iter().all(|p| p.to_string_lossy().contains("a-rig-00")));
+    let first = claimed.pop().unwrap();
+    first.text("summary.json", "{}").unwrap();
+    let kept = first.finish().unwrap();
+    drop(claimed);
+    let left: Vec<PathBuf> = fs::read_dir(place.0.join("runs")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    assert!(left.contains(&kept) && left.len() <= 2, "only the run and the empty folder are left: {left:?}");
+}
+
+/// Earlier both of two equal runs ended well and the second removed the result of the first.
+#[test]
+fn a_place_is_given_to_one_run() {
+    let place = Place::new("two");
+    let run = place.0.join("run");
+    let first = RunFolder::create(&run, false).unwrap();
+    for replace in [false, true] {
+        let refused = RunFolder::create(&run, replace).unwrap_err();
+        assert!(matches!(&refused, Error::BeingWritten { .. }), "{refused}");
+    }
+    // Another machine on a file system without locks.
+    fs::create_dir(&run).unwrap();
+    fs::write(run.join("summary.json"), "other").unwrap();
+    first.text("summary.json", "first").unwrap();
+    assert!(matches!(first.finish(), Err(Error::OutputExists { .. })));
+    assert_eq!(fs::read_to_string(run.join("summary.json")).unwrap(), "other");
+    assert_eq!(fs::read_dir(&place.0).unwrap().count(), 1);
+}
+
+/// Between two steps of its writer a folder has no lock.
+#[test]
+fn an_old_folder_without_a_lock_is_removed() {
+    let place = Place::new("lockless");
+    let left = place.0.join(".run.partial-4000000000");
+    fs::create_dir(&left).unwrap();
+    let run = place.0.join("run");
+    let refused = RunFolder::create(&run, false).unwrap_err().to_string();
+    assert!(refused.contains(".run.partial-4000000000") && refused.contains("remove"), "{refused}");
+    let old = std::time::SystemTime::now() - std::time::Duration::from_secs(3600);
+    fs::File::open(&left).unwrap().set_modified(old).unwrap();
+    drop(RunFolder::create(&run, false).unwrap());
+    assert!(!left.exists());
 }

@@ -27,7 +27,7 @@ const LONGEST_NAME: usize = 1024;
 /// [`Error::Corrupt`] with the position (0 in version 7.3) for a damaged or cut file.
 pub fn read_mat(path: impl AsRef<Path>) -> Result<Variables> {
     let path = path.as_ref();
-    mat_from_bytes(&crate::open::bytes(path)?, path)
+    mat_from_bytes(&crate::open::record_bytes(path)?, path)
 }
 
 /// The variables of a MATLAB file of version 5 or 7.3 that is in memory; `path` is named in errors.

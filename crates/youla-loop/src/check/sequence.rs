@@ -273,7 +273,7 @@ impl Break {
 pub(super) fn jump(record: &str, row: usize, by: f64, channel: &Channel) -> Finding {
     let what = format!("its offset jumps by {} at row {row}", with_unit(by, &channel.unit));
     let advice = "Use the parts before and after this row as two `segments`, each with its own mean; check sensor, range switch and \
-                  zeroing";
+                  zeroing, and without a time column whether a row is missing there";
     let finding = Finding::new(Test::Drift, Severity::Defect, record, what).channel(&channel.name);
     finding.rows(row, row).number("jump", by).advice(advice)
 }

@@ -4,7 +4,6 @@ use crate::folder::artefacts::{Provenance, SCHEMA};
 use crate::records::SourceFile;
 use crate::settings::RunSettings;
 use crate::{Error, Result};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
@@ -12,7 +11,7 @@ use youla::signal::unknown;
 use youla_io::export::{
     ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, model_from_bytes, read_model,
 };
-use youla_io::{open, sha256};
+use youla_io::sha256;
 
 /// The model files of a run folder; the first that is there is what a run is exported as.
 const MODELS: [&str; 11] = [
@@ -111,9 +110,7 @@ fn loop_of_run(run: &Path) -> Result<LoopExport> {
 }
 
 fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
-    let mut bytes = Vec::new();
-    let read = open(path)?.read_to_end(&mut bytes);
-    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    let bytes = youla_io::read_bytes(path)?;
     let found: Option<ExportedController> = serde_json::from_slice(&bytes).ok();
     let Some(ExportedController { observer: Some(observer), ts, measured, commanded, .. }) = found else {
         let problem = "this is neither a run folder nor the controller.json of a redesign by LQG";
@@ -125,9 +122,7 @@ fn loop_of_redesign(path: &Path) -> Result<LoopExport> {
 
 /// Q from either kind of file.
 fn parameter(path: &Path) -> Result<StateSpace<Discrete>> {
-    let mut bytes = Vec::new();
-    let read = open(path)?.read_to_end(&mut bytes);
-    read.map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+    let bytes = youla_io::read_bytes(path)?;
     match serde_json::from_slice::<ExportedController>(&bytes) {
         Ok(ExportedController { q: Some(q), ts, .. }) => Ok(q.system(Discrete::new(ts)?)?),
         Ok(_) => Err(not(path, "this controller was not designed by its Q")),

@@ -73,7 +73,7 @@ fn wanted(run: &Path, report: &ReportData, figure: &str, choice: &FigureChoice) 
             }
         },
         None => {
-            let known = there.iter().map(|kind| kind.key()).chain([ALL]).map(String::from).collect();
+            let known = [ALL].into_iter().chain(there.iter().map(|kind| kind.key())).map(String::from).collect();
             Err(unknown(&format!("the run {}", run.display()), figure, known).into())
         }
     }

@@ -1,10 +1,8 @@
 //! The report of a finished run, drawn again from its data.
 
 use crate::{Error, Result};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla_io::folder::replace_file;
-use youla_io::open;
 use youla_report::{ReportData, html};
 
 /// Draws `report.html` of a run folder again from its `report.json` and returns its path.
@@ -29,9 +27,6 @@ pub(crate) fn read_report(run: &Path) -> Result<ReportData> {
         return Err(Error::File(youla_io::Error::NotAModel { path: run.to_owned(), problem }));
     }
     let data = run.join("report.json");
-    let mut text = String::new();
-    open(&data)?
-        .read_to_string(&mut text)
-        .map_err(|source| Error::File(youla_io::Error::Io { path: data.clone(), source }))?;
+    let text = youla_io::read_text(&data)?;
     serde_json::from_str(&text).map_err(|source| Error::NotAReport { path: data.clone(), source })
 }

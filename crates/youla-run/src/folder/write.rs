@@ -29,9 +29,16 @@ pub fn write_run(
     replace: bool,
     clock: &mut StageClock<'_>,
 ) -> Result<WrittenRun> {
-    let folder = RunFolder::create(target, replace)?;
+    write_into(found, RunFolder::create(target, replace)?, clock)
+}
+
+/// The same to a folder that was claimed before the computation.
+///
+/// # Errors
+/// As [`write_run`].
+pub fn write_into(found: &Identification, folder: RunFolder, clock: &mut StageClock<'_>) -> Result<WrittenRun> {
     clock.run(Stage::Write, || write_artefacts(found, &folder))?;
-    let name = target.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = folder.target().file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
     let so_far = clock.seconds.clone();
     clock.run(Stage::Report, || {
         let page = page(found, &summary(found, &so_far)?, &name)?;

@@ -7,6 +7,7 @@ use minijinja::value::Serde;
 use minijinja::{Environment, context};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
+use youla::error::{Names, short};
 use youla_io::{ChannelRef, CsvOptions, SurveyedColumn};
 
 const TEMPLATE: &str = include_str!("../../assets/run.toml.j2");
@@ -173,10 +174,12 @@ fn column(wanted: &ChannelRef, columns: &[SurveyedColumn]) -> std::result::Resul
     };
     match found.map(|c| &c.content) {
         Some(Ok(content)) => Ok(content.rows),
-        Some(Err(problem)) => Err(format!("the column {:?} cannot be a channel: {problem}", wanted.to_string())),
+        Some(Err(problem)) => {
+            Err(format!("the column {:?} cannot be a channel: {problem}", short(&wanted.to_string())))
+        }
         None => {
-            let known: Vec<&str> = columns.iter().map(|c| c.from.as_str()).collect();
-            Err(format!("there is no column {:?}; there are {}", wanted.to_string(), known.join(", ")))
+            let known: Vec<String> = columns.iter().map(|c| c.from.clone()).collect();
+            Err(format!("there is no column {:?}; there are {}", short(&wanted.to_string()), Names(&known)))
         }
     }
 }

@@ -219,17 +219,28 @@ fn read_file(
     let tacho = settings.disturbance.as_ref().and_then(DisturbanceSettings::channel);
     let computed = ComputedChannels::new(settings)?;
     let wanted: Vec<ChannelSpec> = settings.groups().into_iter().flatten().cloned().chain(tacho).collect();
-    let source = Source {
-        path: path.clone(),
-        format: Format::Detect,
-        time: settings.clock(),
-        channels: computed.to_read(&wanted),
-        csv: settings.csv.clone(),
-    };
-    let read = read_parts(&source).map_err(|e| match e {
+    let of_file = |e: youla_io::Error| match e {
         youla_io::Error::MissingFile { .. } => e.within(format!("[data] {purpose}")),
         other => other,
-    })?;
+    };
+    let clock = settings.clock();
+    let source = |time: TimeSource, channels: &[ChannelSpec]| Source {
+        path: path.clone(),
+        format: Format::Detect,
+        time,
+        channels: computed.to_read(channels),
+        csv: settings.csv.clone(),
+    };
+    let read = match computed.time(settings) {
+        None => read_parts(&source(clock, &wanted)).map_err(of_file)?,
+        Some(time) => {
+            // The rows first, whatever their time; then their time from their columns.
+            let all = [&wanted[..], std::slice::from_ref(&time)].concat();
+            let rows = youla_io::read(&source(TimeSource::ts(1.0), &all)).map_err(of_file)?;
+            let times = computed.apply(std::slice::from_ref(&time), rows.clone(), 1)?.column(&time.name)?.to_vec();
+            clock.cut(&rows, &times)?
+        }
+    };
     let mut first = 1;
     let compute = |record: Record| {
         let from = first;

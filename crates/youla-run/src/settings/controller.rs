@@ -137,9 +137,7 @@ impl ControllerSettings {
         if path.extension().is_none_or(|e| !e.eq_ignore_ascii_case("json")) {
             return Ok(None);
         }
-        let mut text = String::new();
-        let read = std::io::Read::read_to_string(&mut youla_io::open(path)?, &mut text);
-        read.map_err(|source| youla_io::Error::Io { path: path.to_owned(), source })?;
+        let text = youla_io::read_text(path)?;
         let table = match serde_json::from_str::<serde_json::Value>(&text) {
             Ok(serde_json::Value::Object(table)) => table,
             _ => return Ok(None),

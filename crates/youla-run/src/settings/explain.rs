@@ -6,7 +6,7 @@ use crate::Error;
 use serde::de::value::{Error as ProbeError, StrDeserializer};
 use serde::de::{DeserializeOwned, IntoDeserializer};
 use std::path::Path;
-use youla::error::nearest_name;
+use youla::error::{nearest_name, short};
 use youla_io::TextPosition;
 
 /// The parser's refusal with line, column, table and key, and the nearest known word for a misspelt one.
@@ -152,6 +152,7 @@ fn unknown(word: &str, known: &[&str], place: &Place<'_>) -> String {
         Some(k) => format!("did you mean `{k}`? The"),
         None => "the".into(),
     };
+    let word = short(word);
     format!("`{word}` is not a {is} of {of}; {hint} {are} are {}", known.join(", "))
 }
 

@@ -25,12 +25,10 @@ use crate::{Error, Result};
 use explain::{explain, problem_at};
 use serde::{Deserialize, Serialize};
 use shown::{RecommendedTable, ReductionTable, SubspaceTable};
-use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::SubspaceOptions;
 use youla::reduce::ReductionOptions;
-use youla_io::open;
 use youla_loop::check::CheckOptions;
 use youla_loop::redesign::RedesignOptions;
 
@@ -112,10 +110,7 @@ impl RunSettings {
     /// # Errors
     /// [`youla_io::Error::Settings`] with line and column, and the nearest known key for a misspelt one; [`youla_io::Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let mut bytes = Vec::new();
-        open(path)?
-            .read_to_end(&mut bytes)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let bytes = youla_io::read_bytes(path)?;
         if is_log(path, &bytes) {
             let problem = "this is no run.toml; for a log, say what its columns mean: --input, --output and --sample-time or --time, or \
                            write a run.toml with `youla init`"

@@ -47,16 +47,32 @@ impl std::fmt::Display for Value {
     }
 }
 
-/// Prints a list of names, the first forty of them, each up to eighty characters.
+/// Most characters of a name in a message, and most names of a list.
+const LONGEST: usize = 60;
+const SHOWN: usize = 10;
+
+/// A name of a user's file, short enough for a message.
+///
+/// ```
+/// assert_eq!(youla::error::short("speed"), "speed");
+/// assert_eq!(youla::error::short(&"x".repeat(1000)).chars().count(), 60);
+/// ```
+pub fn short(name: &str) -> String {
+    match name.char_indices().nth(LONGEST) {
+        None => name.to_owned(),
+        Some(_) => name.chars().take(LONGEST - 1).chain(['\u{2026}']).collect(),
+    }
+}
+
+/// Prints a list of names, the first ten of them, each up to sixty characters.
 pub struct Names<'a>(pub &'a [String]);
 
 impl std::fmt::Display for Names<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        const SHOWN: usize = 40;
         for (k, name) in self.0.iter().take(SHOWN).enumerate() {
             f.write_str(if k == 0 { "" } else { ", " })?;
-            name.chars()
-                .take(80)
+            short(name)
+                .chars()
                 .map(|c| if c.is_control() { char::REPLACEMENT_CHARACTER } else { c })
                 .try_for_each(|c| f.write_char(c))?;
         }

@@ -9,7 +9,7 @@ mod display;
 mod limits;
 mod names;
 
-pub use display::{Names, Pole, Seconds, Value};
+pub use display::{Names, Pole, Seconds, Value, short};
 pub use limits::OrderLimit;
 pub use names::{misspelt, nearest_name};
 
@@ -249,7 +249,7 @@ pub enum Error {
         samples: usize,
     },
     /// A channel, column or variable was asked for that does not exist.
-    #[error("{what} has no {name:?}{}; known: {}", nearest.as_ref().map(|n| format!(" (did you mean {n:?}?)")).unwrap_or_default(), Names(known))]
+    #[error("{what} has no {:?}{}; known: {}", short(name), nearest.as_ref().map(|n| format!(" (did you mean {:?}?)", short(n))).unwrap_or_default(), Names(known))]
     UnknownChannel {
         /// The record or file.
         what: String,
@@ -261,7 +261,7 @@ pub enum Error {
         nearest: Option<String>,
     },
     /// Two channels of one record have the same name.
-    #[error("{what} has more than one channel named {name:?}")]
+    #[error("{what} has more than one channel named {:?}", short(name))]
     DuplicateChannel {
         /// The record or file.
         what: String,
@@ -270,7 +270,8 @@ pub enum Error {
     },
     /// A value of a record is NaN or infinite.
     #[error(
-        "{what}: channel {channel:?} is not finite in row {row} (counted from 1); leave the row out of the file and use the rows before and after it as two records"
+        "{what}: channel {:?} is not finite in row {row} (counted from 1); leave the row out of the file and use the rows before and after it as two records",
+        short(channel)
     )]
     NotFiniteSample {
         /// The record or file.

@@ -52,9 +52,9 @@ impl Configuration {
     /// [`youla_io::Error::Io`], [`youla_io::Error::Settings`].
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(FILE);
-        let text = std::fs::read_to_string(&path).map_err(|source| match source.kind() {
-            std::io::ErrorKind::NotFound => Error::NotResults { path: folder.to_owned() },
-            _ => Error::File(youla_io::Error::Io { path: path.clone(), source }),
+        let text = youla_io::read_text(&path).map_err(|error| match error {
+            youla_io::Error::MissingFile { .. } => Error::NotResults { path: folder.to_owned() },
+            other => Error::File(other),
         })?;
         Ok(youla_io::toml_file::parse(&text, &path)?)
     }

@@ -230,8 +230,7 @@ struct Found {
 impl Found {
     /// Reads the complete items at the beginning of a file.
     fn read(path: &Path, items: Range<usize>, rows_per_item: usize) -> Result<Self> {
-        let text =
-            std::fs::read(path).map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_bytes(path)?;
         let mut lines = text.split_inclusive(|byte| *byte == b'\n');
         let header = lines.next().unwrap_or_default();
         let expected = format!("{}\n", Row::HEADER);

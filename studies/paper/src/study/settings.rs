@@ -129,8 +129,7 @@ impl PaperSettings {
     /// # Errors
     /// Those of [`PaperSettings::parse`]; [`youla_io::Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_text(path)?;
         Self::parse(&text, path)
     }
 

@@ -75,3 +75,24 @@ fn without_an_excitation_the_verdict_says_what_was_not_noticed() {
         assert!(words.contains("Not trusted: 2 of 8 tests of the recommended model failed"), "{words}");
     }
 }
+
+/// A time column in milliseconds, made seconds by a formula: earlier `check` read it and `identify` found no such column.
+#[test]
+fn a_computed_time_column_is_read_by_every_verb() {
+    let (mut seconds, mut millis) = (String::from("t,u,d,y\n"), String::from("ms,u,d,y\n"));
+    for [t, u, d, y] in log() {
+        writeln!(seconds, "{t:?},{u:?},{d:?},{y:?}").expect("text");
+        writeln!(millis, "{:?},{u:?},{d:?},{y:?}", 1000.0 * t).expect("text");
+    }
+    let computed = settings("time_column = \"t\"", "time_column = \"s\"").replacen(
+        "[nominal.transfer_function]",
+        "[data.computed]\ns = \"ms / 1000\"\n\n[nominal.transfer_function]",
+        1,
+    );
+    let (one, check) = identified("seconds", &settings(DECLARED, DECLARED), &seconds);
+    let (two, check_computed) = identified("milliseconds", &computed, &millis);
+    let line = |text: &str| text.lines().next().unwrap_or_default().to_owned();
+    assert_eq!(line(&check), line(&check_computed));
+    assert_eq!(one.len(), two.len());
+    assert!(one.iter().zip(&two).all(|(a, b)| (a - b).abs() < 1e-6 * (1.0 + a.abs())), "{one:?} {two:?}");
+}

@@ -25,6 +25,55 @@ fn pipes_and_devices() {
     assert!(youla(&folder, &["check", "/dev/zero"]).stderr.contains(what));
 }
 
+/// Readers of settings beside run.toml: campaign, parameters, loops, Q.
+#[cfg(unix)]
+#[test]
+fn pipes_and_devices_of_every_reader() {
+    let what = "a pipe, a socket or a device cannot be read";
+    let folder = loop_folder("pipe-readers", &[]);
+    let machine = "udp://127.0.0.1:9";
+    for verb in [
+        &["commission", "/dev/zero", "--out", "o"][..],
+        &["rig", "load", machine, "/dev/zero"],
+        &["rig", "load", machine, "/dev/zero", "--speed", "100"],
+        &["rig", "record", machine, "--out", "new/x.csv", "--duration", "1", "--settings", "/dev/zero"],
+        &["rig", "twin", "/dev/zero", "--bearing", "linear", "--port", "0", "--duration", "0.5"],
+        &["paper", "--settings", "/dev/zero", "--out", "o"],
+        &["paper", "--rig", "/dev/zero", "--out", "o"],
+    ] {
+        let found = youla(&folder, verb);
+        assert_eq!(found.code, Some(2), "{verb:?}: {}", found.stderr);
+        assert!(found.stderr.contains(what), "{verb:?}: {}", found.stderr);
+    }
+}
+
+/// Names are cut, lists end after ten of them, and no table ends in a panic.
+#[test]
+fn messages_stay_short() {
+    let long = "x".repeat(70_000);
+    let wide: Vec<String> = (0..3000).map(|k| format!("c{k}")).collect();
+    let row = |count: usize| vec!["1.5"; count].join(",");
+    let folder = loop_folder(
+        "long-names",
+        &[
+            ("long.csv", format!("{long},u,y\n{}\n{}\n", row(3), row(3)).as_bytes()),
+            ("wide.csv", format!("{}\n{}\n{}\n", wide.join(","), row(3000), row(3000)).as_bytes()),
+            ("key.toml", format!("{long} = 1\n").as_bytes()),
+        ],
+    );
+    for verb in [
+        &["init", "long.csv", "--input", "q", "--output", "y", "--sample-time", "1", "--open-loop", "--out", "n.toml"]
+            [..],
+        &["init", "wide.csv", "--input", "q", "--output", "y", "--sample-time", "1", "--open-loop", "--out", "n.toml"],
+        &["check", "long.csv", "--input", "q", "--output", "y", "--sample-time", "1"],
+        &["identify", "key.toml", "--out", "o"],
+    ] {
+        let found = youla(&folder, verb);
+        assert_eq!(found.code, Some(2), "{verb:?}: {:.2000}", found.stderr);
+        assert!(found.stderr.len() < 2000, "{verb:?}: {} bytes: {:.2000}", found.stderr.len(), found.stderr);
+    }
+}
+
 /// Numbers near the largest one are refused or of no consequence.
 #[test]
 fn horizons_and_rows_near_the_largest_number() {

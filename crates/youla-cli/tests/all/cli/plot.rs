@@ -96,7 +96,7 @@ fn what_cannot_be_drawn_is_refused_and_leaves_nothing() {
     let folder = empty_folder("plot-refused");
     let run = demo().to_str().expect("text");
     let cases: [(&[&str], &[&str]); 12] = [
-        (&["plot", run, "bodee"], &["has no \"bodee\" (did you mean \"bode\"?); known: bode, ", "all"]),
+        (&["plot", run, "bodee"], &["has no \"bodee\" (did you mean \"bode\"?); known: all, bode, "]),
         (&["plot", run, "bode", "--output", "y_x"], &["has no \"y_x\"", "known: y_h, y_v"]),
         (&["plot", run, "bode", "--input", "u"], &["known: u_h, u_v"]),
         (&["plot", run, "data", "--record", "third"], &["known: estimation, verification"]),

@@ -14,6 +14,7 @@ use dynamics::{Dynamics, dynamics_of};
 use std::collections::HashMap;
 use std::path::Path;
 use youla::Mat;
+use youla::error::{Names, short};
 use youla::signal::{Channel, Record};
 use youla_greybox::NamedExpression;
 use youla_io::{ChannelRef, ChannelSpec};
@@ -63,11 +64,11 @@ impl ComputedChannels {
                 Target::Computed(name) => formulas.iter().any(|f| f.name == name),
             };
             let Some(next) = waiting.iter().position(|f| f.expression.names().iter().all(known)) else {
-                let names: Vec<&str> = waiting.iter().map(|f| f.name.as_str()).collect();
+                let names: Vec<String> = waiting.iter().map(|f| f.name.clone()).collect();
                 return refused(format!(
                     "[data.computed] {} need each other: a column of the file with the name of a computed channel must be \
                      computed under another name",
-                    names.join(", ")
+                    Names(&names)
                 ));
             };
             let mut formula = waiting.remove(next);
@@ -90,6 +91,12 @@ impl ComputedChannels {
             all[number].operands.iter().all(|o| matches!(o, Operand::Computed(k) if constant(all, *k)))
         }
         self.formula_of(channel).is_some_and(|number| constant(&self.formulas, number))
+    }
+
+    /// The time column where it is computed.
+    pub(crate) fn time(&self, data: &DataSettings) -> Option<ChannelSpec> {
+        let time = ChannelSpec::from("(time)", data.time_column.clone()?, "");
+        self.formula_of(&time).map(|_| time)
     }
 
     /// Takes away what a check finds of computed channels because of how they are declared: the limits of a `tanh`, a constant.
@@ -193,11 +200,11 @@ impl ComputedChannels {
         if let Some(k) = result.iter().position(|x| !x.is_finite()) {
             let names = formula.expression.names().iter().zip(row(k));
             let values: Vec<String> = names.map(|(name, value)| format!("{name} = {value}")).collect();
-            let at = if values.is_empty() { String::new() } else { format!(" ({})", values.join(", ")) };
+            let at = if values.is_empty() { String::new() } else { format!(" ({})", Names(&values)) };
             return refused(format!(
                 "[data.computed] {} = {:?} is {} in row {} of {}{at}; a computed channel must be a finite number in every row",
-                formula.name,
-                formula.text,
+                short(&formula.name),
+                short(&formula.text),
                 result[k],
                 first + k,
                 read.name(),

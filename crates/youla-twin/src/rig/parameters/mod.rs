@@ -9,7 +9,7 @@ pub use quantity::{
 };
 
 use super::Bearing;
-use crate::{Error, Result};
+use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -196,8 +196,7 @@ impl RigParameters {
     /// # Errors
     /// Those of [`RigParameters::parse`]; [`youla_io::Error::Io`].
     pub fn read(path: &Path) -> Result<Self> {
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| Error::File(youla_io::Error::Io { path: path.to_owned(), source }))?;
+        let text = youla_io::read_text(path)?;
         Self::parse(&text, path)
     }
 

@@ -205,6 +205,7 @@ pub fn figure(value: f64) -> String {
     match value.abs() {
         v if !v.is_finite() => "not finite".into(),
         v if v >= 1e5 || v > 0.0 && v < 1e-4 => format!("{value:.1e}"),
+        v if v > 0.0 && v < 1e-2 => format!("{value:.5}"),
         v if v >= 100.0 => format!("{value:.0}"),
         v if v >= 10.0 => format!("{value:.1}"),
         v if v >= 1.0 => format!("{value:.2}"),

@@ -2,6 +2,7 @@
 //! arrays; results go back as JSON and arrays. The package around it gives them their types.
 
 mod failure;
+mod kept;
 mod logs;
 mod matrices;
 mod models;
@@ -17,6 +18,8 @@ use pyo3::prelude::*;
 /// The extension module.
 #[pymodule]
 mod _native {
+    #[pymodule_export]
+    use super::kept::{Region, read_mat, redesign, report_html, settings_json, write_files};
     #[pymodule_export]
     use super::logs::{clock, read_log};
     #[pymodule_export]

@@ -2,16 +2,40 @@
 
 use crate::failure::Failure;
 use crate::worker;
-use numpy::{PyReadonlyArray1, PyReadonlyArray2};
+use numpy::{Complex64, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3};
 use pyo3::prelude::*;
 use std::path::PathBuf;
-use youla::Mat;
+use youla::identify::likelihood::{ResponseTable, ResponseVariance};
 use youla::lti::Discrete;
 use youla::signal::{Channel, Record};
+use youla::{Mat, c64};
 use youla_io::{ChannelRef, ChannelSpec, Source, TimeSource};
 
 /// A record as Python holds it: name, sample time, channels with name, unit and column, and an array of samples x columns.
 pub(crate) type Log<'py> = (String, f64, Vec<(String, String, usize)>, PyReadonlyArray2<'py, f64>);
+
+/// A measured response: angular frequencies, values `[frequency, row, column]`, their variances, whether these are known in full, and
+/// whether it is that of the loop, rows u and y.
+pub(crate) type TableIn<'py> =
+    (PyReadonlyArray1<'py, f64>, PyReadonlyArray3<'py, Complex64>, Option<PyReadonlyArray3<'py, f64>>, bool, bool);
+
+/// A measured response out of its arrays, and whether it is that of the loop.
+pub(crate) fn table((omega, values, variance, known, of_loop): TableIn<'_>) -> (ResponseTable, bool) {
+    let view = values.as_array();
+    let (n, rows, columns) = view.dim();
+    let value = |k: usize| Mat::from_fn(rows, columns, |i, j| c64::new(view[[k, i, j]].re, view[[k, i, j]].im));
+    let variance = variance.map(|given| {
+        let view = given.as_array();
+        (0..n).map(|k| Mat::from_fn(rows, columns, |i, j| view[[k, i, j]])).collect()
+    });
+    let variance = match variance {
+        None => ResponseVariance::Unknown,
+        Some(all) if known => ResponseVariance::Known(all),
+        Some(all) => ResponseVariance::Proportional(all),
+    };
+    let omega = omega.as_array().to_vec();
+    (ResponseTable { omega, values: (0..n).map(value).collect(), variance }, of_loop)
+}
 
 /// Copies records out of their arrays, which are only read.
 pub(crate) fn records(py: Python<'_>, logs: Vec<Log<'_>>) -> PyResult<Vec<Record>> {

@@ -4,9 +4,8 @@ use crate::failure::{Failure, OPTIONS};
 use crate::logs::{Log, records};
 use crate::matrices::{ModelOut, array, model_out};
 use crate::options::{as_toml, options, settings};
-use crate::region::{Region, RegionOut};
 use crate::worker;
-use numpy::{PyArray2, PyReadonlyArray1};
+use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::Path;
 use youla::identify::subspace::SubspaceModel;
@@ -59,12 +58,6 @@ impl Subspace {
     /// Block rows of the future and of the past.
     fn horizons(&self) -> (usize, usize) {
         (self.found.horizon, self.found.past)
-    }
-
-    /// The response.
-    fn response<'py>(&self, py: Python<'py>, hz: PyReadonlyArray1<'py, f64>) -> PyResult<RegionOut<'py>> {
-        let hz: Vec<f64> = hz.as_array().to_vec();
-        Ok(py.detach(|| Region::none(&self.found.model, &hz))?.out(py))
     }
 }
 

@@ -2,11 +2,12 @@
 
 use crate::failure::Result;
 use numpy::ndarray::{Array3, Array4};
-use numpy::{Complex64, IntoPyArray, PyArray3, PyArray4};
+use numpy::{Complex64, IntoPyArray, PyArray3, PyArray4, PyReadonlyArray2};
 use pyo3::prelude::*;
 use std::f64::consts::TAU;
-use youla::identify::likelihood::Recommendation;
+use youla::identify::likelihood::Region as Stated;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
+use youla::{Mat, c64};
 use youla_greybox::ResponseBand;
 
 /// 95 % quantile of chi-square with two degrees of freedom, and of the normal distribution.
@@ -41,10 +42,10 @@ impl Region {
     }
 
     /// That of the recommended model.
-    pub(crate) fn recommended(found: &Recommendation, hz: &[f64]) -> Result<Self> {
-        let response = frequency_response(&found.plant, &omega(hz))?;
-        let (p, m) = (found.plant.outputs(), found.plant.inputs());
-        let errors: Vec<_> = hz.iter().map(|f| found.region.at(*f)).collect();
+    pub(crate) fn recommended(plant: &StateSpace<Discrete>, region: &Stated, hz: &[f64]) -> Result<Self> {
+        let response = frequency_response(plant, &omega(hz))?;
+        let (p, m) = (plant.outputs(), plant.inputs());
+        let errors: Vec<_> = hz.iter().map(|f| region.at(*f)).collect();
         let covariance =
             Array4::from_shape_fn((hz.len(), p, m, 3), |(k, i, j, part)| errors[k].covariance((i, j))[part]);
         let magnitude = Array4::from_shape_fn((hz.len(), p, m, 2), |(k, i, j, side)| {
@@ -87,4 +88,12 @@ pub(crate) fn response_array<'py>(py: Python<'py>, response: &FrequencyResponse)
         Complex64::new(g.re, g.im)
     };
     Array3::from_shape_fn((response.omega.len(), p, m), value).into_pyarray(py)
+}
+
+/// Standard deviation of a figure with these slopes in the entries of the response at a frequency.
+pub(crate) fn along(region: &Stated, hz: f64, slopes: &PyReadonlyArray2<'_, Complex64>) -> f64 {
+    let view = slopes.as_array();
+    let (p, m) = view.dim();
+    let slopes = Mat::from_fn(p, m, |i, j| c64::new(view[[i, j]].re, view[[i, j]].im));
+    region.at(hz).along(slopes.as_ref())
 }

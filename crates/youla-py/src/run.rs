@@ -1,7 +1,7 @@
 //! A run in memory.
 
 use crate::failure::{Failure, Result};
-use crate::logs::{Log, records};
+use crate::logs::{Log, TableIn, records, table};
 use crate::matrices::{ModelOut, array, model_out};
 use crate::options::{options, settings};
 use crate::region::{Region, RegionOut, response_array};
@@ -13,10 +13,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
-use youla::{Mat, c64};
 use youla_run::{
     Identification, Method, RunRecords, RunSettings, Stage, StageClock, StageTimes, page, read_records,
-    records_in_memory, redesign_of, summary, write_run,
+    records_in_memory, redesign_of, response_in_memory, summary, write_run,
 };
 
 /// The result of a run.
@@ -28,12 +27,22 @@ pub(crate) struct Run {
 
 /// Identifies from records in memory; `single` uses one core only.
 #[pyfunction]
-#[pyo3(signature = (chosen, logs, single = false))]
-pub(crate) fn identify(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, single: bool) -> PyResult<Run> {
+#[pyo3(signature = (chosen, logs, single = false, response = None))]
+pub(crate) fn identify(
+    py: Python<'_>,
+    chosen: &str,
+    logs: Vec<Log<'_>>,
+    single: bool,
+    response: Option<TableIn<'_>>,
+) -> PyResult<Run> {
     let chosen = settings(chosen)?;
     let logs = records(py, logs)?;
+    let response = response.map(table);
     worker::run(py, single, move |stop| {
-        pipeline(chosen, Path::new("."), stop, |chosen| Ok(records_in_memory(&chosen.data, logs)?))
+        pipeline(chosen, Path::new("."), stop, |chosen| match response {
+            None => Ok(records_in_memory(&chosen.data, logs)?),
+            Some(response) => Ok(response_in_memory(&chosen.data, response, logs)?),
+        })
     })
 }
 
@@ -143,13 +152,8 @@ impl Run {
     /// Standard deviation of a figure of the recommended model whose slopes in the entries of its response at a frequency are given.
     fn deviation_along(&self, hz: f64, slopes: PyReadonlyArray2<'_, Complex64>) -> Option<f64> {
         let found = self.found.recommended.as_ref().ok()?;
-        let view = slopes.as_array();
-        let (p, m) = (found.plant.outputs(), found.plant.inputs());
-        if view.dim() != (p, m) {
-            return None;
-        }
-        let slopes = Mat::from_fn(p, m, |i, j| c64::new(view[[i, j]].re, view[[i, j]].im));
-        Some(found.region.at(hz).along(slopes.as_ref()))
+        let fits = slopes.as_array().dim() == (found.plant.outputs(), found.plant.inputs());
+        fits.then(|| crate::region::along(&found.region, hz, &slopes))
     }
 
     /// The non-parametric response of the plant where an excitation is known.
@@ -234,7 +238,7 @@ impl Run {
         let band = match key {
             "likelihood" => {
                 if let Ok(found) = &self.found.recommended {
-                    return Region::recommended(found, hz);
+                    return Region::recommended(&found.plant, &found.region, hz);
                 }
                 None
             }

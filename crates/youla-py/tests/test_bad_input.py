@@ -122,7 +122,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     ),
     "machine": (lambda: youla.demo("rocket"), 'machine is "rocket", but must be "levitation" or "bearing"'),
     "seed": (lambda: youla.demo(seed=-1), "seed is -1, but must be a whole number of at least 0"),
-    "bootstrap of a demo": (lambda: youla.bootstrap(None, 3, seed=1), "run must be a youla.Run that youla.identify made"),
+    "bootstrap of nothing": (lambda: youla.bootstrap(None, 3, seed=1), "run is None, but must be a youla.Run"),
     "grid": (lambda: youla.scan(rec(), {"order": 3}), "grid['order'] must be a list of values of a key 'table.key'"),
     "executor": (
         lambda: youla.scan(rec(), {"hansen.order": [1]}, executor=4, nominal=NOMINAL, controller=2.0),

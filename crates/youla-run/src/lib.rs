@@ -39,7 +39,7 @@ pub use method::Method;
 pub use page::notes::cautions;
 pub use page::page;
 pub use records::segments::RecordSegment;
-pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory};
+pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory, response_in_memory};
 pub use result::{Filtered, Identification, Refusal};
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{
@@ -53,7 +53,7 @@ pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise_ru
 pub use stages::grey_box::GreyBoxRun;
 pub use stages::grey_box::criterion::StructureSearch;
 pub use stages::nonparametric::LinesOfRun;
-pub use stages::parts::{recommend_alone, redesign_of};
+pub use stages::parts::{recommend_alone, redesign_kept, redesign_of};
 pub use stages::pipeline::identify;
 pub use stages::reduction::RunReduction;
 pub use stages::signals::{DeviationSignals, deviation_signals, signal_records, write_signals};

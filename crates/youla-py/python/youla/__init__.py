@@ -26,7 +26,8 @@ from ._loop import (
 from ._model import FrequencyResponse, Mode, Model
 from ._plan import Study, study
 from ._record import Record
-from ._result import Evidence, Prediction, Run, Verdict, VerdictTest
+from ._response import Response
+from ._result import Evidence, Prediction, Run, Verdict, VerdictTest, load
 from ._stages import Check, SubspaceEstimate, check, greybox, subspace
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
@@ -51,6 +52,7 @@ __all__ = [
     "Record",
     "Redesign",
     "Reduction",
+    "Response",
     "Rows",
     "Run",
     "Study",
@@ -66,6 +68,7 @@ __all__ = [
     "greybox",
     "identify",
     "identify_many",
+    "load",
     "redesign",
     "reduce",
     "scan",

@@ -19,7 +19,7 @@ _KINDS = {
     "O": ("Python objects", "convert with .astype(float) first"),
     "U": ("text", "convert with .astype(float) first"),
     "S": ("bytes", "convert with .astype(float) first"),
-    "c": ("complex numbers", "give .real, or real and imaginary part as two channels"),
+    "c": ("complex numbers", "a frequency response goes into youla.Response; of complex samples give real and imaginary part as two channels"),
     "M": ("dates", "name the column with the time by time="),
     "m": ("durations", "name the column with the time by time="),
     "V": ("records with fields", "give a mapping: {name: array[name] for name in array.dtype.names}"),

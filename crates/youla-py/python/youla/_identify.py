@@ -14,11 +14,12 @@ from . import _native
 from ._arrays import Array, whole
 from ._checks import file_of, known, text
 from ._errors import InputError
-from ._model import FrequencyResponse
+from ._model import FrequencyResponse, _numbered
 from ._record import Record
+from ._response import Response, data_of
 from ._result import Run
 from ._systems import controller_table, nominal_table
-from ._types import Log
+from ._types import Log, Table
 
 Records = Record | Sequence[Record]
 
@@ -38,7 +39,7 @@ _ARGUMENTS = {
 
 
 def identify(
-    record: Records | str | os.PathLike[str],
+    record: Records | Response | FrequencyResponse | str | os.PathLike[str],
     *,
     nominal: Any = None,
     controller: Any = None,
@@ -52,8 +53,9 @@ def identify(
 
     Parameters
     ----------
-    record : Record, sequence of Record, or path
-        Records to identify from; several are several experiments. The path of a run.toml does what
+    record : Record, sequence of Record, Response, or path
+        Records to identify from; several are several experiments. A measured response: `Response`, `FrequencyResponse` or
+        `control.FrequencyResponseData`. The path of a run.toml does what
         ``youla identify run.toml`` does, and takes no other argument.
     nominal : Model, python-control or SciPy system, number, matrix, mapping or path
         A rough model of the plant. A continuous-time system is discretised by a zero-order hold. A mapping is the table
@@ -104,8 +106,47 @@ def identify(
         if nominal is not None or controller is not None or verify is not None or options:
             raise InputError("a run.toml states everything; leave the other arguments out, or give a youla.Record")
         return Run(_native.identify_file(file_of(record, "record")))
+    response = data_of(record)
+    if response is not None:
+        settings, logs, table = _of_response(response, verify, nominal, controller, feedback, hold, name, options)
+        return Run(_native.identify(json.dumps(settings), logs, False, table))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
-    return Run(_native.identify(json.dumps(settings), logs), (settings, logs))
+    return Run(_native.identify(json.dumps(settings), logs))
+
+
+def _of_response(
+    response: Response,
+    verify: Records | None,
+    nominal: Any,
+    controller: Any,
+    feedback: str,
+    hold: str | None,
+    name: str | None,
+    options: Mapping[str, Any],
+) -> tuple[dict[str, Any], list[Log], Table]:
+    """run.toml as nested dictionaries, the records to verify on, and the response."""
+    clocks = [response.dt, *(getattr(system, "dt", None) for system in (controller, nominal))]
+    known = [float(dt) for dt in clocks if dt is not None and not isinstance(dt, bool) and dt > 0]
+    if not known:
+        raise InputError("dt is missing, which a response does not show: give that of the controller, youla.Response(..., dt=0.001)")
+    m, p, dt = len(response.inputs), len(response.outputs), known[0]
+    empty = Record(np.zeros((m + p + m + 1, m + p + m)), inputs=list(range(m)), outputs=list(range(m, m + p)), dt=dt)
+    settings, _ = prepare(empty, None, nominal, controller, feedback, hold, name or response.name, options)
+    named = {"inputs": response.inputs, "outputs": response.outputs}
+    if response._of_loop:
+        named["input_excitation"] = tuple(_numbered("d", m))
+    groups = {key: [{"name": label} for label in labels] for key, labels in named.items()}
+    fresh = records_of(verify, "verify")
+    for k, other in enumerate(fresh):
+        if (other.inputs, other.outputs) != (response.inputs, response.outputs):
+            raise InputError(f"verify[{k}] has other inputs or outputs than the response; give Response its names by inputs= and outputs=")
+    labels = _labels(fresh)
+    verification = [{"file": label, "name": label} for label in labels]
+    data = {**settings["data"], **groups, "estimation": [], "verification": verification}
+    data["response"] = [{"file": response.name, "name": response.name}]
+    if fresh:
+        data.update({key: of for key, of in fresh[0]._tables().items()})
+    return {**settings, "data": data}, [_log_of(r) for r in fresh], response._table(dt)
 
 
 def prepare(

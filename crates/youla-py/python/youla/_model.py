@@ -281,9 +281,18 @@ class Model:
         p, m = self.d.shape
         return f"<youla.Model {self.name!r}: order {self.order}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
 
+    def __reduce__(self) -> Any:
+        return _model_of, (self._matrices, self._dt, self.inputs, self.outputs, self.name)
+
     def _native(self) -> Matrices:
         a, b, c, d = self._matrices
         return (a, b, c, d, self._dt)
+
+
+def _model_of(matrices: Sequence[Array], dt: float, inputs: Sequence[str], outputs: Sequence[str], name: str) -> Model:
+    """A model from its state."""
+    a, b, c, d = matrices
+    return Model(a, b, c, d, dt=dt, inputs=inputs, outputs=outputs, name=name)
 
 
 def frequencies(omega: Any) -> Array:

@@ -183,7 +183,7 @@ def study(
     plant : Run, Model, or discrete-time system of python-control or SciPy
         The simulated machine. Of a run, the recommended model with its noise.
     controller : Model or discrete-time system of python-control or SciPy
-        The controller, or a gain, m x p.
+        The controller, or a gain, m x p; ``"own"`` is that of the run.
     conditions : sequence of mapping
         Arguments of `excite` for each experiment: ``amplitude``, ``band``, ``seconds`` or ``samples``, ``shape`` and so on.
     n : int
@@ -225,6 +225,8 @@ def study(
     check_signs(feedback)
     twin, spread = _twin(plant, noise)
     of_plant = Model(*twin[0][:4], dt=twin[0][4])
+    if isinstance(plant, Run) and isinstance(controller, str) and controller == "own":
+        controller, feedback = plant.model("controller"), "positive"
     k = as_model(controller, "controller", of_plant.dt)
     certificate = certify(of_plant, k, feedback=feedback)
     if certificate.peak_sensitivity is None:

@@ -10,14 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from . import _native
 from ._arrays import Array
 from ._checks import path_of, text, truth, write_file
 from ._errors import InputError, NumericalError
 from ._figures import RECOMMENDED, Plots
+from ._kept import Kept, Results, files_of, read_folder
 from ._model import FrequencyResponse, Mode, Model, frequencies
 from ._optional import need
-from ._types import Log
 
 
 @dataclass(frozen=True)
@@ -128,10 +127,25 @@ class Run:
     True
     """
 
-    def __init__(self, native: _native.Run, made_from: tuple[dict[str, Any], list[Log]] | None = None) -> None:
+    def __init__(self, native: Results) -> None:
         self._native = native
-        #: Settings and records, where the run was made from records in memory.
-        self._made_from = made_from
+
+    @cached_property
+    def _kept(self) -> Kept:
+        """The files of the run: its state in a pickle, a copy and a bootstrap."""
+        return Kept(files_of(self._native))
+
+    def __reduce__(self) -> Any:
+        return Run, (self._kept,)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another run has the same settings, records and results, bit by bit; the times of the stages may differ."""
+        if not isinstance(other, Run):
+            return NotImplemented
+        return self is other or _results(self) == _results(other)
+
+    def __hash__(self) -> int:
+        return hash((self.name, self.settings))
 
     @cached_property
     def summary(self) -> dict[str, Any]:
@@ -376,3 +390,41 @@ class Run:
         from ._html import page
 
         return page(self)
+
+
+#: Files with the times of the stages, or drawn from other files.
+_TIMED = ("summary.json", "report.json", "report.html", "files.txt")
+
+
+def _results(run: Run) -> tuple[dict[str, Any], dict[str, bytes]]:
+    files = {name: content for name, content in run._kept.files.items() if name not in _TIMED}
+    return {key: value for key, value in run.summary.items() if key != "seconds"}, files
+
+
+def load(folder: str | os.PathLike[str]) -> Run:
+    """Load a run from its folder.
+
+    Parameters
+    ----------
+    folder : path
+        A run folder that `Run.save` wrote, or ``youla identify`` and ``youla demo``.
+
+    Returns
+    -------
+    Run
+        Equal to the run that was saved, bit by bit. Only files of the folder are read; nothing is identified again.
+
+    Raises
+    ------
+    InputError
+        For what is no run folder, and for one of an older version of youla.
+
+    Examples
+    --------
+    >>> import tempfile, youla
+    >>> run = youla.demo()
+    >>> with tempfile.TemporaryDirectory() as parent:
+    ...     youla.load(run.save(f"{parent}/run")) == run
+    True
+    """
+    return Run(Kept(read_folder(path_of(folder, "folder"))))

@@ -45,6 +45,8 @@ def source_of(data: Any, chosen: dict[str, list[str | int]], time: str | int | N
         return _of_file(data, chosen, time, dt)
     if _is(data, "control", "TimeResponseData"):
         return _of_response(data, time, dt)
+    if _is(data, "control", "FrequencyResponseData"):
+        raise InputError("data is a frequency response, not a record over time; give it to youla.identify as it is, or as a youla.Response")
     if _is(data, "pandas", "DataFrame"):
         return _of_pandas(data, chosen, time, dt)
     if _is(data, "polars", "LazyFrame"):

@@ -13,8 +13,8 @@ from . import _native
 from ._arrays import Array
 from ._checks import table
 from ._errors import InputError
-from ._identify import Records, check_options, identify, options_json, prepare, records_of, with_region
-from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._identify import Records, check_options, identify, options_json, prepare, records_of
+from ._model import FrequencyResponse, Mode, Model
 from ._optional import need
 from ._record import Record
 from ._result import Run
@@ -127,7 +127,6 @@ class SubspaceEstimate:
     """
 
     def __init__(self, found: _native.Subspace, record: Record) -> None:
-        self._found = found
         a, b, c, d, dt = found.model()
         self.model = Model(a, b, c, d, dt=dt, inputs=record.inputs, outputs=record.outputs, name="subspace")
         self.singular_values: Array = np.array(found.singular_values())
@@ -150,9 +149,7 @@ class SubspaceEstimate:
         FrequencyResponse
             Values of the shape (n, p, m).
         """
-        w = frequencies(omega)
-        values, known = self._found.response(w / (2 * np.pi))
-        return with_region(w, values, known, "subspace")
+        return self.model.frequency_response(omega)
 
     def __repr__(self) -> str:
         return f"<youla.SubspaceEstimate: order {self.model.order}, horizon {self.horizon}, past {self.past}>"

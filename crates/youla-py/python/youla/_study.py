@@ -15,9 +15,10 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, whole
-from ._checks import known, share, table
+from ._checks import kind, known, share, table
 from ._errors import Error, InputError, NumericalError
 from ._identify import OPTIONS, Records, check_options, options_json, prepare
+from ._kept import again
 from ._model import Model
 from ._record import Record
 from ._result import Run
@@ -101,7 +102,7 @@ def bootstrap(
     Parameters
     ----------
     run : Run
-        A run that `identify` made from records in memory.
+        A run of records: of `identify`, of a run.toml, of `demo` or of `load`.
     n : int
         Number of replicates.
     seed : int
@@ -122,7 +123,7 @@ def bootstrap(
     Raises
     ------
     InputError
-        For a run of a file or of `demo`, which holds no records in memory.
+        For a run of a measured response, which holds no records.
     NumericalError
         For a run without a recommended model, or without a predictor of its noise.
 
@@ -141,17 +142,17 @@ def bootstrap(
     ((8, 1, 2), 0)
     """
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
-    if not isinstance(run, Run) or run._made_from is None:
-        raise InputError("run must be a youla.Run that youla.identify made from a youla.Record, not from a file or by youla.demo")
+    if not isinstance(run, Run):
+        raise InputError(f"run is {kind(run)}, but must be a youla.Run, as youla.identify, youla.demo and youla.load return it")
+    made_from, records, count = again(run._kept)
     predictor = run._native.predictor()
     if predictor is None:
         raise NumericalError("the run has no recommended model with a predictor; its noise cannot be simulated")
     found = run.summary["recommended"]
     fixed = {"order": found["order"], "dead_time": found["dead_time"]}
-    made_from, records = run._made_from
-    logs = records[: len(made_from["data"]["estimation"])]
+    logs = records[:count]
     data = {**made_from["data"], "verification": []}
-    settings = json.dumps({**made_from, "data": data, "recommended": {**made_from.get("recommended", {}), **fixed}})
+    settings = json.dumps({**made_from, "data": data, "recommended": {**made_from["recommended"], **fixed}})
     payload = {"settings": settings, "logs": logs, "predictor": predictor, "seed": seed}
     key = key_of(settings, *_bytes(logs), *predictor, seed)
     rows = run_tasks(_replicate, payload, range(n), key=key, executor=executor, folder=folder, progress=progress)
@@ -165,7 +166,7 @@ def _replicate(payload: Payload, item: int, index: int) -> Row:
 
 
 def scan(
-    record: Records,
+    record: Records | Run,
     grid: Mapping[str, Sequence[Any]],
     *,
     executor: Executor | None = None,
@@ -177,8 +178,8 @@ def scan(
 
     Parameters
     ----------
-    record : Record or sequence of Record
-        Records.
+    record : Record, sequence of Record, or Run
+        Records; of a run, its records and settings.
     grid : mapping
         Values to try by key, for example ``{"hansen.horizon": [20, 40], "hansen.order": [4, 6, 8]}``.
     executor, folder, progress
@@ -216,8 +217,13 @@ def scan(
         if len(values) == 0:
             raise InputError(f"grid[{key!r}] is empty; give at least one value")
         known([key.partition(".")[0]], OPTIONS, "the grid of scan")
-    verify = arguments.pop("verify", None)
-    settings, logs = _prepared(record, verify, arguments)
+    if isinstance(record, Run):
+        if arguments:
+            raise InputError(f"{', '.join(arguments)} is given for a run, which holds its settings; change them by the grid")
+        of_run, logs, _ = again(record._kept)
+        settings = json.dumps(of_run)
+    else:
+        settings, logs = _prepared(record, arguments.pop("verify", None), arguments)
     points = [dict(zip(grid, values, strict=True)) for values in product(*(list(v) for v in grid.values()))]
     for point in points:
         _with(settings, point)

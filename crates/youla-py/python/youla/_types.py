@@ -3,10 +3,16 @@
 from collections.abc import Sequence
 from typing import TypeAlias
 
+import numpy as np
+import numpy.typing as npt
+
 from ._arrays import Array
 
 #: Name, sample time, channels with name, unit and column, samples x columns.
 Log: TypeAlias = tuple[str, float, Sequence[tuple[str, str, int]], Array]
+
+#: Angular frequencies, values, variances, whether these are known in full, and whether it is the response of the loop.
+Table: TypeAlias = tuple[Array, npt.NDArray[np.complex128], Array | None, bool, bool]
 
 #: A, B, C, D and the sample time.
 Matrices: TypeAlias = tuple[Array, Array, Array, Array, float]

@@ -21,10 +21,10 @@ use crate::summary::reduction::{ReductionDetails, SweepFile, as_csv as sweep_csv
 use crate::{Error, Result};
 use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile, exported};
 use serde::Serialize;
-use youla::MatRef;
 use youla::identify::HansenModel;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
+use youla::{Mat, MatRef, c64};
 use youla_io::folder::RunFolder;
 use youla_io::{Packing, Value, Variable, write_mat};
 use youla_report::{figure_csv, svg};
@@ -48,6 +48,7 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
     writer.signals()?;
     writer.models()?;
     writer.verdict()?;
+    writer.frequencies()?;
     writer.deviation()?;
     writer.reduction()?;
     writer.certificate()?;
@@ -96,6 +97,9 @@ impl Writer<'_> {
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
         self.model_with("2-factor/controller", declared.controller(), (y, u), &())?;
         self.model("2-factor/nominal", &declared.nominal, &())?;
+        if let Some(plant) = &self.found.records.true_plant {
+            self.model("2-factor/true_plant", plant, &())?;
+        }
         let f = match &self.found.filtered {
             Ok(filtered) => &filtered.factorisation,
             Err(reason) => return self.refused("2-factor/factors.json", reason),
@@ -134,7 +138,8 @@ impl Writer<'_> {
         let found = self.found;
         self.outcome(recommended::FILE, Some(&found.recommended), |model| {
             let name = recommended::FILE.trim_end_matches(".json");
-            self.model(name, &model.plant, &RecommendedDetails::new(model))
+            self.model(name, &model.plant, &RecommendedDetails::new(model))?;
+            self.json("4-identify/region.json", to_value(&model.region)?)
         })?;
         self.outcome("4-identify/direct.json", found.direct.as_ref(), |direct| {
             self.model("4-identify/direct", &direct.model, &SubspaceDetails::from(direct))
@@ -217,6 +222,23 @@ impl Writer<'_> {
             self.mat(&format!("7-validate/{}.mat", record.name), &variables)?;
         }
         Ok(())
+    }
+
+    /// The frequencies of the report and the response that rests on no model, with all digits.
+    fn frequencies(&self) -> Result<()> {
+        let column = |values: &[f64]| array("hz", Mat::from_fn(values.len(), 1, |i, _| values[i]).as_ref()).value;
+        let mut variables = vec![Variable { name: "hz".into(), value: column(&self.found.hz) }];
+        if let Some(Ok(measured)) = &self.found.indirect {
+            let response = &measured.response;
+            let (p, m) = (self.found.records.outputs.len(), self.found.records.inputs.len());
+            let part = |of: fn(c64) -> f64| {
+                Mat::from_fn(response.omega.len(), p * m, |k, i| of(response.at(k)[(i / m, i % m)]))
+            };
+            variables.push(Variable { name: "measured_omega".into(), value: column(&response.omega) });
+            variables.push(array("measured_re", part(|g| g.re).as_ref()));
+            variables.push(array("measured_im", part(|g| g.im).as_ref()));
+        }
+        self.mat("4-identify/frequencies.mat", &variables)
     }
 
     fn model(&self, name: &str, model: &StateSpace<Discrete>, details: &impl Serialize) -> Result<()> {

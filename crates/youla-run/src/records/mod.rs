@@ -15,6 +15,7 @@ use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::Path;
 use youla::Mat;
+use youla::identify::likelihood::ResponseTable;
 use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
@@ -121,6 +122,26 @@ pub fn records_in_memory(settings: &DataSettings, logs: Vec<Record>) -> Result<R
     };
     let read = files.into_iter().zip(logs).enumerate().map(of).collect::<Result<_>>()?;
     assembled(settings, read, None)
+}
+
+/// The records of a run from a measured response in memory, and logs to verify on.
+///
+/// # Errors
+/// As [`records_in_memory`].
+pub fn response_in_memory(
+    settings: &DataSettings,
+    (table, of_loop): (ResponseTable, bool),
+    logs: Vec<Record>,
+) -> Result<RunRecords> {
+    let records = records_in_memory(settings, logs)?;
+    let name = settings.response.first().and_then(|file| file.name.clone()).unwrap_or_else(|| "response".into());
+    let numbers: Vec<f64> =
+        table.values.iter().flat_map(|v| v.col_iter()).flat_map(|c| c.iter()).flat_map(|v| [v.re, v.im]).collect();
+    let sha256 = sha256_of([&table.omega[..], &numbers].into_iter());
+    let source = SourceFile { path: name.clone(), purpose: "response".into(), sha256 };
+    let measured = MeasuredTable { name, table, of_loop, source: source.clone() };
+    let sources = [vec![source], records.sources].concat();
+    Ok(RunRecords { measured: Some(measured), sources, ..records })
 }
 
 fn purpose(settings: &DataSettings, k: usize) -> &'static str {

@@ -5,12 +5,13 @@ use crate::records::RunRecords;
 use crate::result::Identification;
 use crate::settings::RunSettings;
 use crate::stages::context::RunContext;
-use crate::stages::factors::declared_loop;
+use crate::stages::factors::{declared_loop, factorise_run};
 use crate::stages::recommend::recommend;
-use crate::stages::redesign::redesigned;
+use crate::stages::redesign::{design, redesigned};
 use crate::{Error, Result};
 use std::path::Path;
-use youla::identify::likelihood::Recommendation;
+use youla::identify::likelihood::{Recommendation, Region};
+use youla::lti::{Discrete, StateSpace};
 use youla_loop::redesign::{Redesign, RedesignOptions};
 
 /// The recommended model of a run without anything else; paths are relative to `folder`.
@@ -21,6 +22,21 @@ pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Pa
     settings.check()?;
     let declared = declared_loop(settings, records, folder)?;
     recommend(RunContext { settings, records, declared: &declared, factorisation: None })
+}
+
+/// A new controller on the plant and region of a run that was kept, designed on `model`.
+///
+/// # Errors
+/// As [`redesign_of`], and those of [`factorise_run`].
+pub fn redesign_kept(
+    settings: &RunSettings,
+    records: &RunRecords,
+    (plant, model): (&StateSpace<Discrete>, &StateSpace<Discrete>),
+    region: &Region,
+    options: &RedesignOptions,
+) -> Result<Redesign> {
+    let factors = factorise_run(settings, records, Path::new("."))?.factors;
+    design(records, (plant, model), &factors, region, options)
 }
 
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.

@@ -1,10 +1,13 @@
 //! `[redesign]`: a new controller on the model of a run, with what it is worth.
 
+use crate::records::RunRecords;
 use crate::stages::context::RunContext;
 use crate::stages::reduction::RunReduction;
 use crate::{Error, Result};
-use youla::identify::likelihood::Recommendation;
-use youla_loop::redesign::{Redesign, RedesignProblem, redesign};
+use youla::factor::CoprimeFactors;
+use youla::identify::likelihood::{Recommendation, Region};
+use youla::lti::{Discrete, StateSpace};
+use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign};
 
 /// Designs on the reduced model where there is one, else on the recommended plant; every new controller is tested on the plant and its
 /// region.
@@ -17,14 +20,21 @@ pub(crate) fn redesigned(
     reduced: Option<&RunReduction>,
 ) -> Option<Result<Redesign>> {
     let (options, factorisation) = (run.settings.redesign.as_ref()?, run.factorisation?);
-    let (input, output) = run.records.sizes();
-    let problem = RedesignProblem {
-        plant: &recommended.plant,
-        model: reduced.map_or(&recommended.plant, |r| &r.found.reduction.model),
-        factors: &factorisation.factors,
-        region: Some(&recommended.region),
-        input_size: &input,
-        output_size: &output,
-    };
-    Some(redesign(&problem, options).map_err(|e| Error::from(e).within("[redesign]")))
+    let plant = &recommended.plant;
+    let model = reduced.map_or(plant, |r| &r.found.reduction.model);
+    Some(design(run.records, (plant, model), &factorisation.factors, &recommended.region, options))
+}
+
+/// Designs on `model` and tests on `plant` and its region.
+pub(crate) fn design(
+    records: &RunRecords,
+    (plant, model): (&StateSpace<Discrete>, &StateSpace<Discrete>),
+    factors: &CoprimeFactors<Discrete>,
+    region: &Region,
+    options: &RedesignOptions,
+) -> Result<Redesign> {
+    let (input, output) = records.sizes();
+    let problem =
+        RedesignProblem { plant, model, factors, region: Some(region), input_size: &input, output_size: &output };
+    redesign(&problem, options).map_err(|e| Error::from(e).within("[redesign]"))
 }

@@ -66,6 +66,7 @@ pub(crate) struct LocalErrors {
 
 /// Mean squares over bands, beyond what chance explains.
 #[derive(Debug, Clone, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Excess {
     /// Middles of the bands, mean square of each entry there less its chance, and the variance of this difference's mean.
     bands: Vec<(f64, Vec<f64>, Vec<f64>)>,
@@ -138,6 +139,12 @@ impl Excess {
     /// Whether any band speaks.
     pub(crate) fn is_empty(&self) -> bool {
         self.bands.is_empty()
+    }
+
+    /// Whether every band states so many entries.
+    #[cfg(feature = "serde")]
+    pub(crate) fn is_of(&self, entries: usize) -> bool {
+        self.bands.iter().all(|(_, excess, chance)| [excess.len(), chance.len()] == [entries; 2])
     }
 
     /// Mean square of each of `entries` near a frequency beyond chance, by how many standard deviations the largest exceeds it.

@@ -162,6 +162,7 @@ pub(crate) fn lines_of(signal: MatRef<'_, f64>, skip: usize) -> Vec<c64> {
 
 /// Sizes of the channels, by which they are divided.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Sizes {
     /// Of the inputs.
     pub(crate) u: Vec<f64>,

@@ -12,13 +12,15 @@ pub(crate) mod innovation;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
+#[cfg(feature = "serde")]
+mod stored;
 
 use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::verdict::Witness;
+use crate::identify::verdict::{Excess, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
 
@@ -77,8 +79,8 @@ pub(crate) struct Directions {
     rivals: Vec<(Model, Vec<usize>, f64)>,
     /// Variance of the parameters by their scatter over pieces of the records, in units of that of the noise; it is in `root`.
     scatter: f64,
-    /// The error that the excitation shows.
-    witness: Option<Witness>,
+    /// The errors that the excitation shows: differences between records, and distortion.
+    seen: Option<[Excess; 2]>,
 }
 
 /// Mean squares of the error of each entry, by what causes them.
@@ -112,7 +114,8 @@ impl Directions {
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);
-        Directions { witness, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
+        let seen = witness.map(|w| [w.variation, w.distortion]);
+        Directions { seen, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
     }
 
     /// A model with its delays, the roots of the covariance of its parameters, and rivals with their criteria.
@@ -129,7 +132,7 @@ impl Directions {
         let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(TINY);
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
-        Directions { model, delays, chart, root, rivals, scatter: 1.0, witness: None }
+        Directions { model, delays, chart, root, rivals, scatter: 1.0, seen: None }
     }
 
     /// Independent errors of the parameters.
@@ -205,10 +208,9 @@ impl Directions {
             (0..self.root.nrows()).fold(c64::ZERO, along) * phases[i % m]
         });
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
-        let seen = |of: fn(&Witness) -> &crate::identify::verdict::Excess| {
-            self.witness.as_ref().map_or_else(|| vec![0.0; entries], |w| of(w).near(share, entries).0)
-        };
-        let (mut variation, distortion) = (seen(|w| &w.variation), seen(|w| &w.distortion));
+        let seen =
+            |k: usize| self.seen.as_ref().map_or_else(|| vec![0.0; entries], |seen| seen[k].near(share, entries).0);
+        let (mut variation, distortion) = (seen(0), seen(1));
         // What moved parameters explain of the differences between records is not counted twice.
         for (i, variation) in variation.iter_mut().enumerate() {
             let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();

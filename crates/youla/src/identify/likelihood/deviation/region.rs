@@ -82,6 +82,8 @@ impl RegionParts {
 
 /// The region of a model: stated deviations of its response, draws, and intervals of its figures.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "super::stored::StoredRegion", try_from = "super::stored::StoredRegion"))]
 pub struct Region {
     /// Frequencies, Hz.
     pub hz: Vec<f64>,
@@ -89,9 +91,11 @@ pub struct Region {
     pub absolute: Vec<Mat<f64>>,
     /// What causes it: the squares of the parts sum to that of `absolute`.
     pub parts: RegionParts,
-    sizes: Sizes,
-    time: Discrete,
-    directions: Directions,
+    /// The frequencies as shares of the sample rate.
+    pub(super) shares: Vec<f64>,
+    pub(super) sizes: Sizes,
+    pub(super) time: Discrete,
+    pub(super) directions: Directions,
 }
 
 impl Region {
@@ -109,7 +113,7 @@ impl Region {
             variation: all(|p| &p.variation),
             distortion: all(|p| &p.distortion),
         };
-        Region { hz, absolute, parts, sizes, time, directions }
+        Region { hz, absolute, parts, shares: shares.to_vec(), sizes, time, directions }
     }
 
     /// Sizes of the channels, root mean square over the records.

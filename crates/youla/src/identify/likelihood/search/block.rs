@@ -5,6 +5,7 @@ use faer::{Mat, c64};
 
 /// One block of s states.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Block {
     /// Number of states s.
     pub(crate) states: usize,

@@ -17,6 +17,12 @@ pub(crate) struct Chart {
 }
 
 impl Chart {
+    /// The coordinates of which the directions are known.
+    #[cfg(feature = "serde")]
+    pub(crate) fn of(model: &Model, directions: Vec<Mat<f64>>, feedthrough: bool) -> Self {
+        Chart { directions, feedthrough, inputs: model.inputs, outputs: model.outputs }
+    }
+
     /// The coordinates at a model.
     pub(crate) fn new(model: &Model, feedthrough: bool) -> Self {
         let (m, p) = (model.inputs, model.outputs);

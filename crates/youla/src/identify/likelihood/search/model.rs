@@ -11,6 +11,7 @@ use faer::{Mat, MatRef, c64};
 
 /// `y = sum of C_i (z I - A_i)^-1 B_i u + D u`.
 #[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Model {
     /// Inputs m.
     pub(crate) inputs: usize,

@@ -80,6 +80,13 @@ pub(crate) fn settings_json(toml: &str) -> PyResult<String> {
     Ok(serde_json::to_string(&parsed).map_err(Failure::from)?)
 }
 
+/// Refuses settings with keys or values that do not exist.
+#[pyfunction]
+pub(crate) fn check_settings(chosen: &str) -> PyResult<()> {
+    settings(chosen)?.check().map_err(Failure::from)?;
+    Ok(())
+}
+
 /// Writes the files of a run as a run folder.
 #[pyfunction]
 pub(crate) fn write_files(

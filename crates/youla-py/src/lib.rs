@@ -19,7 +19,7 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::kept::{Region, read_mat, redesign, report_html, settings_json, write_files};
+    use super::kept::{Region, check_settings, read_mat, redesign, report_html, settings_json, write_files};
     #[pymodule_export]
     use super::logs::{clock, read_log};
     #[pymodule_export]

@@ -186,8 +186,8 @@ def test_scan_is_in_order(small: youla.Record) -> None:
         assert bits(youla.scan(small, grid, executor=executor, **OPTIONS)) == bits(alone)
     assert [(r["hansen.horizon"], r["recommended.order"]) for r in alone] == [(5, 1), (5, 2), (8, 1), (8, 2)]
     assert [r["order"] for r in alone] == [1, 2, 1, 2]
-    (misspelt,) = youla.scan(small, {"hansen.horizn": [1]}, **OPTIONS).failed
-    assert "horizon" in misspelt["error"]
+    with pytest.raises(youla.InputError, match="did you mean `horizon`"):
+        youla.scan(small, {"hansen.horizn": [1]}, **OPTIONS)
 
 
 def test_a_fleet_with_broken_files(tmp_path: Path) -> None:

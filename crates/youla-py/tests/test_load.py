@@ -27,7 +27,7 @@ def same(one: youla.Run, other: youla.Run) -> None:
         a, b = one.model(key), other.model(key)
         assert all(np.array_equal(getattr(a, x), getattr(b, x)) for x in "abcd"), key
         assert (a.inputs, a.outputs, a.dt) == (b.inputs, b.outputs, b.dt)
-        for omega in (None, OMEGA):
+        for omega in (None, OMEGA[OMEGA < np.pi / a.dt]):
             left, right = (run.frequency_response(omega, model=key) for run in (one, other))
             for part in ("omega", "values", "low", "high", "covariance"):
                 a, b = getattr(left, part), getattr(right, part)
@@ -104,14 +104,14 @@ def test_every_result_pickles_and_copies(run: youla.Run, record: youla.Record) -
 
 
 def of_process(run: youla.Run) -> tuple[youla.Run, bytes]:
-    return run, run.frequency_response(OMEGA).covariance.tobytes()
+    return run, run.frequency_response(OMEGA[:15]).covariance.tobytes()
 
 
 def test_a_process_has_the_same_bits(run: youla.Run) -> None:
     with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as pool:
         back, covariance = pool.submit(of_process, run).result()
     same(run, back)
-    assert covariance == run.frequency_response(OMEGA).covariance.tobytes()
+    assert covariance == run.frequency_response(OMEGA[:15]).covariance.tobytes()
 
 
 def test_runs_differ(run: youla.Run) -> None:

@@ -76,7 +76,7 @@ def test_frame_and_figure(found: youla.Study) -> None:
     assert list(frame["seconds"]) == [10, 40]
     axes = found.plot(wanted=0.01)
     assert [line.get_label() for line in axes.lines] == ["multisine, amplitude 1", "wanted"]
-    assert "damping at 3.2 Hz" in axes.get_ylabel()
+    assert axes.get_title() == "mode at 3.2 Hz"
 
 
 @pytest.mark.parametrize(

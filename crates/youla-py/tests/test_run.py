@@ -88,7 +88,7 @@ def test_files(run: youla.Run, tmp_path: Path) -> None:
     assert written["a"] == run.recommended.a.tolist()
     summary = json.loads((Path(folder) / "summary.json").read_text())
     assert summary["recommended"] == run.summary["recommended"]
-    with pytest.raises(youla.InputError, match="exists"):
+    with pytest.raises(youla.InputError, match="give replace=True"):
         run.save(tmp_path / "run")
     run.save(tmp_path / "run", replace=True)
     run.report(tmp_path / "report.html")

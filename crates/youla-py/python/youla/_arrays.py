@@ -83,6 +83,13 @@ def positive(value: Any, what: str) -> float:
     return number
 
 
+def seeded(value: Any) -> int:
+    """Return a seed, which must be stated."""
+    if value is None:
+        raise InputError("seed is missing; give a whole number, such as seed=1: the same seed gives the same rows again")
+    return whole(value, "seed", 0)
+
+
 def whole(value: Any, what: str, least: int) -> int:
     """Return a whole number from `least` to 2^64 - 1."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:

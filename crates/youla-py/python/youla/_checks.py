@@ -76,7 +76,7 @@ def folder_of(value: Any, what: str) -> str:
 def callback(value: Callable[..., Any] | None, what: str) -> None:
     """Refuse what cannot be called."""
     if value is not None and not callable(value):
-        raise InputError(f"{what} is {value!r}, but must be a function of the number of finished tasks, or None")
+        raise InputError(f"{what} is {value!r}, but must be True, or a function of the number of finished tasks, or None")
 
 
 def share(value: Any, what: str) -> float:

@@ -110,7 +110,9 @@ def identify(
     if response is not None:
         settings, logs, table = _of_response(response, verify, nominal, controller, feedback, hold, name, options)
         return Run(_native.identify(json.dumps(settings), logs, False, table))
+    assert not isinstance(record, (Response, FrequencyResponse))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
+    _check_moves(records_of(record, "record"))
     return Run(_native.identify(json.dumps(settings), logs))
 
 
@@ -198,12 +200,28 @@ def check_options(options: Mapping[str, Any], function: str) -> None:
             raise InputError(f"{key} is {type(table).__name__}, but must be a mapping as the table [{key}] of run.toml")
 
 
+def _check_moves(records: list[Record]) -> None:
+    """Refuse an input that never moves: nothing shows what it does."""
+    for j, name in enumerate(records[0].inputs):
+        if all(np.ptp(r.u[:, j]) == 0 for r in records):
+            value = records[0].u[0, j] + 0.0  # no -0
+            raise InputError(f"record: the input {name!r} is constant ({value:g}) in every record; excite it, check its column, or leave it out of inputs")
+
+
 def _log_of(record: Record) -> Log:
     """A record for the native module; values that would overflow in squares are refused."""
     log = record._log()
     # One pass over the array as it lies in memory; a NaN fails the comparison too.
     if log[3].max() <= 1e100 and log[3].min() >= -1e100:
         return log
+    for name, _, column in log[2]:
+        bad = np.flatnonzero(~np.isfinite(log[3][:, column]))
+        if bad.size:
+            k = int(bad[0])
+            raise InputError(
+                f"{record.name}: channel {name!r} is not finite at sample {k}, counted from 0 ({bad.size} such samples); identify from the parts "
+                f"without them, such as [{f'record[:{k}], ' if k > 1 else ''}record[{k + 1}:]]"
+            )
     columns = [log[3][:, column] for _, _, column in log[2]]
     largest = max(max(column.max(), -column.min()) for column in columns)
     if largest > 1e100 and np.isfinite(largest):

@@ -13,13 +13,20 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, as_floats, positive, whole
-from ._checks import listed, path_of, text
+from ._checks import known, listed, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
 from ._identify import _plain, options_json
 from ._model import Complex, Model, _signal
 from ._result import Run
 from ._systems import as_model, check_signs, controller_table, nominal_table
+
+
+#: Further options of `excite`.
+EXCITE = (
+    "shape", "seed", "ramp", "notch", "inputs", "periods", "limit_input", "limit_output", "scale_to_limit", "model_error", "noise",
+    "damping_deviation",
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,11 @@ class Certificate:
 
     def __bool__(self) -> bool:
         return self.stable
+
+    def __repr__(self) -> str:
+        peak = "" if self.peak_sensitivity is None else f", peak sensitivity {self.peak_sensitivity:.4g}"
+        largest = f"{np.abs(self.poles).max():.6g}" if len(self.poles) else "none"
+        return f"<youla.Certificate: {'stable' if self.stable else 'unstable'}, {len(self.poles)} poles, largest |z| {largest}{peak}>"
 
 
 def _loop(plant: Any, controller: Any, feedback: str) -> tuple[Model, Model]:
@@ -156,6 +168,10 @@ class Reduction:
     hankel: Array
     error_bound: float | None
 
+    def __repr__(self) -> str:
+        bound = "no bound of the error" if self.error_bound is None else f"error at most {self.error_bound:.4g}"
+        return f"<youla.Reduction: order {self.model.order} of {len(self.hankel)}, {bound}>"
+
 
 def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **options: Any) -> Reduction:
     """Remove states from a model.
@@ -203,6 +219,10 @@ class Redesign:
     controller: Model
     promised: dict[str, Any]
 
+    def __repr__(self) -> str:
+        loops = [f"{key} {of['least_damping']:.4g}" for key, of in self.promised.items() if isinstance(of, dict) and of.get("least_damping") is not None]
+        return f"<youla.Redesign: controller of order {self.controller.order}; least damping {', '.join(loops) or 'unknown'}>"
+
 
 def redesign(run: Run, **options: Any) -> Redesign:
     """Design a new controller on the result of a run.
@@ -247,6 +267,11 @@ class Excitation:
     signal: Array
     dt: float
     promised: dict[str, Any]
+
+    def __repr__(self) -> str:
+        n, m = self.signal.shape
+        peak = np.abs(self.signal).max()
+        return f"<youla.Excitation: {n} samples of {self.dt:g} s, {m} inputs, at most {peak:.4g}; promised {', '.join(list(self.promised)[:8])}>"
 
 
 def excite(
@@ -300,6 +325,7 @@ def excite(
     """
     if (seconds is None) == (samples is None):
         raise InputError("the length is given twice or not at all; give either seconds= or samples=")
+    known(options, EXCITE, "excite")
     dt = as_model(nominal, "nominal").dt if dt is None else positive(dt, "dt")
     edges = np.ravel(as_floats(band, "band"))
     if edges.size != 2:
@@ -349,6 +375,9 @@ class Comparison:
 
     runs: tuple[str, ...]
     distances: tuple[dict[str, Any], ...]
+
+    def __repr__(self) -> str:
+        return f"<youla.Comparison: {len(self.runs)} runs, {len(self.distances)} distances; {', '.join(self.runs[:6])}>"
 
 
 def compare(runs: Sequence[Run | str | os.PathLike[str]], *, model: str = "likelihood", page: Any = None) -> Comparison:

@@ -39,6 +39,9 @@ class MagneticLoop:
     _modal: tuple[Array, Array, Array, Array]
     _shapes: Array
 
+    def __repr__(self) -> str:
+        return f"<youla.rotor.MagneticLoop at {self.speed:g} rad/s:\n  plant {self.plant!r},\n  controller {self.controller!r}>"
+
     def unbalance_response(self, hz: Any, *, node: int, magnitude: float, model: Any = None) -> Complex:
         """Compute the synchronous response of the sensors to an unbalance, with gyroscopic terms of the speed of the loop.
 

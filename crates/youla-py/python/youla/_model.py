@@ -85,6 +85,11 @@ class FrequencyResponse:
         found: Array = np.unwrap(np.angle(self.values), axis=0)
         return found
 
+    def __repr__(self) -> str:
+        n, p, m = self.values.shape
+        band = f"{self.hz.min():.4g} to {self.hz.max():.4g} Hz"
+        return f"<youla.FrequencyResponse {self.name!r}: {n} frequencies, {band}, {p} x {m}, {'no' if self.low is None else 'with a'} region>"
+
     def to_control(self) -> Any:
         """Return a `control.FrequencyResponseData`."""
         control = need("control")
@@ -230,7 +235,7 @@ class Model:
         FrequencyResponse
             Values of the shape (n, p, m), without a region.
         """
-        w = frequencies(omega)
+        w = frequencies(omega, self._dt)
         values = _native.frequency_response(self._native(), w / (2 * np.pi))
         return FrequencyResponse(w, values, name=self.name)
 
@@ -295,11 +300,16 @@ def _model_of(matrices: Sequence[Array], dt: float, inputs: Sequence[str], outpu
     return Model(a, b, c, d, dt=dt, inputs=inputs, outputs=outputs, name=name)
 
 
-def frequencies(omega: Any) -> Array:
-    """Angular frequencies of an argument."""
+def frequencies(omega: Any, dt: float | None = None) -> Array:
+    """Angular frequencies of an argument; up to that of Nyquist where a sample time is given."""
     w = np.ascontiguousarray(np.atleast_1d(as_floats(omega, "omega")), dtype=np.float64)
     if w.ndim != 1 or w.size == 0 or not np.isfinite(w).all() or (w < 0).any():
         raise InputError("omega must be a list of finite angular frequencies in rad/s, none of them negative")
+    if dt is not None and w.max() > np.pi / dt * (1 + 1e-9):
+        raise InputError(
+            f"omega reaches {w.max():.6g} rad/s, but a model of dt={dt:g} s shows nothing above its Nyquist frequency of {np.pi / dt:.6g} rad/s "
+            f"({0.5 / dt:.6g} Hz); leave these frequencies out"
+        )
     return w
 
 

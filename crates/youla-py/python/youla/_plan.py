@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._arrays import Array, as_floats, positive, whole
+from ._arrays import Array, as_floats, positive, seeded, whole
 from ._checks import known, listed, place, table
 from ._errors import Error, InputError, NumericalError
-from ._loop import certify, excite, simulate_loop
+from ._loop import EXCITE, certify, excite, simulate_loop
 from ._model import Model
 from ._optional import need
-from ._plot import _axes
+from ._plot import _axes, grid
 from ._record import Record
 from ._result import Run
 from ._study import Folder, _prepared
@@ -33,7 +33,7 @@ _FARTHEST = 0.2
 System = tuple[Array, Array, Array, Array, float]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Study(Rows):
     """Monte Carlo runs of several experiments; see `study`.
 
@@ -92,54 +92,69 @@ class Study(Rows):
         """Return the table as a pandas data frame, a row for each condition."""
         return need("pandas").DataFrame(self.table())
 
-    def cheapest(self, zeta: float, *, mode: int = 0) -> dict[str, Any] | None:
+    def cheapest(self, zeta: float, *, mode: int | None = None) -> dict[str, Any] | None:
         """Find the shortest experiment, and of these the one with the least amplitude, that gives the damping accurately enough.
 
         Parameters
         ----------
         zeta : float
             Wanted standard deviation of the damping ratio, as a part of it: 0.05 is 5 %.
-        mode : int
-            Which mode, from 0 in the order of `modes`.
+        mode : int, optional
+            Which mode, from 0 in the order of `modes`; every mode when absent.
 
         Returns
         -------
         dict or None
-            The row of `table`; None where no condition suffices. A condition suffices where every run found the mode.
+            The row of `table`, whose deviations are absolute; None where no condition suffices. A condition suffices where every
+            run found the mode.
 
         Raises
         ------
         InputError
             For a plant without oscillating modes, or a mode that it does not have.
         """
-        wanted = positive(zeta, "zeta") * self._zeta(mode)
-        key = f"zeta_deviation_{mode + 1}"
-        enough = [row for row in self.table() if row[key] <= wanted and row[f"found_{mode + 1}"] == 1]
+        wanted = positive(zeta, "zeta")
+        self._zeta(0 if mode is None else mode)
+        limits = {k + 1: wanted * self._zeta(k) for k in (range(len(self.modes)) if mode is None else [mode])}
+
+        def suffices(row: Mapping[str, Any]) -> bool:
+            return all(row[f"zeta_deviation_{k}"] <= limit and row[f"found_{k}"] == 1 for k, limit in limits.items())
+
+        enough = [row for row in self.table() if suffices(row)]
         return min(enough, key=lambda row: (_length(row), float(np.max(row["amplitude"]))), default=None)
 
-    def plot(self, ax: Any = None, *, mode: int = 0, wanted: float | None = None) -> Any:
+    def plot(self, ax: Any = None, *, mode: int | None = None, wanted: float | None = None) -> Any:
         """Draw the standard deviation of the damping over the length of the experiment.
 
         Parameters
         ----------
-        ax : matplotlib Axes, optional
-            Where to draw; new axes when absent.
-        mode : int
-            Which mode, from 0 in the order of `modes`.
+        ax : matplotlib axes, optional
+            Where to draw, one for each mode that is drawn; new axes when absent.
+        mode : int, optional
+            Which mode, from 0 in the order of `modes`; all of them when absent.
         wanted : float, optional
             Wanted deviation as a part of the damping, drawn as a line.
 
         Returns
         -------
-        matplotlib Axes
+        matplotlib axes
+            An array of them for several modes.
 
         Raises
         ------
         InputError
             For a plant without oscillating modes, or a mode that it does not have.
         """
+        self._zeta(0 if mode is None else mode)
+        if mode is not None or len(self.modes) == 1:
+            return self._draw(_axes(ax), mode or 0, wanted)
+        axes = grid(ax, len(self.modes), 1, (6.4, 2.6)).ravel()
+        for k, one in enumerate(axes):
+            self._draw(one, k, wanted)
+        return axes
+
+    def _draw(self, ax: Any, mode: int, wanted: float | None) -> Any:
         true = self._zeta(mode)
-        ax = _axes(ax)
         curves: dict[str, list[tuple[float, float]]] = {}
         for row in self.table():
             label = f"{row.get('shape', 'multisine')}, amplitude {np.max(row['amplitude']):g}"
@@ -151,7 +166,8 @@ class Study(Rows):
         ax.set_xscale("log")
         ax.set_yscale("log")
         ax.set_xlabel("length of the record, s" if all("seconds" in c for c in self.conditions) else "length of the record")
-        ax.set_ylabel(f"standard deviation of the damping at {self.modes[mode][0]:.3g} Hz, %")
+        ax.set_ylabel("deviation of the damping, %")
+        ax.set_title(f"mode at {self.modes[mode][0]:.3g} Hz", fontsize="medium")
         ax.legend()
         return ax
 
@@ -167,7 +183,7 @@ def study(
     conditions: Sequence[Mapping[str, Any]],
     *,
     n: int = 20,
-    seed: int,
+    seed: int | None = None,
     noise: Any = None,
     feedback: str = "negative",
     executor: Executor | None = None,
@@ -221,7 +237,7 @@ def study(
     >>> found.cheapest(0.5)["seconds"]
     10
     """
-    n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
+    n, seed = whole(n, "n", 1), seeded(seed)
     check_signs(feedback)
     twin, spread = _twin(plant, noise)
     of_plant = Model(*twin[0][:4], dt=twin[0][4])
@@ -280,9 +296,12 @@ def _condition(given: Any, index: int, plant: Model, k: Model, feedback: str, se
     for key in ("amplitude", "band"):
         if key not in found:
             raise InputError(f"{what} lacks {key!r}; each condition holds the arguments of excite")
-    known([key for key in found if key in ("nominal", "controller", "dt", "feedback", "hold")], [], what)
+    known(found, ["amplitude", "band", "seconds", "samples", *EXCITE], what)
     found = {"seed": seed, **found}
-    excite(plant, k, feedback=feedback, **found)
+    try:
+        excite(plant, k, feedback=feedback, **found)
+    except InputError as error:
+        raise InputError(f"{what}: {error}") from None
     return found
 
 

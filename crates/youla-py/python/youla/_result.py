@@ -98,6 +98,11 @@ class Verdict:
     def __str__(self) -> str:
         return "\n".join(self.lines)
 
+    def __repr__(self) -> str:
+        counts = [f"{sum(t.outcome == o for t in self.tests)} {o.replace('-', ' ')}" for o in ("passed", "failed", "not-tested")]
+        shown = [f"  {reason}" for reason in self.reasons[:6]] + (["  ..."] if len(self.reasons) > 6 else [])
+        return "\n".join([f"<youla.Verdict: {'trusted' if self.trusted else 'not trusted'}; tests: {', '.join(counts)}>", *shown])
+
 
 @dataclass(frozen=True)
 class Prediction:
@@ -106,6 +111,10 @@ class Prediction:
     record: str
     measured: Array
     predicted: dict[str, Array]
+
+    def __repr__(self) -> str:
+        n, p = self.measured.shape
+        return f"<youla.Prediction {self.record!r}: {n} samples of {p} outputs, by {', '.join(self.predicted)}>"
 
 
 class Run:
@@ -167,6 +176,10 @@ class Run:
     def settings(self) -> str:
         """The settings of the run as the text of a run.toml."""
         return self._native.settings()
+
+    @cached_property
+    def _dt(self) -> float:
+        return self.model("controller").dt
 
     @property
     def models(self) -> tuple[str, ...]:
@@ -283,7 +296,7 @@ class Run:
         """
         from ._identify import with_region
 
-        w = frequencies(self._native.hz() * (2 * np.pi) if omega is None else omega)
+        w = frequencies(self._native.hz() * (2 * np.pi) if omega is None else omega, self._dt)
         values, known = self._native.response(text(model, "model"), w / (2 * np.pi))
         return with_region(w, values, known, "recommended" if model == RECOMMENDED else model)
 
@@ -373,11 +386,14 @@ class Run:
         place = path_of(folder, "folder")
         if os.path.isfile(place):
             raise InputError(f"folder is the file {place}; give a folder that is not there yet")
+        if not truth(replace, "replace") and os.path.isdir(place) and os.listdir(place):
+            what = "holds a run: give replace=True to replace it" if os.path.isfile(os.path.join(place, "files.txt")) else "is not empty: empty it"
+            raise InputError(f"folder {place} {what}, or give another folder")
         return self._native.write(place, truth(replace, "replace"))
 
     @property
     def plot(self) -> Plots:
-        """Figures as matplotlib axes: ``run.plot.bode()``, ``nyquist``, ``poles``, ``fit``."""
+        """Figures as matplotlib axes: ``run.plot.bode()``, ``nyquist``, ``loop``, ``poles``, ``parts``, ``fit``, ``compare``."""
         return Plots(self)
 
     def __repr__(self) -> str:

@@ -74,6 +74,16 @@ def _clock(times: Any, dt: float | None, what: str) -> float:
     seconds = as_floats(times, what)
     if not np.isfinite(seconds).all():
         raise InputError(f"{what} has a value that is not finite; cut these rows out")
+    steps = np.diff(seconds.ravel())
+    usual = float(np.median(steps)) if steps.size else 0.0
+    # As the readers of files have it: a step may differ from the others by 1 %.
+    uneven = np.flatnonzero(np.abs(steps - usual) > 0.01 * abs(usual))
+    if usual > 0 and uneven.size:
+        k = int(uneven[0])
+        raise InputError(
+            f"{what} is not uniform: sample {k + 1}, counted from 0, comes {steps[k]:.6g} s after the one before, the usual step is {usual:.6g} s "
+            f"({uneven.size} such steps); cut at gaps and give identify a list of records, or interpolate to equal steps before"
+        )
     return _native.clock(what, np.ascontiguousarray(seconds), dt)
 
 

@@ -47,6 +47,11 @@ class Check:
         pd = need("pandas")
         return pd.DataFrame(self.findings)
 
+    def __repr__(self) -> str:
+        lines = [f"  {f['severity']}: {' '.join(str(f[k]) for k in ('record', 'channel') if f.get(k))}: {f['what']}"[:160] for f in self.findings]
+        more = [f"  ... and {len(lines) - 8} more; print() shows all"] if len(lines) > 8 else []
+        return "\n".join([f"<youla.Check: {self.defects} defects, {self.cautions} cautions, {self.notes} notes>", *lines[:8], *more])
+
     def __str__(self) -> str:
         lines = [f"{self.defects} defects, {self.cautions} cautions, {self.notes} notes"]
         for f in self.findings:

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._arrays import Array, whole
+from ._arrays import Array, seeded, whole
 from ._checks import kind, known, share, table
 from ._errors import Error, InputError, NumericalError
 from ._identify import OPTIONS, Records, check_options, options_json, prepare
@@ -30,7 +30,7 @@ Payload = dict[str, Any]
 Folder = str | os.PathLike[str] | None
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Bootstrap(Rows):
     """Replicates of a recommended model; see `bootstrap`.
 
@@ -89,7 +89,7 @@ def bootstrap(
     run: Run,
     n: int,
     *,
-    seed: int,
+    seed: int | None = None,
     executor: Executor | None = None,
     folder: Folder = None,
     progress: Progress | None = None,
@@ -112,8 +112,9 @@ def bootstrap(
         process one after the other when absent.
     folder : path, optional
         Where finished replicates are kept; a second call computes only what is missing.
-    progress : callable, optional
-        Called with the number of finished replicates.
+    progress : True or callable, optional
+        True draws a line with the time that is left. A function is called with an object that has `count`,
+        `total` and `seconds`.
 
     Returns
     -------
@@ -141,7 +142,7 @@ def bootstrap(
     >>> found.modes().shape, len(found.failed)
     ((8, 1, 2), 0)
     """
-    n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
+    n, seed = whole(n, "n", 1), seeded(seed)
     if not isinstance(run, Run):
         raise InputError(f"run is {kind(run)}, but must be a youla.Run, as youla.identify, youla.demo and youla.load return it")
     made_from, records, count = again(run._kept)
@@ -226,10 +227,18 @@ def scan(
         settings, logs = _prepared(record, arguments.pop("verify", None), arguments)
     points = [dict(zip(grid, values, strict=True)) for values in product(*(list(v) for v in grid.values()))]
     for point in points:
-        _with(settings, point)
+        _check_point(_with(settings, point), point)
     payload = {"settings": settings, "logs": logs}
     key = key_of(settings, *_bytes(logs), points)
     return run_tasks(_point, payload, points, key=key, executor=executor, folder=folder, progress=progress)
+
+
+def _check_point(settings: str, point: Mapping[str, Any]) -> None:
+    """Refuse a key or a value that no run takes, before the first task."""
+    try:
+        _native.check_settings(settings)
+    except InputError as error:
+        raise InputError(f"grid with {', '.join(f'{key!r}: {value!r}' for key, value in point.items())}: {error}") from None
 
 
 def _with(settings: str, point: Mapping[str, Any]) -> str:

@@ -90,7 +90,8 @@ def _state_space(system: Any, what: str) -> Any:
 def _numbers(system: Any, what: str) -> Any:
     """A gain as a matrix, or what can be a system."""
     if system is None:
-        raise InputError(f"{what} is missing" + ("; give 0 where no controller ran" if what == "controller" else ""))
+        remedy = "give 0 where no controller ran" if what == "controller" else f"give a rough {what}: a youla.Model, control.tf(...), or a gain"
+        raise InputError(f"{what} is missing; {remedy}")
     try:
         gain = as_matrix(system, what)
     except InputError:
@@ -142,7 +143,21 @@ def _system(system: Any, dt: float, ports: tuple[int, int], what: str) -> tuple[
         numerator, denominator = np.atleast_1d(numerator).tolist(), np.atleast_1d(denominator).tolist()
         if isinstance(numerator[0], list):
             numerator = [[row] for row in numerator]
+    _check_proper(numerator, denominator, what)
     return "transfer_function", {"domain": domain, "numerator": numerator, "denominator": denominator}
+
+
+def _check_proper(numerator: Any, denominator: Any, what: str) -> None:
+    """Refuse a numerator of a higher degree than its denominator; both may be nested by outputs and inputs."""
+    if numerator and isinstance(numerator[0], list):
+        for row, below in zip(numerator, denominator if isinstance(denominator[0], list) else [denominator] * len(numerator), strict=True):
+            _check_proper(row, below, what)
+        return
+    n, d = (max(len(np.trim_zeros(np.asarray(x, dtype=float), "f")) - 1, 0) for x in (numerator, denominator))
+    if n > d:
+        raise InputError(
+            f"{what} is improper: its numerator has degree {n}, its denominator {d}; give what ran, with the filter of its derivative or its delay"
+        )
 
 
 def _domain(system: Any, what: str) -> str:

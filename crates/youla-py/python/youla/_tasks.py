@@ -9,8 +9,10 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import sys
 import tempfile
-from collections.abc import Callable, Iterable, Iterator, Mapping
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sized
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -26,7 +28,56 @@ from ._record import Record
 
 Row = dict[str, Any]
 Task = Callable[[Any, Any, int], Row]
-Progress = Callable[[int], None]
+
+@dataclass(frozen=True, eq=False)
+class Done:
+    """Finished tasks as a function of progress gets them.
+
+    Attributes
+    ----------
+    count : int
+        Finished tasks.
+    total : int or None
+        All tasks; None where their number is not known.
+    seconds : float
+        Time since the start.
+    """
+
+    count: int
+    total: int | None
+    seconds: float
+
+    def __int__(self) -> int:
+        return self.count
+
+    def __str__(self) -> str:
+        if self.total is None:
+            return f"{self.count} done, {self.seconds:.1f} s"
+        bar = "#" * (20 * self.count // max(self.total, 1))
+        left = self.seconds * (self.total - self.count) / max(self.count, 1)
+        return f"[{bar:<20}] {self.count} of {self.total}, {self.seconds:.1f} s, {left:.1f} s left"
+
+
+#: True draws a line; a function is called with what is done.
+Progress = bool | Callable[[Done], None]
+
+
+class _Clock:
+    """Tells a function, or the terminal and notebook, what is done."""
+
+    def __init__(self, progress: Progress | None, total: int | None) -> None:
+        self._progress, self._total, self._start = progress, total, time.monotonic()
+
+    def tell(self, rows: Mapping[int, Row]) -> None:
+        if self._progress is None or self._progress is False:
+            return
+        done = Done(len(rows), self._total, time.monotonic() - self._start)
+        if callable(self._progress):
+            self._progress(done)
+        else:
+            end = "\n" if done.count == self._total else ""
+            print(f"\r{done}  ", end=end, file=sys.stderr, flush=True)
+
 
 #: Tasks that are handed to an executor at a time: memory does not grow with the number of tasks.
 _WINDOW = 256
@@ -46,6 +97,13 @@ class Rows:
 
     rows: tuple[Row, ...]
     computed: int
+
+    def __repr__(self) -> str:
+        lines = [f"<youla.{type(self).__name__}: {len(self.rows)} rows, {len(self.failed)} failed>"]
+        for row in self.rows[:4]:
+            shown = ", ".join(f"{key} {value:.6g}" if isinstance(value, float) else f"{key} {value}" for key, value in flat(row).items() if not isinstance(value, (dict, list)))
+            lines.append(f"  {shown}"[:160])
+        return "\n".join([*lines, *(["  ..."] if len(self.rows) > 4 else [])])
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -123,11 +181,13 @@ def run_tasks(
 ) -> Rows:
     """Compute the rows of all items; `key` names the payload in the folder."""
     _check_executor(executor)
-    callback(progress, "progress")
+    if not isinstance(progress, bool):
+        callback(progress, "progress")
     single = isinstance(items, (str, bytes, os.PathLike, Mapping, Record)) or getattr(items, "shape", None) == ()
     if single or not isinstance(items, Iterable):
         raise InputError(f"records is {kind(items)}, but must be a list of them or of paths")
     kept = None if folder is None else _prepared(folder, key)
+    clock = _Clock(progress, len(items) if isinstance(items, Sized) else None)
     rows: dict[int, Row] = {}
     missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, item, rows))
     if executor is None:
@@ -135,9 +195,9 @@ def run_tasks(
         for k, item in missing:
             rows[k] = call(task, payload, item, k, kept)
             computed += 1
-            _tell(progress, rows)
+            clock.tell(rows)
     else:
-        computed = _submit(executor, task, payload, missing, kept, rows, progress)
+        computed = _submit(executor, task, payload, missing, kept, rows, clock)
     return Rows(tuple(rows[k] for k in sorted(rows)), computed)
 
 
@@ -158,7 +218,7 @@ def _submit(
     missing: Iterator[tuple[int, Any]],
     kept: str | None,
     rows: dict[int, Row],
-    progress: Progress | None,
+    clock: _Clock,
 ) -> int:
     computed, running = 0, dict[Future[Row], int]()
     try:
@@ -174,15 +234,10 @@ def _submit(
             for future in done:
                 rows[running.pop(future)] = future.result()
                 computed += 1
-            _tell(progress, rows)
+            clock.tell(rows)
     finally:
         for future in running:
             future.cancel()
-
-
-def _tell(progress: Progress | None, rows: dict[int, Row]) -> None:
-    if progress is not None:
-        progress(len(rows))
 
 
 def call(task: Task, payload: Any, item: Any, index: int, folder: str | None) -> Row:

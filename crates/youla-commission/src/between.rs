@@ -53,6 +53,12 @@ pub(crate) fn between(
     let place = out.join(&name);
     let kept: Option<BetweenRecord> = read_json(&place.join("between.json"))?;
     if let Some(kept) = kept.filter(|kept| kept.status == PointStatus::Done) {
+        if !of_these_points(&kept, ends, out)? {
+            let problem =
+                "its evidence is not that of the Q and S of its points; remove this file to examine the way again"
+                    .into();
+            return Err(Error::Campaign { path: place.join("between.json"), problem });
+        }
         operator.notes(&format!("{name}: done before"));
         return Ok(kept);
     }
@@ -62,6 +68,16 @@ pub(crate) fn between(
     write_text(&place.join("verification.csv"), &log_text(&rows, ends.running.nominal.time().ts()))?;
     write_json(&place.join("between.json"), &record)?;
     Ok(record)
+}
+
+/// Whether the evidence of a pair that is kept is that of the present Q and S of its points. Of Q and S that have none, as of a Q that is not
+/// stable, it is not.
+fn of_these_points(kept: &BetweenRecord, ends: &Ends<'_>, out: &Path) -> Result<bool> {
+    let mut present = BetweenRecord { evidence: None, ..kept.clone() };
+    if let Err(unread @ Error::File(_)) = evidence(ends, out, &mut present) {
+        return Err(unread);
+    }
+    Ok(matches!((&kept.evidence, &present.evidence), (Some(kept), Some(present)) if kept.equals(present)))
 }
 
 fn examined(

@@ -6,7 +6,8 @@ use crate::campaign::{Campaign, OperatingPoint};
 use crate::point::{Operator, Point, PointFiles};
 use crate::q_table::write_tables;
 use crate::record::{
-    BetweenRecord, CampaignSummary, PointRecord, PointStatus, io, log_text, read_json, write_json, write_text,
+    BetweenRecord, CampaignSummary, PointRecord, PointStatus, checksum_of, io, log_text, read_json, write_json,
+    write_text,
 };
 use crate::report::report;
 use crate::{Error, Result};
@@ -48,6 +49,7 @@ pub fn commission(path: &Path, out: &Path, operator: &mut dyn Operator) -> Resul
         let kept: Option<PointRecord> = read_json(&place.join("point.json"))?;
         let record = match kept.filter(|kept| kept.status == PointStatus::Done) {
             Some(kept) => {
+                of_this_point(&kept, &place)?;
                 operator.notes(&format!("{}: done before", at.name));
                 kept
             }
@@ -127,6 +129,18 @@ fn claim(campaign: &Campaign, loops: &[RunningLoop], controller: &str, out: &Pat
     }
 }
 
+/// Whether q.json is the Q that was verified at a point that is kept.
+fn of_this_point(kept: &PointRecord, place: &Path) -> Result<()> {
+    let path = place.join("q.json");
+    if kept.q_checksum.is_some() && checksum_of(&path)? == kept.q_checksum {
+        return Ok(());
+    }
+    let problem = "this is not the Q that was verified at this point (its checksum is not that of point.json); remove point.json to run \
+                   the point again"
+        .into();
+    Err(Error::Campaign { path, problem })
+}
+
 fn one_point(
     campaign: &Campaign,
     at: &OperatingPoint,
@@ -135,14 +149,14 @@ fn one_point(
     operator: &mut dyn Operator,
 ) -> Result<PointRecord> {
     operator.notes(&at.name);
-    let (record, files) =
+    let (mut record, files) =
         Point::new(campaign, at, running, Bench::start(campaign, at, running, image)?).run(operator)?;
-    write_point(place, running, &record, files)?;
+    write_point(place, running, &mut record, files)?;
     Ok(record)
 }
 
 /// The record last: a point without it is run again.
-fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files: PointFiles) -> Result<()> {
+fn write_point(place: &Path, running: &RunningLoop, record: &mut PointRecord, files: PointFiles) -> Result<()> {
     fs::create_dir_all(place).map_err(|source| io(place, source))?;
     let names = ["point.json", "q.json", "log.csv", "verification.csv"];
     for name in names {
@@ -170,6 +184,7 @@ fn write_point(place: &Path, running: &RunningLoop, record: &PointRecord, files:
                 q: Some(SystemMatrices::new(&proposal.new.q.system)),
             };
             write_json(&place.join("q.json"), &q)?;
+            record.q_checksum = checksum_of(&place.join("q.json"))?;
             Some(proposal.found)
         }
         None => files.found.map(|found| *found),

@@ -170,6 +170,10 @@ impl RowSink for Rows {
         Ok(())
     }
 
+    fn part(&mut self, _: usize) -> std::io::Result<()> {
+        Err(std::io::Error::other("the machine has started again, or its rows do not follow those before"))
+    }
+
     fn finish(&mut self) -> std::io::Result<()> {
         Ok(())
     }

@@ -70,6 +70,7 @@ impl<'a> Point<'a> {
             predicted: None,
             reached: None,
             q_order: None,
+            q_checksum: None,
             certified_models: None,
             switches: 0,
             unstable_switches: 0,

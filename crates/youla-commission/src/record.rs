@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
+use youla_rt::Checksum;
 use youla_run::ModeEntry;
 use youla_twin::LogRow;
 
@@ -49,6 +50,9 @@ pub struct PointRecord {
     pub reached: Option<LoopState>,
     /// States of the new Q.
     pub q_order: Option<usize>,
+    /// CRC-32 of q.json as it was verified.
+    #[serde(default)]
+    pub q_checksum: Option<u32>,
     /// Models within the region of S that the new controller stabilises, all of them.
     pub certified_models: Option<usize>,
     /// Switches of Q.
@@ -113,6 +117,12 @@ pub struct Evidence {
 }
 
 impl Evidence {
+    /// Whether the figures are the same but for rounding.
+    pub fn equals(&self, other: &Self) -> bool {
+        let figures = |e: &Self| [e.gain, e.room, e.change, e.region, e.q_room, e.q_error];
+        figures(self).iter().zip(figures(other)).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs().max(b.abs()).max(1e-9))
+    }
+
     /// Whether S has room for its region and Q for its error.
     pub fn holds(&self) -> bool {
         self.gain < 1.0 && self.region < self.room && self.q_error < self.q_room
@@ -192,6 +202,21 @@ pub(crate) fn read_json<T: serde::de::DeserializeOwned>(path: &Path) -> Result<O
         path: path.to_owned(),
         problem: format!("{e}; choose another --out, or remove this file to repeat its part"),
     })
+}
+
+/// CRC-32 of a file; `None` where it does not exist.
+///
+/// # Errors
+/// [`youla_io::Error::Io`].
+pub(crate) fn checksum_of(path: &Path) -> Result<Option<u32>> {
+    match fs::read(path) {
+        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(None),
+        other => {
+            let mut checksum = Checksum::new();
+            checksum.append(&other.map_err(|source| io(path, source))?);
+            Ok(Some(checksum.value()))
+        }
+    }
 }
 
 /// Writes a file whole: beside its place first.

@@ -5,7 +5,7 @@ use core::fmt;
 use youla_rt::Checksum;
 
 /// Version of the wire format.
-pub const VERSION: u8 = 1;
+pub const VERSION: u8 = 2;
 
 /// Bytes of the longest frame: it passes an Ethernet of 1500 bytes whole.
 pub const LARGEST_FRAME: usize = 1400;
@@ -14,8 +14,9 @@ pub const LARGEST_FRAME: usize = 1400;
 pub const LARGEST_BODY: usize = LARGEST_FRAME - HEADER - CHECKSUM;
 
 const MAGIC: [u8; 2] = *b"YL";
-const HEADER: usize = 12;
+const HEADER: usize = 20;
 const CHECKSUM: usize = 4;
+const SHORTEST: usize = HEADER + CHECKSUM;
 
 /// What the body is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -38,6 +39,11 @@ pub struct Frame<'a> {
     pub schema: u32,
     /// Counts the frames of a sender and kind.
     pub sequence: u32,
+    /// Number of the host, drawn at random for each connection: whose request it is, or for whom the reply is; 0 in rows.
+    pub host: u32,
+    /// Drawn at random when the machine starts: a machine that starts again has another one. 0 in requests of a host that does not
+    /// know it yet.
+    pub life: u32,
     /// At most [`LARGEST_BODY`] bytes.
     pub body: &'a [u8],
 }
@@ -62,11 +68,14 @@ pub enum FrameError {
 impl fmt::Display for FrameError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            FrameError::Length(bytes) => write!(f, "a frame has 16 to {LARGEST_FRAME} bytes, not {bytes}"),
+            FrameError::Length(bytes) => write!(f, "a frame has {SHORTEST} to {LARGEST_FRAME} bytes, not {bytes}"),
             FrameError::Foreign => f.write_str("the bytes do not begin with \"YL\": not a frame of youla"),
             FrameError::Checksum => f.write_str("the checksum of the frame is wrong: it was damaged on the way"),
             FrameError::Version(version) => {
-                write!(f, "the frame has version {version} of the format; this program knows version {VERSION}")
+                write!(
+                    f,
+                    "the frame has version {version} of the format, this program speaks version {VERSION}: update the older side"
+                )
             }
             FrameError::Kind(kind) => write!(f, "frames of kind {kind} are not known"),
             FrameError::Packet => f.write_str("the bytes between two zeros are not a COBS packet"),
@@ -89,8 +98,8 @@ impl<'a> Frame<'a> {
         let mut writer = Writer::new(buffer);
         let mut checksum = Checksum::new();
         let version_and_kind = [VERSION, self.kind as u8];
-        let pieces: [&[u8]; 5] =
-            [&MAGIC, &version_and_kind, &self.schema.to_le_bytes(), &self.sequence.to_le_bytes(), self.body];
+        let numbers = [self.schema, self.sequence, self.host, self.life].map(u32::to_le_bytes);
+        let pieces: [&[u8]; 4] = [&MAGIC, &version_and_kind, numbers.as_flattened(), self.body];
         for piece in pieces {
             checksum.append(piece);
             writer.put(piece).ok_or(FrameError::Length(length))?;
@@ -111,10 +120,6 @@ impl<'a> Frame<'a> {
         let (content, sent) = bytes.split_last_chunk::<CHECKSUM>().ok_or(length)?;
         let mut reader = Reader(content);
         let magic = reader.array::<2>().ok_or(length)?;
-        let version = reader.u8().ok_or(length)?;
-        let kind = reader.u8().ok_or(length)?;
-        let schema = reader.u32().ok_or(length)?;
-        let sequence = reader.u32().ok_or(length)?;
         if magic != MAGIC {
             return Err(FrameError::Foreign);
         }
@@ -123,15 +128,19 @@ impl<'a> Frame<'a> {
         if checksum.value() != u32::from_le_bytes(*sent) {
             return Err(FrameError::Checksum);
         }
+        let version = reader.u8().ok_or(length)?;
         if version != VERSION {
             return Err(FrameError::Version(version));
         }
+        let kind = reader.u8().ok_or(length)?;
+        let mut number = || reader.u32().ok_or(length);
+        let (schema, sequence, host, life) = (number()?, number()?, number()?, number()?);
         let kind = match kind {
             1 => Kind::Rows,
             2 => Kind::Request,
             3 => Kind::Reply,
             other => return Err(FrameError::Kind(other)),
         };
-        Ok(Frame { kind, schema, sequence, body: reader.rest() })
+        Ok(Frame { kind, schema, sequence, host, life, body: reader.rest() })
     }
 }

@@ -9,8 +9,12 @@
 //! | 3 | [`Kind`] |
 //! | 4 to 7 | schema: CRC-32 of the machine's description |
 //! | 8 to 11 | sequence number of the sender |
-//! | 12 .. n - 4 | body |
+//! | 12 to 15 | number of the host |
+//! | 16 to 19 | life: number of the start of the machine |
+//! | 20 .. n - 4 | body |
 //! | last 4 | CRC-32 (ISO-HDLC) of all bytes before |
+//!
+//! The machine counts the requests of each host apart, and executes a [`Request::Stop`] of any host always.
 //!
 //! All numbers are little-endian. The bodies are [`RowBlock`]s from the machine, [`Request`]s from the host, and a [`Reply`] to each
 //! request. [`Tracker`] finds what was lost, doubled or reordered on the way. [`Station`] is the machine's end: a
@@ -27,6 +31,8 @@ extern crate std;
 
 mod bytes;
 mod frame;
+mod old;
+mod peers;
 mod request;
 mod rows;
 mod serial;
@@ -34,10 +40,11 @@ mod station;
 mod tracker;
 
 pub use frame::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_FRAME, VERSION};
+pub use old::{OLD_VERSION, write_old_describe};
 pub use request::{LARGEST_CHUNK, Outcome, Reply, Request, Source};
 pub use rows::{RowBatch, RowBlock, RowShape, RowView};
 pub use serial::{LARGEST_PACKET, PacketReader, write_packet};
-pub use station::{Machine, Station};
+pub use station::{Machine, Station, is_stop};
 pub use tracker::{Arrival, Tracker};
 
 #[cfg(test)]

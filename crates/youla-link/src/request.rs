@@ -23,7 +23,7 @@ pub enum Source {
 /// What the host asks for.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Request<'a> {
-    /// The machine's description. Begins a session: the sequence numbers of requests count on from this one.
+    /// The machine's description.
     Describe,
     /// A sign of life, and the status in the reply.
     Alive,
@@ -36,7 +36,7 @@ pub enum Request<'a> {
         /// Factor of the machine's own sequence, amplitude of the others.
         amplitude: f32,
     },
-    /// Ramps the excitation out.
+    /// Ramps the excitation out. Executed always: from any host, whatever its numbers.
     Stop,
     /// Begins to load Q.
     BeginQ,
@@ -61,6 +61,12 @@ pub enum Request<'a> {
 }
 
 impl<'a> Request<'a> {
+    /// Whether it changes nothing, so that it may come late or twice.
+    #[must_use]
+    pub fn only_reads(&self) -> bool {
+        matches!(self, Request::Describe | Request::Alive | Request::ReadQ { .. })
+    }
+
     /// From the body of a frame.
     #[must_use]
     pub fn read(body: &'a [u8]) -> Option<Self> {
@@ -162,12 +168,14 @@ pub enum Outcome {
     NoQ = 11,
     /// The excitation that was asked for is not possible.
     Source = 12,
-    /// Older than the last request: late on the way, not executed.
+    /// Older than the last request of its host: late on the way, not executed.
     Stale = 13,
+    /// Made for the machine before it started again.
+    OtherLife = 14,
 }
 
 impl Outcome {
-    const ALL: [Outcome; 14] = [
+    const ALL: [Outcome; 15] = [
         Outcome::Done,
         Outcome::NotUnderstood,
         Outcome::OtherSchema,
@@ -182,6 +190,7 @@ impl Outcome {
         Outcome::NoQ,
         Outcome::Source,
         Outcome::Stale,
+        Outcome::OtherLife,
     ];
 }
 

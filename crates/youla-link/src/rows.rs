@@ -121,13 +121,13 @@ impl<const M: usize, const P: usize> RowBatch<M, P> {
         (self.length, self.rows, self.next) = (end, self.rows + 1, row.sample.wrapping_add(1));
     }
 
-    /// Writes the frame and begins a new batch; `None` where there is no row.
+    /// Writes the frame with these numbers of its header and begins a new batch; `None` where there is no row.
     ///
     /// # Errors
     /// [`FrameError::Length`] where the buffer is too short.
-    pub fn take(&mut self, schema: u32, sequence: u32, buffer: &mut [u8]) -> Option<Result<usize, FrameError>> {
+    pub fn take(&mut self, [schema, life, sequence]: [u32; 3], buffer: &mut [u8]) -> Option<Result<usize, FrameError>> {
         let body = self.body.get(..self.length).filter(|_| self.rows > 0)?;
-        let written = Frame { kind: Kind::Rows, schema, sequence, body }.write(buffer);
+        let written = Frame { kind: Kind::Rows, schema, sequence, host: 0, life, body }.write(buffer);
         self.rows = 0;
         Some(written)
     }

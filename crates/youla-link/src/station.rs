@@ -1,7 +1,8 @@
 //! The machine's end of the link: a loop in single precision, its excitation, its rows and its replies.
 
 use crate::bytes::Reader;
-use crate::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_CHUNK, Outcome, Reply, Request, RowBatch, Source};
+use crate::peers::{Number, Peers};
+use crate::{Frame, FrameError, Kind, LARGEST_BODY, LARGEST_CHUNK, Outcome, Reply, Request, RowBatch, Source, old};
 use youla_rt::{Checksum, Excitation, ExcitedLoop, LoopRefusal, Prbs, QRefusal, Row};
 
 /// What a machine is, for its host.
@@ -13,6 +14,8 @@ pub struct Machine<'a, const M: usize> {
     pub table: &'a [[f32; M]],
     /// Rows of a frame.
     pub rows: u16,
+    /// Drawn at random when the machine starts, so that its host sees a machine that has started again.
+    pub life: u32,
 }
 
 /// A loop with its host. N states, M inputs, P outputs, Q of order K.
@@ -29,8 +32,9 @@ pub struct Station<'a, const N: usize, const M: usize, const P: usize, const K: 
     batch: RowBatch<M, P>,
     sequence: u32,
     replies: u32,
-    /// The last request with its outcome: a request that comes again is answered, not executed, again.
-    last: Option<(u32, Outcome)>,
+    peers: Peers,
+    /// The host that armed. It alone may start, and its new requests alone are signs of life for the guard.
+    owner: Option<u32>,
     place: u16,
 }
 
@@ -49,7 +53,8 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
             batch: RowBatch::new(machine.rows),
             sequence: 0,
             replies: 0,
-            last: None,
+            peers: Peers::NONE,
+            owner: None,
             place: 0,
         }
     }
@@ -86,7 +91,7 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
     /// # Errors
     /// As [`Station::frame`].
     pub fn flush(&mut self, buffer: &mut [u8]) -> Option<Result<usize, FrameError>> {
-        let written = self.batch.take(self.schema, self.sequence, buffer)?;
+        let written = self.batch.take([self.schema, self.machine.life, self.sequence], buffer)?;
         self.sequence = self.sequence.wrapping_add(1);
         Some(written)
     }
@@ -97,50 +102,107 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         &self.running
     }
 
+    /// What it keeps of its hosts, for a search through its states.
+    #[cfg(test)]
+    pub(crate) fn books(&self) -> std::string::String {
+        std::format!("{:?} {:?}", self.peers, self.owner)
+    }
+
     /// CRC-32 of the description.
     #[must_use]
     pub fn schema(&self) -> u32 {
         self.schema
     }
 
-    /// Takes a frame of the host and writes the reply; `None` for a frame that is no request.
+    /// Number of its start.
+    #[must_use]
+    pub fn life(&self) -> u32 {
+        self.machine.life
+    }
+
+    /// Ramps the excitation out, as a [`Request::Stop`] does.
+    pub fn stop(&mut self) {
+        self.running.stop();
+    }
+
+    /// Takes a frame of a host and writes the reply; `None` for a frame that is no request.
     ///
     /// # Errors
     /// [`FrameError`] of the frame, or of a buffer that is too short for the reply.
     pub fn receive(&mut self, bytes: &[u8], buffer: &mut [u8]) -> Result<Option<usize>, FrameError> {
-        let frame = Frame::read(bytes)?;
+        let frame = match Frame::read(bytes) {
+            Err(refused @ FrameError::Version(_)) => return self.receive_old(bytes, buffer).ok_or(refused)?.map(Some),
+            read => read?,
+        };
         if frame.kind != Kind::Request {
             return Ok(None);
         }
         let request = Request::read(frame.body);
-        let known = matches!(request, Some(Request::Describe)) || frame.schema == self.schema;
-        if known {
-            self.running.heard();
-        }
-        let behind = self.last.map_or(u32::MAX, |(last, _)| last.wrapping_sub(frame.sequence));
-        let outcome = match (self.last, request) {
-            (_, Some(Request::Describe)) => Outcome::Done,
-            (Some((_, outcome)), _) if behind == 0 => outcome,
-            (Some(_), _) if behind <= u32::MAX / 2 => Outcome::Stale,
-            (_, None) => Outcome::NotUnderstood,
-            (_, Some(_)) if !known => Outcome::OtherSchema,
-            (_, Some(request)) => self.execute(&request),
-        };
-        if outcome != Outcome::Stale {
-            self.last = Some((frame.sequence, outcome));
-        }
-        self.reply(frame.sequence, outcome, request, buffer).map(Some)
+        let outcome = self.outcome(&frame, request);
+        self.reply(&frame, outcome, request, buffer).map(Some)
     }
 
-    fn execute(&mut self, request: &Request<'_>) -> Outcome {
+    /// A host of version 1: its stop is executed, everything else is not known.
+    fn receive_old(&mut self, bytes: &[u8], buffer: &mut [u8]) -> Option<Result<usize, FrameError>> {
+        let (sequence, body) = old::request(bytes)?;
+        let outcome = match Request::read(body) {
+            Some(Request::Stop) => {
+                self.stop();
+                Outcome::Done
+            }
+            _ => Outcome::NotUnderstood,
+        };
+        let mut reply = [0; 17];
+        let length = self.reply_to(sequence, outcome, &[]).write(&mut reply)?;
+        Some(old::write(Kind::Reply, [self.schema, self.replies], reply.get(..length)?, buffer))
+    }
+
+    fn outcome(&mut self, frame: &Frame<'_>, request: Option<Request<'_>>) -> Outcome {
+        let (of_machine, of_life) = (frame.schema == self.schema, frame.life == self.machine.life);
+        let Some(request) = request else { return Outcome::NotUnderstood };
+        if request == Request::Stop {
+            self.stop();
+            // A start of this host that was sent before, and is still on its way, is late now.
+            if of_life && self.peers.number(frame) == Number::New {
+                self.peers.changed(frame, Outcome::Done, self.owner);
+            }
+            return Outcome::Done;
+        }
+        match request {
+            Request::Describe => return Outcome::Done,
+            _ if !of_machine => return Outcome::OtherSchema,
+            _ if !of_life => return Outcome::OtherLife,
+            _ => (),
+        }
+        let number = self.peers.number(frame);
+        if number == Number::New && self.owner == Some(frame.host) {
+            self.running.heard();
+        }
+        match number {
+            _ if request.only_reads() => {
+                self.peers.passed(frame, Outcome::Done);
+                Outcome::Done
+            }
+            Number::Again(outcome) => outcome,
+            Number::Late => Outcome::Stale,
+            Number::New => {
+                let outcome = self.execute(frame.host, &request);
+                self.peers.changed(frame, outcome, self.owner);
+                outcome
+            }
+        }
+    }
+
+    fn execute(&mut self, host: u32, request: &Request<'_>) -> Outcome {
         let done = match *request {
             Request::Describe | Request::Alive | Request::ReadQ { .. } => Ok(()),
-            Request::Arm => self.running.arm(),
-            Request::Start { source, amplitude } => return self.start(source, amplitude),
             Request::Stop => {
-                self.running.stop();
+                self.stop();
                 Ok(())
             }
+            Request::Arm => self.running.arm().inspect(|()| self.owner = Some(host)),
+            Request::Start { .. } if self.owner != Some(host) => Err(LoopRefusal::NotArmed),
+            Request::Start { source, amplitude } => return self.start(source, amplitude),
             Request::BeginQ => {
                 self.place = 0;
                 self.running.begin_q()
@@ -187,7 +249,7 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
 
     fn reply(
         &mut self,
-        request: u32,
+        frame: &Frame<'_>,
         outcome: Outcome,
         asked: Option<Request<'_>>,
         buffer: &mut [u8],
@@ -196,7 +258,7 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         let mut outcome = outcome;
         let data = match asked {
             Some(Request::Describe) => self.machine.description.as_bytes(),
-            Some(Request::ReadQ { place }) => match self.read_q(place, &mut coefficients) {
+            Some(Request::ReadQ { place }) if outcome == Outcome::Done => match self.read_q(place, &mut coefficients) {
                 Some(length) => coefficients.get(..length).unwrap_or_default(),
                 None => {
                     outcome = Outcome::NoQ;
@@ -205,13 +267,19 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
             },
             _ => &[],
         };
-        let reply = Reply { request, outcome, status: self.running.status(), sample: self.running.sample(), data };
+        let reply = self.reply_to(frame.sequence, outcome, data);
         let mut body = [0; LARGEST_BODY];
         let length = reply.write(&mut body).ok_or(FrameError::Length(data.len()))?;
         let body = body.get(..length).unwrap_or_default();
-        let written = Frame { kind: Kind::Reply, schema: self.schema, sequence: self.replies, body }.write(buffer)?;
+        let (sequence, life) = (self.replies, self.machine.life);
+        let reply = Frame { kind: Kind::Reply, schema: self.schema, sequence, host: frame.host, life, body };
+        let written = reply.write(buffer)?;
         self.replies = self.replies.wrapping_add(1);
         Ok(written)
+    }
+
+    fn reply_to<'b>(&self, request: u32, outcome: Outcome, data: &'b [u8]) -> Reply<'b> {
+        Reply { request, outcome, status: self.running.status(), sample: self.running.sample(), data }
     }
 
     fn read_q(&self, place: u16, buffer: &mut [u8]) -> Option<usize> {
@@ -219,6 +287,17 @@ impl<'a, const N: usize, const M: usize, const P: usize, const K: usize> Station
         let pairs = buffer.chunks_exact_mut(4).zip(values);
         Some(pairs.map(|(bytes, value)| bytes.copy_from_slice(&value.to_le_bytes())).count() * 4)
     }
+}
+
+/// Whether the bytes of a frame ask for a stop: for a machine that keeps requests in a queue, where a stop must not wait.
+#[must_use]
+pub fn is_stop(bytes: &[u8]) -> bool {
+    let body = match Frame::read(bytes) {
+        Ok(frame) if frame.kind == Kind::Request => Some(frame.body),
+        Err(FrameError::Version(_)) => old::request(bytes).map(|(_, body)| body),
+        _ => None,
+    };
+    body.and_then(Request::read) == Some(Request::Stop)
 }
 
 /// Registers that differ from input to input: odd multiples within the period.

@@ -1,6 +1,8 @@
 //! Frames through a way that loses, doubles, swaps and damages them; readers against any bytes.
 
+mod exploration;
 mod firmware;
+mod hosts;
 
 use crate::*;
 use proptest::prelude::*;
@@ -41,11 +43,11 @@ fn frames(rows: u64, of_each: u16) -> Vec<Vec<u8>> {
         batch.push(&row(sample));
         if batch.is_full() || sample + 1 == rows {
             let mut buffer = [0; LARGEST_FRAME];
-            let length = batch.take(7, sent.len() as u32, &mut buffer).unwrap().unwrap();
+            let length = batch.take([7, 0, sent.len() as u32], &mut buffer).unwrap().unwrap();
             sent.push(buffer[..length].to_vec());
         }
     }
-    assert!(batch.take(7, 0, &mut [0; LARGEST_FRAME]).is_none());
+    assert!(batch.take([7, 0, 0], &mut [0; LARGEST_FRAME]).is_none());
     sent
 }
 
@@ -258,13 +260,13 @@ fn station() -> Station<'static, 2, 2, 2, 2> {
         host: 50,
         duration: 0,
     };
-    let machine = Machine { description: "name = \"two\"", table: &[[1.0, 1.0], [-1.0, 1.0]], rows: 4 };
+    let machine = Machine { description: "name = \"two\"", table: &[[1.0, 1.0], [-1.0, 1.0]], rows: 4, life: 9 };
     Station::new(ExcitedLoop::new(controller.unwrap(), limits, 4).unwrap(), machine)
 }
 
 fn ask_bytes(station: &mut Station<'static, 2, 2, 2, 2>, sequence: u32, body: &[u8]) -> (u32, Outcome, Vec<u8>) {
     let mut buffer = [0; LARGEST_FRAME];
-    let frame = Frame { kind: Kind::Request, schema: station.schema(), sequence, body };
+    let frame = Frame { kind: Kind::Request, schema: station.schema(), sequence, host: 1, life: 9, body };
     let length = frame.write(&mut buffer).unwrap();
     let mut answer = [0; LARGEST_FRAME];
     let length = station.receive(&buffer[..length], &mut answer).unwrap().unwrap();
@@ -296,7 +298,7 @@ fn dialogue() {
     assert_eq!(ask(&mut station, 4, start).0, Outcome::Done);
     assert_eq!(station.running().status().phase(), Phase::Exciting);
     // An older one, late on the way, is not executed.
-    assert_eq!(ask(&mut station, 3, Request::Stop).0, Outcome::Stale);
+    assert_eq!(ask(&mut station, 3, Request::BeginQ).0, Outcome::Stale);
     assert_eq!(station.running().status().phase(), Phase::Exciting);
 
     let q = QCoefficients { a: [[0.5_f32, 0.0], [0.0, 0.25]], b: [[0.1; 2]; 2], c: [[0.2; 2]; 2] };
@@ -327,7 +329,9 @@ fn dialogue() {
     assert_eq!(ask(&mut station, 12, Request::SwitchQ).0, Outcome::Tripped);
     let mut unknown = [0; LARGEST_FRAME];
     let body = [1];
-    let length = Frame { kind: Kind::Request, schema: 1, sequence: 13, body: &body }.write(&mut unknown).unwrap();
+    let length = Frame { kind: Kind::Request, schema: 1, sequence: 13, host: 1, life: 9, body: &body }
+        .write(&mut unknown)
+        .unwrap();
     let mut answer = [0; LARGEST_FRAME];
     let length = station.receive(&unknown[..length], &mut answer).unwrap().unwrap();
     let frame = Frame::read(&answer[..length]).unwrap();

@@ -41,10 +41,16 @@ impl Tracker {
         Self::default()
     }
 
+    /// Frames that come from now on follow none of those before: the counts go on.
+    pub fn restart(&mut self) {
+        self.newest = None;
+    }
+
     /// The next frame.
     pub fn receive(&mut self, sequence: u32) -> Arrival {
         let Some(newest) = self.newest else {
-            (self.newest, self.seen, self.taken) = (Some(sequence), 1, 1);
+            (self.newest, self.seen) = (Some(sequence), 1);
+            self.taken += 1;
             return Arrival::New { missing: 0 };
         };
         let ahead = sequence.wrapping_sub(newest);

@@ -29,6 +29,18 @@ pub enum Error {
         /// Where it was asked.
         address: String,
     },
+    /// The machine speaks another version of the format.
+    #[error(
+        "the rig at {address} speaks version {version} of the link, this program version {}: {}",
+        youla_link::VERSION,
+        if *version < youla_link::VERSION { "build its firmware with the present youla-link" } else { "update this program" }
+    )]
+    Version {
+        /// Where it was asked.
+        address: String,
+        /// Of the machine.
+        version: u8,
+    },
     /// The machine refused a request.
     #[error("the rig refused \"{request}\": {}", of_outcome(*outcome))]
     Refused {
@@ -66,5 +78,6 @@ fn of_outcome(outcome: Outcome) -> &'static str {
         Outcome::NoQ => "no Q is loaded",
         Outcome::Source => "it cannot make this excitation",
         Outcome::Stale => "the request came too late",
+        Outcome::OtherLife => "it has started again in the meantime; connect again",
     }
 }

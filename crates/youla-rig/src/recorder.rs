@@ -22,8 +22,31 @@ pub struct LogReport {
     pub damaged: u64,
     /// Frames with another description of the machine, or with rows that do not fit it.
     pub foreign: u64,
+    /// Frames of another life of the machine, or far from the rows before, that no neighbour confirmed: they are not in the log.
+    pub implausible: u64,
+    /// Parts of the log, each in its own file: the machine has started again, or its rows went back, in between.
+    pub parts: Vec<LogPart>,
     /// Trips of the guard: sample and cause.
     pub trips: Vec<(u64, Trip)>,
+}
+
+/// Rows that belong together.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct LogPart {
+    /// The first sample.
+    pub first: u64,
+    /// Number of rows.
+    pub rows: u64,
+    /// Life of the machine.
+    pub life: u32,
+}
+
+/// Where a frame stands in the log.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Place {
+    life: u32,
+    sequence: u32,
+    first: u64,
 }
 
 /// Rows of one frame that wait for those before them.
@@ -52,6 +75,12 @@ pub struct Recorder {
     sample_time: f64,
     waiting: BTreeMap<u64, Block>,
     next: Option<u64>,
+    /// Place of the newest frame of this part.
+    newest: Option<Place>,
+    /// A frame far from it: the next one like it confirms it.
+    strange: Option<(Place, Block)>,
+    /// Frames far behind it, one after the other.
+    behind: usize,
     /// Rows of the longest frame.
     of_frame: u64,
     trip: Option<Trip>,
@@ -80,6 +109,9 @@ impl Recorder {
             sample_time: machine.sample_time,
             waiting: BTreeMap::new(),
             next: None,
+            newest: None,
+            strange: None,
+            behind: 0,
             of_frame: 0,
             trip: None,
             report: LogReport::default(),
@@ -109,18 +141,90 @@ impl Recorder {
             self.report.foreign += 1;
             return Ok(());
         };
-        if matches!(self.report.frames.receive(frame.sequence), Arrival::Doubled | Arrival::Stale) {
-            return Ok(());
-        }
+        let place = Place { life: frame.life, sequence: frame.sequence, first: block.first };
         let mut rows = Block { values: Vec::new(), status: Vec::new() };
         for row in block.rows() {
             rows.values.extend(row.values());
             rows.status.push(row.status);
         }
         self.of_frame = self.of_frame.max(rows.rows());
-        // Two frames of the same samples: the machine has started again.
-        self.report.foreign += u64::from(self.waiting.insert(block.first, rows).is_some());
+        if self.newest.is_some_and(|newest| self.are_near(newest, place)) {
+            self.report.implausible += u64::from(self.strange.take().is_some());
+            self.behind = 0;
+            return self.take_block(place, rows);
+        }
+        match self.strange.take() {
+            Some((before, block)) if before != place && self.are_near(before, place) => {
+                self.go_on([(before, block), (place, rows)])
+            }
+            Some(same) if same.0 == place => {
+                self.report.frames.doubled += 1;
+                self.strange = Some(same);
+                Ok(())
+            }
+            other => {
+                self.report.implausible += u64::from(other.is_some());
+                self.strange = Some((place, rows));
+                Ok(())
+            }
+        }
+    }
+
+    /// Two frames that confirm each other, far from those before: a gap, or another part.
+    fn go_on(&mut self, [(before, block), (place, rows)]: [(Place, Block); 2]) -> Result<()> {
+        let newest = self.newest.filter(|newest| newest.life == place.life);
+        let onward = newest.is_some_and(|newest| before.first > newest.first);
+        if newest.is_some() && !onward && self.behind < WAITING {
+            // A few that are very late; if nothing else comes, what was taken before was forged.
+            self.behind += 1;
+            self.report.frames.stale += 1;
+            self.strange = Some((place, rows));
+            return Ok(());
+        }
+        if self.newest.is_some() && !onward {
+            self.begin_part()?;
+        }
+        if newest.is_none_or(|newest| before.sequence.wrapping_sub(newest.sequence).cast_signed() <= 0) {
+            self.report.frames.restart();
+        }
+        (self.newest, self.behind) = (None, 0);
+        self.take_block(before, block)?;
+        self.take_block(place, rows)
+    }
+
+    /// Whether two frames can be neighbours on a way that loses and swaps some: one that was forged or damaged far ahead is not near.
+    fn are_near(&self, a: Place, b: Place) -> bool {
+        let frames = b.sequence.wrapping_sub(a.sequence).cast_signed();
+        let samples = i128::from(b.first) - i128::from(a.first);
+        let most = WAITING as u128 * u128::from(self.of_frame.max(1));
+        a.life == b.life
+            && frames.unsigned_abs() <= WAITING as u32
+            && i128::from(frames.signum()) == samples.signum()
+            && samples.unsigned_abs() <= most
+    }
+
+    fn take_block(&mut self, place: Place, rows: Block) -> Result<()> {
+        if self.newest.is_none_or(|newest| place.first > newest.first) {
+            self.newest = Some(place);
+        }
+        if matches!(self.report.frames.receive(place.sequence), Arrival::Doubled | Arrival::Stale) {
+            return Ok(());
+        }
+        // Two frames of the same samples: one is not of this machine.
+        self.report.foreign += u64::from(self.waiting.insert(place.first, rows).is_some());
         self.write_in_order()
+    }
+
+    /// Writes what waits, and begins a new part with the frame that is taken next.
+    fn begin_part(&mut self) -> Result<()> {
+        while !self.waiting.is_empty() {
+            self.write_first()?;
+        }
+        (self.next, self.trip) = (None, None);
+        let number = self.report.parts.len() + 1;
+        let begun = self.sinks.iter_mut().try_for_each(|sink| sink.part(number));
+        begun.map_err(|source| Error::File { path: self.path.clone(), source })?;
+        Ok(())
     }
 
     fn write_in_order(&mut self) -> Result<()> {
@@ -139,9 +243,13 @@ impl Recorder {
         let Some((first, block)) = self.waiting.pop_first() else { return Ok(()) };
         let next = self.next.unwrap_or(first);
         if first < next {
-            // Behind rows that are written already: the machine has started again.
+            // Behind rows that are written already.
             self.report.foreign += 1;
             return Ok(());
+        }
+        if self.next.is_none() {
+            let life = self.newest.map_or(0, |newest| newest.life);
+            self.report.parts.push(LogPart { first, rows: 0, life });
         }
         self.miss(next, first - next);
         self.next = Some(first + block.rows());
@@ -151,6 +259,9 @@ impl Recorder {
             let written = self.sinks.iter_mut().try_for_each(|sink| sink.take(&row));
             written.map_err(|source| Error::File { path: self.path.clone(), source })?;
             self.report.rows += 1;
+            if let Some(part) = self.report.parts.last_mut() {
+                part.rows += 1;
+            }
             self.largest.iter_mut().zip(values).for_each(|(most, value)| *most = most.max(value.abs()));
             let trip = status.trip();
             if self.trip != trip {
@@ -187,6 +298,12 @@ impl Recorder {
     /// # Errors
     /// [`Error::File`].
     pub fn finish(mut self, end: u64) -> Result<LogReport> {
+        if let Some((place, rows)) = self.strange.take() {
+            match self.newest {
+                None => self.take_block(place, rows)?,
+                Some(_) => self.report.implausible += 1,
+            }
+        }
         while !self.waiting.is_empty() {
             self.write_first()?;
         }

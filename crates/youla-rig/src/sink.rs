@@ -4,7 +4,7 @@ use crate::Description;
 use std::fs::{File, TryLockError};
 use std::io::{BufWriter, Error, ErrorKind, Result, Write};
 use std::net::UdpSocket;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use youla_rt::Status;
 
 /// A row of a log.
@@ -26,6 +26,12 @@ pub trait RowSink: Send {
     /// Of the file.
     fn take(&mut self, row: &LogRow<'_>) -> Result<()>;
 
+    /// What comes now does not continue the rows before: it is part `number`, from 2 on, of its own.
+    ///
+    /// # Errors
+    /// Of the file.
+    fn part(&mut self, number: usize) -> Result<()>;
+
     /// The end of the log.
     ///
     /// # Errors
@@ -33,41 +39,63 @@ pub trait RowSink: Send {
     fn finish(&mut self) -> Result<()>;
 }
 
-/// A CSV file: `t`, y, u, alpha, beta, `status`.
-pub struct CsvLog(BufWriter<File>);
+/// A CSV file: `t`, y, u, alpha, beta, `status`. A further part goes into a file of its own, `log-part-2.csv` beside `log.csv`.
+pub struct CsvLog {
+    file: BufWriter<File>,
+    path: PathBuf,
+    header: String,
+}
 
 impl CsvLog {
-    /// Begins a file. It is locked until it is whole, so that no other recorder empties it.
+    /// Begins a file.
     ///
     /// # Errors
     /// Of the file; for one that another recorder writes, and for what is no regular file.
     pub fn create(path: &Path, machine: &Description) -> Result<Self> {
-        let refused = |kind, why| Err(Error::new(kind, why));
-        if path.metadata().is_ok_and(|found| !found.is_file()) {
-            return refused(ErrorKind::InvalidInput, "it is no regular file; choose another place for the log");
-        }
-        let file = File::options().write(true).create(true).truncate(false).open(path)?;
-        if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
-            return refused(ErrorKind::ResourceBusy, "another recorder writes it; choose another place for the log");
-        }
-        file.set_len(0)?;
-        let mut file = BufWriter::new(file);
-        writeln!(file, "{}", machine.columns().join(","))?;
-        Ok(CsvLog(file))
+        let header = machine.columns().join(",");
+        Ok(CsvLog { file: begun(path, &header)?, path: path.to_owned(), header })
     }
+
+    /// The file of a part.
+    pub fn part_path(path: &Path, number: usize) -> PathBuf {
+        let name = path.file_stem().unwrap_or_default().to_string_lossy();
+        path.with_file_name(format!("{name}-part-{number}.csv"))
+    }
+}
+
+/// A new file with its first line. It is locked until it is whole, so that no other recorder empties it.
+fn begun(path: &Path, header: &str) -> Result<BufWriter<File>> {
+    let refused = |kind, why| Err(Error::new(kind, why));
+    if path.metadata().is_ok_and(|found| !found.is_file()) {
+        return refused(ErrorKind::InvalidInput, "it is no regular file; choose another place for the log");
+    }
+    let file = File::options().write(true).create(true).truncate(false).open(path)?;
+    if matches!(file.try_lock(), Err(TryLockError::WouldBlock)) {
+        return refused(ErrorKind::ResourceBusy, "another recorder writes it; choose another place for the log");
+    }
+    file.set_len(0)?;
+    let mut file = BufWriter::new(file);
+    writeln!(file, "{header}")?;
+    Ok(file)
 }
 
 impl RowSink for CsvLog {
     fn take(&mut self, row: &LogRow<'_>) -> Result<()> {
-        write!(self.0, "{:?}", row.time)?;
+        write!(self.file, "{:?}", row.time)?;
         for value in row.values {
-            write!(self.0, ",{value:?}")?;
+            write!(self.file, ",{value:?}")?;
         }
-        writeln!(self.0, ",{}", row.status.bits())
+        writeln!(self.file, ",{}", row.status.bits())
+    }
+
+    fn part(&mut self, number: usize) -> Result<()> {
+        self.file.flush()?;
+        self.file = begun(&Self::part_path(&self.path, number), &self.header)?;
+        Ok(())
     }
 
     fn finish(&mut self) -> Result<()> {
-        self.0.flush()
+        self.file.flush()
     }
 }
 
@@ -113,6 +141,10 @@ impl RowSink for PlotStream {
         Ok(())
     }
 
+    fn part(&mut self, _: usize) -> Result<()> {
+        Ok(())
+    }
+
     fn finish(&mut self) -> Result<()> {
         Ok(())
     }
@@ -132,7 +164,7 @@ mod tests {
         let mut first = CsvLog::create(&path, &machine).unwrap();
         let row = LogRow { time: 0.0, values: &[0.5], status: Status::from_bits(0) };
         first.take(&row).unwrap();
-        first.0.flush().unwrap();
+        first.file.flush().unwrap();
         let refused = CsvLog::create(&path, &machine).err().map(|e| e.to_string()).unwrap_or_default();
         assert!(refused.contains("another recorder"), "{refused}");
         assert!(std::fs::read_to_string(&path).unwrap().ends_with("0.0,0.5,0\n"));

@@ -11,6 +11,7 @@ use youla_link::{LARGEST_FRAME, Machine, Outcome, Request, Source, Station};
 use youla_rt::{Cause, Controller, ExcitedLoop, Limits, Matrices, OUT_WITHIN, Phase, QCoefficients};
 
 mod board;
+mod faults;
 
 /// A rotor that is served on a thread.
 struct Served {
@@ -168,8 +169,8 @@ fn ask(twin: &mut Twin<'static, 4, 2, 2, 4>, sequence: u32, request: &Request<'_
     use youla_link::{Frame, Kind, Reply};
     let (mut body, mut bytes, mut answer) = ([0; 200], [0; LARGEST_FRAME], [0; LARGEST_FRAME]);
     let length = request.write(&mut body).unwrap();
-    let schema = twin.station.schema();
-    let frame = Frame { kind: Kind::Request, schema, sequence, body: &body[..length] };
+    let (schema, life) = (twin.station.schema(), twin.station.life());
+    let frame = Frame { kind: Kind::Request, schema, sequence, host: 1, life, body: &body[..length] };
     let length = frame.write(&mut bytes).unwrap();
     let length = twin.station.receive(&bytes[..length], &mut answer).unwrap().unwrap();
     let reply = Reply::read(Frame::read(&answer[..length]).unwrap().body).unwrap();
@@ -238,7 +239,10 @@ fn hardening() -> Twin<'static, 2, 1, 1, 1, Hardening> {
     let limits = Limits { y: [10.0], beta: [10.0], u: [50.0], rate: [50.0], clipped, stuck, host, duration };
     let description = "name = \"mass\"\nsample_time = 0.01\ninputs = [{ name = \"u\" }]\noutputs = [{ name = \"y\" }]";
     let running = ExcitedLoop::new(controller, limits, 0).unwrap();
-    Twin { station: Station::new(running, Machine { description, table: &[], rows: 10 }), plant: Hardening([0.5, 0.0]) }
+    Twin {
+        station: Station::new(running, Machine { description, table: &[], rows: 10, life: 5 }),
+        plant: Hardening([0.5, 0.0]),
+    }
 }
 
 /// A plant that is not linear, of another size: the log over UDP has the bits of the loop without a way in between.

@@ -17,6 +17,7 @@ pub struct LockStep {
     target: Target,
     plant: BearingRig,
     schema: u32,
+    life: u32,
     sequence: u32,
     reply: Option<(Outcome, Status)>,
     /// Rows since the last [`LockStep::take_rows`].
@@ -36,6 +37,7 @@ impl LockStep {
             target,
             plant,
             schema: 0,
+            life: 0,
             sequence: 0,
             reply: None,
             rows: Vec::new(),
@@ -67,7 +69,7 @@ impl LockStep {
         }
         let damaged = || failed("sent a frame that cannot be read");
         let frame = Frame::read(bytes).map_err(|_| damaged())?;
-        self.schema = frame.schema;
+        (self.schema, self.life) = (frame.schema, frame.life);
         if frame.kind == Kind::Reply {
             let reply = Reply::read(frame.body).ok_or_else(damaged)?;
             self.reply = Some((reply.outcome, reply.status));
@@ -119,7 +121,8 @@ impl LockStep {
         let length = request.write(&mut body).ok_or_else(too_long)?;
         let body = body.get(..length).unwrap_or_default();
         let mut bytes = [0; LARGEST_FRAME];
-        let frame = Frame { kind: Kind::Request, schema: self.schema, sequence: self.sequence, body };
+        let frame =
+            Frame { kind: Kind::Request, schema: self.schema, sequence: self.sequence, host: 1, life: self.life, body };
         let length = frame.write(&mut bytes).map_err(|_| too_long())?;
         self.reply = None;
         self.sample(bytes.get(..length).unwrap_or_default())?;

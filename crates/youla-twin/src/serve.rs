@@ -16,7 +16,7 @@ use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_io::export::NamedModel;
 use youla_link::{LARGEST_BODY, Machine, Station};
-use youla_rig::{Pace, Plant, RigChannel, Twin, serve};
+use youla_rig::{Pace, Plant, RigChannel, Twin, random_number, serve};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices};
 
 /// Largest order of the nominal model.
@@ -134,7 +134,8 @@ impl Served<'_> {
         let running =
             ExcitedLoop::<f32, STATES, M, P, Q_STATES>::new(controller, limits, RAMP).map_err(|e| wrong(&e))?;
         let description = self.description()?;
-        let station = Station::new(running, Machine { description: &description, table: &[], rows: 20 });
+        let station =
+            Station::new(running, Machine { description: &description, table: &[], rows: 20, life: random_number() });
         match self.plant {
             TwinPlant::Bearing { fidelity, cross_coupling } => {
                 let mut parameters = RigParameters::shipped();

@@ -51,5 +51,5 @@ pub(crate) fn station(numbers: &[f32]) -> Option<CampaignStation> {
     let (clipped, stuck, ramp) = (count()?, count()?, count()?);
     let limits = Limits { y, beta, u, rate, clipped, stuck, host: 0, duration: 0 };
     let running = ExcitedLoop::new(Controller::new(matrices).ok()?, limits, ramp).ok()?;
-    Some(Station::new(running, Machine { description: DESCRIPTION, table: &[], rows: ROWS }))
+    Some(Station::new(running, Machine { description: DESCRIPTION, table: &[], rows: ROWS, life: 1 }))
 }

@@ -35,5 +35,5 @@ pub(crate) fn rig() -> Option<Rig> {
         duration: 0,
     };
     let running = ExcitedLoop::new(controller.ok()?, limits, 200).ok()?;
-    Some(Station::new(running, Machine { description: DESCRIPTION, table: &TABLE, rows: 20 }))
+    Some(Station::new(running, Machine { description: DESCRIPTION, table: &TABLE, rows: 20, life: 1 }))
 }

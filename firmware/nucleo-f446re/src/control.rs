@@ -4,6 +4,7 @@
 //! as a gap. At most one frame is written per sample, so its time is bounded.
 
 use crate::machine::{ROOM, Rig, code, volts};
+use core::sync::atomic::{AtomicBool, Ordering};
 use embassy_stm32::Peri;
 use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::dac::{DacChannel, Value};
@@ -40,6 +41,9 @@ pub(crate) type Frames = Channel<'static, CriticalSectionRawMutex, Slot>;
 pub(crate) type Sending = Sender<'static, CriticalSectionRawMutex, Slot>;
 pub(crate) type Receiving = Receiver<'static, CriticalSectionRawMutex, Slot>;
 
+/// A stop has come: for the next sample, whatever waits in the channels.
+pub(crate) static STOP: AtomicBool = AtomicBool::new(false);
+
 /// Everything that the interrupt owns.
 pub(crate) struct Control {
     pub(crate) rig: Rig,
@@ -59,6 +63,9 @@ impl Control {
     /// `command -> DAC, ADC -> observe`, then at most one frame.
     pub(crate) fn sample(&mut self) {
         self.timer.clear_update_interrupt();
+        if STOP.swap(false, Ordering::Relaxed) {
+            self.rig.stop();
+        }
         let codes = self.u.map(code);
         self.dac.set(Value::Bit12Right(codes[0]));
         // 15 + 12 cycles at 20 MHz, and 3 us for the start of the converter.

@@ -66,11 +66,11 @@ static TABLE: [[f32; 1]; 40] = {
     table
 };
 
-/// At rest; `None` where a number is not finite or a limit is not above 0.
-pub(crate) fn rig() -> Option<Rig> {
+/// At rest; `life` is drawn at each start. `None` where a number is not finite or a limit is not above 0.
+pub(crate) fn rig(life: u32) -> Option<Rig> {
     let controller = Controller::new(OBSERVER).and_then(|exact| exact.to_f32()).ok()?;
     let running = ExcitedLoop::new(controller, LIMITS, 500).ok()?;
-    Some(Station::new(running, Machine { description: DESCRIPTION, table: &TABLE, rows: ROWS }))
+    Some(Station::new(running, Machine { description: DESCRIPTION, table: &TABLE, rows: ROWS, life }))
 }
 
 /// Code of the converters at 0 V of the description: half of their range, 1.65 V at the pin.

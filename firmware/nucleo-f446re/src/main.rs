@@ -13,11 +13,12 @@
 mod control;
 mod machine;
 
-use control::{Control, Frames, Receiving, Sending, Slot};
+use control::{Control, Frames, Receiving, STOP, Sending, Slot};
 use core::cell::RefCell;
+use core::sync::atomic::Ordering;
 use critical_section::Mutex;
 use embassy_executor::Spawner;
-use embassy_stm32::adc::Adc;
+use embassy_stm32::adc::{Adc, SampleTime};
 use embassy_stm32::dac::{DacChannel, Value};
 use embassy_stm32::gpio::{Level, Output, Speed};
 use embassy_stm32::interrupt::{InterruptExt, Priority};
@@ -27,7 +28,8 @@ use embassy_stm32::timer::low_level::{RoundTo, Timer};
 use embassy_stm32::usart::{self, RingBufferedUartRx, Uart, UartTx};
 use embassy_stm32::{bind_interrupts, dma, interrupt, pac, peripherals, rcc};
 use static_cell::{ConstStaticCell, StaticCell};
-use youla_link::{LARGEST_PACKET, PacketReader, write_packet};
+use youla_link::{LARGEST_PACKET, PacketReader, is_stop, write_packet};
+use youla_rt::Checksum;
 
 bind_interrupts!(struct Irqs {
     USART2 => usart::InterruptHandler<peripherals::USART2>;
@@ -99,12 +101,18 @@ async fn main(spawner: Spawner) {
     timer.set_frequency(Hertz(machine::RATE), RoundTo::Slower);
     timer.enable_update_interrupt(true);
     timer.start();
+    let (mut adc, mut input) = (Adc::new(p.ADC1), p.PA0);
+    let mut life = Checksum::new();
+    // The part has no generator of random numbers: the noise of the converter in its place.
+    for _ in 0..1024 {
+        life.append(&adc.blocking_read(&mut input, SampleTime::CYCLES3).to_le_bytes());
+    }
     let control = Control {
-        rig: machine::rig().expect("numbers of the machine"),
+        rig: machine::rig(life.value()).expect("numbers of the machine"),
         timer,
         dac,
-        adc: Adc::new(p.ADC1),
-        input: p.PA0,
+        adc,
+        input,
         late: Output::new(p.PA5, Level::Low, Speed::Low),
         frames,
         requests,
@@ -139,6 +147,10 @@ async fn receive(mut port: RingBufferedUartRx<'static>, mut requests: Sending) {
         let count = port.read(&mut bytes).await.unwrap_or(0);
         for byte in bytes.iter().take(count) {
             let Some(Ok(frame)) = packets.push(*byte) else { continue };
+            // It waits for no place among the requests.
+            if is_stop(frame) {
+                STOP.store(true, Ordering::Relaxed);
+            }
             if requests.send().await.put(frame) {
                 requests.send_done();
             }

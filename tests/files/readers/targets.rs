@@ -179,11 +179,11 @@ pub(crate) fn link(bytes: &[u8]) {
     }
     let _ = (Request::read(bytes), Reply::read(bytes), RowBlock::read(bytes, description.shape()));
     // Each line of bytes as a body: mutations do not find checksums.
-    let schema = rotor(1).map_or(0, |machine| machine.station.schema());
+    let (schema, life) = rotor(1).map_or((0, 0), |machine| (machine.station.schema(), machine.station.life()));
     for (sequence, body) in (1..).zip(bytes.split(|byte| *byte == b'\n')) {
         for kind in [Kind::Request, Kind::Rows, Kind::Reply] {
             let mut frame = [0; LARGEST_FRAME];
-            let written = Frame { kind, schema, sequence, body }.write(&mut frame);
+            let written = Frame { kind, schema, sequence, host: 1, life, body }.write(&mut frame);
             written.ok().and_then(|length| frame.get(..length)).into_iter().for_each(&mut take);
         }
     }

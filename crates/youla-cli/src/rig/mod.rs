@@ -74,8 +74,7 @@ pub(crate) fn run(form: Form, command: &RigCommand) -> Result<(), Failure> {
         }
         RigCommand::Load(args) => load(form, args),
         RigCommand::Stop { address, release } => {
-            let mut rig = Rig::connect(address)?;
-            let mut answer = rig.ask(&Request::Stop)?;
+            let (mut rig, mut answer) = Rig::stop(address)?;
             if *release {
                 answer = rig.ask(&Request::ReleaseQ)?;
             }

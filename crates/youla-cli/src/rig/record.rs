@@ -9,7 +9,9 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use youla_rig::{Answer, LogReport, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings};
+use youla_rig::{
+    Answer, CsvLog, Error, LogReport, Outcome, Phase, PlotStream, Recorder, Request, Rig, RowSink, Source, settings,
+};
 
 pub(super) const RECORD_EXAMPLE: &str = "\
 Example:
@@ -73,7 +75,7 @@ pub(super) fn excite(form: Form, args: &ExciteArgs) -> Result<(), Failure> {
 fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result<(), Failure> {
     let duration = seconds("--duration", args.duration)?;
     let run_file = args.out.with_file_name("run.toml");
-    for path in [&args.out, &run_file] {
+    for path in [&args.out, &run_file, &CsvLog::part_path(&args.out, 2)] {
         if path.exists() && !args.force {
             return Err(refused(format!("{} exists already; choose another --out or add --force", path.display())));
         }
@@ -87,20 +89,39 @@ fn recorded(form: Form, args: &RecordArgs, start: Option<Request<'_>>) -> Result
         None => Ok(()),
         Some(start) => rig.ask(&Request::Arm).and_then(|_| rig.ask(start)).map(drop),
     };
-    let ended = begun.map_err(Failure::from).and_then(|()| run(form, &mut rig, &mut recorder, duration));
+    let excites = start.is_some();
+    let ended = begun.map_err(Failure::from).and_then(|()| run(form, (&mut rig, excites), &mut recorder, duration));
     // Whatever happened, the excitation is stopped and the log is whole.
-    let last = rig.ask(&if start.is_some() { Request::Stop } else { Request::Alive });
+    let last = rig.ask(&if excites { Request::Stop } else { Request::Alive });
     // What was on its way; the rows of the machine's next frame are not sent yet.
     rig.record(&mut recorder, BEAT)?;
     let end = last.as_ref().map_or(0, |answer| recorder.end(answer.sample));
     let report = recorder.finish(end)?;
+    // Identification takes the first part: what the machine kept of Q and of its excitation is lost with its life.
+    let rows = report.parts.first().map_or(0, |part| part.rows);
     let log = args.out.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let text = settings(rig.description(), &log, report.rows, base.as_deref())?;
+    let text = settings(rig.description(), &log, rows, base.as_deref())?;
     std::fs::write(&run_file, text).map_err(|e| Failure::io(&run_file, e))?;
     say_report(form, &report, &args.out, &run_file)?;
+    if report.parts.len() > 1 {
+        return Err(refused(in_parts(&report, &args.out)));
+    }
     ended?;
     last?;
     Ok(())
+}
+
+fn in_parts(report: &LogReport, out: &Path) -> String {
+    let restarts = report.parts.windows(2).filter(|pair| pair[0].life != pair[1].life).count();
+    let why = if restarts > 0 { "the machine started again" } else { "the samples of the machine went back" };
+    let rows = report.parts.iter().map(|part| part.rows.to_string()).collect::<Vec<_>>();
+    format!(
+        "{why} while it was recorded: the log has {} parts of {} rows, the first in {}, the next in {}; run.toml takes the first",
+        report.parts.len(),
+        rows.join(", "),
+        out.display(),
+        CsvLog::part_path(out, 2).display()
+    )
 }
 
 fn recorder(args: &RecordArgs, run_file: &Path, rig: &Rig) -> Result<Recorder, Failure> {
@@ -115,7 +136,7 @@ fn recorder(args: &RecordArgs, run_file: &Path, rig: &Rig) -> Result<Recorder, F
         sinks.push(Box::new(stream));
     }
     // Last, because it empties an older log.
-    let log = youla_rig::CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?;
+    let log = CsvLog::create(&args.out, machine).map_err(|e| Failure::io(&args.out, e))?;
     sinks.push(Box::new(log));
     // An older one would describe another log if this program were killed.
     match std::fs::remove_file(run_file) {
@@ -126,7 +147,12 @@ fn recorder(args: &RecordArgs, run_file: &Path, rig: &Rig) -> Result<Recorder, F
 }
 
 /// Takes rows until the time is over, or Ctrl-C.
-fn run(form: Form, rig: &mut Rig, recorder: &mut Recorder, duration: Duration) -> Result<(), Failure> {
+fn run(
+    form: Form,
+    (rig, excites): (&mut Rig, bool),
+    recorder: &mut Recorder,
+    duration: Duration,
+) -> Result<(), Failure> {
     let interrupted = Arc::new(AtomicBool::new(false));
     let set = interrupted.clone();
     // Where no handler can be set, Ctrl-C ends the program; the guard of the machine then ends the excitation.
@@ -139,7 +165,11 @@ fn run(form: Form, rig: &mut Rig, recorder: &mut Recorder, duration: Duration) -
         }
         rig.record(recorder, left.min(BEAT))?;
         // A heartbeat for the guard.
-        let answer = rig.ask(&Request::Alive)?;
+        let answer = match rig.ask(&Request::Alive) {
+            // It has started again, and its rows go on, in a part of their own; an excitation ended with its life.
+            Err(Error::Refused { outcome: Outcome::OtherLife, .. }) if !excites => continue,
+            answer => answer?,
+        };
         progress.show(&figures(begin.elapsed(), rig, recorder, &answer));
     }
     progress.clear();
@@ -169,19 +199,21 @@ fn say_report(form: Form, report: &LogReport, log: &Path, run: &Path) -> Result<
 fn as_json(report: &LogReport, log: &Path, run: &Path) -> Value {
     let frames = &report.frames;
     let trips: Vec<Value> = report.trips.iter().map(|(sample, trip)| trip_as_json(*sample, trip)).collect();
+    let parts: Vec<Value> = report.parts.iter().map(|part| json!({ "first": part.first, "rows": part.rows })).collect();
     json!({
         "log": log, "run": run, "rows": report.rows, "missing": report.missing, "gaps": report.gaps,
         "frames": { "taken": frames.taken, "lost": frames.lost, "doubled": frames.doubled,
             "reordered": frames.reordered, "stale": frames.stale },
-        "damaged": report.damaged, "foreign": report.foreign, "trips": trips,
+        "damaged": report.damaged, "foreign": report.foreign, "implausible": report.implausible, "trips": trips,
+        "parts": parts,
     })
 }
 
 fn as_text(report: &LogReport, log: &Path, run: &Path) -> String {
-    let LogReport { rows, missing, gaps, frames, damaged, foreign, .. } = report;
+    let LogReport { rows, missing, gaps, frames, damaged, foreign, implausible, .. } = report;
     let mut text = format!(
         "{}: {rows} rows, {missing} missing in {} gaps. Frames: {} taken, {} lost, {} duplicated, {} reordered, {} late, {damaged} damaged, \
-         {foreign} of other senders.",
+         {foreign} of other senders, {implausible} far from the rows around them (left out).",
         log.display(),
         gaps.len(),
         frames.taken,

@@ -174,7 +174,8 @@ fn lock_step() {
         let mut request = [0; LARGEST_FRAME];
         let length = body.map_or(0, |body| {
             requests += 1;
-            let frame = Frame { kind: Kind::Request, schema: host.schema(), sequence: requests, body: &body };
+            let frame =
+                Frame { kind: Kind::Request, schema: host.schema(), sequence: requests, host: 1, life: 1, body: &body };
             frame.write(&mut request).unwrap()
         });
         let request = &request[..length];

@@ -5,6 +5,7 @@ use crate::link::{Letter, LoopEnd};
 use crate::machine::Rig;
 use rustix::thread::clock_nanosleep_absolute;
 use rustix::time::{ClockId, Timespec, clock_gettime};
+use std::sync::atomic::Ordering;
 use youla_rig::Plant;
 
 const SECOND: u64 = 1_000_000_000;
@@ -40,6 +41,9 @@ pub(crate) fn run(
         let due = begin + sample * period;
         sleep_until(due)?;
         let started = now();
+        if end.stop.swap(false, Ordering::Relaxed) {
+            rig.stop();
+        }
         let u = rig.command();
         let y = plant.measure();
         plant.apply(&u);

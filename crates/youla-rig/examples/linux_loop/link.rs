@@ -1,9 +1,11 @@
 //! Between the loop and the socket: two channels of fixed size, and the thread that owns the socket.
 
 use std::net::UdpSocket;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
 use std::time::Duration;
-use youla_link::LARGEST_FRAME;
+use youla_link::{LARGEST_FRAME, is_stop};
 
 /// A frame by value: nothing is allocated on its way.
 pub(crate) struct Letter {
@@ -28,18 +30,22 @@ impl Letter {
 pub(crate) struct LoopEnd {
     pub(crate) frames: SyncSender<Letter>,
     pub(crate) requests: Receiver<Letter>,
+    /// A stop has come, for the next sample: it waits for no place among the requests.
+    pub(crate) stop: Arc<AtomicBool>,
 }
 
 /// The end of the socket.
 pub(crate) struct HostEnd {
     frames: Receiver<Letter>,
     requests: SyncSender<Letter>,
+    stop: Arc<AtomicBool>,
 }
 
 pub(crate) fn channels() -> (LoopEnd, HostEnd) {
     let (frames, to_send) = sync_channel(64);
     let (received, requests) = sync_channel(8);
-    (LoopEnd { frames, requests }, HostEnd { frames: to_send, requests: received })
+    let stop = Arc::new(AtomicBool::new(false));
+    (LoopEnd { frames, requests, stop: stop.clone() }, HostEnd { frames: to_send, requests: received, stop })
 }
 
 /// Until the loop has gone. It polls each millisecond instead of waiting for a frame, since a sender in a channel on which somebody waits takes
@@ -52,6 +58,9 @@ pub(crate) fn serve(socket: &UdpSocket, end: HostEnd) -> std::io::Result<()> {
         // A timeout, a host that has gone, or a datagram that is too long: the host asks again.
         if let Ok((length, from)) = socket.recv_from(&mut request) {
             host = Some(from);
+            if request.get(..length).is_some_and(is_stop) {
+                end.stop.store(true, Ordering::Relaxed);
+            }
             let letter = Letter { bytes: request, length };
             let _ = end.requests.try_send(letter);
         }

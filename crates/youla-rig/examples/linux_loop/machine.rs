@@ -1,7 +1,7 @@
 //! The numbers of the machine and its hardware: adapt both to yours.
 
 use youla_link::{Machine, Station};
-use youla_rig::{LinearPlant, Plant};
+use youla_rig::{LinearPlant, Plant, random_number};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices};
 
 /// Order of the model, inputs, outputs, order of Q.
@@ -50,7 +50,7 @@ pub(crate) fn station(description: &str, rate: u32) -> Result<Rig<'_>, Box<dyn s
     let running = ExcitedLoop::new(Controller::new(OBSERVER)?.to_f32()?, limits, 400)?;
     // A frame each 20 ms, or as many rows as a frame holds.
     let rows = u16::try_from(rate / 50).unwrap_or(u16::MAX);
-    Ok(Station::new(running, Machine { description, table: &SQUARE, rows }))
+    Ok(Station::new(running, Machine { description, table: &SQUARE, rows, life: random_number() }))
 }
 
 /// The hardware. Here a plant that is computed; a machine has a type of its own, with its converters (IIO, SPI, EtherCAT, comedi) in `measure` and

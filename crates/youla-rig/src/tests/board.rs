@@ -13,8 +13,8 @@ fn ask(board: &mut machine::Rig, sequence: u32, request: &Request<'_>) -> Vec<u8
     let mut body = [0; 64];
     let length = request.write(&mut body).unwrap();
     let mut bytes = [0; ROOM];
-    let schema = board.schema();
-    let frame = Frame { kind: Kind::Request, schema, sequence, body: &body[..length] };
+    let (schema, life) = (board.schema(), board.life());
+    let frame = Frame { kind: Kind::Request, schema, sequence, host: 1, life, body: &body[..length] };
     let length = frame.write(&mut bytes).unwrap();
     let mut reply = [0; ROOM];
     let length = board.receive(&bytes[..length], &mut reply).unwrap().unwrap();
@@ -28,7 +28,7 @@ fn entry(table: &toml::Table, path: [&str; 3], row: usize, column: usize) -> f32
 
 #[test]
 fn description_states_the_numbers_that_run() {
-    let mut board = rig().unwrap();
+    let mut board = rig(5).unwrap();
     let reply = ask(&mut board, 1, &Request::Describe);
     let description = Description::parse(Reply::read(Frame::read(&reply).unwrap().body).unwrap().data).unwrap();
     assert_eq!(description.sample_time, 1.0 / f64::from(RATE));
@@ -52,7 +52,7 @@ fn codes_saturate_and_round() {
 /// The low-pass of the file with an error of 10 % in its time constant, through converters of 12 bits.
 #[test]
 fn loop_of_the_low_pass_runs_excited() {
-    let mut board = rig().unwrap();
+    let mut board = rig(5).unwrap();
     let mut buffer = [0; ROOM];
     let (mut y, mut largest) = (0.0_f32, 0.0_f32);
     let pole = (-1.0_f32 / 11.0).exp();

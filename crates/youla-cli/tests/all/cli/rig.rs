@@ -12,8 +12,12 @@ struct Twin {
 
 impl Twin {
     fn start(more: &[&str]) -> Self {
+        Self::at("0", more)
+    }
+
+    fn at(port: &str, more: &[&str]) -> Self {
         let mut command = Command::new(env!("CARGO_BIN_EXE_youla"));
-        command.args(["rig", "twin", "--port", "0", "--duration", "300"]).args(more).stdout(Stdio::piped());
+        command.args(["rig", "twin", "--port", port, "--duration", "300"]).args(more).stdout(Stdio::piped());
         let mut process = command.spawn().expect("the program starts");
         let mut address = String::new();
         BufReader::new(process.stdout.as_mut().expect("piped")).read_line(&mut address).expect("a line");
@@ -69,6 +73,32 @@ fn identify_takes_the_record_as_it_is() {
     assert!(stopped.stdout.contains("Q = 0"), "{}", stopped.stdout);
     let nobody = youla(&folder, &["rig", "status", "udp://127.0.0.1:1"]);
     assert!(nobody.code == Some(2) && nobody.stderr.contains("does not answer"), "{}", nobody.stderr);
+}
+
+/// A machine that starts again while it is recorded: two files, and the program says so.
+#[test]
+fn a_restart_parts_the_record() {
+    let folder = empty_folder("rig-restart");
+    let twin = Twin::start(&["--seed", "1"]);
+    let (address, to) = (twin.address.clone(), folder.clone());
+    let recorded = std::thread::spawn(move || {
+        youla(&to, &["rig", "record", &address, "--out", "log.csv", "--duration", "4", "--json"])
+    });
+    while !folder.join("log.csv").exists() {
+        std::thread::sleep(std::time::Duration::from_millis(10));
+    }
+    std::thread::sleep(std::time::Duration::from_millis(500));
+    let port = twin.address.rsplit(':').next().expect("a port").to_owned();
+    drop(twin);
+    let _again = Twin::at(&port, &["--seed", "2"]);
+    let recorded = recorded.join().expect("recorded");
+    assert_eq!(recorded.code, Some(2), "{} {}", recorded.stdout, recorded.stderr);
+    assert!(recorded.stderr.contains("the machine started again while it was recorded: the log has 2 parts"));
+    let report: serde_json::Value = serde_json::from_str(&recorded.stdout).expect("JSON");
+    for (part, name) in ["log.csv", "log-part-2.csv"].iter().enumerate() {
+        let lines = std::fs::read_to_string(folder.join(name)).expect("a file").lines().count() as u64;
+        assert_eq!(report["parts"][part]["rows"].as_u64(), Some(lines - 1), "{report}");
+    }
 }
 
 /// The gas bearing in the time of the requests, then the identified model as a twin under the same loop.

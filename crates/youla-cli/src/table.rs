@@ -67,7 +67,7 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
                 _ => format!("{fit:.2}"),
             };
             let fits = models.iter().map(|v| percent(v.records[k].fit[i])).collect();
-            rows.push(row(&format!("{}, {}", short(&record.name), short(&output.name)), fits));
+            rows.push(row(&format!("{}, {}", short(record.name()), short(&output.name)), fits));
         }
     }
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();

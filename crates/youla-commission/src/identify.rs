@@ -5,13 +5,10 @@ use crate::parameter::{LoadedQ, at_plant_input};
 use std::path::Path;
 use youla::identify::subspace::{Experiment, InitialState, SubspaceMethod, SubspaceOptions, subspace};
 use youla::lti::{Discrete, StateSpace};
-use youla::signal::Channel;
-use youla::signal::without_harmonics;
+use youla::signal::{Channel, LoopRecord, without_harmonics};
 use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec};
-use youla_run::{
-    DataFile, DataSettings, Identification, LoopRecord, RunRecords, RunSettings, SourceFile, StageClock, identify,
-};
+use youla_run::{DataFile, DataSettings, Identification, RunRecords, RunSettings, SourceFile, StageClock, identify};
 use youla_twin::{LogRow, RunningLoop};
 
 /// Rows of one experiment without the harmonics of the speed.
@@ -50,16 +47,7 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
     let settings = RunSettings::new(name.into(), data, description.nominal, description.controller);
     let time = running.nominal.time();
     let channels = |names: [&str; 2], unit: &str| names.map(|name| Channel::new(name, unit)).to_vec();
-    let record = LoopRecord {
-        name: "log".into(),
-        time,
-        u: rows.u.clone(),
-        y: rows.y.clone(),
-        input_excitation: None,
-        reference: None,
-        alpha: Some(rows.alpha.clone()),
-        disturbance: None,
-    };
+    let record = LoopRecord::new(time, rows.u.clone(), rows.y.clone())?.with_alpha(rows.alpha.clone())?.named("log");
     let records = RunRecords {
         time,
         inputs: channels(["u_h", "u_v"], "V"),

@@ -20,10 +20,9 @@ use std::path::Path;
 use youla::control::with_input_port;
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, Partitioned, StateSpace, simulate};
+use youla::signal::LoopRecord;
 use youla::{Mat, MatRef};
-use youla_run::{
-    LoopRecord, RunRecords, RunSettings, declared_loop, factorise_run, recommend_alone, records_in_memory,
-};
+use youla_run::{RunRecords, RunSettings, declared_loop, factorise_run, recommend_alone, records_in_memory};
 
 /// Seed and index of a replicate.
 type Draw = (u64, u64);
@@ -65,16 +64,17 @@ fn simulated(
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     rng.set_stream(index);
     let one = |record: &LoopRecord| {
-        let (samples, m, p) = (record.samples(), record.u.ncols(), record.y.ncols());
+        let (samples, m, p) = (record.samples(), record.inputs(), record.outputs());
         let white = Mat::from_fn(p, samples, |_, _| rng.sample::<f64, _>(StandardNormal));
         let e = (&factor * &white).transpose().to_owned();
-        let given = |x: &Option<Mat<f64>>, columns| x.clone().unwrap_or_else(|| Mat::zeros(samples, columns));
-        let (d, alpha) = (given(&record.input_excitation, m), given(&record.alpha, m));
-        let r = given(&record.reference, p);
+        let given =
+            |x: Option<MatRef<'_, f64>>, columns| x.map_or_else(|| Mat::zeros(samples, columns), |x| x.to_owned());
+        let (d, alpha) = (given(record.input_excitation(), m), given(record.alpha(), m));
+        let r = given(record.reference(), p);
         let outside = block(&[&[e.as_ref(), d.as_ref(), r.as_ref(), alpha.as_ref()]]);
         let both = simulate(&closed, outside.as_ref(), &vec![0.0; closed.order()])?;
         let (y, u) = (both.as_ref().subcols(0, p).to_owned(), both.as_ref().subcols(p, m).to_owned());
-        Ok(LoopRecord { u, y, disturbance: None, ..record.clone() })
+        Ok(record.with_response(u, y)?)
     };
     let estimation = records.estimation.iter().map(one).collect::<Result<_>>()?;
     Ok(RunRecords { estimation, verification: Vec::new(), ..records.clone() })

@@ -165,12 +165,12 @@ impl Run {
 
     /// The verification records beside the predictions of the models.
     fn predictions<'py>(&self, py: Python<'py>) -> Vec<Predictions<'py>> {
-        let of = |(k, record): (usize, &youla_run::LoopRecord)| {
+        let of = |(k, record): (usize, &youla::signal::LoopRecord)| {
             let predicted = self.found.verdict.models.iter().filter_map(|v| {
                 let y = v.records.get(k)?.predicted.as_ref().ok()?;
                 Some((v.method.key().to_owned(), array(py, y.as_ref())))
             });
-            (record.name.clone(), array(py, record.y.as_ref()), predicted.collect())
+            (record.name().to_owned(), array(py, record.y()), predicted.collect())
         };
         self.found.records.verification.iter().enumerate().map(of).collect()
     }

@@ -39,7 +39,7 @@ pub use method::Method;
 pub use page::notes::cautions;
 pub use page::page;
 pub use records::segments::RecordSegment;
-pub use records::{LoopRecord, RunRecords, SourceFile, read_records, records_in_memory, response_in_memory};
+pub use records::{RunRecords, SourceFile, read_records, records_in_memory, response_in_memory};
 pub use result::{Filtered, Identification, Refusal};
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{

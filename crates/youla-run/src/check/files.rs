@@ -3,13 +3,13 @@
 use super::{CheckedRecord, DataCheck};
 use crate::records::computed::ComputedChannels;
 use crate::records::segments::{Part, parts};
-use crate::records::{LoopRecord, UsedRows, channels_of, refuse_overlap};
+use crate::records::{UsedRows, channels_of, loop_record, refuse_overlap};
 use crate::settings::DataFile;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;
-use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
+use youla::signal::LoopRecord;
 use youla::signal::Record;
 use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, read, sha256};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
@@ -124,11 +124,10 @@ fn check_part(job: &Job, file: &DataFile, part: &Part, controller: &DeclaredCont
         record = record.trim(from, Some(to - from))?;
         first += from;
     }
-    let logged = LoopRecord::from_record(&record, part.name.clone(), job.groups.each_ref())?;
-    let logged = LoopRecord { time, ..logged };
+    let logged = loop_record(&record, time, &part.name, job.groups.each_ref())?;
     let names = names(job.groups.each_ref());
     let controller = controller(time)?;
-    let (m, p) = (logged.u.ncols(), logged.y.ncols());
+    let (m, p) = (logged.inputs(), logged.outputs());
     if let Some(k) = controller.as_ref().filter(|k| (k.outputs(), k.inputs()) != (m, p)) {
         let (expected, found) = ((m, p), (k.outputs(), k.inputs()));
         return Err(Error::Method(youla::Error::Shape {
@@ -153,18 +152,15 @@ fn longest(breaks: &[usize], samples: usize) -> (usize, usize) {
 }
 
 pub(super) fn logged(record: &LoopRecord, first_row: usize) -> LoggedRecord<'_> {
-    fn of(x: &Option<Mat<f64>>) -> Option<youla::MatRef<'_, f64>> {
-        x.as_ref().map(|x| x.as_ref())
-    }
     LoggedRecord {
-        name: &record.name,
-        time: record.time,
+        name: record.name(),
+        time: record.time(),
         first_row,
-        u: record.u.as_ref(),
-        y: record.y.as_ref(),
-        input_excitation: of(&record.input_excitation),
-        reference: of(&record.reference),
-        alpha: of(&record.alpha),
+        u: record.u(),
+        y: record.y(),
+        input_excitation: record.input_excitation(),
+        reference: record.reference(),
+        alpha: record.alpha(),
     }
 }
 

@@ -9,8 +9,8 @@ mod result;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
+use crate::records::RunRecords;
 use crate::records::computed::ComputedChannels;
-use crate::records::{LoopRecord, RunRecords};
 use crate::settings::{DataFile, DataSettings, RunSettings};
 use crate::stages::factors::{DeclaredLoop, declared_loop};
 use crate::{Error, Result};
@@ -21,6 +21,7 @@ use std::path::{Path, PathBuf};
 use youla::ErrorKind;
 use youla::identify::subspace::SubspaceOptions;
 use youla::lti::{Discrete, StateSpace};
+use youla::signal::LoopRecord;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions};
 use youla_loop::check::{CheckOptions, Finding, Severity, Test, by_severity, check_record};
 
@@ -130,18 +131,18 @@ pub(super) fn check_records(
     let computed = ComputedChannels::new(d)?;
     let channels: Vec<&ChannelSpec> = d.groups().into_iter().flatten().collect();
     let one = |record: &&LoopRecord| {
-        let (file, first) = place(settings, records, &record.name);
+        let (file, first) = place(settings, records, record.name());
         let logged = logged(record, first);
         // A test that cannot be computed does not end a run.
         let findings = match check_record(&logged, &names, controller, &options) {
             Err(error) if error.kind() == ErrorKind::Numerical => {
-                vec![finding(Severity::Note, &record.name, format!("the record could not be checked: {error}"), "")]
+                vec![finding(Severity::Note, record.name(), format!("the record could not be checked: {error}"), "")]
             }
             found => found?,
         };
         let findings = computed.without_expected(&channels, findings);
         let rows = [first, first + record.samples() - 1];
-        Ok((CheckedRecord { record: record.name.clone(), file, rows, sample_time: record.time.ts() }, findings))
+        Ok((CheckedRecord { record: record.name().to_owned(), file, rows, sample_time: record.time().ts() }, findings))
     };
     let mut found = collected(all.par_iter().map(one).collect())?;
     found.findings.extend(method_finding(settings));

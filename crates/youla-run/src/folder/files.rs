@@ -2,8 +2,8 @@
 
 use crate::Result;
 use crate::folder::artefacts::Provenance;
+use crate::records::RunRecords;
 use crate::records::segments::RecordSegment;
-use crate::records::{LoopRecord, RunRecords};
 use crate::result::Identification;
 use crate::stages::validate::ModelVerdict;
 use crate::stages::validate::residuals::{RecordResiduals, step_keys};
@@ -14,6 +14,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use youla::control::Margins;
 use youla::signal::Channel;
+use youla::signal::LoopRecord;
 use youla::validate::RESIDUAL_LAGS;
 use youla_io::SystemMatrices;
 use youla_io::export::{ExportedController, ObserverData};
@@ -47,7 +48,7 @@ pub(crate) struct RecordLength<'a> {
 impl<'a> From<&'a RunRecords> for RecordsFile<'a> {
     fn from(records: &'a RunRecords) -> Self {
         let lengths = |group: &'a [LoopRecord]| {
-            group.iter().map(|r| RecordLength { name: &r.name, samples: r.samples() }).collect()
+            group.iter().map(|r| RecordLength { name: r.name(), samples: r.samples() }).collect()
         };
         RecordsFile {
             sample_time: records.time.ts(),

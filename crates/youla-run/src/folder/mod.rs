@@ -9,7 +9,6 @@ mod files;
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
 use crate::folder::subspace_details::SubspaceDetails;
 use crate::page::redesign::{figure, loops};
-use crate::records::LoopRecord;
 use crate::result::{Filtered, Identification};
 use crate::stages::uncertainty::SystemUncertainty;
 use crate::summary::certificate::CertificateEntry;
@@ -24,6 +23,7 @@ use serde::Serialize;
 use youla::identify::HansenModel;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
+use youla::signal::LoopRecord;
 use youla::{Mat, MatRef, c64};
 use youla_io::folder::RunFolder;
 use youla_io::{Packing, Value, Variable, write_mat};
@@ -76,19 +76,19 @@ impl Writer<'_> {
     }
 
     fn record(&self, purpose: &str, record: &LoopRecord) -> Result<()> {
-        let mut variables = vec![number("ts", record.time.ts())];
+        let mut variables = vec![number("ts", record.time().ts())];
         let groups = [
-            ("u", Some(&record.u)),
-            ("y", Some(&record.y)),
-            ("input_excitation", record.input_excitation.as_ref()),
-            ("reference", record.reference.as_ref()),
-            ("alpha", record.alpha.as_ref()),
-            ("disturbance", record.disturbance.as_ref()),
+            ("u", Some(record.u())),
+            ("y", Some(record.y())),
+            ("input_excitation", record.input_excitation()),
+            ("reference", record.reference()),
+            ("alpha", record.alpha()),
+            ("disturbance", record.disturbance()),
         ];
         for (name, matrix) in groups {
             variables.extend(matrix.map(|m| array(name, m.as_ref())));
         }
-        self.mat(&format!("1-record/{purpose}-{}.mat", record.name), &variables)
+        self.mat(&format!("1-record/{purpose}-{}.mat", record.name()), &variables)
     }
 
     /// `2-factor/`: the two systems of (15), the controller and the nominal model.
@@ -122,12 +122,12 @@ impl Writer<'_> {
         let Ok(Filtered { signals: s, .. }) = &self.found.filtered else { return Ok(()) };
         for (record, signals) in self.found.records.estimation.iter().zip(&s.experiments) {
             let variables = [
-                number("ts", record.time.ts()),
+                number("ts", record.time().ts()),
                 number("dropped_samples", s.settle as f64),
                 array("alpha", signals.alpha()),
                 array("beta", signals.beta()),
             ];
-            self.mat(&format!("3-signals/{}.mat", record.name), &variables)?;
+            self.mat(&format!("3-signals/{}.mat", record.name()), &variables)?;
         }
         let file = SignalsFile { dropped_samples: s.settle, controller_mismatch: s.controller_mismatch };
         self.json("3-signals/signals.json", file)
@@ -214,12 +214,12 @@ impl Writer<'_> {
         self.json("7-validate/verdict.json", VerdictFile::new(self.found)?)?;
         self.json("7-validate/residuals.json", ResidualsFile::from(&verdict.models[..]))?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
-            let mut variables = vec![number("ts", record.time.ts()), array("measured", record.y.as_ref())];
+            let mut variables = vec![number("ts", record.time().ts()), array("measured", record.y())];
             for v in &self.found.verdict.models {
                 let predicted = v.records[k].predicted.as_ref().ok();
                 variables.extend(predicted.map(|p| array(v.method.key(), p.as_ref())));
             }
-            self.mat(&format!("7-validate/{}.mat", record.name), &variables)?;
+            self.mat(&format!("7-validate/{}.mat", record.name()), &variables)?;
         }
         Ok(())
     }

@@ -3,12 +3,12 @@
 use super::further::further_lines;
 use super::verdict::verdict_lines;
 use crate::method::Method;
-use crate::records::LoopRecord;
 use crate::records::segments::RecordSegment;
 use crate::result::Identification;
 use crate::summary::Summary;
 use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{SubspaceModel, amplitudes};
+use youla::signal::LoopRecord;
 use youla_report::data::{Note, ReportPart, Status};
 
 /// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.

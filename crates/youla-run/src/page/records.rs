@@ -1,11 +1,12 @@
 //! The records of a run on its page: files, findings, signals, predictions.
 
 use crate::Result;
-use crate::records::{LoopRecord, channels_of};
+use crate::records::channels_of;
 use crate::result::Identification;
 use crate::settings::Prediction;
 use youla::MatRef;
 use youla::signal::Channel;
+use youla::signal::LoopRecord;
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{self as draw, SignalKind};
 use youla_report::{Timeline, Trace};
@@ -65,8 +66,14 @@ pub(crate) fn experiments(found: &Identification) -> Result<Vec<draw::DrawnExper
     found.records.estimation.iter().enumerate().map(|(k, r)| experiment(found, k, r)).collect()
 }
 
+/// Times that are drawn, around the largest swing of the first output.
+fn clock(record: &LoopRecord) -> Timeline {
+    let first: Vec<f64> = record.y().col(0).iter().copied().collect();
+    Timeline::around_largest_swing(record.time().ts(), &first)
+}
+
 fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::DrawnExperiment> {
-    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let clock = clock(record);
     let (u, y) = (&found.records.inputs, &found.records.outputs);
     let named = |prefix: &str, channels: &[Channel]| -> Vec<Channel> {
         channels.iter().map(|c| Channel::new(format!("{prefix} {}", c.name), &c.unit)).collect()
@@ -85,22 +92,22 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
     };
     let data = &found.settings.data;
     for (specs, excitation) in [
-        (&data.input_excitation, &record.input_excitation),
-        (&data.reference, &record.reference),
-        (&data.alpha, &record.alpha),
+        (&data.input_excitation, record.input_excitation()),
+        (&data.reference, record.reference()),
+        (&data.alpha, record.alpha()),
     ] {
         if let Some(excitation) = excitation {
-            add(SignalKind::Excitation, &channels_of(specs), excitation.as_ref())?;
+            add(SignalKind::Excitation, &channels_of(specs), excitation)?;
         }
     }
-    add(SignalKind::Input, u, record.u.as_ref())?;
-    add(SignalKind::Output, y, record.y.as_ref())?;
+    add(SignalKind::Input, u, record.u())?;
+    add(SignalKind::Output, y, record.y())?;
     if let Ok(filtered) = &found.filtered {
         let signals = &filtered.signals.experiments[k];
         add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
         add(SignalKind::Beta, &named("beta", y), signals.beta())?;
     }
-    Ok(draw::DrawnExperiment { name: record.name.clone(), clock, signals: drawn })
+    Ok(draw::DrawnExperiment { name: record.name().to_owned(), clock, signals: drawn })
 }
 
 /// Measured outputs beside the predictions of all models.
@@ -112,15 +119,15 @@ pub(crate) fn verification(found: &Identification) -> Result<Vec<draw::Verificat
 }
 
 fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
-    let clock = Timeline::around_largest_swing(record.time.ts(), record.y.col_as_slice(0));
+    let clock = clock(record);
     let prediction = match found.verdict.prediction {
         Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
         Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
     };
-    let outputs = (0..record.y.ncols())
+    let outputs = (0..record.outputs())
         .map(|output| {
             let name = &found.records.outputs[output].name;
-            let measured = record.y.col_as_slice(output);
+            let measured: Vec<f64> = record.y().col(output).iter().copied().collect();
             let mut predictions = Vec::new();
             for v in &found.verdict.models {
                 let Ok(predicted) = &v.records[k].predicted else { continue };
@@ -132,8 +139,8 @@ fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<dra
                     residual: Trace::new(name, &residual, &clock)?,
                 });
             }
-            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, measured, &clock)?, predictions })
+            Ok(draw::VerifiedOutput { output, measured: Trace::new(name, &measured, &clock)?, predictions })
         })
         .collect::<Result<_>>()?;
-    Ok(draw::Verification { record: record.name.clone(), prediction: prediction.into(), clock, outputs })
+    Ok(draw::Verification { record: record.name().to_owned(), prediction: prediction.into(), clock, outputs })
 }

@@ -14,35 +14,13 @@ use crate::{Error, Result};
 use rayon::prelude::*;
 use std::collections::HashSet;
 use std::path::Path;
-use youla::Mat;
+use youla::MatRef;
 use youla::identify::likelihood::ResponseTable;
 use youla::identify::subspace::Experiment;
 use youla::lti::{Discrete, StateSpace};
-use youla::signal::Channel;
-use youla::signal::Record;
+use youla::signal::{Channel, LoopRecord, Record};
 use youla_io::{ChannelSpec, Format, Source, TimeSource, read_parts, sha256, sha256_of};
 pub use youla_report::data::Source as SourceFile;
-
-/// One record of a machine under feedback, samples x channels each.
-#[derive(Debug, Clone)]
-pub struct LoopRecord {
-    /// Name in reports.
-    pub name: String,
-    /// Clock of the samples.
-    pub time: Discrete,
-    /// Plant input as applied, samples x m.
-    pub u: Mat<f64>,
-    /// Measured output, samples x p.
-    pub y: Mat<f64>,
-    /// Known excitation added at the plant input, samples x m.
-    pub input_excitation: Option<Mat<f64>>,
-    /// Known reference, samples x p.
-    pub reference: Option<Mat<f64>>,
-    /// Known excitation alpha of Fig. 3, samples x m.
-    pub alpha: Option<Mat<f64>>,
-    /// Cosine and sine of each known line in the outputs, samples x 2 per line.
-    pub disturbance: Option<Mat<f64>>,
-}
 
 /// All records of a run.
 #[derive(Debug, Clone)]
@@ -75,13 +53,13 @@ impl RunRecords {
             return measured.sizes(self.inputs.len());
         }
         let estimation = self.estimation.iter();
-        let u = rms(estimation.clone().map(|r| &r.u), self.inputs.len());
-        (u, rms(estimation.map(|r| &r.y), self.outputs.len()))
+        let u = rms(estimation.clone().map(LoopRecord::u), self.inputs.len());
+        (u, rms(estimation.map(LoopRecord::y), self.outputs.len()))
     }
 
     /// The estimation records as (u, y), with their known lines.
     pub fn experiments(&self) -> Vec<Experiment<'_>> {
-        self.estimation.iter().map(LoopRecord::experiment).collect()
+        self.estimation.iter().map(Experiment::from).collect()
     }
 }
 
@@ -164,18 +142,18 @@ fn assembled(settings: &DataSettings, read: Vec<FileRecords>, measured: Option<M
         records.extend(file.records);
         sources.push(file.source);
         segments.extend(file.segments);
-        let (time, last): (Discrete, Discrete) = (records[0].time, records[records.len() - 1].time);
+        let (time, last): (Discrete, Discrete) = (records[0].time(), records[records.len() - 1].time());
         if (last.ts() / time.ts() - 1.0).abs() > TimeSource::default().tolerance {
             let what = format!("{} and {}", sources[0].path, sources[sources.len() - 1].path);
             return Err(Error::Method(youla::Error::SampleTimeMismatch { what, left: time.ts(), right: last.ts() }));
         }
     }
     let mut names = HashSet::new();
-    if let Some(twice) = records.iter().find(|r| !names.insert(r.name.clone())) {
-        return Err(Error::DuplicateRecord { name: twice.name.clone() });
+    if let Some(twice) = records.iter().find(|r| !names.insert(r.name().to_owned())) {
+        return Err(Error::DuplicateRecord { name: twice.name().to_owned() });
     }
     let time = match (records.first(), settings.sample_time) {
-        (Some(record), _) => record.time,
+        (Some(record), _) => record.time(),
         (None, ts) => Discrete::new(ts.unwrap_or(f64::NAN))?,
     };
     let verification = records.split_off(of_estimation);
@@ -292,63 +270,39 @@ fn file_records(settings: &DataSettings, of: FileOfRun<'_>, read: Vec<Record>) -
         if cut {
             segments.push(RecordSegment { record: name.clone(), file: path.clone(), rows });
         }
-        records.push(LoopRecord { disturbance, ..LoopRecord::from_record(&record, name, settings.groups())? });
+        let logged = loop_record(&record, record.time(), &name, settings.groups())?;
+        records.push(match disturbance {
+            Some(lines) => logged.with_disturbance(lines)?,
+            None => logged,
+        });
     }
     let source = SourceFile { path, purpose: of.purpose.to_owned(), sha256: of.sha256 };
     Ok(FileRecords { records, rows: all_rows, source, segments })
 }
 
-impl LoopRecord {
-    /// The record as the method takes it.
-    ///
-    /// # Errors
-    /// [`youla::Error::NotFinite`] for records in memory.
-    pub(crate) fn of_method(&self) -> youla::Result<youla::signal::LoopRecord> {
-        let mut record = youla::signal::LoopRecord::new(self.time, self.u.clone(), self.y.clone())?.named(&self.name);
-        if let Some(d) = &self.input_excitation {
-            record = record.with_input_excitation(d.clone())?;
-        }
-        if let Some(r) = &self.reference {
-            record = record.with_reference(r.clone())?;
-        }
-        if let Some(alpha) = &self.alpha {
-            record = record.with_alpha(alpha.clone())?;
-        }
-        if let Some(lines) = &self.disturbance {
-            record = record.with_disturbance(lines.clone())?;
-        }
-        Ok(record)
+/// The record of a loop from the channels of these groups: inputs, outputs, excitation of the inputs, reference, alpha.
+pub(crate) fn loop_record(
+    record: &Record,
+    time: Discrete,
+    name: &str,
+    groups: [&Vec<ChannelSpec>; 5],
+) -> Result<LoopRecord> {
+    let matrix = |group: &[ChannelSpec]| {
+        let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();
+        record.matrix(&names)
+    };
+    let [inputs, outputs, input_excitation, reference, alpha] = groups;
+    let mut found = LoopRecord::new(time, matrix(inputs)?, matrix(outputs)?)?.named(name);
+    if !input_excitation.is_empty() {
+        found = found.with_input_excitation(matrix(input_excitation)?)?;
     }
-
-    pub(crate) fn from_record(record: &Record, name: String, groups: [&Vec<ChannelSpec>; 5]) -> Result<Self> {
-        let matrix = |group: &[ChannelSpec]| {
-            let names: Vec<&str> = group.iter().map(|c| c.name.as_str()).collect();
-            record.matrix(&names)
-        };
-        let optional = |group: &[ChannelSpec]| if group.is_empty() { Ok(None) } else { matrix(group).map(Some) };
-        let [inputs, outputs, input_excitation, reference, alpha] = groups;
-        Ok(LoopRecord {
-            name,
-            time: record.time(),
-            u: matrix(inputs)?,
-            y: matrix(outputs)?,
-            input_excitation: optional(input_excitation)?,
-            reference: optional(reference)?,
-            alpha: optional(alpha)?,
-            disturbance: None,
-        })
+    if !reference.is_empty() {
+        found = found.with_reference(matrix(reference)?)?;
     }
-
-    /// (u, y) with the known lines.
-    pub fn experiment(&self) -> Experiment<'_> {
-        let disturbance = self.disturbance.as_ref().map(|w| w.as_ref());
-        Experiment { disturbance, ..Experiment::new(self.u.as_ref(), self.y.as_ref()) }
+    if !alpha.is_empty() {
+        found = found.with_alpha(matrix(alpha)?)?;
     }
-
-    /// Number of samples.
-    pub fn samples(&self) -> usize {
-        self.u.nrows()
-    }
+    Ok(found)
 }
 
 /// Names and units without the places in the files.
@@ -357,7 +311,7 @@ pub(crate) fn channels_of(specs: &[ChannelSpec]) -> Vec<Channel> {
 }
 
 /// Root mean square of each channel over several records, 1 for a channel that is zero throughout.
-pub(crate) fn rms<'a>(records: impl Iterator<Item = &'a Mat<f64>> + Clone, channels: usize) -> Vec<f64> {
+pub(crate) fn rms<'a>(records: impl Iterator<Item = MatRef<'a, f64>> + Clone, channels: usize) -> Vec<f64> {
     let samples: usize = records.clone().map(|r| r.nrows()).sum();
     (0..channels)
         .map(|j| {

@@ -148,7 +148,7 @@ mod tests {
         let cut = folder.read("gaps = \"split\"\nestimation = [{ file = \"whole.csv\" }]").unwrap();
         let apart = folder.read("estimation = [{ file = \"one.csv\" }, { file = \"two.csv\" }]").unwrap();
         assert_eq!(cut.segments.iter().map(|s| s.rows).collect::<Vec<_>>(), [[1, 400], [401, 963]]);
-        assert_eq!(cut.estimation.iter().map(|r| &r.name[..]).collect::<Vec<_>>(), ["whole-1", "whole-2"]);
+        assert_eq!(cut.estimation.iter().map(|r| r.name()).collect::<Vec<_>>(), ["whole-1", "whole-2"]);
         assert!(apart.segments.is_empty() && apart.sources.len() == 2 && cut.sources.len() == 1);
         let options = SubspaceOptions { horizon: 4.into(), order: Order::Fixed(1), ..SubspaceOptions::default() };
         let model = |records: &RunRecords| direct(&records.experiments(), records.time, &options).unwrap().model;
@@ -182,7 +182,7 @@ mod tests {
                  verification = [{ file = \"whole.csv\", skip = 600, take = 100 }, { file = \"whole.csv\", skip = 700, name = \"rest\" }]",
             )
             .unwrap();
-        let names: Vec<&str> = found.estimation.iter().chain(&found.verification).map(|r| &r.name[..]).collect();
+        let names: Vec<&str> = found.estimation.iter().chain(&found.verification).map(|r| r.name()).collect();
         assert_eq!(names, ["whole-1", "other", "whole-2", "rest"]);
     }
 
@@ -219,7 +219,7 @@ mod tests {
                         verification = [{ file = \"whole.csv\", name = \"rest\", skip = 300 }]";
         let found = folder.read(verified).unwrap();
         assert_eq!((found.estimation.len(), found.verification.len()), (1, 2));
-        assert_eq!(found.estimation[0].name, "whole");
+        assert_eq!(found.estimation[0].name(), "whole");
         for (data, words) in [
             ("estimation = [{ file = \"whole.csv\", segments = [[1, 20], [20, 30]] }]", "without overlap"),
             ("estimation = [{ file = \"whole.csv\", segments = [[0, 20]] }]", "counted from 1"),

@@ -138,7 +138,7 @@ mod tests {
         let mut none = chosen.data.clone();
         none.detrend = youla::signal::Detrend::None;
         let records = records_in_memory(&none, vec![log]).unwrap();
-        let d = records.estimation[0].input_excitation.as_ref().unwrap();
+        let d = records.estimation[0].input_excitation().unwrap();
         for k in 0..20 {
             assert!((d[(k, 0)] + 1.4 * r[k]).abs() < 1e-12, "row {k}: {}", d[(k, 0)]);
         }

@@ -13,13 +13,13 @@ pub(crate) fn require_length(options: &SubspaceOptions, records: &RunRecords, se
     let delay = options.delays.iter().copied().max().unwrap_or(0);
     let needed = [past, horizon, delay, settle].into_iter().fold(0, usize::saturating_add);
     let of_file = |name: &str| records.segments.iter().any(|segment| segment.record == name);
-    match records.estimation.iter().find(|r| of_file(&r.name) && r.samples() < needed) {
+    match records.estimation.iter().find(|r| of_file(r.name()) && r.samples() < needed) {
         None => Ok(()),
         Some(record) => {
             let what = format!(
                 "{}, a part of a file, with a horizon of {horizon} and a past of {past} block rows and {settle} samples of \
                  settling (leave it out by `segments`)",
-                record.name
+                record.name()
             );
             Err(Error::Method(youla::Error::TooFewSamples { what, found: record.samples(), needed }))
         }

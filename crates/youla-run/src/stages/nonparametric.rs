@@ -1,11 +1,11 @@
 //! The plant without a model, at the lines of a periodic excitation with noise and distortion told apart, or in windows of other ones.
 
-use crate::records::LoopRecord;
 use crate::stages::context::RunContext;
 use crate::stages::responses::is_constant;
 use crate::{Error, Result};
+use youla::signal::LoopRecord;
 use youla::signal::{LineResponse, PeriodicExperiment, detect_period, line_response, local_response};
-use youla::{Error as Method, Mat};
+use youla::{Error as Method, Mat, MatRef};
 
 /// The loop and its plant without a model.
 #[derive(Debug, Clone)]
@@ -27,7 +27,7 @@ const WINDOWS: usize = 400;
 /// The error is the reason why a periodic excitation shows nothing, for example inputs that are not excited independently.
 pub(crate) fn lines(run: RunContext<'_>) -> Option<Result<LinesOfRun>> {
     let records = &run.records.estimation;
-    let excitations: Vec<&Mat<f64>> = records.iter().map(excitation).collect::<Option<_>>()?;
+    let excitations: Vec<MatRef<'_, f64>> = records.iter().map(excitation).collect::<Option<_>>()?;
     let signals: Vec<Mat<f64>> = records.iter().map(inputs_and_outputs).collect();
     let both = excitations.iter().zip(&signals);
     let experiments: Vec<_> = both.map(|(d, z)| PeriodicExperiment { d: d.as_ref(), z: z.as_ref() }).collect();
@@ -45,17 +45,17 @@ pub(crate) fn lines(run: RunContext<'_>) -> Option<Result<LinesOfRun>> {
 }
 
 /// The one signal that moves the loop, with a channel for each input.
-fn excitation(record: &LoopRecord) -> Option<&Mat<f64>> {
-    let known = [&record.input_excitation, &record.alpha, &record.reference];
-    let moving: Vec<&Mat<f64>> = known.into_iter().flatten().filter(|d| !is_constant(d)).collect();
+fn excitation(record: &LoopRecord) -> Option<MatRef<'_, f64>> {
+    let known = [record.input_excitation(), record.alpha(), record.reference()];
+    let moving: Vec<MatRef<'_, f64>> = known.into_iter().flatten().filter(|d| !is_constant(*d)).collect();
     match moving[..] {
-        [d] if d.ncols() == record.u.ncols() => Some(d),
+        [d] if d.ncols() == record.inputs() => Some(d),
         _ => None,
     }
 }
 
 fn inputs_and_outputs(record: &LoopRecord) -> Mat<f64> {
-    let m = record.u.ncols();
-    let value = |t: usize, k: usize| if k < m { record.u[(t, k)] } else { record.y[(t, k - m)] };
-    Mat::from_fn(record.samples(), m + record.y.ncols(), value)
+    let m = record.inputs();
+    let value = |t: usize, k: usize| if k < m { record.u()[(t, k)] } else { record.y()[(t, k - m)] };
+    Mat::from_fn(record.samples(), m + record.outputs(), value)
 }

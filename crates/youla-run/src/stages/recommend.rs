@@ -1,7 +1,6 @@
 //! The recommended model of a run: [`identify`] on its records, with the controller that ran and the nominal model.
 
 use crate::check::{DataCheck, OF_SETTINGS};
-use crate::records::LoopRecord;
 use crate::stages::context::RunContext;
 use crate::{Error, Result};
 use youla::identify::likelihood::{self, Evidence, Recommendation};
@@ -35,8 +34,7 @@ pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
         }
         return Ok(found);
     }
-    let of = |group: &[LoopRecord]| group.iter().map(LoopRecord::of_method).collect::<youla::Result<Vec<_>>>();
-    let (estimation, fresh) = (of(&records.estimation)?, of(&records.verification)?);
-    let found = identify(&estimation, &fresh, running, Some(&run.declared.nominal), options);
+    let nominal = Some(&run.declared.nominal);
+    let found = identify(&records.estimation, &records.verification, running, nominal, options);
     found.map(|Identified { model, .. }| model).map_err(within)
 }

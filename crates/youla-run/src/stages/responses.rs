@@ -1,16 +1,16 @@
 //! Frequency responses of a run: every model, and the indirect non-parametric one where the excitation is known.
 
 use crate::method::Method;
-use crate::records::LoopRecord;
 use crate::settings::FrequencySettings;
 use crate::stages::context::RunContext;
 use crate::stages::signals::DeviationSignals;
 use crate::stages::validate::Verdict;
 use crate::{Error, Result};
 use std::f64::consts::TAU;
-use youla::Mat;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
+use youla::signal::LoopRecord;
 use youla::signal::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
+use youla::{Mat, MatRef};
 
 /// The indirect response `S_dy S_du^-1` averaged over all estimation records, `None` where no excitation is known.
 ///
@@ -21,14 +21,14 @@ use youla::signal::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
 pub(crate) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) -> Option<Result<IndirectResponse>> {
     let settings = &run.settings.frequency_response;
     let records = &run.records.estimation;
-    let at_rest = |r: &LoopRecord| r.reference.as_ref().is_none_or(is_constant);
+    let at_rest = |r: &LoopRecord| r.reference().is_none_or(is_constant);
     let excitations: Vec<Mat<f64>> = records
         .iter()
         .enumerate()
         .filter_map(|(k, r)| {
-            let alone = [&r.input_excitation, &r.alpha].into_iter().flatten().collect::<Vec<_>>();
+            let alone = [r.input_excitation(), r.alpha()].into_iter().flatten().collect::<Vec<_>>();
             match alone[..] {
-                [d] if at_rest(r) => Some(d.clone()),
+                [d] if at_rest(r) => Some(d.to_owned()),
                 _ => signals?.expected_alpha.get(k).cloned(),
             }
         })
@@ -42,7 +42,7 @@ pub(crate) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) 
         .zip(&excitations)
         .map(|(r, d)| {
             let dropped = r.samples() - d.nrows();
-            let (u, y) = (r.u.subrows(dropped, d.nrows()), r.y.subrows(dropped, d.nrows()));
+            let (u, y) = (r.u().subrows(dropped, d.nrows()), r.y().subrows(dropped, d.nrows()));
             ExcitedRecord { d: d.as_ref(), u, y }
         })
         .collect();
@@ -50,7 +50,7 @@ pub(crate) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) 
     Some(indirect_response(&experiments, run.records.time, &options).map_err(Error::from))
 }
 
-pub(crate) fn is_constant(signals: &Mat<f64>) -> bool {
+pub(crate) fn is_constant(signals: MatRef<'_, f64>) -> bool {
     signals.col_iter().all(|c| c.iter().all(|v| *v == c[0]))
 }
 

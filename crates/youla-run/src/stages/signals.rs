@@ -1,6 +1,6 @@
 //! alpha and beta of the estimation records, with the transient of the filter dropped and the controller checked.
 
-use crate::records::{LoopRecord, RunRecords};
+use crate::records::RunRecords;
 use crate::{Error, Result};
 use faer::Scale;
 use std::path::{Path, PathBuf};
@@ -10,6 +10,7 @@ use youla::factor::{CoprimeFactors, YoulaSignals};
 use youla::linalg::block;
 use youla::lti::Discrete;
 use youla::signal::Channel;
+use youla::signal::LoopRecord;
 use youla::signal::Record;
 use youla_io::write_csv;
 
@@ -65,21 +66,21 @@ pub fn deviation_signals(
     for record in records {
         if record.samples() <= settle {
             let what = match stated {
-                true => format!("record {}, of which `settle` in [factors] drops the first {settle}", record.name),
+                true => format!("record {}, of which `settle` in [factors] drops the first {settle}", record.name()),
                 false => format!(
                     "record {} is {} s long, but the slowest pole of model and controller settles in {} s; check sample_time and the \
                      units of the time in [data], or state `settle` in [factors], which is {settle} samples",
-                    record.name,
-                    Seconds(record.samples() as f64 * record.time.ts()),
-                    Seconds(settle as f64 * record.time.ts()),
+                    record.name(),
+                    Seconds(record.samples() as f64 * record.time().ts()),
+                    Seconds(settle as f64 * record.time().ts()),
                 ),
             };
             let (found, needed) = (record.samples(), settle + 1);
             return Err(Error::Method(youla::Error::TooFewSamples { what, found, needed }));
         }
-        let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
-        let signals = match &record.disturbance {
-            Some(lines) => signals.with_disturbance(lines.clone())?,
+        let signals = factors.signals(record.u(), record.y())?;
+        let signals = match record.disturbance() {
+            Some(lines) => signals.with_disturbance(lines.to_owned())?,
             None => signals,
         };
         experiments.push(signals.after(settle)?);
@@ -112,12 +113,12 @@ pub fn signal_records(factors: &CoprimeFactors<Discrete>, records: &RunRecords) 
     let (u, y) = (&records.inputs, &records.outputs);
     let channels = [named("alpha", u), named("beta", y), named("eta", u)].concat();
     let one = |record: &LoopRecord| {
-        let signals = factors.signals(record.u.as_ref(), record.y.as_ref())?;
+        let signals = factors.signals(record.u(), record.y())?;
         let (eta, beta) = (signals.alpha(), signals.beta());
         let expected = expected(factors, record)?;
         let alpha = expected.as_ref().map_or(eta, |alpha| alpha.as_ref());
         let data = block(&[&[alpha, beta, eta]]);
-        Ok(Record::new(&record.name, channels.clone(), data, record.time)?)
+        Ok(Record::new(record.name(), channels.clone(), data, record.time())?)
     };
     records.estimation.iter().map(one).collect()
 }
@@ -150,18 +151,18 @@ const REMAINDER: f64 = 1e-3;
 
 /// `alpha + Vt v1 - Ut r` of the known excitations.
 fn expected(factors: &CoprimeFactors<Discrete>, record: &LoopRecord) -> Result<Option<Mat<f64>>> {
-    let outside = match (&record.input_excitation, &record.reference) {
+    let outside = match (record.input_excitation(), record.reference()) {
         (None, None) => None,
         (v1, r) => {
             let none = |channels| Mat::zeros(record.samples(), channels);
             let (no_v1, no_r) = (none(factors.inputs()), none(factors.outputs()));
-            let v2 = Scale(-1.0) * r.as_ref().unwrap_or(&no_r);
-            Some(factors.alpha_of_excitation(v1.as_ref().unwrap_or(&no_v1).as_ref(), v2.as_ref())?)
+            let v2 = Scale(-1.0) * r.unwrap_or(no_r.as_ref());
+            Some(factors.alpha_of_excitation(v1.unwrap_or(no_v1.as_ref()), v2.as_ref())?)
         }
     };
-    Ok(match (&record.alpha, outside) {
+    Ok(match (record.alpha(), outside) {
         (Some(alpha), Some(outside)) => Some(alpha + outside),
-        (Some(alpha), None) => Some(alpha.clone()),
+        (Some(alpha), None) => Some(alpha.to_owned()),
         (None, outside) => outside,
     })
 }

@@ -14,7 +14,7 @@ use youla::linalg::{block, eye};
 use youla::lti::{Continuous, Discrete, StateSpace, simulate};
 use youla::reduce::{ReducedOrder, ReductionOptions};
 use youla::signal::Channel;
-use youla::signal::{Detrend, Excitation, SquareWaves};
+use youla::signal::{Detrend, Excitation, LoopRecord, SquareWaves};
 use youla::{Mat, MatRef};
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps};
 use youla_loop::check::CheckOptions;
@@ -23,7 +23,7 @@ use youla_run::{ControllerSettings, Domain, Feedback, NominalModel};
 use youla_run::{
     DataFile, DataSettings, FactorSettings, FrequencySettings, Prediction, RunSettings, VerificationSettings,
 };
-use youla_run::{LoopRecord, RunRecords, SourceFile};
+use youla_run::{RunRecords, SourceFile};
 
 /// Sample time of the rig, seconds (5 kHz).
 const TS: f64 = 2e-4;
@@ -109,16 +109,8 @@ fn simulated_record(closed: &StateSpace<Discrete>, time: Discrete, seed: u64, in
     let noise = Mat::from_fn(samples, 2, |_, _| NOISE * rng.sample::<f64, _>(StandardNormal));
     let signals = block(&[&[alpha.as_ref(), noise.as_ref()]]);
     let z = simulate(closed, signals.as_ref(), &vec![0.0; closed.order()])?;
-    Ok(LoopRecord {
-        name: NAMES[index].into(),
-        time,
-        u: z.subcols(0, 2).to_owned(),
-        y: z.subcols(2, 2).to_owned(),
-        input_excitation: None,
-        reference: None,
-        alpha: Some(alpha),
-        disturbance: None,
-    })
+    let (u, y) = (z.subcols(0, 2).to_owned(), z.subcols(2, 2).to_owned());
+    Ok(LoopRecord::new(time, u, y)?.with_alpha(alpha)?.named(NAMES[index]))
 }
 
 /// The run.toml of the demonstration; it works on the records in its own run folder.

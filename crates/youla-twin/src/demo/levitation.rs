@@ -15,9 +15,9 @@ use std::f64::consts::TAU;
 use std::path::Path;
 use youla::Mat;
 use youla::lti::{Continuous, Discrete, StateSpace};
-use youla::signal::{Channel, Excitation, SquareWaves};
+use youla::signal::{Channel, Excitation, LoopRecord, SquareWaves};
 use youla_io::ChannelSpec;
-use youla_run::{LoopRecord, RunRecords, RunSettings, SourceFile};
+use youla_run::{RunRecords, RunSettings, SourceFile};
 
 /// What `youla identify` would be given; the paths are those of the run folder.
 const SETTINGS: &str = include_str!("levitation.toml");
@@ -96,14 +96,5 @@ fn record(plant: &StateSpace<Discrete>, experiment: &Recording, rng: &mut impl R
         u[(k, 0)] = command + d[(k, 0)];
         x = plant.a() * &x + plant.b() * u.row(k).as_mat();
     }
-    Ok(LoopRecord {
-        name: name.into(),
-        time: plant.time(),
-        u,
-        y,
-        input_excitation: Some(d),
-        reference: None,
-        alpha: None,
-        disturbance: None,
-    })
+    Ok(LoopRecord::new(plant.time(), u, y)?.with_input_excitation(d)?.named(name))
 }

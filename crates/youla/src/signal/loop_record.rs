@@ -93,6 +93,15 @@ impl LoopRecord {
         Ok(LoopRecord { disturbance: Some(signals), ..self })
     }
 
+    /// With the same excitation and other inputs and outputs, without disturbances of known shape: a further experiment.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_response(&self, u: Mat<f64>, y: Mat<f64>) -> Result<Self> {
+        let (u, y) = (self.signal("u", u, self.inputs())?, self.signal("y", y, self.outputs())?);
+        Ok(LoopRecord { u, y, disturbance: None, ..self.clone() })
+    }
+
     /// With names and units of inputs and outputs, for messages and figures.
     #[must_use]
     pub fn with_channels(self, inputs: Vec<Channel>, outputs: Vec<Channel>) -> Self {

@@ -7,8 +7,8 @@
 //! ```
 //! The second is for plants that integrate or are unstable, whose simulation drifts with every error of u.
 
+use crate::records::RunRecords;
 use crate::records::disturbance::without_lines;
-use crate::records::{LoopRecord, RunRecords};
 use crate::settings::Prediction;
 use crate::stages::context::RunContext;
 use crate::stages::signals::DeviationSignals;
@@ -21,6 +21,7 @@ use youla::identify::hansen::HansenModel;
 use youla::identify::subspace::Experiment;
 use youla::linalg::block;
 use youla::lti::{Discrete, Partitioned, StateSpace};
+use youla::signal::LoopRecord;
 use youla::validate::{LoopExcitation, fit, predict_closed_loop};
 use youla_greybox::hansen_pem::{
     HansenPem, HansenPemOptions, PemRun, PemStart, SchemeData, pem_from_hansen, projection_target,
@@ -33,7 +34,7 @@ use youla_greybox::{
 
 /// The measured outputs without known lines.
 pub(crate) fn outputs_without_lines(records: &RunRecords) -> Result<Vec<Mat<f64>>> {
-    let measured = |r: &LoopRecord| without_lines(r.y.as_ref(), r.disturbance.as_ref().map(|w| w.as_ref()));
+    let measured = |r: &LoopRecord| without_lines(r.y(), r.disturbance());
     records.estimation.iter().map(measured).collect()
 }
 
@@ -101,7 +102,7 @@ impl<'a> Criterion<'a> {
 
     fn experiments(&self) -> Vec<Experiment<'_>> {
         let input = |k: usize| match &self.closed {
-            None => self.records.estimation[k].u.as_ref(),
+            None => self.records.estimation[k].u(),
             Some(closed) => closed.external[k].as_ref(),
         };
         self.outputs.iter().enumerate().map(|(k, y)| Experiment::new(input(k), y.as_ref())).collect()
@@ -195,10 +196,7 @@ impl<'a> Criterion<'a> {
     fn fit_of_plant(&self, closed: &Closed, plant: &StateSpace<Discrete>) -> Result<Vec<f64>> {
         let mut predicted = Vec::new();
         for (r, y) in self.records.estimation.iter().zip(self.outputs) {
-            let excitation = LoopExcitation {
-                input: r.alpha.as_ref().or(r.input_excitation.as_ref()).map(|v| v.as_ref()),
-                reference: r.reference.as_ref().map(|r| r.as_ref()),
-            };
+            let excitation = LoopExcitation { input: r.alpha().or(r.input_excitation()), reference: r.reference() };
             match predict_closed_loop(plant, &closed.ports, excitation, y.as_ref()) {
                 Ok(yp) => predicted.push(yp),
                 Err(youla::Error::Diverged { .. }) => return Ok(vec![f64::NEG_INFINITY; plant.outputs()]),
@@ -212,7 +210,7 @@ impl<'a> Criterion<'a> {
 impl Closed {
     fn new(run: RunContext<'_>) -> Result<Self> {
         let (records, controller) = (run.records, run.declared.controller());
-        let with_alpha = records.estimation.iter().any(|r| r.alpha.is_some());
+        let with_alpha = records.estimation.iter().any(|r| r.alpha().is_some());
         let ports = match run.factorisation.filter(|_| with_alpha) {
             Some(factorisation) => factorisation.factors.j_k()?,
             None if with_alpha => {
@@ -226,8 +224,8 @@ impl Closed {
         let (m, p) = (controller.outputs(), controller.inputs());
         let external = records.estimation.iter().map(|r| {
             let (no_input, no_reference) = (Mat::zeros(r.samples(), m), Mat::zeros(r.samples(), p));
-            let added = r.alpha.as_ref().or(r.input_excitation.as_ref()).unwrap_or(&no_input);
-            block(&[&[added.as_ref(), r.reference.as_ref().unwrap_or(&no_reference).as_ref()]])
+            let added = r.alpha().or(r.input_excitation()).unwrap_or(no_input.as_ref());
+            block(&[&[added, r.reference().unwrap_or(no_reference.as_ref())]])
         });
         let external = external.collect();
         Ok(Closed { controller: with_reference(&ports, m, p)?, ports, external })

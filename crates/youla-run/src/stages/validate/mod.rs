@@ -5,7 +5,6 @@ pub(crate) mod residuals;
 pub(crate) mod robustness;
 
 use crate::method::Method;
-use crate::records::LoopRecord;
 use crate::records::disturbance::without_lines;
 use crate::settings::Prediction;
 use crate::stages::context::RunContext;
@@ -23,8 +22,9 @@ use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::lti::{Discrete, Mode, StateSpace, VisibleMode, VisibleModes};
+use youla::signal::LoopRecord;
 use youla::validate::{LoopCertificate, LoopExcitation, certify, fit, predict_closed_loop, predict_open_loop, vaf};
-use youla::{Mat, c64};
+use youla::{Mat, MatRef, c64};
 
 /// Prediction of one verification record by one model.
 #[derive(Debug, Clone)]
@@ -198,37 +198,35 @@ pub(crate) fn verify_record(
     noise: Option<&StateSpace<Discrete>>,
     record: &LoopRecord,
 ) -> Result<RecordVerdict> {
-    let lines = record.disturbance.as_ref().map(|w| w.as_ref());
-    let measured = without_lines(record.y.as_ref(), lines)?;
+    let lines = record.disturbance();
+    let measured = without_lines(record.y(), lines)?;
     let predicted = match run.prediction() {
-        Prediction::OpenLoop => predict_open_loop(model, record.u.as_ref(), measured.as_ref()),
+        Prediction::OpenLoop => predict_open_loop(model, record.u(), measured.as_ref()),
         Prediction::ClosedLoop => {
-            let factors = run.factorisation.filter(|_| record.alpha.is_some()).map(|f| &f.factors);
+            let factors = run.factorisation.filter(|_| record.alpha().is_some()).map(|f| &f.factors);
             let ports = factors.map_or_else(|| with_input_port(run.declared.controller()), |f| f.j_k())?;
-            let excitation = LoopExcitation {
-                input: record.alpha.as_ref().or(record.input_excitation.as_ref()).map(|v| v.as_ref()),
-                reference: record.reference.as_ref().map(|r| r.as_ref()),
-            };
+            let excitation =
+                LoopExcitation { input: record.alpha().or(record.input_excitation()), reference: record.reference() };
             predict_closed_loop(model, &ports, excitation, measured.as_ref())
         }
     };
     let skip = run.settings.verification.skip;
     if record.samples() <= skip {
-        let what = format!("record {}, of which `skip` in [verification] drops the first {skip}", record.name);
+        let what = format!("record {}, of which `skip` in [verification] drops the first {skip}", record.name());
         return Err(Error::Method(youla::Error::TooFewSamples { what, found: record.samples(), needed: skip + 1 }));
     }
-    let record_name = record.name.clone();
+    let record_name = record.name().to_owned();
     match predicted {
         Ok(predicted) => {
             let lines = lines.map(|w| w.get(skip.., ..));
-            let rest = |m: &Mat<f64>| without_lines(m.as_ref().get(skip.., ..), lines);
-            let (y, yp) = (rest(&record.y)?, rest(&predicted)?);
+            let rest = |m: MatRef<'_, f64>| without_lines(m.get(skip.., ..), lines);
+            let (y, yp) = (rest(record.y())?, rest(predicted.as_ref())?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
             let residuals = Some(residual_tests(run, record, noise, measured.as_ref(), predicted.as_ref())?);
             Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
         }
         Err(e @ youla::Error::Diverged { .. }) => {
-            let none = vec![f64::NAN; record.y.ncols()];
+            let none = vec![f64::NAN; record.outputs()];
             let predicted = Err(e.to_string());
             Ok(RecordVerdict { record: record_name, predicted, fit: none.clone(), vaf: none, residuals: None })
         }

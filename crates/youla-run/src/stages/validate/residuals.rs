@@ -1,16 +1,16 @@
 //! The residual of every model on every verification record: correlations with what excites the loop, fits some steps ahead.
 
 use crate::Result;
-use crate::records::{LoopRecord, channels_of};
+use crate::records::channels_of;
 use crate::stages::context::RunContext;
 use serde::{Deserialize, Serialize};
-use std::borrow::Cow;
+use youla::MatRef;
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace};
+use youla::signal::LoopRecord;
 use youla::validate::{
     PREDICTION_STEPS, ResidualCorrelations, k_step_fits, k_step_fits_by_noise, residual_correlations,
 };
-use youla::{Mat, MatRef};
 
 /// The residual of one model on one record.
 #[derive(Debug, Clone, Serialize)]
@@ -55,22 +55,21 @@ pub(crate) fn residual_tests(
     predicted: MatRef<'_, f64>,
 ) -> Result<RecordResiduals> {
     let (data, skip) = (&run.settings.data, run.settings.verification.skip);
-    let moving = |x: &Mat<f64>| x.col_iter().all(|c| c.iter().any(|v| *v != c[0]));
+    let moving = |x: &MatRef<'_, f64>| x.col_iter().all(|c| c.iter().any(|v| *v != c[0]));
     let known = [
-        (&record.alpha, &data.alpha),
-        (&record.input_excitation, &data.input_excitation),
-        (&record.reference, &data.reference),
+        (record.alpha(), &data.alpha),
+        (record.input_excitation(), &data.input_excitation),
+        (record.reference(), &data.reference),
     ];
-    let known: Vec<_> =
-        known.into_iter().filter_map(|(x, specs)| x.as_ref().filter(|x| moving(x)).map(|x| (x, specs))).collect();
+    let known: Vec<_> = known.into_iter().filter_map(|(x, specs)| Some((x.filter(moving)?, specs))).collect();
     // Without feedback the inputs come from outside.
     let external = !known.is_empty() || run.declared.controller().is_zero();
     let (x, channels) = match known.is_empty() {
         false => {
-            let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| x.as_ref()).collect();
-            (Cow::Owned(block(&[&parts])), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
+            let parts: Vec<MatRef<'_, f64>> = known.iter().map(|(x, _)| *x).collect();
+            (block(&[&parts]), known.iter().flat_map(|(_, specs)| channels_of(specs)).collect())
         }
-        true => (Cow::Borrowed(&record.u), run.records.inputs.clone()),
+        true => (record.u().to_owned(), run.records.inputs.clone()),
     };
     let (measured, predicted) = (measured.get(skip.., ..), predicted.get(skip.., ..));
     let e = measured - predicted;
@@ -78,7 +77,7 @@ pub(crate) fn residual_tests(
     Ok(RecordResiduals {
         excitations: channels.into_iter().map(|c| c.name).collect(),
         external,
-        correlations: residual_correlations(e.as_ref(), (*x).as_ref().get(skip.., ..))?,
+        correlations: residual_correlations(e.as_ref(), x.as_ref().get(skip.., ..))?,
         k_step_fits,
         predictor,
     })

@@ -5,11 +5,12 @@
 //! taken in channels that are divided by their root mean square over the estimation records, about the mean of each record.
 
 use crate::Result;
-use crate::records::{LoopRecord, RunRecords};
+use crate::records::RunRecords;
 use crate::stages::factors::DeclaredLoop;
-use youla::Mat;
+use youla::MatRef;
 use youla::control::{ChannelScales, Margins, NuGap, coprime_margin, margins, nu_gap};
 use youla::lti::{Discrete, StateSpace};
+use youla::signal::LoopRecord;
 
 /// The robustness of one model. A reason is where a figure cannot be had.
 #[derive(Debug, Clone)]
@@ -34,11 +35,11 @@ pub(crate) fn channel_scales(records: &RunRecords) -> Result<ChannelScales> {
         return Ok(ChannelScales::new(u, y)?);
     }
     let records = &records.estimation;
-    Ok(ChannelScales::new(rms(records, |r| &r.u), rms(records, |r| &r.y))?)
+    Ok(ChannelScales::new(rms(records, LoopRecord::u), rms(records, LoopRecord::y))?)
 }
 
 /// Root mean square of each channel about the mean of its record.
-fn rms(records: &[LoopRecord], signal: impl Fn(&LoopRecord) -> &Mat<f64>) -> Vec<f64> {
+fn rms(records: &[LoopRecord], signal: impl Fn(&LoopRecord) -> MatRef<'_, f64>) -> Vec<f64> {
     let channels = records.first().map_or(0, |r| signal(r).ncols());
     let mut energy = vec![0.0; channels];
     let mut samples = 0;

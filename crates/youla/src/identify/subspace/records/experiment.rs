@@ -1,5 +1,6 @@
 //! The records of one experiment.
 
+use crate::signal::LoopRecord;
 use faer::MatRef;
 
 /// Records of one experiment, as views: row k is time k.
@@ -20,6 +21,13 @@ pub struct Experiment<'a> {
     pub y: MatRef<'a, f64>,
     /// Disturbances of the outputs, of known shape and unknown size, N x signals: see [`crate::identify::subspace::lines`] and [`crate::identify::subspace::harmonics`].
     pub disturbance: Option<MatRef<'a, f64>>,
+}
+
+/// Inputs and outputs of a loop with the disturbances of known shape.
+impl<'a> From<&'a LoopRecord> for Experiment<'a> {
+    fn from(record: &'a LoopRecord) -> Self {
+        Experiment { u: record.u(), y: record.y(), disturbance: record.disturbance() }
+    }
 }
 
 impl<'a> Experiment<'a> {

@@ -87,3 +87,37 @@ fn a_report_with_an_impossible_clock_is_refused() {
         assert_eq!(found.stderr.trim_end().lines().count(), 1, "{}", found.stderr);
     }
 }
+
+/// Commands between backquotes; those in blocks run in the tests of the book.
+#[test]
+fn commands_that_the_documents_name_exist() {
+    let project = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let pages = ["docs", "docs/book"].into_iter().flat_map(|folder| fs::read_dir(project.join(folder)).unwrap());
+    let pages = pages.map(|entry| entry.unwrap().path()).filter(|path| path.extension().is_some_and(|e| e == "md"));
+    let mut count = 0;
+    for page in pages.chain(["README.md", "CONTRIBUTING.md"].map(|name| project.join(name))) {
+        let text = fs::read_to_string(&page).unwrap();
+        let spans = text.split("```").step_by(2).flat_map(|part| part.split('`').skip(1).step_by(2));
+        for span in spans.filter(|span| span.starts_with("youla ")) {
+            let mut command = youla_cli::command();
+            command.build();
+            let mut words = span.split(|c: char| c.is_whitespace() || c == '[' || c == ']').skip(1).peekable();
+            while let Some(found) = words.peek().and_then(|word| command.find_subcommand(word)).cloned() {
+                command = found;
+                words.next();
+            }
+            let at = |what: &str| format!("{}: `{span}`: {what}", page.display());
+            assert!(
+                !command.has_subcommands() || words.peek().is_none_or(|w| w.starts_with("--")),
+                "{}",
+                at("no such verb")
+            );
+            for flag in words.filter_map(|word| word.strip_prefix("--")) {
+                let known = command.get_arguments().any(|a| a.get_long() == Some(flag));
+                assert!(known, "{}", at(flag));
+            }
+            count += 1;
+        }
+    }
+    assert!(count > 30, "{count}");
+}

@@ -10,10 +10,9 @@ use std::{fs, iter};
 const LARGEST: usize = 3;
 
 /// Larger circles, by a module in them, with their size and what holds them together. The list only shrinks.
-const KNOWN: [(&str, usize, &str); 3] = [
+const KNOWN: [(&str, usize, &str); 2] = [
     ("identify/subspace/options", 20, "the options hold those of the intervals"),
     ("robust", 4, "options and result hold loss and report"),
-    ("stages", 4, "stages make entries of the summary"),
 ];
 
 /// A module by its path below the crate.

@@ -5,12 +5,13 @@ pub(crate) mod subspace_details;
 pub(crate) mod write;
 
 mod files;
+mod uncertainty;
 
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
 use crate::folder::subspace_details::SubspaceDetails;
+use crate::folder::uncertainty::UncertaintyFile;
 use crate::page::redesign::{figure, loops};
 use crate::result::{Filtered, Identification};
-use crate::stages::uncertainty::SystemUncertainty;
 use crate::summary::certificate::CertificateEntry;
 use crate::summary::entries::Refused;
 use crate::summary::physical::PhysicalDetails;
@@ -150,7 +151,9 @@ impl Writer<'_> {
 
     /// The physical structure.
     fn grey_box(&self) -> Result<()> {
-        self.uncertainty("4-identify/grey_box_uncertainty.json", &self.found.grey_box_uncertainty)?;
+        if let Some(known) = &self.found.grey_box_uncertainty {
+            self.json("4-identify/grey_box_uncertainty.json", UncertaintyFile::new(known, &self.found.hz))?;
+        }
         self.outcome("4-identify/grey_box.json", self.found.grey_box.as_ref(), |run| {
             self.model("4-identify/grey_box", &run.found.model.model, &PhysicalDetails::new(run)?)
         })
@@ -244,12 +247,6 @@ impl Writer<'_> {
     fn model(&self, name: &str, model: &StateSpace<Discrete>, details: &impl Serialize) -> Result<()> {
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
         self.model_with(name, model, (u, y), details)
-    }
-
-    /// Nothing where there is none.
-    fn uncertainty(&self, name: &str, known: &Option<SystemUncertainty>) -> Result<()> {
-        let Some(known) = known else { return Ok(()) };
-        self.json(name, known.file(&self.found.hz))
     }
 
     fn model_with(

@@ -1,5 +1,7 @@
 //! The circle on the twin: on the host in every run, over seeds in QEMU on request.
 
+mod changed_q;
+
 use crate::bench::{Bench, RAMP};
 use crate::parameter::parameter_of;
 use crate::point::{Operator, Point, PointFiles};
@@ -341,30 +343,7 @@ fn q_over_speed() {
     let (again, person) = place.run(&campaign, "out", false);
     assert_eq!(again.unwrap(), summary);
     assert_eq!(person.notes, ["0 rpm: done before", "fast: done before", "0 rpm to fast: done before"]);
-    changed_q_is_refused(&place, &campaign);
-}
-
-/// A Q that is not stable, beside the evidence of the one that was verified.
-fn changed_q_is_refused(place: &Place, campaign: &Campaign) {
-    let folder = place.0.join("out/0 rpm");
-    let (q_file, point_file) = (folder.join("q.json"), folder.join("point.json"));
-    let edit = |path: &Path, change: &dyn Fn(&mut serde_json::Value)| {
-        let mut value = serde_json::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-        change(&mut value);
-        std::fs::write(path, value.to_string()).unwrap();
-    };
-    std::fs::remove_file(place.0.join("out/q_table.json")).unwrap();
-    edit(&q_file, &|q| q["q"]["a"][0][0] = 5.0.into());
-    let refused = place.run(campaign, "out", true).0.unwrap_err();
-    assert_eq!(refused.kind(), ErrorKind::BadInput);
-    assert!(refused.to_string().contains("q.json: this is not the Q that was verified"), "{refused}");
-    // With a checksum that fits, the evidence does not.
-    let checksum = crate::record::checksum_of(&q_file).unwrap();
-    edit(&point_file, &|point| point["q_checksum"] = checksum.into());
-    let refused = place.run(campaign, "out", true).0.unwrap_err();
-    assert_eq!(refused.kind(), ErrorKind::BadInput);
-    assert!(refused.to_string().contains("between.json: "), "{refused}");
-    assert!(!place.0.join("out/q_table.json").exists());
+    changed_q::is_refused(&place, &campaign);
 }
 
 /// The same bearing behind a socket, in lock-step: the figures are those of the campaign on the twin, but for the times of the requests.

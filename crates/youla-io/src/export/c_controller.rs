@@ -56,7 +56,7 @@ pub struct CController {
 
 /// Writes the header: positive feedback, `u = K(Q) y` with alpha added at the port of Fig. 3.
 ///
-/// Agrees with the library's simulation of `J_K(Q)` to 1e-12 in double precision (`tests/all/exports/c.rs`).
+/// Agrees with the library's simulation of `J_K(Q)` to 1e-12 in double precision (`tests/files/exports/c.rs`).
 ///
 /// # Errors
 /// [`youla::Error::Ports`] and [`youla::Error::SampleTimeMismatch`] where nominal model, factors and Q do not fit; [`youla::Error::Unstable`] for an

@@ -36,7 +36,7 @@ pub struct LoopExport {
 /// Writes the header.
 ///
 /// u, alpha, beta, status and refusals are those of `youla_rt::ExcitedLoop` bit by bit, in double and single precision, over 200 000 samples of
-/// random events (`tests/all/exports/c_loop.rs`).
+/// random events (`tests/files/exports/c_loop.rs`).
 ///
 /// # Errors
 /// [`youla::Error::Shape`], [`youla::Error::NotFinite`] for matrices that do not fit; [`youla::Error::OutOfRange`] without inputs or outputs.

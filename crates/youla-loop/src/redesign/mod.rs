@@ -159,7 +159,7 @@ impl Redesign {
 
 /// Designs a controller on an identified model.
 ///
-/// Predicted and measured damping on the simulated rig agree within 15 % (`tests/all/redesign.rs`).
+/// Predicted and measured damping on the simulated rig agree within 15 % (`tests/running_loop/redesign.rs`).
 ///
 /// # Errors
 /// [`Error::NoRedesign`] when no weight meets the limits, with the reason of the nearest; [`youla::Error::OutOfRange`] for options outside of their

@@ -80,7 +80,7 @@ fn early(
     let known = if at.feedback { lagged.past(at.known.clone(), 0) } else { Vec::new() };
     let columns = [past.columns.clone(), known].concat();
     let next: Vec<usize> = cause.clone().map(|s| lagged.column(s, -1)).collect();
-    let new = lagged.fit(&next, columns.clone())?.left.iter().any(|left| *left > NEW * lagged.rows as f64);
+    let new = lagged.fit(&next, columns.clone())?.left.iter().any(|left| *left > NEW * lagged.factored as f64);
     if !new {
         return Ok(vec![None; outputs.len()]);
     }
@@ -116,7 +116,7 @@ const CLEAR: f64 = 15.0;
 /// Coefficient over its standard deviation.
 fn t_value(lagged: &Lagged, fit: &Fit, column: usize, target: usize) -> f64 {
     let Some(k) = fit.columns.iter().position(|c| *c == column) else { return 0.0 };
-    let variance = fit.left[target] / lagged.rows.saturating_sub(fit.rank).max(1) as f64;
+    let variance = fit.left[target] / lagged.factored.saturating_sub(fit.rank).max(1) as f64;
     let deviation = (variance * fit.inverse[(k, k)]).sqrt();
     if deviation > 0.0 { fit.coefficients[(k, target)] / deviation } else { 0.0 }
 }

@@ -60,7 +60,7 @@ pub(super) fn by_regression(lagged: &Lagged, m: usize, p: usize) -> Result<Optio
     let mut all = Vec::new();
     for i in 0..p {
         let e = lagged.residual(&fit, targets[i], i);
-        let variance = fit.left[i] / lagged.rows as f64;
+        let variance = fit.left[i] / lagged.factored as f64;
         let weight = covariance.partial_piv_lu().solve(g.row(i).transpose().as_mat());
         let f = (g.row(i) * &weight)[0] / (2.0 * variance.max(f64::MIN_POSITIVE));
         let freedom = (BLOCKS - 3) as f64;

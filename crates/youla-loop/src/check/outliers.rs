@@ -79,7 +79,7 @@ pub(super) fn of_outputs(lagged: &Lagged, m: usize, p: usize, options: &CheckOpt
         found.sizes.iter_mut().for_each(|w| *w *= unit);
         found.jump = found.jump.map(|(k, w)| (k + lagged.lags, w * unit));
         found.burst = found.burst.map(|span| span.map(|k| k + lagged.lags));
-        all.push((found, unit * (plain.left[i] / lagged.rows as f64).sqrt()));
+        all.push((found, unit * (plain.left[i] / lagged.factored as f64).sqrt()));
     }
     Ok(all)
 }

@@ -22,6 +22,9 @@ pub(super) const AHEAD: usize = 3;
 /// Rows of one task; fixed, so that the result does not depend on the number of threads.
 /// Chosen, not measured.
 const CHUNK: usize = 8192;
+/// Rows of a factor, about: more tell no model from another that these do not. They are taken from every chunk.
+/// The 99 columns of a single loop then have 300 rows each. Chosen, not measured.
+const FACTORED: usize = 30_000;
 /// Most columns of past samples.
 /// 160^2 products for each sample. Chosen, not measured.
 const COLUMNS: usize = 160;
@@ -42,6 +45,8 @@ pub(super) struct Lagged {
     pub(super) lags: usize,
     /// Rows of the regressions; the first belongs to sample `lags`.
     pub(super) rows: usize,
+    /// Rows of the factor.
+    pub(super) factored: usize,
     /// Rows that do not count; empty for none.
     left_out: Vec<bool>,
     r: Mat<f64>,
@@ -82,17 +87,17 @@ impl Lagged {
             signals.push(column.iter().map(|v| scale * (v - mean)).collect());
             deviations.push(deviation);
         }
-        let mut lagged = Lagged { signals, deviations, lags, rows, left_out: Vec::new(), r: Mat::zeros(0, 0) };
-        lagged.r = lagged.factor();
+        let mut lagged =
+            Lagged { signals, deviations, lags, rows, factored: rows, left_out: Vec::new(), r: Mat::zeros(0, 0) };
+        lagged.factor();
         Some(lagged)
     }
 
     /// The same without some rows of the regressions: those in which samples are wrong.
     pub(super) fn without(&self, left_out: Vec<bool>) -> Self {
         let (signals, deviations) = (self.signals.clone(), self.deviations.clone());
-        let mut lagged =
-            Lagged { signals, deviations, lags: self.lags, rows: self.rows, left_out, r: Mat::zeros(0, 0) };
-        lagged.r = lagged.factor();
+        let mut lagged = Lagged { signals, deviations, left_out, r: Mat::zeros(0, 0), ..*self };
+        lagged.factor();
         lagged
     }
 
@@ -146,11 +151,14 @@ impl Lagged {
         }
     }
 
-    fn factor(&self) -> Mat<f64> {
+    fn factor(&mut self) {
         let columns = self.signals.len() * self.width() + 3;
         let starts: Vec<usize> = (0..self.rows).step_by(CHUNK).collect();
+        let every = self.rows.div_ceil(FACTORED);
+        let count = |first: &usize| CHUNK.min(self.rows - first).div_ceil(every);
+        self.factored = starts.iter().map(count).sum();
         let part = |first: &usize| {
-            let mut rows = Mat::zeros(CHUNK.min(self.rows - first), columns);
+            let mut rows = Mat::zeros(count(first), columns);
             (0..columns).for_each(|j| self.values(j, *first, rows.col_as_slice_mut(j)));
             let left_out = self.left_out.iter().skip(*first).take(rows.nrows()).enumerate();
             left_out.filter(|(_, out)| **out).for_each(|(k, _)| rows.row_mut(k).fill(0.0));
@@ -159,7 +167,7 @@ impl Lagged {
         let factors: Vec<Mat<f64>> = starts.par_iter().map(part).collect();
         let join =
             |above: Mat<f64>, below: Mat<f64>| block(&[&[above.as_ref()], &[below.as_ref()]]).qr().thin_R().to_owned();
-        factors.into_iter().reduce(join).unwrap_or_else(|| Mat::zeros(0, columns))
+        self.r = factors.into_iter().reduce(join).unwrap_or_else(|| Mat::zeros(0, columns));
     }
 
     /// Least squares of some columns on others.
@@ -209,11 +217,14 @@ impl Lagged {
     pub(super) fn residual(&self, fit: &Fit, target: usize, which: usize) -> Vec<f64> {
         let mut left = vec![0.0; self.rows];
         self.values(target, 0, &mut left);
-        let mut column = vec![0.0; self.rows];
-        for (k, j) in fit.columns.iter().enumerate() {
-            self.values(*j, 0, &mut column);
-            let coefficient = fit.coefficients[(k, which)];
-            left.iter_mut().zip(&column).for_each(|(e, value)| *e -= coefficient * value);
+        let mut column = vec![0.0; CHUNK];
+        for (part, left) in left.chunks_mut(CHUNK).enumerate() {
+            let column = &mut column[..left.len()];
+            for (k, j) in fit.columns.iter().enumerate() {
+                self.values(*j, part * CHUNK, column);
+                let coefficient = fit.coefficients[(k, which)];
+                left.iter_mut().zip(&*column).for_each(|(e, value)| *e -= coefficient * value);
+            }
         }
         left
     }
@@ -222,9 +233,9 @@ impl Lagged {
     pub(super) fn gain(&self, reduced: &Fit, full: &Fit, which: usize) -> Gain {
         let (before, after) = (reduced.left[which], full.left[which]);
         let added = full.rank.saturating_sub(reduced.rank);
-        let freedom = self.rows.saturating_sub(full.rank);
+        let freedom = self.factored.saturating_sub(full.rank);
         // Below this the difference of the sums is rounding.
-        let floor = 1e-24 * self.rows as f64;
+        let floor = 1e-24 * self.factored as f64;
         if added == 0 || freedom == 0 || before <= floor {
             return Gain { share: 0.0, deviations: 0.0 };
         }

@@ -16,9 +16,15 @@ pub fn quantile(sorted: &[f64], share: f64) -> f64 {
 
 /// The value in the middle, of an even number of values the mean of both; NaN for no values.
 pub fn median(values: impl IntoIterator<Item = f64>) -> f64 {
-    let mut sorted: Vec<f64> = values.into_iter().collect();
-    sorted.sort_unstable_by(f64::total_cmp);
-    quantile(&sorted, 0.5)
+    let mut values: Vec<f64> = values.into_iter().collect();
+    let (count, middle) = (values.len(), values.len() / 2);
+    if count < 3 {
+        values.sort_unstable_by(f64::total_cmp);
+        return quantile(&values, 0.5);
+    }
+    let (below, upper, _) = values.select_nth_unstable_by(middle, f64::total_cmp);
+    let lower = below.iter().copied().max_by(f64::total_cmp).filter(|_| count % 2 == 0);
+    quantile(&[lower.unwrap_or(*upper), *upper], 0.5)
 }
 
 /// Standard deviation of normal values about zero from the median of their magnitudes, which a few wrong values do not move.

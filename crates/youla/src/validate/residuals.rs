@@ -14,6 +14,7 @@
 use crate::linalg::check_shape;
 use crate::statistics::normal_quantile;
 use crate::{MatRef, Result};
+use faer::ColRef;
 use rustfft::FftPlanner;
 use rustfft::num_complex::Complex;
 
@@ -82,27 +83,24 @@ pub struct LargestCorrelation {
 pub fn residual_correlations(e: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Result<ResidualCorrelations> {
     let n = e.nrows();
     check_shape("the excitation beside the residual", x, (n, x.ncols()))?;
-    let transform = Transform::new(n);
-    let spectra = |m: MatRef<'_, f64>| -> Vec<Vec<Complex<f64>>> {
-        (0..m.ncols()).map(|j| transform.forward(m.col(j).iter().copied().collect())).collect()
-    };
-    let (e, x) = (spectra(e), spectra(x));
-    let (of_e, of_x): (Vec<_>, Vec<_>) = (
-        e.iter().map(|e| transform.correlation(e, e)).collect(),
-        x.iter().map(|x| transform.correlation(x, x)).collect(),
-    );
-    let reach = n / 10;
+    let (reach, p) = (n / 10, e.ncols());
+    let mut transform = Transform::new(n, reach.max(RESIDUAL_LAGS));
+    let spectra = transform.forward(&e.col_iter().chain(x.col_iter()).collect::<Vec<_>>());
+    let pairs = (0..p).flat_map(|i| (p..spectra.len()).map(move |j| (i, j)));
+    let pairs: Vec<_> = (0..spectra.len()).map(|j| (j, j)).chain(pairs).collect();
+    let correlations = transform.correlations(&spectra, &pairs);
+    let (of_e, of_x) = correlations[..spectra.len()].split_at(p);
+    let mut of_pairs = correlations[spectra.len()..].iter();
     let c = normal_quantile(0.5 * (1.0 + LEVEL));
     let normalised = |r: &[f64], k: usize| if r[0] > 0.0 { r[k] / r[0] } else { 0.0 };
     let lags = RESIDUAL_LAGS.min(n.saturating_sub(1));
     let auto: Vec<Vec<f64>> = of_e.iter().map(|r| (0..=lags).map(|k| normalised(r, k)).collect()).collect();
     let mut cross = Vec::new();
     let mut largest: Option<LargestCorrelation> = None;
-    for (output, (e, re)) in e.iter().zip(&of_e).enumerate() {
-        for (input, (x, rx)) in x.iter().zip(&of_x).enumerate() {
+    for (output, re) in of_e.iter().enumerate() {
+        for (input, (rx, r)) in of_x.iter().zip(&mut of_pairs).enumerate() {
             let scale = (re[0] * rx[0]).sqrt();
             let scale = if scale > 0.0 { 1.0 / scale } else { 0.0 };
-            let r = transform.correlation(e, x);
             let at = |lag: isize| scale * r[lag.rem_euclid(r.len() as isize) as usize];
             let taper = |s: usize| 1.0 - s as f64 / (reach + 1) as f64;
             let sum: f64 = (1..=reach).map(|s| taper(s) * normalised(re, s) * normalised(rx, s)).sum();
@@ -129,31 +127,61 @@ pub fn residual_correlations(e: MatRef<'_, f64>, x: MatRef<'_, f64>) -> Result<R
     Ok(ResidualCorrelations { auto, auto_band: c / (n as f64).sqrt(), cross, largest, independent })
 }
 
-/// Correlations by the fast Fourier transform, without wrapping around.
+/// Correlations by the fast Fourier transform, without wrapping around as far as they are asked for, two real signals to a transform.
 struct Transform {
     samples: usize,
     length: usize,
+    planner: FftPlanner<f64>,
 }
 
 impl Transform {
-    fn new(samples: usize) -> Self {
-        Transform { samples, length: (2 * samples).next_power_of_two() }
+    fn new(samples: usize, reach: usize) -> Self {
+        // powers of two times at most 27
+        let smooth = [1_usize, 3, 9, 27].map(|odd| odd * (samples + reach + 1).div_ceil(odd).next_power_of_two());
+        let length = smooth.into_iter().min().unwrap_or(1);
+        Transform { samples, length, planner: FftPlanner::new() }
     }
 
-    /// Of a signal about its mean.
-    fn forward(&self, values: Vec<f64>) -> Vec<Complex<f64>> {
-        let mean = values.iter().sum::<f64>() / self.samples as f64;
-        let mut buffer: Vec<Complex<f64>> = values.into_iter().map(|v| Complex::new(v - mean, 0.0)).collect();
-        buffer.resize(self.length, Complex::default());
-        FftPlanner::new().plan_fft_forward(self.length).process(&mut buffer);
-        buffer
+    /// Of signals about their means.
+    fn forward(&mut self, signals: &[ColRef<'_, f64>]) -> Vec<Vec<Complex<f64>>> {
+        let (samples, length) = (self.samples, self.length);
+        let fft = self.planner.plan_fft_forward(length);
+        let mut spectra = Vec::with_capacity(signals.len());
+        for pair in signals.chunks(2) {
+            let centred = |signal: &ColRef<'_, f64>| -> Vec<f64> {
+                let mean = signal.iter().sum::<f64>() / samples as f64;
+                signal.iter().map(|v| v - mean).collect()
+            };
+            let (first, second) = (centred(&pair[0]), pair.get(1).map_or(vec![0.0; samples], centred));
+            let mut both: Vec<_> = first.into_iter().zip(second).map(|(a, b)| Complex::new(a, b)).collect();
+            both.resize(length, Complex::default());
+            fft.process(&mut both);
+            let back = |k: usize| both[(length - k) % length].conj();
+            let parts = [(1.0, Complex::new(0.5, 0.0)), (-1.0, Complex::new(0.0, -0.5))];
+            let of =
+                |(sign, scale): (f64, Complex<f64>)| (0..length).map(|k| (both[k] + back(k) * sign) * scale).collect();
+            spectra.extend(parts.into_iter().take(pair.len()).map(of));
+        }
+        spectra
     }
 
-    /// `sum a(t) b(t - k)` at the places k modulo the length.
-    fn correlation(&self, a: &[Complex<f64>], b: &[Complex<f64>]) -> Vec<f64> {
-        let mut buffer: Vec<Complex<f64>> = a.iter().zip(b).map(|(a, b)| a * b.conj()).collect();
-        FftPlanner::new().plan_fft_inverse(self.length).process(&mut buffer);
-        buffer.iter().map(|z| z.re / self.length as f64).collect()
+    /// `sum a(t) b(t - k)` at the places k modulo the length, for the spectra a and b of each pair.
+    fn correlations(&mut self, spectra: &[Vec<Complex<f64>>], pairs: &[(usize, usize)]) -> Vec<Vec<f64>> {
+        let (length, i) = (self.length, Complex::new(0.0, 1.0));
+        let fft = self.planner.plan_fft_inverse(length);
+        let mut out = Vec::with_capacity(pairs.len());
+        for two in pairs.chunks(2) {
+            let product = |(a, b): (usize, usize), k: usize| spectra[a][k] * spectra[b][k].conj();
+            let both =
+                |k: usize| product(two[0], k) + two.get(1).map_or(Complex::default(), |pair| i * product(*pair, k));
+            let mut both: Vec<_> = (0..length).map(both).collect();
+            fft.process(&mut both);
+            out.push(both.iter().map(|z| z.re / length as f64).collect());
+            if two.len() > 1 {
+                out.push(both.iter().map(|z| z.im / length as f64).collect());
+            }
+        }
+        out
     }
 }
 

@@ -11,10 +11,11 @@ use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::deviation::{grid, inverse_root};
 use crate::identify::likelihood::search::chart::Chart;
+use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
-use crate::identify::likelihood::search::{search, with_best_ends, with_slope_of_unstable};
+use crate::identify::likelihood::search::{DAMPED, search, with_best_ends, with_slope_of_unstable};
 use crate::identify::subspace::Experiment;
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
@@ -63,7 +64,8 @@ impl Part {
         }
         let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
         let chart = Chart::new(&point.model, found.feedthrough);
-        let linearised = linearise(&spectra, &point, &chart, &found.noise);
+        let groups = grouped(&spectra, &point, DAMPED);
+        let linearised = linearise(groups.as_ref().unwrap_or(&spectra), &point, &chart, &found.noise);
         let energy = energy(&spectra, &point.residuals(&spectra), &found.noise);
         let factor = with_slope_of_unstable(linearised.factor, &spectra, &point.model, &chart);
         Some(Part { factor, energy, samples: (spectra.samples() * spectra.outputs) as f64 })

@@ -9,8 +9,10 @@
 use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
+use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::likelihood::search::point::Point;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side, c64};
 use pulp::{Arch, NullaryFnOnce};
@@ -19,7 +21,9 @@ use pulp::{Arch, NullaryFnOnce};
 const DAMPINGS: [f64; 3] = [0.02, 0.1, 0.4];
 
 /// Blocks of two states that promise most, the best first, with the decrease of the sum of squares that they promise.
-pub(crate) fn modes(spectra: &Spectra, residuals: &[Vec<c64>], noise: &Noise, count: usize) -> Vec<(f64, Block)> {
+pub(crate) fn modes(spectra: &Spectra, point: &Point, noise: &Noise, count: usize) -> Vec<(f64, Block)> {
+    let groups = grouped(spectra, point, DAMPINGS[0]);
+    let spectra = groups.as_ref().unwrap_or(spectra);
     let samples = spectra.samples().max(16) as f64;
     let lowest = (12.0 / samples).max(1e-4);
     let mut grid = Vec::new();
@@ -31,7 +35,7 @@ pub(crate) fn modes(spectra: &Spectra, residuals: &[Vec<c64>], noise: &Noise, co
             share *= 1.0 + 1.5 * damping;
         }
     }
-    let fits = Fits::new(spectra, residuals, noise);
+    let fits = Fits::new(spectra, &point.residuals(spectra), noise);
     let mut found: Vec<(f64, c64, Mat<f64>)> =
         grid.into_iter().filter_map(|pole| fits.at(pole).map(|(g, r)| (g, pole, r))).collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));

@@ -200,8 +200,7 @@ impl Problem<'_> {
         if self.order.is_some() || model.order() + 2 > self.largest_order {
             return None;
         }
-        let residuals = best.found.point.residuals(spectra);
-        let (_, block) = grow::modes(spectra, &residuals, noise, 1).into_iter().next()?;
+        let (_, block) = grow::modes(spectra, &best.found.point, noise, 1).into_iter().next()?;
         let wider: Model = grow::with_block(model, block);
         let start = with_best_inputs(spectra, wider, noise, self.feedthrough);
         Some(Task { spectra: spectra.clone(), start, delays: best.delays.clone(), origin: "one mode more".into() })

@@ -5,9 +5,8 @@ use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
 use crate::identify::likelihood::deviation::physical;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
-use crate::identify::likelihood::search::{Found, SearchOptions, search, with_best_ends};
+use crate::identify::likelihood::search::{Found, SearchOptions, on_groups, search};
 use crate::identify::subspace::Experiment;
 use crate::lti::{Discrete, StateSpace};
 use faer::{Mat, c64};
@@ -17,10 +16,9 @@ use std::sync::Arc;
 /// Largest order of the autoregression of the noise: noise at the inputs of a plant has zeros near the circle as well as poles.
 pub(crate) const NOISE_ORDER: usize = 40;
 
-/// Samples of all records above which order and dead time are first chosen on a part of them, and searches begin on some of the lines.
+/// Samples of all records above which order and dead time are first chosen on a part of them.
 pub(crate) const LONG: usize = 30000;
-/// About how many lines these are, and tasks that go on to all lines.
-const SEARCHED: usize = 10000;
+/// Tasks on them that go on from groups of lines to all lines.
 const KEPT: usize = 2;
 
 /// More than any criterion of a record that fits into memory.
@@ -189,26 +187,20 @@ impl Problem<'_> {
         Choice { criterion: criterion + self.instability(&choice), ..choice }
     }
 
-    /// A search on every n-th line, about [`SEARCHED`] in all.
-    pub(crate) fn on_some_lines(&self, spectra: &Spectra, start: Model, options: &SearchOptions) -> Option<Found> {
-        let thin = spectra.thinned((self.samples().0 / 2).div_ceil(SEARCHED));
-        search(&thin, with_best_ends(&thin, start, &Noise::white(self.outputs())), options)
-    }
-
-    /// Of many tasks on long records those that reach the least criteria on some of the lines, with what they reach as start.
+    /// Of many tasks on long records those that reach the least criteria on groups of lines, with what they reach as start.
     fn promising_tasks(&self, tasks: Vec<Task>) -> Vec<Task> {
         let samples = self.samples().0;
         if tasks.len() <= KEPT || samples <= LONG {
             return tasks;
         }
         let reached = |mut task: Task| {
-            let found = self.on_some_lines(&task.spectra, task.start.model, &self.options(25, 0.3, &task.delays))?;
-            let share = samples as f64 / (2 * SEARCHED) as f64;
-            let criterion = found.criterion(samples) + (share.ceil() - 1.0) * found.deviance;
+            let (spectra, options) = (&task.spectra, self.options(25, 0.3, &task.delays));
+            let found = on_groups(spectra, &task.start, &options);
+            let found = found.or_else(|| search(spectra, task.start.clone(), &options))?;
+            let criterion = found.criterion(samples);
             let reached = Choice { found, delays: task.delays.clone(), criterion, origin: String::new() };
             let criterion = criterion + self.instability(&reached);
-            let Found { point, noise, .. } = reached.found;
-            task.start = with_best_ends(&task.spectra, point.model, &noise);
+            task.start = reached.found.point;
             Some((criterion, task))
         };
         let found: Vec<Option<(f64, Task)>> = tasks.into_par_iter().map(reached).collect();

@@ -18,8 +18,7 @@ impl Problem<'_> {
         let noise = &chosen.found.noise;
         let mut point = chosen.found.point;
         while point.model.order() < order {
-            let residuals = point.residuals(&spectra);
-            let (_, block) = grow::modes(&spectra, &residuals, noise, 1).into_iter().next()?;
+            let (_, block) = grow::modes(&spectra, &point, noise, 1).into_iter().next()?;
             point = with_best_inputs(&spectra, grow::with_block(&point.model, block), noise, self.feedthrough);
         }
         let start = match point.model.order() == order {

@@ -199,8 +199,7 @@ impl Problem<'_> {
         let spectra = self.spectra(&chosen.delays);
         let whole = self.with_feedthrough(chosen.found.feedthrough);
         let options = whole.options(15, 0.3, &chosen.delays);
-        let on_some = whole.on_some_lines(&spectra, chosen.found.point.model, &options)?;
-        let start = with_best_ends(&spectra, on_some.point.model, &on_some.noise);
+        let start = with_best_ends(&spectra, chosen.found.point.model, &chosen.found.noise);
         let found = search(&spectra, start, &options)?;
         Some(self.choice(found, spectra.samples(), chosen.delays, "first part of the records".into()))
     }

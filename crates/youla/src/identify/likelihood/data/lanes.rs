@@ -43,6 +43,23 @@ impl Lanes {
     }
 
     #[inline(always)]
+    pub(crate) fn set_product(&mut self, a: &Lanes, b: &Lanes) {
+        for l in 0..LANES {
+            self.re[l] = a.re[l] * b.re[l] - a.im[l] * b.im[l];
+            self.im[l] = a.re[l] * b.im[l] + a.im[l] * b.re[l];
+        }
+    }
+
+    #[inline(always)]
+    pub(crate) fn multiply(&mut self, b: &Lanes) {
+        for l in 0..LANES {
+            let (re, im) = (self.re[l], self.im[l]);
+            self.re[l] = re * b.re[l] - im * b.im[l];
+            self.im[l] = re * b.im[l] + im * b.re[l];
+        }
+    }
+
+    #[inline(always)]
     pub(crate) fn times(&self, b: &Lanes) -> Lanes {
         let mut out = Lanes::ZERO;
         out.add_product(self, b);

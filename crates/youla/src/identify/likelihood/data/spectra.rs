@@ -43,10 +43,32 @@ pub(crate) struct Lines {
     pub(crate) z: Vec<c64>,
     /// Root of the number of lines of the full circle for which the line stands: sqrt 2, or 1 at the Nyquist frequency.
     pub(crate) weight: Vec<f64>,
+    /// What multiplies the share of the ends: 1, or that of a row of a group of lines.
+    pub(crate) ends: Vec<c64>,
     /// Input, lines x m, row by row, scaled by 1 / sqrt(N).
     pub(crate) u: Vec<c64>,
     /// Output, lines x p, row by row.
     pub(crate) y: Vec<c64>,
+}
+
+impl Lines {
+    /// None of a record of so many samples.
+    pub(crate) fn new(samples: usize) -> Self {
+        Lines { samples, z: Vec::new(), weight: Vec::new(), ends: Vec::new(), u: Vec::new(), y: Vec::new() }
+    }
+
+    /// Appends a line of others with the same channels.
+    pub(crate) fn push(&mut self, from: &Lines, k: usize) {
+        let of = |all: &[c64]| {
+            let channels = all.len() / from.z.len();
+            all[k * channels..(k + 1) * channels].to_vec()
+        };
+        self.z.push(from.z[k]);
+        self.weight.push(from.weight[k]);
+        self.ends.push(from.ends[k]);
+        self.u.extend(of(&from.u));
+        self.y.extend(of(&from.y));
+    }
 }
 
 /// The lines of all records, channels divided by their sizes.
@@ -70,25 +92,34 @@ impl Spectra {
             let samples = e.u.nrows() - skip;
             let fft = planner.plan_fft_forward(samples);
             let count = samples / 2;
+            let signal = |j: usize, t: usize| match j.checked_sub(m) {
+                None => e.u[(t + skip - delays[j], j)] / sizes.u[j],
+                Some(i) => e.y[(t + skip, i)] / sizes.y[i],
+            };
             let mut lines = Lines {
                 samples,
                 z: (1..=count).map(|k| c64::cis(std::f64::consts::TAU * k as f64 / samples as f64)).collect(),
                 weight: (1..=count).map(|k| if 2 * k == samples { 1.0 } else { 2.0_f64.sqrt() }).collect(),
+                ends: vec![c64::ONE; count],
                 u: vec![c64::ZERO; count * m],
                 y: vec![c64::ZERO; count * p],
             };
-            let root = (samples as f64).sqrt();
-            let transform = |column: &dyn Fn(usize) -> f64, out: &mut [c64], channels: usize, at: usize| {
-                let mut work: Vec<c64> = (0..samples).map(|t| c64::new(column(t) / root, 0.0)).collect();
+            // Two real signals to a transform.
+            let half = 0.5 / (samples as f64).sqrt();
+            for j in (0..m + p).step_by(2) {
+                let second = |t: usize| if j + 1 < m + p { signal(j + 1, t) } else { 0.0 };
+                let mut work: Vec<c64> = (0..samples).map(|t| c64::new(signal(j, t), second(t))).collect();
                 fft.process(&mut work);
-                (0..count).for_each(|k| out[k * channels + at] = work[k + 1]);
-            };
-            for j in 0..m {
-                let first = skip - delays[j];
-                transform(&|t| e.u[(t + first, j)] / sizes.u[j], &mut lines.u, m, j);
-            }
-            for i in 0..p {
-                transform(&|t| e.y[(t + skip, i)] / sizes.y[i], &mut lines.y, p, i);
+                let mut put = |j: usize, k: usize, value: c64| match j.checked_sub(m) {
+                    None => lines.u[(k - 1) * m + j] = value,
+                    Some(i) if i < p => lines.y[(k - 1) * p + i] = value,
+                    Some(_) => {}
+                };
+                for k in 1..=count {
+                    let (ahead, back) = (work[k], work[samples - k].conj());
+                    put(j, k, (ahead + back) * half);
+                    put(j + 1, k, (ahead - back) * c64::new(0.0, -half));
+                }
             }
             lines
         });
@@ -112,23 +143,22 @@ impl Spectra {
 
     /// Every k-th line, for comparisons of starts.
     pub(crate) fn thinned(&self, every: usize) -> Self {
-        let (m, p) = (self.inputs, self.outputs);
         let of = |lines: &Lines| {
-            let kept: Vec<usize> = (0..lines.z.len()).step_by(every).collect();
-            Lines {
-                samples: lines.samples / every,
-                z: kept.iter().map(|k| lines.z[*k]).collect(),
-                weight: kept.iter().map(|k| lines.weight[*k]).collect(),
-                u: kept.iter().flat_map(|k| lines.u[k * m..(k + 1) * m].iter().copied()).collect(),
-                y: kept.iter().flat_map(|k| lines.y[k * p..(k + 1) * p].iter().copied()).collect(),
-            }
+            let mut out = Lines::new(lines.samples / every);
+            (0..lines.z.len()).step_by(every).for_each(|k| out.push(lines, k));
+            out
         };
-        Spectra { inputs: m, outputs: p, records: self.records.iter().map(of).collect() }
+        Spectra { records: self.records.iter().map(of).collect(), ..*self }
     }
 
     /// Every how many lines leave about `count`, at least every third.
     pub(crate) fn every(&self, count: usize) -> usize {
         (self.samples() / 2).div_ceil(count).max(3)
+    }
+
+    /// Number of lines of all records.
+    pub(crate) fn lines(&self) -> usize {
+        self.records.iter().map(|r| r.z.len()).sum()
     }
 
     /// Number of samples of all records.

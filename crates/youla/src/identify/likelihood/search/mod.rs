@@ -13,6 +13,7 @@ pub(crate) mod block;
 pub(crate) mod chart;
 pub(crate) mod feedthrough;
 pub(crate) mod grouping;
+pub(crate) mod groups;
 pub(crate) mod linearise;
 pub(crate) mod model;
 pub(crate) mod noise;
@@ -25,6 +26,7 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
 use chart::Chart;
 use faer::{Mat, c64};
+use groups::grouped;
 use linearise::{Linearised, linearise_quickly};
 use model::Model;
 use noise::Noise;
@@ -58,6 +60,12 @@ const LEAST_DRIFT: f64 = 1e-3;
 /// A search is given up where its distance to the aim is this many times what its last step gained. Chosen: of 2 to 25 steps of a search the
 /// gains fall from step to step.
 const STEPS_TO_AIM: f64 = 20.0;
+/// Damping ratio of the modes that the groups of a search leave room for beside those of its start.
+pub(crate) const DAMPED: f64 = 0.4;
+/// Steps on groups from which they are made anew: a start that moves less is near enough to them.
+const REGROUPED: usize = 2;
+/// Steps on all lines behind those on groups, at most.
+const LAST: usize = 5;
 /// Diagonal of the factor, relative to the largest, below which the records do not determine a direction: rounding of a sum of squares.
 const UNDETERMINED: f64 = 1e-10;
 
@@ -121,8 +129,34 @@ pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> 
     moved(&point, &chart, &ends, &[])
 }
 
-/// Searches from a start; `None` where nothing finite comes of it.
+/// Searches from a start, on many lines first on groups of them; `None` where nothing finite comes of it.
 pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
+    let Some(near) = on_groups(spectra, &start, options) else { return on_lines(spectra, start, options) };
+    let left = (options.steps - near.steps).max(LAST);
+    let found = on_lines(spectra, near.point, &SearchOptions { steps: left, ..options.clone() })?;
+    Some(Found { steps: near.steps + found.steps, ..found })
+}
+
+/// The same on groups of lines alone, which are made anew while the search moves; `None` also where there are no groups.
+pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<Found> {
+    let (mut reached, mut steps): (Option<Found>, usize) = (None, 0);
+    while steps < options.steps {
+        let point = reached.as_ref().map_or(start, |found| &found.point);
+        let Some(groups) = grouped(spectra, point, DAMPED) else { break };
+        let options = SearchOptions { steps: options.steps - steps, ..options.clone() };
+        let found = on_lines(&groups, point.clone(), &options)?;
+        let moved = found.steps;
+        steps += moved;
+        reached = Some(Found { steps, ..found });
+        if moved < REGROUPED {
+            break;
+        }
+    }
+    reached
+}
+
+/// The same on lines as they are.
+fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
     let mut point = reblocked(&start)?;
     let cost_of = |point: &Point| {
         let (value, noise) = deviance(spectra, point, options.noise_order);

@@ -55,18 +55,19 @@ impl NullaryFnOnce for Part<'_> {
             let count = LANES.min(range.end - first);
             let line = |l: usize| first + l.min(count - 1);
             let z = Lanes::gather(|l| lines.z[line(l)]);
+            let ends = Lanes::gather(|l| lines.ends[line(l)]).times(&z);
             u.iter_mut().enumerate().for_each(|(j, u)| *u = Lanes::gather(|l| lines.u[line(l) * m + j]));
             y.iter_mut().enumerate().for_each(|(o, y)| *y = Lanes::gather(|l| lines.y[line(l) * p + o]));
             let mut at = 0;
             for block in &model.blocks {
                 let s = block.states;
-                states(block, (&z, &u), &t[at..at + s], (&mut inverse, &mut x));
+                states(block, (&z, &ends, &u), &t[at..at + s], (&mut inverse, &mut x));
                 for (o, y) in y.iter_mut().enumerate() {
                     (0..s).for_each(|i| y.add_scaled(&x[i], -block.c[o * s + i]));
                 }
                 at += s;
             }
-            let drift = z.times(&z.shifted(-1.0).inverse());
+            let drift = ends.times(&z.shifted(-1.0).inverse());
             for (o, y) in y.iter_mut().enumerate() {
                 y.add_scaled(&drift, -t[at + o]);
                 if direct {

@@ -85,18 +85,19 @@ impl Rows {
         let last = lines.z.len() - 1;
         let line = |l: usize| (first + l).min(last);
         let z = Lanes::gather(|l| lines.z[line(l)]);
+        let ends = Lanes::gather(|l| lines.ends[line(l)]).times(&z);
         let u: Vec<Lanes> = (0..m).map(|j| Lanes::gather(|l| lines.u[line(l) * m + j])).collect();
         for o in 0..p {
             self.values[o * columns + columns - 1] = Lanes::gather(|l| lines.y[line(l) * p + o]);
         }
         let (mut state, mut column) = (0, model.end_count());
         for (block, directions) in model.blocks.iter().zip(&chart.directions) {
-            self.states(block, &z, &u, &place.t[state..state + block.states]);
-            self.slopes(block, directions, (&z, &u), [state, column]);
+            self.states(block, (&z, &ends, &u), &place.t[state..state + block.states]);
+            self.slopes(block, directions, (&ends, &u), [state, column]);
             state += block.states;
             column += directions.ncols();
         }
-        self.drift(&z, &place.t[state..], state);
+        self.drift((&z, &ends), &place.t[state..], state);
         self.direct(place, &u, column);
         let (more, count) = place.more;
         for o in 0..p {
@@ -110,48 +111,48 @@ impl Rows {
 
     /// `X = M (B U + z t)` and `L = C M` of one block.
     #[inline(always)]
-    fn states(&mut self, block: &Block, z: &Lanes, u: &[Lanes], t: &[f64]) {
+    fn states(&mut self, block: &Block, at: (&Lanes, &Lanes, &[Lanes]), t: &[f64]) {
         let s = block.states;
-        states(block, (z, u), t, (&mut self.inverse, &mut self.x));
+        states(block, at, t, (&mut self.inverse, &mut self.x));
         for o in 0..block.c.len() / s {
             for j in 0..s {
-                let mut sum = Lanes::ZERO;
-                (0..s).for_each(|i| sum.add_scaled(&self.inverse[i * s + j], block.c[o * s + i]));
-                self.left[o * s + j] = sum;
+                let left = &mut self.left[o * s + j];
+                *left = Lanes::ZERO;
+                (0..s).for_each(|i| left.add_scaled(&self.inverse[i * s + j], block.c[o * s + i]));
             }
         }
     }
 
     /// The columns of t and of the directions of one block, and its share of the residual.
     #[inline(always)]
-    fn slopes(&mut self, block: &Block, directions: &Mat<f64>, (z, u): (&Lanes, &[Lanes]), at: [usize; 2]) {
+    fn slopes(&mut self, block: &Block, directions: &Mat<f64>, (ends, u): (&Lanes, &[Lanes]), at: [usize; 2]) {
         let (s, m, columns) = (block.states, u.len(), self.columns);
         let entries = s * (s + m);
         for o in 0..block.c.len() / s {
             for i in 0..s {
-                let left = self.left[o * s + i];
+                let left = &self.left[o * s + i];
                 self.values[o * columns + columns - 1].add_scaled(&self.x[i], -block.c[o * s + i]);
-                self.values[o * columns + at[0] + i] = left.times(z);
+                self.values[o * columns + at[0] + i].set_product(left, ends);
                 if directions.ncols() > 0 {
-                    (0..s).for_each(|j| self.full[i * s + j] = left.times(&self.x[j]));
-                    (0..m).for_each(|j| self.full[s * s + i * m + j] = left.times(&u[j]));
+                    (0..s).for_each(|j| self.full[i * s + j].set_product(left, &self.x[j]));
+                    (0..m).for_each(|j| self.full[s * s + i * m + j].set_product(left, &u[j]));
                 }
             }
             for q in 0..directions.ncols() {
                 let direction = directions.col(q);
-                let mut sum = Lanes::ZERO;
+                let sum = &mut self.values[o * columns + at[1] + q];
+                *sum = Lanes::ZERO;
                 (0..entries).for_each(|e| sum.add_scaled(&self.full[e], direction[e]));
                 (0..s).for_each(|j| sum.add_scaled(&self.x[j], direction[entries + o * s + j]));
-                self.values[o * columns + at[1] + q] = sum;
             }
         }
     }
 
     /// The columns of the drift of each output from one end of the record to the other, and its share of the residual.
     #[inline(always)]
-    fn drift(&mut self, z: &Lanes, t: &[f64], column: usize) {
+    fn drift(&mut self, (z, ends): (&Lanes, &Lanes), t: &[f64], column: usize) {
         let (p, columns) = (self.filters.len(), self.columns);
-        let drift = z.times(&z.shifted(-1.0).inverse());
+        let drift = ends.times(&z.shifted(-1.0).inverse());
         for o in 0..p {
             self.values[o * columns + columns - 1].add_scaled(&drift, -t[o]);
             (0..p).for_each(|l| self.values[l * columns + column + o] = if l == o { drift } else { Lanes::ZERO });
@@ -179,15 +180,16 @@ impl Rows {
     fn whiten(&mut self, noise: &Noise, z: &Lanes) {
         let (p, columns) = (self.filters.len(), self.columns);
         let back = z.conj();
-        self.filters.iter_mut().zip(&noise.regression).for_each(|(filter, r)| *filter = r.filter(&back));
-        for c in 0..columns {
-            for o in (0..p).rev() {
-                let mut sum = Lanes::ZERO;
-                for l in 0..=o {
-                    let filtered = self.filters[l].times(&self.values[l * columns + c]);
-                    sum.add_scaled(&filtered, noise.root[(o, l)]);
-                }
-                self.values[o * columns + c] = sum;
+        let root = |o: usize, l: usize| noise.root[(o, l)];
+        for (o, (filter, r)) in self.filters.iter_mut().zip(&noise.regression).enumerate() {
+            *filter = r.filter(&back).scaled(root(o, o));
+            self.values[o * columns..(o + 1) * columns].iter_mut().for_each(|v| v.multiply(filter));
+        }
+        for o in (1..p).rev() {
+            let (above, own) = self.values.split_at_mut(o * columns);
+            for l in 0..o {
+                let share = root(o, l) / root(l, l);
+                own.iter_mut().zip(&above[l * columns..][..columns]).for_each(|(v, a)| v.add_scaled(a, share));
             }
         }
     }

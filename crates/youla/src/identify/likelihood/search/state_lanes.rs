@@ -4,14 +4,19 @@ use super::block::Block;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes};
 use faer::c64;
 
-/// `M = (z I - A)^-1`, row by row, and `X = M (B U + z t)` of one block.
+/// `M = (z I - A)^-1`, row by row, and `X = M (B U + z t)` of one block; with z what multiplies t.
 #[inline(always)]
-pub(crate) fn states(block: &Block, (z, u): (&Lanes, &[Lanes]), t: &[f64], (inverse, x): (&mut [Lanes], &mut [Lanes])) {
+pub(crate) fn states(
+    block: &Block,
+    (z, ends, u): (&Lanes, &Lanes, &[Lanes]),
+    t: &[f64],
+    (inverse, x): (&mut [Lanes], &mut [Lanes]),
+) {
     let (s, m) = (block.states, u.len());
     resolvent(block, z, inverse);
     x[..s].fill(Lanes::ZERO);
     for j in 0..s {
-        let mut drive = z.scaled(t[j]);
+        let mut drive = ends.scaled(t[j]);
         (0..m).for_each(|l| drive.add_scaled(&u[l], block.b[j * m + l]));
         (0..s).for_each(|i| x[i].add_product(&inverse[i * s + j], &drive));
     }

@@ -72,7 +72,7 @@ fn the_gradient_is_that_of_differences() {
     let (u, y) = record(&machine(), 400, 0.3, 2);
     let spectra = unscaled(&u, &y, &[0, 0], 0);
     let mut noise = Noise::white(1);
-    noise.regression = vec![Regression { coefficients: vec![-0.6, 0.2], zero: 0.0 }];
+    noise.regression = vec![Regression { coefficients: vec![-0.6, 0.2], ..Regression::default() }];
     let mut model = blocks_of(&machine());
     model.blocks.iter_mut().for_each(|b| b.a.iter_mut().for_each(|a| *a *= 0.99));
     let chart = Chart::new(&model, true);
@@ -133,7 +133,7 @@ fn a_random_walk_below_white_noise_takes_a_slow_pole_and_a_zero() {
     let ended = with_best_ends(&spectra, empty.model, &Noise::white(1));
     let (value, noise) = deviance(&spectra, &ended, 12);
     // the sum is (1 - b/z) e / (1 - 1/z) with (1 - b)^2 / b = 0.02^2, so b = 0.98 and the variance of e is 1 / b
-    let Regression { coefficients, zero } = &noise.regression[0];
+    let Regression { coefficients, zero, .. } = &noise.regression[0];
     assert!(
         (zero - 0.98).abs() < 0.011 && (1.0 + coefficients.iter().sum::<f64>()).abs() < 0.01,
         "{coefficients:?}, {zero}"

@@ -2,7 +2,7 @@
 //!
 //! Each output carries an autoregression with a zero, `v(t) = -a_1 v(t-1) - ... + e(t) - b e(t-1)`, whose innovations are those
 //! of the whole where the plant is stable: K is zero for the states of the plant. Where it is not, the gain comes from the Riccati
-//! equation of plant and noise, which mirrors its poles.
+//! equation of plant and noise, which mirrors its poles. Noise at the inputs of the plant moves its states.
 
 use crate::identify::likelihood::recommendation::Predictor;
 use crate::identify::likelihood::search::autoregression::Regression;
@@ -19,10 +19,27 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
     let [shift, enters, seen] = autoregressions(&noise.regression);
     let (n, p, extra) = (plant.order(), plant.outputs(), shift.nrows());
     let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * sizes[i] * sizes[j]);
-    let a = block_diagonal(plant.a(), shift.as_ref());
-    let b = block(&[&[plant.b()], &[Mat::zeros(extra, plant.inputs()).as_ref()]]);
-    let c = block(&[&[plant.c(), seen.as_ref()]]);
-    let gain = block(&[&[Mat::zeros(n, p).as_ref()], &[enters.as_ref()]]);
+    // Noise at the inputs moves the states of the plant; of several outputs each has its own, independent of the others.
+    let driven = || noise.regression.iter().enumerate().filter_map(|(i, r)| Some((i, r.driven.as_deref()?)));
+    let copies: usize = if p > 1 { driven().map(|(_, d)| d.gain.len()).sum() } else { 0 };
+    let first = n + copies;
+    let mut a = block_diagonal(block_diagonal(plant.a(), Mat::zeros(copies, copies).as_ref()).as_ref(), shift.as_ref());
+    let b = block(&[&[plant.b()], &[Mat::zeros(copies + extra, plant.inputs()).as_ref()]]);
+    let mut c = block(&[&[plant.c(), Mat::zeros(p, copies).as_ref(), seen.as_ref()]]);
+    let mut gain = block(&[&[Mat::zeros(first, p).as_ref()], &[enters.as_ref()]]);
+    let mut at = if p > 1 { n } else { 0 };
+    for (i, driven) in driven() {
+        let states = driven.gain.len();
+        if p > 1 {
+            a.submatrix_mut(at, at, states, states).copy_from(&driven.a);
+            (0..states).for_each(|s| c[(i, at + s)] = driven.c[(0, s)] * sizes[i]);
+        }
+        for (s, k) in driven.gain.iter().enumerate() {
+            gain[(at + s, i)] = k / sizes[i];
+            (0..extra).for_each(|j| a[(at + s, first + j)] = k / sizes[i] * seen[(i, j)]);
+        }
+        at += states;
+    }
     let stable = plant.is_stable().unwrap_or(false);
     let k = if stable { Some(gain) } else { riccati(&a, &c, &gain, &covariance) };
     Predictor { a, b, c, d: plant.d().to_owned(), k, covariance }

@@ -1,34 +1,41 @@
 //! The autoregression of the noise at one output, with a zero where slow drift lies below white noise.
 
+use super::driven::Driven;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes};
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use faer::c64;
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
-/// Coefficients of `(1 - b/z) / (1 + a_1/z + ...)`.
-#[derive(Debug, Clone, Default, PartialEq)]
+/// Coefficients of `(1 - b/z) / (1 + a_1/z + ...)`, behind noise at the inputs of the plant where there is any.
+#[derive(Debug, Clone, Default)]
 pub(crate) struct Regression {
     /// a_1 ...
     pub(crate) coefficients: Vec<f64>,
     /// b, 0 for none.
     pub(crate) zero: f64,
+    /// What the plant makes of noise at its inputs.
+    pub(crate) driven: Option<Arc<Driven>>,
 }
 
 impl Regression {
     /// Number of its coefficients.
     pub(crate) fn parameters(&self) -> usize {
-        self.coefficients.len() + usize::from(self.zero != 0.0)
+        self.coefficients.len() + usize::from(self.zero != 0.0) + usize::from(self.driven.is_some())
     }
 
-    /// `(1 + a_1 / z + ...) / (1 - b / z)`, given `1 / z`.
+    /// `(1 + a_1 / z + ...) / (1 - b / z) / H`, given `1 / z`.
     #[inline(always)]
     pub(crate) fn filter(&self, back: &Lanes) -> Lanes {
         let mut sum = Lanes::ZERO;
         self.coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(back));
-        let filter = sum.shifted(1.0);
-        if self.zero == 0.0 { filter } else { filter.times(&back.scaled(-self.zero).shifted(1.0).inverse()) }
+        let mut filter = sum.shifted(1.0);
+        if self.zero != 0.0 {
+            filter = filter.times(&back.scaled(-self.zero).shifted(1.0).inverse());
+        }
+        self.driven.as_ref().map_or(filter, |driven| filter.times(&driven.filter(back)))
     }
 }
 
@@ -49,12 +56,18 @@ pub(crate) struct Correlations {
 }
 
 impl Correlations {
-    /// For autoregressions up to `largest` coefficients.
-    pub(crate) fn new(spectra: &Spectra, residuals: &[Vec<c64>], output: usize, largest: usize) -> Self {
+    /// For autoregressions up to `largest` coefficients, behind noise at the inputs of the plant.
+    pub(crate) fn new(
+        spectra: &Spectra,
+        residuals: &[Vec<c64>],
+        output: usize,
+        largest: usize,
+        driven: Option<&Driven>,
+    ) -> Self {
         let channel = (output, spectra.outputs);
         let mut sum = Correlations::zero(largest);
         for (lines, v) in spectra.records.iter().zip(residuals) {
-            let of = |range| Arch::new().dispatch(PartSum { lines, v, channel, largest, range });
+            let of = |range| Arch::new().dispatch(PartSum { lines, v, channel, largest, driven, range });
             parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum.add(part));
         }
         sum
@@ -72,8 +85,8 @@ impl Correlations {
         }
     }
 
-    /// The regression with the least `N log variance + log(N) parameters`.
-    pub(crate) fn regression(&self, samples: usize) -> Regression {
+    /// The regression with the least `N log variance + log(N) parameters`, which comes with it.
+    pub(crate) fn regression(&self, samples: usize) -> (Regression, f64) {
         let (mut coefficients, mut least) = autoregression(&self.plain, samples);
         let mut zero = 0.0;
         for (f, b) in ZEROS.iter().enumerate() {
@@ -85,7 +98,7 @@ impl Correlations {
                 }
             }
         }
-        Regression { coefficients, zero }
+        (Regression { coefficients, zero, driven: None }, least)
     }
 
     /// Autocorrelations behind `(1 - c/z) / (1 - b/z)`.
@@ -104,6 +117,7 @@ struct PartSum<'a> {
     /// Output, and number of outputs.
     channel: (usize, usize),
     largest: usize,
+    driven: Option<&'a Driven>,
     range: Range<usize>,
 }
 
@@ -112,7 +126,7 @@ impl NullaryFnOnce for PartSum<'_> {
 
     #[inline(always)]
     fn call(self) -> Correlations {
-        let PartSum { lines, v, channel: (output, p), largest, range } = self;
+        let PartSum { lines, v, channel: (output, p), largest, driven, range } = self;
         let mut sum = Correlations::zero(largest);
         let mut plain = vec![[0.0; LANES]; sum.plain.len()];
         let mut filtered = vec![[[0.0; LANES]; ZEROS.len()]; sum.filtered.len()];
@@ -121,6 +135,13 @@ impl NullaryFnOnce for PartSum<'_> {
             for (l, k) in (first..range.end.min(first + LANES)).enumerate() {
                 power[l] = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
                 cosine[l] = lines.z[k].re;
+            }
+            if let Some(driven) = driven {
+                let back = Lanes::gather(|l| lines.z[(first + l).min(range.end - 1)].conj());
+                let filter = driven.filter(&back);
+                for l in 0..LANES {
+                    power[l] *= filter.re[l] * filter.re[l] + filter.im[l] * filter.im[l];
+                }
             }
             let powers = ZEROS.map(|b| {
                 let mut out = power;

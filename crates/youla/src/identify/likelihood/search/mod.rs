@@ -11,6 +11,7 @@ pub(crate) mod autoregression;
 pub(crate) mod balancing;
 pub(crate) mod block;
 pub(crate) mod chart;
+pub(crate) mod driven;
 pub(crate) mod feedthrough;
 pub(crate) mod grouping;
 pub(crate) mod groups;
@@ -104,7 +105,7 @@ fn penalty(parameters: usize, samples: usize, point: &Point) -> f64 {
 /// -2 log likelihood and noise of a point.
 pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> (f64, Noise) {
     let residuals = point.residuals(spectra);
-    let noise = Noise::fit(spectra, &residuals, noise_order);
+    let noise = Noise::fit(spectra, &residuals, noise_order, &point.model);
     (of_noise(spectra, &noise, &point.model), noise)
 }
 

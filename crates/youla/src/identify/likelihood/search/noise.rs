@@ -5,15 +5,19 @@
 //! v_i(t) + a_i1 v_i(t-1) + ... = e_i(t) - b_i e_i(t-1),     E e e' = Lambda
 //! ```
 //! Orders by the Bayesian criterion from the autocorrelations of the residuals (`autoregression`). White noise is order 0. The
-//! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients.
+//! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients. Noise that enters at the inputs of
+//! the plant comes before both (`driven`).
 
 use super::autoregression::{Correlations, Regression};
+use super::driven::Driven;
+use super::model::Model;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use faer::{Mat, c64};
 use pulp::{Arch, NullaryFnOnce};
 use rayon::prelude::*;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Coefficients and covariance.
 #[derive(Debug, Clone)]
@@ -38,10 +42,20 @@ impl Noise {
         Noise { regression: vec![Regression::default(); outputs], root: one.clone(), covariance: one, log_det: 0.0 }
     }
 
-    /// From residuals, lines x p per record.
-    pub(crate) fn fit(spectra: &Spectra, residuals: &[Vec<c64>], largest_order: usize) -> Self {
+    /// From the residuals of a model, lines x p per record.
+    pub(crate) fn fit(spectra: &Spectra, residuals: &[Vec<c64>], largest_order: usize, model: &Model) -> Self {
         let p = spectra.outputs;
-        let of = |i: usize| Correlations::new(spectra, residuals, i, largest_order).regression(spectra.samples());
+        let (samples, log) = (spectra.samples(), (spectra.samples().max(2) as f64).ln());
+        let behind = |i: usize, driven: Option<&Driven>| {
+            Correlations::new(spectra, residuals, i, largest_order, driven).regression(samples)
+        };
+        let of = |i: usize| {
+            let (plain, least) = behind(i, None);
+            let Some(driven) = Driven::new(model, spectra, residuals, i) else { return plain };
+            let (rest, criterion) = behind(i, Some(&driven));
+            let better = criterion + log < least;
+            if better { Regression { driven: Some(Arc::new(driven)), ..rest } } else { plain }
+        };
         let regression: Vec<Regression> = (0..p).map(of).collect();
         let mut noise = Noise { regression, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
@@ -49,7 +63,7 @@ impl Noise {
             let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, v, range });
             parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
         }
-        let samples = spectra.samples().max(1) as f64;
+        let samples = samples.max(1) as f64;
         for i in 0..p {
             for j in 0..=i {
                 let value = sum[(i, j)] / samples + if i == j { ROUNDING * ROUNDING } else { 0.0 };
@@ -80,7 +94,7 @@ impl Noise {
         (self.root, self.covariance) = (root, covariance);
     }
 
-    /// `(1 + a_1 / z + ...) / (1 - b / z)` of each output.
+    /// `(1 + a_1 / z + ...) / (1 - b / z) / H` of each output.
     pub(crate) fn filters(&self, z: c64, out: &mut [c64]) {
         let back = z.conj();
         for (value, regression) in out.iter_mut().zip(&self.regression) {
@@ -91,6 +105,9 @@ impl Noise {
             *value = sum + c64::ONE;
             if regression.zero != 0.0 {
                 *value /= c64::ONE - back * regression.zero;
+            }
+            if let Some(driven) = &regression.driven {
+                *value *= driven.at(back);
             }
         }
     }

@@ -1,0 +1,149 @@
+//! Noise at an output that enters at the inputs of the plant: torque of cogging and of a current controller, load, turbulence.
+//!
+//! ```text
+//! spectrum of v_i = sigma^2 (1 + lambda |G_i|^2) = sigma^2 |H_i|^2,     H_i = 1 + C_i (z I - A)^-1 K_i
+//! ```
+//! with white noise of equal size at all inputs beside that of the sensor. It has the resonances of the plant as peaks, which an autoregression
+//! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
+//! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
+
+use super::model::Model;
+use crate::identify::likelihood::data::lanes::Lanes;
+use crate::identify::likelihood::data::spectra::Spectra;
+use crate::linalg::{RiccatiProblem, dare, eigenvalues};
+use faer::{Mat, Scale, c64};
+
+/// Growth of a pole over all records up to which noise at the inputs is tried, as a logarithm: an integrator is not told from less.
+const GROWTH: f64 = 2.0;
+/// Product of input and output of a block over the largest below which an output does not see what the inputs move there.
+const UNSEEN: f64 = 1e-8;
+/// About how many lines show the size of the noise.
+const LINES: usize = 6000;
+/// Steps of the logarithm of that size: the likelihood is flat to a quarter of a nat.
+const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
+
+/// The filter `1 / H_i` of an output, and what it is made of.
+#[derive(Debug, Clone)]
+pub(crate) struct Driven {
+    /// Quadratics of numerator and denominator: `(1 + c_1 / z + c_2 / z^2) / (1 + d_1 / z + d_2 / z^2)`.
+    sections: Vec<[f64; 4]>,
+    /// K_i, one for each state of the model.
+    pub(crate) gain: Vec<f64>,
+    /// A of the model.
+    pub(crate) a: Mat<f64>,
+    /// C of the model, its row of the output.
+    pub(crate) c: Mat<f64>,
+}
+
+impl Driven {
+    /// The most likely size of such noise in residuals, lines x p per record; `None` where there is none.
+    pub(crate) fn new(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Option<Self> {
+        let samples = spectra.samples() as f64;
+        let poles = model.poles();
+        if poles.is_empty() || poles.iter().any(|p| p.norm().ln() > GROWTH / samples) {
+            return None;
+        }
+        let ratio = size(&lines(model, spectra, residuals, output), samples)?;
+        let reach = |k: usize| {
+            let (block, size) = (&model.blocks[k], |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt());
+            size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
+        };
+        let largest = (0..model.blocks.len()).map(reach).fold(0.0, f64::max);
+        let hidden: Vec<usize> = (0..model.blocks.len()).filter(|k| reach(*k) <= UNSEEN * largest).collect();
+        let seen = model.without(&hidden);
+        let (a, b, c) = seen.matrices();
+        let c = c.subrows(output, 1).to_owned();
+        let q = &b * b.transpose() * Scale(ratio);
+        let one = Mat::<f64>::identity(1, 1);
+        let dual = RiccatiProblem { a: a.transpose(), b: c.transpose(), q: q.as_ref(), r: one.as_ref(), s: None };
+        let k = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
+        let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
+        let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
+        let [over, under] = [seen.poles().into_iter().map(mirrored).collect(), zeros].map(quadratics);
+        let sections = over.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
+        let (mut gain, mut at) = (Vec::with_capacity(model.order()), 0);
+        for (place, block) in model.blocks.iter().enumerate() {
+            let used = if hidden.contains(&place) { 0 } else { block.states };
+            gain.extend((0..block.states).map(|i| if used > 0 { k[(at + i, 0)] } else { 0.0 }));
+            at += used;
+        }
+        let (a, _, c) = model.matrices();
+        Some(Driven { sections, gain, a, c: c.subrows(output, 1).to_owned() })
+    }
+
+    /// `1 / H_i`, given `1 / z`.
+    #[inline(always)]
+    pub(crate) fn filter(&self, back: &Lanes) -> Lanes {
+        let quadratic = |one: f64, two: f64| back.scaled(two).shifted(one).times(back).shifted(1.0);
+        let (mut over, mut under) = (Lanes::ZERO.shifted(1.0), Lanes::ZERO.shifted(1.0));
+        for [c1, c2, d1, d2] in &self.sections {
+            over = over.times(&quadratic(*c1, *c2));
+            under = under.times(&quadratic(*d1, *d2));
+        }
+        over.times(&under.inverse())
+    }
+
+    /// The same at one line.
+    pub(crate) fn at(&self, back: c64) -> c64 {
+        let quadratic = |one: f64, two: f64| (back * two + one) * back + 1.0;
+        self.sections.iter().fold(c64::ONE, |f, [c1, c2, d1, d2]| f * quadratic(*c1, *c2) / quadratic(*d1, *d2))
+    }
+}
+
+/// Of some of the lines how many each stands for, power of the residual, and `|G_i|^2`.
+fn lines(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Vec<[f64; 3]> {
+    let (p, m) = (spectra.outputs, spectra.inputs);
+    let strictly = Model { d: vec![0.0; p * m], ..model.clone() };
+    let every = (spectra.samples() / 2).div_ceil(LINES).max(1);
+    let mut out = Vec::with_capacity(LINES);
+    for (lines, v) in spectra.records.iter().zip(residuals) {
+        for k in (0..lines.z.len()).step_by(every) {
+            let g = strictly.response(lines.z[k]);
+            let gain = g[output * m..(output + 1) * m].iter().map(|g| g.norm_sqr()).sum::<f64>();
+            out.push([lines.weight[k].powi(2) * every as f64, v[k * p + output].norm_sqr(), gain]);
+        }
+    }
+    out
+}
+
+/// The most likely lambda; `None` where white noise alone has the lesser criterion of Schwarz.
+fn size(lines: &[[f64; 3]], samples: f64) -> Option<f64> {
+    let cost = |ratio: f64| {
+        let (mut power, mut logarithms, mut count) = (0.0, 0.0, 0.0);
+        for [weight, v, gain] in lines {
+            let shape = 1.0 + ratio * gain;
+            power += weight * v / shape;
+            logarithms += weight * shape.ln();
+            count += weight;
+        }
+        count * (power / count).ln() + logarithms
+    };
+    let gains = || lines.iter().map(|l| l[2]).filter(|g| *g > 0.0);
+    let (least, most) = (gains().fold(f64::INFINITY, f64::min).ln(), gains().fold(0.0, f64::max).ln());
+    let mut best = (cost(0.0) - samples.ln(), f64::NEG_INFINITY);
+    let mut from = -most;
+    while from.is_finite() && from <= -least {
+        let value = cost(from.exp());
+        if value < best.0 {
+            best = (value, from);
+        }
+        from += 2.0 * STEPS[0];
+    }
+    for step in STEPS {
+        for near in [best.1 - step, best.1 + step] {
+            let value = cost(near.exp());
+            if value < best.0 {
+                best = (value, near);
+            }
+        }
+    }
+    best.1.is_finite().then(|| best.1.exp())
+}
+
+/// `1 + a / z + b / z^2` of each conjugate pair, and of real roots two by two.
+fn quadratics(roots: Vec<c64>) -> Vec<[f64; 2]> {
+    let pairs = roots.iter().filter(|r| r.im > 0.0).map(|r| [-2.0 * r.re, r.norm_sqr()]);
+    let real: Vec<f64> = roots.iter().filter(|r| r.im == 0.0).map(|r| r.re).collect();
+    let product = |two: &[f64]| two.get(1).map_or([-two[0], 0.0], |b| [-two[0] - b, two[0] * b]);
+    pairs.chain(real.chunks(2).map(product)).collect()
+}

@@ -18,7 +18,10 @@ const TRACE: f64 = 1e-12;
 pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f64]) -> Predictor {
     let [shift, enters, seen] = autoregressions(&noise.regression);
     let (n, p, extra) = (plant.order(), plant.outputs(), shift.nrows());
-    let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * sizes[i] * sizes[j]);
+    // The innovations of a filter that mirrors poles are smaller than those of the noise at the inputs of an unstable plant.
+    let mirrored = |i: usize| noise.regression[i].driven.as_ref().map_or(1.0, |driven| driven.unstable);
+    let size = |i: usize| sizes[i] * mirrored(i);
+    let covariance = Mat::from_fn(p, p, |i, j| noise.covariance[(i, j)] * size(i) * size(j));
     // Noise at the inputs moves the states of the plant; of several outputs each has its own, independent of the others.
     let driven = || noise.regression.iter().enumerate().filter_map(|(i, r)| Some((i, r.driven.as_deref()?)));
     let copies: usize = if p > 1 { driven().map(|(_, d)| d.gain.len()).sum() } else { 0 };

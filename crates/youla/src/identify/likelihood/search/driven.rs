@@ -13,7 +13,8 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{RiccatiProblem, dare, eigenvalues};
 use faer::{Mat, Scale, c64};
 
-/// Growth of a pole over all records up to which noise at the inputs is tried, as a logarithm: an integrator is not told from less.
+/// Growth of a pole over all records up to which an integrator is not told from it, as a logarithm. Noise of several outputs has a state for each,
+/// of which nothing may grow beside those of the plant.
 const GROWTH: f64 = 2.0;
 /// Product of input and output of a block over the largest below which an output does not see what the inputs move there.
 const UNSEEN: f64 = 1e-8;
@@ -27,6 +28,8 @@ const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 pub(crate) struct Driven {
     /// Quadratics of numerator and denominator: `(1 + c_1 / z + c_2 / z^2) / (1 + d_1 / z + d_2 / z^2)`.
     sections: Vec<[f64; 4]>,
+    /// Product of the magnitudes of the poles outside of the unit circle, which the filter mirrors: `1 / H_i` over its size.
+    pub(crate) unstable: f64,
     /// K_i, one for each state of the model.
     pub(crate) gain: Vec<f64>,
     /// A of the model.
@@ -40,7 +43,8 @@ impl Driven {
     pub(crate) fn new(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Option<Self> {
         let samples = spectra.samples() as f64;
         let poles = model.poles();
-        if poles.is_empty() || poles.iter().any(|p| p.norm().ln() > GROWTH / samples) {
+        let grows = || poles.iter().any(|p| p.norm().ln() > GROWTH / samples);
+        if poles.is_empty() || spectra.outputs > 1 && grows() {
             return None;
         }
         let ratio = size(&lines(model, spectra, residuals, output), samples)?;
@@ -59,6 +63,7 @@ impl Driven {
         let k = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
         let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
         let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
+        let unstable = poles.iter().map(|p| p.norm().max(1.0)).product();
         let [over, under] = [seen.poles().into_iter().map(mirrored).collect(), zeros].map(quadratics);
         let sections = over.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
         let (mut gain, mut at) = (Vec::with_capacity(model.order()), 0);
@@ -68,7 +73,7 @@ impl Driven {
             at += used;
         }
         let (a, _, c) = model.matrices();
-        Some(Driven { sections, gain, a, c: c.subrows(output, 1).to_owned() })
+        Some(Driven { sections, unstable, gain, a, c: c.subrows(output, 1).to_owned() })
     }
 
     /// `1 / H_i`, given `1 / z`.

@@ -25,6 +25,8 @@ mod known_loop;
 #[cfg(test)]
 mod many_records;
 mod measured;
+#[cfg(test)]
+mod noise_at_inputs;
 mod options;
 mod recommendation;
 pub(super) mod search;

@@ -1,0 +1,118 @@
+//! Noise that enters at the inputs of a plant: its likelihood, its predictor, and a control without it.
+
+use super::deviation::innovation::predictor;
+use super::search::deviance;
+use super::search::model::Model;
+use super::search::noise::Noise;
+use super::search::with_best_ends;
+use super::{Discrete, Experiment, LikelihoodOptions, recommend};
+use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
+use crate::lti::{StateSpace, frequency_response, simulate};
+use crate::{Mat, c64};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const SAMPLES: usize = 8000;
+
+/// A mode of damping ratio 0.01 and a real pole.
+fn machine(real: f64) -> StateSpace<Discrete> {
+    let (re, im) = (0.9987 * 0.13_f64.cos(), 0.9987 * 0.13_f64.sin());
+    let a = [[re, im, 0.0], [-im, re, 0.0], [0.0, 0.0, real]];
+    let b = [0.02, 0.1, 0.05];
+    let time = Discrete::new(1e-3).unwrap();
+    StateSpace::new(
+        Mat::from_fn(3, 3, |i, j| a[i][j]),
+        Mat::from_fn(3, 1, |i, _| b[i]),
+        Mat::from_fn(1, 3, |_, j| if j == 1 { 0.0 } else { 1.0 }),
+        Mat::zeros(1, 1),
+        time,
+    )
+    .unwrap()
+}
+
+/// u, and y with noise of these sizes at the input and at the output.
+fn record(at_input: f64, at_output: f64, seed: u64) -> (Mat<f64>, Mat<f64>) {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = |size: f64| Mat::from_fn(SAMPLES, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+    let (u, w, e) = (normal(1.0), normal(at_input), normal(at_output));
+    (u.clone(), simulate(&machine(0.98), (u + w).as_ref(), &[0.0; 3]).unwrap() + e)
+}
+
+fn unscaled(u: &Mat<f64>, y: &Mat<f64>) -> Spectra {
+    let sizes = Sizes { u: vec![1.0], y: vec![1.0] };
+    Spectra::new(&[Experiment::new(u.as_ref(), y.as_ref())], &sizes, &[0], 0)
+}
+
+/// `|G|^2` at one line.
+fn gain(plant: &StateSpace<Discrete>, share: f64) -> f64 {
+    let omega = std::f64::consts::TAU * share / plant.time().ts();
+    frequency_response(plant, &[omega]).unwrap().at(0)[(0, 0)].norm_sqr()
+}
+
+#[test]
+fn the_likelihood_of_noise_at_the_input_is_that_of_its_spectrum() {
+    let (u, y) = record(0.3, 0.02, 1);
+    let spectra = unscaled(&u, &y);
+    let plant = machine(0.98);
+    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
+    let (value, noise) = deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40);
+    assert!(noise.regression[0].driven.is_some());
+    let lines = 1..SAMPLES;
+    let expected: f64 =
+        lines.map(|k| (0.02_f64.powi(2) + 0.3_f64.powi(2) * gain(&plant, k as f64 / SAMPLES as f64)).ln()).sum();
+    assert!((value - expected).abs() < 4.0 * (2.0 * SAMPLES as f64).sqrt(), "{value} and {expected}");
+}
+
+#[test]
+fn white_noise_at_the_output_is_none_at_the_input() {
+    let (u, y) = record(0.0, 0.02, 2);
+    let spectra = unscaled(&u, &y);
+    let plant = machine(0.98);
+    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
+    let (_, noise) = deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40);
+    assert!(noise.regression[0].driven.is_none());
+}
+
+#[test]
+fn the_predictor_has_the_spectrum_of_noise_at_the_input_also_of_an_unstable_plant() {
+    for real in [0.98, 1.02] {
+        let plant = machine(real);
+        let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
+        // Residuals with the very spectrum, as lines of one record.
+        let (u, _) = record(0.0, 0.0, 3);
+        let spectra = unscaled(&u, &u);
+        let rng = &mut ChaCha8Rng::seed_from_u64(4);
+        let mut line = |k: usize| {
+            let size = (0.5 * (0.02_f64.powi(2) + 0.3_f64.powi(2) * gain(&plant, k as f64 / SAMPLES as f64))).sqrt();
+            c64::new(size * rng.sample::<f64, _>(StandardNormal), size * rng.sample::<f64, _>(StandardNormal))
+        };
+        let residuals = vec![(1..=SAMPLES / 2).map(&mut line).collect::<Vec<c64>>()];
+        let noise = Noise::fit(&spectra, &residuals, 40, &model);
+        assert!(noise.regression[0].driven.is_some());
+        let states = model.matrices();
+        let plant = StateSpace::new(states.0, states.1, states.2, Mat::zeros(1, 1), plant.time()).unwrap();
+        let found = predictor(&plant, &noise, &[1.0]);
+        let k = found.k.unwrap();
+        let h = StateSpace::new(found.a, k, found.c, Mat::identity(1, 1), plant.time()).unwrap();
+        for share in [0.005, 0.0207, 0.1, 0.4] {
+            let stated = gain(&h, share) * found.covariance[(0, 0)];
+            let true_power = 0.02_f64.powi(2) + 0.3_f64.powi(2) * gain(&plant, share);
+            assert!((stated / true_power).ln().abs() < 0.3, "{real}, {share}: {stated} and {true_power}");
+        }
+    }
+}
+
+#[test]
+fn noise_at_the_input_leaves_no_modes_beside_those_of_the_plant() {
+    let (u, y) = record(0.3, 0.005, 5);
+    let records = [Experiment::new(u.as_ref(), y.as_ref())];
+    let time = Discrete::new(1e-3).unwrap();
+    let found = recommend(&records, &[], None, time, &LikelihoodOptions::default()).unwrap();
+    assert_eq!(found.order, 3, "{:?}", found.modes);
+    // Not at the peak, three lines wide, where the noise leaves 10 %.
+    for share in [0.005, 0.018, 0.024, 0.05] {
+        let (own, of_machine) = (gain(&found.plant, share), gain(&machine(0.98), share));
+        assert!((own / of_machine).ln().abs() < 0.1, "{share}: {own} and {of_machine}");
+    }
+}

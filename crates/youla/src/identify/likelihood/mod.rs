@@ -120,7 +120,8 @@ pub fn recommend(
     let parts = Parts::new(&problem, &solution, verification);
     let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
     let witness = signals.and_then(|signals| Witness::new(&problem, &solution, signals, verification));
-    let directions = Directions::new(&spectra, &solution, parts.scatter, witness.clone());
+    let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, &solution);
+    let directions = Directions::new(&spectra, &solution, parts.scatter, witness.clone()).with(nonlinear_part);
     let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
     let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
     let judged = Judged {
@@ -132,6 +133,7 @@ pub fn recommend(
         parts: &parts,
         plant: &plant,
         region: &region,
+        nonlinear,
     };
     let Judgement { mut evidence, loop_ratio, entry_bands, bands } = verdict::judge(&judged)?;
     evidence.extend(lines);

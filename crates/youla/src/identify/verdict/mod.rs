@@ -28,6 +28,7 @@ mod witness;
 pub(crate) use controller::explains;
 pub(crate) use local_error::Excess;
 pub use loop_ratio::LoopRatio;
+pub(crate) use nonlinear::{NonlinearPart, nonlinear};
 pub(crate) use parts::Parts;
 pub(crate) use witness::Witness;
 
@@ -62,6 +63,8 @@ pub(crate) struct Judged<'a> {
     pub(crate) plant: &'a StateSpace<Discrete>,
     /// Its region.
     pub(crate) region: &'a Region,
+    /// What acts at the inputs and is no linear function of them.
+    pub(crate) nonlinear: Vec<Evidence>,
 }
 
 /// Tests, the region in the metric of the loop, and bands of validity.
@@ -126,7 +129,7 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
         evidence.push(repeatability(on, witness, &weigh));
     }
     evidence.push(shown.0);
-    evidence.extend(nonlinear::nonlinear(on.spectra, on.solution));
+    evidence.extend(on.nonlinear.clone());
     Ok(Judgement { evidence, ..shown.1 })
 }
 

@@ -6,7 +6,7 @@
 //! ```
 //! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
 
-use super::limits::{LARGEST_NONLINEAR, LARGEST_OF_INPUT};
+use super::limits::{BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LASTING};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
@@ -37,22 +37,71 @@ struct Shaped {
     columns: Vec<c64>,
     /// Root mean square of each function without its part along the input or the velocity.
     sizes: Vec<f64>,
+    /// Lines of the functions, those of one after the other.
+    plain: Vec<Vec<c64>>,
 }
 
-/// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input?
-pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Vec<Evidence> {
+/// What acts at an input and is no linear function of it, over frequency.
+#[derive(Debug, Clone)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct NonlinearPart {
+    /// The input.
+    pub(crate) input: usize,
+    /// Middles of bands as shares of the sample rate, power of this part, and of the input.
+    bands: Vec<[f64; 3]>,
+}
+
+impl NonlinearPart {
+    /// Bands of 40 lines: of `c f` what no response to the input gives.
+    fn new(spectra: &Spectra, shaped: &[Shaped], input: usize, of: usize, c: f64) -> Self {
+        let m = spectra.inputs;
+        let lines = spectra.records.iter().map(|lines| lines.z.len()).min().unwrap_or(0);
+        let count = (lines / BAND_LINES).max(1);
+        let mut sums = vec![(0.0, c64::ZERO, 0.0); count];
+        for (lines, shaped) in spectra.records.iter().zip(shaped) {
+            let total = lines.z.len();
+            for (k, f) in shaped.plain[of].iter().enumerate() {
+                let (sum, u) = (&mut sums[(k * count / total).min(count - 1)], lines.u[k * m + input]);
+                *sum = (sum.0 + f.norm_sqr(), sum.1 + f * u.conj(), sum.2 + u.norm_sqr());
+            }
+        }
+        let band = |(k, (f, fu, u)): (usize, (f64, c64, f64))| {
+            [0.5 * (k as f64 + 0.5) / count as f64, c * c * (f - fu.norm_sqr() / u.max(TINY)).max(0.0), u]
+        };
+        NonlinearPart { input, bands: sums.into_iter().enumerate().map(band).collect() }
+    }
+
+    /// Whether it is that of a plant with so many inputs.
+    #[cfg(feature = "serde")]
+    pub(crate) fn is_of(&self, inputs: usize) -> bool {
+        self.input < inputs && !self.bands.is_empty()
+    }
+
+    /// Mean square of the error of the response that stays of it, relative to the response, over a third of an octave.
+    pub(crate) fn near(&self, share: f64) -> f64 {
+        let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
+        let first = self.bands.partition_point(|b| b[0] < from).min(self.bands.len() - 1);
+        let end = self.bands.partition_point(|b| b[0] <= to).max(first + 1);
+        let sum = |k: usize| self.bands[first..end].iter().map(|b| b[k]).sum::<f64>();
+        LASTING * sum(1) / sum(2).max(TINY)
+    }
+}
+
+/// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input? Beyond chance it comes
+/// with its power over frequency.
+pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence>, Option<NonlinearPart>) {
     let found = &solution.chosen.found;
     let residuals = found.point.residuals(spectra);
     let pairs = spectra.records.iter().zip(&residuals);
     let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
     let mut planner = FftPlanner::new();
     let pairs = spectra.records.iter().zip(&clean);
-    let shaped: Vec<Shaped> =
+    let mut shaped: Vec<Shaped> =
         pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
     let sizes: Vec<f64> = (0..FUNCTIONS * spectra.inputs)
         .map(|f| shaped.iter().map(|s| s.sizes[f]).sum::<f64>() / shaped.len().max(1) as f64)
         .collect();
-    let values: Vec<Vec<c64>> = shaped.into_iter().map(|s| s.columns).collect();
+    let values: Vec<Vec<c64>> = shaped.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let count = FUNCTIONS * spectra.inputs;
     let extra = Extra { count, values: &values, quick: false };
@@ -65,14 +114,13 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Vec<Evidence>
     let single = |f: usize| {
         let along: f64 = rows.clone().map(|i| factor[(i, parameters + f)] * factor[(i, parameters + count)]).sum();
         let own: f64 = rows.clone().map(|i| factor[(i, parameters + f)].powi(2)).sum();
-        if own > DISTINCT * length(parameters + f) {
-            (along / own * sizes[f], along.abs() / own.sqrt())
-        } else {
-            (0.0, 0.0)
-        }
+        if own > DISTINCT * length(parameters + f) { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
     };
     let telling = (0..count).map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-    let (f, (size, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
+    let (f, (c, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
+    let size = c * sizes[f];
+    let nonlinear_part =
+        (significance > BEYOND_CHANCE).then(|| NonlinearPart::new(spectra, &shaped, f % spectra.inputs, f, c));
     let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
     let note = format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1);
     let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance);
@@ -85,7 +133,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> Vec<Evidence>
     let share = ((statistic - behind.len() as f64).max(0.0) / moved).sqrt();
     let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
     let significance = chi_square_deviations(statistic, behind.len() as f64);
-    vec![of_size, Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance)]
+    (vec![of_size, Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance)], nonlinear_part)
 }
 
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.
@@ -104,7 +152,7 @@ fn columns(
     let model = &solution.chosen.found.point.model;
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
-    let mut sizes = vec![0.0; count];
+    let (mut sizes, mut plain) = (vec![0.0; count], vec![Vec::new(); count]);
     for j in 0..m {
         let u = in_time(lines, planner, |k| lines.u[k * m + j]);
         // velocity of the output that this input moves most
@@ -121,6 +169,7 @@ fn columns(
             let root = (lines.samples as f64).sqrt();
             let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
             planner.plan_fft_forward(lines.samples).process(&mut work);
+            plain[f * m + j] = work[1..=half].to_vec();
             for k in 0..half {
                 for i in 0..p {
                     columns[(k * p + i) * count + f * m + j] = responses[k][i * m + j] * work[k + 1];
@@ -128,7 +177,7 @@ fn columns(
             }
         }
     }
-    Shaped { columns, sizes }
+    Shaped { columns, sizes, plain }
 }
 
 /// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.

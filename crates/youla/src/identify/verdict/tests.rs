@@ -157,3 +157,38 @@ fn a_model_of_neither_half_is_no_model() {
     let test = outcome(&found, "(same model)");
     assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
 }
+
+/// The clean loop with dry friction at the input of the plant, over the standard deviation of the excitation.
+fn with_friction(level: f64) -> Identified {
+    let (g, rng) = (plant(1.0), &mut ChaCha8Rng::seed_from_u64(2));
+    let rows = CLEAN.samples;
+    let mut normal = |size: f64| Mat::from_fn(rows, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+    let (d, n) = (normal(1.0), normal(CLEAN.noise));
+    let (mut u, mut y) = (Mat::<f64>::zeros(rows, 1), Mat::<f64>::zeros(rows, 1));
+    let (mut x, mut before) = (Mat::<f64>::zeros(3, 1), 0.0);
+    for k in 0..rows {
+        let moved = (g.c() * &x)[(0, 0)];
+        y[(k, 0)] = moved + n[(k, 0)];
+        u[(k, 0)] = -0.8 * y[(k, 0)] + d[(k, 0)];
+        let acts = u[(k, 0)] - level * ((moved - before) / 0.005).tanh();
+        x = g.a() * &x + g.b() * acts;
+        before = moved;
+    }
+    let record = LoopRecord::new(time(), u, y).unwrap().with_input_excitation(d).unwrap();
+    let running = RunningController::new(controller(1.0));
+    identify(&[record], &[], &running, None, &LikelihoodOptions::default()).unwrap()
+}
+
+#[test]
+fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
+    let distortion = |found: &Identified| {
+        let region = &found.model.region;
+        let k = region.hz.partition_point(|hz| *hz < 10.0);
+        region.parts.distortion[k][(0, 0)]
+    };
+    let [none, little, much] = [0.0, 0.08, 0.5].map(with_friction);
+    assert!(none.trusted() && little.trusted(), "{:?} {:?}", none.reasons(), little.reasons());
+    let [of_none, of_little] = [&none, &little].map(distortion);
+    assert!(of_none == 0.0 && of_little > 0.005, "{of_none} {of_little}");
+    assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
+}

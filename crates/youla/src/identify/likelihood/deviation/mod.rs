@@ -20,7 +20,7 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::verdict::{Excess, Witness};
+use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
 
@@ -81,6 +81,8 @@ pub(crate) struct Directions {
     scatter: f64,
     /// The errors that the excitation shows: differences between records, and distortion.
     seen: Option<[Excess; 2]>,
+    /// What acts at an input and is no linear function of it.
+    nonlinear_part: Option<NonlinearPart>,
 }
 
 /// Mean squares of the error of each entry, by what causes them.
@@ -132,7 +134,12 @@ impl Directions {
         let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(TINY);
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
-        Directions { model, delays, chart, root, rivals, scatter: 1.0, seen: None }
+        Directions { model, delays, chart, root, rivals, scatter: 1.0, seen: None, nonlinear_part: None }
+    }
+
+    /// The same with what acts at an input and is no linear function of it.
+    pub(crate) fn with(self, nonlinear_part: Option<NonlinearPart>) -> Self {
+        Directions { nonlinear_part, ..self }
     }
 
     /// Independent errors of the parameters.
@@ -210,11 +217,16 @@ impl Directions {
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
         let seen =
             |k: usize| self.seen.as_ref().map_or_else(|| vec![0.0; entries], |seen| seen[k].near(share, entries).0);
-        let (mut variation, distortion) = (seen(0), seen(1));
+        let (mut variation, mut distortion) = (seen(0), seen(1));
         // What moved parameters explain of the differences between records is not counted twice.
         for (i, variation) in variation.iter_mut().enumerate() {
             let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();
             *variation = (*variation - moved * (1.0 - 1.0 / self.scatter)).max(0.0);
+        }
+        // It moves the outputs as the input does, and does not average out over records of the same kind.
+        if let Some(nonlinear_part) = &self.nonlinear_part {
+            let ratio = nonlinear_part.near(share);
+            (nonlinear_part.input..entries).step_by(m).for_each(|i| distortion[i] += g[i].norm_sqr() * ratio);
         }
         Columns { parameters, rivals, variation, distortion }
     }

@@ -5,7 +5,7 @@ use super::region::Region;
 use crate::identify::likelihood::data::spectra::Sizes;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::verdict::Excess;
+use crate::identify::verdict::{Excess, NonlinearPart};
 use crate::lti::Discrete;
 use faer::Mat;
 use serde::{Deserialize, Serialize};
@@ -24,6 +24,7 @@ pub(super) struct StoredRegion {
     rivals: Vec<(Model, Vec<usize>, f64)>,
     scatter: f64,
     seen: Option<[Excess; 2]>,
+    nonlinear_part: Option<NonlinearPart>,
 }
 
 /// A matrix, column by column.
@@ -64,6 +65,7 @@ impl From<Region> for StoredRegion {
             rivals: d.rivals,
             scatter: d.scatter,
             seen: d.seen,
+            nonlinear_part: d.nonlinear_part,
         }
     }
 }
@@ -86,6 +88,7 @@ impl TryFrom<StoredRegion> for Region {
         let lists = [&stored.sizes.u, &stored.sizes.y, &stored.shares];
         let fits = stored.chart.len() == stored.model.blocks.len()
             && seen
+            && stored.nonlinear_part.as_ref().is_none_or(|part| part.is_of(m))
             && lists.into_iter().all(|list| positive(list))
             && is_of_loop(&stored.model, &stored.delays)
             && stored.rivals.iter().all(|(model, delays, _)| is_of_loop(model, delays));
@@ -106,6 +109,7 @@ impl TryFrom<StoredRegion> for Region {
             rivals: stored.rivals,
             scatter: stored.scatter,
             seen: stored.seen,
+            nonlinear_part: stored.nonlinear_part,
         };
         Ok(Region::new(stored.sizes, time, &stored.shares, directions))
     }

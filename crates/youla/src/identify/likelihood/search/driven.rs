@@ -12,12 +12,15 @@ use crate::identify::likelihood::data::lanes::Lanes;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{RiccatiProblem, dare, eigenvalues};
 use faer::{Mat, Scale, c64};
+use std::f64::consts::TAU;
 
 /// Growth of a pole over all records up to which an integrator is not told from it, as a logarithm. Noise of several outputs has a state for each,
 /// of which nothing may grow beside those of the plant.
 const GROWTH: f64 = 2.0;
 /// Product of input and output of a block over the largest below which an output does not see what the inputs move there.
 const UNSEEN: f64 = 1e-8;
+/// Half width of a mode, in lines of the longest record, below which it is a line of the noise and not a peak.
+const NARROW: f64 = 0.3;
 /// About how many lines show the size of the noise.
 const LINES: usize = 6000;
 /// Steps of the logarithm of that size: the likelihood is flat to a quarter of a nat.
@@ -47,14 +50,17 @@ impl Driven {
         if poles.is_empty() || spectra.outputs > 1 && grows() {
             return None;
         }
-        let ratio = size(&lines(model, spectra, residuals, output), samples)?;
         let reach = |k: usize| {
             let (block, size) = (&model.blocks[k], |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt());
             size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
         };
         let largest = (0..model.blocks.len()).map(reach).fold(0.0, f64::max);
-        let hidden: Vec<usize> = (0..model.blocks.len()).filter(|k| reach(*k) <= UNSEEN * largest).collect();
+        let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64;
+        let narrow = |p: &c64| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU;
+        let left_out = |k: &usize| reach(*k) <= UNSEEN * largest || model.blocks[*k].poles().iter().any(narrow);
+        let hidden: Vec<usize> = (0..model.blocks.len()).filter(left_out).collect();
         let seen = model.without(&hidden);
+        let ratio = size(&lines(&seen, spectra, residuals, output), samples)?;
         let (a, b, c) = seen.matrices();
         let c = c.subrows(output, 1).to_owned();
         let q = &b * b.transpose() * Scale(ratio);
@@ -63,7 +69,7 @@ impl Driven {
         let k = dare("the noise", &dual).ok()?.gain.transpose().to_owned();
         let zeros = eigenvalues("the noise", (&a - &k * &c).as_ref()).ok()?;
         let mirrored = |p: c64| if p.norm() > 1.0 { p / p.norm_sqr() } else { p };
-        let unstable = poles.iter().map(|p| p.norm().max(1.0)).product();
+        let unstable = seen.poles().iter().map(|p| p.norm().max(1.0)).product();
         let [over, under] = [seen.poles().into_iter().map(mirrored).collect(), zeros].map(quadratics);
         let sections = over.iter().zip(&under).map(|(o, u)| [o[0], o[1], u[0], u[1]]).collect();
         let (mut gain, mut at) = (Vec::with_capacity(model.order()), 0);

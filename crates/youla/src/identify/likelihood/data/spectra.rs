@@ -43,6 +43,8 @@ pub(crate) struct Lines {
     pub(crate) z: Vec<c64>,
     /// Root of the number of lines of the full circle for which the line stands: sqrt 2, or 1 at the Nyquist frequency.
     pub(crate) weight: Vec<f64>,
+    /// The square of the weight, or the share of a row in the squares of the weights of its group of lines.
+    pub(crate) share: Vec<f64>,
     /// What multiplies the share of the ends: 1, or that of a row of a group of lines.
     pub(crate) ends: Vec<c64>,
     /// Input, lines x m, row by row, scaled by 1 / sqrt(N).
@@ -54,7 +56,15 @@ pub(crate) struct Lines {
 impl Lines {
     /// None of a record of so many samples.
     pub(crate) fn new(samples: usize) -> Self {
-        Lines { samples, z: Vec::new(), weight: Vec::new(), ends: Vec::new(), u: Vec::new(), y: Vec::new() }
+        Lines {
+            samples,
+            z: Vec::new(),
+            weight: Vec::new(),
+            share: Vec::new(),
+            ends: Vec::new(),
+            u: Vec::new(),
+            y: Vec::new(),
+        }
     }
 
     /// Appends a line of others with the same channels.
@@ -65,6 +75,7 @@ impl Lines {
         };
         self.z.push(from.z[k]);
         self.weight.push(from.weight[k]);
+        self.share.push(from.share[k]);
         self.ends.push(from.ends[k]);
         self.u.extend(of(&from.u));
         self.y.extend(of(&from.y));
@@ -100,6 +111,7 @@ impl Spectra {
                 samples,
                 z: (1..=count).map(|k| c64::cis(std::f64::consts::TAU * k as f64 / samples as f64)).collect(),
                 weight: (1..=count).map(|k| if 2 * k == samples { 1.0 } else { 2.0_f64.sqrt() }).collect(),
+                share: (1..=count).map(|k| if 2 * k == samples { 1.0 } else { 2.0 }).collect(),
                 ends: vec![c64::ONE; count],
                 u: vec![c64::ZERO; count * m],
                 y: vec![c64::ZERO; count * p],
@@ -136,6 +148,7 @@ impl Spectra {
                 let place = |line: f64| (line.max(1.0) as usize - 1).min(lines.weight.len());
                 let (first, end) = (place((at - half).ceil()), place((at + half).floor() + 1.0));
                 lines.weight[first..end].fill(0.0);
+                lines.share[first..end].fill(0.0);
             }
         }
         self

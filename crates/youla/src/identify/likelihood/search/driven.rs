@@ -101,17 +101,18 @@ impl Driven {
     }
 }
 
-/// Of some of the lines how many each stands for, power of the residual, and `|G_i|^2`.
+/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2`.
 fn lines(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Vec<[f64; 3]> {
     let (p, m) = (spectra.outputs, spectra.inputs);
     let strictly = Model { d: vec![0.0; p * m], ..model.clone() };
-    let every = (spectra.samples() / 2).div_ceil(LINES).max(1);
+    let every = spectra.lines().div_ceil(LINES).max(1);
     let mut out = Vec::with_capacity(LINES);
     for (lines, v) in spectra.records.iter().zip(residuals) {
         for k in (0..lines.z.len()).step_by(every) {
             let g = strictly.response(lines.z[k]);
             let gain = g[output * m..(output + 1) * m].iter().map(|g| g.norm_sqr()).sum::<f64>();
-            out.push([lines.weight[k].powi(2) * every as f64, v[k * p + output].norm_sqr(), gain]);
+            let (count, power) = (lines.share[k], lines.weight[k].powi(2) * v[k * p + output].norm_sqr());
+            out.push([count * every as f64, power * every as f64, gain]);
         }
     }
     out
@@ -121,11 +122,11 @@ fn lines(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize
 fn size(lines: &[[f64; 3]], samples: f64) -> Option<f64> {
     let cost = |ratio: f64| {
         let (mut power, mut logarithms, mut count) = (0.0, 0.0, 0.0);
-        for [weight, v, gain] in lines {
+        for [of, energy, gain] in lines {
             let shape = 1.0 + ratio * gain;
-            power += weight * v / shape;
-            logarithms += weight * shape.ln();
-            count += weight;
+            power += energy / shape;
+            logarithms += of * shape.ln();
+            count += of;
         }
         count * (power / count).ln() + logarithms
     };

@@ -73,6 +73,7 @@ fn put(out: &mut Lines, lines: &Lines, v: &[c64], group: Range<usize>) {
             (0..=j).for_each(|i| gram[(i, j)] += row[i].conj() * row[j]);
         }
     }
+    let share = group.clone().map(|k| lines.share[k]).sum::<f64>() / q as f64;
     let least: Vec<f64> = (0..q).map(|i| DEPENDENT * gram[(i, i)].re).collect();
     let middle = lines.z[(group.start + group.end - 1) / 2];
     for i in 0..q {
@@ -84,6 +85,7 @@ fn put(out: &mut Lines, lines: &Lines, v: &[c64], group: Range<usize>) {
         }
         out.z.push(middle);
         out.weight.push(1.0);
+        out.share.push(share);
         out.u.extend_from_slice(&row[..m]);
         out.ends.push(row[m]);
         out.y.extend_from_slice(&row[m + 1..]);

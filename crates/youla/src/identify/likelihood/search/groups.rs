@@ -20,6 +20,9 @@ use std::ops::Range;
 const WIDTH: f64 = 0.25;
 /// Largest such distance, rad per sample: autoregressions of the noise have 40 coefficients.
 const FARTHEST: f64 = 0.04;
+/// Lines of which groups are made, at least: on fewer a search costs little, and its start may be so far away that groups lead it to a neighbour of
+/// a narrow mode.
+const MANY: usize = 5000;
 /// Lines for each row of a group, and for each that is left in all, at least.
 const LEAST: usize = 2;
 /// Share of a column that is left of it below which it depends on those before it.
@@ -28,7 +31,7 @@ const DEPENDENT: f64 = 1e-12;
 /// The lines in groups around a point, for modes with damping ratios from `damping` on beside those of its model; `None` where they are not many fewer.
 pub(crate) fn grouped(spectra: &Spectra, point: &Point, damping: f64) -> Option<Spectra> {
     let (all, rows) = (spectra.lines(), spectra.inputs + 1 + spectra.outputs);
-    if all < 2 * LEAST * rows * spectra.records.len() {
+    if all < MANY.max(2 * LEAST * rows * spectra.records.len()) {
         return None;
     }
     let poles = point.model.poles();
@@ -76,9 +79,9 @@ fn put(out: &mut Lines, lines: &Lines, v: &[c64], group: Range<usize>) {
     let share = group.clone().map(|k| lines.share[k]).sum::<f64>() / q as f64;
     let least: Vec<f64> = (0..q).map(|i| DEPENDENT * gram[(i, i)].re).collect();
     let middle = lines.z[(group.start + group.end - 1) / 2];
-    for i in 0..q {
+    for (i, least) in least.into_iter().enumerate() {
         let square = gram[(i, i)].re;
-        let scale = if square > least[i] { 1.0 / square.sqrt() } else { 0.0 };
+        let scale = if square > least { 1.0 / square.sqrt() } else { 0.0 };
         (0..q).for_each(|j| row[j] = if j < i { c64::ZERO } else { gram[(i, j)] * scale });
         for j in i + 1..q {
             (i + 1..=j).for_each(|l| gram[(l, j)] -= row[l].conj() * row[j]);

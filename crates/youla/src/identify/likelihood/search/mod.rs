@@ -65,7 +65,7 @@ const STEPS_TO_AIM: f64 = 20.0;
 pub(crate) const DAMPED: f64 = 0.4;
 /// Steps on groups from which they are made anew: a start that moves less is near enough to them.
 const REGROUPED: usize = 2;
-/// Steps on all lines behind those on groups, at most.
+/// Steps that are left for all lines behind those on groups, at least: most searches take none or one there.
 const LAST: usize = 5;
 /// Diagonal of the factor, relative to the largest, below which the records do not determine a direction: rounding of a sum of squares.
 const UNDETERMINED: f64 = 1e-10;

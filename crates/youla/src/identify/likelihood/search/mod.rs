@@ -65,6 +65,8 @@ const STEPS_TO_AIM: f64 = 20.0;
 pub(crate) const DAMPED: f64 = 0.4;
 /// Steps on groups from which they are made anew: a start that moves less is near enough to them.
 const REGROUPED: usize = 2;
+/// Share of the gain that groups promise which all lines must show. Chosen: within it the slopes of groups are those of lines.
+const KEPT: f64 = 0.5;
 /// Steps that are left for all lines behind those on groups, at least: most searches take none or one there.
 const LAST: usize = 5;
 /// Diagonal of the factor, relative to the largest, below which the records do not determine a direction: rounding of a sum of squares.
@@ -138,14 +140,25 @@ pub(crate) fn search(spectra: &Spectra, start: Point, options: &SearchOptions) -
     Some(Found { steps: near.steps + found.steps, ..found })
 }
 
-/// The same on groups of lines alone, which are made anew while the search moves; `None` also where there are no groups.
+/// The same on groups of lines alone, which are made anew while the search moves; `None` also where there are no groups, and where all lines do
+/// not gain what groups promise: beside large and slow motion a small change of the model leaves more than the noise.
 pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOptions) -> Option<Found> {
     let (mut reached, mut steps): (Option<Found>, usize) = (None, 0);
+    let mut before = f64::INFINITY;
     while steps < options.steps {
         let point = reached.as_ref().map_or(start, |found| &found.point);
         let Some(groups) = grouped(spectra, point, DAMPED) else { break };
+        if before.is_infinite() {
+            before = cost(spectra, point, options).0;
+        }
         let options = SearchOptions { steps: options.steps - steps, ..options.clone() };
+        let promised = cost(&groups, point, &options).0;
         let found = on_lines(&groups, point.clone(), &options)?;
+        let after = cost(spectra, &found.point, &options).0;
+        if (before - after).is_nan() || before - after < KEPT * (promised - found.deviance) - options.tolerance {
+            break;
+        }
+        before = after;
         let moved = found.steps;
         steps += moved;
         reached = Some(Found { steps, ..found });
@@ -156,15 +169,17 @@ pub(crate) fn on_groups(spectra: &Spectra, start: &Point, options: &SearchOption
     reached
 }
 
+/// What a search makes small, and the noise of the point.
+fn cost(spectra: &Spectra, point: &Point, options: &SearchOptions) -> (f64, Noise) {
+    let (value, noise) = deviance(spectra, point, options.noise_order);
+    (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
+}
+
 /// The same on lines as they are.
 fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<Found> {
     let mut point = reblocked(&start)?;
-    let cost_of = |point: &Point| {
-        let (value, noise) = deviance(spectra, point, options.noise_order);
-        (value - 2.0 * spectra.samples() as f64 * feedthrough::log_loop(&point.model, &options.direct), noise)
-    };
-    let (mut cost, mut noise) = cost_of(&point);
-    if !cost.is_finite() {
+    let (mut least, mut noise) = cost(spectra, &point, options);
+    if !least.is_finite() {
         return None;
     }
     let (mut damping, mut steps) = (Damping::new(FIRST_DAMPING), 0);
@@ -182,25 +197,25 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
             }
             let trial = moved(&point, &chart, &ends, &step);
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
-            let (value, noise) = cost_of(&trial);
-            if value < cost && (options.radius.is_infinite() || inside()) {
-                return Trial::Lower { point: (trial, value, noise), ratio: (cost - value) / promised };
+            let (value, noise) = cost(spectra, &trial, options);
+            if value < least && (options.radius.is_infinite() || inside()) {
+                return Trial::Lower { point: (trial, value, noise), ratio: (least - value) / promised };
             }
             Trial::Rejected
         });
         let Some((trial, value, lower_noise)) = lower else { break };
         steps += 1;
-        let gain = cost - value;
-        (point, cost, noise) = (reblocked(&trial)?, value, lower_noise);
+        let gain = least - value;
+        (point, least, noise) = (reblocked(&trial)?, value, lower_noise);
         if gain < options.tolerance {
             break;
         }
         let penalty = penalty(parameters + noise.parameters(), spectra.samples(), &point);
-        if steps >= 3 && cost + penalty - options.aim > STEPS_TO_AIM * gain {
+        if steps >= 3 && least + penalty - options.aim > STEPS_TO_AIM * gain {
             break;
         }
     }
-    Some(Found { point, noise, deviance: cost, parameters, steps, feedthrough: options.feedthrough })
+    Some(Found { point, noise, deviance: least, parameters, steps, feedthrough: options.feedthrough })
 }
 
 /// Blocks formed anew, the ends of the records carried along as if they were inputs.

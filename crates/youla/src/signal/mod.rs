@@ -13,6 +13,7 @@ mod periodic;
 mod persistency;
 mod record;
 mod spectrum;
+mod transform;
 
 pub use channel::{Channel, unknown};
 pub use detrend::{Detrend, Detrended, Trend};
@@ -27,3 +28,4 @@ pub(crate) use periodic::{Excited, inverse, output_rest};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, Segments, SplitRecord};
 pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
+pub(crate) use transform::of_two_real;

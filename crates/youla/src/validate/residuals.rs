@@ -12,6 +12,7 @@
 //! Source: L. Ljung, System Identification, 2nd ed. (1999), section 16.6; M. S. Bartlett, J. R. Stat. Soc. B 8 (1946), 27.
 
 use crate::linalg::check_shape;
+use crate::signal::of_two_real;
 use crate::statistics::normal_quantile;
 use crate::{MatRef, Result};
 use faer::ColRef;
@@ -156,11 +157,7 @@ impl Transform {
             let mut both: Vec<_> = first.into_iter().zip(second).map(|(a, b)| Complex::new(a, b)).collect();
             both.resize(length, Complex::default());
             fft.process(&mut both);
-            let back = |k: usize| both[(length - k) % length].conj();
-            let parts = [(1.0, Complex::new(0.5, 0.0)), (-1.0, Complex::new(0.0, -0.5))];
-            let of =
-                |(sign, scale): (f64, Complex<f64>)| (0..length).map(|k| (both[k] + back(k) * sign) * scale).collect();
-            spectra.extend(parts.into_iter().take(pair.len()).map(of));
+            spectra.extend((0..pair.len()).map(|of| (0..length).map(|k| of_two_real(&both, k, 0.5)[of]).collect()));
         }
         spectra
     }

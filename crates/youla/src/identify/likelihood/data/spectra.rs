@@ -9,6 +9,7 @@
 //! is a ramp, and t holds it. Nothing is subtracted from the data.
 
 use crate::identify::subspace::Experiment;
+use crate::signal::of_two_real;
 use faer::{Mat, MatRef, c64};
 use rayon::prelude::*;
 use rustfft::FftPlanner;
@@ -128,9 +129,9 @@ impl Spectra {
                     Some(_) => {}
                 };
                 for k in 1..=count {
-                    let (ahead, back) = (work[k], work[samples - k].conj());
-                    put(j, k, (ahead + back) * half);
-                    put(j + 1, k, (ahead - back) * c64::new(0.0, -half));
+                    let [first, second] = of_two_real(&work, k, half);
+                    put(j, k, first);
+                    put(j + 1, k, second);
                 }
             }
             lines

@@ -6,9 +6,9 @@
 
 use crate::*;
 use std::collections::{BTreeMap, HashSet};
+use std::format;
 use std::string::String;
 use std::vec::Vec;
-use std::{format, println};
 use youla_rt::{Controller, ExcitedLoop, Limits, Matrices, Phase};
 
 type Small = Station<'static, 1, 1, 1, 1>;
@@ -219,7 +219,6 @@ fn every_order_of_events() {
     ] {
         states += explore(scripts, DEPTH, &mut counts);
     }
-    println!("{states} states, {counts:#?}");
     assert_eq!(counts.len(), 10, "{counts:?}");
     assert!(states > 10_000, "{states}");
 }

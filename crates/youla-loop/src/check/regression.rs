@@ -22,7 +22,7 @@ pub(super) const AHEAD: usize = 3;
 /// Rows of one task; fixed, so that the result does not depend on the number of threads.
 /// Chosen, not measured.
 const CHUNK: usize = 8192;
-/// Rows of a factor, about: more tell no model from another that these do not. They are taken from every chunk.
+/// Rows of a factor, about: they distinguish all models that more rows would. They are taken from every chunk.
 /// The 99 columns of a single loop then have 300 rows each. Chosen, not measured.
 const FACTORED: usize = 30_000;
 /// Most columns of past samples.

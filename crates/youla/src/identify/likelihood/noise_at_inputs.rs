@@ -44,6 +44,13 @@ fn unscaled(u: &Mat<f64>, y: &Mat<f64>) -> Spectra {
     Spectra::new(&[Experiment::new(u.as_ref(), y.as_ref())], &sizes, &[0], 0)
 }
 
+/// -2 log likelihood and noise of the machine itself.
+fn of_the_machine(u: &Mat<f64>, y: &Mat<f64>) -> (f64, Noise) {
+    let (spectra, plant) = (unscaled(u, y), machine(0.98));
+    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
+    deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40)
+}
+
 /// `|G|^2` at one line.
 fn gain(plant: &StateSpace<Discrete>, share: f64) -> f64 {
     let omega = std::f64::consts::TAU * share / plant.time().ts();
@@ -53,11 +60,9 @@ fn gain(plant: &StateSpace<Discrete>, share: f64) -> f64 {
 #[test]
 fn the_likelihood_of_noise_at_the_input_is_that_of_its_spectrum() {
     let (u, y) = record(0.3, 0.02, 1);
-    let spectra = unscaled(&u, &y);
-    let plant = machine(0.98);
-    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
-    let (value, noise) = deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40);
+    let (value, noise) = of_the_machine(&u, &y);
     assert!(noise.regression[0].driven.is_some());
+    let plant = machine(0.98);
     let lines = 1..SAMPLES;
     let expected: f64 =
         lines.map(|k| (0.02_f64.powi(2) + 0.3_f64.powi(2) * gain(&plant, k as f64 / SAMPLES as f64)).ln()).sum();
@@ -67,10 +72,7 @@ fn the_likelihood_of_noise_at_the_input_is_that_of_its_spectrum() {
 #[test]
 fn white_noise_at_the_output_is_none_at_the_input() {
     let (u, y) = record(0.0, 0.02, 2);
-    let spectra = unscaled(&u, &y);
-    let plant = machine(0.98);
-    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
-    let (_, noise) = deviance(&spectra, &with_best_ends(&spectra, model, &Noise::white(1)), 40);
+    let (_, noise) = of_the_machine(&u, &y);
     assert!(noise.regression[0].driven.is_none());
 }
 

@@ -19,11 +19,13 @@ use youla::validate::margin_intervals;
 use youla::{Result, c64};
 
 const QUANTILE: f64 = 1.96;
+/// A margin below it is zero: a controller that integrates loses the loop of a stable plant at gain 0, whatever the plant.
+const ROUNDING: f64 = 1e-9;
 
 /// Errors over stated deviations: frequency and damping of each mode of the truth, magnitudes; none where the mode is missed.
 fn errors(system: &Loop, found: &Recommendation) -> Result<[Vec<Option<f64>>; 3]> {
     let (mut hz, mut zeta) = (Vec::new(), Vec::new());
-    for truth in system.plant.modes()?.iter().filter(|m| m.hz.is_finite()) {
+    for truth in system.plant.modes()?.iter().filter(|m| m.hz.is_finite() && m.hz > 0.0) {
         let apart = |m: &&ModeEstimate| (m.mode.pole - truth.pole).norm();
         let near = found.modes.iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
         let near = near.filter(|m| (m.mode.hz / truth.hz).ln().abs() < 0.2);
@@ -52,7 +54,7 @@ fn margin_errors(system: &Loop, found: &Recommendation) -> Result<Vec<(&'static 
     let truth = LinearMargins::new(&system.plant, &system.controller, None)?.deviations(|_| Vec::new())?;
     let stated = margin_intervals(&found.plant, &system.controller, &found.region, None, 0.95)?;
     let error = |(name, exact): (&&'static str, Option<(f64, f64)>)| {
-        let (exact, _) = exact.filter(|(value, _)| value.is_finite())?;
+        let (exact, _) = exact.filter(|(value, _)| value.is_finite() && value.abs() > ROUNDING)?;
         let near = stated.iter().find(|m| m.name == *name);
         Some((*name, near.map(|m| (m.interval.value - exact) / m.interval.deviation)))
     };

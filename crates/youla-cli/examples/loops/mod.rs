@@ -54,14 +54,18 @@ fn delayed(plant: &StateSpace<Discrete>, samples: usize) -> Result<StateSpace<Di
     StateSpace::new(a, b, c, Mat::zeros(1, 1), plant.time())
 }
 
-/// -(kp + kd (1 - z^-1) + ki z^-1 / (1 - z^-1)) for each channel.
+/// -(kp + kd (1 - z^-1) + ki z^-1 / (1 - z^-1)) for each channel; without ki no state of an integral, which nothing would stabilise.
 fn pid(channels: usize, [kp, ki, kd]: [f64; 3], ts: f64) -> Result<StateSpace<Discrete>> {
-    let n = 2 * channels;
+    let each = if ki == 0.0 { 1 } else { 2 };
+    let n = each * channels;
     let mut a = Mat::zeros(n, n);
     let (mut b, mut c, mut d) = (Mat::zeros(n, channels), Mat::zeros(channels, n), Mat::zeros(channels, channels));
     for k in 0..channels {
-        (a[(2 * k, 2 * k)], b[(2 * k, k)], b[(2 * k + 1, k)]) = (1.0, 1.0, 1.0);
-        (c[(k, 2 * k)], c[(k, 2 * k + 1)], d[(k, k)]) = (-ki, kd, -kp - kd);
+        (b[(each * k, k)], c[(k, each * k)], d[(k, k)]) = (1.0, kd, -kp - kd);
+        if ki != 0.0 {
+            let sum = each * k + 1;
+            (a[(sum, sum)], b[(sum, k)], c[(k, sum)]) = (1.0, 1.0, -ki);
+        }
     }
     StateSpace::new(a, b, c, d, Discrete::new(ts)?)
 }
@@ -123,7 +127,7 @@ pub(crate) fn loops() -> Result<Vec<Loop>> {
             name: "drive with dead time, PI, coloured noise",
             plant: delayed(&modal(&[(6.0, 0.5, &[1.0, 1.0]), (70.0, 0.015, &[0.3, 0.4])], (1, 1), 1e-3)?, 3)?,
             dead_time: 3,
-            controller: pid(1, [0.3, 0.01, 0.0], 1e-3)?,
+            controller: pid(1, [0.2, 0.01, 0.0], 1e-3)?,
             noise: 0.05,
             colour: 0.9,
             hz: [1.0, 4.0, 10.0, 40.0, 75.0],

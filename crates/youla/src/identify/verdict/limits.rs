@@ -17,9 +17,9 @@ pub(crate) const LEAST_MOVED: f64 = 30.0;
 pub(crate) const BAND_RATIO: f64 = 1.122;
 /// Least number of bands in a window.
 pub(crate) const LEAST_BANDS: usize = 5;
-/// Standard deviations beyond chance from which one of the windows of a record shows an error. Of 100 independent windows with the tails of
-/// chi-square of 10 degrees of freedom one exceeds 4.5 in one of 40 records.
-pub(crate) const LOCAL_CHANCE: f64 = 4.5;
+/// Standard deviations beyond chance from which one of the windows of a record shows an error. Of 100 independent windows one exceeds
+/// 4.0 in one of 300 records.
+pub(crate) const LOCAL_CHANCE: f64 = 4.0;
 /// The same where the errors of all windows together exceed chance by as much.
 pub(crate) const OVERALL_CHANCE: f64 = 3.0;
 

@@ -67,7 +67,8 @@ fn identify_and_write(
     let found = identify(settings, records, folder, &mut clock)?;
     let written = write_into(&found, place, &mut clock)?;
     progress.clear();
-    form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))
+    form.print(|| serde_json::json!(written.summary), || table::results(&found, &written))?;
+    found.pid_reservation().map_or(Ok(()), |why| Err(Failure::Refused(why, youla::ErrorKind::Numerical)))
 }
 
 fn signals(form: Form, settings: &Path, out: &Path) -> Result<(), Failure> {

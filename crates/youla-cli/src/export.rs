@@ -3,8 +3,8 @@
 use crate::output::{Failure, Form};
 use clap::Args;
 use std::path::PathBuf;
-use youla_io::export::{ModelFormat, c_controller, c_loop, export_model, write_export};
-use youla_run::{controller_for_export, loop_for_export, model_for_export};
+use youla_io::export::{ModelFormat, PidForm, c_controller, c_loop, export_model, export_pid, write_export};
+use youla_run::{controller_for_export, loop_for_export, model_for_export, pid_for_export};
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -22,7 +22,8 @@ pub(crate) struct ExportArgs {
     #[arg(value_name = "RUN|MODEL")]
     source: PathBuf,
     /// mat, json, npz, python, matlab, c (C99 header of the model), c-controller (C99 header of the controller of a run with the
-    /// ports alpha and beta) or c-loop (C99 header of the whole loop of a firmware: guard, excitation, exchangeable Q).
+    /// ports alpha and beta) or c-loop (C99 header of the whole loop of a firmware: guard, excitation, exchangeable Q); of a new PID st (IEC
+    /// 61131-3 structured text), c-pid (C99 header) or gains (parallel, ideal, series, MATLAB, Simulink).
     #[arg(long, value_name = "FORMAT", value_parser = format)]
     to: Format,
     /// Model of the run: recommended by default, or hansen, hansen_reduced, direct, grey_box, deviation, nominal, controller, new_controller,
@@ -46,6 +47,7 @@ enum Format {
     Model(ModelFormat),
     Controller,
     Loop,
+    Pid(PidForm),
 }
 
 const CONTROLLER: &str = "c-controller";
@@ -57,7 +59,11 @@ fn format(name: &str) -> Result<Format, String> {
         LOOP => return Ok(Format::Loop),
         _ => {}
     }
-    let known: Vec<&str> = ModelFormat::ALL.iter().map(|format| format.key()).chain([CONTROLLER, LOOP]).collect();
+    if let Some(form) = PidForm::ALL.into_iter().find(|form| form.key() == name) {
+        return Ok(Format::Pid(form));
+    }
+    let models = ModelFormat::ALL.iter().map(|format| format.key());
+    let known: Vec<&str> = models.chain([CONTROLLER, LOOP]).chain(PidForm::ALL.map(PidForm::key)).collect();
     let found = ModelFormat::ALL.into_iter().find(|format| format.key() == name);
     found.map(Format::Model).ok_or_else(|| format!("there is no such format; known are {}", known.join(", ")))
 }
@@ -65,9 +71,12 @@ fn format(name: &str) -> Result<Format, String> {
 /// Writes the file and says which.
 pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
     let misplaced = match args.to {
-        Format::Model(_) | Format::Loop if args.q.is_some() => Some("--q serves --to c-controller only"),
+        Format::Model(_) | Format::Loop | Format::Pid(_) if args.q.is_some() => {
+            Some("--q serves --to c-controller only")
+        }
         Format::Controller if args.model.is_some() => Some("--model does not serve --to c-controller; give a Q by --q"),
         Format::Loop if args.model.is_some() => Some("--model does not serve --to c-loop"),
+        Format::Pid(_) if args.model.is_some() => Some("--model does not serve the exports of a new PID"),
         _ => None,
     };
     if let Some(problem) = misplaced {
@@ -96,6 +105,13 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
                 "model": export.name, "order": export.observer.model.a.len(), "inputs": export.measured, "outputs": export.commanded,
             });
             (c_loop(&export)?.into_bytes(), file_name(&export.name, "h"), about)
+        }
+        Format::Pid(form) => {
+            let pid = pid_for_export(&args.source)?;
+            let about = serde_json::json!({
+                "model": "pid", "order": 2 + 2 * pid.notches.len(), "inputs": [&pid.measured], "outputs": [&pid.commanded],
+            });
+            (export_pid(&pid, form).into_bytes(), file_name("pid", form.extension()), about)
         }
     };
     let path = args.out.clone().unwrap_or(default);

@@ -26,6 +26,14 @@ pub enum Error {
         /// The reason for each weight.
         reasons: String,
     },
+    /// No PID meets the limits at every drawn model.
+    #[error(
+        "no PID meets the limits at every model of the region: {reason}; relax the limit in [redesign.pid], or allow other terms or more notches"
+    )]
+    NoPid {
+        /// What stops the nearest.
+        reason: String,
+    },
     /// The predicted response to an excitation exceeds a limit.
     #[error(
         "the predicted magnitude of {channel} is {predicted:.4}{unit}, above its limit of {limit}{unit}; the largest permitted {}",
@@ -47,7 +55,7 @@ pub enum Error {
 
 youla::error_context! {
     sources: Method;
-    numerical: NoRedesign;
+    numerical: NoRedesign NoPid;
     bad_input: BeyondLimit;
 }
 

@@ -228,7 +228,10 @@ impl Run {
         match key {
             "controller" => Some(self.found.declared.controller()),
             "deviation" => Some(&scheme?.deviation.model),
-            "new_controller" => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
+            "new_controller" => match &self.found.pid {
+                Some(pid) => Some(&pid.as_ref().ok()?.system),
+                None => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
+            },
             key => Some(&self.found.verdict.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
         }
     }

@@ -18,6 +18,7 @@ use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
 use youla::signal::IndirectResponse;
 use youla_loop::redesign::Redesign;
+use youla_loop::redesign::structured::PidRedesign;
 
 /// Everything that a run found. A method that is impossible does not end the run: its field holds the reason.
 #[derive(Debug)]
@@ -46,6 +47,8 @@ pub struct Identification {
     pub grey_box_uncertainty: Option<SystemUncertainty>,
     /// The new controller where it was asked for.
     pub redesign: Option<Result<Redesign>>,
+    /// The new PID where one was asked for.
+    pub pid: Option<Result<PidRedesign>>,
     /// The direct model where it was asked for.
     pub direct: Option<Result<SubspaceModel>>,
     /// The non-parametric response of the plant where an excitation is known.
@@ -92,6 +95,7 @@ impl Identification {
             refusal("indirect", "indirect frequency response", self.indirect.as_ref()),
             refusal("lines", "response at the lines of the excitation", self.lines.as_ref()),
             refusal("redesign", "new controller", self.redesign.as_ref()),
+            refusal("pid", "new PID", self.pid.as_ref()),
         ]
         .into_iter()
         .flatten()
@@ -126,6 +130,21 @@ impl Identification {
     /// The new controller, where there is one.
     pub(crate) fn new_controller(&self) -> Option<&Redesign> {
         found(self.redesign.as_ref())
+    }
+
+    /// The new PID, where there is one.
+    pub(crate) fn new_pid(&self) -> Option<&PidRedesign> {
+        found(self.pid.as_ref())
+    }
+
+    /// Why the new PID that was asked for is not there or should not be taken.
+    pub fn pid_reservation(&self) -> Option<String> {
+        let asked = self.settings.redesign.as_ref().is_some_and(|r| r.structure.is_some());
+        match self.pid.as_ref() {
+            None => asked.then(|| "[redesign] structure needs the recommended model, which this run lacks".to_owned()),
+            Some(Err(error)) => Some(error.to_string()),
+            Some(Ok(new)) => Some(new.reservations().join("; ")).filter(|reasons| !reasons.is_empty()),
+        }
     }
 
     /// The uncertainty of a model beside the recommended one.

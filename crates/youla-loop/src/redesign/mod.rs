@@ -13,6 +13,7 @@
 mod figures;
 mod lqg;
 mod robust;
+pub mod structured;
 mod youla_parameter;
 
 pub use figures::{LoopFigures, least_damping, loop_modes};
@@ -21,6 +22,7 @@ pub use robust::DeviationRegion;
 
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
+use structured::{PidOptions, Structure};
 use youla::control::{closed_loop, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::Region;
@@ -69,6 +71,12 @@ pub struct RedesignOptions {
     /// Models that are drawn from the region of the plant for the final test; not a key of run.toml.
     #[serde(skip)]
     pub band: BandOptions,
+    /// A fixed structure in which the controller is designed, in place of `method`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub structure: Option<Structure>,
+    /// Parts and limits of a PID, for `structure = "pid"`.
+    #[serde(skip_serializing_if = "PidOptions::is_default")]
+    pub pid: PidOptions,
 }
 
 impl Default for RedesignOptions {
@@ -80,6 +88,8 @@ impl Default for RedesignOptions {
             peak_sensitivity: 3.0,
             small_gain: 0.9,
             band: BandOptions::default(),
+            structure: None,
+            pid: PidOptions::default(),
         }
     }
 }

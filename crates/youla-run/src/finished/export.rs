@@ -3,15 +3,17 @@
 use crate::folder::artefacts::{Provenance, SCHEMA};
 use crate::records::SourceFile;
 use crate::settings::RunSettings;
+use crate::summary::pid::PidEntry;
 use crate::{Error, Result};
 use std::path::{Path, PathBuf};
 use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::unknown;
 use youla_io::export::{
-    ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, model_from_bytes, read_model,
+    ControllerExport, ExportedController, LoopExport, NamedModel, ObserverData, PidExport, model_from_bytes, read_model,
 };
 use youla_io::sha256;
+use youla_loop::redesign::structured::{Discretisation, Notch};
 
 /// The model files of a run folder; the first that is there is what a run is exported as.
 const MODELS: [&str; 11] = [
@@ -82,6 +84,42 @@ pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerE
 /// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a source whose controller is no observer.
 pub fn loop_for_export(source: &Path) -> Result<LoopExport> {
     if source.is_dir() { loop_of_run(source) } else { loop_of_redesign(source) }
+}
+
+/// The new PID of a run.
+///
+/// # Errors
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a run without a new PID.
+pub fn pid_for_export(run: &Path) -> Result<PidExport> {
+    require_run(run)?;
+    let path = run.join("8-redesign/pid.json");
+    if !path.is_file() {
+        return Err(not(
+            run,
+            "this run has no new PID; add structure = \"pid\" to [redesign] and run `youla identify` again",
+        ));
+    }
+    let found: PidEntry = serde_json::from_slice(&youla_io::read_bytes(&path)?)
+        .map_err(|source| Error::NotASummary { path: path.clone(), source })?;
+    let model = read_model(run.join("8-redesign/new_controller.json"))?;
+    let (c, ts) = (&found.controller, model.system.time().ts());
+    let [(ki, i, _), (kd, d, lag)] = c.gains.parts(ts);
+    let notch = |n: &Notch| ([n.hz, n.width, n.depth], n.coefficients(ts));
+    Ok(PidExport {
+        measured: model.inputs[0].clone(),
+        commanded: model.outputs[0].clone(),
+        ts,
+        kp: c.gains.kp,
+        ki,
+        kd,
+        derivative_filter: c.gains.derivative_filter,
+        tustin: c.gains.discretisation == Discretisation::Tustin,
+        integral: i.map(|b| ki * b),
+        derivative: if kd == 0.0 { [0.0; 2] } else { [kd * d[0] / lag[0], -lag[1] / lag[0]] },
+        notches: c.notches.iter().map(notch).collect(),
+        delay: c.delay,
+        origin: origin(run, &path)?,
+    })
 }
 
 fn loop_of_run(run: &Path) -> Result<LoopExport> {

@@ -13,6 +13,7 @@ use crate::summary::robustness::{ScalesEntry, scales};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use youla::control::Margins;
+use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::signal::LoopRecord;
 use youla::validate::RESIDUAL_LAGS;
@@ -115,15 +116,23 @@ impl<'a> From<&'a [ModelVerdict]> for ResidualsFile<'a> {
 
 /// The controller as `youla-rt` takes it.
 pub(crate) fn exported(records: &RunRecords, redesign: &Redesign) -> ExportedController {
-    let (u, y) = (records.inputs.clone(), records.outputs.clone());
     let new = &redesign.controller;
     ExportedController {
-        method: redesign.method.key().into(),
-        ts: new.system.time().ts(),
-        measured: y,
-        commanded: u,
-        controller: SystemMatrices::new(&new.system),
         observer: new.gains.as_ref().map(|g| ObserverData::new(&g.model, g.f.as_ref(), g.l.as_ref())),
         q: new.q.as_ref().map(SystemMatrices::new),
+        ..plain(records, redesign.method.key(), &new.system)
+    }
+}
+
+/// A controller that is a system and nothing else.
+pub(crate) fn plain(records: &RunRecords, method: &str, system: &StateSpace<Discrete>) -> ExportedController {
+    ExportedController {
+        method: method.into(),
+        ts: system.time().ts(),
+        measured: records.outputs.clone(),
+        commanded: records.inputs.clone(),
+        controller: SystemMatrices::new(system),
+        observer: None,
+        q: None,
     }
 }

@@ -10,16 +10,18 @@ mod uncertainty;
 use crate::folder::artefacts::{ModelFile, Provenance, SCHEMA};
 use crate::folder::subspace_details::SubspaceDetails;
 use crate::folder::uncertainty::UncertaintyFile;
+use crate::page::pid;
 use crate::page::redesign::{figure, loops};
 use crate::result::{Filtered, Identification};
 use crate::summary::certificate::CertificateEntry;
 use crate::summary::entries::Refused;
 use crate::summary::physical::PhysicalDetails;
+use crate::summary::pid::PidEntry;
 use crate::summary::recommended::{self, RecommendedDetails};
 use crate::summary::redesign::RedesignEntry;
 use crate::summary::reduction::{ReductionDetails, SweepFile, as_csv as sweep_csv, orders};
 use crate::{Error, Result};
-use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile, exported};
+use files::{Artefact, FactorDetails, RecordsFile, ResidualsFile, SignalsFile, VerdictFile, exported, plain};
 use serde::Serialize;
 use youla::identify::HansenModel;
 use youla::lti::{Discrete, StateSpace};
@@ -53,7 +55,8 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
     writer.deviation()?;
     writer.reduction()?;
     writer.certificate()?;
-    writer.redesign()
+    writer.redesign()?;
+    writer.pid()
 }
 
 struct Writer<'a> {
@@ -208,6 +211,22 @@ impl Writer<'_> {
             self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &loops))?;
             self.folder.text("8-redesign/response.svg", &svg(&figure, &loops)?)?;
             self.json("8-redesign/redesign.json", RedesignEntry::from(new))
+        })
+    }
+
+    /// `8-redesign/`: the new PID with its proof, and the controller to go back to.
+    fn pid(&self) -> Result<()> {
+        self.outcome("8-redesign/pid.json", self.found.pid.as_ref(), |new| {
+            let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
+            self.model_with("8-redesign/new_controller", &new.system, (y, u), &())?;
+            let controller = plain(&self.found.records, "pid", &new.system);
+            self.folder.text("8-redesign/controller.rs", &controller.rust())?;
+            self.folder.json("8-redesign/controller.json", &controller)?;
+            self.folder.json("8-redesign/revert.json", &plain(&self.found.records, "running", &new.running))?;
+            let (figure, steps) = (pid::figure(new), pid::steps());
+            self.folder.text("8-redesign/response.csv", &figure_csv(&figure, &steps))?;
+            self.folder.text("8-redesign/response.svg", &svg(&figure, &steps)?)?;
+            self.json("8-redesign/pid.json", PidEntry::from(new))
         })
     }
 

@@ -1,6 +1,6 @@
 //! Lines below the answer to "Can it be trusted?": margins, redesign, reduction, physical structure, factors.
 
-use super::{certificate, redesign, reduction};
+use super::{certificate, pid, redesign, reduction};
 use crate::method::Method;
 use crate::result::Identification;
 use crate::summary::Summary;
@@ -15,6 +15,7 @@ pub(crate) fn further_lines(found: &Identification, summary: &Summary) -> Vec<Ve
         found.certified().map(certificate::line),
         margin_line(found, summary),
         found.new_controller().map(redesign::line),
+        found.new_pid().map(pid::line),
         found.reduced().map(reduction::line),
         grey_box_line(found),
         factor_line(summary),

@@ -4,6 +4,7 @@ pub(crate) mod decibels;
 pub(crate) mod further;
 pub(crate) mod models;
 pub(crate) mod notes;
+pub(crate) mod pid;
 pub(crate) mod recommended;
 pub(crate) mod redesign;
 pub(crate) mod verdict;
@@ -69,7 +70,10 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         certificates: all().map(|(key, model)| models::certificate(key, model)).collect(),
         loop_tables: found.certified().map_or_else(Vec::new, certificate::tables),
         recommended: recommended::tables(found),
-        redesign: found.new_controller().map(redesign::drawn).transpose()?,
+        redesign: match found.new_pid() {
+            Some(new) => Some(pid::drawn(new)),
+            None => found.new_controller().map(redesign::drawn).transpose()?,
+        },
         margins: all().map(|(key, model)| models::margins(key, model)).collect(),
         margins_caption: margins_caption(found, summary),
         bezout_residual: summary.bezout_residual,

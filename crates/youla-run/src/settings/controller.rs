@@ -162,6 +162,18 @@ impl ControllerSettings {
         self.controller(nominal, folder).map_err(|e| e.within("[controller]"))
     }
 
+    /// Dead time in whole samples that is stated beside the controller.
+    pub(crate) fn delay(&self) -> usize {
+        match self {
+            Self::DifferenceEquation { delay, .. }
+            | Self::TransferFunction { delay, .. }
+            | Self::StateSpace { delay, .. } => *delay,
+            Self::Pid(pid) => pid.delay,
+            Self::IdealPid(pid) => pid.delay,
+            Self::ModelFile { .. } | Self::Observer { .. } => 0,
+        }
+    }
+
     /// What the types allow and no controller is, in one sentence.
     pub(super) fn problem(&self) -> Option<String> {
         match self {

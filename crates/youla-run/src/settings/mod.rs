@@ -172,6 +172,7 @@ impl RunSettings {
             .or_else(|| self.response_problem())
             .or_else(|| self.controller.problem())
             .or_else(|| self.loop_problem())
+            .or_else(|| self.redesign_problem())
             .or_else(|| self.number_problem());
         problem.or_else(structure)
     }
@@ -185,6 +186,23 @@ impl RunSettings {
         ];
         let (table, _) = asked.into_iter().find(|(_, asked)| *asked)?;
         Some(format!("[{table}] needs estimation records, but [data] has a response; leave the table out"))
+    }
+
+    fn redesign_problem(&self) -> Option<String> {
+        let redesign = self.redesign.as_ref()?;
+        if redesign.structure.is_some() && (self.data.inputs.len(), self.data.outputs.len()) != (1, 1) {
+            return Some(
+                "[redesign] structure = \"pid\" is for one input and one output; leave it out for method = \"lqg\""
+                    .into(),
+            );
+        }
+        if redesign.structure.is_none() && !redesign.pid.is_default() {
+            return Some(
+                "[redesign.pid] is read with structure = \"pid\" in [redesign] only; add that, or leave the table out"
+                    .into(),
+            );
+        }
+        redesign.pid.check().err().map(|e| e.to_string())
     }
 
     fn loop_problem(&self) -> Option<String> {

@@ -1,27 +1,11 @@
-//! PID controllers `kp + ki/s + kd s/(1 + filter s)` as they are programmed (K. J. Åström, T. Hägglund, Advanced PID Control, ISA,
-//! 2006, section 13.4): with `q = z^-1`,
-//!
-//! ```text
-//!                    integral                          filtered derivative
-//! backward Euler     ki ts / (1 - q)                   kd (1 - q) / (filter + ts - filter q)
-//! Tustin             ki ts/2 (1 + q) / (1 - q)         2 kd (1 - q) / (2 filter + ts + (ts - 2 filter) q)
-//! ```
+//! PID controllers of run.toml, in parallel and in ideal form; how they are computed is in [`youla_loop::redesign::structured`].
 
 use super::controller::Feedback;
 use crate::Result;
 use serde::{Deserialize, Serialize};
-use youla::Mat;
 use youla::lti::{Discrete, StateSpace};
-
-/// How the integral and the derivative part of a PID were programmed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Discretisation {
-    /// Backward differences, `s = (1 - z^-1)/ts`: the integral includes the error of the present sample.
-    BackwardEuler,
-    /// Tustin's rule, `s = 2/ts (1 - z^-1)/(1 + z^-1)`.
-    Tustin,
-}
+pub use youla_loop::redesign::structured::Discretisation;
+use youla_loop::redesign::structured::PidGains;
 
 /// PID in its parallel form, `kp + ki/s + kd s/(1 + derivative_filter s)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -124,25 +108,7 @@ impl Pid {
 
     /// From the error to the command, with a state for each part that is there.
     pub(super) fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
-        let (ts, filter) = (time.ts(), self.filter);
-        let mut sum = StateSpace::gain(Mat::from_fn(1, 1, |_, _| self.kp), time)?;
-        let (integral, derivative) = match self.discretisation {
-            Discretisation::BackwardEuler => {
-                let integral = [vec![self.ki * ts], vec![1.0, -1.0]];
-                (integral, [vec![self.kd, -self.kd], vec![filter + ts, -filter]])
-            }
-            Discretisation::Tustin => {
-                let half = 0.5 * self.ki * ts;
-                let derivative = [vec![2.0 * self.kd, -2.0 * self.kd], vec![2.0 * filter + ts, ts - 2.0 * filter]];
-                ([vec![half, half], vec![1.0, -1.0]], derivative)
-            }
-        };
-        for (gain, [numerator, denominator]) in [(self.ki, integral), (self.kd, derivative)] {
-            if gain != 0.0 {
-                let part = StateSpace::difference_equation(&vec![vec![numerator]], &vec![vec![denominator]], time)?;
-                sum = sum.plus(&part)?;
-            }
-        }
-        Ok(sum)
+        let Pid { discretisation, kp, ki, kd, filter, .. } = *self;
+        Ok(PidGains { discretisation, kp, ki, kd, derivative_filter: filter }.system(time)?)
     }
 }

@@ -15,7 +15,7 @@ use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
 use crate::stages::recommend::{defects, recommend};
-use crate::stages::redesign::redesigned;
+use crate::stages::redesign::{pid, redesigned};
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
 use crate::stages::signals::deviation_signals;
@@ -97,8 +97,13 @@ pub fn identify(
     let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
     let certificate =
         clock.run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?)));
-    let redesign =
-        clock.run(Stage::Redesign, || redesigned(run, recommended.as_ref().ok()?, found(reduction.as_ref())));
+    let (redesign, pid) = clock.run(Stage::Redesign, || match recommended.as_ref() {
+        Ok(model) => match pid(run, model) {
+            None => (redesigned(run, model, found(reduction.as_ref())), None),
+            new => (None, new),
+        },
+        Err(_) => (None, None),
+    });
     Ok(Identification {
         settings,
         records,
@@ -112,6 +117,7 @@ pub fn identify(
         grey_box,
         grey_box_uncertainty,
         redesign,
+        pid,
         direct,
         indirect,
         lines,

@@ -7,6 +7,7 @@ use crate::{Error, Result};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::{Recommendation, Region};
 use youla::lti::{Discrete, StateSpace};
+use youla_loop::redesign::structured::{PidProblem, PidRedesign, design_pid};
 use youla_loop::redesign::{Redesign, RedesignOptions, RedesignProblem, redesign};
 
 /// Designs on the reduced model where there is one, else on the recommended plant; every new controller is tested on the plant and its
@@ -25,6 +26,22 @@ pub(crate) fn redesigned(
     Some(design(run.records, (plant, model), &factorisation.factors, &recommended.region, options))
 }
 
+/// The PID where `structure` asks for one.
+///
+/// # Errors
+/// As [`design_pid`].
+pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<Result<PidRedesign>> {
+    let options = run.settings.redesign.as_ref()?;
+    options.structure?;
+    let problem = PidProblem {
+        plant: &recommended.plant,
+        region: &recommended.region,
+        running: run.declared.controller(),
+        delay: run.settings.controller.delay(),
+    };
+    Some(design_pid(&problem, &options.pid, &options.band).map_err(|e| Error::from(e).within("[redesign]")))
+}
+
 /// Designs on `model` and tests on `plant` and its region.
 pub(crate) fn design(
     records: &RunRecords,
@@ -33,6 +50,12 @@ pub(crate) fn design(
     region: &Region,
     options: &RedesignOptions,
 ) -> Result<Redesign> {
+    if options.structure.is_some() {
+        let what = "`structure` in a redesign after the run";
+        let instead =
+            "state [redesign] structure before the run, in run.toml; the PID is then in summary and run folder";
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
+    }
     let (input, output) = records.sizes();
     let problem =
         RedesignProblem { plant, model, factors, region: Some(region), input_size: &input, output_size: &output };

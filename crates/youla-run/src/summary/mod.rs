@@ -4,6 +4,7 @@ pub(crate) mod certificate;
 pub(crate) mod entries;
 pub(crate) mod model;
 pub(crate) mod physical;
+pub(crate) mod pid;
 pub(crate) mod recommended;
 pub(crate) mod redesign;
 pub(crate) mod reduction;
@@ -17,6 +18,7 @@ use crate::{Error, Result};
 use certificate::CertificateEntry;
 use entries::{OrRefused, finite};
 use model::ModelEntry;
+use pid::PidEntry;
 use recommended::RecommendedEntry;
 use redesign::RedesignEntry;
 use reduction::ReductionEntry;
@@ -64,6 +66,9 @@ pub struct Summary {
     /// The new controller, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub redesign: Option<RedesignEntry>,
+    /// The new PID, where one was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub pid: Option<PidEntry>,
     /// The reduction, where one was asked for.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionEntry>,
@@ -94,6 +99,7 @@ pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
         channel_scales: robustness::scales(run),
         certificate: run.certified().map(CertificateEntry::from),
         redesign: run.new_controller().map(RedesignEntry::from),
+        pid: run.new_pid().map(PidEntry::from),
         reduction: run.reduced().map(ReductionEntry::from),
     })
 }

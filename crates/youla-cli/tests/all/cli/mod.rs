@@ -14,6 +14,7 @@ mod limits;
 mod lines;
 mod mistakes;
 mod notes;
+mod pid;
 mod plot;
 mod response;
 mod rig;

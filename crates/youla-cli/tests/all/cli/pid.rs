@@ -1,0 +1,107 @@
+//! `structure = "pid"` in `[redesign]`: what a run writes, and its exports.
+
+use crate::common::{empty_folder, youla};
+use serde_json::Value;
+use std::fmt::Write;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// `G = 0.02 / (z - pole)` under a PI, u = d + 2 e + 0.05 i.
+fn log(folder: &Path, pole: f64) {
+    let mut state = 7u64;
+    let mut random = move || {
+        // Knuth, MMIX.
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
+    };
+    let (mut x, mut i) = (0.0, 0.0);
+    let mut text = "u,y,d\n".to_owned();
+    for _ in 0..6000 {
+        let (y, d) = (x + 0.02 * random(), 2.0 * random());
+        i -= 0.05 * y;
+        let u = d - 2.0 * y + i;
+        x = pole * x + 0.02 * u;
+        writeln!(text, "{u},{y},{d}").expect("a string");
+    }
+    fs::write(folder.join("log.csv"), text).expect("written");
+}
+
+fn run(name: &str, pole: f64, redesign: &str) -> (PathBuf, Option<i32>, String) {
+    let folder = empty_folder(name);
+    log(&folder, pole);
+    let settings = format!(
+        "name = \"tank\"\n[data]\nsample_time = 0.01\ninputs = [{{ name = \"u\", unit = \"V\" }}]\noutputs = [{{ name = \"y\" }}]\n\
+         input_excitation = [{{ name = \"d\" }}]\nestimation = [{{ file = \"log.csv\", take = 4000 }}]\n\
+         verification = [{{ file = \"log.csv\", skip = 4000, name = \"rest\" }}]\n\
+         [nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [0.03]\ndenominator = [1.0, -{pole}]\n\
+         [controller.pid]\nfeedback = \"negative\"\ndiscretisation = \"backward-euler\"\nkp = 2.0\nki = 5.0\n{redesign}"
+    );
+    fs::write(folder.join("run.toml"), settings).expect("written");
+    let done = youla(&folder, &["identify", "run.toml", "--out", "run", "--quiet"]);
+    (folder, done.code, done.stderr)
+}
+
+fn json(path: &Path) -> Value {
+    serde_json::from_slice(&fs::read(path).expect("written")).expect("JSON")
+}
+
+#[test]
+fn a_pid_comes_with_its_proof_and_a_way_back() {
+    let (folder, code, stderr) = run("pid", 0.98, "[redesign]\nstructure = \"pid\"\n[redesign.pid]\nterms = \"pi\"\n");
+    assert_eq!(code, Some(0), "{stderr}");
+    let pid = &json(&folder.join("run/summary.json"))["pid"];
+    assert_eq!((&pid["proof"]["holds"], &pid["proof"]["unstable"]), (&Value::Bool(true), &Value::from(0)), "{pid}");
+    assert!((pid["running"]["ki"].as_f64().expect("recognised") - 5.0).abs() < 1e-6, "{pid}");
+    assert!(pid["rejection"].as_f64().expect("a number") > 1.5, "{pid}");
+    let revert = json(&folder.join("run/8-redesign/revert.json"));
+    assert_eq!(revert["method"], "running");
+    let page = fs::read_to_string(folder.join("run/report.html")).expect("written");
+    assert!(page.contains("The way to the new controller"));
+    // Structured text and C are the same statements.
+    for form in ["c-pid", "st", "gains"] {
+        let done = youla(&folder, &["export", "run", "--to", form, "--out", form]);
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+    }
+    let read = |form: &str| fs::read_to_string(folder.join(form)).expect("written");
+    let of_c: Vec<String> = read("c-pid").lines().map(|l| l.trim().replace("s->", "")).collect();
+    let of_st: Vec<String> = read("st").lines().map(|l| l.replacen(" := ", " = ", 1)).collect();
+    for statement in of_st.iter().filter(|l| l.contains(" * ")) {
+        assert!(of_c.contains(statement), "{statement}");
+    }
+    // The statements, evaluated, are the controller of new_controller.json.
+    let number = |name: &str| pid["controller"][name].as_f64().expect("a number");
+    let k = json(&folder.join("run/8-redesign/new_controller.json"));
+    let matrix = |name: &str| k[name][0][0].as_f64().expect("a number");
+    let (mut i, mut x) = (0.0, 0.0);
+    for t in 0..50 {
+        let y = (0.3 * f64::from(t)).sin();
+        i += number("ki") * 0.01 * -y;
+        let u = matrix("c") * x + matrix("d") * y;
+        x = matrix("a") * x + matrix("b") * y;
+        assert!((number("kp") * -y + i - u).abs() < 1e-9 * u.abs().max(1.0), "{t}");
+    }
+    assert!(read("gains").contains("'IFormula', 'BackwardEuler'"), "{}", read("gains"));
+}
+
+#[test]
+fn what_is_not_met_is_written_and_ends_with_3() {
+    // An unstable plant needs a gain, and with it u answers the noise.
+    let limit = "[redesign]\nstructure = \"pid\"\n[redesign.pid]\ncommand_effort = 0.05\n";
+    let (folder, code, stderr) = run("pid-not-met", 1.01, limit);
+    assert_eq!(code, Some(3), "{stderr}");
+    assert!(stderr.contains("command_effort"), "{stderr}");
+    assert!(folder.join("run/summary.json").is_file());
+}
+
+#[test]
+fn what_no_run_can_do_is_refused_before_it() {
+    for (name, redesign, key) in [
+        ("pid-unused", "[redesign.pid]\nterms = \"pi\"\n", "structure = \"pid\""),
+        ("pid-range", "[redesign]\nstructure = \"pid\"\n[redesign.pid]\nnotches = 9\n", "[redesign.pid] notches"),
+        ("pid-word", "[redesign]\nstructure = \"pdi\"\n", "pid"),
+    ] {
+        let (_, code, stderr) = run(name, 0.98, redesign);
+        assert_eq!(code, Some(2));
+        assert!(stderr.contains(key), "{stderr}");
+    }
+}

@@ -1,0 +1,169 @@
+//! Margins of a loop on a grid of frequencies, with `L = G C` (negative feedback) at each line:
+//!
+//! ```text
+//! peak sensitivity    max 1 / |1 + L|
+//! gain                L real and negative: 1 / |L| above it, |L| below it, the smaller
+//! phase, delay        |L| = 1: |arg(-L)|, (arg(-L) mod 2 pi) / omega
+//! effort              sqrt(1/pi int_0^pi |C / (1 + L)|^2), the rms of u per rms of white noise of y
+//! ```
+//!
+//! The loop is stable exactly when the winding number about zero of the quotient of its characteristic polynomial by that of a stable
+//! loop of the same plant is zero (principle of the argument, both in powers of `z^-1`; the polynomial of the plant cancels),
+//!
+//! ```text
+//! R = (D + G N) / (D_r + G N_r),        C = N / D,  C_r = N_r / D_r the running controller
+//! ```
+//!
+//! Between lines L is taken as straight; `margins_equal_the_exact_ones` holds the figures against [`youla::control::margins()`].
+
+use super::options::PidOptions;
+use super::scenarios::{Grid, Scenario};
+use std::f64::consts::{PI, TAU};
+use youla::c64;
+
+/// A controller on the grid: numerators, denominators and their quotients.
+pub(super) struct OnGrid {
+    pub(super) numerator: Vec<c64>,
+    pub(super) denominator: Vec<c64>,
+    pub(super) response: Vec<c64>,
+}
+
+/// Margins of a stable loop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridMargins {
+    /// Peak of the sensitivity.
+    pub peak_sensitivity: f64,
+    /// Least factor on the gain, up or down, that makes the loop unstable; infinite where none does.
+    pub gain: f64,
+    /// Least phase margin, degrees; 180 where the loop has no crossover.
+    pub phase: f64,
+    /// Least delay margin, seconds; infinite where the loop has no crossover.
+    pub delay: f64,
+    /// Rms of u per rms of white noise of the sensor, unit of u per unit of y.
+    pub effort: f64,
+    /// Frequency up to which the sensitivity is below -3 dB, Hz; zero where it is nowhere.
+    pub bandwidth: f64,
+}
+
+/// The limits of a design in the order in which they are named.
+pub(super) const LIMITS: [&str; 5] =
+    ["peak_sensitivity", "gain_margin", "phase_margin", "delay_margin", "command_effort"];
+
+impl GridMargins {
+    /// Of no loop.
+    pub(super) const NONE: GridMargins = GridMargins {
+        peak_sensitivity: 0.0,
+        gain: f64::INFINITY,
+        phase: 180.0,
+        delay: f64::INFINITY,
+        effort: 0.0,
+        bandwidth: 0.0,
+    };
+
+    /// By how much each limit is missed, as the logarithm of the quotient of figure and limit: at most 0 where it holds. `running` is the
+    /// effort of the running controller on the same plant.
+    pub(super) fn excess(&self, limits: &PidOptions, running: f64) -> [f64; 5] {
+        let below =
+            |limit: f64, value: f64| if limit > 0.0 { (limit / value.max(1e-12)).ln() } else { f64::NEG_INFINITY };
+        [
+            (self.peak_sensitivity / limits.peak_sensitivity).ln(),
+            below(limits.gain_margin, self.gain),
+            below(limits.phase_margin, self.phase),
+            below(limits.delay_margin, self.delay),
+            (self.effort / (limits.command_effort * running)).ln(),
+        ]
+    }
+}
+
+/// Margins of a plant under a controller; `None` where the loop is unstable.
+pub(super) fn margins(grid: &Grid, plant: &Scenario, c: &OnGrid) -> Option<GridMargins> {
+    let mut found = GridMargins::NONE;
+    let (mut winding, mut first, mut before) = (0.0, c64::ONE, (c64::ZERO, c64::ONE, 0.0));
+    let (mut least, mut rejects) = (f64::INFINITY, true);
+    for k in 0..grid.omega.len() {
+        let g = plant.response[k];
+        let l = g * c.response[k];
+        let distance = (l + 1.0).norm_sqr();
+        let turned = (c.denominator[k] + g * c.numerator[k]) * plant.reference[k];
+        least = least.min(if k == 0 { distance } else { nearest(before.0, l, distance) });
+        found.effort += grid.weights[k] * c.response[k].norm_sqr() / distance;
+        if k == 0 {
+            first = turned;
+        } else {
+            winding += half_turn(before.1, turned);
+            crossings(&mut found, (before.0, l), (grid.omega[k - 1], grid.omega[k]));
+        }
+        if rejects && distance < 2.0 {
+            rejects = false;
+            found.bandwidth = if k == 0 { 0.0 } else { below_3_db(grid, k, before.2, distance) };
+        }
+        before = (l, turned, distance);
+    }
+    ends(&mut found, plant.response[0] * c.response[0], before.0);
+    found.peak_sensitivity = 1.0 / least.sqrt();
+    found.effort = found.effort.sqrt();
+    let turn = before.1.arg() - first.arg() + TAU * winding;
+    (turn.abs() < 0.5 * PI && least > 0.0 && found.effort.is_finite()).then_some(found)
+}
+
+/// Square of the least distance from -1 to the straight line between two points, the second of which has the square `end`.
+fn nearest(from: c64, to: c64, end: f64) -> f64 {
+    let (start, along) = (from + 1.0, to - from);
+    let share = -(start.re * along.re + start.im * along.im) / along.norm_sqr();
+    if share > 0.0 && share < 1.0 { (start + along * share).norm_sqr() } else { end }
+}
+
+/// Passages of the negative real axis between two points, counted as turns.
+fn half_turn(from: c64, to: c64) -> f64 {
+    if (from.im < 0.0) == (to.im < 0.0) || from.re * to.im - to.re * from.im == 0.0 {
+        return 0.0;
+    }
+    let real = (from.re * to.im - to.re * from.im) / (to.im - from.im);
+    match (real < 0.0, from.im < 0.0) {
+        (false, _) => 0.0,
+        (true, true) => -1.0,
+        (true, false) => 1.0,
+    }
+}
+
+/// Gain, phase and delay at the crossings between two lines.
+fn crossings(found: &mut GridMargins, (from, to): (c64, c64), (low, high): (f64, f64)) {
+    if (from.im < 0.0) != (to.im < 0.0) {
+        let real = (from.re * to.im - to.re * from.im) / (to.im - from.im);
+        found.gain = found.gain.min(factor(real));
+    }
+    let (a, b) = (from.norm_sqr(), to.norm_sqr());
+    if (a < 1.0) != (b < 1.0) {
+        let share = a.ln() / (a.ln() - b.ln());
+        let at = -(from + (to - from) * share);
+        let angle = at.arg();
+        found.phase = found.phase.min(angle.abs().to_degrees());
+        found.delay = found.delay.min(angle.rem_euclid(TAU) / (low + share * (high - low)));
+    }
+}
+
+/// The factor on the gain that makes a loop critical whose response is real there.
+fn factor(real: f64) -> f64 {
+    if real < 0.0 { (-real).max(-1.0 / real) } else { f64::INFINITY }
+}
+
+/// L is real at both ends of all frequencies: at Nyquist, which is a line, and at zero, unless it grows without bound.
+fn ends(found: &mut GridMargins, first: c64, last: c64) {
+    for end in [first, last] {
+        if end.im.abs() < REAL * end.re.abs() {
+            found.gain = found.gain.min(factor(end.re));
+        }
+    }
+    if last.norm_sqr() >= 1.0 {
+        found.delay = 0.0;
+    }
+}
+
+/// An imaginary part below this share of the real part is none. Chosen, not measured.
+const REAL: f64 = 0.05;
+
+/// Where `|1 + L|^2` falls below 2, between the lines k - 1 and k, Hz.
+fn below_3_db(grid: &Grid, k: usize, before: f64, here: f64) -> f64 {
+    let share = (before / 2.0).ln() / (before / here).ln();
+    grid.omega[k - 1] * (grid.omega[k] / grid.omega[k - 1]).powf(share) / TAU
+}

@@ -1,0 +1,149 @@
+//! Redesign in a fixed structure: the gains of a PID with notches, as the machine computes it.
+//!
+//! ```text
+//! maximise    ki, or kp without an integral part      such that at every plant drawn from the whole region
+//!             the loop is stable, and peak sensitivity, gain, phase and delay margin and command effort keep their limits
+//! ```
+//!
+//! The objective is the rejection of slow loads (K. J. Åström, H. Panagopoulos, T. Hägglund, Design of PI controllers based on non-convex
+//! optimization, Automatica 34 (1998), 585; the same authors' MIGO design of PID controllers): after a step of load at the plant input the
+//! integral of y is `load / ki`. A bandwidth has no use for an integral part where the plant has one of its own, and
+//! would give it up. What the search found is proved on draws that it has not seen.
+
+mod evolution;
+mod margins;
+mod options;
+mod pid;
+mod plan;
+mod proof;
+mod recognise;
+mod scenarios;
+mod search;
+mod space;
+#[cfg(test)]
+mod tests;
+
+pub use margins::GridMargins;
+pub use options::{PidOptions, PidTerms, Structure};
+pub use pid::{Discretisation, Notch, PidController, PidGains};
+pub use plan::PlannedStep;
+pub use proof::{Band, FigureBand, LEVEL, PidProof};
+
+use crate::error::{Error, Result};
+use plan::plan;
+use proof::prove;
+use recognise::recognise;
+use scenarios::{Grid, Scenario, Scenarios};
+use search::Search;
+use space::Space;
+use youla::identify::likelihood::Region;
+use youla::lti::{Discrete, StateSpace};
+use youla::validate::BandOptions;
+
+/// The input of a PID design.
+#[derive(Debug, Clone, Copy)]
+pub struct PidProblem<'a> {
+    /// The identified plant.
+    pub plant: &'a StateSpace<Discrete>,
+    /// Its region.
+    pub region: &'a Region,
+    /// The running controller, `u = K y`, positive feedback.
+    pub running: &'a StateSpace<Discrete>,
+    /// Dead time in whole samples that the machine adds to its controller; it is in `running` too.
+    pub delay: usize,
+}
+
+/// A PID with its proof.
+#[derive(Debug, Clone)]
+pub struct PidRedesign {
+    /// The new controller, negative feedback.
+    pub controller: PidController,
+    /// The same as `u = K y`, positive feedback.
+    pub system: StateSpace<Discrete>,
+    /// What was designed, within which limits.
+    pub options: PidOptions,
+    /// The running controller.
+    pub running: StateSpace<Discrete>,
+    /// Its gains, where it is a PID.
+    pub running_gains: Option<PidController>,
+    /// How much better slow loads are rejected: the quotient of the gains of the new and the running controller at the lowest line.
+    pub rejection: f64,
+    /// The proof on fresh draws.
+    pub proof: PidProof,
+    /// The way to the new controller.
+    pub steps: Vec<PlannedStep>,
+}
+
+impl PidRedesign {
+    /// Why the new controller should not be taken; empty where it keeps what it promises.
+    pub fn reservations(&self) -> Vec<String> {
+        let p = &self.proof;
+        let mut reasons = Vec::new();
+        if !p.holds() {
+            reasons.push(format!(
+                "of {} fresh models of the region {} are unstable and {} miss a limit",
+                p.models, p.unstable, p.missed
+            ));
+        }
+        if self.rejection < 1.0 && p.running_holds() {
+            reasons.push(format!(
+                "it rejects slow loads {:.2} times as well as the running controller, which keeps the limits itself",
+                self.rejection
+            ));
+        }
+        reasons
+    }
+}
+
+/// Designs a PID on an identified model with one input and one output.
+///
+/// # Errors
+/// [`Error::NoPid`] with the limit that stops it; [`youla::Error::OutOfRange`] for options outside of their range;
+/// [`youla::Error::Unsupported`] for more than one channel; [`youla::Error::NotStabilising`] where the running controller does not
+/// stabilise the plant.
+pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
+    options.check()?;
+    let PidProblem { plant, region, running, delay } = *problem;
+    if plant.inputs() != 1 || plant.outputs() != 1 {
+        let what = "a PID for a machine of several inputs or outputs";
+        let instead = "leave `structure` out: method = \"lqg\" and \"youla\" design for any number";
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
+    }
+    if running.is_zero() {
+        let what = "a PID for a machine that no controller ran";
+        let instead = "state the running controller in [controller]: its command effort is the measure of the new one";
+        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
+    }
+    let looped = youla::control::closed_loop(plant, &youla::control::with_input_port(running)?)?;
+    youla::control::peak_sensitivity(plant, running)?;
+    let grid = Grid::new(plant.time(), &[plant, &looped])?;
+    let on = grid.any(running)?;
+    let estimate = Scenario::new(&grid, plant.clone(), (running, &on), |_| {});
+    let estimate =
+        estimate.ok_or(Error::NoPid { reason: "the running controller has no margins on the model".into() })?;
+    let drawn = Scenarios::new(&grid, region, running, (band.draws, band.seed))?;
+    let rules = match options.discretisation {
+        Some(rule) => vec![rule],
+        None => vec![Discretisation::BackwardEuler, Discretisation::Tustin],
+    };
+    let running_gains = recognise(&grid, running, &rules, delay)?;
+    let discretisation = running_gains.as_ref().map_or(rules[0], |c| c.gains.discretisation);
+    let c = on.response[0];
+    // Of a gain, of an integral (phase -90 degrees) and of what lies between.
+    let sign = if c.re - c.im >= 0.0 { 1.0 } else { -1.0 };
+    let space = Space { options, discretisation, delay, sign, ts: grid.ts };
+    let search = Search { space, grid: &grid, estimate: &estimate, drawn: &drawn, running: running_gains.as_ref() };
+    let controller = search.run()?;
+    let system = controller.system(plant.time())?;
+    let fresh = Scenarios::new(&grid, region, running, (band.draws, band.seed.wrapping_add(1)))?;
+    Ok(PidRedesign {
+        rejection: grid.controller(&controller).response[0].norm() / c.norm(),
+        proof: prove(&grid, &fresh, (running, &system), options)?,
+        steps: plan(&grid, &fresh, (running, running_gains.as_ref()), (&system, &controller))?,
+        running: running.clone(),
+        running_gains,
+        options: options.clone(),
+        controller,
+        system,
+    })
+}

@@ -1,0 +1,183 @@
+//! The proof of a design on plants that the search has not seen, and the way from the running controller to it.
+
+use super::margins::{GridMargins, LIMITS, OnGrid};
+use super::options::PidOptions;
+use super::scenarios::{Grid, Scenario, Scenarios};
+use super::search::excess;
+use crate::error::Result;
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+use youla::c64;
+use youla::lti::{Discrete, StateSpace};
+use youla::statistics::quantile;
+
+/// Level of bands and of the probability, that of regions and intervals elsewhere.
+pub const LEVEL: f64 = 0.95;
+
+/// A figure over the drawn plants: lower end, median and upper end of the band of [`LEVEL`].
+pub type Band = [f64; 3];
+
+/// A figure of the loop with the running and the new controller.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FigureBand {
+    /// Key of its limit in run.toml, or `bandwidth`.
+    pub name: &'static str,
+    /// Unit; empty for a factor.
+    pub unit: &'static str,
+    /// The limit, where it has one.
+    pub limit: Option<f64>,
+    /// With the running controller.
+    pub running: Band,
+    /// With the new one.
+    pub new: Band,
+}
+
+/// What a new controller does at fresh draws.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PidProof {
+    /// Models that were drawn afresh and tested.
+    pub models: usize,
+    /// Draws that the running controller does not stabilise: the log contradicts them.
+    pub impossible: usize,
+    /// Models whose new loop is unstable.
+    pub unstable: usize,
+    /// Models whose new loop is stable and misses a limit.
+    pub missed: usize,
+    /// Models at which the running controller misses a limit.
+    pub running_missed: usize,
+    /// How many miss each limit, by its key.
+    pub misses: Vec<(&'static str, usize)>,
+    /// The largest probability that a model is of these two kinds, at [`LEVEL`] (C. J. Clopper, E. S. Pearson, The use of confidence or
+    /// fiducial limits, Biometrika 26 (1934), 404; with none of n it is 3/n).
+    pub at_most: f64,
+    /// Figures with bands.
+    pub figures: Vec<FigureBand>,
+    /// Frequencies of the sensitivities, Hz.
+    pub hz: Vec<f64>,
+    /// Magnitude of the sensitivity with the running and with the new controller.
+    pub sensitivities: [Vec<Band>; 2],
+}
+
+impl PidProof {
+    /// Whether no model is unstable and the limits hold for the share [`LEVEL`] of models at least.
+    pub fn holds(&self) -> bool {
+        self.unstable == 0 && self.at_most <= 1.0 - LEVEL
+    }
+
+    /// Whether the running controller keeps the limits by the same standard.
+    pub fn running_holds(&self) -> bool {
+        at_most(self.running_missed, self.models) <= 1.0 - LEVEL
+    }
+}
+
+pub(super) fn prove(
+    grid: &Grid,
+    fresh: &Scenarios,
+    (running, new): (&StateSpace<Discrete>, &StateSpace<Discrete>),
+    limits: &PidOptions,
+) -> Result<PidProof> {
+    let (before, after) = (grid.any(running)?, grid.any(new)?);
+    let stable = fresh.stable(new)?;
+    let of = |(plant, stable): (&Scenario, &bool)| if *stable { excess(grid, plant, &after, limits) } else { None };
+    let excesses: Vec<Option<[f64; 5]>> = fresh.plants.par_iter().zip(&stable).map(of).collect();
+    let models = excesses.len();
+    let unstable = excesses.iter().filter(|e| e.is_none()).count();
+    let beyond = |e: &&[f64; 5]| e.iter().any(|e| *e > TOLERANCE);
+    let missed = excesses.iter().flatten().filter(beyond).count();
+    let of_limit = |k: usize| (LIMITS[k], excesses.iter().flatten().filter(|e| e[k] > TOLERANCE).count());
+    let now: Vec<GridMargins> = fresh.plants.iter().map(|p| p.running).collect();
+    let then: Vec<GridMargins> = fresh.judge(grid, &after).into_iter().flatten().collect();
+    Ok(PidProof {
+        models,
+        impossible: fresh.impossible,
+        unstable,
+        missed,
+        running_missed: now_missed(fresh, limits),
+        misses: (0..LIMITS.len()).map(of_limit).collect(),
+        at_most: at_most(unstable + missed, models),
+        figures: figures(&now, &then, limits),
+        hz: grid.omega.iter().map(|w| w / TAU).collect(),
+        sensitivities: [&before, &after].map(|c| sensitivity(fresh, c)),
+    })
+}
+
+fn now_missed(fresh: &Scenarios, limits: &PidOptions) -> usize {
+    let misses = |p: &&Scenario| p.running.excess(limits, p.running.effort).iter().any(|e| *e > TOLERANCE);
+    fresh.plants.iter().filter(misses).count()
+}
+
+/// An excess that rounding explains.
+const TOLERANCE: f64 = 1e-9;
+
+/// The band of values.
+pub(super) fn band(mut values: Vec<f64>) -> Band {
+    values.sort_by(f64::total_cmp);
+    match values.is_empty() {
+        true => [f64::NAN; 3],
+        false => [0.5 * (1.0 - LEVEL), 0.5, 0.5 * (1.0 + LEVEL)].map(|share| quantile(&values, share)),
+    }
+}
+
+fn figures(now: &[GridMargins], then: &[GridMargins], limits: &PidOptions) -> Vec<FigureBand> {
+    let of = |name, unit, limit, pick: fn(&GridMargins) -> f64| FigureBand {
+        name,
+        unit,
+        limit,
+        running: band(now.iter().map(pick).collect()),
+        new: band(then.iter().map(pick).collect()),
+    };
+    let effort = limits.command_effort * of("", "", None, |m| m.effort).running[1];
+    vec![
+        of("peak_sensitivity", "", Some(limits.peak_sensitivity), |m| m.peak_sensitivity),
+        of("gain_margin", "", Some(limits.gain_margin), |m| m.gain),
+        of("phase_margin", "degrees", Some(limits.phase_margin), |m| m.phase),
+        of("delay_margin", "s", Some(limits.delay_margin), |m| m.delay),
+        of("command_effort", "u per y", Some(effort), |m| m.effort),
+        of("bandwidth", "Hz", None, |m| m.bandwidth),
+    ]
+}
+
+fn sensitivity(fresh: &Scenarios, c: &OnGrid) -> Vec<Band> {
+    let at = |k: usize| {
+        let size = |p: &Scenario| 1.0 / (c64::ONE + p.response[k] * c.response[k]).norm();
+        band(fresh.plants.iter().map(size).collect())
+    };
+    (0..c.response.len()).into_par_iter().map(at).collect()
+}
+
+/// The probability for which `found` or fewer of `count` come with a chance of `1 - LEVEL`.
+fn at_most(found: usize, count: usize) -> f64 {
+    if found >= count {
+        return 1.0;
+    }
+    let chance = |p: f64| {
+        let (mut term, mut sum) = (count as f64 * (1.0 - p).ln(), 0.0);
+        for k in 0..=found {
+            sum += term.exp();
+            term += ((count - k) as f64 / (k + 1) as f64 * p / (1.0 - p)).ln();
+        }
+        sum
+    };
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..60 {
+        let middle = 0.5 * (low + high);
+        if chance(middle) > 1.0 - LEVEL { low = middle } else { high = middle }
+    }
+    high
+}
+
+#[cfg(test)]
+mod tests {
+    use super::at_most;
+
+    /// Rule of three, and Clopper and Pearson's one-sided bounds by SciPy: `beta.ppf(0.95, k + 1, n - k)`.
+    #[test]
+    fn the_bound_of_a_probability() {
+        for (found, count, bound) in
+            [(0, 500, 0.005974_f64), (3, 500, 0.015434), (10, 100, 0.163718), (1, 20, 0.216106)]
+        {
+            assert!((at_most(found, count) - bound).abs() < 2e-6, "{found} of {count}: {}", at_most(found, count));
+        }
+        assert_eq!(at_most(4, 4), 1.0);
+    }
+}

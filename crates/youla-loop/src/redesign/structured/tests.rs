@@ -1,0 +1,168 @@
+//! Identities of the design: what is judged on the grid is what the exact code says of the same loop.
+
+use super::margins::margins;
+use super::recognise::recognise;
+use super::scenarios::{Grid, Scenario};
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use youla::Mat;
+use youla::control::{closed_loop, with_input_port};
+use youla::identify::likelihood::{Experiment, LikelihoodOptions, recommend};
+use youla::lti::{Continuous, simulate};
+
+fn time() -> Discrete {
+    Discrete::new(1e-3).unwrap()
+}
+
+/// A motor with a resonance at 60 Hz and a dead time of one sample; unstable where it is not braked.
+fn machine(brake: f64) -> StateSpace<Discrete> {
+    let w = 377.0;
+    let entry = |rows: [&[f64]; 4]| Mat::from_fn(4, rows[0].len(), |i, j| rows[i][j]);
+    let a = entry([&[0.0, 1.0, 0.0, 0.0], &[0.0, -brake, 0.0, 0.0], &[0.0, 0.0, 0.0, w], &[0.0, 0.0, -w, -0.06 * w]]);
+    let b = entry([&[0.0], &[600.0], &[0.0], &[1.0]]);
+    let c = Mat::from_fn(1, 4, |_, j| [1.0, 0.0, 1.0, 0.0][j]);
+    let held = StateSpace::new(a, b, c, Mat::zeros(1, 1), Continuous).unwrap().zoh(time()).unwrap();
+    let delay = StateSpace::difference_equation(&vec![vec![vec![0.0, 1.0]]], &vec![vec![vec![1.0]]], time()).unwrap();
+    held.then(&delay).unwrap()
+}
+
+fn pid(discretisation: Discretisation, [kp, ki, kd, derivative_filter]: [f64; 4]) -> PidController {
+    let gains = PidGains { discretisation, kp, ki, kd, derivative_filter };
+    PidController { gains, notches: Vec::new(), delay: 0 }
+}
+
+fn running() -> PidController {
+    pid(Discretisation::BackwardEuler, [0.8, 2.0, 0.02, 2e-3])
+}
+
+fn grid_of(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>) -> Grid {
+    let looped = closed_loop(plant, &with_input_port(k).unwrap()).unwrap();
+    Grid::new(time(), &[plant, &looped]).unwrap()
+}
+
+/// Stability of random controllers, and up to a peak of the sensitivity of 4 peak, gain, phase and delay margin, each within 3 % of
+/// [`youla::control::margins()`].
+#[test]
+fn margins_equal_the_exact_ones() {
+    let plant = machine(8.0);
+    let k = running().system(time()).unwrap();
+    let grid = grid_of(&plant, &k);
+    let scenario = Scenario::new(&grid, plant.clone(), (&k, &grid.any(&k).unwrap()), |_| {}).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(4);
+    let (mut stable, mut unstable) = (0, 0);
+    for rule in [Discretisation::BackwardEuler, Discretisation::Tustin] {
+        for _ in 0..60 {
+            let mut factor = || 10f64.powf(rng.random_range(-1.0..1.0));
+            let notches = vec![Notch { hz: 60.0 * factor().sqrt(), width: 0.3, depth: 0.2 }];
+            let c = PidController {
+                notches,
+                ..pid(rule, [0.8 * factor(), 2.0 * factor(), 0.02 * factor(), 2e-3 * factor()])
+            };
+            let found = margins(&grid, &scenario, &grid.controller(&c));
+            let exact = youla::control::margins(&plant, &c.system(time()).unwrap());
+            assert_eq!(found.is_some(), exact.is_ok(), "{c:?}");
+            let (Some(found), Ok(exact)) = (found, exact) else {
+                unstable += 1;
+                continue;
+            };
+            // A design ends far from there.
+            if exact.output_sensitivity.value > 4.0 {
+                continue;
+            }
+            stable += 1;
+            let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 0.03, "{a} for {b}: {c:?}");
+            near(found.peak_sensitivity, exact.output_sensitivity.value);
+            let channel = &exact.outputs[0];
+            let lowest = channel.lowest_gain.filter(|g| g.factor > 1e-6).map_or(f64::INFINITY, |g| 1.0 / g.factor);
+            near(found.gain.min(10.0), 10f64.min(channel.highest_gain.map_or(f64::INFINITY, |g| g.factor).min(lowest)));
+            near(found.phase, channel.phase.unwrap().degrees);
+            near(found.delay, channel.delay.unwrap().seconds);
+        }
+    }
+    assert!(stable > 30 && unstable > 20, "{stable} stable, {unstable} unstable");
+}
+
+/// The effort is the standard deviation of u by simulation.
+#[test]
+fn the_effort_is_the_size_of_u_for_white_noise() {
+    let plant = machine(8.0);
+    let k = running().system(time()).unwrap();
+    let grid = grid_of(&plant, &k);
+    let scenario = Scenario::new(&grid, plant.clone(), (&k, &grid.any(&k).unwrap()), |_| {}).unwrap();
+    let to_u = closed_loop(&plant, &with_input_port(&k).unwrap()).unwrap().part(0..1, 1..2);
+    let exact = youla::lti::h2_norm(&to_u).unwrap();
+    assert!((scenario.running.effort / exact - 1.0).abs() < 0.01, "{} for {exact}", scenario.running.effort);
+}
+
+#[test]
+fn a_pid_is_recognised_in_any_form() {
+    for (rule, filter) in [(Discretisation::BackwardEuler, 2e-3), (Discretisation::Tustin, 3e-4)] {
+        let stated = pid(rule, [0.8, 2.0, 0.02, filter]);
+        let k = stated.system(time()).unwrap();
+        let grid = grid_of(&machine(8.0), &k);
+        let found = recognise(&grid, &k, &[Discretisation::BackwardEuler, Discretisation::Tustin], 0).unwrap().unwrap();
+        let pairs = [(found.gains.kp, 0.8), (found.gains.ki, 2.0), (found.gains.kd, 0.02)];
+        // By either rule it is the same controller.
+        let difference = found.system(time()).unwrap().plus(&k.negated()).unwrap();
+        let response = youla::lti::frequency_response(&difference, &[10.0, 300.0, 3000.0]).unwrap();
+        assert!(response.iter().all(|g| g[(0, 0)].norm() < 1e-6), "{found:?}");
+        if found.gains.discretisation == rule {
+            assert!(pairs.into_iter().all(|(a, b)| (a / b - 1.0).abs() < 1e-6), "{found:?}");
+        }
+    }
+    let second =
+        StateSpace::difference_equation(&vec![vec![vec![1.0]]], &vec![vec![vec![1.0, -1.2, 0.5]]], time()).unwrap();
+    let grid = grid_of(&machine(8.0), &running().system(time()).unwrap());
+    assert_eq!(recognise(&grid, &second, &[Discretisation::BackwardEuler], 0).unwrap(), None);
+}
+
+/// Identifies the machine from a seeded record under the running controller.
+fn identified(brake: f64) -> youla::identify::likelihood::Recommendation {
+    let plant = machine(brake);
+    let k = running().system(time()).unwrap();
+    let whole = closed_loop(&plant, &with_input_port(&k).unwrap()).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let drive = Mat::from_fn(6000, 2, |_, j| [0.3, 0.002][j] * (rng.random::<f64>() - 0.5));
+    let signals = simulate(&whole, drive.as_ref(), &vec![0.0; whole.order()]).unwrap();
+    let (u, y) = (signals.subcols(0, 1), signals.subcols(1, 1));
+    let options = LikelihoodOptions { order: Some(4), dead_time: Some(vec![1]), ..Default::default() };
+    recommend(&[Experiment::new(u, y)], &[], None, time(), &options).unwrap()
+}
+
+/// The seeded promise: designed on a model, the limits hold on the machine itself, and the proof on fresh draws holds. The same on one thread
+/// as on two.
+#[test]
+fn what_is_promised_holds_on_the_machine() {
+    let model = identified(8.0);
+    let k = running().system(time()).unwrap();
+    let problem = PidProblem { plant: &model.plant, region: &model.region, running: &k, delay: 0 };
+    let options = PidOptions { notches: 1, command_effort: 4.0, ..PidOptions::default() };
+    let band = BandOptions { draws: 60, seed: 1 };
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let new = pool(2).install(|| design_pid(&problem, &options, &band)).unwrap();
+    assert_eq!(new.controller, pool(1).install(|| design_pid(&problem, &options, &band)).unwrap().controller);
+    assert!(new.rejection > 2.0 && new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
+    let exact = youla::control::margins(&machine(8.0), &new.system).unwrap();
+    assert!(exact.output_sensitivity.value < 2.0, "{:?}", exact.output_sensitivity);
+    assert!(exact.outputs[0].phase.unwrap().degrees > 28.0, "{:?}", exact.outputs[0].phase);
+    assert!(new.steps.iter().all(|s| s.unstable == 0) && new.steps.len() == 3);
+    // The last response ends at its reference.
+    assert!((new.steps[2].response.last().unwrap()[1] - 1.0).abs() < 0.05);
+}
+
+/// An unstable machine needs a gain.
+#[test]
+fn a_refusal_names_the_limit() {
+    let model = identified(-8.0);
+    let k = running().system(time()).unwrap();
+    let problem = PidProblem { plant: &model.plant, region: &model.region, running: &k, delay: 0 };
+    let band = BandOptions { draws: 30, seed: 1 };
+    let refusal = |options: PidOptions| design_pid(&problem, &options, &band).err().unwrap().to_string();
+    let late = refusal(PidOptions { delay_margin: 1.0, ..PidOptions::default() });
+    assert!(late.contains("delay_margin") && late.contains("[redesign.pid]"), "{late}");
+    let quiet = refusal(PidOptions { command_effort: 0.02, ..PidOptions::default() });
+    assert!(quiet.contains("command_effort"), "{quiet}");
+    let notches = refusal(PidOptions { notches: 5, ..PidOptions::default() });
+    assert!(notches.contains("[redesign.pid] notches"), "{notches}");
+}

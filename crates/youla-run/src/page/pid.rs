@@ -1,0 +1,148 @@
+//! A new PID on the page.
+
+use super::decibels::decibel;
+use super::redesign::loops;
+use youla::identify::likelihood::figure as digits;
+use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep};
+use youla_report::data::{self as draw, EvidenceTable, Method, ReportPart, Role, Status, Verdict};
+use youla_report::figure::{Axis, Content, Curve, Figure, Panel, Region};
+
+/// The section of the page.
+pub(super) fn drawn(new: &PidRedesign) -> draw::Redesign {
+    draw::Redesign { loops: steps(), figure: figure(new), tables: tables(new) }
+}
+
+/// What the new controller promises.
+pub(super) fn line(new: &PidRedesign) -> Verdict {
+    let good = new.reservations().is_empty() && new.rejection >= 1.0;
+    let status = if good { Status::Good } else { Status::Caution };
+    Verdict { status, text: sentence(new), evidence: ReportPart::Redesign }
+}
+
+fn sentence(new: &PidRedesign) -> String {
+    let proof = &new.proof;
+    let kept = match new.reservations()[..] {
+        [] => format!(
+            "All limits hold at {} of {} fresh models of the region and none is unstable: the probability that they do not hold is at most \
+             {:.1} %",
+            proof.models - proof.missed,
+            proof.models,
+            100.0 * proof.at_most
+        ),
+        _ => format!("Do not take it as it is: {}", new.reservations().join("; ")),
+    };
+    let slow_loads = match new.rejection {
+        better if better >= 1.0 => {
+            format!("The new PID rejects slow loads {better:.2} times as well as the running controller")
+        }
+        worse => format!(
+            "The new PID rejects slow loads worse than the running controller, {worse:.2} times as well, which is the price of the limits"
+        ),
+    };
+    format!(
+        "{slow_loads}. The running controller misses a limit at {} of {} models. {kept}. This is a prediction: the controller has not run yet.",
+        proof.running_missed, proof.models
+    )
+}
+
+/// The three steps as the figure names them.
+pub(crate) fn steps() -> Vec<Method> {
+    let [running, new] = loops();
+    vec![running, Method::new("half", "half way", Role::Direct), new]
+}
+
+fn key(step: &PlannedStep) -> &'static str {
+    if step.name == "running" { "present" } else { step.name }
+}
+
+fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
+    let band = |[low, middle, high]: Band| format!("{} ({} to {})", shown(middle), shown(low), shown(high));
+    let row = |f: &FigureBand| {
+        let name = format!("{} {}", f.name.replace('_', " "), f.unit).trim_end().to_owned();
+        vec![name, f.limit.map_or("–".into(), digits), band(f.running), band(f.new)]
+    };
+    let step = |s: &PlannedStep| {
+        let gains = s.controller.as_ref().map_or("no PID".into(), gains);
+        vec![s.name.into(), gains, band(s.peak_sensitivity), band(s.phase_margin), band(s.bandwidth)]
+    };
+    vec![
+        EvidenceTable {
+            text: sentence(new),
+            caption: format!(
+                "Medians with 95 % bands over {} models that the search has not seen. The command effort is the rms of u per rms of white \
+                 noise of the sensor; its limit is that at the median.",
+                new.proof.models
+            ),
+            ..EvidenceTable::new(
+                "Limits, running and new",
+                &["Figure", "Limit", "Running", "New"],
+                new.proof.figures.iter().map(row).collect(),
+            )
+        },
+        EvidenceTable {
+            caption: "Change the gains in these steps, each stable at all models; revert.json holds the running controller. Gains in \
+                      parallel form, negative feedback."
+                .into(),
+            ..EvidenceTable::new(
+                "The way to the new controller",
+                &["Step", "Gains", "Peak sensitivity", "Phase margin", "Bandwidth, Hz"],
+                new.steps.iter().map(step).collect(),
+            )
+        },
+    ]
+}
+
+fn shown(value: f64) -> String {
+    if value == f64::INFINITY { "∞".into() } else { digits(value) }
+}
+
+/// The gains in one line.
+pub(crate) fn gains(c: &PidController) -> String {
+    let g = &c.gains;
+    let parts = [("kp", g.kp, ""), ("ki", g.ki, " /s"), ("kd", g.kd, " s"), ("filter", g.derivative_filter, " s")];
+    let there = parts.into_iter().filter(|(_, value, _)| *value != 0.0);
+    let mut text: Vec<String> = there.map(|(name, value, unit)| format!("{name} {value:.4e}{unit}")).collect();
+    let notch = |n: &youla_loop::redesign::structured::Notch| {
+        format!("notch at {} Hz, width {}, depth {}", digits(n.hz), digits(n.width), digits(n.depth))
+    };
+    text.extend(c.notches.iter().map(notch));
+    text.join(", ")
+}
+
+/// Sensitivities and step responses with their bands.
+pub(crate) fn figure(new: &PidRedesign) -> Figure {
+    let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), log, ..Axis::default() };
+    let decibels = |bands: &[Band]| bands.iter().map(|b| b.map(decibel)).collect::<Vec<Band>>();
+    let hz = &new.proof.hz;
+    let [before, after] = &new.proof.sensitivities;
+    let of = |key: &str, bands: &[Band]| (key.to_owned(), hz.clone(), decibels(bands));
+    let sensitivity = panel(
+        ("Sensitivity", axis("Frequency", "Hz", true), axis("Magnitude", "dB", false)),
+        vec![of("present", before), of("new", after)],
+    );
+    let responses = new.steps.iter().map(|s| (key(s).to_owned(), s.seconds.clone(), s.response.clone())).collect();
+    let step = panel(("Step of the reference", axis("Time", "s", false), axis("y per step", "", false)), responses);
+    Figure {
+        key: "response".into(),
+        title: "The loop, running and new".into(),
+        caption: "Medians and 95 % bands over models of the region that the search has not seen.".into(),
+        panels: vec![sensitivity, step],
+        ..Figure::default()
+    }
+}
+
+fn panel((title, x, y): (&str, Axis, Axis), of: Vec<(String, Vec<f64>, Vec<Band>)>) -> Panel {
+    let at = |bands: &[Band], k: usize| bands.iter().map(|b| b[k]).collect::<Vec<f64>>();
+    let regions = of.iter().map(|(method, x, bands)| Region {
+        method: method.clone(),
+        note: "95 %".into(),
+        x: x.clone(),
+        low: at(bands, 0),
+        high: at(bands, 2),
+    });
+    let regions = regions.collect();
+    let curve =
+        |(method, x, bands): (String, Vec<f64>, Vec<Band>)| Curve { method, y: at(&bands, 1), x, ..Curve::default() };
+    let content = Content::Curves(of.into_iter().map(curve).collect());
+    Panel { title: title.into(), x, y, content, regions, ..Panel::default() }
+}

@@ -23,6 +23,8 @@ pub(super) mod data;
 pub(super) mod deviation;
 mod known_loop;
 #[cfg(test)]
+mod many_channels;
+#[cfg(test)]
 mod many_records;
 mod measured;
 #[cfg(test)]
@@ -200,7 +202,7 @@ fn problem<'a>(
     let (m, p) = experiments.first().map_or((0, 0), |e| (e.u.ncols(), e.y.ncols()));
     let longest = experiments.iter().map(|e| e.u.nrows()).max().unwrap_or(0);
     let order = options.order.unwrap_or(1);
-    let needed = SAMPLES_PER_PARAMETER * (order * (m + p) + 8);
+    let needed = SAMPLES_PER_PARAMETER * (order * (m + p).div_ceil(p.max(1)) + 8);
     if m == 0 || p == 0 || longest < needed {
         return Err(Error::TooFewSamples { what: "the longest record".into(), found: longest, needed });
     }

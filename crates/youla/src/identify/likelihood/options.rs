@@ -21,6 +21,6 @@ pub struct LikelihoodOptions {
 
 impl Default for LikelihoodOptions {
     fn default() -> Self {
-        LikelihoodOptions { order: None, dead_time: None, feedthrough: None, largest_order: 40 }
+        LikelihoodOptions { order: None, dead_time: None, feedthrough: None, largest_order: 100 }
     }
 }

@@ -10,13 +10,15 @@ use super::limits::{BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_NONLINEAR, LA
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
+use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
 use crate::identify::likelihood::search::point::energy;
-use crate::identify::likelihood::search::with_slope_of_unstable;
+use crate::identify::likelihood::search::separable::separable;
+use crate::identify::likelihood::search::unstable::{self, with_slope_of_unstable};
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
-use faer::c64;
+use faer::{Mat, c64};
 use rustfft::FftPlanner;
 
 /// Functions of the input in units of its standard deviation: smooth ones, and what saturation takes away.
@@ -105,16 +107,13 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let chart = Chart::new(&found.point.model, found.feedthrough);
     let count = FUNCTIONS * spectra.inputs;
     let extra = Extra { count, values: &values, quick: false };
-    let factor = linearise_with(spectra, &found.point, &chart, &found.noise, &extra).factor;
-    let factor = with_slope_of_unstable(factor, spectra, &found.point.model, &chart);
-    let parameters = chart.parameters();
-    let rows = parameters..(parameters + count).min(factor.nrows());
-    let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, c)].powi(2)).sum::<f64>();
+    let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
+    let rows = 0..factor.nrows();
     // Each function alone: its coefficient beside the parameters, with its deviation.
     let single = |f: usize| {
-        let along: f64 = rows.clone().map(|i| factor[(i, parameters + f)] * factor[(i, parameters + count)]).sum();
-        let own: f64 = rows.clone().map(|i| factor[(i, parameters + f)].powi(2)).sum();
-        if own > DISTINCT * length(parameters + f) { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
+        let along: f64 = rows.clone().map(|i| factor[(i, f)] * factor[(i, count)]).sum();
+        let own: f64 = rows.clone().map(|i| factor[(i, f)].powi(2)).sum();
+        if own > DISTINCT * lengths[f] { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
     };
     let telling = (0..count).map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
     let (f, (c, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
@@ -125,15 +124,30 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let note = format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1);
     let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance);
     // Functions of the input behind friction.
-    let behind: Vec<usize> = rows
-        .filter(|i| *i >= parameters + spectra.inputs && factor[(*i, *i)].powi(2) > DISTINCT * length(*i))
-        .collect();
-    let statistic: f64 = behind.iter().map(|i| factor[(*i, parameters + count)].powi(2)).sum();
+    let behind: Vec<usize> =
+        rows.filter(|i| *i >= spectra.inputs && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]).collect();
+    let statistic: f64 = behind.iter().map(|i| factor[(*i, count)].powi(2)).sum();
     let moved = energy(spectra, &clean, &found.noise).max(TINY);
     let share = ((statistic - behind.len() as f64).max(0.0) / moved).sqrt();
     let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
     let significance = chi_square_deviations(statistic, behind.len() as f64);
     (vec![of_size, Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance)], nonlinear_part)
+}
+
+/// The triangle `[R r]` of further columns beside the parameters, and the squared lengths of these columns.
+fn beside_parameters(spectra: &Spectra, solution: &Solution, chart: &Chart, extra: &Extra<'_>) -> (Mat<f64>, Vec<f64>) {
+    let found = &solution.chosen.found;
+    if separable(spectra.outputs) {
+        let normal = Normal::with(spectra, &found.point, chart, &found.noise, (Ends::Shared, extra));
+        return normal.with_slope(unstable::slope(spectra, &found.point.model, chart)).extra();
+    }
+    let factor = linearise_with(spectra, &found.point, chart, &found.noise, extra).factor;
+    let factor = with_slope_of_unstable(factor, spectra, &found.point.model, chart);
+    let (first, count) = (chart.parameters(), extra.count);
+    let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, first + c)].powi(2)).sum::<f64>();
+    let rows = factor.nrows().saturating_sub(first).min(count);
+    let triangle = Mat::from_fn(rows, count + 1, |i, j| factor[(first + i, first + j)]);
+    (triangle, (0..count).map(length).collect())
 }
 
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.

@@ -9,17 +9,22 @@
 use super::limits::{BEYOND_CHANCE, KNOWN, LARGEST_DIFFERENCE, LARGEST_NOISE_RATIO, OVERALL_CHANCE};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
+use crate::identify::likelihood::deviation::root::Root;
 use crate::identify::likelihood::deviation::{grid, inverse_root};
+use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::groups::grouped;
 use crate::identify::likelihood::search::linearise::{compressed, linearise, stacked};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
-use crate::identify::likelihood::search::{DAMPED, search, with_best_ends, with_slope_of_unstable};
+use crate::identify::likelihood::search::separable::separable;
+use crate::identify::likelihood::search::unstable::{self, with_slope_of_unstable};
+use crate::identify::likelihood::search::{DAMPED, search, with_best_ends};
 use crate::identify::subspace::Experiment;
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
+use rayon::prelude::*;
 
 /// Pieces of a record with at least so many samples each.
 const PIECES: [(usize, usize); 2] = [(8, 1000), (4, 500)];
@@ -29,9 +34,17 @@ const WINDOW: usize = 5;
 const COMPARED: usize = 10000;
 /// Steps of a search on a part.
 const STEPS: usize = 15;
-/// Triangular factor of a part of the records at the model.
+
+/// What a part of the records says of the parameters: a triangular factor, or normal equations by outputs.
+#[derive(Clone)]
+enum Information {
+    Dense(Mat<f64>),
+    ByOutput(Normal),
+}
+
+/// A part of the records at the model.
 struct Part {
-    factor: Mat<f64>,
+    information: Information,
     energy: f64,
     samples: f64,
 }
@@ -65,35 +78,59 @@ impl Part {
         let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
         let chart = Chart::new(&point.model, found.feedthrough);
         let groups = grouped(&spectra, &point, DAMPED);
-        let linearised = linearise(groups.as_ref().unwrap_or(&spectra), &point, &chart, &found.noise);
+        let lines = groups.as_ref().unwrap_or(&spectra);
+        let information = if separable(spectra.outputs) {
+            let slope = unstable::slope(&spectra, &point.model, &chart);
+            let normal = Normal::new(lines, &point, &chart, &found.noise, Ends::Own);
+            Information::ByOutput(normal.with_slope(slope).reduced())
+        } else {
+            let factor = linearise(lines, &point, &chart, &found.noise).factor;
+            Information::Dense(with_slope_of_unstable(factor, &spectra, &point.model, &chart))
+        };
         let energy = energy(&spectra, &point.residuals(&spectra), &found.noise);
-        let factor = with_slope_of_unstable(linearised.factor, &spectra, &point.model, &chart);
-        Some(Part { factor, energy, samples: (spectra.samples() * spectra.outputs) as f64 })
+        Some(Part { information, energy, samples: (spectra.samples() * spectra.outputs) as f64 })
     }
 
     fn together(parts: &[&Part]) -> Option<Part> {
         let (first, others) = parts.split_first()?;
-        let mut factor = first.factor.clone();
-        others.iter().for_each(|part| factor = compressed(&stacked(&factor, &part.factor)));
+        let joined = |sum: Information, part: &&Part| match (sum, &part.information) {
+            (Information::Dense(a), Information::Dense(b)) => Information::Dense(compressed(&stacked(&a, b))),
+            (Information::ByOutput(a), Information::ByOutput(b)) => Information::ByOutput(a.plus(b)),
+            (sum, _) => sum,
+        };
+        let information = others.iter().fold(first.information.clone(), joined);
         let sum = |of: fn(&Part) -> f64| parts.iter().map(|p| of(p)).sum::<f64>();
-        Some(Part { factor, energy: sum(|p| p.energy), samples: sum(|p| p.samples) })
+        Some(Part { information, energy: sum(|p| p.energy), samples: sum(|p| p.samples) })
     }
 
     /// `|r|^2`, what the parameters of this part alone lower the sum of squares by.
     fn explained(&self, parameters: usize) -> f64 {
-        (0..parameters.min(self.factor.nrows())).map(|i| self.factor[(i, parameters)].powi(2)).sum()
+        match &self.information {
+            Information::Dense(factor) => {
+                (0..parameters.min(factor.nrows())).map(|i| factor[(i, parameters)].powi(2)).sum()
+            }
+            Information::ByOutput(normal) => normal.factor(0.0).explained(),
+        }
     }
 
     /// The step that this part asks for, and the root of its covariance.
-    fn step(&self, parameters: usize) -> (Vec<f64>, Mat<f64>) {
-        let root = inverse_root(&self.factor, parameters);
-        let rows = parameters.min(self.factor.nrows());
-        let gradient = |j: usize| (0..rows).map(|i| self.factor[(i, j)] * self.factor[(i, parameters)]).sum::<f64>();
+    fn step(&self, chart: &Chart, model: &Model) -> (Vec<f64>, Root) {
+        let factor = match &self.information {
+            Information::Dense(factor) => factor,
+            Information::ByOutput(normal) => {
+                let arrow = normal.factor(0.0);
+                return (arrow.parameters(normal), Root::of_arrow(&arrow, chart, model));
+            }
+        };
+        let parameters = chart.parameters();
+        let root = inverse_root(factor, parameters);
+        let rows = parameters.min(factor.nrows());
+        let gradient = |j: usize| (0..rows).map(|i| factor[(i, j)] * factor[(i, parameters)]).sum::<f64>();
         let gradient: Vec<f64> = (0..parameters).map(gradient).collect();
         let inner: Vec<f64> =
             (0..root.ncols()).map(|k| (0..parameters).map(|j| root[(j, k)] * gradient[j]).sum()).collect();
         let step = (0..parameters).map(|j| (0..root.ncols()).map(|k| root[(j, k)] * inner[k]).sum()).collect();
-        (step, root)
+        (step, Root::dense(root))
     }
 }
 
@@ -204,8 +241,7 @@ fn differences(
     let found = &solution.chosen.found;
     let model = &found.point.model;
     let chart = Chart::new(model, found.feedthrough);
-    let parameters = chart.parameters();
-    let ((sa, ra), (sb, rb)) = (a.step(parameters), b.step(parameters));
+    let ((sa, ra), (sb, rb)) = (a.step(&chart, model), b.step(&chart, model));
     let models = searched.then(|| records.map(|records| on(problem, solution, records)));
     let every = match &models {
         Some([Some(a), Some(b)]) => [a.1, b.1],
@@ -218,8 +254,8 @@ fn differences(
         let slopes = chart.response_slopes(model, z);
         let along =
             |i: usize, v: &dyn Fn(usize) -> f64| (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j));
-        let of =
-            |root: &Mat<f64>, i: usize| (0..root.ncols()).map(|c| along(i, &|j| root[(j, c)]).norm_sqr()).sum::<f64>();
+        let (ra, rb) = (ra.seen(&slopes), rb.seen(&slopes));
+        let of = |seen: &Mat<c64>, i: usize| (0..seen.ncols()).map(|c| seen[(i, c)].norm_sqr()).sum::<f64>();
         let variance: f64 = (0..slopes.nrows()).map(|i| every[0] * of(&ra, i) + every[1] * of(&rb, i)).sum();
         let g = model.response(z);
         let norm = |g: &[c64]| g.iter().map(|g| g.norm_sqr()).sum::<f64>().sqrt();
@@ -233,7 +269,7 @@ fn differences(
         let known = variance < (KNOWN * norm(&g)).powi(2);
         known.then(|| At { share, apart: matrix(&apart), chance: variance.sqrt() / size, size })
     };
-    grid(solution.samples).into_iter().filter_map(at).collect()
+    grid(solution.samples).into_par_iter().filter_map(at).collect()
 }
 
 /// The model of some records, from that of all, and of how many lines it sees one.

@@ -16,6 +16,7 @@ use crate::identify::likelihood::search::point::Point;
 use faer::linalg::solvers::Solve;
 use faer::{Mat, Side, c64};
 use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
 
 /// Damping ratios of the grid.
 const DAMPINGS: [f64; 3] = [0.02, 0.1, 0.4];
@@ -37,7 +38,7 @@ pub(crate) fn modes(spectra: &Spectra, point: &Point, noise: &Noise, count: usiz
     }
     let fits = Fits::new(spectra, &point.residuals(spectra), noise);
     let mut found: Vec<(f64, c64, Mat<f64>)> =
-        grid.into_iter().filter_map(|pole| fits.at(pole).map(|(g, r)| (g, pole, r))).collect();
+        grid.into_par_iter().filter_map(|pole| fits.at(pole).map(|(g, r)| (g, pole, r))).collect();
     found.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut chosen: Vec<(f64, c64, Mat<f64>)> = Vec::new();
     for candidate in found {

@@ -9,3 +9,4 @@ pub(crate) mod resize;
 pub(crate) mod solve;
 pub(crate) mod starts;
 pub(crate) mod states;
+mod wide;

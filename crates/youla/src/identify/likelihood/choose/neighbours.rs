@@ -240,7 +240,7 @@ impl Problem<'_> {
     }
 
     /// Other delays, input by input: many of a single input, up to two samples away for several and on long records.
-    fn shifted(&self, delays: &[usize]) -> Vec<Vec<usize>> {
+    pub(super) fn shifted(&self, delays: &[usize]) -> Vec<Vec<usize>> {
         if self.dead_time.is_some() {
             return Vec::new();
         }

@@ -3,6 +3,7 @@
 
 use super::dead_time::dead_times;
 use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
+use super::wide;
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
@@ -18,14 +19,14 @@ const SHORTEST: usize = 500;
 /// Rounds of models one step away.
 const ROUNDS: usize = 16;
 /// Differences of the criterion that decide neither between dead times nor for a direct path: odds of e^4 to one.
-const INDISTINCT: f64 = 8.0;
+pub(super) const INDISTINCT: f64 = 8.0;
 /// Difference of the criterion up to which a model with fewer states may owe it to a wrong dead time. Two samples cost 23 with
 /// 12 000 samples of 10 dB; distinctly wrong orders cost hundreds.
 const WRONG_DELAY: f64 = 60.0;
 /// Differences of the criterion of rivals up to which a model counts beside the best: weights of e^-6.
 const BESIDE: f64 = 12.0;
 
-fn best(tried: &[Choice]) -> Option<&Choice> {
+pub(super) fn best(tried: &[Choice]) -> Option<&Choice> {
     tried.iter().min_by(|a, b| a.criterion.total_cmp(&b.criterion))
 }
 
@@ -33,14 +34,22 @@ impl Problem<'_> {
     /// The model that the records support; what was tried is noted in the table. `None` where no search ends.
     pub(crate) fn solve(&self, table: &mut Vec<Candidate>) -> Option<Solution> {
         let samples = self.samples().0;
-        if samples > LONG {
+        if samples > self.long() {
             return self.solve_from(vec![self.chosen_on_a_part(samples, table)?], table);
         }
         self.solve_from(self.first(table), table)
     }
 
+    /// Samples above which order and dead time are first chosen on a part of them.
+    fn long(&self) -> usize {
+        if self.is_wide() { wide::LONG } else { LONG }
+    }
+
     /// The model that is reached from some models.
     pub(super) fn solve_from(&self, mut tried: Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Solution> {
+        if self.is_wide() {
+            return self.solve_wide_from(tried, table);
+        }
         let samples = self.samples().0;
         let rounds = if samples > LONG { 1 } else { ROUNDS };
         let now = best(&tried)?.found.feedthrough;
@@ -71,7 +80,13 @@ impl Problem<'_> {
             }
             last.along_delays(&mut tried, &at, table);
         }
-        let mut chosen = calmest(&tried, &at)?.clone();
+        self.concluded(tried, &at)
+    }
+
+    /// The calmest model beside the best, searched to its end, with its rivals.
+    pub(super) fn concluded(&self, tried: Vec<Choice>, at: &Choice) -> Option<Solution> {
+        let samples = self.samples().0;
+        let mut chosen = calmest(&tried, at)?.clone();
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
         if let Some(found) = search(&spectra, chosen.found.point.clone(), &last.options(40, 0.01, &chosen.delays)) {
@@ -145,7 +160,7 @@ impl Problem<'_> {
     }
 
     /// The same model as a start, for D to move.
-    fn same(&self, choice: &Choice) -> Task {
+    pub(super) fn same(&self, choice: &Choice) -> Task {
         Task {
             spectra: Arc::new(self.spectra(&choice.delays)),
             start: choice.found.point.clone(),
@@ -157,26 +172,31 @@ impl Problem<'_> {
     /// Searches from long regressions, without dead time and with that which a long regression shows.
     fn first(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let zero = vec![0; self.inputs()];
+        let count = if self.is_wide() { 1 } else { FIRST };
         let mut tasks = match &self.dead_time {
-            Some(delays) => self.first_tasks(delays, FIRST),
+            Some(delays) => self.first_tasks(delays, count),
             None => {
-                let past = 40.min(self.samples().1 / 8).max(2);
+                let most = if self.is_wide() { self.samples().0 / 4 / (self.inputs() + self.outputs()) } else { 40 };
+                let past = 40.min(self.samples().1 / 8).min(most).max(2);
                 let sums = LagSums::new(self.experiments, &self.sizes, &zero, past);
                 let delays = dead_times(&sums, self.inputs(), self.skip);
-                let mut tasks = self.first_tasks(&zero, FIRST);
+                let mut tasks = self.first_tasks(&zero, count);
                 if delays != zero {
                     tasks.extend(self.first_tasks(&delays, 1));
                 }
                 tasks
             }
         };
-        tasks.extend(self.order.and_then(|order| self.resized(order)));
+        if !self.is_wide() {
+            tasks.extend(self.order.and_then(|order| self.resized(order)));
+        }
         self.run(tasks, f64::INFINITY, table)
     }
 
     /// The choice for the first part of long records, searched again on all of them.
     fn chosen_on_a_part(&self, samples: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
-        let share = SHORT as f64 / samples as f64;
+        let short = if self.is_wide() { wide::SHORT } else { SHORT };
+        let share = short as f64 / samples as f64;
         let kept = |rows: usize| ((rows as f64 * share) as usize).max(SHORTEST).min(rows);
         let mut longest: Vec<usize> = (0..self.experiments.len()).collect();
         longest.sort_by_key(|k| std::cmp::Reverse(self.experiments[*k].u.nrows()));
@@ -184,7 +204,7 @@ impl Problem<'_> {
         let mut sum = 0;
         longest.retain(|k| {
             sum += kept(self.experiments[*k].u.nrows());
-            sum <= LONG
+            sum <= self.long()
         });
         longest.sort_unstable();
         let cut = |k: &usize| {

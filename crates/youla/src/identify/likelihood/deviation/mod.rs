@@ -12,17 +12,18 @@ pub(crate) mod innovation;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
+pub(crate) mod root;
 #[cfg(feature = "serde")]
 mod stored;
 
 use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
-use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
+use root::Root;
 
 /// Rivals of less weight are left out.
 const LEAST_WEIGHT: f64 = 1e-12;
@@ -73,8 +74,8 @@ pub(crate) struct Directions {
     model: Model,
     delays: Vec<usize>,
     chart: Chart,
-    /// Columns are independent errors of the parameters.
-    root: Mat<f64>,
+    /// Independent errors of the parameters.
+    root: Root,
     /// Models that the record does not distinguish, with the roots of their weights.
     rivals: Vec<(Model, Vec<usize>, f64)>,
     /// Variance of the parameters by their scatter over pieces of the records, in units of that of the noise; it is in `root`.
@@ -111,8 +112,7 @@ impl Directions {
     pub(crate) fn new(spectra: &Spectra, solution: &Solution, scatter: f64, witness: Option<Witness>) -> Self {
         let found = &solution.chosen.found;
         let chart = Chart::new(&found.point.model, found.feedthrough);
-        let linearised = linearise(spectra, &found.point, &chart, &found.noise);
-        let root = inverse_root(&linearised.factor, chart.parameters()) * faer::Scale(scatter.sqrt());
+        let root = Root::new(spectra, &found.point, &chart, &found.noise).scaled(scatter.sqrt());
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);
@@ -124,7 +124,7 @@ impl Directions {
     pub(crate) fn of_parts(
         (model, delays): (Model, Vec<usize>),
         chart: Chart,
-        root: Mat<f64>,
+        root: Root,
         rivals: Vec<(Model, Vec<usize>, f64)>,
     ) -> Self {
         let least = rivals.iter().map(|(.., criterion)| *criterion).fold(f64::INFINITY, f64::min);
@@ -144,14 +144,12 @@ impl Directions {
 
     /// Independent errors of the parameters.
     pub(crate) fn errors(&self) -> usize {
-        self.root.ncols()
+        self.root.errors()
     }
 
     /// The model with independent errors of its parameters, in standard deviations, and its dead times.
     pub(crate) fn moved(&self, errors: &[f64]) -> (Model, &[usize]) {
-        let along = |j: usize| (0..self.root.ncols()).map(|k| self.root[(j, k)] * errors[k]).sum();
-        let step: Vec<f64> = (0..self.root.nrows()).map(along).collect();
-        (self.chart.moved(&self.model, &step), &self.delays)
+        (self.chart.moved(&self.model, &self.root.step(errors)), &self.delays)
     }
 
     /// Models of another structure that the record does not distinguish, with their dead times and weights.
@@ -210,10 +208,8 @@ impl Directions {
         let (slopes, phases) = (self.chart.response_slopes(&self.model, z), phases(&self.delays, z));
         let g = delayed(&self.model, &self.delays, share);
         let others: Vec<_> = self.rivals.iter().map(|(model, delays, _)| delayed(model, delays, share)).collect();
-        let parameters = Mat::from_fn(entries, self.root.ncols(), |i, k| {
-            let along = |sum: c64, j: usize| sum + slopes[(i, j)] * self.root[(j, k)];
-            (0..self.root.nrows()).fold(c64::ZERO, along) * phases[i % m]
-        });
+        let seen = self.root.seen(&slopes);
+        let parameters = Mat::from_fn(entries, seen.ncols(), |i, k| seen[(i, k)] * phases[i % m]);
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
         let seen =
             |k: usize| self.seen.as_ref().map_or_else(|| vec![0.0; entries], |seen| seen[k].near(share, entries).0);

@@ -4,16 +4,15 @@
 //! var f = (df/dtheta) (J'J)^-1 (df/dtheta)',     f: natural frequency, damping ratio, magnitude
 //! ```
 
-use super::inverse_root;
+use super::root::Root;
 use crate::identify::likelihood::choose::problem::Choice;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::chart::Chart;
-use crate::identify::likelihood::search::linearise::linearise;
 use crate::identify::likelihood::search::model::Model;
 use crate::lti::Discrete;
 use crate::lti::modes::{Mode, mode};
-use faer::{Mat, c64};
+use faer::c64;
 
 /// Step of the central differences, in units of the entries of a balanced A.
 const STEP: f64 = 1e-6;
@@ -35,22 +34,22 @@ pub struct ModeEstimate {
 pub(crate) fn modes(spectra: &Spectra, choice: &Choice, time: Discrete) -> Vec<ModeEstimate> {
     let found = &choice.found;
     let chart = Chart::new(&found.point.model, found.feedthrough);
-    let linearised = linearise(spectra, &found.point, &chart, &found.noise);
-    let root = inverse_root(&linearised.factor, chart.parameters());
+    let root = Root::new(spectra, &found.point, &chart, &found.noise);
     of_blocks(&found.point.model, &chart, &root, time)
 }
 
 /// Modes of a model whose parameters have the covariance `root root'`, by natural frequency.
-pub(crate) fn of_blocks(model: &Model, chart: &Chart, root: &Mat<f64>, time: Discrete) -> Vec<ModeEstimate> {
+pub(crate) fn of_blocks(model: &Model, chart: &Chart, root: &Root, time: Discrete) -> Vec<ModeEstimate> {
     let mut out = Vec::new();
     let mut at = 0;
-    for (block, directions) in model.blocks.iter().zip(&chart.directions) {
+    for (place, block) in model.blocks.iter().enumerate() {
         for pole in block.poles().into_iter().filter(|p| p.im >= 0.0) {
-            let slopes = slopes(block, directions, pole, time);
+            let slopes = slopes(block, (chart, place), pole, time);
             let deviation = |figure: usize| {
-                let along =
-                    |c: usize| slopes.iter().enumerate().map(|(q, s)| s[figure] * root[(at + q, c)]).sum::<f64>();
-                (0..root.ncols()).map(|c| along(c).powi(2)).sum::<f64>().sqrt()
+                let along = |c: usize| {
+                    slopes.iter().enumerate().map(|(q, s)| s[figure] * root.shared[(at + q, c)]).sum::<f64>()
+                };
+                (0..root.shared.ncols()).map(|c| along(c).powi(2)).sum::<f64>().sqrt()
             };
             out.push(ModeEstimate {
                 mode: mode(time, pole),
@@ -59,21 +58,21 @@ pub(crate) fn of_blocks(model: &Model, chart: &Chart, root: &Mat<f64>, time: Dis
                 magnitude_deviation: deviation(2),
             });
         }
-        at += directions.ncols();
+        at += chart.parameters_of(place);
     }
     out.sort_by(|a, b| a.mode.hz.total_cmp(&b.mode.hz));
     out
 }
 
 /// Slopes of frequency, damping and magnitude of a pole in each direction of its block, by central differences.
-fn slopes(block: &Block, directions: &Mat<f64>, pole: c64, time: Discrete) -> Vec<[f64; 3]> {
+fn slopes(block: &Block, (chart, place): (&Chart, usize), pole: c64, time: Discrete) -> Vec<[f64; 3]> {
     let figures = |pole: c64| {
         let mode = mode(time, pole);
         [mode.hz, mode.zeta, pole.norm()]
     };
     let moved = |q: usize, step: f64| {
         let mut other = block.clone();
-        other.a.iter_mut().enumerate().for_each(|(i, a)| *a += step * directions[(i, q)]);
+        other.a.iter_mut().enumerate().for_each(|(i, a)| *a += step * chart.direction(place, i, q));
         let distance = |p: &c64| (p - pole).norm();
         let near = other.poles().into_iter().min_by(|a, b| distance(a).total_cmp(&distance(b)));
         figures(near.unwrap_or(pole))
@@ -82,5 +81,5 @@ fn slopes(block: &Block, directions: &Mat<f64>, pole: c64, time: Discrete) -> Ve
         let (up, down) = (moved(q, STEP), moved(q, -STEP));
         std::array::from_fn(|k| (up[k] - down[k]) / (2.0 * STEP))
     };
-    (0..directions.ncols()).map(slope).collect()
+    (0..chart.parameters_of(place)).map(slope).collect()
 }

@@ -2,7 +2,9 @@
 
 use super::Directions;
 use super::region::Region;
+use super::root::Root;
 use crate::identify::likelihood::data::spectra::Sizes;
+use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::verdict::{Excess, NonlinearPart};
@@ -19,6 +21,11 @@ pub(super) struct StoredRegion {
     model: Model,
     delays: Vec<usize>,
     chart: Vec<StoredMatrix>,
+    /// Of many outputs the entries that move, in place of directions, and the errors of each output alone.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    units: Vec<Vec<usize>>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    own: Vec<StoredMatrix>,
     feedthrough: bool,
     root: StoredMatrix,
     rivals: Vec<(Model, Vec<usize>, f64)>,
@@ -59,7 +66,9 @@ impl From<Region> for StoredRegion {
             shares: region.shares,
             chart: d.chart.directions.iter().map(StoredMatrix::from).collect(),
             feedthrough: d.chart.feedthrough,
-            root: StoredMatrix::from(&d.root),
+            units: d.chart.units,
+            own: d.root.own.iter().map(StoredMatrix::from).collect(),
+            root: StoredMatrix::from(&d.root.shared),
             model: d.model,
             delays: d.delays,
             rivals: d.rivals,
@@ -86,7 +95,8 @@ impl TryFrom<StoredRegion> for Region {
         let seen = stored.seen.iter().flatten().all(|seen| seen.is_of(m * p));
         let positive = |values: &[f64]| !values.is_empty() && values.iter().all(|v| *v > 0.0 && v.is_finite());
         let lists = [&stored.sizes.u, &stored.sizes.y, &stored.shares];
-        let fits = stored.chart.len() == stored.model.blocks.len()
+        let fits = stored.chart.len() + stored.units.len() == stored.model.blocks.len()
+            && (stored.chart.is_empty() || stored.units.is_empty())
             && seen
             && stored.nonlinear_part.as_ref().is_none_or(|part| part.is_of(m))
             && lists.into_iter().all(|list| positive(list))
@@ -98,8 +108,14 @@ impl TryFrom<StoredRegion> for Region {
         let blocks = stored.chart.iter().zip(&stored.model.blocks);
         let directions = blocks.map(|(of, b)| of.of_rows(b.states.checked_mul(b.states + m + p)?));
         let directions: Vec<Mat<f64>> = directions.collect::<Option<_>>().ok_or(refused)?;
-        let chart = Chart::of(&stored.model, directions, stored.feedthrough);
-        let root = stored.root.of_rows(chart.parameters()).ok_or(refused)?;
+        let within = |(units, b): (&Vec<usize>, &Block)| units.iter().all(|e| *e < b.states * (b.states + m + p));
+        if !stored.units.iter().zip(&stored.model.blocks).all(within) {
+            return Err(refused);
+        }
+        let chart = Chart::of(&stored.model, (directions, stored.units), stored.feedthrough);
+        let shared = stored.root.of_rows(chart.parameters()).ok_or(refused)?;
+        let own = stored.own.iter().map(|of| of.of_rows(of.rows)).collect::<Option<_>>().ok_or(refused)?;
+        let root = Root::of_parts(shared, own, &chart, &stored.model).ok_or(refused)?;
         let time = Discrete::new(stored.ts).map_err(|_| "this region has no sample time; identify the run again")?;
         let directions = Directions {
             model: stored.model,

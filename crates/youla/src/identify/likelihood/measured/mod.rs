@@ -33,6 +33,7 @@ pub use data::{MeasuredResponse, ResponseTable, ResponseVariance};
 
 use super::LikelihoodOptions;
 use crate::identify::likelihood::deviation::region::Region;
+use crate::identify::likelihood::deviation::root::Root;
 use crate::identify::likelihood::deviation::{Directions, inverse_root, mode_estimates, physical};
 use crate::identify::likelihood::recommendation::{Predictor, Recommendation};
 use crate::identify::verdict::of_response;
@@ -81,7 +82,7 @@ pub fn recommend_from_response(
     let chart = chosen.chart();
     let factor = search::linearise(&lines, &chosen.model, &chart);
     let scale = if response.known() { 1.0 } else { (chosen.energy / lines.rows() as f64).sqrt() };
-    let root = inverse_root(&factor, chart.parameters()) * faer::Scale(scale);
+    let root = Root::dense(inverse_root(&factor, chart.parameters())).scaled(scale);
     let shares: Vec<f64> = response.omega.iter().map(|w| w * response.time.ts() / TAU).collect();
     let others = rivals.iter().map(|c| (c.model.clone(), c.delays.clone(), c.criterion)).collect();
     let modes = mode_estimates::of_blocks(&chosen.model, &chart, &root, response.time);

@@ -48,7 +48,7 @@ impl Block {
         (2..s).all(|i| (0..i - 1).all(|j| !below(i, j)) && !(below(i, i - 1) && below(i - 1, i - 2)))
     }
 
-    /// The block and t in the states of the real Schur form of A; as they are where A is triangular already.
+    /// The block and t (which may be empty) in the states of the real Schur form of A; as they are where A is triangular already.
     pub(crate) fn triangular(&self, t: &[f64]) -> Option<(Block, Vec<f64>)> {
         if self.is_triangular() {
             return Some((self.clone(), t.to_vec()));
@@ -63,7 +63,8 @@ impl Block {
             b: (0..s * m).map(|x| sum(&|i| form.q[(i, x / m)] * self.b[i * m + x % m])).collect(),
             c: (0..p * s).map(|x| sum(&|i| self.c[x / s * s + i] * form.q[(i, x % s)])).collect(),
         };
-        Some((block, (0..s).map(|k| sum(&|i| form.q[(i, k)] * t[i])).collect()))
+        let ends = if t.is_empty() { 0 } else { s };
+        Some((block, (0..ends).map(|k| sum(&|i| form.q[(i, k)] * t[i])).collect()))
     }
 
     /// (z I - A)^-1, row by row.

@@ -3,6 +3,7 @@
 
 use super::block::Block;
 use super::model::Model;
+use super::separable::separable;
 use faer::{Mat, c64};
 
 /// The local coordinates of a model.
@@ -10,41 +11,122 @@ use faer::{Mat, c64};
 pub(crate) struct Chart {
     /// Per block: entries of A, B and C by directions, column by column.
     pub(crate) directions: Vec<Mat<f64>>,
+    /// Where entries move alone: per block the entry of (A, B, C) that each parameter moves.
+    pub(crate) units: Vec<Vec<usize>>,
     /// Whether D moves.
     pub(crate) feedthrough: bool,
     inputs: usize,
     outputs: usize,
 }
 
+/// An entry of (A, B) that moves.
+#[derive(Debug, Clone)]
+pub(crate) struct Entry {
+    pub(crate) block: usize,
+    /// Its place in A, then B, row by row.
+    pub(crate) entry: usize,
+    /// Its place among the parameters.
+    pub(crate) place: usize,
+}
+
+/// The parameters of coordinates by outputs.
+#[derive(Debug, Clone)]
+pub(crate) struct Places {
+    /// Entries of A and B, which all outputs share.
+    pub(crate) plant: Vec<Entry>,
+    /// Places of the row of C and that of D of each output.
+    pub(crate) own: Vec<Vec<usize>>,
+}
+
 impl Chart {
     /// The coordinates of which the directions are known.
     #[cfg(feature = "serde")]
-    pub(crate) fn of(model: &Model, directions: Vec<Mat<f64>>, feedthrough: bool) -> Self {
-        Chart { directions, feedthrough, inputs: model.inputs, outputs: model.outputs }
+    pub(crate) fn of(model: &Model, (directions, units): (Vec<Mat<f64>>, Vec<Vec<usize>>), feedthrough: bool) -> Self {
+        Chart { directions, units, feedthrough, inputs: model.inputs, outputs: model.outputs }
     }
 
-    /// The coordinates at a model.
+    /// The coordinates at a model; of many outputs those of [`Self::by_outputs`].
     pub(crate) fn new(model: &Model, feedthrough: bool) -> Self {
         let (m, p) = (model.inputs, model.outputs);
+        if separable(p) {
+            return Chart::by_outputs(model, feedthrough);
+        }
         let directions = model.blocks.iter().map(|b| complement(b, m, p)).collect();
-        Chart { directions, feedthrough, inputs: m, outputs: p }
+        Chart { directions, units: Vec::new(), feedthrough, inputs: m, outputs: p }
+    }
+
+    /// Coordinates in which each output has its row of C (and D) for itself: every entry of C, and of A and B those that do not belong to a
+    /// similarity transformation.
+    pub(crate) fn by_outputs(model: &Model, feedthrough: bool) -> Self {
+        let (m, p) = (model.inputs, model.outputs);
+        let of_block = |block: &Block| {
+            let first = block.states * (block.states + m);
+            free(block, m).into_iter().chain(first..first + p * block.states).collect()
+        };
+        Chart::of_units(model, model.blocks.iter().map(of_block).collect(), feedthrough)
+    }
+
+    fn of_units(model: &Model, units: Vec<Vec<usize>>, feedthrough: bool) -> Self {
+        Chart { directions: Vec::new(), units, feedthrough, inputs: model.inputs, outputs: model.outputs }
+    }
+
+    /// The parameters by what they move.
+    pub(crate) fn places(&self, model: &Model) -> Places {
+        let (mut plant, mut own, mut at) = (Vec::new(), vec![Vec::new(); self.outputs], 0);
+        for (block, (of, units)) in model.blocks.iter().zip(&self.units).enumerate() {
+            let first = of.states * (of.states + self.inputs);
+            for (q, entry) in units.iter().enumerate() {
+                match entry.checked_sub(first) {
+                    None => plant.push(Entry { block, entry: *entry, place: at + q }),
+                    Some(c) => own[c / of.states].push(at + q),
+                }
+            }
+            at += units.len();
+        }
+        if self.feedthrough {
+            let of = |o: usize| at + o * self.inputs..at + (o + 1) * self.inputs;
+            own.iter_mut().enumerate().for_each(|(o, own)| own.extend(of(o)));
+        }
+        Places { plant, own }
+    }
+
+    /// What parameter q of a block changes at an entry of its (A, B, C).
+    pub(crate) fn direction(&self, block: usize, entry: usize, q: usize) -> f64 {
+        match self.units.get(block) {
+            Some(units) => f64::from(units[q] == entry),
+            None => self.directions[block][(entry, q)],
+        }
+    }
+
+    /// Parameters of a block.
+    pub(crate) fn parameters_of(&self, block: usize) -> usize {
+        self.units.get(block).map_or_else(|| self.directions[block].ncols(), Vec::len)
     }
 
     /// Coordinates in which B (and D) move alone: the residual is linear in them.
     pub(crate) fn inputs_only(model: &Model, feedthrough: bool) -> Self {
         let (m, p) = (model.inputs, model.outputs);
+        if separable(p) {
+            let of_block = |block: &Block| (block.a.len()..block.a.len() + block.b.len()).collect();
+            return Chart::of_units(model, model.blocks.iter().map(of_block).collect(), feedthrough);
+        }
         let of_block = |block: &Block| {
             let s = block.states;
             Mat::from_fn(s * (s + m + p), s * m, |i, j| if i == s * s + j { 1.0 } else { 0.0 })
         };
-        Chart { directions: model.blocks.iter().map(of_block).collect(), feedthrough, inputs: m, outputs: p }
+        let directions = model.blocks.iter().map(of_block).collect();
+        Chart { directions, units: Vec::new(), feedthrough, inputs: m, outputs: p }
     }
 
     /// Coordinates in which nothing moves.
     pub(crate) fn fixed(model: &Model) -> Self {
         let (m, p) = (model.inputs, model.outputs);
+        if separable(p) {
+            return Chart::of_units(model, vec![Vec::new(); model.blocks.len()], false);
+        }
         let of_block = |block: &Block| Mat::zeros(block.states * (block.states + m + p), 0);
-        Chart { directions: model.blocks.iter().map(of_block).collect(), feedthrough: false, inputs: m, outputs: p }
+        let directions = model.blocks.iter().map(of_block).collect();
+        Chart { directions, units: Vec::new(), feedthrough: false, inputs: m, outputs: p }
     }
 
     /// Slopes of G(z) in the parameters, `[row][column]` of G row by row, then parameters.
@@ -52,7 +134,7 @@ impl Chart {
         let (m, p) = (self.inputs, self.outputs);
         let mut out = Mat::<c64>::zeros(p * m, self.parameters());
         let mut at = 0;
-        for (block, directions) in model.blocks.iter().zip(&self.directions) {
+        for (k, block) in model.blocks.iter().enumerate() {
             let s = block.states;
             let mut inverse = vec![c64::ZERO; s * s];
             block.resolvent(z, &mut inverse);
@@ -62,6 +144,24 @@ impl Chart {
             let left = Mat::<c64>::from_fn(p, s, |o, j| {
                 (0..s).fold(c64::ZERO, |sum, i| sum + inverse[i * s + j] * block.c[o * s + i])
             });
+            if let Some(units) = self.units.get(k) {
+                let (b, c) = (s * s, s * (s + m));
+                for (q, e) in units.iter().enumerate() {
+                    if *e >= c {
+                        let (o, i) = ((e - c) / s, (e - c) % s);
+                        (0..m).for_each(|j| out[(o * m + j, at + q)] = x[(i, j)]);
+                    } else if *e >= b {
+                        let (i, j) = ((e - b) / m, (e - b) % m);
+                        (0..p).for_each(|o| out[(o * m + j, at + q)] = left[(o, i)]);
+                    } else {
+                        let of = |row: usize| left[(row / m, e / s)] * x[(e % s, row % m)];
+                        (0..p * m).for_each(|row| out[(row, at + q)] = of(row));
+                    }
+                }
+                at += units.len();
+                continue;
+            }
+            let directions = &self.directions[k];
             for q in 0..directions.ncols() {
                 for o in 0..p {
                     for j in 0..m {
@@ -87,7 +187,7 @@ impl Chart {
 
     /// Number of parameters.
     pub(crate) fn parameters(&self) -> usize {
-        self.directions.iter().map(|d| d.ncols()).sum::<usize>()
+        self.directions.iter().map(|d| d.ncols()).chain(self.units.iter().map(Vec::len)).sum::<usize>()
             + if self.feedthrough { self.inputs * self.outputs } else { 0 }
     }
 
@@ -95,6 +195,17 @@ impl Chart {
     pub(crate) fn moved(&self, model: &Model, step: &[f64]) -> Model {
         let mut out = model.clone();
         let mut at = 0;
+        for (block, units) in out.blocks.iter_mut().zip(&self.units) {
+            let (a, b) = (block.a.len(), block.b.len());
+            for (entry, step) in units.iter().zip(&step[at..]) {
+                match *entry {
+                    e if e < a => block.a[e] += step,
+                    e if e < a + b => block.b[e - a] += step,
+                    e => block.c[e - a - b] += step,
+                }
+            }
+            at += units.len();
+        }
         for (block, directions) in out.blocks.iter_mut().zip(&self.directions) {
             let (s, m) = (block.states, self.inputs);
             for row in 0..directions.nrows() {
@@ -119,8 +230,29 @@ impl Chart {
     }
 }
 
+/// The entries of (A, B) of a block that move: a similarity transformation takes any values of the others, which its slopes determine best.
+fn free(block: &Block, m: usize) -> Vec<usize> {
+    let s = block.states;
+    let tangents = tangents(block, m, 0);
+    let pivots = tangents.transpose().col_piv_qr();
+    let mut kept = pivots.P().arrays().0[s * s..].to_vec();
+    kept.sort_unstable();
+    kept
+}
+
 /// Orthonormal basis of the directions of (A, B, C) that are orthogonal to those of similarity transformations.
 fn complement(block: &Block, m: usize, p: usize) -> Mat<f64> {
+    let s = block.states;
+    let rows = s * (s + m + p);
+    let keep = s * (m + p);
+    match tangents(block, m, p).svd() {
+        Ok(svd) => svd.U().subcols(rows - keep, keep).to_owned(),
+        Err(_) => Mat::identity(rows, keep),
+    }
+}
+
+/// Slopes of (A, B) and of the first p rows of C along similarity transformations.
+fn tangents(block: &Block, m: usize, p: usize) -> Mat<f64> {
     let s = block.states;
     let rows = s * (s + m + p);
     let mut tangents = Mat::<f64>::zeros(rows, s * s);
@@ -140,9 +272,5 @@ fn complement(block: &Block, m: usize, p: usize) -> Mat<f64> {
             }
         }
     }
-    let keep = s * (m + p);
-    match tangents.svd() {
-        Ok(svd) => svd.U().subcols(rows - keep, keep).to_owned(),
-        Err(_) => Mat::identity(rows, keep),
-    }
+    tangents
 }

@@ -9,7 +9,7 @@
 
 use super::model::Model;
 use crate::identify::likelihood::data::lanes::Lanes;
-use crate::identify::likelihood::data::spectra::Spectra;
+use crate::identify::likelihood::data::spectra::{Lines, Spectra};
 use crate::linalg::{RiccatiProblem, dare, eigenvalues};
 use faer::{Mat, Scale, c64};
 use std::f64::consts::TAU;
@@ -43,7 +43,12 @@ pub(crate) struct Driven {
 
 impl Driven {
     /// The most likely size of such noise in residuals, lines x p per record; `None` where there is none.
-    pub(crate) fn new(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Option<Self> {
+    pub(crate) fn new(
+        model: &Model,
+        (spectra, moved): (&Spectra, &Moved),
+        residuals: &[Vec<c64>],
+        output: usize,
+    ) -> Option<Self> {
         let samples = spectra.samples() as f64;
         let poles = model.poles();
         let grows = || poles.iter().any(|p| p.norm().ln() > GROWTH / samples);
@@ -60,7 +65,7 @@ impl Driven {
         let left_out = |k: &usize| reach(*k) <= UNSEEN * largest || model.blocks[*k].poles().iter().any(narrow);
         let hidden: Vec<usize> = (0..model.blocks.len()).filter(left_out).collect();
         let seen = model.without(&hidden);
-        let ratio = size(&lines(&seen, spectra, residuals, output), samples)?;
+        let ratio = size(&lines((model, &hidden), (spectra, moved), residuals, output), samples)?;
         let (a, b, c) = seen.matrices();
         let c = c.subrows(output, 1).to_owned();
         let q = &b * b.transpose() * Scale(ratio);
@@ -101,16 +106,61 @@ impl Driven {
     }
 }
 
-/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2`.
-fn lines(model: &Model, spectra: &Spectra, residuals: &[Vec<c64>], output: usize) -> Vec<[f64; 3]> {
-    let (p, m) = (spectra.outputs, spectra.inputs);
-    let strictly = Model { d: vec![0.0; p * m], ..model.clone() };
-    let every = spectra.lines().div_ceil(LINES).max(1);
+/// What the inputs move of the states on some of the lines: `(z I - A_b)^-1 B_b` of each block.
+pub(crate) struct Moved {
+    /// Per record, line by line and block by block, s x m.
+    values: Vec<Vec<c64>>,
+    /// Every how many lines.
+    every: usize,
+}
+
+impl Moved {
+    pub(crate) fn new(model: &Model, spectra: &Spectra) -> Self {
+        let every = spectra.lines().div_ceil(LINES).max(1);
+        let largest = model.blocks.iter().map(|b| b.states).max().unwrap_or(0);
+        let mut inverse = vec![c64::ZERO; largest * largest];
+        let mut of_record = |lines: &Lines| {
+            let mut out = Vec::with_capacity(lines.z.len().div_ceil(every) * model.order() * model.inputs);
+            for z in lines.z.iter().step_by(every) {
+                for block in &model.blocks {
+                    let (s, m) = (block.states, model.inputs);
+                    block.resolvent(*z, &mut inverse);
+                    for (i, j) in (0..s).flat_map(|i| (0..m).map(move |j| (i, j))) {
+                        let along = |sum: c64, l: usize| sum + inverse[i * s + l] * block.b[l * m + j];
+                        out.push((0..s).fold(c64::ZERO, along));
+                    }
+                }
+            }
+            out
+        };
+        Moved { values: spectra.records.iter().map(&mut of_record).collect(), every }
+    }
+}
+
+/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2` of the blocks that are seen.
+fn lines(
+    (model, hidden): (&Model, &[usize]),
+    (spectra, moved): (&Spectra, &Moved),
+    residuals: &[Vec<c64>],
+    output: usize,
+) -> Vec<[f64; 3]> {
+    let (p, m, every) = (spectra.outputs, spectra.inputs, moved.every);
     let mut out = Vec::with_capacity(LINES);
-    for (lines, v) in spectra.records.iter().zip(residuals) {
-        for k in (0..lines.z.len()).step_by(every) {
-            let g = strictly.response(lines.z[k]);
-            let gain = g[output * m..(output + 1) * m].iter().map(|g| g.norm_sqr()).sum::<f64>();
+    let mut g = vec![c64::ZERO; m];
+    for ((lines, v), x) in spectra.records.iter().zip(residuals).zip(&moved.values) {
+        for (k, x) in (0..lines.z.len()).step_by(every).zip(x.chunks_exact(model.order() * m)) {
+            g.fill(c64::ZERO);
+            let mut at = 0;
+            for (place, block) in model.blocks.iter().enumerate() {
+                let s = block.states;
+                if !hidden.contains(&place) {
+                    for (j, g) in g.iter_mut().enumerate() {
+                        (0..s).for_each(|i| *g += x[at + i * m + j] * block.c[output * s + i]);
+                    }
+                }
+                at += s * m;
+            }
+            let gain = g.iter().map(|g| g.norm_sqr()).sum::<f64>();
             let (count, power) = (lines.share[k], lines.weight[k].powi(2) * v[k * p + output].norm_sqr());
             out.push([count * every as f64, power * every as f64, gain]);
         }

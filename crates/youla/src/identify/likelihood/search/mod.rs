@@ -3,13 +3,13 @@
 //! ```text
 //! -2 log likelihood = N log det Lambda + 2 N log |det A_u|,     Lambda = covariance of the whitened residuals
 //! ```
-//! A_u holds the poles outside the unit circle. On the unit circle `Y - G U` exists for them too, and the predictor differs
-//! from it by an all-pass with their mirror images, whose gain |det A_u| appears in the likelihood: so poles may cross the
-//! circle, and neither a stable predictor nor a Kalman gain is needed to search.
+//! A_u holds the poles outside the unit circle ([`unstable`]): poles may cross the circle, and neither a stable predictor nor a Kalman
+//! gain is needed to search.
 
 pub(crate) mod autoregression;
 pub(crate) mod balancing;
 pub(crate) mod block;
+pub(crate) mod by_output;
 pub(crate) mod chart;
 pub(crate) mod driven;
 pub(crate) mod feedthrough;
@@ -21,17 +21,21 @@ pub(crate) mod noise;
 pub(crate) mod point;
 pub(crate) mod residual;
 pub(crate) mod rows;
+pub(crate) mod separable;
 pub(crate) mod state_lanes;
+pub(crate) mod unstable;
 
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
+use by_output::{Ends, Normal};
 use chart::Chart;
-use faer::{Mat, c64};
+use faer::Mat;
 use groups::grouped;
 use linearise::{Linearised, linearise_quickly};
 use model::Model;
 use noise::Noise;
 use point::Point;
+use separable::separable;
 
 /// Choices of a search.
 #[derive(Debug, Clone)]
@@ -112,24 +116,21 @@ pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> 
 }
 
 fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
-    spectra.samples() as f64 * (noise.log_det + 2.0 * model.unstable())
+    spectra.samples() as f64 * noise.log_det + 2.0 * unstable::growth(spectra, &model.poles())
 }
 
 /// B, D and the ends of the records by least squares, A and C kept.
 pub(crate) fn with_best_inputs(spectra: &Spectra, model: Model, noise: &Noise, feedthrough: bool) -> Point {
     let chart = Chart::inputs_only(&model, feedthrough);
     let point = Point::at_rest(model, spectra.records.len());
-    let Linearised { factor, ends } = linearise_quickly(spectra, &point, &chart, noise);
-    let (step, _) = damped(&factor, chart.parameters(), LEAST_DAMPING);
-    moved(&point, &chart, &ends, &step)
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new()).trial(&point, LEAST_DAMPING).0
 }
 
 /// The ends of the records by least squares, the model kept.
 pub(crate) fn with_best_ends(spectra: &Spectra, model: Model, noise: &Noise) -> Point {
     let chart = Chart::fixed(&model);
     let point = Point::at_rest(model, spectra.records.len());
-    let Linearised { ends, .. } = linearise_quickly(spectra, &point, &chart, noise);
-    moved(&point, &chart, &ends, &[])
+    Slopes::new(spectra, &point, (&chart, noise), Vec::new()).trial(&point, 0.0).0
 }
 
 /// Searches from a start, on many lines first on groups of them; `None` where nothing finite comes of it.
@@ -187,15 +188,14 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
     while steps < options.steps {
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
-        let Linearised { factor, ends } = linearise_quickly(spectra, &point, &chart, &noise);
-        let factor = with_slope(factor, &slope(spectra, &point.model, &chart, options));
+        let slope = slope(spectra, &point.model, &chart, options);
+        let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope);
         let lower = damping.descend(|damping| {
-            let (step, promised) = damped(&factor, parameters, damping);
+            let (trial, promised) = slopes.trial(&point, damping);
             // A promise that is not a number ends the search as well.
             if promised.is_nan() || promised <= options.tolerance {
                 return Trial::Negligible;
             }
-            let trial = moved(&point, &chart, &ends, &step);
             let inside = || trial.model.poles().iter().all(|p| p.norm() <= options.radius);
             let (value, noise) = cost(spectra, &trial, options);
             if value < least && (options.radius.is_infinite() || inside()) {
@@ -216,6 +216,42 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
         }
     }
     Some(Found { point, noise, deviance: least, parameters, steps, feedthrough: options.feedthrough })
+}
+
+/// What a search near a point needs: a triangular factor, or normal equations by outputs.
+enum Slopes<'a> {
+    Dense(&'a Chart, Linearised),
+    ByOutput(&'a Chart, Normal),
+}
+
+impl<'a> Slopes<'a> {
+    /// With the slope of what is no square.
+    fn new(spectra: &Spectra, point: &Point, (chart, noise): (&'a Chart, &Noise), slope: Vec<f64>) -> Self {
+        if separable(spectra.outputs) {
+            let normal = Normal::new(spectra, point, chart, noise, Ends::Shared);
+            return Slopes::ByOutput(chart, if slope.is_empty() { normal } else { normal.with_slope(slope) });
+        }
+        let Linearised { factor, ends } = linearise_quickly(spectra, point, chart, noise);
+        Slopes::Dense(chart, Linearised { factor: with_slope(factor, &slope), ends })
+    }
+
+    /// The point after a damped step, and the decrease of the deviance that it promises.
+    fn trial(&self, point: &Point, damping: f64) -> (Point, f64) {
+        match self {
+            Slopes::Dense(chart, Linearised { factor, ends }) => {
+                let count = chart.parameters();
+                let (step, promised) = if count == 0 { (Vec::new(), 0.0) } else { damped(factor, count, damping) };
+                (moved(point, chart, ends, &step), promised)
+            }
+            Slopes::ByOutput(chart, normal) => {
+                let (step, changes, promised) = normal.step(damping);
+                let mut ends = point.ends.clone();
+                let all = ends.iter_mut().flatten().zip(changes.iter().flatten());
+                all.for_each(|(end, change)| *end += change);
+                (Point { model: chart.moved(&point.model, &step), ends }, promised)
+            }
+        }
+    }
 }
 
 /// Blocks formed anew, the ends of the records carried along as if they were inputs.
@@ -279,21 +315,13 @@ pub(crate) fn damped(factor: &Mat<f64>, parameters: usize, damping: f64) -> (Vec
 
 /// Slopes of the terms of half the deviance that are no squares.
 fn slope(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
-    let mut out = slope_of_unstable(spectra, model, chart);
+    let mut out = unstable::slope(spectra, model, chart);
     if chart.feedthrough {
         let slopes = feedthrough::slopes(model, &options.direct);
         let first = out.len() - slopes.len();
         out[first..].iter_mut().zip(slopes).for_each(|(o, s)| *o += spectra.samples() as f64 * s);
     }
     out
-}
-
-/// `[R r]` of a point whose residual goes with the slope of `N log |det A_u|`.
-///
-/// The residual of an unstable plant on the lines is that of its two-sided inverse, whose product with the sensitivities has the
-/// mean of this slope, not zero; parts of the records with other excitations would seem to disagree.
-pub(crate) fn with_slope_of_unstable(factor: Mat<f64>, spectra: &Spectra, model: &Model, chart: &Chart) -> Mat<f64> {
-    with_slope(factor, &slope_of_unstable(spectra, model, chart))
 }
 
 /// `[R r - w]` with `R' w` the slope of what is no square beside `1/2 |r|^2`: then `R' (r - w)` is the slope of half the deviance, and the same
@@ -316,28 +344,4 @@ fn with_slope(mut factor: Mat<f64>, slope: &[f64]) -> Mat<f64> {
     }
     w.iter().enumerate().for_each(|(i, w)| factor[(i, columns)] -= w);
     factor
-}
-
-/// Slope of `N log |det A_u|`, by differences.
-fn slope_of_unstable(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
-    let parameters = chart.parameters();
-    let mut out = vec![0.0; parameters];
-    let samples = spectra.samples() as f64;
-    let outside = |poles: Vec<c64>| poles.iter().map(|p| p.norm().ln().max(0.0)).sum::<f64>();
-    let mut at = 0;
-    for (block, directions) in model.blocks.iter().zip(&chart.directions) {
-        if outside(block.poles()) > 0.0 {
-            for q in 0..directions.ncols() {
-                let step = 1e-6;
-                let shifted = |sign: f64| {
-                    let mut moved = block.clone();
-                    moved.a.iter_mut().enumerate().for_each(|(i, a)| *a += sign * step * directions[(i, q)]);
-                    outside(moved.poles())
-                };
-                out[at + q] = samples * (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
-            }
-        }
-        at += directions.ncols();
-    }
-    out
 }

@@ -6,6 +6,7 @@
 use super::balancing::balanced;
 use super::block::Block;
 use super::grouping::{Grouped, grouped};
+use super::separable::separable;
 use faer::prelude::*;
 use faer::{Mat, MatRef, c64};
 
@@ -63,7 +64,10 @@ impl Model {
                 b: row_by_row(bt.subrows(start, s)),
                 c: row_by_row(ct.subcols(start, s)),
             };
-            blocks.push(block.levelled());
+            let block = block.levelled();
+            // Responses of triangular blocks cost less.
+            let triangular = if separable(p) { block.triangular(&[]) } else { None };
+            blocks.push(triangular.map_or(block, |(block, _)| block));
             start += s;
         }
         Some(Model { inputs: m, outputs: p, blocks, d })

@@ -9,8 +9,9 @@
 //! the plant comes before both (`driven`).
 
 use super::autoregression::{Correlations, Regression};
-use super::driven::Driven;
+use super::driven::{Driven, Moved};
 use super::model::Model;
+use super::separable::separable;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use faer::{Mat, c64};
@@ -24,11 +25,11 @@ use std::sync::Arc;
 pub(crate) struct Noise {
     /// a_1 ... and b of each output.
     pub(crate) regression: Vec<Regression>,
-    /// Inverse of the Cholesky factor of Lambda, lower triangular, p x p.
+    /// Inverse of the Cholesky factor of Lambda, lower triangular, p x p; of many outputs that of its diagonal.
     pub(crate) root: Mat<f64>,
     /// Lambda, p x p, in units of the scaled outputs.
     pub(crate) covariance: Mat<f64>,
-    /// Logarithm of the determinant of Lambda.
+    /// Logarithm of the determinant of Lambda, or of its diagonal.
     pub(crate) log_det: f64,
 }
 
@@ -49,14 +50,15 @@ impl Noise {
         let behind = |i: usize, driven: Option<&Driven>| {
             Correlations::new(spectra, residuals, i, largest_order, driven).regression(samples)
         };
+        let moved = Moved::new(model, spectra);
         let of = |i: usize| {
             let (plain, least) = behind(i, None);
-            let Some(driven) = Driven::new(model, spectra, residuals, i) else { return plain };
+            let Some(driven) = Driven::new(model, (spectra, &moved), residuals, i) else { return plain };
             let (rest, criterion) = behind(i, Some(&driven));
             let better = criterion + log < least;
             if better { Regression { driven: Some(Arc::new(driven)), ..rest } } else { plain }
         };
-        let regression: Vec<Regression> = (0..p).map(of).collect();
+        let regression: Vec<Regression> = (0..p).into_par_iter().map(of).collect();
         let mut noise = Noise { regression, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
         for (lines, v) in spectra.records.iter().zip(residuals) {
@@ -71,7 +73,18 @@ impl Noise {
             }
         }
         noise.set_covariance(sum);
+        if separable(p) {
+            noise.set_independent();
+        }
         noise
+    }
+
+    /// Counts the innovations of the outputs as independent.
+    fn set_independent(&mut self) {
+        let variance = |i: usize| self.covariance[(i, i)];
+        let p = self.covariance.nrows();
+        self.log_det = (0..p).map(|i| variance(i).ln()).sum();
+        self.root = Mat::from_fn(p, p, |i, j| if i == j { 1.0 / variance(i).sqrt() } else { 0.0 });
     }
 
     fn set_covariance(&mut self, covariance: Mat<f64>) {

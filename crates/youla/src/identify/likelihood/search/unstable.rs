@@ -1,0 +1,158 @@
+//! What poles near and outside the unit circle add to the likelihood of residuals on lines.
+//!
+//! `Y - G U` exists on the unit circle for poles outside too. The predictor differs from it by an all-pass with their mirror images, whose
+//! gain `|det A_u|` appears in the likelihood: `N log |p|` for each pole p of a record of N samples that is long beside the growth.
+//!
+//! A pole near the circle, as that of an integrator, is between the two. The ends of a record take its free motion `p^t` for whatever
+//! fits best, so that the likelihood of what is left (H. D. Patterson, R. Thompson, Recovery of inter-block information when block sizes are
+//! unequal, Biometrika 58 (1971), 545) has half the logarithm of the squared length of this motion, with `x = N log |p|`
+//! ```text
+//! 1/2 log ((e^2x - 1) / 2x)  =  x/2 + 1/2 log (sinh x / x)
+//! ```
+//! which is x far outside and nearly constant inside. The mean and the ramp of a record are free as well. Beside them the motion of a real
+//! pole near 1 has the length of what Legendre's polynomials of degree 0 and 1 leave of it, with modified spherical Bessel functions `i_j`,
+//! ```text
+//! x/2 + 1/2 log (720 (sinh x / x - i_0(x/2)^2 - 3 i_1(x/2)^2) / x^4)
+//! ```
+//! The slope of either is half of N at `|p| = 1`. The residual there has the opposite mean slope: with w the slope of the residual v in log p,
+//! which is minus the sum over the past of v in any loop that holds the output, and Q the projection on the free motions,
+//! `E[w' (I - Q) v]` is minus the slope of the same term.
+
+use super::chart::Chart;
+use super::model::Model;
+use super::with_slope;
+use crate::identify::likelihood::data::spectra::Spectra;
+use faer::{Mat, c64};
+
+/// Exponents `N log |p|` below which a pole counts as stable: the slope of the term is below 2 % of N there.
+const STABLE: f64 = -50.0;
+/// Exponents below which the functions are power series.
+const SMALL: f64 = 0.1;
+
+/// Half the term of -2 log likelihood, summed over poles and records.
+pub(crate) fn growth(spectra: &Spectra, poles: &[c64]) -> f64 {
+    let of = |p: &c64, samples: usize| {
+        let x = samples as f64 * p.norm().ln();
+        let term = if p.im == 0.0 && p.re > 0.0 { beside_ramp } else { alone };
+        if x > STABLE { term(x) - term(STABLE) } else { 0.0 }
+    };
+    let of_record = |samples: usize| poles.iter().map(|p| of(p, samples)).sum::<f64>();
+    spectra.records.iter().map(|lines| of_record(lines.samples)).sum()
+}
+
+/// `x/2 + 1/2 log (sinh x / x)`.
+fn alone(x: f64) -> f64 {
+    let a = x.abs();
+    let even = if a < SMALL {
+        (1.0 + a * a / 6.0 * (1.0 + a * a / 20.0)).ln()
+    } else {
+        a + (-(-2.0 * a).exp_m1() / (2.0 * a)).ln()
+    };
+    0.5 * (x + even)
+}
+
+/// `x/2 + 1/2 log (720 (sinh x / x - i_0(x/2)^2 - 3 i_1(x/2)^2) / x^4)`.
+fn beside_ramp(x: f64) -> f64 {
+    let a = x.abs();
+    let even = if a < SMALL {
+        (3.0 * a * a / 70.0).ln_1p()
+    } else {
+        // Each part times e^-a.
+        let (e, z) = ((-a).exp(), 0.5 * a);
+        let mean = (1.0 - e) / a;
+        let ramp = 0.5 * (z * (1.0 + e) - (1.0 - e)) / (z * z);
+        a + (720.0 * (0.5 * (1.0 - e * e) / a - mean * mean - 3.0 * ramp * ramp) / a.powi(4)).ln()
+    };
+    0.5 * (x + even)
+}
+
+/// Slope of the growth in the parameters, by differences.
+pub(crate) fn slope(spectra: &Spectra, model: &Model, chart: &Chart) -> Vec<f64> {
+    let mut out = vec![0.0; chart.parameters()];
+    let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(1) as f64;
+    let step = 1e-6_f64.min(0.01 / longest);
+    let mut at = 0;
+    for (place, block) in model.blocks.iter().enumerate() {
+        let near = |p: &c64| longest * p.norm().ln() > STABLE;
+        if block.poles().iter().any(near) {
+            for q in 0..chart.parameters_of(place) {
+                let shifted = |sign: f64| {
+                    let mut moved = block.clone();
+                    moved.a.iter_mut().enumerate().for_each(|(i, a)| *a += sign * step * chart.direction(place, i, q));
+                    growth(spectra, &moved.poles())
+                };
+                out[at + q] = (shifted(1.0) - shifted(-1.0)) / (2.0 * step);
+            }
+        }
+        at += chart.parameters_of(place);
+    }
+    out
+}
+
+/// `[R r]` of a point whose residual goes with the slope of the growth: parts of the records with other excitations would seem to disagree
+/// without it.
+pub(crate) fn with_slope_of_unstable(factor: Mat<f64>, spectra: &Spectra, model: &Model, chart: &Chart) -> Mat<f64> {
+    with_slope(factor, &slope(spectra, model, chart))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::likelihood::data::spectra::Sizes;
+    use crate::identify::likelihood::search::linearise::linearise;
+    use crate::identify::likelihood::search::noise::Noise;
+    use crate::identify::likelihood::search::with_best_ends;
+    use crate::identify::subspace::Experiment;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    const SAMPLES: usize = 1000;
+    const RECORDS: usize = 400;
+
+    /// Records of `x(t+1) = p x + u`, `u = -0.3 y` without excitation: mean slopes of half of the sum of squares and of the growth.
+    fn mean_slopes(pole: f64) -> [f64; 2] {
+        let rng = &mut ChaCha8Rng::seed_from_u64(11);
+        let (mut u, mut y) = (Mat::zeros(RECORDS * SAMPLES, 1), Mat::zeros(RECORDS * SAMPLES, 1));
+        let mut x = 0.0;
+        for t in 0..u.nrows() {
+            y[(t, 0)] = x + rng.sample::<f64, _>(StandardNormal);
+            u[(t, 0)] = -0.3 * y[(t, 0)];
+            x = pole * x + u[(t, 0)];
+        }
+        let record = |k: usize| Experiment::new(u.subrows(SAMPLES * k, SAMPLES), y.subrows(SAMPLES * k, SAMPLES));
+        let records: Vec<Experiment<'_>> = (0..RECORDS).map(record).collect();
+        let unit = Sizes { u: vec![1.0], y: vec![1.0] };
+        let spectra = Spectra::new(&records, &unit, &[0], 0);
+        let (one, white) = (Mat::<f64>::identity(1, 1), Noise::white(1));
+        let model = Model::of((&one * pole).as_ref(), one.as_ref(), one.as_ref(), vec![0.0]).unwrap();
+        let point = with_best_ends(&spectra, model, &white);
+        // A alone moves.
+        let mut chart = Chart::fixed(&point.model);
+        chart.directions[0] = Mat::from_fn(3, 1, |i, _| if i == 0 { 1.0 } else { 0.0 });
+        let factor = linearise(&spectra, &point, &chart, &white).factor;
+        let squares = factor[(0, 0)] * factor[(0, 1)];
+        [squares, slope(&spectra, &point.model, &chart)[0]].map(|v| v / (RECORDS * SAMPLES) as f64)
+    }
+
+    /// The two slopes are equal within 0.025 of the number of samples from 20 growths inside to 20 outside; without the term, the residual of
+    /// an integrator draws its pole by half of it.
+    #[test]
+    fn the_growth_makes_residuals_of_marginal_and_unstable_plants_unbiased() {
+        for pole in [0.98, 0.99, 0.996, 0.999, 1.0 - 1e-8, 1.0 + 1e-8, 1.001, 1.004, 1.01, 1.02] {
+            let [squares, growth] = mean_slopes(pole);
+            assert!((squares - growth).abs() < 0.025, "{pole}: {squares} {growth}");
+        }
+    }
+
+    /// Both functions are continuous between power series and closed form, and their slope at zero is one half.
+    #[test]
+    fn functions_are_smooth() {
+        for term in [alone, beside_ramp] {
+            for x in [-SMALL, SMALL] {
+                assert!((term(x * (1.0 - 1e-9)) - term(x * (1.0 + 1e-9))).abs() < 1e-6);
+            }
+            assert!((term(1e-4) - term(-1e-4) - 1e-4).abs() < 1e-12);
+        }
+    }
+}

@@ -38,7 +38,7 @@ fn flexible_drive() {
         response.entry(0, 0).iter().map(|g| 20.0 * g.norm().log10()).collect()
     };
     let curve =
-        |method| decibels(&frequency_response(&found.verdict.of(method).unwrap().model, &measured.omega).unwrap());
+        |method| decibels(&frequency_response(&found.validation.of(method).unwrap().model, &measured.omega).unwrap());
     let (indirect, hansen) = (decibels(measured), curve(Method::Hansen));
     let band = |from: f64, to: f64| (0..hz.len()).filter(|&k| (from..=to).contains(&hz[k])).collect::<Vec<_>>();
     let rms = |model: &[f64]| {
@@ -55,10 +55,10 @@ fn flexible_drive() {
     let (resonance, anti) = (extreme(45.0, 70.0, 1.0), extreme(30.0, 50.0, -1.0));
     assert!((53.0..=56.5).contains(&resonance), "resonance at {resonance} Hz");
     assert!((39.0..=43.0).contains(&anti), "anti-resonance at {anti} Hz");
-    let verdict = found.verdict.of(Method::Hansen).unwrap();
+    let verdict = found.validation.of(Method::Hansen).unwrap();
     assert!(verdict.certificate.stable, "the logged controller stabilises G(S)");
     assert!(found.controller_mismatch().unwrap() < 1e-3, "the logged controller is the declared one");
-    for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
+    for (hansen, nominal) in verdict.records.iter().zip(&found.validation.of(Method::Nominal).unwrap().records) {
         assert!(hansen.fit[0] > nominal.fit[0] + 15.0, "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
     }
 }
@@ -70,13 +70,13 @@ fn flexible_drive() {
 fn rotary_pendulum() {
     let found = run(example("qube"));
     assert_eq!((found.records.estimation.len(), found.records.verification.len()), (6, 6));
-    let verdict = found.verdict.of(Method::Hansen).unwrap();
+    let verdict = found.validation.of(Method::Hansen).unwrap();
     let unstable: Vec<_> = verdict.poles.iter().filter(|p| p.norm() >= 1.0).collect();
     assert_eq!(unstable.len(), 1, "{unstable:?}");
     assert!(unstable[0].im == 0.0 && (1.02..1.04).contains(&unstable[0].re), "{unstable:?}");
     assert!(verdict.certificate.stable && found.scheme().unwrap().deviation.stability.stable);
     assert!(found.scheme().unwrap().deviation.stability.moved.is_empty(), "no pole was moved");
-    for (hansen, nominal) in verdict.records.iter().zip(&found.verdict.of(Method::Nominal).unwrap().records) {
+    for (hansen, nominal) in verdict.records.iter().zip(&found.validation.of(Method::Nominal).unwrap().records) {
         for (h, n) in hansen.fit.iter().zip(&nominal.fit) {
             assert!(h > &(n + 5.0), "{}: {:?} against {:?}", hansen.record, hansen.fit, nominal.fit);
         }

@@ -21,7 +21,7 @@ fn on_threads<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> T {
 fn hansen_reaches_the_true_plant_on_20_seeds() {
     for seed in 1..=20 {
         let found = run_demo(seed);
-        let fit = |method: Method| found.verdict.of(method).unwrap().records[0].fit.clone();
+        let fit = |method: Method| found.validation.of(method).unwrap().records[0].fit.clone();
         let (truth, hansen, reduced) = (fit(Method::TruePlant), fit(Method::Hansen), fit(Method::HansenReduced));
         let recommended = fit(Method::Likelihood);
         for axis in 0..2 {
@@ -33,7 +33,7 @@ fn hansen_reaches_the_true_plant_on_20_seeds() {
         }
         let stability = &found.scheme().unwrap().deviation.stability;
         assert!(stability.stable && stability.moved.is_empty());
-        assert!(found.verdict.of(Method::Hansen).unwrap().certificate.stable);
+        assert!(found.validation.of(Method::Hansen).unwrap().certificate.stable);
         assert!(found.filtered.as_ref().unwrap().factorisation.bezout_residual < 1e-12);
         assert!(found.controller_mismatch().unwrap() < 1e-10, "alpha is what was injected");
     }
@@ -59,12 +59,12 @@ fn models_do_not_depend_on_the_number_of_threads() {
 #[test]
 fn modes_of_the_bearing_are_found() {
     let found = run_demo(1);
-    let truth = found.verdict.of(Method::TruePlant).unwrap();
+    let truth = found.validation.of(Method::TruePlant).unwrap();
     for published in [(209.7, 0.102), (217.6, 0.082)] {
         let near = |hz: f64, zeta: f64| (hz / published.0 - 1.0).abs() < 1e-3 && (zeta - published.1).abs() < 1e-3;
         assert!(truth.modes.iter().any(|m| near(m.hz, m.zeta)), "{:?}", truth.modes);
     }
-    let hansen = found.verdict.of(Method::Hansen).unwrap();
+    let hansen = found.validation.of(Method::Hansen).unwrap();
     let resonant: Vec<_> = hansen.modes.iter().filter(|m| (200.0..230.0).contains(&m.hz) && m.zeta < 0.2).collect();
     assert_eq!(resonant.len(), 2, "{:?}", hansen.modes);
 }
@@ -84,7 +84,7 @@ fn a_declared_structure_is_estimated_from_the_scheme_on() {
     let found = identify(demo.settings, demo.records, Path::new("."), &mut StageClock::new(&mut silent)).unwrap();
     let run = found.grey_box.as_ref().unwrap().as_ref().unwrap();
     assert!(run.found.won == PemStart::Projection && !run.found.local_minimum_suspected);
-    let fit = |method: Method| found.verdict.of(method).unwrap().records[0].fit.clone();
+    let fit = |method: Method| found.validation.of(method).unwrap().records[0].fit.clone();
     for (grey, truth) in fit(Method::GreyBox).iter().zip(fit(Method::TruePlant)) {
         assert!((grey - truth).abs() < 0.1, "{grey} against {truth}");
     }

@@ -47,13 +47,14 @@ fn two_inertias_of_the_flexible_drive() {
         assert!((one.mode.hz / other.hz - 1.0).abs() < tolerance, "{what}: {one:?}, G(S) {other:?}");
         assert!(one.hz_deviation > 0.0 && one.hz_deviation < 0.01 * one.mode.hz, "{one:?}");
     }
-    let fits = |method: Method| found.verdict.of(method).unwrap().records.iter().map(|r| r.fit[0]).collect::<Vec<_>>();
+    let fits =
+        |method: Method| found.validation.of(method).unwrap().records.iter().map(|r| r.fit[0]).collect::<Vec<_>>();
     let (structure, scheme, rigid) = (fits(Method::GreyBox), fits(Method::Hansen), fits(Method::Nominal));
     println!("fits {structure:.1?}, G(S) {scheme:.1?}, nominal {rigid:.1?}");
     for ((structure, scheme), rigid) in structure.iter().zip(scheme).zip(rigid) {
         assert!(*structure > scheme - 2.0 && *structure > rigid + 20.0, "{structure}, G(S) {scheme}, nominal {rigid}");
     }
-    assert!(found.verdict.of(Method::GreyBox).unwrap().certificate.stable);
+    assert!(found.validation.of(Method::GreyBox).unwrap().certificate.stable);
     assert!(known.coloured && !known.residuals.independent() && known.colour[0] > 2.0, "{:?}", known.colour);
     let [with_lag, without] = &grey.compared[..] else { panic!("{:?}", grey.compared) };
     assert!(with_lag.bic == Some(0.0) && without.bic.unwrap() > 1000.0, "{:?}", grey.compared);

@@ -54,7 +54,7 @@ pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
 
 /// One column per model; fits of every record and output, then order, stability and loop.
 fn rows(found: &Identification) -> Vec<Vec<String>> {
-    let models = &found.verdict.models;
+    let models = &found.validation.models;
     let row = |label: &str, cells: Vec<String>| [vec![label.to_owned()], cells].concat();
     let corner = if found.records.verification.is_empty() { "model" } else { "fit (26), percent" };
     let mut rows = vec![row(corner, models.iter().map(|v| v.method.label().into()).collect())];

@@ -121,10 +121,10 @@ impl Run {
 
     /// Keys of the models that exist.
     fn models(&self) -> Vec<String> {
-        let of_verdict = self.found.verdict.models.iter().map(|v| v.method.key().to_owned());
+        let validated = self.found.validation.models.iter().map(|v| v.method.key().to_owned());
         let others =
             ["controller", "deviation", "new_controller"].into_iter().filter(|key| self.model_of(key).is_some());
-        of_verdict.chain(others.map(String::from)).collect()
+        validated.chain(others.map(String::from)).collect()
     }
 
     /// The matrices of a model; `None` where it does not exist.
@@ -166,7 +166,7 @@ impl Run {
     /// The verification records beside the predictions of the models.
     fn predictions<'py>(&self, py: Python<'py>) -> Vec<Predictions<'py>> {
         let of = |(k, record): (usize, &youla::signal::LoopRecord)| {
-            let predicted = self.found.verdict.models.iter().filter_map(|v| {
+            let predicted = self.found.validation.models.iter().filter_map(|v| {
                 let y = v.records.get(k)?.predicted.as_ref().ok()?;
                 Some((v.method.key().to_owned(), array(py, y.as_ref())))
             });
@@ -232,7 +232,7 @@ impl Run {
                 Some(pid) => Some(&pid.as_ref().ok()?.system),
                 None => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
             },
-            key => Some(&self.found.verdict.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
+            key => Some(&self.found.validation.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
         }
     }
 

@@ -60,7 +60,7 @@ pub use stages::signals::{DeviationSignals, deviation_signals, signal_records, w
 pub use stages::uncertainty::SystemUncertainty;
 pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
 pub use stages::validate::robustness::LoopRobustness;
-pub use stages::validate::{ModelVerdict, RecordVerdict, Verdict};
+pub use stages::validate::{ModelValidation, RecordValidation, Validation};
 pub use summary::certificate::CertificateEntry;
 pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
 pub use summary::model::{LargestEntry, ModelEntry, ResidualEntry};

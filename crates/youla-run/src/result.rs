@@ -11,7 +11,7 @@ use crate::stages::nonparametric::LinesOfRun;
 use crate::stages::reduction::RunReduction;
 use crate::stages::signals::DeviationSignals;
 use crate::stages::uncertainty::SystemUncertainty;
-use crate::stages::validate::Verdict;
+use crate::stages::validate::Validation;
 use crate::{Error, Result};
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
@@ -58,7 +58,7 @@ pub struct Identification {
     /// Frequencies of the responses of all models, Hz.
     pub hz: Vec<f64>,
     /// Evidence on every model.
-    pub verdict: Verdict,
+    pub validation: Validation,
 }
 
 /// Factors and signals of the scheme.

@@ -1,10 +1,10 @@
 //! Files as they are read and tested one record at a time.
 
 use super::{CheckedRecord, DataCheck};
-use crate::records::computed::ComputedChannels;
 use crate::records::segments::{Part, parts};
 use crate::records::{UsedRows, channels_of, loop_record, refuse_overlap};
 use crate::settings::DataFile;
+use crate::settings::computed::ComputedChannels;
 use crate::{Error, Result};
 use rayon::prelude::*;
 use std::path::Path;

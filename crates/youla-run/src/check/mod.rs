@@ -10,7 +10,7 @@ mod result;
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
 
 use crate::records::RunRecords;
-use crate::records::computed::ComputedChannels;
+use crate::settings::computed::ComputedChannels;
 use crate::settings::{DataFile, DataSettings, RunSettings};
 use crate::stages::factors::{DeclaredLoop, declared_loop};
 use crate::{Error, Result};

@@ -5,7 +5,7 @@ use crate::folder::artefacts::Provenance;
 use crate::records::RunRecords;
 use crate::records::segments::RecordSegment;
 use crate::result::Identification;
-use crate::stages::validate::ModelVerdict;
+use crate::stages::validate::ModelValidation;
 use crate::stages::validate::residuals::{RecordResiduals, step_keys};
 use crate::summary::entries::OrRefused;
 use crate::summary::model::ModelEntry;
@@ -85,9 +85,9 @@ pub(crate) struct VerdictFile<'a> {
 
 impl<'a> VerdictFile<'a> {
     pub(crate) fn new(found: &'a Identification) -> Result<Self> {
-        let models = &found.verdict.models;
-        let entry = |v: &'a ModelVerdict| Ok((v.method.key(), ModelEntry::new(found, v)?));
-        let margins = |v: &'a ModelVerdict| (v.method.key(), OrRefused::new(v.robustness.margins.as_ref()));
+        let models = &found.validation.models;
+        let entry = |v: &'a ModelValidation| Ok((v.method.key(), ModelEntry::new(found, v)?));
+        let margins = |v: &'a ModelValidation| (v.method.key(), OrRefused::new(v.robustness.margins.as_ref()));
         Ok(VerdictFile {
             models: models.iter().map(entry).collect::<Result<_>>()?,
             margins: models.iter().map(margins).collect(),
@@ -104,9 +104,9 @@ pub(crate) struct ResidualsFile<'a> {
     models: BTreeMap<&'a str, BTreeMap<&'a str, &'a RecordResiduals>>,
 }
 
-impl<'a> From<&'a [ModelVerdict]> for ResidualsFile<'a> {
-    fn from(models: &'a [ModelVerdict]) -> Self {
-        let tests = |v: &'a ModelVerdict| {
+impl<'a> From<&'a [ModelValidation]> for ResidualsFile<'a> {
+    fn from(models: &'a [ModelValidation]) -> Self {
+        let tests = |v: &'a ModelValidation| {
             v.records.iter().filter_map(|r| Some((r.record.as_str(), r.residuals.as_ref()?))).collect()
         };
         let models = models.iter().map(|v| (v.method.key(), tests(v))).collect();

@@ -50,7 +50,7 @@ pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()>
     writer.factors()?;
     writer.signals()?;
     writer.models()?;
-    writer.verdict()?;
+    writer.validation()?;
     writer.frequencies()?;
     writer.deviation()?;
     writer.reduction()?;
@@ -231,13 +231,13 @@ impl Writer<'_> {
     }
 
     /// `7-validate/verdict.json`, `7-validate/residuals.json` and the predictions.
-    fn verdict(&self) -> Result<()> {
-        let verdict = &self.found.verdict;
+    fn validation(&self) -> Result<()> {
+        let validation = &self.found.validation;
         self.json("7-validate/verdict.json", VerdictFile::new(self.found)?)?;
-        self.json("7-validate/residuals.json", ResidualsFile::from(&verdict.models[..]))?;
+        self.json("7-validate/residuals.json", ResidualsFile::from(&validation.models[..]))?;
         for (k, record) in self.found.records.verification.iter().enumerate() {
             let mut variables = vec![number("ts", record.time().ts()), array("measured", record.y())];
-            for v in &self.found.verdict.models {
+            for v in &self.found.validation.models {
                 let predicted = v.records[k].predicted.as_ref().ok();
                 variables.extend(predicted.map(|p| array(v.method.key(), p.as_ref())));
             }

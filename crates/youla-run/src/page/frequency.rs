@@ -22,7 +22,7 @@ const NORMAL: f64 = 1.959_963_984_540_054;
 const ELLIPSE: f64 = 5.991_464_547_107_979;
 
 pub(crate) fn drawn(found: &Identification) -> Result<draw::FrequencyResponse> {
-    let responses = model_responses(&found.verdict, &found.hz)?;
+    let responses = model_responses(&found.validation, &found.hz)?;
     let models = responses.iter().flat_map(|(method, r)| decibels::drawn(method.key(), r)).collect();
     let known = responses.iter().filter_map(|(method, _)| Some((*method, found.uncertainty(*method)?)));
     let of_scheme = known.flat_map(|(method, of)| ports(found).map(move |port| band(method, of, port)));

@@ -36,7 +36,7 @@ use youla_report::pretty_unit;
 /// Those of the frequency responses, and settings that TOML cannot hold.
 pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<ReportData> {
     let models: Vec<(&str, &ModelEntry)> =
-        found.verdict.models.iter().filter_map(|v| Some((v.method.key(), summary.model(v.method)?))).collect();
+        found.validation.models.iter().filter_map(|v| Some((v.method.key(), summary.model(v.method)?))).collect();
     let all = || models.iter().copied();
     let structure = summary.model(Method::GreyBox).and_then(|model| model.physical.as_ref());
     Ok(ReportData {
@@ -49,7 +49,7 @@ pub fn page(found: &Identification, summary: &Summary, run: &str) -> Result<Repo
         inputs: found.records.inputs.clone(),
         outputs: found.records.outputs.clone(),
         sample_time: Some(found.records.time.ts()),
-        methods: found.verdict.models.iter().map(|v| method(v.method)).collect(),
+        methods: found.validation.models.iter().map(|v| method(v.method)).collect(),
         overview: Vec::new(),
         verdict: verdict_lines(found, summary),
         further: further_lines(found, summary),

@@ -72,7 +72,7 @@ fn diverged(found: &Identification, summary: &Summary) -> Vec<Note> {
         let records = summary.model(method).into_iter().flat_map(|model| &model.diverged);
         records.map(move |(r, reason)| caution(format!("{} has no prediction of {r}: {reason}.", method.label())))
     };
-    found.verdict.models.iter().flat_map(|v| of(v.method)).collect()
+    found.validation.models.iter().flat_map(|v| of(v.method)).collect()
 }
 
 /// Records that are parts of files, and those that are too short for the recommended model.

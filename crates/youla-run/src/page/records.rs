@@ -120,7 +120,7 @@ pub(crate) fn verification(found: &Identification) -> Result<Vec<draw::Verificat
 
 fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<draw::Verification> {
     let clock = clock(record);
-    let prediction = match found.verdict.prediction {
+    let prediction = match found.validation.prediction {
         Prediction::OpenLoop => "simulated from the measured input, initial state estimated",
         Prediction::ClosedLoop => "simulated under the controller from the known excitations, initial state estimated",
     };
@@ -129,7 +129,7 @@ fn verified(found: &Identification, k: usize, record: &LoopRecord) -> Result<dra
             let name = &found.records.outputs[output].name;
             let measured: Vec<f64> = record.y().col(output).iter().copied().collect();
             let mut predictions = Vec::new();
-            for v in &found.verdict.models {
+            for v in &found.validation.models {
                 let Ok(predicted) = &v.records[k].predicted else { continue };
                 let values = predicted.col_as_slice(output);
                 let residual: Vec<f64> = measured.iter().zip(values).map(|(y, yp)| y - yp).collect();

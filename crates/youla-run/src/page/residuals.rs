@@ -9,7 +9,7 @@ use youla_report::data as draw;
 /// What the report draws.
 pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
     let mut tests = Vec::new();
-    for v in &found.verdict.models {
+    for v in &found.validation.models {
         for record in &v.records {
             // A residual or an excitation that is zero throughout has no correlations; `residuals.json` says so by null.
             let Some(r) = record.residuals.as_ref().filter(|r| exist(&r.correlations)) else { continue };
@@ -37,14 +37,14 @@ pub(crate) fn drawn(found: &Identification) -> Option<draw::Residuals> {
             });
         }
     }
-    let of = match found.verdict.prediction {
+    let of = match found.validation.prediction {
         Prediction::OpenLoop => "the simulation from the measured input",
         Prediction::ClosedLoop => "the simulation under the controller from the known excitations",
     };
     (!tests.is_empty()).then(|| draw::Residuals {
         prediction: of.into(),
         external: found
-            .verdict
+            .validation
             .models
             .iter()
             .flat_map(|v| &v.records)

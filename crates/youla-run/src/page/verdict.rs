@@ -47,7 +47,7 @@ fn recommended_lines(found: &Identification) -> Vec<Verdict> {
 /// The model that the lines are about: the recommended one, else the first that was identified.
 fn subject<'a>(found: &Identification, summary: &'a Summary) -> Option<(Method, &'a ModelEntry)> {
     let given = [Method::Nominal, Method::TruePlant];
-    let method = found.verdict.models.iter().map(|v| v.method).find(|method| !given.contains(method))?;
+    let method = found.validation.models.iter().map(|v| v.method).find(|method| !given.contains(method))?;
     Some((method, summary.model(method)?))
 }
 

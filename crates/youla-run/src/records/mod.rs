@@ -1,14 +1,13 @@
 //! The records of a run: read, cut, detrended, and split by the meaning of their channels.
 
-pub(crate) mod computed;
 pub(crate) mod disturbance;
 pub(crate) mod measured;
 pub(crate) mod segments;
 
-use crate::records::computed::ComputedChannels;
 use crate::records::disturbance::disturbance_signals;
 use crate::records::measured::{MeasuredTable, read_measured};
 use crate::records::segments::{Part, RecordSegment, parts};
+use crate::settings::computed::ComputedChannels;
 use crate::settings::{DataFile, DataSettings, DisturbanceSettings};
 use crate::{Error, Result};
 use rayon::prelude::*;

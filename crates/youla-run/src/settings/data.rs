@@ -176,7 +176,7 @@ impl DataSettings {
     pub(super) fn problem(&self) -> Option<String> {
         self.record_problem()
             .or_else(|| self.channel_problem())
-            .or_else(|| crate::records::computed::problem(self))
+            .or_else(|| crate::settings::computed::problem(self))
             .or_else(|| self.clock_problem())
     }
 

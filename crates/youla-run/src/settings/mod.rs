@@ -1,5 +1,6 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+pub(crate) mod computed;
 mod controller;
 mod data;
 mod disturbance;

@@ -86,7 +86,7 @@ pub fn identify(
     let models = [&[&declared.nominal], &identified[..]].concat();
     let hz = grid(&settings.frequency_response, &models, records.time)?;
     // (26), the loop certificate and the response that rests on no model.
-    let ((indirect, lines), verdict) = clock.run(Stage::Validate, || {
+    let ((indirect, lines), validation) = clock.run(Stage::Validate, || {
         let indirect = match &records.measured {
             None => indirect(run, context.map(|c| c.signals)),
             Some(measured) => Some(measured.shown()),
@@ -122,7 +122,7 @@ pub fn identify(
         indirect,
         lines,
         hz,
-        verdict,
+        validation,
     })
 }
 

@@ -4,7 +4,7 @@ use crate::method::Method;
 use crate::settings::FrequencySettings;
 use crate::stages::context::RunContext;
 use crate::stages::signals::DeviationSignals;
-use crate::stages::validate::Verdict;
+use crate::stages::validate::Validation;
 use crate::{Error, Result};
 use std::f64::consts::TAU;
 use youla::lti::{Discrete, FrequencyResponse, StateSpace, frequency_response};
@@ -58,10 +58,10 @@ pub(crate) fn is_constant(signals: MatRef<'_, f64>) -> bool {
 ///
 /// # Errors
 /// As [`frequency_response`].
-pub(crate) fn model_responses(verdict: &Verdict, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
+pub(crate) fn model_responses(validation: &Validation, hz: &[f64]) -> Result<Vec<(Method, FrequencyResponse)>> {
     let omega: Vec<f64> = hz.iter().map(|f| TAU * f).collect();
-    let response = |v: &crate::stages::validate::ModelVerdict| Ok((v.method, frequency_response(&v.model, &omega)?));
-    verdict.models.iter().map(response).collect()
+    let response = |v: &crate::stages::validate::ModelValidation| Ok((v.method, frequency_response(&v.model, &omega)?));
+    validation.models.iter().map(response).collect()
 }
 
 /// Highest frequency of the curves, over the Nyquist frequency: at it some responses are not defined.

@@ -80,7 +80,7 @@ pub struct Summary {
 /// Those of the frequency responses, modes and derived quantities.
 pub fn summary(run: &Identification, seconds: &StageTimes) -> Result<Summary> {
     let mut methods = BTreeMap::new();
-    for v in &run.verdict.models {
+    for v in &run.validation.models {
         methods.insert(v.method.key().to_owned(), ModelEntry::new(run, v)?);
     }
     let [nominal, true_plant] = [Method::Nominal, Method::TruePlant].map(|given| methods.remove(given.key()));

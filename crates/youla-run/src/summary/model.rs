@@ -7,7 +7,7 @@ use crate::Result;
 use crate::method::Method;
 use crate::result::Identification;
 use crate::stages::validate::residuals::{RecordResiduals, ResidualPredictor, step_keys};
-use crate::stages::validate::{ModelVerdict, RecordVerdict};
+use crate::stages::validate::{ModelValidation, RecordValidation};
 use crate::summary::recommended::shown_modes;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -56,13 +56,13 @@ impl ModelEntry {
     ///
     /// # Errors
     /// Those of zeros and of derived quantities of a physical structure.
-    pub(crate) fn new(run: &Identification, v: &ModelVerdict) -> Result<Self> {
+    pub(crate) fn new(run: &Identification, v: &ModelValidation) -> Result<Self> {
         let square = v.model.inputs() == v.model.outputs();
         let structure = run.structure().filter(|_| v.method == Method::GreyBox);
-        let by_record = |of: &dyn Fn(&RecordVerdict) -> Vec<f64>| -> Fits {
+        let by_record = |of: &dyn Fn(&RecordValidation) -> Vec<f64>| -> Fits {
             v.records.iter().map(|r| (r.record.clone(), finite_all(&of(r)))).collect()
         };
-        let diverged = |r: &RecordVerdict| Some((r.record.clone(), r.predicted.as_ref().err()?.clone()));
+        let diverged = |r: &RecordValidation| Some((r.record.clone(), r.predicted.as_ref().err()?.clone()));
         let residuals = v.records.iter().filter_map(|r| Some((r.record.clone(), r.residuals.as_ref()?.into())));
         Ok(ModelEntry {
             order: v.model.order(),
@@ -96,7 +96,7 @@ impl ModelEntry {
 }
 
 /// The modes that the response shows, with deviations where they are known. A pole at z = 0 is a sample of delay, and no mode.
-fn modes(run: &Identification, v: &ModelVerdict) -> Vec<ModeEntry> {
+fn modes(run: &Identification, v: &ModelValidation) -> Vec<ModeEntry> {
     if let (Method::Likelihood, Ok(found)) = (v.method, &run.recommended) {
         return shown_modes(found);
     }

@@ -56,7 +56,7 @@ pub struct ScalesEntry {
 
 /// The scales of a run.
 pub(crate) fn scales(found: &Identification) -> OrRefused<ScalesEntry> {
-    OrRefused::new(found.verdict.scales.as_ref().map(|scales| ScalesEntry {
+    OrRefused::new(found.validation.scales.as_ref().map(|scales| ScalesEntry {
         inputs: scales.inputs().to_vec(),
         outputs: scales.outputs().to_vec(),
         basis: basis(&found.records).to_owned(),

@@ -102,7 +102,7 @@ fn the_shortest_run_toml_runs_to_its_end() {
     let mut silent = |_| ();
     let mut clock = StageClock::new(&mut silent);
     let run = identify(settings, records, folder.path(), &mut clock).unwrap();
-    let plant = &run.verdict.of(Method::Hansen).unwrap().model;
+    let plant = &run.validation.of(Method::Hansen).unwrap().model;
     assert!(plant.poles().unwrap().iter().any(|p| (p.re - 0.9).abs() < 0.01), "{:?}", plant.poles());
     let written = write_run(&run, &folder.path().join("out"), false, &mut clock).unwrap();
     let read = Summary::read(&written.folder).unwrap();

@@ -104,7 +104,7 @@ impl Laps {
 }
 
 /// A record of the loop, from rest.
-struct LoopRecord {
+struct StudyRecord {
     u: Mat<f64>,
     y: Mat<f64>,
 }
@@ -116,14 +116,14 @@ fn record(
     noise: f64,
     settings: &PaperSettings,
     stream: u64,
-) -> Result<LoopRecord> {
+) -> Result<StudyRecord> {
     let alpha = excitation(&settings.study.excitation, samples, plant.time(), settings.seed, 2 * stream)?;
     let mut rng = generator(settings.seed, 2 * stream + 1);
     let n = Mat::from_fn(samples, 2, |_, _| noise * rng.sample::<f64, _>(StandardNormal));
     let closed = closed_loop(plant, &design.factors.j_k()?)?;
     let driving = block(&[&[alpha.as_ref(), n.as_ref()]]);
     let z = simulate(&closed, driving.as_ref(), &vec![0.0; closed.order()])?;
-    Ok(LoopRecord { u: z.subcols(0, 2).to_owned(), y: z.subcols(2, 2).to_owned() })
+    Ok(StudyRecord { u: z.subcols(0, 2).to_owned(), y: z.subcols(2, 2).to_owned() })
 }
 
 /// alpha from its own random stream.
@@ -146,8 +146,8 @@ pub(super) fn generator(seed: u64, stream: u64) -> ChaCha8Rng {
 
 struct LoopData<'a> {
     design: &'a Design,
-    estimation: LoopRecord,
-    verification: LoopRecord,
+    estimation: StudyRecord,
+    verification: StudyRecord,
     start: Bearing,
     /// The search from the nominal model, which several methods take part in.
     single: OnceCell<Result<GreyBoxModel, String>>,
@@ -267,7 +267,7 @@ impl LoopData<'_> {
 }
 
 /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.
-fn fit_on(LoopRecord { u, y }: &LoopRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
+fn fit_on(StudyRecord { u, y }: &StudyRecord, model: &StateSpace<Discrete>) -> Result<[f64; 2]> {
     match simulate(model, u.as_ref(), &vec![0.0; model.order()]) {
         Ok(predicted) => {
             let percent = fit(y.as_ref(), predicted.as_ref())?;

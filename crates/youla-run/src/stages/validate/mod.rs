@@ -28,7 +28,7 @@ use youla::{Mat, MatRef, c64};
 
 /// Prediction of one verification record by one model.
 #[derive(Debug, Clone)]
-pub struct RecordVerdict {
+pub struct RecordValidation {
     /// Name of the record.
     pub record: String,
     /// Predicted outputs, samples x p, without known lines, or why there are none (a model that diverges).
@@ -43,7 +43,7 @@ pub struct RecordVerdict {
 
 /// What is known of one model.
 #[derive(Debug, Clone)]
-pub struct ModelVerdict {
+pub struct ModelValidation {
     /// Which model.
     pub method: Method,
     /// The model.
@@ -59,10 +59,10 @@ pub struct ModelVerdict {
     /// Margins of that loop, and distances from other models.
     pub robustness: LoopRobustness,
     /// One entry per verification record.
-    pub records: Vec<RecordVerdict>,
+    pub records: Vec<RecordValidation>,
 }
 
-impl ModelVerdict {
+impl ModelValidation {
     /// The mode of a pole and its residue, where the response shows it.
     pub fn visible_residue(&self, pole: c64) -> Option<&[c64]> {
         match &self.visible {
@@ -83,18 +83,18 @@ pub(crate) fn residue_at(visible: &VisibleModes, pole: c64) -> Option<&[c64]> {
 
 /// The evidence on all models, in the order nominal, direct, Hansen, reduced, grey box.
 #[derive(Debug, Clone)]
-pub struct Verdict {
+pub struct Validation {
     /// What drove the models on the verification records.
     pub prediction: Prediction,
     /// One entry per model that exists.
-    pub models: Vec<ModelVerdict>,
+    pub models: Vec<ModelValidation>,
     /// The sizes by which channels are scaled for b(G, K) and the nu-gap, or why there are none.
     pub scales: Result<ChannelScales, String>,
 }
 
-impl Verdict {
+impl Validation {
     /// The entry of a method, `None` where there is no such model.
-    pub fn of(&self, method: Method) -> Option<&ModelVerdict> {
+    pub fn of(&self, method: Method) -> Option<&ModelValidation> {
         self.models.iter().find(|m| m.method == method)
     }
 }
@@ -162,13 +162,13 @@ impl<'a> Candidates<'a> {
 ///
 /// # Errors
 /// Ports or numerical conditions; a prediction that diverges is an outcome, not an error.
-pub(crate) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Verdict> {
+pub(crate) fn verify(run: RunContext<'_>, candidates: &Candidates<'_>) -> Result<Validation> {
     let scales = channel_scales(run.records).map_err(|e| e.to_string());
     let recommended = candidates.recommended.map(|r| &r.plant);
     let all = candidates.all(run)?;
-    let verdicts: Vec<Result<ModelVerdict>> =
+    let models: Vec<Result<ModelValidation>> =
         all.par_iter().map(|candidate| verify_model(run, &scales, recommended, candidate)).collect();
-    Ok(Verdict { prediction: run.prediction(), models: verdicts.into_iter().collect::<Result<_>>()?, scales })
+    Ok(Validation { prediction: run.prediction(), models: models.into_iter().collect::<Result<_>>()?, scales })
 }
 
 fn verify_model(
@@ -176,10 +176,10 @@ fn verify_model(
     scales: &Result<ChannelScales, String>,
     recommended: Option<&StateSpace<Discrete>>,
     Candidate { method, model, noise }: &Candidate<'_>,
-) -> Result<ModelVerdict> {
+) -> Result<ModelValidation> {
     let verify = |r: &LoopRecord| verify_record(run, model, noise.as_ref(), r);
     let records = run.records.verification.iter().map(verify).collect::<Result<_>>()?;
-    Ok(ModelVerdict {
+    Ok(ModelValidation {
         method: *method,
         model: (*model).clone(),
         poles: model.poles()?,
@@ -197,7 +197,7 @@ pub(crate) fn verify_record(
     model: &StateSpace<Discrete>,
     noise: Option<&StateSpace<Discrete>>,
     record: &LoopRecord,
-) -> Result<RecordVerdict> {
+) -> Result<RecordValidation> {
     let lines = record.disturbance();
     let measured = without_lines(record.y(), lines)?;
     let predicted = match run.prediction() {
@@ -223,12 +223,12 @@ pub(crate) fn verify_record(
             let (y, yp) = (rest(record.y())?, rest(predicted.as_ref())?);
             let (fit, vaf) = (fit(y.as_ref(), yp.as_ref())?, vaf(y.as_ref(), yp.as_ref())?);
             let residuals = Some(residual_tests(run, record, noise, measured.as_ref(), predicted.as_ref())?);
-            Ok(RecordVerdict { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
+            Ok(RecordValidation { record: record_name, predicted: Ok(predicted), fit, vaf, residuals })
         }
         Err(e @ youla::Error::Diverged { .. }) => {
             let none = vec![f64::NAN; record.outputs()];
             let predicted = Err(e.to_string());
-            Ok(RecordVerdict { record: record_name, predicted, fit: none.clone(), vaf: none, residuals: None })
+            Ok(RecordValidation { record: record_name, predicted, fit: none.clone(), vaf: none, residuals: None })
         }
         Err(e) => Err(e.into()),
     }

@@ -8,7 +8,8 @@ use super::problem::{Choice, Problem, Solution, Task};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
 use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::point::Point;
+use crate::identify::likelihood::search::noise::Noise;
+use crate::identify::likelihood::search::point::{Point, energy};
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
 use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
@@ -165,27 +166,30 @@ fn less_lines(
     None
 }
 
-/// Whether a mode is hardly moved by the inputs: away from its frequency `|C M B U|` is far below `|C M z t|`.
-fn unmoved(block: &Block, first: usize, turns: f64, spectra: &Spectra, point: &Point) -> bool {
-    let (m, s) = (spectra.inputs, block.states);
+/// Whether a mode is hardly moved by the inputs: away from its frequency `|C M B U|` is far below `|C M z t|`, or does not pay for B by
+/// Schwarz's criterion. A disturbance with whole periods in a record has no ends, and B stands for its one line.
+fn unmoved(block: &Block, first: usize, turns: f64, (spectra, noise): (&Spectra, &Noise), point: &Point) -> bool {
+    let (m, s, p) = (spectra.inputs, block.states, spectra.outputs);
     let mut inverse = [c64::ZERO; 4];
-    let (mut by_inputs, mut by_ends) = (0.0, 0.0);
+    let [mut by_inputs, mut by_ends] = [(); 2].map(|()| Vec::with_capacity(spectra.records.len()));
     for (lines, t) in spectra.records.iter().zip(&point.ends) {
-        let away = |k: &usize| (*k as f64 + 1.0 - turns * lines.samples as f64).abs() > AWAY;
-        for k in (0..lines.z.len()).filter(away) {
+        let away = |k: usize| (k as f64 + 1.0 - turns * lines.samples as f64).abs() > AWAY;
+        let [mut inputs, mut ends] = [(); 2].map(|()| vec![c64::ZERO; lines.z.len() * p]);
+        for k in (0..lines.z.len()).filter(|k| away(*k)) {
             block.resolvent(lines.z[k], &mut inverse);
-            let weight = lines.weight[k] * lines.weight[k];
-            let through = |drive: &dyn Fn(usize) -> c64| {
+            let through = |out: &mut [c64], drive: &dyn Fn(usize) -> c64| {
                 let x = [0, 1].map(|i| inverse[2 * i] * drive(0) + inverse[2 * i + 1] * drive(1));
-                let outputs = block.c.chunks_exact(s).map(|c| (x[0] * c[0] + x[1] * c[1]).norm_sqr());
-                weight * outputs.sum::<f64>()
+                out.iter_mut().zip(block.c.chunks_exact(s)).for_each(|(out, c)| *out = x[0] * c[0] + x[1] * c[1]);
             };
             let input = |i: usize| (0..m).fold(c64::ZERO, |sum, j| sum + lines.u[k * m + j] * block.b[i * m + j]);
-            by_inputs += through(&input);
-            by_ends += through(&|i| lines.z[k] * t[first + i]);
+            through(&mut inputs[k * p..(k + 1) * p], &input);
+            through(&mut ends[k * p..(k + 1) * p], &|i| lines.z[k] * t[first + i]);
         }
+        by_inputs.push(inputs);
+        by_ends.push(ends);
     }
-    by_ends > UNMOVED * by_inputs
+    let [by_inputs, by_ends] = [by_inputs, by_ends].map(|signal| energy(spectra, &signal, noise));
+    by_ends > UNMOVED * by_inputs || by_inputs < (spectra.samples() as f64).ln() * (m * s) as f64
 }
 
 /// Adds a disturbance, or widens one whose sidebands the mode stands for.
@@ -233,7 +237,8 @@ impl Narrow {
         }
         let spectra = problem.spectra(&choice.delays);
         let point = with_best_ends(&spectra, model.clone(), &choice.found.noise);
-        found.retain(|(k, turns, first)| unmoved(&model.blocks[*k], *first, *turns, &spectra, &point));
+        let known = (&spectra, &choice.found.noise);
+        found.retain(|(k, turns, first)| unmoved(&model.blocks[*k], *first, *turns, known, &point));
         let (places, turns): (Vec<usize>, Vec<f64>) = found.into_iter().map(|(k, turns, _)| (k, turns)).unzip();
         (!places.is_empty()).then_some(Narrow { model, places, turns, longest })
     }

@@ -127,7 +127,8 @@ impl Problem<'_> {
 
     /// The lines of other records in the same units.
     pub(crate) fn spectra_of(&self, experiments: &[Experiment<'_>], delays: &[usize]) -> Spectra {
-        Spectra::new(experiments, &self.sizes, delays, self.skip).masked(&self.masked)
+        let spectra = Spectra::new(experiments, &self.sizes, delays, self.skip).masked(&self.masked);
+        Spectra { held: !self.open_loop, ..spectra }
     }
 
     /// Options of a search.

@@ -90,6 +90,8 @@ pub(crate) struct Spectra {
     pub(crate) inputs: usize,
     /// Outputs p.
     pub(crate) outputs: usize,
+    /// Whether a loop may hold the outputs, so that the inputs depend on their noise.
+    pub(crate) held: bool,
     /// Each record.
     pub(crate) records: Vec<Lines>,
 }
@@ -136,7 +138,7 @@ impl Spectra {
             }
             lines
         });
-        Spectra { inputs: m, outputs: p, records: records.collect() }
+        Spectra { inputs: m, outputs: p, held: true, records: records.collect() }
     }
 
     /// Without the lines in some bands.

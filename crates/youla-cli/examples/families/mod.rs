@@ -13,7 +13,7 @@ use youla::{Mat, Result};
 /// Sample time, s.
 const TS: f64 = 1e-3;
 /// Largest magnitude of a pole of a loop: a record holds many of its time constants.
-const SLOWEST: f64 = 0.9985;
+const SLOWEST: f64 = 0.9995;
 
 /// What kind of machine.
 #[derive(Clone, Copy)]
@@ -24,6 +24,7 @@ enum Kind {
     Lags,
     Rotor,
     CloseModes,
+    Slow,
 }
 
 /// What is not as assumed.
@@ -40,6 +41,10 @@ enum Imperfection {
     Outliers,
     /// The gain rises by 5 % from the first to the last sample.
     GainDrift,
+    /// Outputs and commands have offsets of fifty times their size.
+    Offset,
+    /// White noise at the input of the plant, a fifth of the excitation.
+    InputNoise,
     /// No excitation.
     Quiet,
     /// The stated controller has twice the gain.
@@ -64,7 +69,7 @@ const fn family(name: &'static str, kind: Kind, imperfection: Imperfection, samp
     Family { name, kind, imperfection, samples, honest }
 }
 
-pub(crate) const FAMILIES: [Family; 16] = [
+pub(crate) const FAMILIES: [Family; 19] = [
     family("modes", Kind::Modes, Imperfection::Nothing, 9000),
     family("drive", Kind::Drive, Imperfection::Nothing, 9000),
     family("levitation", Kind::Levitation, Imperfection::Nothing, 9000),
@@ -78,6 +83,9 @@ pub(crate) const FAMILIES: [Family; 16] = [
     family("steps of load", Kind::Modes, Imperfection::LoadSteps, 9000),
     family("outliers", Kind::Modes, Imperfection::Outliers, 9000),
     family("gain that drifts by 5 %", Kind::Modes, Imperfection::GainDrift, 9000),
+    family("offsets", Kind::Modes, Imperfection::Offset, 9000),
+    family("noise at the input", Kind::Modes, Imperfection::InputNoise, 9000),
+    family("five modes at a fiftieth of the rate", Kind::Slow, Imperfection::Nothing, 60_000),
     family("no excitation", Kind::Modes, Imperfection::Quiet, 9000),
     family("wrong controller", Kind::Modes, Imperfection::WrongController, 9000),
     family("limit that the log hides", Kind::Modes, Imperfection::HiddenLimit, 9000),
@@ -158,6 +166,10 @@ impl Kind {
                 let modes =
                     [mode([8.0, 25.0], [0.5, 2.0]), mode([40.0, 80.0], [0.2, 1.0]), mode([120.0, 250.0], [0.05, 0.3])];
                 modal(&modes)?.zoh(time)
+            }
+            Kind::Slow => {
+                let hz = [[1.0, 1.5], [2.0, 3.0], [4.0, 6.0], [8.0, 12.0], [15.0, 20.0]];
+                modal(&hz.map(|hz| mode(hz, [0.2, 1.0])))?.zoh(time)
             }
             Kind::CloseModes => {
                 let first = mode([20.0, 80.0], [0.5, 1.0]);
@@ -287,6 +299,7 @@ impl Loop {
                     Imperfection::Hum => {
                         seen[(i, 0)] += typical * ((TAU * 50.0 * time).sin() + 0.3 * (TAU * 150.0 * time + 1.0).sin());
                     }
+                    Imperfection::Offset => seen[(i, 0)] += 50.0 * typical,
                     Imperfection::Outliers if rng.random_range(0..500) == 0 => seen[(i, 0)] += 10.0 * typical,
                     _ => {}
                 }
@@ -302,6 +315,7 @@ impl Loop {
             for j in 0..m {
                 u[(t, j)] = command[(j, 0)] + d[(t, j)];
                 acting[(j, 0)] = match imperfection {
+                    Imperfection::InputNoise => u[(t, j)] + 0.2 * rng.sample::<f64, _>(StandardNormal),
                     Imperfection::GainDrift => u[(t, j)] * (1.0 + drift),
                     Imperfection::HiddenLimit => u[(t, j)].clamp(-0.5, 0.5),
                     _ => u[(t, j)] + load,

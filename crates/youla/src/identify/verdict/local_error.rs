@@ -230,13 +230,9 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
     all
 }
 
-/// The inputs as far as the excitation explains them, lines x m for each record: `S_ux S_xx^-1 x` in each band, of the lines without a window
-/// (`plain`: inputs and excitation).
-pub(crate) fn explained_inputs(
-    records: &[RecordLines<'_>],
-    plain: &[[&[c64]; 2]],
-    channels: Channels,
-) -> Vec<Vec<c64>> {
+/// The inputs as far as the excitation explains them, lines x m for each record: `S_ux S_xx^-1 x` in each band. Lines without a window:
+/// a window hides what a sweep excites at the ends of a record, and what the ends leak is small beside what an input is asked for here.
+pub(crate) fn explained_inputs(records: &[RecordLines<'_>], channels: Channels) -> Vec<Vec<c64>> {
     let Channels { m, p, q } = channels;
     let lines: usize = records.iter().map(|r| r.v.len() / p.max(1)).sum();
     let count = band_count(lines, channels);
@@ -244,18 +240,18 @@ pub(crate) fn explained_inputs(
     let power = |s: &Sums| (0..q).map(|i| s.xx[(i, i)].re).sum::<f64>();
     let least = WEAK_EXCITATION * all.iter().map(power).sum::<f64>() / count as f64;
     let gains: Vec<Option<Mat<c64>>> = all.iter().map(|s| gain(s, least)).collect();
-    let of = |[u, x]: &[&[c64]; 2]| {
-        let total = u.len() / m.max(1);
+    let of = |r: &RecordLines<'_>| {
+        let total = r.u.len() / m.max(1);
         let mut out = vec![c64::ZERO; total * m];
         for k in 0..total {
             let Some(gain) = &gains[(k * count / total).min(count - 1)] else { continue };
             for j in 0..m {
-                out[k * m + j] = (0..q).fold(c64::ZERO, |sum, a| sum + gain[(j, a)] * x[k * q + a]);
+                out[k * m + j] = (0..q).fold(c64::ZERO, |sum, a| sum + gain[(j, a)] * r.x[k * q + a]);
             }
         }
         out
     };
-    plain.iter().map(of).collect()
+    records.iter().map(of).collect()
 }
 
 /// `S_ux S_xx^-1` along the strong directions of the excitation.

@@ -15,7 +15,7 @@ use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
-use crate::identify::likelihood::search::unstable::{self, with_slope_of_unstable};
+use crate::identify::likelihood::search::unstable::{self, with_slope_of_growth};
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
@@ -139,10 +139,10 @@ fn beside_parameters(spectra: &Spectra, solution: &Solution, chart: &Chart, extr
     let found = &solution.chosen.found;
     if separable(spectra.outputs) {
         let normal = Normal::with(spectra, &found.point, chart, &found.noise, (Ends::Shared, extra));
-        return normal.with_slope(unstable::slope(spectra, &found.point.model, chart)).extra();
+        return normal.with_slope(unstable::slope(unstable::growth, spectra, &found.point.model, chart)).extra();
     }
     let factor = linearise_with(spectra, &found.point, chart, &found.noise, extra).factor;
-    let factor = with_slope_of_unstable(factor, spectra, &found.point.model, chart);
+    let factor = with_slope_of_growth(factor, spectra, &found.point.model, chart);
     let (first, count) = (chart.parameters(), extra.count);
     let length = |c: usize| (0..factor.nrows()).map(|i| factor[(i, first + c)].powi(2)).sum::<f64>();
     let rows = factor.nrows().saturating_sub(first).min(count);

@@ -18,7 +18,7 @@ use crate::identify::likelihood::search::linearise::{compressed, linearise, stac
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
-use crate::identify::likelihood::search::unstable::{self, with_slope_of_unstable};
+use crate::identify::likelihood::search::unstable::{self, with_slope_of_growth};
 use crate::identify::likelihood::search::{DAMPED, search, with_best_ends};
 use crate::identify::subspace::Experiment;
 use crate::linalg::TINY;
@@ -80,12 +80,12 @@ impl Part {
         let groups = grouped(&spectra, &point, DAMPED);
         let lines = groups.as_ref().unwrap_or(&spectra);
         let information = if separable(spectra.outputs) {
-            let slope = unstable::slope(&spectra, &point.model, &chart);
+            let slope = unstable::slope(unstable::growth, &spectra, &point.model, &chart);
             let normal = Normal::new(lines, &point, &chart, &found.noise, Ends::Own);
             Information::ByOutput(normal.with_slope(slope).reduced())
         } else {
             let factor = linearise(lines, &point, &chart, &found.noise).factor;
-            Information::Dense(with_slope_of_unstable(factor, &spectra, &point.model, &chart))
+            Information::Dense(with_slope_of_growth(factor, &spectra, &point.model, &chart))
         };
         let energy = energy(&spectra, &point.residuals(&spectra), &found.noise);
         Some(Part { information, energy, samples: (spectra.samples() * spectra.outputs) as f64 })

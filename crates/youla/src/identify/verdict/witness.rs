@@ -16,8 +16,8 @@ const MOST_GROUPS: usize = 6;
 struct Group {
     /// Inputs, residuals and excitation of each record under a Hann window.
     windowed: Vec<[Vec<c64>; 3]>,
-    /// Inputs and excitation as they are.
-    plain: Vec<[Vec<c64>; 2]>,
+    /// The same as they are.
+    plain: Vec<[Vec<c64>; 3]>,
 }
 
 /// The error of the model as the excitation shows it.
@@ -48,10 +48,10 @@ impl Group {
         let residuals = point.residuals(&spectra);
         let (m, p) = (spectra.inputs, spectra.outputs);
         let (mut windowed, mut plain) = (Vec::new(), Vec::new());
-        for ((lines, v), (_, x)) in spectra.records.into_iter().zip(&residuals).zip(records) {
+        for ((lines, v), (_, x)) in spectra.records.into_iter().zip(residuals).zip(records) {
             let excitation = lines_of(*x, problem.skip);
-            windowed.push([hann(&lines.u, m), hann(v, p), hann(&excitation, x.ncols())]);
-            plain.push([lines.u, excitation]);
+            windowed.push([hann(&lines.u, m), hann(&v, p), hann(&excitation, x.ncols())]);
+            plain.push([lines.u, v, excitation]);
         }
         Some(Group { windowed, plain })
     }
@@ -89,8 +89,8 @@ impl Witness {
         let count = band_count(shortest, channels);
         let errors: Vec<LocalErrors> =
             groups.iter().map(|g| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0)).collect();
-        let plain = first.plain.iter().map(|[u, x]| [u.as_slice(), x.as_slice()]).collect::<Vec<_>>();
-        let excited = explained_inputs(&first.lines().collect::<Vec<_>>(), &plain, channels);
+        let plain: Vec<RecordLines<'_>> = first.plain.iter().map(|[u, v, x]| RecordLines { u, v, x }).collect();
+        let excited = explained_inputs(&plain, channels);
         Some(Witness { distortion: whole.excess(), variation: LocalErrors::scatter(&errors), whole, excited })
     }
 }

@@ -116,7 +116,7 @@ pub(crate) fn deviance(spectra: &Spectra, point: &Point, noise_order: usize) -> 
 }
 
 fn of_noise(spectra: &Spectra, noise: &Noise, model: &Model) -> f64 {
-    spectra.samples() as f64 * noise.log_det + 2.0 * unstable::growth(spectra, &model.poles())
+    spectra.samples() as f64 * noise.log_det + 2.0 * unstable::outside(spectra, &model.poles())
 }
 
 /// B, D and the ends of the records by least squares, A and C kept.
@@ -315,7 +315,7 @@ pub(crate) fn damped(factor: &Mat<f64>, parameters: usize, damping: f64) -> (Vec
 
 /// Slopes of the terms of half the deviance that are no squares.
 fn slope(spectra: &Spectra, model: &Model, chart: &Chart, options: &SearchOptions) -> Vec<f64> {
-    let mut out = unstable::slope(spectra, model, chart);
+    let mut out = unstable::slope(unstable::outside, spectra, model, chart);
     if chart.feedthrough {
         let slopes = feedthrough::slopes(model, &options.direct);
         let first = out.len() - slopes.len();

@@ -146,20 +146,20 @@ pub(super) fn excess(grid: &Grid, plant: &Scenario, on: &OnGrid, limits: &PidOpt
     Some(margins(grid, plant, on)?.excess(limits, plant.running.effort))
 }
 
-/// What stops a controller: the limit that is missed by the largest factor, and instability.
+/// What stops a controller: the limits that are missed, the one with the largest factor first, and instability. The nearest controller
+/// shares its excess among limits that exclude each other, so that the first alone need not be the one that was set too high.
 fn sentence(excesses: &[Option<[f64; 5]>]) -> String {
     let (all, unstable) = (excesses.len(), excesses.iter().filter(|e| e.is_none()).count());
     let most = |limit: usize| excesses.iter().flatten().map(|e| e[limit]).fold(f64::NEG_INFINITY, f64::max);
-    let worst = (0..LIMITS.len()).fold(0, |a, b| if most(b) > most(a) { b } else { a });
-    let count = excesses.iter().flatten().filter(|e| e[worst] > 0.0).count();
-    let factor = most(worst).exp();
-    let misses = format!(
-        "the nearest controller misses {} by a factor of {factor:.2}, at {count} of {all} models",
-        LIMITS[worst]
-    );
-    match (count, unstable) {
-        (0, _) => format!("the nearest controller is unstable at {unstable} of {all} models"),
-        (_, 0) => misses,
-        _ => format!("{misses}, and is unstable at {unstable}"),
+    let mut missed: Vec<usize> = (0..LIMITS.len()).filter(|limit| most(*limit) > 0.0).collect();
+    missed.sort_by(|a, b| most(*b).total_cmp(&most(*a)));
+    let one = |limit: &usize| {
+        let count = excesses.iter().flatten().filter(|e| e[*limit] > 0.0).count();
+        format!("misses {} by a factor of {:.2}, at {count} of {all} models", LIMITS[*limit], most(*limit).exp())
+    };
+    let mut parts: Vec<String> = missed.iter().map(one).collect();
+    if unstable > 0 {
+        parts.push(format!("is unstable at {unstable} of {all} models"));
     }
+    format!("the nearest controller {}", parts.join(", and "))
 }

@@ -1,5 +1,9 @@
 //! Loops u = K y + d from a family and a seed: machine, controller, excitation, noise, and what is not as assumed.
 
+#[path = "../loops/mod.rs"]
+mod loops;
+
+use loops::{delayed, modal};
 use rand::{Rng, RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -125,57 +129,28 @@ fn between(rng: &mut impl Rng, [low, high]: [f64; 2]) -> f64 {
     low * (high / low).powf(rng.random::<f64>())
 }
 
-/// Modes `w^2 c b' / (s^2 + 2 zeta w s + w^2)`, each with its gain c b', p x m.
-fn modal(modes: &[([f64; 2], Mat<f64>, Mat<f64>)]) -> Result<StateSpace<Continuous>> {
-    let (n, m, p) = (2 * modes.len(), modes[0].1.ncols(), modes[0].2.nrows());
-    let (mut a, mut b, mut c) = (Mat::zeros(n, n), Mat::zeros(n, m), Mat::zeros(p, n));
-    for (k, ([hz, zeta], input, output)) in modes.iter().enumerate() {
-        let w = TAU * hz;
-        (a[(2 * k, 2 * k + 1)], a[(2 * k + 1, 2 * k)], a[(2 * k + 1, 2 * k + 1)]) = (w, -w, -2.0 * zeta * w);
-        (0..m).for_each(|j| b[(2 * k + 1, j)] = w * input[(0, j)]);
-        (0..p).for_each(|i| c[(i, 2 * k)] = output[(i, 0)]);
-    }
-    StateSpace::new(a, b, c, Mat::zeros(p, m), Continuous)
-}
-
-/// The same with a dead time of whole samples at its inputs.
-fn delayed(plant: &StateSpace<Discrete>, samples: usize) -> Result<StateSpace<Discrete>> {
-    let (n, all) = (plant.order(), plant.order() + samples);
-    let a = Mat::from_fn(all, all, |i, j| match (i < n, j < n) {
-        (true, true) => plant.a()[(i, j)],
-        (true, false) if j == n => plant.b()[(i, 0)],
-        (false, false) if j == i + 1 => 1.0,
-        _ => 0.0,
-    });
-    let b = Mat::from_fn(all, 1, |i, _| if i + 1 == all { 1.0 } else { 0.0 });
-    let c = Mat::from_fn(1, all, |_, j| if j < n { plant.c()[(0, j)] } else { 0.0 });
-    StateSpace::new(a, b, c, Mat::zeros(1, 1), plant.time())
-}
-
 impl Kind {
     /// The machine with some of its frequencies scaled: the truth with 1, a nominal model with another number.
     fn plant(self, scale: f64, rng: &mut impl Rng) -> Result<StateSpace<Discrete>> {
         let time = Discrete::new(TS)?;
-        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
         let mut mode = |hz: [f64; 2], gain: [f64; 2]| {
-            let of = [scale * between(rng, hz), between(rng, [0.005, 0.05])];
-            (of, number(1.0), number(between(rng, gain)))
+            (scale * between(rng, hz), between(rng, [0.005, 0.05]), [1.0, between(rng, gain)])
         };
         match self {
             Kind::Modes => {
                 let modes =
                     [mode([8.0, 25.0], [0.5, 2.0]), mode([40.0, 80.0], [0.2, 1.0]), mode([120.0, 250.0], [0.05, 0.3])];
-                modal(&modes)?.zoh(time)
+                modal(&modes, (1, 1), TS)
             }
             Kind::Slow => {
                 let hz = [[1.0, 1.5], [2.0, 3.0], [4.0, 6.0], [8.0, 12.0], [15.0, 20.0]];
-                modal(&hz.map(|hz| mode(hz, [0.2, 1.0])))?.zoh(time)
+                let modes = hz.map(|hz| mode(hz, [0.2, 1.0]));
+                modal(&modes, (1, 1), TS)
             }
             Kind::CloseModes => {
-                let first = mode([20.0, 80.0], [0.5, 1.0]);
-                let [hz, zeta] = first.0;
-                let second = ([1.01 * hz, 0.6 * zeta.min(0.01)], number(1.0), number(0.7));
-                modal(&[([hz, zeta.min(0.01)], first.1, first.2), second])?.zoh(time)
+                let (hz, zeta, gains) = mode([20.0, 80.0], [0.5, 1.0]);
+                let zeta = zeta.min(0.01);
+                modal(&[(hz, zeta, gains), (1.01 * hz, 0.6 * zeta, [1.0, 0.7])], (1, 1), TS)
             }
             // Integrator, lag, resonance: modes at frequency near zero would need their own form.
             Kind::Drive => {
@@ -204,15 +179,13 @@ impl Kind {
                 delayed(&lags, rng.random_range(2..9))
             }
             Kind::Rotor => {
-                let mut modes = Vec::new();
-                for hz in [[60.0, 90.0], [110.0, 160.0]] {
-                    let of = [scale * between(rng, hz), between(rng, [0.01, 0.04])];
+                let modes = [[60.0, 90.0], [110.0, 160.0]].map(|hz| {
+                    let (hz, zeta) = (scale * between(rng, hz), between(rng, [0.01, 0.04]));
                     let angle = TAU * rng.random::<f64>();
-                    let input = Mat::from_fn(1, 2, |_, j| [angle.cos(), angle.sin()][j]);
-                    let output = Mat::from_fn(2, 1, |i, _| [(angle + 0.2).cos(), (angle + 0.2).sin()][i]);
-                    modes.push((of, input, output));
-                }
-                modal(&modes)?.zoh(time)
+                    let output = angle + 0.2;
+                    (hz, zeta, [angle.cos(), angle.sin(), output.cos(), output.sin()])
+                });
+                modal(&modes, (2, 2), TS)
             }
         }
     }
@@ -221,17 +194,19 @@ impl Kind {
 impl Family {
     /// The first loop from a seed that is fast enough.
     pub(crate) fn system(&self, seed: u64) -> Result<Loop> {
-        for turn in 0.. {
-            let draw = || ChaCha8Rng::seed_from_u64(1000 * seed + turn);
+        let mut turn = 1000 * seed;
+        loop {
+            let draw = || ChaCha8Rng::seed_from_u64(turn);
             let plant = self.kind.plant(1.0, &mut draw())?;
             let nominal = self.kind.plant(between(&mut draw(), [0.93, 1.07]), &mut draw())?;
             let (m, p) = (plant.inputs(), plant.outputs());
             let weights = LqrWeights::on_outputs(&nominal, eye(p).as_ref(), (eye(m) * faer::Scale(3.0)).as_ref())?;
             let noise = NoiseCovariance::at_inputs(&nominal, eye(m).as_ref(), eye(p).as_ref())?;
             let (f, l) = (lqr(&nominal, &weights)?.f, kalman(&nominal, &noise)?.l);
-            let controller = RunningController::observer(&nominal, f.clone(), l.clone())?;
+            let controller = RunningController::observer(&nominal, f, l)?;
             let loop_ = closed_loop(&plant, &with_input_port(controller.system())?)?;
             if loop_.poles()?.iter().any(|pole| pole.norm() > SLOWEST) {
+                turn += 1;
                 continue;
             }
             let stated = match self.imperfection {
@@ -242,7 +217,6 @@ impl Family {
             };
             return Ok(Loop { plant, controller, stated, imperfection: self.imperfection, samples: self.samples });
         }
-        unreachable!("the turns do not end")
     }
 }
 

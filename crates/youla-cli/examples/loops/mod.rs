@@ -26,13 +26,17 @@ pub(crate) struct Loop {
 }
 
 /// Modal masses side by side: frequencies in Hz, damping ratios, gains of each mode p x m (row by row).
-fn modal(modes: &[(f64, f64, &[f64])], (outputs, inputs): (usize, usize), ts: f64) -> Result<StateSpace<Discrete>> {
+pub(crate) fn modal(
+    modes: &[(f64, f64, impl AsRef<[f64]>)],
+    (outputs, inputs): (usize, usize),
+    ts: f64,
+) -> Result<StateSpace<Discrete>> {
     let n = 2 * modes.len();
     let mut a = Mat::zeros(n, n);
     // Each mode has its own input direction (first row of its gains) and its own output direction (first column).
     let (mut b, mut c) = (Mat::zeros(n, inputs), Mat::zeros(outputs, n));
     for (k, (hz, zeta, gains)) in modes.iter().enumerate() {
-        let w = std::f64::consts::TAU * hz;
+        let (w, gains) = (std::f64::consts::TAU * hz, gains.as_ref());
         (a[(2 * k, 2 * k + 1)], a[(2 * k + 1, 2 * k)], a[(2 * k + 1, 2 * k + 1)]) = (w, -w, -2.0 * zeta * w);
         (0..inputs).for_each(|j| b[(2 * k + 1, j)] = w * gains[j]);
         (0..outputs).for_each(|i| c[(i, 2 * k)] = gains[inputs + i]);
@@ -41,7 +45,7 @@ fn modal(modes: &[(f64, f64, &[f64])], (outputs, inputs): (usize, usize), ts: f6
 }
 
 /// The same with a dead time of whole samples at its single input.
-fn delayed(plant: &StateSpace<Discrete>, samples: usize) -> Result<StateSpace<Discrete>> {
+pub(crate) fn delayed(plant: &StateSpace<Discrete>, samples: usize) -> Result<StateSpace<Discrete>> {
     let n = plant.order();
     let a = Mat::from_fn(n + samples, n + samples, |i, j| match (i < n, j < n) {
         (true, true) => plant.a()[(i, j)],

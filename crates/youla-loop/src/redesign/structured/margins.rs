@@ -113,23 +113,28 @@ fn nearest(from: c64, to: c64, end: f64) -> f64 {
     if share > 0.0 && share < 1.0 { (start + along * share).norm_sqr() } else { end }
 }
 
+/// Where the straight line between two points passes the real axis.
+fn on_real_axis(from: c64, to: c64) -> Option<f64> {
+    ((from.im < 0.0) != (to.im < 0.0)).then(|| (from.re * to.im - to.re * from.im) / (to.im - from.im))
+}
+
 /// Passages of the negative real axis between two points, counted as turns.
 fn half_turn(from: c64, to: c64) -> f64 {
-    if (from.im < 0.0) == (to.im < 0.0) || from.re * to.im - to.re * from.im == 0.0 {
-        return 0.0;
-    }
-    let real = (from.re * to.im - to.re * from.im) / (to.im - from.im);
-    match (real < 0.0, from.im < 0.0) {
-        (false, _) => 0.0,
-        (true, true) => -1.0,
-        (true, false) => 1.0,
+    match on_real_axis(from, to) {
+        Some(real) if real < 0.0 => {
+            if from.im < 0.0 {
+                -1.0
+            } else {
+                1.0
+            }
+        }
+        _ => 0.0,
     }
 }
 
 /// Gain, phase and delay at the crossings between two lines.
 fn crossings(found: &mut GridMargins, (from, to): (c64, c64), (low, high): (f64, f64)) {
-    if (from.im < 0.0) != (to.im < 0.0) {
-        let real = (from.re * to.im - to.re * from.im) / (to.im - from.im);
+    if let Some(real) = on_real_axis(from, to) {
         found.gain = found.gain.min(factor(real));
     }
     let (a, b) = (from.norm_sqr(), to.norm_sqr());

@@ -3,7 +3,7 @@
 use super::margins::{GridMargins, LIMITS, OnGrid};
 use super::options::PidOptions;
 use super::scenarios::{Grid, Scenario, Scenarios};
-use super::search::excess;
+use super::search::excesses;
 use crate::error::Result;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -77,9 +77,7 @@ pub(super) fn prove(
     limits: &PidOptions,
 ) -> Result<PidProof> {
     let (before, after) = (grid.any(running)?, grid.any(new)?);
-    let stable = fresh.stable(new)?;
-    let of = |(plant, stable): (&Scenario, &bool)| if *stable { excess(grid, plant, &after, limits) } else { None };
-    let excesses: Vec<Option<[f64; 5]>> = fresh.plants.par_iter().zip(&stable).map(of).collect();
+    let excesses = excesses(grid, fresh, (new, &after), limits)?;
     let models = excesses.len();
     let unstable = excesses.iter().filter(|e| e.is_none()).count();
     let beyond = |e: &&[f64; 5]| e.iter().any(|e| *e > TOLERANCE);

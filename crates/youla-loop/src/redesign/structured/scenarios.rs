@@ -161,15 +161,15 @@ impl Scenario {
         disturb: impl FnOnce(&mut [c64]),
     ) -> Option<Self> {
         let looped = closed_loop(&plant, &with_input_port(running).ok()?).ok()?;
+        if !looped.is_stable().ok()? {
+            return None;
+        }
         let mut response = frequency_response(&plant, &grid.omega).ok()?.entry(0, 0);
         let characteristic = |response: &[c64]| -> Vec<c64> {
             response.iter().enumerate().map(|(k, g)| c64::ONE / (c.denominator[k] + g * c.numerator[k])).collect()
         };
         let reference = characteristic(&response);
         disturb(&mut response);
-        if !looped.is_stable().ok()? {
-            return None;
-        }
         let found = Scenario { plant, response, reference, running: GridMargins::NONE };
         Some(Scenario { running: margins(grid, &found, c)?, ..found })
     }

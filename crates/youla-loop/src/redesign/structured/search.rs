@@ -13,7 +13,7 @@ use super::scenarios::{Grid, Scenario, Scenarios};
 use super::space::Space;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
-use youla::lti::Discrete;
+use youla::lti::{Discrete, StateSpace};
 
 /// Rounds of constraint generation. Chosen: on 60 loops the last was used in none that met its limits.
 const ROUNDS: usize = 8;
@@ -125,13 +125,8 @@ impl Search<'_> {
 
     /// The plants at which a limit is missed, the worst first, and what is missed in a sentence.
     fn missed(&self, controller: &PidController) -> Result<(Vec<usize>, String)> {
-        let on = self.grid.controller(controller);
-        let stable = self.drawn.stable(&controller.system(Discrete::new(self.grid.ts)?)?)?;
-        let of = |(plant, stable): (&Scenario, &bool)| match stable {
-            true => excess(self.grid, plant, &on, self.limits()),
-            false => None,
-        };
-        let excesses: Vec<Option<[f64; 5]>> = self.drawn.plants.par_iter().zip(&stable).map(of).collect();
+        let (on, system) = (self.grid.controller(controller), controller.system(Discrete::new(self.grid.ts)?)?);
+        let excesses = excesses(self.grid, self.drawn, (&system, &on), self.limits())?;
         let worst = |k: usize| excesses[k].map_or(f64::INFINITY, |e| e.into_iter().fold(f64::NEG_INFINITY, f64::max));
         let mut missed: Vec<usize> = (0..excesses.len()).filter(|k| worst(*k) > 0.0).collect();
         missed.sort_by(|a, b| worst(*b).total_cmp(&worst(*a)));
@@ -142,8 +137,20 @@ impl Search<'_> {
 /// Two starts nearer than this in every parameter, as a factor of e, are one. Chosen, not measured.
 const APART: f64 = 0.7;
 
-pub(super) fn excess(grid: &Grid, plant: &Scenario, on: &OnGrid, limits: &PidOptions) -> Option<[f64; 5]> {
+fn excess(grid: &Grid, plant: &Scenario, on: &OnGrid, limits: &PidOptions) -> Option<[f64; 5]> {
     Some(margins(grid, plant, on)?.excess(limits, plant.running.effort))
+}
+
+/// The excess of each limit at each plant; `None` where the loop is unstable, by its poles or by the winding number.
+pub(super) fn excesses(
+    grid: &Grid,
+    drawn: &Scenarios,
+    (k, on): (&StateSpace<Discrete>, &OnGrid),
+    limits: &PidOptions,
+) -> Result<Vec<Option<[f64; 5]>>> {
+    let stable = drawn.stable(k)?;
+    let of = |(plant, stable): (&Scenario, &bool)| if *stable { excess(grid, plant, on, limits) } else { None };
+    Ok(drawn.plants.par_iter().zip(&stable).map(of).collect())
 }
 
 /// What stops a controller: the limits that are missed, the one with the largest factor first, and instability. The nearest controller

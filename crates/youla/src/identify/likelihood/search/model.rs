@@ -103,11 +103,6 @@ impl Model {
         self.blocks.iter().flat_map(Block::poles).collect()
     }
 
-    /// Sum of the logarithms of the poles outside the unit circle, log |det A_u|.
-    pub(crate) fn unstable(&self) -> f64 {
-        self.poles().iter().map(|p| p.norm().ln().max(0.0)).sum()
-    }
-
     /// Draws blocks with poles outside of the unit circle inside, for a start.
     pub(crate) fn draw_inside(&mut self) {
         for block in &mut self.blocks {

@@ -6,4 +6,5 @@ mod identities;
 mod measured;
 mod paper;
 mod reduction;
+mod slow_modes;
 mod stages;

@@ -47,6 +47,12 @@ impl Choice {
         self.criterion < 0.5 * UNSTABLE
     }
 
+    /// The same, whether the feedback stabilises it or not.
+    pub(super) fn unasked(&self) -> Self {
+        let criterion = if self.stabilised() { self.criterion } else { self.criterion - UNSTABLE };
+        Choice { criterion, ..self.clone() }
+    }
+
     /// The criterion by which it counts beside the chosen model.
     pub(crate) fn as_rival(&self, samples: usize) -> f64 {
         self.criterion - credit_of_lags(&self.found.point.model, samples)
@@ -163,29 +169,36 @@ impl Problem<'_> {
         (rows().sum(), rows().min().unwrap_or(0))
     }
 
+    /// A choice of a walk that did not ask whether the feedback stabilises it, as one that did.
+    pub(super) fn asked(&self, choice: Choice) -> Choice {
+        Choice { criterion: choice.criterion + self.instability(&choice), ..choice }
+    }
+
     /// What is added to the criterion of a model that the feedback does not stabilise, so that any other comes before it.
+    fn instability(&self, choice: &Choice) -> f64 {
+        if self.unstable_poles(choice).is_empty() { 0.0 } else { UNSTABLE }
+    }
+
+    /// Poles of the loop outside of the unit circle, each with its distance to the nearest pole of the plant.
     ///
     /// A pole on the unit circle that the feedback does not move is a disturbance at one frequency, and is left to `lines`.
-    fn instability(&self, choice: &Choice) -> f64 {
-        let unstable = |k: &StateSpace<Discrete>| {
+    pub(super) fn unstable_poles(&self, choice: &Choice) -> Vec<(c64, f64)> {
+        let poles = |k: &StateSpace<Discrete>| {
             let plant = physical::plant(choice, &self.sizes, k.time()).ok()?;
-            let (own, of_loop) =
-                (plant.poles().ok()?, closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?);
-            let least = GROWTH / self.samples().0 as f64;
-            let stays = |z: &c64| z.norm().ln() <= least && own.iter().any(|p| (p - z).norm() <= least);
-            Some(of_loop.iter().any(|z| z.norm() >= 1.0 && !stays(z)))
+            let of_loop = closed_loop(&plant, &with_input_port(k).ok()?).ok()?.poles().ok()?;
+            Some((plant.poles().ok()?, of_loop))
         };
-        match self.feedback.and_then(unstable) {
-            Some(true) => UNSTABLE,
-            _ => 0.0,
-        }
+        let Some((own, of_loop)) = self.feedback.and_then(poles) else { return Vec::new() };
+        let least = GROWTH / self.samples().0 as f64;
+        let apart = |z: &c64| own.iter().map(|p| (p - z).norm()).fold(f64::INFINITY, f64::min);
+        let outside = of_loop.into_iter().filter(|z| z.norm() >= 1.0).map(|z| (z, apart(&z)));
+        outside.filter(|(z, apart)| z.norm().ln() > least || *apart > least).collect()
     }
 
     /// What a search found on so many samples.
     pub(crate) fn choice(&self, found: Found, samples: usize, delays: Vec<usize>, origin: String) -> Choice {
         let criterion = found.criterion(samples);
-        let choice = Choice { found, delays, criterion, origin };
-        Choice { criterion: criterion + self.instability(&choice), ..choice }
+        self.asked(Choice { found, delays, criterion, origin })
     }
 
     /// Of many tasks on long records those that reach the least criteria on groups of lines, with what they reach as start.
@@ -227,13 +240,13 @@ impl Problem<'_> {
 }
 
 impl Candidate {
-    fn of(choice: &Choice) -> Self {
+    pub(super) fn of(choice: &Choice) -> Self {
         Candidate {
             origin: choice.origin.clone(),
             dead_time: choice.delays.clone(),
             order: choice.order(),
             deviance: choice.found.deviance,
-            criterion: if choice.stabilised() { choice.criterion } else { choice.criterion - UNSTABLE },
+            criterion: choice.unasked().criterion,
             steps: choice.found.steps,
             stabilised: choice.stabilised(),
         }

@@ -17,6 +17,9 @@ use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, Side, c64};
 
+/// Unit of a band over that at the frequency in question, below which the band says nothing: half an octave of a double integrator.
+const LEAST_UNIT: f64 = 0.5;
+
 /// One record: lines of the inputs, of what the model leaves, and of the excitation.
 pub(crate) struct RecordLines<'a> {
     /// Lines x m.
@@ -135,6 +138,19 @@ impl LocalErrors {
         });
         Excess { bands: bands.collect(), least: LOCAL_CHANCE }
     }
+
+    /// Squares of the difference of the errors of two records beyond their variances: of the model of one and another record, twice the
+    /// scatter between records.
+    pub(crate) fn difference([one, other]: [&LocalErrors; 2]) -> Excess {
+        let of = |(a, b): (&Option<Band>, &Option<Band>)| {
+            let (a, b) = (a.as_ref()?, b.as_ref()?);
+            let chance: Vec<f64> = a.variance.iter().zip(&b.variance).map(|(a, b)| a + b).collect();
+            let apart = a.error.iter().zip(&b.error).map(|(a, b)| (a - b).norm_sqr());
+            let squares = apart.zip(&chance).map(|(square, chance)| square - chance).collect();
+            Some(ExcessBand { share: a.share, squares, chance, freedom: 1.0 })
+        };
+        Excess { bands: one.bands.iter().zip(&other.bands).filter_map(of).collect(), least: LOCAL_CHANCE }
+    }
 }
 
 /// `sum w |E_k - mean|^2` less its mean by chance over that of a unit scatter, and this mean by chance over it.
@@ -163,24 +179,21 @@ impl Excess {
 
     /// Mean square of each of `entries` near a frequency beyond chance, by how many standard deviations of a normal variable the largest
     /// exceeds it.
-    ///
-    /// The bands count with the inverse variances `w = freedom / chance^2` of their mean squares. By chance the sum of these is nearly
-    /// chi-square with `2 (sum w chance)^2 / sum w` degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110).
     pub(crate) fn near(&self, share: f64, entries: usize) -> (Vec<f64>, f64) {
-        let near = self.window(share);
-        let (mut out, mut largest) = (vec![0.0; entries], 0.0_f64);
-        for (i, value) in out.iter_mut().enumerate().filter(|_| !near.is_empty()) {
-            let (mut excess, mut chance, mut weights) = (0.0, 0.0, 0.0);
-            for band in near {
-                let weight = band.freedom / (band.chance[i] * band.chance[i]).max(TINY);
-                excess += weight * band.squares[i];
-                chance += weight * band.chance[i].max(TINY);
-                weights += weight;
-            }
-            let degrees = 2.0 * chance * chance / weights;
-            let deviations = chi_square_deviations(degrees * (1.0 + excess / chance), degrees);
+        self.near_in_units(share, &|_| vec![1.0; entries])
+    }
+
+    /// The same where the errors are alike in other units from band to band: `squares` gives the square of the unit of each entry. Of few wide
+    /// bands around a low frequency a response falls by decades, and its errors with it. Bands in which the unit is less than half are left
+    /// out.
+    pub(crate) fn near_in_units(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> (Vec<f64>, f64) {
+        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).iter().map(|b| (b, squares(b.share))).collect();
+        let (mut out, mut largest) = (squares(share), 0.0_f64);
+        for (i, value) in out.iter_mut().enumerate() {
+            let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * *value);
+            let (excess, deviations) = beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY))));
             largest = largest.max(deviations);
-            *value = if deviations > self.least { (excess / weights).max(0.0) } else { 0.0 };
+            *value *= if deviations > self.least { excess.max(0.0) } else { 0.0 };
         }
         (out, largest)
     }
@@ -196,6 +209,27 @@ impl Excess {
         }
         &self.bands[first..end]
     }
+}
+
+/// Mean square of an entry over some bands less its mean by chance, with the squares of their units, and by how many standard deviations of a
+/// normal variable the mean square exceeds chance.
+///
+/// The bands count with the inverse variances `w = freedom / chance^2` of their mean squares. By chance the sum of these is nearly
+/// chi-square with `2 (sum w chance)^2 / sum w` degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110).
+fn beyond_chance<'a>(bands: impl Iterator<Item = (&'a ExcessBand, usize, f64)>) -> (f64, f64) {
+    let (mut excess, mut chance, mut weights) = (0.0, 0.0, 0.0);
+    for (band, entry, unit) in bands {
+        let by_chance = band.chance[entry] / unit;
+        let weight = band.freedom / (by_chance * by_chance).max(TINY);
+        excess += weight * band.squares[entry] / unit;
+        chance += weight * by_chance.max(TINY);
+        weights += weight;
+    }
+    if weights == 0.0 {
+        return (0.0, 0.0);
+    }
+    let degrees = 2.0 * chance * chance / weights;
+    (excess / weights, chi_square_deviations(degrees * (1.0 + excess / chance), degrees))
 }
 
 /// Sums of products over the lines of a band.
@@ -337,5 +371,23 @@ mod tests {
             let beyond = (0..100_000).filter(|_| drawn(rng).near(0.102, 1).0[0] > 0.0).count();
             assert!((70..=270).contains(&beyond), "{beyond} of 100000 with chances {means:?}");
         }
+    }
+
+    /// Errors of 30 % of a response that falls by 12 dB per octave are 30 % at each frequency in its units; as they are, the bands of least chance
+    /// above speak for the low ones.
+    #[test]
+    fn an_error_that_follows_the_response_is_found_in_its_units() {
+        let response = |share: f64| vec![(0.01 / share).powi(4)];
+        let band = |k: usize| {
+            let share = 0.005 + 0.01 * k as f64;
+            let power = response(share)[0];
+            ExcessBand { share, squares: vec![0.09 * power], chance: vec![1e-4 * power], freedom: 1.0 }
+        };
+        let excess = Excess { bands: (0..50).map(band).collect(), least: 4.0 };
+        for share in [0.006, 0.02, 0.1] {
+            let power = response(share)[0];
+            assert!((excess.near_in_units(share, &response).0[0] / (0.09 * power) - 1.0).abs() < 1e-12);
+        }
+        assert!(excess.near(0.006, 1).0[0] < 0.01 * 0.09 * response(0.006)[0]);
     }
 }

@@ -4,7 +4,7 @@ use crate::control::{RunningController, closed_loop, with_input_port};
 use crate::identify::likelihood::{Evidence, LikelihoodOptions, Outcome};
 use crate::identify::{Identified, identify};
 use crate::linalg::block;
-use crate::lti::{Continuous, Discrete, StateSpace, simulate};
+use crate::lti::{Continuous, Discrete, StateSpace, frequency_response, simulate};
 use crate::signal::LoopRecord;
 use crate::{Mat, MatRef};
 use rand::{RngExt, SeedableRng};
@@ -118,6 +118,22 @@ fn a_machine_that_changes_is_not_repeatable() {
     let region = &found.model.region;
     let k = region.hz.partition_point(|hz| *hz < 3.0);
     assert!(region.parts.variation[k][(0, 0)] > 0.25, "{}", region.parts.variation[k][(0, 0)]);
+}
+
+#[test]
+fn a_fresh_record_of_another_gain_widens_the_region_by_the_difference() {
+    let with_fresh = |second_gain: f64| {
+        let fresh = Planted { second_gain, ..CLEAN }.record(2);
+        let running = RunningController::new(controller(1.0));
+        let found = identify(&[CLEAN.record(1)], &[fresh], &running, None, &LikelihoodOptions::default()).unwrap();
+        let region = found.model.region;
+        let k = region.hz.partition_point(|hz| *hz < 10.0);
+        let g = frequency_response(&found.model.plant, &[std::f64::consts::TAU * region.hz[k]]).unwrap();
+        region.parts.variation[k][(0, 0)] / g.at(0)[(0, 0)].norm()
+    };
+    // The gain of half of the fresh record is 20 % higher: of the whole record by 10 %.
+    let (changed, same) = (with_fresh(1.2), with_fresh(1.0));
+    assert!((0.07..0.14).contains(&changed) && same < 0.02, "{changed} and {same}");
 }
 
 #[test]

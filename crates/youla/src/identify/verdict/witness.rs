@@ -7,7 +7,7 @@ use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};
 use crate::identify::likelihood::search::with_best_ends;
 use crate::identify::subspace::Experiment;
-use faer::{MatRef, c64};
+use faer::{Mat, MatRef, c64};
 
 /// Records that are a group each, at most; more are joined.
 const MOST_GROUPS: usize = 6;
@@ -29,6 +29,8 @@ pub(crate) struct Witness {
     pub(crate) distortion: Excess,
     /// Mean squares of the differences between groups of records beyond chance.
     pub(crate) variation: Excess,
+    /// The same of the estimation records and the fresh ones, which differ by as much as the model and a record that is not there.
+    pub(crate) renewed: Excess,
     /// Inputs of the estimation records as far as the excitation explains them, lines x m.
     excited: Vec<Vec<c64>>,
 }
@@ -69,9 +71,11 @@ impl Witness {
         [estimation, fresh]: [&[LoopSignals<'_>]; 2],
         verification: &[Experiment<'_>],
     ) -> Option<Self> {
-        let of_records = pairs(problem.experiments, estimation)?;
-        let of_fresh = pairs(verification, fresh).unwrap_or_default();
-        if of_records.iter().all(|(_, x)| x.norm_l2() == 0.0) {
+        let moving = moving(estimation, fresh);
+        let [estimating, verifying] = [estimation, fresh].map(|signals| moving_columns(signals, &moving));
+        let of_records = pairs(problem.experiments, estimating.as_ref()?)?;
+        let of_fresh = verifying.as_ref().and_then(|columns| pairs(verification, columns)).unwrap_or_default();
+        if moving.is_empty() {
             return None;
         }
         let group = |records: &[Pair<'_>]| Group::new(problem, solution, records);
@@ -83,15 +87,19 @@ impl Witness {
         let parameters = solution.chosen.found.parameters;
         let whole = LocalErrors::new(&all, channels, band_count(lines(&all), channels), parameters);
         let mut groups: Vec<Group> = split(&of_records, problem.skip).iter().filter_map(|g| group(g)).collect();
+        let renewed = second.is_some();
         groups.extend(second);
         let of_group = |g: &Group| g.lines().map(|r| r.v.len() / channels.p).sum::<usize>();
         let shortest = groups.iter().map(of_group).min().unwrap_or(0);
         let count = band_count(shortest, channels);
-        let errors: Vec<LocalErrors> =
-            groups.iter().map(|g| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0)).collect();
+        let of = |g: &Group| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0);
+        let errors: Vec<LocalErrors> = groups.iter().map(of).collect();
+        let fresh = errors.last().filter(|_| renewed);
+        let renewed = fresh.map(|fresh| LocalErrors::difference([&of(&first), fresh])).unwrap_or_default();
         let plain: Vec<RecordLines<'_>> = first.plain.iter().map(|[u, v, x]| RecordLines { u, v, x }).collect();
         let excited = explained_inputs(&plain, channels);
-        Some(Witness { distortion: whole.excess(), variation: LocalErrors::scatter(&errors), whole, excited })
+        let variation = LocalErrors::scatter(&errors);
+        Some(Witness { distortion: whole.excess(), variation, renewed, whole, excited })
     }
 }
 
@@ -107,9 +115,24 @@ impl Witness {
     }
 }
 
-/// Records with their excitation, where it is known of all.
-fn pairs<'a>(experiments: &[Experiment<'a>], signals: &[LoopSignals<'a>]) -> Option<Vec<Pair<'a>>> {
-    experiments.iter().zip(signals).map(|(e, s)| Some((*e, s.excitation?))).collect()
+/// The channels of the excitation that are not constant in every record: others only take lines from the bands.
+fn moving(estimation: &[LoopSignals<'_>], fresh: &[LoopSignals<'_>]) -> Vec<usize> {
+    let known: Vec<MatRef<'_, f64>> = estimation.iter().chain(fresh).filter_map(|s| s.excitation).collect();
+    let channels = known.iter().map(|x| x.ncols()).min().unwrap_or(0);
+    let moves = |x: &MatRef<'_, f64>, c: usize| x.col(c).iter().any(|v| *v != x[(0, c)]);
+    (0..channels).filter(|c| known.iter().any(|x| moves(x, *c))).collect()
+}
+
+/// These channels of each record; `None` where the excitation of one is not known.
+fn moving_columns(signals: &[LoopSignals<'_>], moving: &[usize]) -> Option<Vec<Mat<f64>>> {
+    let of = |x: MatRef<'_, f64>| Mat::from_fn(x.nrows(), moving.len(), |t, c| x[(t, moving[c])]);
+    signals.iter().map(|s| s.excitation.map(of)).collect()
+}
+
+/// Records with their excitation.
+fn pairs<'a>(experiments: &[Experiment<'a>], excitation: &'a [Mat<f64>]) -> Option<Vec<Pair<'a>>> {
+    (experiments.len() == excitation.len())
+        .then(|| experiments.iter().zip(excitation).map(|(e, x)| (*e, x.as_ref())).collect())
 }
 
 /// The halves of a single record; of several each record, of many several together.

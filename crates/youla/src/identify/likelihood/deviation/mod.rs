@@ -80,8 +80,8 @@ pub(crate) struct Directions {
     rivals: Vec<(Model, Vec<usize>, f64)>,
     /// Variance of the parameters by their scatter over pieces of the records, in units of that of the noise; it is in `root`.
     scatter: f64,
-    /// The errors that the excitation shows: differences between records, and distortion.
-    seen: Option<[Excess; 2]>,
+    /// The errors that the excitation shows: distortion, differences between groups of records, and between records and fresh ones.
+    seen: Option<[Excess; 3]>,
     /// What acts at an input and is no linear function of it.
     nonlinear_part: Option<NonlinearPart>,
 }
@@ -116,7 +116,7 @@ impl Directions {
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);
-        let seen = witness.map(|w| [w.variation, w.distortion]);
+        let seen = witness.map(|w| [w.distortion, w.variation, w.renewed]);
         Directions { seen, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
     }
 
@@ -211,9 +211,15 @@ impl Directions {
         let seen = self.root.seen(&slopes);
         let parameters = Mat::from_fn(entries, seen.ncols(), |i, k| seen[(i, k)] * phases[i % m]);
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
-        let seen =
-            |k: usize| self.seen.as_ref().map_or_else(|| vec![0.0; entries], |seen| seen[k].near(share, entries).0);
-        let (mut variation, mut distortion) = (seen(0), seen(1));
+        // Alike from band to band as they are, or relative to the response, which falls by decades at low frequencies and turns at a resonance.
+        let powers = |share: f64| delayed(&self.model, &self.delays, share).iter().map(|g| g.norm_sqr()).collect();
+        let seen = |k: usize| -> Vec<f64> {
+            let Some(seen) = &self.seen else { return vec![0.0; entries] };
+            let (plain, relative) = (seen[k].near(share, entries).0, seen[k].near_in_units(share, &powers).0);
+            plain.into_iter().zip(relative).map(|(a, b)| a.max(b)).collect()
+        };
+        let (mut distortion, variation, renewed) = (seen(0), seen(1), seen(2));
+        let mut variation: Vec<f64> = variation.into_iter().zip(renewed).map(|(a, b)| a.max(b)).collect();
         // What moved parameters explain of the differences between records is not counted twice.
         for (i, variation) in variation.iter_mut().enumerate() {
             let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();

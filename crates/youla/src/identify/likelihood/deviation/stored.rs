@@ -30,7 +30,7 @@ pub(super) struct StoredRegion {
     root: StoredMatrix,
     rivals: Vec<(Model, Vec<usize>, f64)>,
     scatter: f64,
-    seen: Option<[Excess; 2]>,
+    seen: Option<[Excess; 3]>,
     nonlinear_part: Option<NonlinearPart>,
 }
 

@@ -27,6 +27,8 @@ const NOISE_RATIO: f64 = 3.0;
 
 struct Score {
     trusted: bool,
+    /// Whether `min over w of sigma_min(I - G K)` of the truth is at least half of that of the model.
+    half_of_margin: bool,
     error: f64,
     in_loop: f64,
     /// Root mean square of the error over the deviation that the noise leaves, and over the total one.
@@ -45,11 +47,16 @@ fn score(system: &Loop, found: &Recommendation) -> Result<Score> {
     let of = |s| frequency_response(s, &omega);
     let (truth, model, k) = (of(&system.plant)?, of(&found.plant)?, of(system.controller.system())?);
     let (mut errors, mut in_loop, mut sums, mut count) = (Vec::new(), 0.0f64, [0.0; 2], 0.0);
+    let mut margins = [f64::INFINITY; 2];
     for w in 0..omega.len() {
         let (g, k) = (truth.at(w), k.at(w));
         let dg = model.at(w) - g;
         errors.push(dg.norm_l2() / g.norm_l2());
-        let closed = Mat::<c64>::identity(g.nrows(), g.nrows()) - g * k;
+        let one = Mat::<c64>::identity(g.nrows(), g.nrows());
+        let [closed, of_model] = [g, model.at(w)].map(|g| &one - g * k);
+        for (margin, at) in margins.iter_mut().zip([&closed, &of_model]) {
+            *margin = at.singular_values().unwrap().into_iter().fold(*margin, f64::min);
+        }
         let complementary = &dg * k * closed.partial_piv_lu().inverse();
         let largest = complementary.singular_values().unwrap();
         in_loop = largest.into_iter().fold(in_loop, f64::max);
@@ -61,7 +68,9 @@ fn score(system: &Loop, found: &Recommendation) -> Result<Score> {
         }
     }
     let ratios = sums.map(|sum| (sum / count).sqrt());
-    Ok(Score { trusted: found.trusted(), error: median(errors), in_loop, ratios, reasons: found.reasons() })
+    let half_of_margin = margins[0] >= 0.5 * margins[1];
+    let (trusted, reasons) = (found.trusted(), found.reasons());
+    Ok(Score { trusted, half_of_margin, error: median(errors), in_loop, ratios, reasons })
 }
 
 fn median(mut values: Vec<f64>) -> f64 {
@@ -85,9 +94,9 @@ fn main() -> Result<()> {
     let number = |k: usize, default: u64| given.get(k).map_or(default, |v| v.parse().expect("a number"));
     let (loops, first) = (number(0, 10), number(1, 1));
     println!(
-        "| family | good, trusted | good, not trusted | wrong, trusted | wrong, not trusted | refused | error, median | over noise | z |"
+        "| family | good, trusted | good, not trusted | wrong, trusted | wrong, not trusted | refused | error, median | over noise | z | less than half of the margin |"
     );
-    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|");
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
     for family in FAMILIES.iter().filter(|f| given.get(2).is_none_or(|name| f.name == name)) {
         let all: Vec<_> =
             (first..first + loops).into_par_iter().map(|seed| solved(family, seed)).collect::<Result<Vec<_>>>()?;
@@ -97,7 +106,7 @@ fn main() -> Result<()> {
         };
         let of = |pick: fn(&Score) -> f64| median(known.iter().map(|s| pick(s)).collect());
         println!(
-            "| {} | {} | {} | {} | {} | {} | {:.4} | {:.2} | {:.2} |",
+            "| {} | {} | {} | {} | {} | {} | {:.4} | {:.2} | {:.2} | {} |",
             family.name,
             count(true, true),
             count(true, false),
@@ -107,6 +116,7 @@ fn main() -> Result<()> {
             of(|s| s.error),
             of(|s| s.ratios[0]),
             of(|s| s.ratios[1]),
+            known.iter().filter(|s| s.trusted && !s.half_of_margin).count(),
         );
         all.iter().zip(first..).for_each(|(s, seed)| match s {
             Err(reason) => eprintln!("{} {seed}: {reason}", family.name),

@@ -211,15 +211,16 @@ impl Directions {
         let seen = self.root.seen(&slopes);
         let parameters = Mat::from_fn(entries, seen.ncols(), |i, k| seen[(i, k)] * phases[i % m]);
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
-        // Alike from band to band as they are, or relative to the response, which falls by decades at low frequencies and turns at a resonance.
+        let near = |k: usize| self.seen.as_ref().map(|seen| (&seen[k], seen[k].near(share, entries).0));
+        let mut distortion = near(0).map_or_else(|| vec![0.0; entries], |(_, squares)| squares);
+        // Differences between records are alike from band to band as they are, or relative to the response, which falls by decades at low
+        // frequencies and turns at a resonance.
         let powers = |share: f64| delayed(&self.model, &self.delays, share).iter().map(|g| g.norm_sqr()).collect();
-        let seen = |k: usize| -> Vec<f64> {
-            let Some(seen) = &self.seen else { return vec![0.0; entries] };
-            let (plain, relative) = (seen[k].near(share, entries).0, seen[k].near_in_units(share, &powers).0);
-            plain.into_iter().zip(relative).map(|(a, b)| a.max(b)).collect()
-        };
-        let (mut distortion, variation, renewed) = (seen(0), seen(1), seen(2));
-        let mut variation: Vec<f64> = variation.into_iter().zip(renewed).map(|(a, b)| a.max(b)).collect();
+        let mut variation = vec![0.0_f64; entries];
+        for (excess, plain) in [1, 2].into_iter().filter_map(near) {
+            let relative = excess.near_in_units(share, &powers).0;
+            variation.iter_mut().zip(plain.iter().zip(&relative)).for_each(|(v, (a, b))| *v = v.max(*a).max(*b));
+        }
         // What moved parameters explain of the differences between records is not counted twice.
         for (i, variation) in variation.iter_mut().enumerate() {
             let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();

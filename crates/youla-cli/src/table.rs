@@ -5,7 +5,7 @@ use std::fmt::Write;
 use youla::error::short;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
-use youla_run::{Identification, WrittenRun, cautions};
+use youla_run::{Identification, ModelValidation, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
 pub(crate) fn results(found: &Identification, written: &WrittenRun) -> String {
@@ -56,7 +56,7 @@ pub(crate) fn paper(paper: &Paper, written: &WrittenPaper) -> String {
 fn rows(found: &Identification) -> Vec<Vec<String>> {
     let models = &found.validation.models;
     let row = |label: &str, cells: Vec<String>| [vec![label.to_owned()], cells].concat();
-    let corner = if found.records.verification.is_empty() { "model" } else { "fit (26), percent" };
+    let corner = if found.records.verification.is_empty() { "model" } else { "fit on fresh data, percent" };
     let mut rows = vec![row(corner, models.iter().map(|v| v.method.label().into()).collect())];
     for (k, record) in found.records.verification.iter().enumerate() {
         for (i, output) in found.records.outputs.iter().enumerate() {
@@ -71,7 +71,16 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
         }
     }
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
-    rows.push(row("order", models.iter().map(|v| v.model.order().to_string()).collect()));
+    // The states of dead time apart from the others.
+    let dead_time = found.recommended.as_ref().map_or(0, |model| model.dead_time.iter().sum());
+    let order = |v: &ModelValidation| match v.model.order() {
+        n if v.method == youla_run::Method::Likelihood && dead_time > 0 => {
+            format!("{} + {dead_time}", n.saturating_sub(dead_time))
+        }
+        n => n.to_string(),
+    };
+    let label = if dead_time > 0 { "order + dead time" } else { "order" };
+    rows.push(row(label, models.iter().map(order).collect()));
     rows.push(row("stable", models.iter().map(|v| yes(v.poles.iter().all(|p| p.norm() < 1.0))).collect()));
     rows.push(row("stabilised by K", models.iter().map(|v| yes(v.certificate.stable)).collect()));
     rows

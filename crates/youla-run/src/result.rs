@@ -86,7 +86,11 @@ impl Identification {
     pub fn refusals(&self) -> Vec<Refusal<'_>> {
         [
             refusal("recommended", "recommended model", Some(&self.recommended)),
-            refusal("factors", "coprime factorisation, and so no Hansen scheme", Some(&self.filtered)),
+            refusal(
+                "factors",
+                "coprime factorisation, and so no Hansen scheme (the recommended model needs neither)",
+                Some(&self.filtered),
+            ),
             refusal(Method::Hansen.key(), "model by the Hansen scheme", self.hansen.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
             refusal(Method::HansenReduced.key(), "reduced model", self.reduction.as_ref()),

@@ -24,7 +24,8 @@ pub(super) fn finding(lines: &[SpectralLine], record: &str, channel: &Channel) -
     let more = if lines.len() > LISTED { ", ..." } else { "" };
     let plural = if lines.len() == 1 { "a line" } else { "lines" };
     let what = format!("it has {plural} that the excitation does not contain: {}{more}", listed.join(", "));
-    let advice = "Declare the frequencies, or a tachometer, in [data.disturbance]; an undeclared line takes two states of the model";
+    let advice = "The recommended model takes such lines out by itself. [hansen] and [direct] do not: declare the frequencies, or a \
+                  tachometer, in [data.disturbance], as an undeclared line takes two states of their models";
     Some(
         Finding::new(
             Test::Lines,

@@ -21,9 +21,9 @@ fn sentence(certificate: &RunCertificate) -> String {
     };
     // The interval is of one figure, the region of all parameters at once: it reaches further.
     format!(
-        "The controller {stabilises} models drawn from the {level:.0} % confidence region of the plant; the largest pole among them has \
-         |z| = {:.5}. The plant itself has {:.5}, with a {level:.0} % interval of {low:.5} to {high:.5} for this figure alone; the region \
-         holds all parameters at once and is wider.",
+        "The controller {stabilises} models drawn from the {level:.0} % confidence region of the plant; the largest pole of their loops has \
+         |z| = {:.5}. The loop of the model itself has {:.5}, with a {level:.0} % interval of {low:.5} to {high:.5} for this figure alone; \
+         the region holds all parameters at once and is wider.",
         band.worst_within, band.radius.value
     )
 }

@@ -9,13 +9,16 @@ use crate::summary::Summary;
 use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{SubspaceModel, amplitudes};
 use youla::signal::LoopRecord;
-use youla_report::data::{Note, ReportPart, Status};
+use youla_report::data::{Note, ReportPart, Status, Verdict};
 
-/// All warnings of a run as sentences, for the terminal. Those of the check of the data come first.
+/// All warnings of a run as sentences, for the terminal, beside the verdict of the recommended model and its reasons. Those of the check of the
+/// data come first.
 pub fn cautions(found: &Identification, summary: &Summary) -> Vec<String> {
     let weigh = |status: Status, text: String| matches!(status, Status::Caution | Status::Bad).then_some(text);
     // The line on the data counts its findings; here each has its own sentence.
-    let trust = verdict_lines(found, summary).into_iter().filter(|line| line.evidence != ReportPart::Data);
+    let said = |line: &Verdict| line.evidence == ReportPart::Recommended && line.status == Status::Bad;
+    let trust =
+        verdict_lines(found, summary).into_iter().filter(|line| line.evidence != ReportPart::Data && !said(line));
     let lines = trust.chain(further_lines(found, summary)).map(|v| weigh(v.status, v.text));
     let rest = lines.chain(notes(found, summary).into_iter().map(|n| weigh(n.status, n.text))).flatten();
     found.data.sentences().into_iter().chain(rest).collect()

@@ -80,6 +80,10 @@ fn fit_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         }
     }
     text.push('.');
+    let taken = |e: &Evidence| e.question.contains("(lines)");
+    if found.recommended.as_ref().is_ok_and(|model| model.evidence.iter().any(taken)) {
+        text += " The measured outputs hold the lines that no model here predicts.";
+    }
     // A fit says how much of the output is not noise; a high one is no evidence of a right model.
     let worse = !fit.is_finite() || nominal > fit;
     Some(Verdict { status: if worse { Status::Bad } else { Status::Info }, text, evidence: ReportPart::Fits })

@@ -46,7 +46,7 @@ impl Recommendation {
         let required = self.evidence.iter().filter(|e| e.required).count();
         let first = match (failed, &self.loop_ratio) {
             (0, Some(r)) => format!(
-                "Trusted for this loop: {:.0} % of the margin is left at {} Hz",
+                "Trusted for this loop: the uncertainty of the model leaves {:.0} % of the margin at {} Hz",
                 100.0 * (1.0 - r.largest),
                 figure(r.largest_hz)
             ),
@@ -57,6 +57,10 @@ impl Recommendation {
             self.bands.iter().map(|[low, high]| format!("{} to {} Hz", figure(*low), figure(*high))).collect();
         match bands.len() {
             0 => format!("{first}. No band is valid to 10 %."),
+            _ if failed > 0 => format!(
+                "{first}. If the reasons do not concern it, its response is within 10 % from {}.",
+                bands.join(", ")
+            ),
             _ => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
         }
     }
@@ -188,7 +192,11 @@ impl std::fmt::Display for Evidence {
         if self.outcome == Outcome::NotTested {
             return write!(f, "{}: not tested, {}", self.question, self.note);
         }
-        write!(f, "{} {} (limit {})", self.question, figure(self.figure), self.limit)?;
+        // A figure that rounds to its limit and is not the limit has more digits.
+        let rounded = figure(self.figure);
+        let alike = rounded.parse() == Ok(self.limit) && self.figure != self.limit;
+        let value = if alike { format!("{:.6}", self.figure) } else { rounded };
+        write!(f, "{} {value} (limit {})", self.question, self.limit)?;
         if let Some([low, high]) = self.hz {
             match low == high {
                 true => write!(f, " at {} Hz", figure(low))?,
@@ -204,6 +212,7 @@ impl std::fmt::Display for Evidence {
 pub fn figure(value: f64) -> String {
     match value.abs() {
         v if !v.is_finite() => "not finite".into(),
+        v if v < 1e5 && v.fract() == 0.0 => format!("{value:.0}"),
         v if v >= 1e5 || v > 0.0 && v < 1e-4 => format!("{value:.1e}"),
         v if v > 0.0 && v < 1e-2 => format!("{value:.5}"),
         v if v >= 100.0 => format!("{value:.0}"),

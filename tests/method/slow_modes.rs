@@ -6,8 +6,8 @@ mod families;
 use families::FAMILIES;
 use youla::identify::likelihood::LikelihoodOptions;
 
-/// Five modes at a fiftieth of the rate, under LQG: the fourth mode alone bends another one across the circle, so that the loop with the stated
-/// controller is unstable, and the fifth brings it back. Without the way through unstable loops three or four of the modes were found.
+/// Five modes at a fiftieth of the rate, under LQG: with the fourth mode alone the loop with the stated controller is unstable, and with the fifth it is
+/// stable again. Without the way through unstable loops three or four of the modes were found.
 #[test]
 fn a_mode_that_only_an_unstable_loop_leads_to_is_found() {
     let slow =

@@ -73,11 +73,11 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     let yes = |b: bool| if b { "yes" } else { "no" }.to_owned();
     // The states of dead time apart from the others.
     let dead_time = found.recommended.as_ref().map_or(0, |model| model.dead_time.iter().sum());
-    let order = |v: &ModelValidation| match v.model.order() {
-        n if v.method == youla_run::Method::Likelihood && dead_time > 0 => {
-            format!("{} + {dead_time}", n.saturating_sub(dead_time))
+    let order = |v: &ModelValidation| match &found.recommended {
+        Ok(model) if v.method == youla_run::Method::Likelihood && dead_time > 0 => {
+            format!("{} + {dead_time}", model.order)
         }
-        n => n.to_string(),
+        _ => v.model.order().to_string(),
     };
     let label = if dead_time > 0 { "order + dead time" } else { "order" };
     rows.push(row(label, models.iter().map(order).collect()));

@@ -80,7 +80,11 @@ fn a_clean_loop_passes_every_test() {
     assert!(found.model.evidence.iter().all(|e| e.outcome == Outcome::Passed), "{:?}", found.model.evidence);
     let r = found.model.loop_ratio.as_ref().unwrap();
     assert!(r.largest < 0.1 && r.ratio.iter().all(|ratio| *ratio <= r.largest), "{}", r.largest);
-    assert!(found.model.sentence().contains("leaves 9"), "{}", found.model.sentence());
+    assert!(
+        found.model.sentence().starts_with("Trusted for this loop: the uncertainty of the model leaves 9"),
+        "{}",
+        found.model.sentence()
+    );
     // The squares of the parts sum to that of the whole.
     let region = &found.model.region;
     for k in 0..region.hz.len() {
@@ -161,7 +165,7 @@ fn mains_are_taken_out_and_are_no_mode_of_the_plant() {
         assert!(found.trusted(), "{hz}: {:?}", found.reasons());
         let note = &outcome(&found, "(lines)").note;
         let mut taken = note.split_whitespace().filter_map(|word| word.parse::<f64>().ok());
-        assert!(taken.any(|taken| (taken - hz).abs() < 0.02), "{hz}: {note}");
+        assert!(taken.any(|taken| (taken - hz).abs() < 0.01), "{hz}: {note}");
         let modes: Vec<f64> = found.model.modes.iter().map(|m| m.mode.hz).collect();
         assert!(found.model.order == 3 && modes.iter().all(|hz| !(49.0..51.0).contains(hz)), "{modes:?}");
     }

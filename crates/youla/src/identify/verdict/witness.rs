@@ -30,7 +30,7 @@ pub(crate) struct Witness {
     /// Mean squares of the differences between groups of records beyond chance.
     pub(crate) variation: Excess,
     /// The same of the estimation records and the fresh ones, which differ by as much as the model and a record that is not there.
-    pub(crate) renewed: Excess,
+    pub(crate) against_fresh: Excess,
     /// Inputs of the estimation records as far as the excitation explains them, lines x m.
     excited: Vec<Vec<c64>>,
 }
@@ -87,19 +87,19 @@ impl Witness {
         let parameters = solution.chosen.found.parameters;
         let whole = LocalErrors::new(&all, channels, band_count(lines(&all), channels), parameters);
         let mut groups: Vec<Group> = split(&of_records, problem.skip).iter().filter_map(|g| group(g)).collect();
-        let renewed = second.is_some();
+        let has_fresh = second.is_some();
         groups.extend(second);
         let of_group = |g: &Group| g.lines().map(|r| r.v.len() / channels.p).sum::<usize>();
         let shortest = groups.iter().map(of_group).min().unwrap_or(0);
         let count = band_count(shortest, channels);
         let of = |g: &Group| LocalErrors::new(&g.lines().collect::<Vec<_>>(), channels, count, 0);
         let errors: Vec<LocalErrors> = groups.iter().map(of).collect();
-        let fresh = errors.last().filter(|_| renewed);
-        let renewed = fresh.map(|fresh| LocalErrors::difference([&of(&first), fresh])).unwrap_or_default();
+        let fresh = errors.last().filter(|_| has_fresh);
+        let against_fresh = fresh.map(|fresh| LocalErrors::difference([&of(&first), fresh])).unwrap_or_default();
         let plain: Vec<RecordLines<'_>> = first.plain.iter().map(|[u, v, x]| RecordLines { u, v, x }).collect();
         let excited = explained_inputs(&plain, channels);
         let variation = LocalErrors::scatter(&errors);
-        Some(Witness { distortion: whole.excess(), variation, renewed, whole, excited })
+        Some(Witness { distortion: whole.excess(), variation, against_fresh, whole, excited })
     }
 }
 

@@ -47,8 +47,8 @@ impl Choice {
         self.criterion < 0.5 * UNSTABLE
     }
 
-    /// The same, whether the feedback stabilises it or not.
-    pub(super) fn unasked(&self) -> Self {
+    /// The same with Schwarz's criterion alone, whether the feedback stabilises it or not.
+    pub(super) fn without_penalty(&self) -> Self {
         let criterion = if self.stabilised() { self.criterion } else { self.criterion - UNSTABLE };
         Choice { criterion, ..self.clone() }
     }
@@ -169,8 +169,8 @@ impl Problem<'_> {
         (rows().sum(), rows().min().unwrap_or(0))
     }
 
-    /// A choice of a walk that did not ask whether the feedback stabilises it, as one that did.
-    pub(super) fn asked(&self, choice: Choice) -> Choice {
+    /// A choice with Schwarz's criterion, and the penalty where the feedback does not stabilise it.
+    pub(super) fn with_penalty(&self, choice: Choice) -> Choice {
         Choice { criterion: choice.criterion + self.instability(&choice), ..choice }
     }
 
@@ -198,7 +198,7 @@ impl Problem<'_> {
     /// What a search found on so many samples.
     pub(crate) fn choice(&self, found: Found, samples: usize, delays: Vec<usize>, origin: String) -> Choice {
         let criterion = found.criterion(samples);
-        self.asked(Choice { found, delays, criterion, origin })
+        self.with_penalty(Choice { found, delays, criterion, origin })
     }
 
     /// Of many tasks on long records those that reach the least criteria on groups of lines, with what they reach as start.
@@ -246,7 +246,7 @@ impl Candidate {
             dead_time: choice.delays.clone(),
             order: choice.order(),
             deviance: choice.found.deviance,
-            criterion: choice.unasked().criterion,
+            criterion: choice.without_penalty().criterion,
             steps: choice.found.steps,
             stabilised: choice.stabilised(),
         }

@@ -122,16 +122,16 @@ impl Problem<'_> {
     }
 
     /// Goes on from a model that the feedback does not stabilise where it explains distinctly more than the best that it does: of a machine with
-    /// more slow modes than the model, the next mode alone often bends another one across the circle, and the one after it brings it back.
+    /// more slow modes than the model, the next mode alone often makes the loop unstable, and the one after it makes it stable again.
     fn walk_through_unstable(&self, tried: &mut Vec<Choice>, at: &Choice, rounds: usize, table: &mut Vec<Candidate>) {
         // A growing mode that the feedback does not move is a disturbance whose size changes.
         let moved = |c: &&Choice| self.unstable_poles(c).iter().all(|(z, apart)| *apart > MOVED * z.norm().ln());
         let unstable: Vec<Choice> =
-            tried.iter().filter(|c| !c.stabilised()).filter(moved).map(Choice::unasked).collect();
+            tried.iter().filter(|c| !c.stabilised()).filter(moved).map(Choice::without_penalty).collect();
         let Some(start) = best(&unstable).filter(|c| c.criterion < at.criterion - INDISTINCT) else { return };
         let (mut walked, free) = (vec![start.clone()], Problem { feedback: None, ..self.clone() });
         free.improved(&mut walked, rounds, &mut Vec::new());
-        let walked = walked.into_iter().skip(1).map(|choice| self.asked(choice));
+        let walked = walked.into_iter().skip(1).map(|choice| self.with_penalty(choice));
         let first = tried.len();
         tried.extend(walked);
         table.extend(tried[first..].iter().map(Candidate::of));

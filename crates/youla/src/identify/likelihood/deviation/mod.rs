@@ -116,7 +116,7 @@ impl Directions {
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);
-        let seen = witness.map(|w| [w.distortion, w.variation, w.renewed]);
+        let seen = witness.map(|w| [w.distortion, w.variation, w.against_fresh]);
         Directions { seen, scatter, ..Directions::of_parts(model, chart, root, rivals.collect()) }
     }
 

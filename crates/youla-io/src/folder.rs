@@ -5,12 +5,13 @@ use crate::open::{open, read_text};
 use serde::Serialize;
 use std::collections::HashSet;
 use std::fs;
-use std::io::ErrorKind;
+use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 /// The list of all files of a run folder, one a line: what `--force` may replace.
 const FILES: &str = "files.txt";
-/// Held by the writer of an unfinished folder; the system lets go of it when the program ends in any way.
+/// Held by the writer of an unfinished folder; the system lets go of it when the program ends in any way. It is empty until it is held:
+/// who finds it empty cannot take it from a writer that has made it and not yet locked it.
 const LOCK: &str = ".lock";
 
 /// A run folder that is being written. Dropped before [`RunFolder::finish`], it removes what it wrote.
@@ -76,9 +77,11 @@ impl RunFolder {
             folder.finished = source.kind() == ErrorKind::AlreadyExists;
             return Err(if folder.finished { taken(folder.partial.clone()) } else { io(source) });
         }
-        let lock = fs::File::create(folder.partial.join(LOCK)).map_err(io)?;
-        // A file system without locks: then nothing is ever taken for left over.
-        folder.lock = lock.try_lock().is_ok().then_some(lock);
+        let mut lock = fs::File::create(folder.partial.join(LOCK)).map_err(io)?;
+        // On a file system without locks nobody else gets one either: then nothing is ever taken for left over.
+        let _ = lock.try_lock();
+        lock.write_all(b"held").map_err(io)?;
+        folder.lock = Some(lock);
         Ok(folder)
     }
 
@@ -154,8 +157,9 @@ impl RunFolder {
     pub fn finish(mut self) -> Result<PathBuf> {
         Self::check_free(&self.target, self.replace)?;
         let io = |source| Error::Io { path: self.target.clone(), source };
-        self.lock = None;
+        // Removed while it is held: nobody gets a lock that stands in the folder.
         fs::remove_file(self.partial.join(LOCK)).map_err(io)?;
+        self.lock = None;
         let files = files_below(&self.partial).map_err(io)?;
         let list: String = files.iter().map(|name| format!("{}\n", name.display())).collect();
         fs::write(self.partial.join(FILES), list).map_err(io)?;
@@ -241,10 +245,13 @@ fn remove_left_over(parent: &Path, prefix: &str) -> Option<PathBuf> {
         if name.strip_prefix(prefix).is_none_or(|rest| rest.parse::<u32>().is_err()) {
             continue;
         }
-        let abandoned = match open(&entry.path().join(LOCK)) {
-            Ok(lock) => lock.try_lock().is_ok(),
+        let path = entry.path().join(LOCK);
+        let held = open(&path).ok().filter(|lock| lock.metadata().is_ok_and(|m| m.len() > 0));
+        let abandoned = match held {
+            // The lock of a writer that has just finished is no longer in the folder.
+            Some(lock) => lock.try_lock().is_ok() && path.exists(),
             // Its writer is between two steps, or was killed there: a step takes far less than a minute.
-            Err(_) => {
+            None => {
                 entry.metadata().and_then(|m| m.modified()).is_ok_and(|t| t.elapsed().is_ok_and(|t| t.as_secs() > 60))
             }
         };

@@ -60,7 +60,7 @@ fn what_a_killed_run_left_is_removed() {
     let place = Place::new("killed");
     let left = place.0.join(".run.partial-4000000000");
     fs::create_dir_all(left.join("1-record")).unwrap();
-    fs::write(left.join(LOCK), "").unwrap();
+    fs::write(left.join(LOCK), "held").unwrap();
     let run = place.0.join("run");
     let first = RunFolder::create(&run, false).unwrap();
     assert!(!left.exists() && first.partial.exists());
@@ -73,6 +73,20 @@ fn numbers_are_taken_once() {
     let place = Place::new("numbers");
     // What a run of an earlier version left.
     fs::create_dir_all(place.0.join("runs/a-rig-001")).unwrap();
+    // Earlier a folder was taken from a writer that had made its lock and not yet locked it, once in some hundred rounds.
+    for _ in 0..300 {
+        let together = std::sync::Barrier::new(8);
+        let claim = || {
+            together.wait();
+            RunFolder::numbered(&place.0, "A rig!").unwrap()
+        };
+        let claimed: Vec<RunFolder> = std::thread::scope(|scope| {
+            let threads: Vec<_> = (0..8).map(|_| scope.spawn(claim)).collect();
+            threads.into_iter().map(|thread| thread.join().unwrap()).collect()
+        });
+        assert!(claimed.iter().all(|folder| folder.partial.is_dir()));
+        assert_eq!(claimed.iter().map(RunFolder::target).collect::<HashSet<_>>().len(), 8);
+    }
     let mut claimed: Vec<RunFolder> = std::thread::scope(|scope| {
         let threads: Vec<_> =
             (0..8).map(|_| scope.spawn(|| RunFolder::numbered(&place.0, "A rig!").unwrap())).collect();

@@ -2,12 +2,11 @@
 
 use super::driven::Driven;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes};
-use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
+use crate::identify::likelihood::data::spectra::Spectra;
 use faer::c64;
 use pulp::{Arch, NullaryFnOnce};
-use rayon::prelude::*;
-use std::ops::Range;
-use std::sync::Arc;
+use std::f64::consts::PI;
+use std::sync::{Arc, LazyLock};
 
 /// Coefficients of `(1 - b/z) / (1 + a_1/z + ...)`, behind noise at the inputs of the plant where there is any.
 #[derive(Debug, Clone, Default)]
@@ -29,13 +28,26 @@ impl Regression {
     /// `(1 + a_1 / z + ...) / (1 - b / z) / H`, given `1 / z`.
     #[inline(always)]
     pub(crate) fn filter(&self, back: &Lanes) -> Lanes {
-        let mut sum = Lanes::ZERO;
-        self.coefficients.iter().rev().for_each(|a| sum = sum.shifted(*a).times(back));
-        let mut filter = sum.shifted(1.0);
-        if self.zero != 0.0 {
-            filter = filter.times(&back.scaled(-self.zero).shifted(1.0).inverse());
+        let mut filter = self.behind(back);
+        if let Some(driven) = &self.driven {
+            driven.apply(back, &mut filter);
         }
-        self.driven.as_ref().map_or(filter, |driven| filter.times(&driven.filter(back)))
+        filter
+    }
+
+    /// `(1 + a_1 / z + ...) / (1 - b / z)`, given `1 / z`.
+    #[inline(always)]
+    pub(crate) fn behind(&self, back: &Lanes) -> Lanes {
+        let mut filter = Lanes::ZERO;
+        for a in self.coefficients.iter().rev() {
+            filter.re.iter_mut().for_each(|v| *v += a);
+            filter.multiply(back);
+        }
+        filter.re.iter_mut().for_each(|v| *v += 1.0);
+        if self.zero != 0.0 {
+            filter.multiply(&back.scaled(-self.zero).shifted(1.0).inverse());
+        }
+        filter
     }
 }
 
@@ -56,33 +68,9 @@ pub(crate) struct Correlations {
 }
 
 impl Correlations {
-    /// For autoregressions up to `largest` coefficients, behind noise at the inputs of the plant.
-    pub(crate) fn new(
-        spectra: &Spectra,
-        residuals: &[Vec<c64>],
-        output: usize,
-        largest: usize,
-        driven: Option<&Driven>,
-    ) -> Self {
-        let channel = (output, spectra.outputs);
-        let mut sum = Correlations::zero(largest);
-        for (lines, v) in spectra.records.iter().zip(residuals) {
-            let of = |range| Arch::new().dispatch(PartSum { lines, v, channel, largest, driven, range });
-            parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum.add(part));
-        }
-        sum
-    }
-
-    fn zero(largest: usize) -> Self {
-        let filtered = vec![[0.0; ZEROS.len()]; largest.min(WITH_ZERO) + 2];
-        Correlations { plain: vec![0.0; largest + 1], filtered }
-    }
-
-    fn add(&mut self, part: &Correlations) {
-        self.plain.iter_mut().zip(&part.plain).for_each(|(s, p)| *s += p);
-        for (sums, part) in self.filtered.iter_mut().zip(&part.filtered) {
-            sums.iter_mut().zip(part).for_each(|(s, p)| *s += p);
-        }
+    /// For autoregressions up to `largest` coefficients.
+    pub(crate) fn new(power: &Binned, largest: usize) -> Self {
+        Arch::new().dispatch(Sums { power, largest })
     }
 
     /// The regression with the least `N log variance + log(N) parameters`, which comes with it.
@@ -110,46 +98,72 @@ impl Correlations {
     }
 }
 
-/// The sums over a part of the lines of a record, with the widest instructions that the processor has.
-struct PartSum<'a> {
-    lines: &'a Lines,
-    v: &'a [c64],
-    /// Output, and number of outputs.
-    channel: (usize, usize),
-    largest: usize,
-    driven: Option<&'a Driven>,
-    range: Range<usize>,
+/// Largest width of a bin, rad per sample: autoregressions have up to 40 coefficients, so that a line counts by a phase within
+/// 40 * 0.002 / 2 rad of its own, and a correlation by its value within 3e-4.
+const BIN: f64 = 0.002;
+/// Width of a bin over its distance to zero frequency, where drift has its corner.
+const RELATIVE_BIN: f64 = 0.125;
+/// Frequency of the end of the first bin, rad per sample: the first line of a record of 6e7 samples.
+const FIRST_BIN: f64 = 1e-7;
+
+/// Cosines of the ends of the bins, falling.
+static ENDS: LazyLock<Vec<f64>> = LazyLock::new(|| {
+    let next = |w: &f64| Some(w + (RELATIVE_BIN * w).min(BIN));
+    let ends = std::iter::successors(Some(FIRST_BIN), next).take_while(|w| *w < PI);
+    ends.map(f64::cos).chain([f64::NEG_INFINITY]).collect()
+});
+
+/// Power in bins that an autoregression does not tell apart.
+pub(crate) struct Binned {
+    power: Vec<f64>,
+    /// Cosine of the frequency of each bin, the mean over its power.
+    cosine: Vec<f64>,
 }
 
-impl NullaryFnOnce for PartSum<'_> {
+impl Binned {
+    /// Of a residual of one output, on the lines of each record.
+    pub(crate) fn new(spectra: &Spectra, residual: &[Vec<c64>]) -> Self {
+        let mut sums = vec![[0.0; 2]; ENDS.len()];
+        for (lines, v) in spectra.records.iter().zip(residual) {
+            let mut bin = 0;
+            for ((z, v), weight) in lines.z.iter().zip(v).zip(&lines.weight) {
+                while z.re < ENDS[bin] {
+                    bin += 1;
+                }
+                let power = v.norm_sqr() * weight * weight;
+                sums[bin][0] += power;
+                sums[bin][1] += power * z.re;
+            }
+        }
+        sums.retain(|[power, _]| *power > 0.0);
+        let (power, cosine) = sums.into_iter().map(|[power, along]| (power, along / power)).unzip();
+        Binned { power, cosine }
+    }
+}
+
+/// The autocorrelations of binned power, with the widest instructions that the processor has.
+struct Sums<'a> {
+    power: &'a Binned,
+    largest: usize,
+}
+
+impl NullaryFnOnce for Sums<'_> {
     type Output = Correlations;
 
     #[inline(always)]
     fn call(self) -> Correlations {
-        let PartSum { lines, v, channel: (output, p), largest, driven, range } = self;
-        let mut sum = Correlations::zero(largest);
-        let mut plain = vec![[0.0; LANES]; sum.plain.len()];
-        let mut filtered = vec![[[0.0; LANES]; ZEROS.len()]; sum.filtered.len()];
-        for first in range.clone().step_by(LANES) {
+        let mut plain = vec![[0.0; LANES]; self.largest + 1];
+        let mut filtered = vec![[[0.0; LANES]; ZEROS.len()]; self.largest.min(WITH_ZERO) + 2];
+        for (of, at) in self.power.power.chunks(LANES).zip(self.power.cosine.chunks(LANES)) {
             let (mut power, mut cosine) = ([0.0; LANES], [0.0; LANES]);
-            for (l, k) in (first..range.end.min(first + LANES)).enumerate() {
-                power[l] = v[k * p + output].norm_sqr() * lines.weight[k] * lines.weight[k];
-                cosine[l] = lines.z[k].re;
-            }
-            if let Some(driven) = driven {
-                let back = Lanes::gather(|l| lines.z[(first + l).min(range.end - 1)].conj());
-                let filter = driven.filter(&back);
+            power[..of.len()].copy_from_slice(of);
+            cosine[..at.len()].copy_from_slice(at);
+            let mut powers = [power; ZEROS.len()];
+            for (b, powers) in ZEROS.iter().zip(&mut powers) {
                 for l in 0..LANES {
-                    power[l] *= filter.re[l] * filter.re[l] + filter.im[l] * filter.im[l];
+                    powers[l] /= 1.0 + b * b - 2.0 * b * cosine[l];
                 }
             }
-            let powers = ZEROS.map(|b| {
-                let mut out = power;
-                for l in 0..LANES {
-                    out[l] /= 1.0 + b * b - 2.0 * b * cosine[l];
-                }
-                out
-            });
             // cos(lag w) by the recursion of Chebyshev
             let (mut before, mut now) = (cosine, [1.0; LANES]);
             for lag in 0..plain.len().max(filtered.len()) {
@@ -157,7 +171,9 @@ impl NullaryFnOnce for PartSum<'_> {
                     add_product(sums, &power, &now);
                 }
                 if let Some(sums) = filtered.get_mut(lag) {
-                    sums.iter_mut().zip(&powers).for_each(|(sums, powers)| add_product(sums, powers, &now));
+                    for (sums, powers) in sums.iter_mut().zip(&powers) {
+                        add_product(sums, powers, &now);
+                    }
                 }
                 let mut next = [0.0; LANES];
                 for l in 0..LANES {
@@ -167,9 +183,8 @@ impl NullaryFnOnce for PartSum<'_> {
             }
         }
         let total = |lanes: &[f64; LANES]| lanes.iter().sum::<f64>();
-        sum.plain.iter_mut().zip(&plain).for_each(|(s, lanes)| *s = total(lanes));
-        sum.filtered.iter_mut().zip(&filtered).for_each(|(s, lanes)| *s = lanes.each_ref().map(total));
-        sum
+        let filtered = filtered.iter().map(|lanes| lanes.each_ref().map(total)).collect();
+        Correlations { plain: plain.iter().map(total).collect(), filtered }
     }
 }
 

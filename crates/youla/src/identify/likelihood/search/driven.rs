@@ -7,12 +7,17 @@
 //! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
 //! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
 
+use super::block::Block;
 use super::model::Model;
-use crate::identify::likelihood::data::lanes::Lanes;
-use crate::identify::likelihood::data::spectra::{Lines, Spectra};
+use super::state_lanes::resolvent;
+use crate::identify::likelihood::data::lanes::{LANES, Lanes};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, parts};
 use crate::linalg::{RiccatiProblem, dare, eigenvalues};
 use faer::{Mat, Scale, c64};
+use pulp::{Arch, NullaryFnOnce};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Growth of a pole over all records up to which an integrator is not told from it, as a logarithm. Noise of several outputs has a state for each,
 /// of which nothing may grow beside those of the plant.
@@ -42,11 +47,11 @@ pub(crate) struct Driven {
 }
 
 impl Driven {
-    /// The most likely size of such noise in residuals, lines x p per record; `None` where there is none.
+    /// The most likely size of such noise in the residual of an output, on the lines of each record; `None` where there is none.
     pub(crate) fn new(
         model: &Model,
-        (spectra, moved): (&Spectra, &Moved),
-        residuals: &[Vec<c64>],
+        (spectra, gains): (&Spectra, &Gains),
+        residual: &[Vec<c64>],
         output: usize,
     ) -> Option<Self> {
         let samples = spectra.samples() as f64;
@@ -55,17 +60,9 @@ impl Driven {
         if poles.is_empty() || spectra.outputs > 1 && grows() {
             return None;
         }
-        let reach = |k: usize| {
-            let (block, size) = (&model.blocks[k], |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt());
-            size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
-        };
-        let largest = (0..model.blocks.len()).map(reach).fold(0.0, f64::max);
-        let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64;
-        let narrow = |p: &c64| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU;
-        let left_out = |k: &usize| reach(*k) <= UNSEEN * largest || model.blocks[*k].poles().iter().any(narrow);
-        let hidden: Vec<usize> = (0..model.blocks.len()).filter(left_out).collect();
-        let seen = model.without(&hidden);
-        let ratio = size(&lines((model, &hidden), (spectra, moved), residuals, output), samples)?;
+        let hidden = &gains.hidden[output];
+        let seen = model.without(hidden);
+        let ratio = size(&lines((spectra, gains), residual, output), samples)?;
         let (a, b, c) = seen.matrices();
         let c = c.subrows(output, 1).to_owned();
         let q = &b * b.transpose() * Scale(ratio);
@@ -87,16 +84,25 @@ impl Driven {
         Some(Driven { sections, unstable, gain, a, c: c.subrows(output, 1).to_owned() })
     }
 
-    /// `1 / H_i`, given `1 / z`.
+    /// Multiplies by `1 / H_i`, given `1 / z`.
     #[inline(always)]
-    pub(crate) fn filter(&self, back: &Lanes) -> Lanes {
-        let quadratic = |one: f64, two: f64| back.scaled(two).shifted(one).times(back).shifted(1.0);
-        let (mut over, mut under) = (Lanes::ZERO.shifted(1.0), Lanes::ZERO.shifted(1.0));
+    pub(crate) fn apply(&self, back: &Lanes, to: &mut Lanes) {
+        let mut under = Lanes::ZERO;
+        under.re.fill(1.0);
         for [c1, c2, d1, d2] in &self.sections {
-            over = over.times(&quadratic(*c1, *c2));
-            under = under.times(&quadratic(*d1, *d2));
+            multiply(to, back, [*c1, *c2]);
+            multiply(&mut under, back, [*d1, *d2]);
         }
-        over.times(&under.inverse())
+        to.multiply(&under.inverse());
+    }
+
+    /// The residual of the output behind `1 / H_i`, on the lines of each record.
+    pub(crate) fn rest(&self, spectra: &Spectra, residual: &[Vec<c64>]) -> Vec<Vec<c64>> {
+        let of_record = |(lines, v): (&Lines, &Vec<c64>)| {
+            let of = |range| Arch::new().dispatch(Rest { driven: self, lines, v, range });
+            parts(lines.z.len()).map(of).collect::<Vec<Vec<c64>>>().concat()
+        };
+        spectra.records.iter().zip(residual).map(of_record).collect()
     }
 
     /// The same at one line.
@@ -106,63 +112,133 @@ impl Driven {
     }
 }
 
-/// What the inputs move of the states on some of the lines: `(z I - A_b)^-1 B_b` of each block.
-pub(crate) struct Moved {
-    /// Per record, line by line and block by block, s x m.
-    values: Vec<Vec<c64>>,
-    /// Every how many lines.
-    every: usize,
-}
-
-impl Moved {
-    pub(crate) fn new(model: &Model, spectra: &Spectra) -> Self {
-        let every = spectra.lines().div_ceil(LINES).max(1);
-        let largest = model.blocks.iter().map(|b| b.states).max().unwrap_or(0);
-        let mut inverse = vec![c64::ZERO; largest * largest];
-        let mut of_record = |lines: &Lines| {
-            let mut out = Vec::with_capacity(lines.z.len().div_ceil(every) * model.order() * model.inputs);
-            for z in lines.z.iter().step_by(every) {
-                for block in &model.blocks {
-                    let (s, m) = (block.states, model.inputs);
-                    block.resolvent(*z, &mut inverse);
-                    for (i, j) in (0..s).flat_map(|i| (0..m).map(move |j| (i, j))) {
-                        let along = |sum: c64, l: usize| sum + inverse[i * s + l] * block.b[l * m + j];
-                        out.push((0..s).fold(c64::ZERO, along));
-                    }
-                }
-            }
-            out
-        };
-        Moved { values: spectra.records.iter().map(&mut of_record).collect(), every }
+/// Multiplies by `1 + a / z + b / z^2`.
+#[inline(always)]
+fn multiply(to: &mut Lanes, back: &Lanes, [a, b]: [f64; 2]) {
+    for l in 0..LANES {
+        let (x, y) = (back.re[l], back.im[l]);
+        let (re, im) = (1.0 + a * x + b * (x * x - y * y), (a + 2.0 * b * x) * y);
+        (to.re[l], to.im[l]) = (to.re[l] * re - to.im[l] * im, to.re[l] * im + to.im[l] * re);
     }
 }
 
-/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2` of the blocks that are seen.
-fn lines(
-    (model, hidden): (&Model, &[usize]),
-    (spectra, moved): (&Spectra, &Moved),
-    residuals: &[Vec<c64>],
-    output: usize,
-) -> Vec<[f64; 3]> {
-    let (p, m, every) = (spectra.outputs, spectra.inputs, moved.every);
-    let mut out = Vec::with_capacity(LINES);
-    let mut g = vec![c64::ZERO; m];
-    for ((lines, v), x) in spectra.records.iter().zip(residuals).zip(&moved.values) {
-        for (k, x) in (0..lines.z.len()).step_by(every).zip(x.chunks_exact(model.order() * m)) {
-            g.fill(c64::ZERO);
-            let mut at = 0;
-            for (place, block) in model.blocks.iter().enumerate() {
+/// Residuals behind `1 / H_i` on a part of the lines, with the widest instructions that the processor has.
+struct Rest<'a> {
+    driven: &'a Driven,
+    lines: &'a Lines,
+    v: &'a [c64],
+    range: Range<usize>,
+}
+
+impl NullaryFnOnce for Rest<'_> {
+    type Output = Vec<c64>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<c64> {
+        let Rest { driven, lines, v, range } = self;
+        let mut out = Vec::with_capacity(range.len());
+        for first in range.clone().step_by(LANES) {
+            let line = |l: usize| (first + l).min(range.end - 1);
+            let back = Lanes::gather(|l| lines.z[line(l)].conj());
+            let mut rest = Lanes::gather(|l| v[line(l)]);
+            driven.apply(&back, &mut rest);
+            out.extend((0..LANES.min(range.end - first)).map(|l| c64::new(rest.re[l], rest.im[l])));
+        }
+        out
+    }
+}
+
+/// `|G_i|^2` of the blocks that an output sees, on some of the lines.
+pub(crate) struct Gains {
+    /// Per record lines x p.
+    values: Vec<Vec<f64>>,
+    /// Every how many lines.
+    every: usize,
+    /// Blocks that are left out, for each output.
+    hidden: Vec<Vec<usize>>,
+}
+
+impl Gains {
+    pub(crate) fn new(model: &Model, spectra: &Spectra) -> Self {
+        let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64;
+        let hidden: Vec<Vec<usize>> = (0..model.outputs).map(|output| hidden(model, longest, output)).collect();
+        let every = spectra.lines().div_ceil(LINES).max(1);
+        let triangular = |block: &Block| block.triangular(&[]).map_or_else(|| block.clone(), |(block, _)| block);
+        let blocks: Vec<Block> = model.blocks.iter().map(triangular).collect();
+        let inputs = model.inputs;
+        let of = |lines: &Lines| {
+            let z: Vec<c64> = lines.z.iter().step_by(every).copied().collect();
+            Arch::new().dispatch(GainsOf { blocks: &blocks, inputs, hidden: &hidden, z: &z })
+        };
+        Gains { values: spectra.records.iter().map(of).collect(), every, hidden }
+    }
+}
+
+/// Blocks that an output does not see, and modes that are lines of the noise.
+fn hidden(model: &Model, longest: f64, output: usize) -> Vec<usize> {
+    let reach = |block: &Block| {
+        let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>().sqrt();
+        size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
+    };
+    let largest = model.blocks.iter().map(reach).fold(0.0, f64::max);
+    let narrow = |p: &c64| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU;
+    let left_out = |block: &Block| reach(block) <= UNSEEN * largest || block.poles().iter().any(narrow);
+    (0..model.blocks.len()).filter(|k| left_out(&model.blocks[*k])).collect()
+}
+
+/// The gains on the lines of a record, with the widest instructions that the processor has.
+struct GainsOf<'a> {
+    blocks: &'a [Block],
+    inputs: usize,
+    hidden: &'a [Vec<usize>],
+    z: &'a [c64],
+}
+
+impl NullaryFnOnce for GainsOf<'_> {
+    type Output = Vec<f64>;
+
+    #[inline(always)]
+    fn call(self) -> Vec<f64> {
+        let GainsOf { blocks, inputs: m, hidden, z } = self;
+        let largest = blocks.iter().map(|b| b.states).max().unwrap_or(0);
+        let (mut inverse, mut x) = (vec![Lanes::ZERO; largest * largest], vec![Lanes::ZERO; largest]);
+        let mut g = vec![Lanes::ZERO; hidden.len() * m];
+        let mut out = Vec::with_capacity(z.len() * hidden.len());
+        for z in z.chunks(LANES) {
+            let at = Lanes::gather(|l| z[l.min(z.len() - 1)]);
+            g.fill(Lanes::ZERO);
+            for (place, block) in blocks.iter().enumerate() {
                 let s = block.states;
-                if !hidden.contains(&place) {
-                    for (j, g) in g.iter_mut().enumerate() {
-                        (0..s).for_each(|i| *g += x[at + i * m + j] * block.c[output * s + i]);
+                resolvent(block, &at, &mut inverse);
+                for j in 0..m {
+                    x[..s].fill(Lanes::ZERO);
+                    for (i, l) in (0..s).flat_map(|i| (0..s).map(move |l| (i, l))) {
+                        x[i].add_scaled(&inverse[i * s + l], block.b[l * m + j]);
+                    }
+                    for (o, hidden) in hidden.iter().enumerate() {
+                        if !hidden.contains(&place) {
+                            (0..s).for_each(|i| g[o * m + j].add_scaled(&x[i], block.c[o * s + i]));
+                        }
                     }
                 }
-                at += s * m;
             }
-            let gain = g.iter().map(|g| g.norm_sqr()).sum::<f64>();
-            let (count, power) = (lines.share[k], lines.weight[k].powi(2) * v[k * p + output].norm_sqr());
-            out.push([count * every as f64, power * every as f64, gain]);
+            let square = |g: &Lanes, l: usize| g.re[l] * g.re[l] + g.im[l] * g.im[l];
+            for l in 0..z.len() {
+                out.extend(g.chunks(m).map(|g| g.iter().map(|g| square(g, l)).sum::<f64>()));
+            }
+        }
+        out
+    }
+}
+
+/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2`.
+fn lines((spectra, gains): (&Spectra, &Gains), residual: &[Vec<c64>], output: usize) -> Vec<[f64; 3]> {
+    let (p, every) = (spectra.outputs, gains.every);
+    let mut out = Vec::with_capacity(LINES);
+    for ((lines, v), gains) in spectra.records.iter().zip(residual).zip(&gains.values) {
+        for (k, gains) in (0..lines.z.len()).step_by(every).zip(gains.chunks_exact(p)) {
+            let (count, power) = (lines.share[k], lines.weight[k].powi(2) * v[k].norm_sqr());
+            out.push([count * every as f64, power * every as f64, gains[output]]);
         }
     }
     out

@@ -8,8 +8,8 @@
 //! zero serves slow drift below white noise, which would take an autoregression of some hundred coefficients. Noise that enters at the inputs of
 //! the plant comes before both (`driven`).
 
-use super::autoregression::{Correlations, Regression};
-use super::driven::{Driven, Moved};
+use super::autoregression::{Binned, Correlations, Regression};
+use super::driven::{Driven, Gains};
 use super::model::Model;
 use super::separable::separable;
 use crate::identify::likelihood::data::lanes::{LANES, Lanes, add_real_product};
@@ -47,22 +47,25 @@ impl Noise {
     pub(crate) fn fit(spectra: &Spectra, residuals: &[Vec<c64>], largest_order: usize, model: &Model) -> Self {
         let p = spectra.outputs;
         let (samples, log) = (spectra.samples(), (spectra.samples().max(2) as f64).ln());
-        let behind = |i: usize, driven: Option<&Driven>| {
-            Correlations::new(spectra, residuals, i, largest_order, driven).regression(samples)
-        };
-        let moved = Moved::new(model, spectra);
+        let behind =
+            |rest: &[Vec<c64>]| Correlations::new(&Binned::new(spectra, rest), largest_order).regression(samples);
+        let gains = Gains::new(model, spectra);
         let of = |i: usize| {
-            let (plain, least) = behind(i, None);
-            let Some(driven) = Driven::new(model, (spectra, &moved), residuals, i) else { return plain };
-            let (rest, criterion) = behind(i, Some(&driven));
+            let own = |v: &Vec<c64>| v.iter().skip(i).step_by(p).copied().collect();
+            let own: Vec<Vec<c64>> = residuals.iter().map(own).collect();
+            let (plain, least) = behind(&own);
+            let Some(driven) = Driven::new(model, (spectra, &gains), &own, i) else { return (plain, own) };
+            let rest = driven.rest(spectra, &own);
+            let (noise, criterion) = behind(&rest);
             let better = criterion + log < least;
-            if better { Regression { driven: Some(Arc::new(driven)), ..rest } } else { plain }
+            if better { (Regression { driven: Some(Arc::new(driven)), ..noise }, rest) } else { (plain, own) }
         };
-        let regression: Vec<Regression> = (0..p).into_par_iter().map(of).collect();
+        let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise { regression, ..Noise::white(p) };
         let mut sum = Mat::<f64>::zeros(p, p);
-        for (lines, v) in spectra.records.iter().zip(residuals) {
-            let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, v, range });
+        for (k, lines) in spectra.records.iter().enumerate() {
+            let rest: Vec<&[c64]> = rest.iter().map(|rest| rest[k].as_slice()).collect();
+            let of = |range| Arch::new().dispatch(Products { noise: &noise, lines, rest: &rest, range });
             parts(lines.z.len()).map(of).collect::<Vec<_>>().iter().for_each(|part| sum += part);
         }
         let samples = samples.max(1) as f64;
@@ -131,12 +134,13 @@ impl Noise {
     }
 }
 
-/// Sums of the products of the whitened outputs over a part of the lines of a record, lower triangle, with the widest
+/// Sums of the products of the whitened residuals over a part of the lines of a record, lower triangle, with the widest
 /// instructions that the processor has.
 struct Products<'a> {
     noise: &'a Noise,
     lines: &'a Lines,
-    v: &'a [c64],
+    /// Of each output, behind what the plant makes of noise at its inputs.
+    rest: &'a [&'a [c64]],
     range: Range<usize>,
 }
 
@@ -145,7 +149,7 @@ impl NullaryFnOnce for Products<'_> {
 
     #[inline(always)]
     fn call(self) -> Mat<f64> {
-        let Products { noise, lines, v, range } = self;
+        let Products { noise, lines, rest, range } = self;
         let p = noise.regression.len();
         let mut sums = vec![[0.0; LANES]; p * p];
         let mut white = vec![Lanes::ZERO; p];
@@ -153,10 +157,10 @@ impl NullaryFnOnce for Products<'_> {
             let count = LANES.min(range.end - first);
             let line = |l: usize| first + l.min(count - 1);
             let back = Lanes::gather(|l| lines.z[line(l)]).conj();
-            let weighed =
-                |l: usize, i: usize| if l < count { v[line(l) * p + i] * lines.weight[line(l)] } else { c64::ZERO };
+            let weight = |l: usize| if l < count { lines.weight[line(l)] } else { 0.0 };
             for (i, white) in white.iter_mut().enumerate() {
-                *white = noise.regression[i].filter(&back).times(&Lanes::gather(|l| weighed(l, i)));
+                *white = Lanes::gather(|l| rest[i][line(l)] * weight(l));
+                white.multiply(&noise.regression[i].behind(&back));
             }
             for i in 0..p {
                 for j in 0..=i {

@@ -24,7 +24,7 @@ pub(crate) fn states(
 
 /// (z I - A)^-1 of each line, row by row.
 #[inline(always)]
-fn resolvent(block: &Block, z: &Lanes, out: &mut [Lanes]) {
+pub(crate) fn resolvent(block: &Block, z: &Lanes, out: &mut [Lanes]) {
     if block.is_triangular() {
         return triangular(block, z, out);
     }

@@ -7,7 +7,7 @@
 use crate::identify::likelihood::recommendation::Predictor;
 use crate::identify::likelihood::search::autoregression::Regression;
 use crate::identify::likelihood::search::noise::Noise;
-use crate::linalg::{RiccatiProblem, block, block_diagonal, dare};
+use crate::linalg::{RiccatiProblem, block, block_diagonal, dare, eigenvalues};
 use crate::lti::{Discrete, StateSpace};
 use faer::{Mat, Scale};
 
@@ -43,7 +43,11 @@ pub(crate) fn predictor(plant: &StateSpace<Discrete>, noise: &Noise, sizes: &[f6
         }
         at += states;
     }
-    let stable = plant.is_stable().unwrap_or(false);
+    // The zero matrix solves the Riccati equation; it is the stabilising solution where the zeros of the noise are inside of the unit circle
+    // without it.
+    let inside =
+        || eigenvalues("the predictor", (&a - &gain * &c).as_ref()).is_ok_and(|p| p.iter().all(|p| p.norm() < 1.0));
+    let stable = plant.is_stable().unwrap_or(false) || inside();
     let k = if stable { Some(gain) } else { riccati(&a, &c, &gain, &covariance) };
     Predictor { a, b, c, d: plant.d().to_owned(), k, covariance }
 }

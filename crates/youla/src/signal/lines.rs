@@ -107,8 +107,6 @@ fn lasts(values: &[f64], turns: f64) -> bool {
 
 struct Spectrum {
     power: Vec<f64>,
-    /// Median of the neighbours, as the mean of exponential variables.
-    floor: Vec<f64>,
     side: usize,
     samples: usize,
     periodic: bool,
@@ -128,16 +126,7 @@ impl Spectrum {
             values.iter().enumerate().map(|(k, v)| Complex::new((v - mean) * window(k), 0.0)).collect();
         FftPlanner::new().plan_fft_forward(n).process(&mut buffer);
         let power: Vec<f64> = buffer[..n / 2].iter().map(|z| z.norm_sqr()).collect();
-        let mut floor = vec![f64::INFINITY; power.len()];
-        let mut near = Vec::with_capacity(2 * side);
-        for k in side + 2..power.len().saturating_sub(side + 2) {
-            near.clear();
-            near.extend_from_slice(&power[k - side..k - 2]);
-            near.extend_from_slice(&power[k + 3..=k + side]);
-            let middle = near.len() / 2;
-            floor[k] = *near.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2;
-        }
-        let mut spectrum = Spectrum { power, floor, side, samples: n, periodic: false };
+        let mut spectrum = Spectrum { power, side, samples: n, periodic: false };
         let many = spectrum.lines(spectrum.threshold(1e-3)).len() as f64;
         spectrum.periodic = many > PERIODIC * spectrum.power.len() as f64;
         Some(spectrum)
@@ -149,9 +138,20 @@ impl Spectrum {
         nu * ((self.power.len() as f64 / false_alarm).powf(1.0 / nu) - 1.0)
     }
 
+    /// Median of the neighbours, as the mean of exponential variables; `None` at the ends, where there are too few.
+    fn floor(&self, k: usize) -> Option<f64> {
+        let (side, last) = (self.side, self.power.len());
+        if k < side + 2 || k + side + 2 >= last {
+            return None;
+        }
+        let mut near = [&self.power[k - side..k - 2], &self.power[k + 3..=k + side]].concat();
+        let middle = near.len() / 2;
+        Some(*near.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2)
+    }
+
     fn ratio(&self, k: usize) -> f64 {
-        match self.floor.get(k) {
-            Some(floor) if *floor > 0.0 => self.power[k] / floor,
+        match self.floor(k) {
+            Some(floor) if floor > 0.0 => self.power[k] / floor,
             Some(_) if self.power[k] > 0.0 => f64::INFINITY,
             _ => 0.0,
         }
@@ -167,8 +167,8 @@ impl Spectrum {
     fn lines(&self, threshold: f64) -> Vec<usize> {
         let p = &self.power;
         (6..p.len().saturating_sub(6))
-            .filter(|k| self.ratio(*k) > threshold && p[*k] >= p[k - 1] && p[*k] > p[k + 1])
-            .filter(|k| p[k - 2].max(p[k + 2]) < FALL * p[*k] && p[*k] > NEAR * self.near(*k))
+            .filter(|k| p[*k] >= p[k - 1] && p[*k] > p[k + 1] && p[k - 2].max(p[k + 2]) < FALL * p[*k])
+            .filter(|k| p[*k] > NEAR * self.near(*k) && self.ratio(*k) > threshold)
             .collect()
     }
 

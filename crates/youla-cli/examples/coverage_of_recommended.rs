@@ -41,7 +41,7 @@ fn errors(system: &Loop, found: &Recommendation) -> Result<[Vec<Option<f64>>; 3]
         for i in 0..system.plant.outputs() {
             for j in 0..system.plant.inputs() {
                 let (g, g0): (c64, c64) = (model.at(k)[(i, j)], truth.at(k)[(i, j)]);
-                let deviation = found.region.at(*f).of_magnitude(g, (i, j));
+                let deviation = found.region.at(*f).entries().of_magnitude(g, (i, j));
                 magnitude.push(Some((g.norm() - g0.norm()) / deviation));
             }
         }

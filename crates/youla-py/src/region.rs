@@ -45,7 +45,7 @@ impl Region {
     pub(crate) fn recommended(plant: &StateSpace<Discrete>, region: &Stated, hz: &[f64]) -> Result<Self> {
         let response = frequency_response(plant, &omega(hz))?;
         let (p, m) = (plant.outputs(), plant.inputs());
-        let errors: Vec<_> = hz.iter().map(|f| region.at(*f)).collect();
+        let errors = region.entry_errors(hz);
         let covariance =
             Array4::from_shape_fn((hz.len(), p, m, 3), |(k, i, j, part)| errors[k].covariance((i, j))[part]);
         let magnitude = Array4::from_shape_fn((hz.len(), p, m, 2), |(k, i, j, side)| {

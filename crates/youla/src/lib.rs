@@ -118,7 +118,7 @@
 //! let controller = RunningController::observer(&nominal, f, l)?;
 //! let found = youla::identify(&[record], &[], &controller, Some(&nominal), &Default::default())?.model;
 //! let g = frequency_response(&found.plant, &[60.0])?.at(0)[(0, 0)];
-//! let deviation = found.region.at(60.0 / std::f64::consts::TAU).of_magnitude(g, (0, 0));
+//! let deviation = found.region.at(60.0 / std::f64::consts::TAU).entries().of_magnitude(g, (0, 0));
 //! assert!(0.0 < deviation && deviation < 0.1 * g.norm());
 //! # Ok::<(), youla::Error>(())
 //! ```

@@ -15,7 +15,7 @@ use crate::error::{Error, Result};
 use faer::prelude::*;
 use youla::control::closed_loop;
 use youla::factor::CoprimeFactors;
-use youla::identify::likelihood::{Region, ResponseError};
+use youla::identify::likelihood::{EntryErrors, Region};
 use youla::linalg::eye;
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla::{Mat, c64};
@@ -69,19 +69,19 @@ impl DeviationRegion<'_> {
     pub fn radius(&self) -> Result<f64> {
         let (p, m) = (self.plant.outputs(), self.plant.inputs());
         let entries = || (0..p).flat_map(|i| (0..m).map(move |j| (i, j)));
-        let radius = |e: &ResponseError| entries().map(|(i, j)| squared_radius(e, i, j)).sum::<f64>().sqrt();
+        let radius = |e: &EntryErrors| entries().map(|(i, j)| squared_radius(e, i, j)).sum::<f64>().sqrt();
         Ok(self.errors(&grid(self.plant.time()))?.iter().map(radius).fold(0.0, f64::max))
     }
 
     /// The error of S at angular frequencies.
-    fn errors(&self, omega: &[f64]) -> Result<Vec<ResponseError>> {
+    fn errors(&self, omega: &[f64]) -> Result<Vec<EntryErrors>> {
         let (m, p) = (self.plant.inputs(), self.plant.outputs());
         let whole = closed_loop(self.plant, &self.factors.j_k()?)?;
         let response = frequency_response(&whole, omega)?;
         let at = |k: usize| {
             let t = response.at(k);
             let (beta, u) = (t.submatrix(m + p, m, p, p), t.submatrix(0, 0, m, m));
-            self.region.at(omega[k] / std::f64::consts::TAU).between(beta, u)
+            self.region.at(omega[k] / std::f64::consts::TAU).between(beta, u).entries()
         };
         Ok((0..omega.len()).map(at).collect())
     }
@@ -96,14 +96,14 @@ fn grid(time: Discrete) -> Vec<f64> {
 }
 
 /// Square of the longest half axis of the region of an entry.
-fn squared_radius(error: &ResponseError, i: usize, j: usize) -> f64 {
+fn squared_radius(error: &EntryErrors, i: usize, j: usize) -> f64 {
     let [rr, ri, ii] = error.covariance((i, j));
     let (mean, half) = (0.5 * (rr + ii), 0.5 * (rr - ii));
     ELLIPSE * (mean + (half * half + ri * ri).sqrt())
 }
 
 /// Sizes of the rows and columns of dS, so that its entries divided by both are alike.
-fn sizes(errors: &[ResponseError], p: usize, m: usize) -> (Vec<f64>, Vec<f64>) {
+fn sizes(errors: &[EntryErrors], p: usize, m: usize) -> (Vec<f64>, Vec<f64>) {
     let rms = |i: usize, j: usize| {
         let mean = errors.iter().map(|e| squared_radius(e, i, j)).sum::<f64>() / errors.len() as f64;
         mean.sqrt().max(f64::MIN_POSITIVE)

@@ -10,7 +10,7 @@ use crate::stages::uncertainty::SystemUncertainty;
 use std::f64::consts::TAU;
 use youla::Mat;
 use youla::c64;
-use youla::identify::likelihood::{LARGEST_IN_BAND, ResponseError};
+use youla::identify::likelihood::{EntryErrors, LARGEST_IN_BAND};
 use youla::lti::FrequencyResponse;
 use youla_report::data as draw;
 
@@ -54,7 +54,7 @@ fn indirect(found: &Identification) -> Vec<draw::Indirect> {
 fn recommended(found: &Identification, responses: &[(Method, FrequencyResponse)]) -> Vec<draw::Band> {
     let Ok(model) = &found.recommended else { return Vec::new() };
     let own = responses.iter().filter(|(method, _)| *method == Method::Likelihood);
-    let errors: Vec<_> = found.hz.iter().map(|f| model.region.at(*f)).collect();
+    let errors = model.region.entry_errors(&found.hz);
     own.flat_map(|(_, r)| ports(found).map(|port| recommended_band(&errors, r, port)).collect::<Vec<_>>()).collect()
 }
 
@@ -89,11 +89,11 @@ fn deviations(found: &Identification) -> Result<Vec<draw::Deviation>> {
 
 /// The 95 % region of the response from an input to an output, with the errors at its frequencies.
 fn recommended_band(
-    errors: &[ResponseError],
+    errors: &[EntryErrors],
     response: &FrequencyResponse,
     (output, input): (usize, usize),
 ) -> draw::Band {
-    let half = |g: &c64, error: &ResponseError| NORMAL * error.of_magnitude(*g, (output, input));
+    let half = |g: &c64, error: &EntryErrors| NORMAL * error.of_magnitude(*g, (output, input));
     let bounds = response
         .entry(output, input)
         .into_iter()

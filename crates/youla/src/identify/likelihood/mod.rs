@@ -39,7 +39,7 @@ pub use super::subspace::Experiment;
 pub use super::verdict::LoopRatio;
 pub use super::verdict::limits::LARGEST_IN_BAND;
 pub use deviation::mode_estimates::ModeEstimate;
-pub use deviation::region::{Draw, Interval, Region, RegionParts, ResponseError};
+pub use deviation::region::{Draw, EntryErrors, Interval, Region, RegionParts, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
 pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
 pub use options::LikelihoodOptions;

@@ -18,6 +18,7 @@ use crate::lti::{Discrete, StateSpace, frequency_response, largest_singular_valu
 use crate::{Mat, MatRef, Result, c64};
 use faer::linalg::solvers::Solve;
 use faer::{Scale, Side};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// What the region takes of the margin of the loop that ran.
@@ -139,8 +140,8 @@ pub(crate) fn entries(squares: &[f64], inputs: usize) -> impl Iterator<Item = Ma
 
 impl LoopRatio {
     /// Of a region in the loop; from [`BELOW_ONE_PERIOD`] of the lowest stated frequency on.
-    pub(crate) fn new(loops: &[LoopAt], error_at: impl Fn(f64) -> ResponseError) -> Self {
-        let ratio: Vec<f64> = loops.iter().map(|at| at.ratio(&error_at(at.hz))).collect();
+    pub(crate) fn new(loops: &[LoopAt], error_at: impl Fn(f64) -> ResponseError + Sync) -> Self {
+        let ratio: Vec<f64> = loops.par_iter().map(|at| at.ratio(&error_at(at.hz))).collect();
         let worst = (0..ratio.len()).max_by(|a, b| ratio[*a].total_cmp(&ratio[*b]));
         let (largest, largest_hz) = worst.map_or((0.0, 0.0), |k| (ratio[k], loops[k].hz));
         LoopRatio { hz: loops.iter().map(|at| at.hz).collect(), ratio, largest, largest_hz }

@@ -14,10 +14,9 @@ const MOST_GROUPS: usize = 6;
 
 /// Records by their lines: inputs, what the model leaves of the outputs, and the excitation.
 struct Group {
-    /// Inputs, residuals and excitation of each record under a Hann window.
-    windowed: Vec<[Vec<c64>; 3]>,
-    /// The same as they are.
-    plain: Vec<[Vec<c64>; 3]>,
+    /// Of each record.
+    records: Vec<[Vec<c64>; 3]>,
+    channels: [usize; 3],
 }
 
 /// The error of the model as the excitation shows it.
@@ -48,18 +47,20 @@ impl Group {
         }
         let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
         let residuals = point.residuals(&spectra);
-        let (m, p) = (spectra.inputs, spectra.outputs);
-        let (mut windowed, mut plain) = (Vec::new(), Vec::new());
-        for ((lines, v), (_, x)) in spectra.records.into_iter().zip(residuals).zip(records) {
-            let excitation = lines_of(*x, problem.skip);
-            windowed.push([hann(&lines.u, m), hann(&v, p), hann(&excitation, x.ncols())]);
-            plain.push([lines.u, v, excitation]);
-        }
-        Some(Group { windowed, plain })
+        let channels = [spectra.inputs, spectra.outputs, records.first().map_or(0, |(_, x)| x.ncols())];
+        let all = spectra.records.into_iter().zip(residuals).zip(records);
+        let records = all.map(|((lines, v), (_, x))| [lines.u, v, lines_of(*x, problem.skip)]).collect();
+        Some(Group { records, channels })
+    }
+
+    /// Under a Hann window.
+    fn windowed(self) -> Self {
+        let of = |record: [Vec<c64>; 3]| std::array::from_fn(|k| hann(&record[k], self.channels[k]));
+        Group { records: self.records.into_iter().map(of).collect(), ..self }
     }
 
     fn lines(&self) -> impl Iterator<Item = RecordLines<'_>> {
-        self.windowed.iter().map(|[u, v, x]| RecordLines { u, v, x })
+        self.records.iter().map(|[u, v, x]| RecordLines { u, v, x })
     }
 }
 
@@ -78,10 +79,12 @@ impl Witness {
         if moving.is_empty() {
             return None;
         }
-        let group = |records: &[Pair<'_>]| Group::new(problem, solution, records);
+        let group = |records: &[Pair<'_>]| Group::new(problem, solution, records).map(Group::windowed);
         let q = of_records.iter().map(|(_, x)| x.ncols()).max().unwrap_or(0);
         let channels = Channels { m: problem.inputs(), p: problem.outputs(), q };
-        let (first, second) = (group(&of_records)?, group(&of_fresh));
+        let plain = Group::new(problem, solution, &of_records)?;
+        let excited = explained_inputs(&plain.lines().collect::<Vec<_>>(), channels);
+        let (first, second) = (plain.windowed(), group(&of_fresh));
         let all: Vec<RecordLines<'_>> = first.lines().chain(second.iter().flat_map(Group::lines)).collect();
         let lines = |all: &[RecordLines<'_>]| all.iter().map(|r| r.v.len() / channels.p).sum::<usize>();
         let parameters = solution.chosen.found.parameters;
@@ -96,8 +99,6 @@ impl Witness {
         let errors: Vec<LocalErrors> = groups.iter().map(of).collect();
         let fresh = errors.last().filter(|_| has_fresh);
         let against_fresh = fresh.map(|fresh| LocalErrors::difference([&of(&first), fresh])).unwrap_or_default();
-        let plain: Vec<RecordLines<'_>> = first.plain.iter().map(|[u, v, x]| RecordLines { u, v, x }).collect();
-        let excited = explained_inputs(&plain, channels);
         let variation = LocalErrors::scatter(&errors);
         Some(Witness { distortion: whole.excess(), variation, against_fresh, whole, excited })
     }

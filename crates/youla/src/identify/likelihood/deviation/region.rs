@@ -140,6 +140,11 @@ impl Region {
         ResponseError { directions, inputs }
     }
 
+    /// The errors of the entries at frequencies, Hz: what [`Self::at`] says of each entry by itself.
+    pub fn entry_errors(&self, hz: &[f64]) -> Vec<EntryErrors> {
+        hz.par_iter().map(|hz| self.at(*hz).entries()).collect()
+    }
+
     /// Intervals of figures of the plant, in the order in which `of` gives them, by the delta method: central differences along
     /// each independent error of the parameters, and the figures of the models that the records do not distinguish.
     ///
@@ -234,6 +239,13 @@ impl ResponseError {
         sums
     }
 
+    /// The errors of the entries, without how they hang together: less memory by the number of independent errors.
+    pub fn entries(&self) -> EntryErrors {
+        let (p, m) = (self.directions.nrows() / self.inputs.max(1), self.inputs);
+        let ports = (0..p).flat_map(|i| (0..m).map(move |j| (i, j)));
+        EntryErrors { covariances: ports.map(|port| self.covariance(port)).collect(), inputs: m }
+    }
+
     /// The error of `left G right` (matrices of this frequency, q x p and m x r) in place of G: for example of S, with the loop on
     /// both sides.
     #[must_use]
@@ -251,13 +263,6 @@ impl ResponseError {
         (0..self.directions.ncols()).map(change)
     }
 
-    /// Standard deviation of the magnitude of an entry with the response `g`, to first order.
-    pub fn of_magnitude(&self, g: c64, (output, input): (usize, usize)) -> f64 {
-        let (re, im) = if g.norm() > 0.0 { (g.re / g.norm(), g.im / g.norm()) } else { (1.0, 0.0) };
-        let [rr, ri, ii] = self.covariance((output, input));
-        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
-    }
-
     /// Standard deviation of `Re sum_ij w_ij dG_ij`, `w` p x m: what a figure with these slopes inherits, errors of the entries that
     /// hang together included. A peak of the sensitivity is such a figure.
     pub fn along(&self, slopes: MatRef<'_, c64>) -> f64 {
@@ -266,6 +271,28 @@ impl ResponseError {
             (0..self.directions.nrows()).map(entry).sum::<f64>()
         };
         (0..self.directions.ncols()).map(|k| of(k).powi(2)).sum::<f64>().sqrt()
+    }
+}
+
+/// The errors of the entries of G at a frequency, each by itself, physical units.
+#[derive(Debug, Clone)]
+pub struct EntryErrors {
+    /// `[re re, re im, im im]`, row by row.
+    covariances: Vec<[f64; 3]>,
+    inputs: usize,
+}
+
+impl EntryErrors {
+    /// Covariance `[re re, re im, im im]` of the error of an entry (output, input).
+    pub fn covariance(&self, (output, input): (usize, usize)) -> [f64; 3] {
+        self.covariances[output * self.inputs + input]
+    }
+
+    /// Standard deviation of the magnitude of an entry with the response `g`, to first order.
+    pub fn of_magnitude(&self, g: c64, port: (usize, usize)) -> f64 {
+        let (re, im) = if g.norm() > 0.0 { (g.re / g.norm(), g.im / g.norm()) } else { (1.0, 0.0) };
+        let [rr, ri, ii] = self.covariance(port);
+        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
     }
 }
 
@@ -301,7 +328,7 @@ mod tests {
     #[test]
     fn the_deviation_of_the_magnitude_does_not_depend_on_a_dead_time() {
         for ((plain, g), (delayed, of_delayed)) in errors(0).iter().zip(errors(6)) {
-            let ratio = delayed.of_magnitude(of_delayed, (0, 0)) / plain.of_magnitude(*g, (0, 0));
+            let ratio = delayed.entries().of_magnitude(of_delayed, (0, 0)) / plain.entries().of_magnitude(*g, (0, 0));
             assert!((0.85..1.15).contains(&ratio), "{ratio}");
         }
     }
@@ -312,7 +339,7 @@ mod tests {
             let one = Mat::from_fn(1, 1, |_, _| c64::ONE);
             assert!((error.along(one.as_ref()).powi(2) / error.covariance((0, 0))[0] - 1.0).abs() < 1e-12);
             let turned = Mat::from_fn(1, 1, |_, _| g.conj() / g.norm());
-            assert!((error.along(turned.as_ref()) / error.of_magnitude(g, (0, 0)) - 1.0).abs() < 1e-9);
+            assert!((error.along(turned.as_ref()) / error.entries().of_magnitude(g, (0, 0)) - 1.0).abs() < 1e-9);
         }
     }
 }

@@ -100,9 +100,10 @@ impl Root {
     /// `slopes root`: errors of the entries of G, row by row of the outputs.
     pub(crate) fn seen(&self, slopes: &Mat<c64>) -> Mat<c64> {
         if self.own.is_empty() {
-            return Mat::from_fn(slopes.nrows(), self.shared.ncols(), |i, k| {
-                (0..self.shared.nrows()).fold(c64::ZERO, |sum, j| sum + slopes[(i, j)] * self.shared[(j, k)])
-            });
+            let all: Vec<usize> = (0..slopes.ncols()).collect();
+            let mut out = Mat::<c64>::zeros(slopes.nrows(), self.shared.ncols());
+            put(&mut out, (0, 0), &(real(slopes, 0..slopes.nrows(), &all) * &self.shared));
+            return out;
         }
         let m = slopes.nrows() / self.own.len();
         let mut out = Mat::<c64>::zeros(slopes.nrows(), self.errors());

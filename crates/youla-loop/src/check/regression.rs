@@ -217,15 +217,14 @@ impl Lagged {
     pub(super) fn residual(&self, fit: &Fit, target: usize, which: usize) -> Vec<f64> {
         let mut left = vec![0.0; self.rows];
         self.values(target, 0, &mut left);
-        let mut column = vec![0.0; CHUNK];
-        for (part, left) in left.chunks_mut(CHUNK).enumerate() {
-            let column = &mut column[..left.len()];
+        left.par_chunks_mut(CHUNK).enumerate().for_each(|(part, left)| {
+            let mut column = vec![0.0; left.len()];
             for (k, j) in fit.columns.iter().enumerate() {
-                self.values(*j, part * CHUNK, column);
+                self.values(*j, part * CHUNK, &mut column);
                 let coefficient = fit.coefficients[(k, which)];
-                left.iter_mut().zip(&*column).for_each(|(e, value)| *e -= coefficient * value);
+                left.iter_mut().zip(&column).for_each(|(e, value)| *e -= coefficient * value);
             }
-        }
+        });
         left
     }
 

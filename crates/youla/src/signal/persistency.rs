@@ -13,6 +13,8 @@ use rayon::prelude::*;
 
 /// Columns of the Hankel matrix that one task compresses; fixed, so that the result does not depend on the threads.
 const CHUNK: usize = 4096;
+/// Spread of the singular values up to which those of the Gram matrix are taken: rounding changes the least by a part of 1e8.
+const SPREAD: f64 = 1e4;
 
 /// How much of its block-Hankel matrix a signal fills.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,8 +47,8 @@ impl Persistency {
 
 /// Numerical rank of the block-Hankel matrix of `signal` (samples x m) with `block_rows` block rows.
 ///
-/// Singular values below `max(rows, columns) * machine precision` times the largest count as zero. They come from a QR
-/// factorisation, not from the Gram matrix, so that a spread of 1e8 and more is seen.
+/// Singular values below `max(rows, columns) * machine precision` times the largest count as zero. They come from the Gram matrix where
+/// they spread by less than 1e4, else from a QR factorisation, so that a spread of 1e8 and more is seen.
 ///
 /// # Errors
 /// [`Error::OutOfRange`] for no block rows or more of them than samples, [`Error::NotFinite`],
@@ -68,10 +70,13 @@ pub fn persistency(signal: MatRef<f64>, block_rows: usize) -> Result<Persistency
     }
     let scaled = unit_channels(signal);
     let needed = block_rows * signal.ncols();
-    let r = hankel_factor(scaled.as_ref(), block_rows);
-    let values = r.singular_values();
-    let mut values = values
-        .map_err(|_| Error::NoConvergence { what: "the singular values of the excitation".into(), iterations: 0 })?;
+    let mut values = match values_by_gram(scaled.as_ref(), block_rows) {
+        Some(values) => values,
+        None => hankel_factor(scaled.as_ref(), block_rows).singular_values().map_err(|_| Error::NoConvergence {
+            what: "the singular values of the excitation".into(),
+            iterations: 0,
+        })?,
+    };
     values.resize(needed, 0.0);
     let largest = values.first().copied().unwrap_or(0.0);
     let longest = needed.max(signal.nrows() - block_rows + 1) as f64;
@@ -116,19 +121,30 @@ fn unit_channels(signal: MatRef<f64>) -> Mat<f64> {
     Mat::from_fn(signal.nrows(), signal.ncols(), |i, j| signal[(i, j)] * scale[j])
 }
 
+/// Something of each chunk of rows of the transposed block-Hankel matrix.
+fn of_chunks(signal: MatRef<f64>, block_rows: usize, of: fn(Mat<f64>) -> Mat<f64>) -> Vec<Mat<f64>> {
+    let (m, rows) = (signal.ncols(), signal.nrows() - block_rows + 1);
+    let chunk = |first: usize| {
+        let height = CHUNK.min(rows - first);
+        Mat::from_fn(height, block_rows * m, |k, column| signal[(first + k + column / m, column % m)])
+    };
+    let starts: Vec<usize> = (0..rows).step_by(CHUNK).collect();
+    starts.into_par_iter().map(|first| of(chunk(first))).collect()
+}
+
+/// Singular values by the eigenvalues of the Gram matrix, largest first; `None` where they spread by [`SPREAD`] or more.
+fn values_by_gram(signal: MatRef<f64>, block_rows: usize) -> Option<Vec<f64>> {
+    let sum = of_chunks(signal, block_rows, |rows| rows.transpose() * &rows).into_iter().reduce(|a, b| a + b)?;
+    let squares = sum.self_adjoint_eigenvalues(faer::Side::Lower).ok()?;
+    let (least, most) = (*squares.first()?, *squares.last()?);
+    (least * SPREAD * SPREAD > most).then(|| squares.into_iter().rev().map(f64::sqrt).collect())
+}
+
 /// Triangular factor of the transposed block-Hankel matrix: chunks of rows first, then their factors one by one.
 fn hankel_factor(signal: MatRef<f64>, block_rows: usize) -> Mat<f64> {
-    let (m, rows) = (signal.ncols(), signal.nrows() - block_rows + 1);
-    let starts: Vec<usize> = (0..rows).step_by(CHUNK).collect();
-    let factors: Vec<Mat<f64>> = starts
-        .into_par_iter()
-        .map(|first| {
-            let height = CHUNK.min(rows - first);
-            triangle(Mat::from_fn(height, block_rows * m, |k, column| signal[(first + k + column / m, column % m)]))
-        })
-        .collect();
+    let factors = of_chunks(signal, block_rows, triangle);
     let join = |above: Mat<f64>, below: Mat<f64>| triangle(block(&[&[above.as_ref()], &[below.as_ref()]]));
-    factors.into_iter().reduce(join).unwrap_or_else(|| Mat::zeros(0, block_rows * m))
+    factors.into_iter().reduce(join).unwrap_or_else(|| Mat::zeros(0, block_rows * signal.ncols()))
 }
 
 fn triangle(matrix: Mat<f64>) -> Mat<f64> {

@@ -148,14 +148,14 @@ impl Parts {
         let found = &solution.chosen.found;
         let parameters = Chart::new(&found.point.model, found.feedthrough).parameters();
         let mut halves = [Half::default(), Half::default()];
-        for e in problem.experiments {
-            let rows = e.u.nrows();
-            let count = PIECES.iter().find(|(count, least)| rows >= count * least).map_or(2, |(count, _)| *count);
-            for k in 0..count {
-                let (from, to) = ((k * rows / count).saturating_sub(problem.skip), (k + 1) * rows / count);
-                let piece = Experiment::new(e.u.subrows(from, to - from), e.y.subrows(from, to - from));
-                halves[2 * k / count].add(problem, solution, piece);
-            }
+        let pieces: Vec<(usize, Experiment<'_>)> =
+            problem.experiments.iter().flat_map(|e| pieces(e, problem.skip)).collect();
+        let of = |(_, piece): &(usize, Experiment<'_>)| Part::new(problem, solution, &[*piece]);
+        let parts: Vec<Option<Part>> = pieces.par_iter().map(of).collect();
+        for ((half, piece), part) in pieces.into_iter().zip(parts) {
+            let Some(part) = part else { continue };
+            halves[half].records.push(piece);
+            halves[half].parts.push(part);
         }
         let pieces: Vec<&Part> = halves.iter().flat_map(|half| &half.parts).collect();
         let scatter = chow(&pieces, parameters).filter(|(significance, _)| *significance > OVERALL_CHANCE);
@@ -209,13 +209,15 @@ struct Half<'a> {
     parts: Vec<Part>,
 }
 
-impl<'a> Half<'a> {
-    fn add(&mut self, problem: &Problem<'_>, solution: &Solution, piece: Experiment<'a>) {
-        if let Some(part) = Part::new(problem, solution, &[piece]) {
-            self.records.push(piece);
-            self.parts.push(part);
-        }
-    }
+/// The pieces of a record, each with the half in which it lies.
+fn pieces<'a>(e: &Experiment<'a>, skip: usize) -> Vec<(usize, Experiment<'a>)> {
+    let rows = e.u.nrows();
+    let count = PIECES.iter().find(|(count, least)| rows >= count * least).map_or(2, |(count, _)| *count);
+    let piece = |k: usize| {
+        let (from, to) = ((k * rows / count).saturating_sub(skip), (k + 1) * rows / count);
+        (2 * k / count, Experiment::new(e.u.subrows(from, to - from), e.y.subrows(from, to - from)))
+    };
+    (0..count).map(piece).collect()
 }
 
 /// The difference of the responses of two parts at one frequency, in units of the sizes of the channels.

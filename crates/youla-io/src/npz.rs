@@ -1,4 +1,4 @@
-//! NumPy archives (`numpy.savez`, `numpy.savez_compressed`): real arrays of up to two dimensions.
+//! NumPy archives (`numpy.savez`, `numpy.savez_compressed`) and single arrays (`numpy.save`): real arrays of up to two dimensions.
 //!
 //! Source: NumPy, "NEP 1, A simple file format for NumPy arrays", versions 1 to 3. An archive is a zip file of `.npy`
 //! entries, each a magic string, a Python dictionary of type, order and shape, and the numbers.
@@ -12,10 +12,12 @@ use std::path::Path;
 use zip::ZipArchive;
 
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
+/// Name of the array of a file with one: `numpy.save` stores none.
+const SINGLE: &str = "array";
 /// The longest dictionary that is read; NumPy itself stops at 10000 bytes.
 const LONGEST_HEADER: usize = 1 << 16;
 
-/// Reads all arrays of a NumPy archive.
+/// Reads all arrays of a NumPy archive, or the single array of a `.npy` file, whose name is `array`: its second column is `array(:,2)`.
 ///
 /// One-dimensional arrays become columns. Arrays of text, objects, complex numbers, half precision and of more than two
 /// dimensions become [`Value::Unsupported`].
@@ -41,8 +43,16 @@ pub fn npz_from_bytes(bytes: &[u8], path: impl AsRef<Path>) -> Result<Variables>
     variables(Cursor::new(bytes), path.as_ref())
 }
 
-fn variables(file: impl Read + Seek, path: &Path) -> Result<Variables> {
+fn variables(mut file: impl Read + Seek, path: &Path) -> Result<Variables> {
     let corrupt = |offset, expected| Error::Corrupt { path: path.to_owned(), at: CorruptAt::Byte(offset), expected };
+    let io = |source| Error::Io { path: path.to_owned(), source };
+    let mut start = Vec::new();
+    (&mut file).take(MAGIC.len() as u64).read_to_end(&mut start).map_err(io)?;
+    file.rewind().map_err(io)?;
+    if start == MAGIC {
+        let value = array(&mut file).map_err(|expected| corrupt(0, expected))?;
+        return Ok(Variables::new(path, vec![Variable { name: SINGLE.into(), value }]));
+    }
     let mut archive = ZipArchive::new(file).map_err(|e| corrupt(0, format!("a NumPy archive: {e}")))?;
     let mut variables = Vec::new();
     let mut taken: Vec<Range<u64>> = Vec::new();
@@ -227,6 +237,14 @@ mod tests {
         assert_eq!(file.column("i").unwrap(), [-2.0, 256.0]);
         assert_eq!(file.scalar("f").unwrap(), 1.5);
         assert!(file.column("text").unwrap_err().to_string().contains("<U1 (not read)"));
+    }
+
+    #[test]
+    fn a_single_array_has_no_name() {
+        let doubles = [1.0, 2.0, 3.0, 4.0].map(f64::to_le_bytes).concat();
+        let file = read_bytes(&npy("<f8", "False", "(2, 2)", &doubles)).unwrap();
+        assert_eq!(file.column("array(:,2)").unwrap(), [2.0, 4.0]);
+        assert!(matches!(read_bytes(&npy("<f8", "False", "(3, 2)", &doubles)), Err(Error::Corrupt { .. })));
     }
 
     #[test]

@@ -5,7 +5,7 @@ use crate::choose::ChannelSpec;
 use crate::csv::{CsvOptions, read_csv_parts};
 use crate::error::{Error, Result};
 use crate::matfile::read_mat;
-use crate::npz::read_npz;
+use crate::npz::{self, read_npz};
 use crate::open::open;
 use crate::time::TimeSource;
 use serde::{Deserialize, Serialize};
@@ -18,14 +18,14 @@ use youla::signal::Record;
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Format {
-    /// By the first bytes of the file (MATLAB, HDF5, zip), else text.
+    /// By the first bytes of the file (MATLAB, HDF5, zip, NumPy), else text.
     #[default]
     Detect,
     /// Text, see [`crate::read_csv`].
     Csv,
     /// MATLAB version 5, see [`read_mat`].
     Mat,
-    /// NumPy archive, see [`read_npz`].
+    /// NumPy archive or array, see [`read_npz`].
     Npz,
 }
 
@@ -125,6 +125,7 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
     read.map_err(|e| Error::Io { path: source.path.clone(), source: e })?;
     Ok(match &start[..] {
         [b'P', b'K', 3, 4, ..] => Format::Npz,
+        start if start.starts_with(npz::MAGIC) => Format::Npz,
         start if start.starts_with(b"PAR1") => {
             let remedy = "save the data as CSV or NPZ, or read it by the Python package";
             return Err(Error::FormatNotRead { path: source.path.clone(), found: "a Parquet file", remedy });

@@ -63,7 +63,7 @@ fn bound(system: &Loop, record: &[youla::Mat<f64>; 3]) -> Result<Vec<f64>> {
     let stated = system.recommended(record, &options)?.region;
     let (p, m) = (system.plant.outputs(), system.plant.inputs());
     let variance = |hz: f64| {
-        let error = stated.at(hz);
+        let error = stated.at(hz).entries();
         let of = |x: usize| error.covariance((x / m, x % m));
         (0..p * m).map(|x| of(x)[0] + of(x)[2]).sum::<f64>()
     };

@@ -157,7 +157,7 @@ impl RunFolder {
     pub fn finish(mut self) -> Result<PathBuf> {
         Self::check_free(&self.target, self.replace)?;
         let io = |source| Error::Io { path: self.target.clone(), source };
-        // Removed while it is held: nobody gets a lock that stands in the folder.
+        // Removed while it is held: no other run can lock a file of this folder.
         fs::remove_file(self.partial.join(LOCK)).map_err(io)?;
         self.lock = None;
         let files = files_below(&self.partial).map_err(io)?;

@@ -16,7 +16,6 @@ const MOST_GROUPS: usize = 6;
 struct Group {
     /// Of each record.
     records: Vec<[Vec<c64>; 3]>,
-    channels: [usize; 3],
 }
 
 /// The error of the model as the excitation shows it.
@@ -47,16 +46,15 @@ impl Group {
         }
         let point = with_best_ends(&spectra, found.point.model.clone(), &found.noise);
         let residuals = point.residuals(&spectra);
-        let channels = [spectra.inputs, spectra.outputs, records.first().map_or(0, |(_, x)| x.ncols())];
         let all = spectra.records.into_iter().zip(residuals).zip(records);
         let records = all.map(|((lines, v), (_, x))| [lines.u, v, lines_of(*x, problem.skip)]).collect();
-        Some(Group { records, channels })
+        Some(Group { records })
     }
 
     /// Under a Hann window.
-    fn windowed(self) -> Self {
-        let of = |record: [Vec<c64>; 3]| std::array::from_fn(|k| hann(&record[k], self.channels[k]));
-        Group { records: self.records.into_iter().map(of).collect(), ..self }
+    fn windowed(self, Channels { m, p, q }: Channels) -> Self {
+        let of = |[u, v, x]: [Vec<c64>; 3]| [hann(&u, m), hann(&v, p), hann(&x, q)];
+        Group { records: self.records.into_iter().map(of).collect() }
     }
 
     fn lines(&self) -> impl Iterator<Item = RecordLines<'_>> {
@@ -79,12 +77,12 @@ impl Witness {
         if moving.is_empty() {
             return None;
         }
-        let group = |records: &[Pair<'_>]| Group::new(problem, solution, records).map(Group::windowed);
         let q = of_records.iter().map(|(_, x)| x.ncols()).max().unwrap_or(0);
         let channels = Channels { m: problem.inputs(), p: problem.outputs(), q };
+        let group = |records: &[Pair<'_>]| Some(Group::new(problem, solution, records)?.windowed(channels));
         let plain = Group::new(problem, solution, &of_records)?;
         let excited = explained_inputs(&plain.lines().collect::<Vec<_>>(), channels);
-        let (first, second) = (plain.windowed(), group(&of_fresh));
+        let (first, second) = (plain.windowed(channels), group(&of_fresh));
         let all: Vec<RecordLines<'_>> = first.lines().chain(second.iter().flat_map(Group::lines)).collect();
         let lines = |all: &[RecordLines<'_>]| all.iter().map(|r| r.v.len() / channels.p).sum::<usize>();
         let parameters = solution.chosen.found.parameters;

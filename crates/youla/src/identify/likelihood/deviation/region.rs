@@ -229,7 +229,7 @@ pub struct ResponseError {
 
 impl ResponseError {
     /// Covariance `[re re, re im, im im]` of the error of an entry (output, input).
-    pub fn covariance(&self, (output, input): (usize, usize)) -> [f64; 3] {
+    fn covariance(&self, (output, input): (usize, usize)) -> [f64; 3] {
         let row = output * self.inputs + input;
         let mut sums = [0.0; 3];
         for k in 0..self.directions.ncols() {

@@ -23,11 +23,13 @@ pub use robust::DeviationRegion;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use structured::{PidOptions, Structure};
-use youla::control::{closed_loop, with_input_port};
+use youla::control::{ChannelScales, closed_loop, with_input_port};
 use youla::factor::CoprimeFactors;
-use youla::identify::likelihood::Region;
+use youla::identify::likelihood::{Interval, Region};
 use youla::lti::{Discrete, StateSpace};
-use youla::validate::{BandCertificate, BandOptions, ExactCertificate, certify_deviation, certify_region};
+use youla::validate::{
+    BandCertificate, BandOptions, ExactCertificate, MarginInterval, certify_deviation, certify_region, margin_intervals,
+};
 use youla::{ErrorKind, Mat};
 
 /// What is redesigned.
@@ -156,8 +158,19 @@ pub struct Redesign {
     pub exact: Option<ExactCertificate>,
     /// The new loop over the region of the plant, where it is known.
     pub band: Option<BandCertificate>,
+    /// Figures of the new loop of the plant with their intervals, where the region is known.
+    pub intervals: Option<PredictedIntervals>,
     /// All weights that were tried, in the order of the options.
     pub candidates: Vec<TriedWeight>,
+}
+
+/// What the region of the plant leaves open of the new loop.
+#[derive(Debug, Clone)]
+pub struct PredictedIntervals {
+    /// Least damping of the loop, see [`LoopFigures::least_damping`].
+    pub least_damping: Option<Interval>,
+    /// Its margins.
+    pub margins: Vec<MarginInterval>,
 }
 
 impl Redesign {
@@ -197,7 +210,21 @@ pub fn redesign(problem: &RedesignProblem<'_>, options: &RedesignOptions) -> Res
             let method = options.method;
             let exact = controller.q.as_ref().map(|q| certify_deviation(problem.factors, &deviation, Some(q)));
             let exact = exact.transpose()?;
-            return Ok(Redesign { method, input_weight, controller, present, predicted, exact, band, candidates });
+            let intervals = match (problem.region, &band) {
+                (Some(region), Some(band)) => Some(predicted_intervals(problem, region, &controller, band.level)?),
+                _ => None,
+            };
+            return Ok(Redesign {
+                method,
+                input_weight,
+                controller,
+                present,
+                predicted,
+                exact,
+                band,
+                intervals,
+                candidates,
+            });
         }
         tried[k].0.refused = band.map(|b| {
             format!("unstable for {} of {} models within the region of the plant", b.unstable_within, b.within)
@@ -295,6 +322,26 @@ fn band(
     let possible = |plant: &StateSpace<Discrete>| closed_loop(plant, &running)?.is_stable();
     let ports = with_input_port(&controller.system)?;
     Ok(Some(certify_region(region, &options.band, possible, |plant| closed_loop(plant, &ports))?))
+}
+
+/// Intervals of the new loop: of the damping by the delta method over the region, of the margins by their slopes where they are critical.
+fn predicted_intervals(
+    problem: &RedesignProblem<'_>,
+    region: &Region,
+    controller: &NewController,
+    level: f64,
+) -> Result<PredictedIntervals> {
+    let (plant, k) = (problem.plant, &controller.system);
+    let (m, p) = (plant.inputs(), plant.outputs());
+    let ports = with_input_port(k)?;
+    let damping = |plant: &StateSpace<Discrete>| {
+        let response = closed_loop(plant, &ports)?.part(m..m + p, 0..m);
+        Ok(vec![least_damping(&loop_modes(&response.in_units(problem.input_size, problem.output_size))?)])
+    };
+    let least_damping = region.intervals(level, damping)?.first().copied();
+    let scales = ChannelScales::new(problem.input_size.to_vec(), problem.output_size.to_vec())?;
+    let margins = margin_intervals(plant, k, region, Some(&scales), level)?;
+    Ok(PredictedIntervals { least_damping, margins })
 }
 
 /// A diagonal matrix.

@@ -20,7 +20,10 @@ pub(super) fn line(redesign: &Redesign) -> Verdict {
 }
 
 fn sentence(redesign: &Redesign) -> String {
-    let Redesign { present, predicted, .. } = redesign;
+    let Redesign { present, predicted, intervals, .. } = redesign;
+    let interval = intervals.as_ref().and_then(|i| i.least_damping);
+    let interval =
+        interval.map_or_else(String::new, |i| format!(" (95 % interval {:.3} to {:.3})", i.bounds[0], i.bounds[1]));
     let band = redesign.band.map_or_else(String::new, |b| {
         format!(
             "; it stabilises all {} models drawn from the {:.0} % confidence region of the plant",
@@ -30,7 +33,7 @@ fn sentence(redesign: &Redesign) -> String {
     });
     let verb = if redesign.gains_damping() { "raises" } else { "lowers" };
     format!(
-        "The new controller {verb} the minimum damping of the loop from {:.3} to {:.3}. The peak response to a disturbance at the \
+        "The new controller {verb} the minimum damping of the loop from {:.3} to {:.3}{interval}. The peak response to a disturbance at the \
          plant input is {:.2} (present controller: {:.2}) and the peak sensitivity {:.2} (present: {:.2}){band}. These are \
          predictions: the controller has not run yet.",
         present.least_damping,

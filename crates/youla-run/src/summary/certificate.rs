@@ -22,15 +22,20 @@ pub struct CertificateEntry {
     pub margins: BTreeMap<String, IntervalEntry>,
 }
 
+/// Margins by name, as keys.
+pub(crate) fn margins(all: &[MarginInterval]) -> BTreeMap<String, IntervalEntry> {
+    let margin = |m: &MarginInterval| (m.name.replace(',', "").replace(' ', "_"), IntervalEntry::from(&m.interval));
+    all.iter().map(margin).collect()
+}
+
 impl From<&RunCertificate> for CertificateEntry {
     fn from(certificate: &RunCertificate) -> Self {
-        let margin = |m: &MarginInterval| (m.name.replace(',', "").replace(' ', "_"), IntervalEntry::from(&m.interval));
         CertificateEntry {
             stable: certificate.exact.stable,
             deviation_poles: pairs(&certificate.exact.deviation_poles),
             identity_residual: finite(certificate.exact.identity_residual),
             band: BandEntry::from(&certificate.band),
-            margins: certificate.margins.iter().map(margin).collect(),
+            margins: margins(&certificate.margins),
         }
     }
 }

@@ -1,8 +1,10 @@
 //! A redesign in `8-redesign/redesign.json` and summary.json.
 
-use super::entries::{BandEntry, finite};
+use super::certificate::margins;
+use super::entries::{BandEntry, IntervalEntry, finite};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use youla::lti::SharedMode;
 use youla::validate::ExactCertificate;
 use youla_loop::redesign::{LoopFigures, Redesign, RedesignMethod, TriedWeight};
@@ -22,6 +24,12 @@ pub struct RedesignEntry {
     pub predicted: LoopEntry,
     /// The new controller on every model within the region of the plant; `null` without an uncertainty.
     pub band: Option<BandEntry>,
+    /// Least damping of the new loop on the plant, with its interval over the region.
+    #[serde(default)]
+    pub least_damping: Option<IntervalEntry>,
+    /// Margins of the new loop on the plant with their intervals, by name.
+    #[serde(default)]
+    pub margins: BTreeMap<String, IntervalEntry>,
     /// The exact test of the plant with K(Q), for `youla`.
     pub exact: Option<ExactEntry>,
     /// All weights that were tried.
@@ -72,6 +80,11 @@ impl From<&Redesign> for RedesignEntry {
             present: LoopEntry::from(&redesign.present),
             predicted: LoopEntry::from(&redesign.predicted),
             band: redesign.band.as_ref().map(BandEntry::from),
+            least_damping: redesign
+                .intervals
+                .as_ref()
+                .and_then(|i| Some(IntervalEntry::from(i.least_damping.as_ref()?))),
+            margins: redesign.intervals.as_ref().map_or_else(BTreeMap::new, |i| margins(&i.margins)),
             exact: redesign.exact.as_ref().map(exact),
             candidates: redesign.candidates.clone(),
         }

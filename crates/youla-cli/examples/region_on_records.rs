@@ -233,7 +233,7 @@ fn run(machine: &Machine) -> Result<()> {
     let declared = declared_loop(&settings_of_all, &records, &folder)?;
     let found = |estimation: &[LoopRecord], fresh: &[LoopRecord]| {
         let options = LikelihoodOptions::default();
-        youla::identify(estimation, fresh, &declared.running, Some(&declared.nominal), &options)
+        youla::identify(estimation, fresh, &declared.running, declared.nominal.as_ref(), &options)
             .map(|found| found.model)
     };
     match machine.folds {

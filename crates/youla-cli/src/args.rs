@@ -67,7 +67,7 @@ pub(crate) enum Command {
     },
     /// Identify a machine from records of its closed loop.
     ///
-    /// Channels, sample time, nominal model and controller are enough: method, order, dead time and noise model are chosen by the
+    /// Channels, sample time and controller are enough: method, order, dead time and noise model are chosen by the
     /// evidence of the records. They are stated in a run.toml or, for a plain log, by flags.
     #[command(after_help = identify::EXAMPLES)]
     Identify(Box<identify::IdentifyArgs>),

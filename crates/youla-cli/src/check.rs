@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 use youla_io::folder::require_place;
 use youla_loop::check::Severity;
-use youla_run::{CheckedFiles, DataCheck, RunSettings, check_files, check_run, read_check_options};
+use youla_run::{CheckedFiles, DataCheck, check_files, check_run, read_check_options, read_settings};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -61,7 +61,7 @@ fn of_run(args: &CheckArgs) -> Result<DataCheck, Failure> {
         let what = "the number of run.toml files (give --input and --output for files of data)".into();
         return Err(youla::Error::Ports { what, expected: 1, found: args.files.len() }.into());
     };
-    Ok(check_run(&RunSettings::read(settings)?, &folder_of(settings))?)
+    Ok(check_run(&read_settings(settings)?, &folder_of(settings))?)
 }
 
 fn of_files(args: &CheckArgs) -> Result<DataCheck, Failure> {

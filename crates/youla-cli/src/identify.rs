@@ -5,13 +5,15 @@ use crate::output::Failure;
 use crate::run_folder::{OutputFolder, folder_of};
 use clap::Args;
 use std::path::{Path, PathBuf};
-use youla_loop::check::{Severity, Test};
-use youla_run::{ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings};
+use youla_run::{
+    ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings, agreeing_feedback, agreement,
+    check_run, read_settings,
+};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
   youla identify examples/flexible-drive/run.toml --out drive-run
-  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --nominal nominal.json --controller K.json --feedback positive
+  youla identify log.csv --input u --output y --excitation d --sample-time 5e-4 --controller K.json --feedback positive
 
 A model file is JSON with ts, a, b, c and d by rows; a MATLAB or NumPy file with the same names; or a model that `youla` wrote.
 The controller may also be JSON as [controller] of run.toml:
@@ -25,7 +27,7 @@ pub(crate) struct IdentifyArgs {
     files: Vec<PathBuf>,
     #[command(flatten)]
     log: LogFlags,
-    /// File with the nominal model, in discrete time.
+    /// File with a nominal model, in discrete time, for comparison; the result does not rest on it.
     #[arg(long, value_name = "FILE", requires = "input")]
     nominal: Option<PathBuf>,
     /// File with the controller that ran: a model in discrete time, or JSON with what [controller] of run.toml holds.
@@ -51,7 +53,7 @@ impl IdentifyArgs {
             let what = "the number of run.toml files (give --input and --output for a log)".into();
             return Err(youla::Error::Ports { what, expected: 1, found: self.files.len() }.into());
         };
-        Ok((RunSettings::read(settings)?, folder_of(settings)))
+        Ok((read_settings(settings)?, folder_of(settings)))
     }
 
     fn of_log(&self) -> Result<RunSettings, Failure> {
@@ -66,16 +68,16 @@ impl IdentifyArgs {
             csv: log.dialect.options(),
             ..DataSettings::new(specs(&log.input), specs(&log.output), self.files.iter().map(file).collect())
         };
-        let Some(nominal) = &self.nominal else { return Err(self.missing("--nominal FILE, the nominal model")) };
         let zeros = |rows: usize, columns: usize| vec![vec![0.0; columns]; rows];
         let (m, p) = (data.inputs.len(), data.outputs.len());
         let name = self.files[0].file_stem().map_or_else(|| "log".to_owned(), |n| n.to_string_lossy().into_owned());
-        let nominal = NominalModel::ModelFile { file: nominal.clone(), domain: None };
+        let nominal = self.nominal.clone().map(|file| NominalModel::ModelFile { file, domain: None });
+        let with = |controller| RunSettings {
+            nominal: nominal.clone(),
+            ..RunSettings::new(name.clone(), data.clone(), controller)
+        };
         let controller = match &self.controller {
-            Some(file) => {
-                let with = |controller| RunSettings::new(name.clone(), data.clone(), nominal.clone(), controller);
-                self.controller_of(file, with)?
-            }
+            Some(file) => self.controller_of(file, with)?,
             None if self.open_loop => ControllerSettings::StateSpace {
                 feedback: Feedback::Positive,
                 domain: None,
@@ -88,7 +90,7 @@ impl IdentifyArgs {
             },
             None => return Err(self.missing("--controller FILE, the controller that ran, or --open-loop")),
         };
-        Ok(RunSettings::new(name, data, nominal, controller).checked()?)
+        Ok(with(controller).checked()?)
     }
 
     /// A file with what `[controller]` of run.toml holds states its sign itself; a model needs the flag.
@@ -102,15 +104,11 @@ impl IdentifyArgs {
         match (ControllerSettings::from_json(file)?, self.feedback) {
             (None, Some(sign)) => Ok(model(sign.into())),
             (None, None) => {
-                let explains = |sign: Sign| explains_the_input(&with(model(sign.into())));
-                let agrees = match [explains(Sign::Negative), explains(Sign::Positive)] {
-                    [true, false] => "; the log agrees with negative",
-                    [false, true] => "; the log agrees with positive",
-                    _ => "; the log does not tell which",
-                };
+                let agrees = agreeing_feedback(|sign| check_run(&with(model(sign)), Path::new("")).ok());
                 refuse(format!(
                     "the sign of this controller is not stated: add --feedback negative for u = K (r - y), or --feedback positive for \
-                     u = K (y - r){agrees}"
+                     u = K (y - r){}",
+                    agreement(agrees)
                 ))
             }
             (Some(controller), None) => Ok(controller),
@@ -122,10 +120,4 @@ impl IdentifyArgs {
         let path = self.files.first().map_or(Path::new(""), PathBuf::as_path).to_owned();
         youla_io::Error::Settings { path, at: None, problem: format!("a log needs {flag}") }.into()
     }
-}
-
-/// Whether the controller of the settings explains the logged inputs, by the check of the data.
-fn explains_the_input(settings: &RunSettings) -> bool {
-    let findings = youla_run::check_run(settings, Path::new("")).map(|check| check.findings);
-    findings.is_ok_and(|all| !all.iter().any(|f| f.test == Test::Controller && f.severity == Severity::Defect))
 }

@@ -223,7 +223,7 @@ fn next(args: &InitArgs, draft: &Draft) -> String {
         ),
     };
     let fill = match draft.feedback {
-        Some(_) => "Now fill in numerator and denominator of [nominal] and [controller], then\n",
+        Some(_) => "Now fill in numerator and denominator of [controller], then\n",
         None => "Now\n",
     };
     format!("wrote {file}\n{split}{fill}  youla check {file}\n  youla identify {file}")

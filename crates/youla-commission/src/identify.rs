@@ -44,7 +44,8 @@ pub(crate) fn identified(running: &RunningLoop, rows: &CleanRows, name: &str) ->
         ..DataSettings::new(specs(["u_h", "u_v"], "V"), specs(["y_h", "y_v"], "um"), vec![file])
     };
     let description = running.description.clone();
-    let settings = RunSettings::new(name.into(), data, description.nominal, description.controller);
+    let mut settings = RunSettings::new(name.into(), data, description.controller);
+    settings.nominal = Some(description.nominal);
     let time = running.nominal.time();
     let channels = |names: [&str; 2], unit: &str| names.map(|name| Channel::new(name, unit)).to_vec();
     let record = LoopRecord::new(time, rows.u.clone(), rows.y.clone())?.with_alpha(rows.alpha.clone())?.named("log");

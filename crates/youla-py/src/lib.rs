@@ -25,7 +25,7 @@ mod _native {
     #[pymodule_export]
     use super::models::{certify, frequency_response, modes, reduce, simulate, simulate_loop};
     #[pymodule_export]
-    use super::parts::{Subspace, check, excite, subspace};
+    use super::parts::{Subspace, agreement, check, excite, subspace};
     #[pymodule_export]
     use super::replicate::replicate;
     #[pymodule_export]

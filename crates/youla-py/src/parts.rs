@@ -10,7 +10,10 @@ use pyo3::prelude::*;
 use std::path::Path;
 use youla::identify::subspace::SubspaceModel;
 use youla_loop::excite::ExciteOptions;
-use youla_run::{ExcitationPort, check_in_memory, excite_run, parse_subspace_options, records_in_memory};
+use youla_run::{
+    ExcitationPort, Feedback, RunSettings, agreeing_feedback, check_in_memory, excite_run, parse_subspace_options,
+    records_in_memory,
+};
 
 /// Checks records, with their controller where `controller` says so; the findings as JSON.
 #[pyfunction]
@@ -21,6 +24,22 @@ pub(crate) fn check(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, controller
         let records = records_in_memory(&chosen.data, logs)?;
         let found = check_in_memory(&chosen, &records, Path::new("."), controller)?;
         Ok(serde_json::to_string(&found.entry())?)
+    })
+}
+
+/// What the records say of the sign of a controller that states none, for a message; the settings lack `feedback` only.
+#[pyfunction]
+pub(crate) fn agreement(py: Python<'_>, unsigned: &str, logs: Vec<Log<'_>>) -> PyResult<&'static str> {
+    let unsigned = as_toml(unsigned)?;
+    let logs = records(py, logs)?;
+    worker::run(py, false, move |_| {
+        let Some(with) = RunSettings::without_feedback(&unsigned) else { return Ok("") };
+        let check = |sign: Feedback| {
+            let chosen = with(sign)?;
+            let records = records_in_memory(&chosen.data, logs.clone()).ok()?;
+            check_in_memory(&chosen, &records, Path::new("."), true).ok()
+        };
+        Ok(youla_run::agreement(agreeing_feedback(check)))
     })
 }
 

@@ -8,13 +8,14 @@ use crate::region::{Region, RegionOut, response_array};
 use crate::worker::{self, Stop};
 use numpy::{Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla_run::{
-    Identification, Method, RunRecords, RunSettings, Stage, StageClock, StageTimes, page, read_records,
+    Identification, Method, RunRecords, RunSettings, Stage, StageClock, StageTimes, page, read_records, read_settings,
     records_in_memory, redesign_of, response_in_memory, summary, write_run,
 };
 
@@ -51,7 +52,7 @@ pub(crate) fn identify(
 pub(crate) fn identify_file(py: Python<'_>, path: PathBuf) -> PyResult<Run> {
     worker::run(py, false, move |stop| {
         let folder = path.parent().unwrap_or(Path::new("")).to_owned();
-        pipeline(RunSettings::read(&path)?, &folder, stop, |chosen| Ok(read_records(&chosen.data, &folder)?))
+        pipeline(read_settings(&path)?, &folder, stop, |chosen| Ok(read_records(&chosen.data, &folder)?))
     })
 }
 
@@ -129,7 +130,7 @@ impl Run {
 
     /// The matrices of a model; `None` where it does not exist.
     fn model<'py>(&self, py: Python<'py>, key: &str) -> Option<ModelOut<'py>> {
-        self.model_of(key).map(|model| model_out(py, model))
+        self.model_of(key).map(|model| model_out(py, &model))
     }
 
     /// Names and units of inputs and outputs.
@@ -223,17 +224,19 @@ impl Run {
         Ok(page(&self.found, &summary(&self.found, &self.seconds)?, "")?)
     }
 
-    fn model_of(&self, key: &str) -> Option<&StateSpace<Discrete>> {
-        let scheme = self.found.scheme();
-        match key {
+    fn model_of(&self, key: &str) -> Option<Cow<'_, StateSpace<Discrete>>> {
+        if key == "deviation" {
+            return self.found.deviation().ok()?.map(Cow::Owned);
+        }
+        let model = match key {
             "controller" => Some(self.found.declared.controller()),
-            "deviation" => Some(&scheme?.deviation.model),
             "new_controller" => match &self.found.pid {
                 Some(pid) => Some(&pid.as_ref().ok()?.system),
                 None => Some(&self.found.redesign.as_ref()?.as_ref().ok()?.controller.system),
             },
             key => Some(&self.found.validation.of(*Method::ALL.iter().find(|m| m.key() == key)?)?.model),
-        }
+        };
+        model.map(Cow::Borrowed)
     }
 
     fn region(&self, key: &str, hz: &[f64]) -> Result<Region> {
@@ -258,6 +261,6 @@ impl Run {
                 self.models().join(", ")
             ))
         })?;
-        band.map_or_else(|| Region::none(model, hz), |band| Ok(Region::band(band)))
+        band.map_or_else(|| Region::none(&model, hz), |band| Ok(Region::band(band)))
     }
 }

@@ -74,7 +74,8 @@ pub fn excite_run(
     let port = port.unwrap_or_else(|| usual_port(settings, &declared.running));
     let (inputs, outputs) = (channels_of(&settings.data.inputs), channels_of(&settings.data.outputs));
     let ported = ported(settings, folder, &declared, port)?;
-    let on = ExcitedLoop { nominal: &declared.nominal, controller: &ported, inputs: &inputs, outputs: &outputs };
+    let on =
+        ExcitedLoop { nominal: declared.required_nominal()?, controller: &ported, inputs: &inputs, outputs: &outputs };
     let mut options = options.clone();
     if let Some(file) = quiet {
         options.noise = noise_of(settings, &on, file).map_err(|e| e.within(file.display().to_string()))?;
@@ -118,15 +119,16 @@ fn ported(
     if port == ExcitationPort::Input {
         return Ok(with_input_port(declared.controller())?);
     }
+    let nominal = declared.required_nominal()?;
     let sizes = match declared.running.gains() {
         // The factors of observer gains do not depend on them.
-        Some(_) => (vec![1.0; declared.nominal.inputs()], vec![1.0; declared.nominal.outputs()]),
+        Some(_) => (vec![1.0; nominal.inputs()], vec![1.0; nominal.outputs()]),
         None => {
             let part = "the port alpha of a controller without observer gains rests on the estimation records (or take the port input)";
             read_records(&settings.data, folder).map_err(|e| e.within(part))?.sizes()
         }
     };
-    Ok(factorise(declared, sizes, &settings.factors)?.factors.j_k()?)
+    Ok(factorise((nominal, &declared.running), sizes, &settings.factors)?.factors.j_k()?)
 }
 
 fn noise_of(settings: &RunSettings, on: &ExcitedLoop, file: &Path) -> Result<Vec<f64>> {

@@ -16,6 +16,7 @@ use crate::{Error, Result};
 use youla::identify::hansen::HansenModel;
 use youla::identify::likelihood::Recommendation;
 use youla::identify::subspace::SubspaceModel;
+use youla::lti::{Discrete, StateSpace};
 use youla::signal::IndirectResponse;
 use youla_loop::redesign::Redesign;
 use youla_loop::redesign::structured::PidRedesign;
@@ -104,6 +105,17 @@ impl Identification {
         .into_iter()
         .flatten()
         .collect()
+    }
+
+    /// S, the deviation of the recommended plant from the nominal model; `None` without one of them, and without factors.
+    ///
+    /// # Errors
+    /// Numerical conditions of [`youla::factor::CoprimeFactors::deviation_of`].
+    pub fn deviation(&self) -> Result<Option<StateSpace<Discrete>>> {
+        let (Some(_), Ok(model), Ok(filtered)) = (&self.declared.nominal, &self.recommended, &self.filtered) else {
+            return Ok(None);
+        };
+        Ok(Some(filtered.factorisation.factors.deviation_of(&model.plant)?))
     }
 
     /// The scheme, where it gave a model.

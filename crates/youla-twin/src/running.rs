@@ -104,7 +104,7 @@ impl RunningLoop {
     pub fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let nominal = description.nominal.realise(folder, time)?;
-        let running = description.controller.realise(&nominal, folder)?;
+        let running = description.controller.realise(nominal.time(), Some(&nominal), folder)?;
         let Some([f, l]) = running.gains() else {
             let problem = "the controller of the firmware is an observer; give [controller.observer]".into();
             return Err(Error::Loop { path: path.to_owned(), problem });

@@ -29,7 +29,7 @@ _MODELS = {
     "grey_box": "4-identify/grey_box",
     "true_plant": "2-factor/true_plant",
     "controller": "2-factor/controller",
-    "deviation": "4-identify/hansen_deviation",
+    "deviation": "4-identify/deviation",
     "new_controller": "8-redesign/new_controller",
 }
 
@@ -250,7 +250,9 @@ def again(run: Kept) -> tuple[dict[str, Any], list[Log], int]:
             logs.append((record["name"], records["sample_time"], [(n, unit, k) for k, (n, unit) in enumerate(channels)], table))
     named = {purpose: [{"file": r["name"], "name": r["name"]} for r in records[purpose]] for purpose in ("estimation", "verification")}
     settings["data"] = {"sample_time": records["sample_time"], **{k: g for k, g in groups.items() if g}, **named, "detrend": "none"}
-    settings["nominal"] = {"state_space": _matrices(run.model("nominal"))}
+    nominal = run.model("nominal")
+    if nominal is not None:
+        settings["nominal"] = {"state_space": _matrices(nominal)}
     if "observer" not in settings["controller"]:
         settings["controller"] = {"state_space": {"feedback": "positive", **_matrices(run.model("controller"))}}
     found_settings: dict[str, Any] = _without_none(settings)
@@ -258,7 +260,7 @@ def again(run: Kept) -> tuple[dict[str, Any], list[Log], int]:
 
 
 def _matrices(model: Matrices | None) -> dict[str, Any]:
-    assert model is not None  # every run has a nominal model and a controller
+    assert model is not None  # every run has a controller
     a, b, c, d, _ = model
     return {"domain": "discrete", "a": a.tolist(), "b": b.tolist(), "c": c.tolist(), "d": d.tolist()}
 

@@ -6,8 +6,10 @@
 
 mod files;
 mod result;
+mod sign;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
+pub use sign::{agreeing_feedback, agreement, read_settings};
 
 use crate::records::RunRecords;
 use crate::settings::computed::ComputedChannels;
@@ -19,7 +21,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::ErrorKind;
-use youla::identify::subspace::SubspaceOptions;
+use youla::identify::subspace::{Horizon, SubspaceOptions};
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::LoopRecord;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions};
@@ -54,7 +56,7 @@ pub struct CheckedFiles {
 pub fn check_run(settings: &RunSettings, folder: &Path) -> Result<DataCheck> {
     settings.check()?;
     let d = &settings.data;
-    let job = job(d, with_order(&settings.check, &settings.hansen))?;
+    let job = job(d, with_order(&settings.check, settings.hansen.as_ref()))?;
     let controller = |time: Discrete| Ok(Some(DeclaredLoop::new(settings, folder, time)?.controller().clone()));
     let mut found = check_all(&job, &d.labelled(), folder, &controller)?;
     found.findings.extend(method_finding(settings));
@@ -126,7 +128,7 @@ pub(super) fn check_records(
 ) -> Result<DataCheck> {
     let d = &settings.data;
     let names = names(d.groups());
-    let options = with_order(&settings.check, &settings.hansen);
+    let options = with_order(&settings.check, settings.hansen.as_ref());
     let all: Vec<&LoopRecord> = records.estimation.iter().chain(&records.verification).collect();
     let computed = ComputedChannels::new(d)?;
     let channels: Vec<&ChannelSpec> = d.groups().into_iter().flatten().collect();
@@ -159,8 +161,9 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
     found.map_or((String::new(), 1), |(_, f)| (f.file.display().to_string(), f.skip.saturating_add(1)))
 }
 
-fn with_order(options: &CheckOptions, hansen: &SubspaceOptions) -> CheckOptions {
-    let horizons = hansen.horizon.past.saturating_add(hansen.horizon.future);
+fn with_order(options: &CheckOptions, hansen: Option<&SubspaceOptions>) -> CheckOptions {
+    let horizon = hansen.map_or_else(Horizon::default, |hansen| hansen.horizon);
+    let horizons = horizon.past.saturating_add(horizon.future);
     CheckOptions { excitation_order: options.excitation_order.or(Some(horizons)), ..options.clone() }
 }
 

@@ -55,9 +55,11 @@ pub enum Error {
     /// No method gives a model.
     #[error("{0}")]
     NoModel(NoModel),
-    /// The controller does not stabilise the nominal model.
-    #[error("the controller does not stabilise the nominal model: the closed loop has the pole {pole}; {cause}")]
+    /// The controller does not stabilise the model that is factorised with it.
+    #[error("the controller does not stabilise the {model} model: the closed loop has the pole {pole}; {cause}")]
     NotStabilised {
+        /// `nominal` or `recommended`.
+        model: &'static str,
         /// The worst closed-loop pole with its magnitude.
         pole: String,
         /// The most likely cause, and the key that mends it.

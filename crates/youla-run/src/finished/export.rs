@@ -64,7 +64,7 @@ pub fn model_for_export(source: &Path, name: Option<&str>) -> Result<NamedModel>
 pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerExport> {
     require_run(run)?;
     let path = run.join("2-factor/left.json");
-    let (nominal, left) = (read_model(run.join("2-factor/nominal.json"))?, read_model(&path)?);
+    let (nominal, left) = (read_model(base_of(run))?, read_model(&path)?);
     let q_origin = q.map(|q| Ok::<_, Error>(format!(" and {}", origin(q, q)?))).transpose()?.unwrap_or_default();
     Ok(ControllerExport {
         name: "controller".into(),
@@ -75,6 +75,12 @@ pub fn controller_for_export(run: &Path, q: Option<&Path>) -> Result<ControllerE
         q: q.map(parameter).transpose()?,
         origin: origin(run, &path)? + &q_origin,
     })
+}
+
+/// The model of the factors of a run: the nominal one, the recommended one where none was given.
+fn base_of(run: &Path) -> PathBuf {
+    let nominal = run.join("2-factor/nominal.json");
+    if nominal.is_file() { nominal } else { run.join("4-identify/recommended.json") }
 }
 
 /// The loop of a firmware: nominal model and gains of a run whose controller is an observer, or those of the `controller.json` of a redesign
@@ -124,10 +130,10 @@ pub fn pid_for_export(run: &Path) -> Result<PidExport> {
 
 fn loop_of_run(run: &Path) -> Result<LoopExport> {
     require_run(run)?;
-    let (path, settings) = (run.join("2-factor/nominal.json"), RunSettings::read(&run.join("run.toml"))?);
+    let (path, settings) = (base_of(run), RunSettings::read(&run.join("run.toml"))?);
     let nominal = read_model(&path)?;
     let time = nominal.system.time();
-    let running = settings.controller.realise(&nominal.system, run)?;
+    let running = settings.controller.realise(time, Some(&nominal.system), run)?;
     let Some([f, l]) = running.gains() else {
         let problem = "the controller of this run is no observer with gains; the loop of the firmware needs [controller.observer], and \
                        --to c-controller exports any controller";

@@ -95,12 +95,14 @@ impl Writer<'_> {
         self.mat(&format!("1-record/{purpose}-{}.mat", record.name()), &variables)
     }
 
-    /// `2-factor/`: the two systems of (15), the controller and the nominal model.
+    /// `2-factor/`: the two systems of (15), the controller, and the nominal model where one was given.
     fn factors(&self) -> Result<()> {
         let declared = &self.found.declared;
         let (u, y) = (self.found.records.inputs.clone(), self.found.records.outputs.clone());
         self.model_with("2-factor/controller", declared.controller(), (y, u), &())?;
-        self.model("2-factor/nominal", &declared.nominal, &())?;
+        if let Some(nominal) = &declared.nominal {
+            self.model("2-factor/nominal", nominal, &())?;
+        }
         if let Some(plant) = &self.found.records.true_plant {
             self.model("2-factor/true_plant", plant, &())?;
         }
@@ -175,12 +177,11 @@ impl Writer<'_> {
 
     /// S of the recommended plant.
     fn deviation(&self) -> Result<()> {
-        let (Ok(model), Ok(filtered)) = (&self.found.recommended, &self.found.filtered) else { return Ok(()) };
+        let Some(s) = self.found.deviation()? else { return Ok(()) };
         let (u, y) = (&self.found.records.inputs, &self.found.records.outputs);
         let named = |name: &str, channels: &[Channel]| -> Vec<Channel> {
             channels.iter().map(|c| Channel::new(format!("{name} of {}", c.name), &c.unit)).collect()
         };
-        let s = filtered.factorisation.factors.deviation_of(&model.plant)?;
         self.model_with("4-identify/deviation", &s, (named("alpha", u), named("beta", y)), &())
     }
 

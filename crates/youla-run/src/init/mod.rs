@@ -155,7 +155,7 @@ impl Draft {
             rows => self.rows(columns), estimated => self.estimated,
             estimation => format!("{stem}-first"), verification => format!("{stem}-rest"),
             feedback => self.feedback.map(Serde),
-            zero_plant => entries_of("[0.0]", p, m), zero_controller => entries_of("[0.0]", m, p),
+            zero_controller => entries_of("[0.0]", m, p),
             plant => entries_of("[2500.0]", p, m), controller => entries_of("[5.5, 0.3, -5.2]", m, p),
         };
         let mut environment = Environment::new();

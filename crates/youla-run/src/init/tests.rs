@@ -44,7 +44,7 @@ fn with_a_controller_what_is_missing_is_named_with_its_line() {
         let text = draft(Some(feedback)).toml(&columns()).unwrap();
         let error = RunSettings::parse(&text, Path::new("run.toml")).unwrap_err().to_string();
         assert!(error.starts_with("run.toml:") && error.ends_with("lacks `numerator`"), "{error}");
-        let filled = text.replace("# numerator", "numerator").replace("# denominator", "denominator");
+        let filled = text.replacen("# numerator", "numerator", 1).replacen("# denominator", "denominator", 1);
         RunSettings::parse(&filled, Path::new("run.toml")).unwrap();
     }
 }
@@ -111,7 +111,7 @@ fn the_template_has_the_size_of_the_plant() {
     several.input_excitation.clear();
     let text = several.toml(&columns()).unwrap();
     assert!(text.contains("# numerator = [[[2500.0], [2500.0]]]"), "{text}");
-    let filled = text.replace("# numerator", "numerator").replace("# denominator", "denominator");
+    let filled = text.replacen("# numerator", "numerator", 1).replacen("# denominator", "denominator", 1);
     RunSettings::parse(&filled, Path::new("run.toml")).unwrap();
 }
 

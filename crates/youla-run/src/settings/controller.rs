@@ -154,12 +154,18 @@ impl ControllerSettings {
         }
     }
 
-    /// The controller that ran, in positive feedback; `nominal` is the model of an observer, paths are relative to `folder`.
+    /// The controller that ran, at the sample time of the data, in positive feedback; `nominal` is the model of an observer, paths are relative
+    /// to `folder`.
     ///
     /// # Errors
     /// Whatever is wrong with the values or the file.
-    pub fn realise(&self, nominal: &StateSpace<Discrete>, folder: &Path) -> Result<RunningController> {
-        self.controller(nominal, folder).map_err(|e| e.within("[controller]"))
+    pub fn realise(
+        &self,
+        time: Discrete,
+        nominal: Option<&StateSpace<Discrete>>,
+        folder: &Path,
+    ) -> Result<RunningController> {
+        self.controller(time, nominal, folder).map_err(|e| e.within("[controller]"))
     }
 
     /// Dead time in whole samples that is stated beside the controller.
@@ -185,11 +191,15 @@ impl ControllerSettings {
         }
     }
 
-    fn controller(&self, nominal: &StateSpace<Discrete>, folder: &Path) -> Result<RunningController> {
+    fn controller(
+        &self,
+        time: Discrete,
+        nominal: Option<&StateSpace<Discrete>>,
+        folder: &Path,
+    ) -> Result<RunningController> {
         let left = matches!(self, Self::DifferenceEquation { reference_numerator: Some(_), .. });
         let unread = left.then(|| "reference_numerator belongs to settings that were `checked`".to_owned());
         refuse(self.problem().or(unread), Path::new("run.toml"))?;
-        let time = nominal.time();
         let (feedback, delay, system) = match self {
             Self::DifferenceEquation { feedback, numerator, denominator, delay, .. } => {
                 let (p, m) = numerator.shape();
@@ -221,6 +231,10 @@ impl ControllerSettings {
                 (feedback, 0, model_file(&folder.join(file), Domain::Discrete, time)?)
             }
             Self::Observer { feedback, state_feedback, observer_gain } => {
+                let Some(nominal) = nominal else {
+                    let (what, instead) = ("an observer without [nominal]", "add the model whose states it observes");
+                    return Err(youla::Error::Unsupported { what, instead }.into());
+                };
                 let sign = Scale(feedback.sign());
                 let f = sign * matrix("state_feedback", state_feedback)?;
                 let l = sign * matrix("observer_gain", observer_gain)?;

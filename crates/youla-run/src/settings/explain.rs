@@ -108,15 +108,14 @@ fn is_key(c: char) -> bool {
     c.is_alphanumeric() || matches!(c, '_' | '-')
 }
 
-/// What a user without a model needs to know.
-const NOMINAL: &str = ", a model of the plant, which may be rough; `youla init LOG --open-loop --estimate ROWS` writes one for a log \
-                       without feedback";
+/// What the two signs of a controller mean.
+const SIGNS: &str = ": \"negative\" is u = K (r - y), \"positive\" is u = K (y - r)";
 
 fn sentence(message: &str, place: &Place<'_>) -> String {
     let quoted = || message.split('`').skip(1).step_by(2);
     if let Some(key) = message.strip_prefix("missing field ") {
-        let remedy = if key == "`nominal`" { NOMINAL } else { "" };
-        return format!("{} lacks {key}{remedy}", place.holder());
+        let signs = if key == "`feedback`" { SIGNS } else { "" };
+        return format!("{} lacks {key}{signs}", place.holder());
     }
     if message.starts_with("unknown ") {
         let known: Vec<&str> = quoted().skip(1).collect();

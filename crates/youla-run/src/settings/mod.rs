@@ -41,8 +41,10 @@ pub struct RunSettings {
     pub name: String,
     /// Where the records are and what their channels mean.
     pub data: DataSettings,
-    /// The nominal model G(0).
-    pub nominal: NominalModel,
+    /// The nominal model G(0), for factors, the Hansen scheme and comparison; the recommended model does not rest on it. Without one the
+    /// factors are those of the recommended model.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub nominal: Option<NominalModel>,
     /// The controller that ran while the data were logged.
     pub controller: ControllerSettings,
     /// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
@@ -52,10 +54,10 @@ pub struct RunSettings {
     /// How the coprime factors are built.
     #[serde(default)]
     pub factors: FactorSettings,
-    /// Identification of S from (alpha, beta).
-    #[serde(default, with = "shown")]
-    #[schemars(with = "SubspaceTable")]
-    pub hansen: SubspaceOptions,
+    /// Identification of S from (alpha, beta) by the modified Hansen scheme, for comparison; left out when absent.
+    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
+    #[schemars(with = "Option<SubspaceTable>")]
+    pub hansen: Option<SubspaceOptions>,
     /// Direct identification from (u, y), for comparison; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
     #[schemars(with = "Option<SubspaceTable>")]
@@ -86,15 +88,15 @@ pub struct RunSettings {
 
 impl RunSettings {
     /// What a user knows, everything else by default.
-    pub fn new(name: String, data: DataSettings, nominal: NominalModel, controller: ControllerSettings) -> Self {
+    pub fn new(name: String, data: DataSettings, controller: ControllerSettings) -> Self {
         RunSettings {
             name,
             data,
-            nominal,
+            nominal: None,
             controller,
             recommended: LikelihoodOptions::default(),
             factors: FactorSettings::default(),
-            hansen: SubspaceOptions::default(),
+            hansen: None,
             direct: None,
             reduction: None,
             grey_box: None,
@@ -136,6 +138,21 @@ impl RunSettings {
         Ok(settings)
     }
 
+    /// For a run.toml whose `[controller]` lacks `feedback` and nothing else: the settings with either sign.
+    pub fn without_feedback(text: &str) -> Option<impl Fn(Feedback) -> Option<Self> + use<>> {
+        let table: toml::Table = toml::from_str(text).ok()?;
+        let form = table.get("controller")?.as_table()?.iter().find_map(|(form, of)| {
+            let lacks = of.as_table().is_some_and(|of| !of.contains_key("feedback"));
+            lacks.then(|| form.clone())
+        })?;
+        Some(move |sign: Feedback| {
+            let mut table = table.clone();
+            let controller = table.get_mut("controller")?.get_mut(&form)?.as_table_mut()?;
+            controller.insert("feedback".into(), toml::Value::try_from(sign).ok()?);
+            table.try_into::<Self>().ok()?.checked().ok()
+        })
+    }
+
     /// Settings built in code, if they are valid, as [`RunSettings::parse`] makes them of a file: a path of the reference is a known
     /// excitation.
     ///
@@ -172,6 +189,7 @@ impl RunSettings {
             .problem()
             .or_else(|| self.response_problem())
             .or_else(|| self.controller.problem())
+            .or_else(|| self.nominal_problem())
             .or_else(|| self.loop_problem())
             .or_else(|| self.redesign_problem())
             .or_else(|| self.number_problem());
@@ -187,6 +205,17 @@ impl RunSettings {
         ];
         let (table, _) = asked.into_iter().find(|(_, asked)| *asked)?;
         Some(format!("[{table}] needs estimation records, but [data] has a response; leave the table out"))
+    }
+
+    /// What stands on a nominal model that is not there.
+    fn nominal_problem(&self) -> Option<String> {
+        let asked = [
+            ("[hansen] identifies the deviation from", self.hansen.is_some()),
+            ("[data] alpha is a port of the factors of", !self.data.alpha.is_empty()),
+            ("[controller.observer] has the states of", matches!(self.controller, ControllerSettings::Observer { .. })),
+        ];
+        let (what, _) = asked.into_iter().find(|(_, asked)| *asked && self.nominal.is_none())?;
+        Some(format!("{what} a nominal model; add [nominal], a model of the plant, which may be rough"))
     }
 
     fn redesign_problem(&self) -> Option<String> {

@@ -24,7 +24,9 @@ impl RunContext<'_> {
         let data = &self.settings.data;
         // A known alpha drives the loop through the factors.
         let driven = if data.alpha.is_empty() { data.excitation_is_known() } else { self.factorisation.is_some() };
-        let bounded = self.declared.nominal.is_stable().unwrap_or(true);
+        // Without a nominal model the factors are those of the recommended one.
+        let of_factors = || Some(self.factorisation?.factors.nominal());
+        let bounded = self.declared.nominal.as_ref().or_else(of_factors).is_none_or(|g| g.is_stable().unwrap_or(true));
         let suits = if driven && !bounded { Prediction::ClosedLoop } else { Prediction::OpenLoop };
         self.settings.verification.prediction.unwrap_or(suits)
     }

@@ -13,8 +13,8 @@ use youla::lti::{Discrete, StateSpace};
 /// Nominal model and controller as run.toml declares them.
 #[derive(Debug, Clone)]
 pub struct DeclaredLoop {
-    /// The nominal model in its own states.
-    pub nominal: StateSpace<Discrete>,
+    /// The nominal model in its own states, where one is given.
+    pub nominal: Option<StateSpace<Discrete>>,
     /// The controller that ran.
     pub running: RunningController,
 }
@@ -22,13 +22,26 @@ pub struct DeclaredLoop {
 impl DeclaredLoop {
     /// Realises both; paths are relative to `folder`.
     pub(crate) fn new(settings: &RunSettings, folder: &Path, time: Discrete) -> Result<Self> {
-        let nominal = settings.nominal.realise(folder, time)?;
-        Ok(DeclaredLoop { running: settings.controller.realise(&nominal, folder)?, nominal })
+        let nominal = settings.nominal.as_ref().map(|nominal| nominal.realise(folder, time)).transpose()?;
+        Ok(DeclaredLoop { running: settings.controller.realise(time, nominal.as_ref(), folder)?, nominal })
     }
 
     /// The controller that ran, `u = K y` (positive feedback).
     pub fn controller(&self) -> &StateSpace<Discrete> {
         self.running.system()
+    }
+
+    /// The nominal model, for what rests on it.
+    ///
+    /// # Errors
+    /// [`youla::Error::Unsupported`] where none is given.
+    pub fn required_nominal(&self) -> Result<&StateSpace<Discrete>> {
+        let missing = || {
+            let what = "a factorisation or a prediction before there is a model";
+            let instead = "add [nominal] to run.toml, a model of the plant, which may be rough";
+            Error::Method(youla::Error::Unsupported { what, instead })
+        };
+        self.nominal.as_ref().ok_or_else(missing)
     }
 }
 
@@ -48,8 +61,8 @@ pub struct LoopFactors {
 pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<DeclaredLoop> {
     let declared = DeclaredLoop::new(settings, folder, records.time)?;
     let (m, p) = (records.inputs.len(), records.outputs.len());
-    let systems = [("the nominal model", &declared.nominal, (m, p)), ("the controller", declared.controller(), (p, m))];
-    for (name, system, ports) in systems {
+    let nominal = declared.nominal.as_ref().map(|nominal| ("the nominal model", nominal, (m, p)));
+    for (name, system, ports) in nominal.into_iter().chain([("the controller", declared.controller(), (p, m))]) {
         for (side, expected, found) in [("inputs", ports.0, system.inputs()), ("outputs", ports.1, system.outputs())] {
             if expected != found {
                 let what = format!("the number of {side} of {name}");
@@ -64,20 +77,20 @@ pub fn declared_loop(settings: &RunSettings, records: &RunRecords, folder: &Path
 ///
 /// # Errors
 /// As [`loop_factors`], with the likely cause where the controller does not stabilise the nominal model, and whatever is wrong with the
-/// given model or controller.
+/// given model or controller; a nominal model that is not given.
 pub fn factorise_run(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<LoopFactors> {
-    factorise(&declared_loop(settings, records, folder)?, records.sizes(), &settings.factors)
+    let declared = declared_loop(settings, records, folder)?;
+    factorise((declared.required_nominal()?, &declared.running), records.sizes(), &settings.factors)
 }
 
-/// The factors of a loop whose channels have these sizes.
+/// The factors of a model and its controller, whose channels have these sizes.
 pub(crate) fn factorise(
-    declared: &DeclaredLoop,
+    (nominal, running): (&StateSpace<Discrete>, &RunningController),
     (inputs, outputs): (Vec<f64>, Vec<f64>),
     settings: &FactorSettings,
 ) -> Result<LoopFactors> {
     let weight = settings.input_weight.sqrt();
     let sizes = ChannelScales::new(inputs.iter().map(|size| size / weight).collect(), outputs)?;
-    let DeclaredLoop { nominal, running } = declared;
     let factors = loop_factors(nominal, running, &sizes).map_err(|e| match (e, running.gains()) {
         (youla::Error::Unstable { pole, .. }, Some(gains)) => not_stabilised(pole, wrong_gain(nominal, gains)),
         (youla::Error::NotStabilising { pole, .. }, _) => not_stabilised(pole, likely_cause(nominal, running.system())),
@@ -88,7 +101,7 @@ pub(crate) fn factorise(
 }
 
 fn not_stabilised(pole: youla::c64, cause: String) -> Error {
-    Error::NotStabilised { pole: youla::error::Pole(pole).to_string(), cause }
+    Error::NotStabilised { model: "nominal", pole: youla::error::Pole(pole).to_string(), cause }
 }
 
 /// The closed-loop poles of an observer-based controller are those of A + B F and A + L C: which of the gains is wrong, and whether its

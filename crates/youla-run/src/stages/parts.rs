@@ -5,7 +5,7 @@ use crate::records::RunRecords;
 use crate::result::Identification;
 use crate::settings::RunSettings;
 use crate::stages::context::RunContext;
-use crate::stages::factors::{declared_loop, factorise_run};
+use crate::stages::factors::{declared_loop, factorise};
 use crate::stages::recommend::recommend;
 use crate::stages::redesign::{design, redesigned};
 use crate::{Error, Result};
@@ -27,7 +27,7 @@ pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Pa
 /// A new controller on the plant and region of a run that was kept, designed on `model`.
 ///
 /// # Errors
-/// As [`redesign_of`], and those of [`factorise_run`].
+/// As [`redesign_of`]; whatever is wrong with nominal model and controller.
 pub fn redesign_kept(
     settings: &RunSettings,
     records: &RunRecords,
@@ -35,7 +35,9 @@ pub fn redesign_kept(
     region: &Region,
     options: &RedesignOptions,
 ) -> Result<Redesign> {
-    let factors = factorise_run(settings, records, Path::new("."))?.factors;
+    let declared = declared_loop(settings, records, Path::new("."))?;
+    let base = declared.nominal.as_ref().unwrap_or(plant);
+    let factors = factorise((base, &declared.running), records.sizes(), &settings.factors)?.factors;
     design(records, (plant, model), &factors, region, options)
 }
 

@@ -1,4 +1,4 @@
-//! The driver: from records, nominal model and controller to models with evidence. Read this file first.
+//! The driver: from records, controller and, where one is given, nominal model to models with evidence. Read this file first.
 
 use crate::check::check_records;
 use crate::error::no_model::NoModel;
@@ -9,7 +9,7 @@ use crate::stages::certificate::certificate;
 use crate::stages::clock::{Stage, StageClock};
 use crate::stages::context::{RunContext, SchemeContext};
 use crate::stages::direct::direct;
-use crate::stages::factors::{DeclaredLoop, declared_loop, factorise};
+use crate::stages::factors::{declared_loop, factorise};
 use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
@@ -24,10 +24,15 @@ use crate::stages::validate::{Candidates, verify};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::ErrorKind;
+use youla::control::RunningController;
 use youla::identify::{HansenModel, hansen};
+use youla::lti::{Discrete, StateSpace};
 
-/// Identifies the plant of a loop from its records: the recommended model by maximum likelihood, and beside it the modified
-/// Hansen scheme, direct identification and what else was asked for.
+/// Identifies the plant of a loop from its records: the recommended model by maximum likelihood, and beside it what was asked for: the
+/// modified Hansen scheme, direct identification, a physical structure.
+///
+/// The coprime factors are those of the nominal model and the controller. Without a nominal model the recommended plant takes its place,
+/// whose S is zero; what rests on the region of S and on the loop is the same.
 ///
 /// A method that is impossible on these records does not end the run: its field of the result holds the reason.
 ///
@@ -42,11 +47,12 @@ pub fn identify(
     settings.check()?;
     check_grid(&settings.frequency_response, records.time)?;
     let declared = declared_loop(&settings, &records, folder)?;
-    let filtered = own_line(filtered(&settings, &records, &declared, clock))?;
-    let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
+    let of_nominal = |nominal| own_line(filtered((nominal, &declared.running), &settings, &records, clock));
+    let of_nominal = declared.nominal.as_ref().map(of_nominal).transpose()?;
+    let factors = found(of_nominal.as_ref());
+    let factorisation = factors.map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
-    let context =
-        filtered.as_ref().ok().map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
+    let context = factors.map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
     let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
@@ -60,6 +66,15 @@ pub fn identify(
     if let Ok(model) = &mut recommended {
         model.evidence.extend(defects(&data));
     }
+    let filtered = match (of_nominal, &recommended) {
+        (Some(filtered), _) => filtered,
+        (None, Ok(model)) => {
+            own_line(filtered((&model.plant, &declared.running), &settings, &records, clock))?.map_err(of_recommended)
+        }
+        (None, Err(_)) => Err(Error::Method(NO_MODEL)),
+    };
+    let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
+    let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
     let reduction = clock.run(Stage::Reduce, || {
         let (model, options) = (recommended.as_ref().ok()?, settings.reduction.as_ref()?);
         Some(run_reduction(&factorisation?.factors, &model.plant, &records, options)) // (29)
@@ -76,19 +91,19 @@ pub fn identify(
         let asked = direct.is_some();
         let outcomes = [
             ("the recommended model", recommended.err()),
-            ("the modified Hansen scheme", filtered.err().or_else(|| s?.err())),
+            ("the modified Hansen scheme", settings.hansen.as_ref().and_then(|_| filtered.err().or_else(|| s?.err()))),
             ("direct identification", direct.and_then(Result::err)),
             ("the physical structure", grey_box.and_then(Result::err)),
         ];
         let reasons = outcomes.into_iter().filter_map(|(name, reason)| Some((name, reason?))).collect();
         return Err(Error::NoModel(NoModel::new(reasons, asked, records.time)));
     }
-    let models = [&[&declared.nominal], &identified[..]].concat();
+    let models: Vec<_> = declared.nominal.iter().chain(identified).collect();
     let hz = grid(&settings.frequency_response, &models, records.time)?;
     // (26), the loop certificate and the response that rests on no model.
     let ((indirect, lines), validation) = clock.run(Stage::Validate, || {
         let indirect = match &records.measured {
-            None => indirect(run, context.map(|c| c.signals)),
+            None => indirect(run, filtered.as_ref().ok().map(|f| &f.signals)),
             Some(measured) => Some(measured.shown()),
         };
         Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))
@@ -135,26 +150,45 @@ fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
     }
 }
 
-/// Factors of nominal model and controller, alpha and beta.
+/// Why there are no factors where neither model is there.
+const NO_MODEL: youla::Error = youla::Error::Unsupported {
+    what: "coprime factors without a nominal and without a recommended model",
+    instead: "add [nominal] to run.toml, a model of the plant, which may be rough",
+};
+
+/// The same reason where the model is the recommended one.
+fn of_recommended(error: Error) -> Error {
+    match error {
+        Error::NotStabilised { pole, .. } => {
+            let cause = "the verdict says whether the log agrees with the declared controller".to_owned();
+            Error::NotStabilised { model: "recommended", pole, cause }
+        }
+        other => other,
+    }
+}
+
+/// Factors of a model and the controller, alpha and beta.
 fn filtered(
+    (model, running): (&StateSpace<Discrete>, &RunningController),
     settings: &RunSettings,
     records: &RunRecords,
-    declared: &DeclaredLoop,
     clock: &mut StageClock<'_>,
 ) -> Result<Filtered> {
-    let factorisation = clock.run(Stage::Factor, || factorise(declared, records.sizes(), &settings.factors))?; // (13)-(15)
+    let of_loop = || factorise((model, running), records.sizes(), &settings.factors); // (13)-(15)
+    let factorisation = clock.run(Stage::Factor, of_loop)?;
     let settle = settings.factors.settle;
     let signals =
         clock.run(Stage::Signals, || deviation_signals(&factorisation.factors, &records.estimation, settle))?; // (28)
     Ok(Filtered { factorisation, signals })
 }
 
-/// The scheme, and the physical structure that is started from it.
+/// The scheme where it was asked for, and the physical structure that is started from it.
 fn structures(
     run: RunContext<'_>,
     context: Option<SchemeContext<'_>>,
 ) -> (Option<Result<HansenModel>>, Option<Result<GreyBoxRun>>) {
-    let s = context.map(of_scheme);
+    let asked = run.settings.hansen.is_some() || run.settings.grey_box.is_some();
+    let s = context.filter(|_| asked).map(of_scheme);
     let start = found(s.as_ref()).zip(context).map(|(s, context)| SchemeStart {
         factors: &context.factorisation.factors,
         signals: context.signals,
@@ -167,7 +201,8 @@ fn structures(
 /// S and G(S).
 fn of_scheme(context: SchemeContext<'_>) -> Result<HansenModel> {
     let SchemeContext { run, factorisation, signals } = context;
-    require_length(&run.settings.hansen, run.records, signals.settle)?;
-    let found = hansen(&factorisation.factors, &signals.experiments, &run.settings.hansen);
+    let options = run.settings.hansen.clone().unwrap_or_default();
+    require_length(&options, run.records, signals.settle)?;
+    let found = hansen(&factorisation.factors, &signals.experiments, &options);
     found.map_err(|e| Error::from(e).within(signals.context()))
 }

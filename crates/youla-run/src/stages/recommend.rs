@@ -34,7 +34,7 @@ pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
         }
         return Ok(found);
     }
-    let nominal = Some(&run.declared.nominal);
+    let nominal = run.declared.nominal.as_ref();
     let found = identify(&records.estimation, &records.verification, running, nominal, options);
     found.map(|Identified { model, .. }| model).map_err(within)
 }

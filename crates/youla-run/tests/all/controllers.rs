@@ -17,7 +17,7 @@ fn error() -> Vec<f64> {
 fn response(text: &str) -> Vec<f64> {
     let settings: ControllerSettings = toml::from_str(text).unwrap();
     let nominal = StateSpace::gain(Mat::zeros(1, 1), Discrete::new(TS).unwrap()).unwrap();
-    let running = settings.realise(&nominal, Path::new("/")).unwrap();
+    let running = settings.realise(nominal.time(), Some(&nominal), Path::new("/")).unwrap();
     let k = running.system();
     let e = error();
     let input = Mat::from_fn(e.len(), 1, |i, _| e[i]);

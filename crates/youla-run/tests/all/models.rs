@@ -26,7 +26,7 @@ fn a_model_that_was_written_is_read_again() {
         assert!(error.to_string().contains("sample times differ"), "{error}");
         let text = format!("model_file = {{ feedback = \"negative\", file = {file:?} }}");
         let settings: ControllerSettings = toml::from_str(&text).unwrap();
-        let running = settings.realise(&system, Path::new("/")).unwrap();
+        let running = settings.realise(system.time(), Some(&system), Path::new("/")).unwrap();
         assert_eq!(running.system(), &system.negated());
         // Only a MATLAB file may hold matrices in s.
         let continuous = NominalModel::ModelFile { file, domain: Some(Domain::Continuous) };

@@ -16,15 +16,17 @@ inputs = [{ name = "u" }]
 outputs = [{ name = "y" }]
 estimation = [{ file = "log.csv" }]
 
-[nominal.transfer_function]
-domain = "discrete"
-numerator = [0.1]
-denominator = [1.0, -0.8]
-
 [controller.difference_equation]
 feedback = "negative"
 numerator = [1.0]
 denominator = [1.0]
+"#;
+
+const NOMINAL: &str = r#"
+[nominal.transfer_function]
+domain = "discrete"
+numerator = [0.1]
+denominator = [1.0, -0.8]
 "#;
 
 fn parse(text: &str) -> youla_run::Result<RunSettings> {
@@ -53,8 +55,8 @@ fn orders_are_numbers_words_or_rules() {
     use youla::identify::subspace::Order;
     use youla::reduce::ReducedOrder;
     for (text, order) in [("8", Order::Fixed(8)), ("\"auto\"", Order::default())] {
-        let settings = parse(&format!("{MINIMAL}\n[hansen]\norder = {text}\n")).unwrap();
-        assert_eq!(settings.hansen.order, order);
+        let settings = parse(&format!("{MINIMAL}{NOMINAL}\n[hansen]\norder = {text}\n")).unwrap();
+        assert_eq!(settings.hansen.as_ref().unwrap().order, order);
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
         assert_eq!(parse_subspace_options(&format!("order = {text}"), Path::new("o.toml")).unwrap().order, order);
     }
@@ -93,6 +95,43 @@ fn log() -> String {
     text
 }
 
+/// What needs a nominal model says so; nothing else does.
+#[test]
+fn a_nominal_model_is_asked_for_where_it_is_needed() {
+    let refused = |text: String, says: &str| {
+        let error = parse(&text).unwrap_err().to_string();
+        assert!(error.contains(says) && error.contains("add [nominal]"), "{error}");
+    };
+    refused(format!("{MINIMAL}\n[hansen]\norder = 2\n"), "[hansen] identifies the deviation from a nominal model");
+    let alpha = MINIMAL.replace("estimation =", "alpha = [{ name = \"a\" }]\nestimation =");
+    refused(alpha, "[data] alpha is a port of the factors of a nominal model");
+    let gains = "[controller.observer]\nfeedback = \"negative\"\nstate_feedback = [[1.0]]\nobserver_gain = [[1.0]]\n";
+    let observer = MINIMAL.split("[controller").next().unwrap().to_owned() + gains;
+    refused(observer, "[controller.observer] has the states of a nominal model");
+}
+
+/// With and without a nominal model the recommended model and what rests on it are the same, and without `[hansen]` there is no scheme.
+#[test]
+fn the_recommended_model_does_not_rest_on_a_nominal_one() {
+    let folder = Folder::new("nominal");
+    std::fs::write(folder.path().join("log.csv"), log()).unwrap();
+    let [alone, beside] = [String::new(), NOMINAL.to_owned()].map(|nominal| {
+        let settings = parse(&format!("{MINIMAL}{nominal}\n[redesign]\n[reduction]\norder = 1\n")).unwrap();
+        let records = read_records(&settings.data, folder.path()).unwrap();
+        identify(settings, records, folder.path(), &mut StageClock::new(&mut |_| ())).unwrap()
+    });
+    for run in [&alone, &beside] {
+        assert!(run.refusals().is_empty() && run.scheme().is_none());
+        assert!(run.certified().unwrap().exact.stable);
+    }
+    let plants = [&alone, &beside].map(|run| &run.recommended.as_ref().unwrap().plant);
+    assert_eq!(plants[0], plants[1]);
+    let margins = [&alone, &beside].map(|run| run.certified().unwrap().margins.clone());
+    assert_eq!(margins[0], margins[1]);
+    assert!(alone.deviation().unwrap().is_none() && beside.deviation().unwrap().is_some());
+    assert!(alone.redesign.unwrap().is_ok() && beside.redesign.unwrap().is_ok());
+}
+
 #[test]
 fn the_shortest_run_toml_runs_to_its_end() {
     let folder = Folder::new("minimal");
@@ -102,7 +141,7 @@ fn the_shortest_run_toml_runs_to_its_end() {
     let mut silent = |_| ();
     let mut clock = StageClock::new(&mut silent);
     let run = identify(settings, records, folder.path(), &mut clock).unwrap();
-    let plant = &run.validation.of(Method::Hansen).unwrap().model;
+    let plant = &run.validation.of(Method::Likelihood).unwrap().model;
     assert!(plant.poles().unwrap().iter().any(|p| (p.re - 0.9).abs() < 0.01), "{:?}", plant.poles());
     let written = write_run(&run, &folder.path().join("out"), false, &mut clock).unwrap();
     let read = Summary::read(&written.folder).unwrap();
@@ -110,5 +149,5 @@ fn the_shortest_run_toml_runs_to_its_end() {
     assert_eq!(read.schema, 4);
     let responses: serde_json::Value =
         serde_json::from_slice(&std::fs::read(written.folder.join("response.json")).unwrap()).unwrap();
-    assert!(responses["models"].as_array().unwrap().iter().any(|m| m["method"] == "hansen"));
+    assert!(responses["models"].as_array().unwrap().iter().any(|m| m["method"] == "likelihood"));
 }

@@ -155,13 +155,13 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
             estimation: vec![file(NAMES[0])],
             verification: vec![file(NAMES[1])],
         },
-        nominal: NominalModel::StateSpace {
+        nominal: Some(NominalModel::StateSpace {
             domain: Domain::Continuous,
             a: rows(nominal.a()),
             b: rows(nominal.b()),
             c: rows(nominal.c()),
             d: None,
-        },
+        }),
         controller: ControllerSettings::Observer {
             feedback: Feedback::Positive,
             state_feedback: rows(f.as_ref()),
@@ -169,7 +169,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
         },
         factors: FactorSettings { settle: Some(0), ..FactorSettings::default() },
         direct: Some(SubspaceOptions { order: Order::Fixed(6), stability: Stability::Allow, ..subspace.clone() }),
-        hansen: subspace,
+        hansen: Some(subspace),
         reduction: Some(ReductionOptions { order: ReducedOrder::Fixed(6), ..ReductionOptions::default() }),
         grey_box: None,
         redesign: Some(RedesignOptions::default()),

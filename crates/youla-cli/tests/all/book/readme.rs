@@ -1,4 +1,4 @@
-//! What README.md takes for granted: a log of a drive with a resonance under its controller, nominal model and controller.
+//! What README.md takes for granted: a log of a drive with a resonance under its controller, and the controller.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -20,7 +20,7 @@ impl Second {
     }
 }
 
-/// Writes `log.csv` (two minutes at 2 kHz), `nominal.json` and `K.json`.
+/// Writes `log.csv` (two minutes at 2 kHz) and `K.json`.
 pub(crate) fn write_scene(folder: &Path) {
     let write = |name: &str, bytes: &[u8]| fs::write(folder.join(name), bytes).expect("written");
     let mut text = String::from("t,r,d,u,y\n");
@@ -29,12 +29,8 @@ pub(crate) fn write_scene(folder: &Path) {
     }
     write("log.csv", text.as_bytes());
 
-    write("nominal.json", MODEL.as_bytes());
     write("K.json", controller().as_bytes());
 }
-
-/// The rigid body of the nominal model, sampled every 0.5 ms.
-const MODEL: &str = r#"{"ts": 5e-4, "a": [[1.99004983, -0.99004983], [1, 0]], "b": [[1], [0]], "c": [[3.1146e-4, 3.1042e-4]], "d": [[0]]}"#;
 
 /// The controller of README.md, `u = K (y - r)`: numerator less D times the denominator in the output matrix.
 fn controller() -> String {

@@ -59,17 +59,16 @@ fn misspelt_choices() {
 
 #[test]
 fn missing_keys_and_tables() {
-    let cases: [(&str, &str, &str); 6] = [
+    let cases: [(&str, &str, &str); 5] = [
         ("inputs = [{ name = \"u\", unit = \"V\" }]\n", "run.toml:3:1:", "[data] lacks `inputs`"),
-        ("feedback = \"negative\"\n", "run.toml:16:1:", "[controller.difference_equation] lacks `feedback`"),
+        (
+            "feedback = \"negative\"\n",
+            "run.toml:16:1:",
+            "[controller.difference_equation] lacks `feedback`: \"negative\" is u = K (r - y)",
+        ),
         ("file = \"log.csv\", take", "run.toml:8:15:", "`estimation` in [data] lacks `file`"),
         ("name = \"loop\"\n", "run.toml:1:1:", "the top level lacks `name`"),
         ("time_column = \"t\"\n", "run.toml: [data]", "neither sample_time nor time_column"),
-        (
-            "[nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [0.1]\ndenominator = [1.0, -0.9]\n",
-            "run.toml:1:1:",
-            "the top level lacks `nominal`, a model of the plant, which may be rough; `youla init LOG --open-loop --estimate ROWS` writes",
-        ),
     ];
     for (passage, place, sentence) in cases {
         let replacement = if passage.starts_with("file") { "take" } else { "" };

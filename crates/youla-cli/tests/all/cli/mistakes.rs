@@ -151,20 +151,15 @@ const LOGS: [Mistake; 7] = [
     ),
 ];
 
-const CALLS: [Mistake; 16] = [
+const CALLS: [Mistake; 15] = [
     called("a log for a run.toml", &["check", "log.csv"], &["log.csv", "--input", "--output", "youla init"]),
     called("the same to identify", &["identify", "log.csv"], &["log.csv", "--input", "--sample-time", "youla init"]),
     called("the same to signals", &["signals", "log.csv"], &["log.csv: this is no run.toml", "youla init"]),
     called("no clock", &["check", "log.csv", "--input", "u", "--output", "y"], &["log.csv", "--sample-time", "--time"]),
     called("inputs alone", &["check", "log.csv", "--input", "u"], &["--output <NAME>"]),
     called(
-        "no nominal model",
-        &["identify", "log.csv", "--input", "u", "--output", "y", "--time", "t"],
-        &["log.csv", "--nominal FILE"],
-    ),
-    called(
         "no controller",
-        &["identify", "log.csv", "--input", "u", "--output", "y", "--time", "t", "--nominal", "g.json"],
+        &["identify", "log.csv", "--input", "u", "--output", "y", "--time", "t"],
         &["log.csv", "--controller FILE", "--open-loop"],
     ),
     called(

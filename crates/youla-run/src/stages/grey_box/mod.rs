@@ -32,8 +32,8 @@ pub(crate) fn grey_box(run: RunContext<'_>, start: Option<SchemeStart<'_>>) -> O
 
 fn estimate(run: RunContext<'_>, start: Option<SchemeStart<'_>>, asked: &GreyBoxSettings) -> Result<GreyBoxRun> {
     let outputs = outputs_without_lines(run.records)?;
-    let options =
-        HansenPemOptions { hansen: run.settings.hansen.clone(), pem: asked.search(), ..HansenPemOptions::default() };
+    let hansen = run.settings.hansen.clone().unwrap_or_default();
+    let options = HansenPemOptions { hansen, pem: asked.search(), ..HansenPemOptions::default() };
     let criterion = Criterion::new(asked.prediction, run, &outputs, &options)?;
     let of = |declaration: &Declaration| -> Result<(DeclaredStructure, StructureSearch)> {
         let structure = DeclaredStructure::new(declaration)?;

@@ -139,7 +139,7 @@ impl<'a> Candidates<'a> {
             let noise = noise_of_recommended(prediction, found)?;
             all.push(Candidate { method: Method::Likelihood, model: &found.plant, noise });
         }
-        all.push(plain(Method::Nominal, &run.declared.nominal));
+        all.extend(run.declared.nominal.as_ref().map(|nominal| plain(Method::Nominal, nominal)));
         if let Some(direct) = self.direct {
             let noise = noise_of_direct(prediction, direct)?;
             all.push(Candidate { method: Method::Direct, model: &direct.model, noise });

@@ -61,7 +61,7 @@ pub(crate) fn robustness(
     recommended: Option<&StateSpace<Discrete>>,
     model: &StateSpace<Discrete>,
 ) -> LoopRobustness {
-    let (nominal, controller) = (&declared.nominal, declared.controller());
+    let controller = declared.controller();
     let scaled = |plant: &StateSpace<Discrete>| -> Result<StateSpace<Discrete>, String> {
         scales.as_ref().map_err(Clone::clone)?.plant(plant).map_err(|e| e.to_string())
     };
@@ -80,7 +80,7 @@ pub(crate) fn robustness(
             other => other.to_string(),
         }),
         coprime: coprime(),
-        gap_to_nominal: gap_to(nominal),
+        gap_to_nominal: declared.nominal.as_ref().map_or_else(|| Err("no nominal model is given".to_owned()), gap_to),
         gap_to_recommended: recommended.map_or_else(|| Err("no model is recommended".to_owned()), gap_to),
     }
 }

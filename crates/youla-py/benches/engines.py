@@ -36,7 +36,7 @@ def payload(samples: int, log: str) -> dict[str, Any]:
     rng = np.random.default_rng(1)
     plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=DT)
     d, e = rng.standard_normal((2, samples, 1))
-    u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * e)
+    u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=0.02 * e)
     record = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=DT)
     found: dict[str, Any] = {}
 
@@ -44,7 +44,7 @@ def payload(samples: int, log: str) -> dict[str, Any]:
         found.update(given)
         return youla.Rows((), 0)
 
-    run = youla.identify(record, nominal=plant, controller=2.0, hansen={"order": 1, "horizon": 5})
+    run = youla.identify(record, nominal=plant, controller=2.0, feedback="negative", hansen={"order": 1, "horizon": 5})
     _study.run_tasks, kept = keep, _study.run_tasks
     try:
         youla.bootstrap(run, 1, seed=1)

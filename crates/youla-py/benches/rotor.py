@@ -37,11 +37,11 @@ def rig(proportional: float = 3000.0, derivative: float = 15.0) -> Any:
 
 def record(loop: MagneticLoop, seed: int, share: float = 0.02) -> youla.Record:
     """A log of the loop, with white noise of a share of the standard deviation of the outputs."""
-    made = youla.excite(loop.plant, loop.controller, amplitude=0.02, band=[1, 1000], samples=SAMPLES)
+    made = youla.excite(loop.plant, loop.controller, feedback="negative", amplitude=0.02, band=[1, 1000], samples=SAMPLES)
     d = made.signal
-    _, clean = youla.simulate_loop(loop.plant, loop.controller, excitation=d)
+    _, clean = youla.simulate_loop(loop.plant, loop.controller, feedback="negative", excitation=d)
     draws = np.random.default_rng(seed).standard_normal(clean.shape)
-    u, y = youla.simulate_loop(loop.plant, loop.controller, excitation=d, noise=share * clean.std(axis=0) * draws)
+    u, y = youla.simulate_loop(loop.plant, loop.controller, feedback="negative", excitation=d, noise=share * clean.std(axis=0) * draws)
     m = d.shape[1]
     channels = np.arange(3 * m).reshape(3, m).tolist()
     return youla.Record(np.hstack([u, y, d]), inputs=channels[0], outputs=channels[1], excitation=channels[2], dt=DT, name=str(seed))
@@ -77,7 +77,7 @@ def one(seed: int, folder: str) -> dict[str, Any]:
     rotor = rig()
     loop, nominal = magnetic_loop(rotor, dt=DT, plane=True), magnetic_loop(rotor, dt=DT, plane=True, order=8)
     log = record(loop, seed)
-    run = youla.identify(log, nominal=nominal.plant, controller=loop.controller)
+    run = youla.identify(log, nominal=nominal.plant, controller=loop.controller, feedback="negative")
     zones = sensitivity_zones(run)
     omega = 2 * np.pi * np.geomspace(1, 1000, 200)
     true = loop.plant.frequency_response(omega).values

@@ -18,7 +18,7 @@ def loop(seed: int, samples: int = 4000, noise: float = 0.02) -> np.ndarray:
     rng = np.random.default_rng(seed)
     plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
     d = rng.standard_normal((samples, 1))
-    u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=noise * rng.standard_normal((samples, 1)))
+    u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=noise * rng.standard_normal((samples, 1)))
     return np.hstack([u, y, d])
 
 
@@ -47,7 +47,7 @@ def run(record: youla.Record, fresh: youla.Record, nominal: youla.Model) -> youl
     hansen = {"order": 2, "horizon": 10}
     response = {"window": 512}
     return youla.identify(
-        record, nominal=nominal, controller=2.0, verify=fresh, hansen=hansen, frequency_response=response
+        record, nominal=nominal, controller=2.0, feedback="negative", verify=fresh, hansen=hansen, frequency_response=response
     )
 
 

@@ -23,7 +23,7 @@ FRAME = pd.DataFrame(TABLE, columns=["u", "y", "d"])
 NOMINAL = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
 CHANNELS: dict[str, Any] = {"inputs": 0, "outputs": 1, "excitation": 2, "dt": 0.01}
 RECORD, FRESH = (youla.Record(loop(k, 300), **CHANNELS, name=f"log {k}") for k in (3, 4))
-KNOWN: dict[str, Any] = {"nominal": NOMINAL, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+KNOWN: dict[str, Any] = {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
 RUN = youla.identify(RECORD, verify=FRESH, **KNOWN)
 LOOP = {"feedback": "negative", "hold": None}
 TASKS: dict[str, Any] = {"executor": None, "folder": None}
@@ -52,20 +52,20 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "Model.simulate": (NOMINAL.simulate, {"inputs": np.ones(5), "x0": None}),
     "Model.save": (NOMINAL.save, {"path": "m.json"}),
     "identify": (youla.identify, {"record": RECORD, **KNOWN, **LOOP, "verify": None, "name": None, "recommended": {}, "data": {}}),
-    "check": (youla.check, {"record": RECORD, "nominal": NOMINAL, "controller": 2.0, **LOOP, "check": {}}),
+    "check": (youla.check, {"record": RECORD, "nominal": NOMINAL, "controller": 2.0, "feedback": "negative", **LOOP, "check": {}}),
     "subspace": (youla.subspace, {"record": RECORD, "order": 1, "horizon": 5, "method": "n4sid", "past": 5, "stability": "allow"}),
     "greybox": (youla.greybox, {"record": RECORD, "structure": STRUCTURE, "grey_box": None, **KNOWN}),
-    "certify": (youla.certify, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative"}),
-    "simulate_loop": (youla.simulate_loop, {"plant": NOMINAL, "controller": 2.0, "samples": None, "excitation": np.ones(9), "noise": None}),
+    "certify": (youla.certify, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative", "feedback": "negative"}),
+    "simulate_loop": (youla.simulate_loop, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative", "samples": None, "excitation": np.ones(9), "noise": None}),
     "reduce": (youla.reduce, {"system": NOMINAL, "output_scale": None, "order": 1, "method": "balanced-truncation"}),
     "redesign": (youla.redesign, {"run": RUN, "method": "youla", "peak_sensitivity": 2.0}),
-    "excite": (youla.excite, {"nominal": NOMINAL, "controller": 2.0, "dt": None, **EXCITATION, **LOOP}),
+    "excite": (youla.excite, {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative", "dt": None, **EXCITATION, **LOOP}),
     "compare": (youla.compare, {"runs": [RUN, RUN], "model": "likelihood"}),
     "demo": (youla.demo, {"machine": "rocket", "seed": 1}),
     "bootstrap": (youla.bootstrap, {"run": RUN, "n": 1, "seed": 1, **TASKS}),
     "scan": (youla.scan, {"record": RECORD, "grid": {"hansen.order": [1]}, "verify": None, **TASKS, **KNOWN}),
     "identify_many": (youla.identify_many, {"records": [RECORD], "read": None, **TASKS, **KNOWN, **LOOP}),
-    "study": (youla.study, {"plant": NOMINAL, "controller": 2.0, "conditions": [CONDITION], "n": 1, "seed": 1, "noise": 0.1, **TASKS}),
+    "study": (youla.study, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative", "conditions": [CONDITION], "n": 1, "seed": 1, "noise": 0.1, **TASKS}),
     "Study.cheapest": (STUDY.cheapest, {"zeta": 0.1, "mode": 0}),
     "Study.plot": (STUDY.plot, {"ax": None, "mode": 0, "wanted": 0.1}),
     "Run.model": (RUN.model, {"name": "likelihood"}),

@@ -29,7 +29,7 @@ def rec(data: Any = TABLE, **changes: Any) -> youla.Record:
 
 
 def ident(record: Any = None, **changes: Any) -> youla.Run:
-    given = {"nominal": NOMINAL, "controller": 2.0, **changes}
+    given = {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative", **changes}
     return youla.identify(rec() if record is None else record, **given)
 
 
@@ -86,7 +86,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "share beyond 1": (lambda: rec().split(1.5), "share is 1.5, but must be between 0 and 1"),
     # loop
     "no controller": (lambda: ident(controller=None), "controller is missing; give 0 where no controller ran"),
-    "no nominal": (lambda: ident(nominal=None), "nominal is missing"),
+    "no nominal": (lambda: ident(nominal=None, hansen={}), "deviation from a nominal model; add [nominal]"),
     "wrong feedback": (lambda: ident(feedback="minus"), "feedback is 'minus', but must be 'negative'"),
     "text as a controller": (lambda: ident(controller=object()), "controller is a object, but must be"),
     "form of a controller": (lambda: ident(controller={"pdi": {}}), "exactly one key of difference_equation"),
@@ -114,10 +114,10 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "matrix with infinity": (lambda: youla.Model([[np.inf]], [[1.0]], [[1.0]], [[0.0]], dt=0.1), "a has an entry"),
     "frequencies": (lambda: NOMINAL.frequency_response([-1.0]), "omega must be a list of finite angular frequencies"),
     "inputs of a simulation": (lambda: NOMINAL.simulate(np.zeros((10, 2))), "inputs is 10 x 2, but must be samples x 1"),
-    "length of a simulation": (lambda: youla.simulate_loop(NOMINAL, 1.0), "give signals of one length, or samples="),
+    "length of a simulation": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative"), "give signals of one length, or samples="),
     "continuous plant": (lambda: youla.certify(signal.StateSpace(-1, 1, 1, 0), 1.0), "plant states no sample time"),
     "length twice": (
-        lambda: youla.excite(NOMINAL, 1.0, amplitude=1, band=[1, 10], seconds=1.0, samples=9),
+        lambda: youla.excite(NOMINAL, 1.0, feedback="negative", amplitude=1, band=[1, 10], seconds=1.0, samples=9),
         "give either seconds= or samples=",
     ),
     "machine": (lambda: youla.demo("rocket"), 'machine is "rocket", but must be "levitation" or "bearing"'),
@@ -125,7 +125,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "bootstrap of nothing": (lambda: youla.bootstrap(None, 3, seed=1), "run is None, but must be a youla.Run"),
     "grid": (lambda: youla.scan(rec(), {"order": 3}), "grid['order'] must be a list of values of a key 'table.key'"),
     "executor": (
-        lambda: youla.scan(rec(), {"hansen.order": [1]}, executor=4, nominal=NOMINAL, controller=2.0),
+        lambda: youla.scan(rec(), {"hansen.order": [1]}, executor=4, nominal=NOMINAL, controller=2.0, feedback="negative"),
         "executor is int, but must be a concurrent.futures.Executor",
     ),
 }

@@ -20,7 +20,7 @@ import youla
 from youla import _tasks
 
 N = 12
-ARGUMENTS = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0}
+ARGUMENTS = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0, "feedback": "negative"}
 OPTIONS = {**ARGUMENTS, "hansen": {"order": 1, "horizon": 5}}
 
 
@@ -98,7 +98,7 @@ def test_mpi_gives_the_same_bits(serial: youla.Bootstrap, tmp_path: Path) -> Non
         "if __name__ == '__main__':\n"
         "    small = youla.Record(loop(102, 1000), inputs=0, outputs=1, excitation=2, dt=0.01, name='small')\n"
         "    g = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)\n"
-        "    options = dict(nominal=g, controller=2.0, hansen={'order': 1, 'horizon': 5})\n"
+        "    options = dict(nominal=g, controller=2.0, feedback='negative', hansen={'order': 1, 'horizon': 5})\n"
         "    run = youla.identify(small, **options)\n"
         "    with MPIPoolExecutor() as executor:\n"
         f"        rows = youla.bootstrap(run, {N}, seed=1, executor=executor)\n"

@@ -68,7 +68,7 @@ def test_a_physical_structure_loads(run: youla.Run, record: youla.Record, nomina
     structure = {"parameters": {"pole": {"initial": 4.0, "min": 0.1, "max": 50.0}, "gain": {"initial": 8.0}}}
     structure |= {"a": [["-pole"]], "b": [["gain"]], "c": [[1.0]]}
     hansen = {"order": 1, "horizon": 5}
-    found = youla.greybox(record, structure=structure, nominal=nominal, controller=2.0, hansen=hansen)
+    found = youla.greybox(record, structure=structure, nominal=nominal, controller=2.0, feedback="negative", hansen=hansen)
     assert found.frequency_response(model="grey_box").covariance is not None
     same(found, youla.load(found.save(tmp_path / "run")))
 
@@ -86,7 +86,7 @@ def test_every_result_pickles_and_copies(run: youla.Run, record: youla.Record) -
         run.modes(),
         youla.check(record),
         youla.bootstrap(run, 2, seed=1),
-        youla.study(run.recommended, 2.0, [short], n=1, noise=0.05, seed=1),
+        youla.study(run.recommended, 2.0, [short], feedback="negative", n=1, noise=0.05, seed=1),
     ]
     for result in results:
         assert pickle.loads(pickle.dumps(result)) == result
@@ -94,8 +94,8 @@ def test_every_result_pickles_and_copies(run: youla.Run, record: youla.Record) -
     arrays = [
         (run.frequency_response(), lambda r: r.covariance),
         (youla.subspace(record, order=1), lambda r: r.model.a),
-        (youla.certify(run.recommended, 2.0), lambda r: r.poles),
-        (youla.excite(run.recommended, 2.0, **short), lambda r: r.signal),
+        (youla.certify(run.recommended, 2.0, feedback="negative"), lambda r: r.poles),
+        (youla.excite(run.recommended, 2.0, feedback="negative", **short), lambda r: r.signal),
         (youla.reduce(run.recommended, order=0), lambda r: r.hankel),
     ]
     for result, of in arrays:

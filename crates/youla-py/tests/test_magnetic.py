@@ -62,12 +62,12 @@ def test_a_rotor_is_identified_in_closed_loop(rotor: Any) -> None:
     loop = magnetic_loop(rotor, dt=DT, plane=True)
     nominal = magnetic_loop(rotor, dt=DT, plane=True, order=8)
     assert nominal.plant.order == 8
-    d = youla.excite(loop.plant, loop.controller, amplitude=0.02, band=[1, 1000], samples=SAMPLES).signal
-    _, clean = youla.simulate_loop(loop.plant, loop.controller, excitation=d)
+    d = youla.excite(loop.plant, loop.controller, feedback="negative", amplitude=0.02, band=[1, 1000], samples=SAMPLES).signal
+    _, clean = youla.simulate_loop(loop.plant, loop.controller, feedback="negative", excitation=d)
     noise = 0.02 * clean.std(axis=0) * np.random.default_rng(1).standard_normal(clean.shape)
-    u, y = youla.simulate_loop(loop.plant, loop.controller, excitation=d, noise=noise)
+    u, y = youla.simulate_loop(loop.plant, loop.controller, feedback="negative", excitation=d, noise=noise)
     log = youla.Record(np.hstack([u, y, d]), inputs=[0, 1], outputs=[2, 3], excitation=[4, 5], dt=DT)
-    run = youla.identify(log, nominal=nominal.plant, controller=loop.controller)
+    run = youla.identify(log, nominal=nominal.plant, controller=loop.controller, feedback="negative")
     zones = sensitivity_zones(run)
     assert [zone.peak for zone in zones] == pytest.approx(peaks(loop), rel=0.03)
     assert zones[0].zone in ("undecided", "B") and zones[1].zone in ("undecided", "A")

@@ -34,7 +34,7 @@ def names(record: youla.Record, fresh: youla.Record) -> dict[str, object]:
     u = np.random.default_rng(1).standard_normal(200)
     structure = {"parameters": {"pole": {"initial": 4.0}, "gain": {"initial": 8.0}}, "a": [["-pole"]], "b": [["gain"]], "c": [[1]]}
     response = control.forced_response(control.ss(0.9, 0.1, 1.0, 0.0, 0.01), inputs=u)
-    run = youla.identify(record, nominal=nominal, controller=controller, verify=fresh, frequency_response={"window": 512})
+    run = youla.identify(record, nominal=nominal, controller=controller, feedback="negative", verify=fresh, frequency_response={"window": 512})
     small = {"u": u, "y": u, "G": nominal, "K": controller, "structure": structure, "response": response}
     return {"youla": youla, "log": record, "run": run, "model": model, **small}
 

@@ -30,7 +30,7 @@ assert abs(fits.loc["grey_box", "two inertias"] - fits.loc["likelihood", "two in
 assert abs(fits.loc["grey_box", "rigid"] - fits.loc["nominal", "rigid"]) < 1
 """,
     "choosing-an-experiment": """
-bound = row(youla.excite(machine, controller, amplitude=0.05, band=[5, 100], seconds=8, noise=sensor, shape="prbs"))
+bound = row(youla.excite(machine, controller, feedback="negative", amplitude=0.05, band=[5, 100], seconds=8, noise=sensor, shape="prbs"))
 assert len(modes) == 30 and 0.6 < zeta.std(ddof=1) / bound["deviation of damping"] < 1.5
 deviations = {shape: row(plan)["deviation of damping"] for shape, plan in plans.items()}
 assert max(deviations["prbs"], deviations["square"]) < min(deviations["multisine"], deviations["chirp"])

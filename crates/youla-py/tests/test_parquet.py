@@ -15,7 +15,7 @@ pytest.importorskip("pyarrow")
 pd = pytest.importorskip("pandas")
 
 NOMINAL = youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
-OPTIONS = {"nominal": NOMINAL, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+OPTIONS = {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
 READ = {"inputs": "u", "outputs": "y", "dt": 0.01}
 
 

@@ -23,7 +23,7 @@ CONDITIONS = [SHORT, {**SHORT, "seconds": 40}]
 
 @pytest.fixture(scope="module")
 def found() -> youla.Study:
-    return youla.study(PLANT, 0.1, CONDITIONS, n=16, noise=0.05, seed=1)
+    return youla.study(PLANT, 0.1, CONDITIONS, feedback="negative", n=16, noise=0.05, seed=1)
 
 
 def test_four_times_the_record_gives_half_of_the_deviation(found: youla.Study) -> None:
@@ -49,26 +49,26 @@ def test_the_cheapest_condition_is_the_shortest_that_suffices(found: youla.Study
 
 def test_rows_are_equal_on_every_executor_and_are_kept(found: youla.Study, tmp_path: Path) -> None:
     few = {"n": 2, "noise": 0.05, "seed": 1}
-    serial = youla.study(PLANT, 0.1, [SHORT], **few, folder=tmp_path)
+    serial = youla.study(PLANT, 0.1, [SHORT], feedback="negative", **few, folder=tmp_path)
     assert serial.rows == tuple({**row, "index": k} for k, row in enumerate(found.rows[:2]))
     with ThreadPoolExecutor(2) as threads, ProcessPoolExecutor(2, mp_context=get_context("spawn")) as processes:
         for executor in (threads, processes):
-            assert youla.study(PLANT, 0.1, [SHORT], **few, executor=executor).rows == serial.rows
-    assert youla.study(PLANT, 0.1, [SHORT], **few, folder=tmp_path).computed == 0
+            assert youla.study(PLANT, 0.1, [SHORT], feedback="negative", **few, executor=executor).rows == serial.rows
+    assert youla.study(PLANT, 0.1, [SHORT], feedback="negative", **few, folder=tmp_path).computed == 0
 
 
 def test_a_run_is_its_own_twin() -> None:
     log = youla.Record(loop(102, 1000), inputs=0, outputs=1, excitation=2, dt=0.01)
-    known = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0}
+    known = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0, "feedback": "negative"}
     run = youla.identify(log, **known)
-    found = youla.study(run, 2.0, [{"amplitude": 1.0, "band": [0.5, 20], "samples": 1000}], n=4, seed=1)
+    found = youla.study(run, 2.0, [{"amplitude": 1.0, "band": [0.5, 20], "samples": 1000}], feedback="negative", n=4, seed=1)
     row = found.table()[0]
     assert (found.modes, row["failed"]) == ((), 0)
     assert row["response_error"] < 0.2
     with pytest.raises(youla.InputError, match=r"no oscillating mode.*\.table\(\)"):
         found.cheapest(0.1)
     with pytest.raises(youla.InputError, match=r"noise is given for a run.*run\.recommended"):
-        youla.study(run, 2.0, [SHORT], seed=1, noise=0.1)
+        youla.study(run, 2.0, [SHORT], feedback="negative", seed=1, noise=0.1)
 
 
 def test_frame_and_figure(found: youla.Study) -> None:
@@ -96,6 +96,6 @@ def test_frame_and_figure(found: youla.Study) -> None:
     ],
 )
 def test_bad_input_is_named(change: dict[str, Any], message: str) -> None:
-    given: dict[str, Any] = {"conditions": [SHORT], "noise": 0.05, "controller": 0.1, "n": 1, "seed": 1, **change}
+    given: dict[str, Any] = {"conditions": [SHORT], "noise": 0.05, "controller": 0.1, "feedback": "negative", "n": 1, "seed": 1, **change}
     with pytest.raises(youla.InputError, match=message):
         youla.study(PLANT, given.pop("controller"), given.pop("conditions"), **given)

@@ -120,6 +120,6 @@ def test_a_study_draws_every_mode() -> None:
         a[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = 0.98 * np.array([[c[k], s[k]], [-s[k], c[k]]])
     plant = youla.Model(a, [[0.0], [0.2], [0.0], [0.2]], [[1.0, 0.0, 1.0, 0.0]], [[0.0]], dt=0.01)
     short = {"amplitude": 1.0, "band": [0.5, 20.0], "seconds": 10}
-    axes = youla.study(plant, 0.1, [short], n=2, noise=0.05, seed=1).plot()
+    axes = youla.study(plant, 0.1, [short], feedback="negative", n=2, noise=0.05, seed=1).plot()
     assert len(axes) == 2
     assert axes[0].get_title() != axes[1].get_title()

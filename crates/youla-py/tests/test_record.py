@@ -93,7 +93,7 @@ def test_identification_leaves_its_input_as_it_was(nominal: youla.Model) -> None
     table = loop(5, 500)
     before = table.copy()
     log = youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01)
-    youla.identify(log, nominal=nominal, controller=2.0, hansen={"order": 1, "horizon": 5})
+    youla.identify(log, nominal=nominal, controller=2.0, feedback="negative", hansen={"order": 1, "horizon": 5})
     assert np.array_equal(table, before)
     assert table.flags.writeable
 

@@ -10,7 +10,7 @@ import youla
 HZ = np.geomspace(0.1, 40.0, 60)
 PLANT = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
 G = PLANT.frequency_response(2 * np.pi * HZ).values
-KNOWN = {"nominal": PLANT, "controller": 2.0}
+KNOWN = {"nominal": PLANT, "controller": 2.0, "feedback": "negative"}
 
 
 def noise(seed: int, shape: tuple[int, ...], size: float = 1e-3) -> np.ndarray:
@@ -87,7 +87,7 @@ def test_what_does_not_fit_the_loop() -> None:
     with pytest.raises(youla.InputError, match="above the Nyquist frequency of 50 Hz"):
         youla.identify(youla.Response(hz=2 * HZ, g=G), **KNOWN)
     with pytest.raises(youla.InputError, match="dt is missing, which a response does not show"):
-        youla.identify(youla.Response(hz=HZ, g=G), nominal=0.1, controller=2.0)
+        youla.identify(youla.Response(hz=HZ, g=G), nominal=0.1, controller=2.0, feedback="negative")
     control = pytest.importorskip("control")
     with pytest.raises(youla.InputError, match="frequency response, not a record"):
         youla.Record(control.frd(G[:, 0, 0], HZ), inputs=0, outputs=1, dt=0.01)

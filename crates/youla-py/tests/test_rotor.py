@@ -30,9 +30,9 @@ def _controller(gain: float) -> youla.Model:
 def _run(seed: int, controller: youla.Model, noise: float) -> youla.Run:
     draws = np.random.default_rng(seed)
     d = draws.choice([-1.0, 1.0], (1000, 2)).repeat(4, 0)
-    u, y = youla.simulate_loop(ROTOR, controller, excitation=d, noise=noise * draws.standard_normal(d.shape))
+    u, y = youla.simulate_loop(ROTOR, controller, feedback="negative", excitation=d, noise=noise * draws.standard_normal(d.shape))
     log = youla.Record(np.hstack([u, y, d]), inputs=[0, 1], outputs=[2, 3], excitation=[4, 5], dt=DT)
-    return youla.identify(log, nominal=ROTOR, controller=controller)
+    return youla.identify(log, nominal=ROTOR, controller=controller, feedback="negative")
 
 
 def _exact(controller: youla.Model) -> np.ndarray:

@@ -71,14 +71,14 @@ def test_systems_of_every_kind_are_the_same_loop(record: youla.Record) -> None:
     gains = [2.0, np.array([[2.0]]), control.ss([], [], [], 2.0, 0.01), {"pid": {"kp": 2.0, "discretisation": "tustin"}}]
     hansen = {"order": 1, "horizon": 5}
     found = [
-        youla.identify(record, nominal=g, controller=k, hansen=hansen).model("hansen") for g, k in zip(kinds, gains, strict=True)
+        youla.identify(record, nominal=g, controller=k, feedback="negative", hansen=hansen).model("hansen") for g, k in zip(kinds, gains, strict=True)
     ]
     assert len({(m.a.tobytes(), m.b.tobytes(), m.c.tobytes()) for m in found}) == 1
     positive = youla.identify(record, nominal=model, controller=-2.0, feedback="positive", hansen=hansen).model("hansen")
     assert positive.a.tobytes() == found[0].a.tobytes()
     tf = control.tf([0.1], [1, -0.9], 0.01)
     theirs = scipy_signal.TransferFunction([0.1], [1, -0.9], dt=0.01)
-    both = [youla.identify(record, nominal=g, controller=2.0, hansen=hansen).model("nominal") for g in (tf, theirs)]
+    both = [youla.identify(record, nominal=g, controller=2.0, feedback="negative", hansen=hansen).model("nominal") for g in (tf, theirs)]
     assert both[0].a.tobytes() == both[1].a.tobytes()
 
 
@@ -95,7 +95,7 @@ def test_files(run: youla.Run, tmp_path: Path) -> None:
     assert "<svg" in (tmp_path / "report.html").read_text() or "uPlot" in (tmp_path / "report.html").read_text()
     run.recommended.save(tmp_path / "model.json")
     log = youla.Record(loop(7, 500), inputs=0, outputs=1, excitation=2, dt=0.01)
-    again = youla.identify(log, nominal=tmp_path / "model.json", controller=2.0, hansen={"order": 1, "horizon": 5})
+    again = youla.identify(log, nominal=tmp_path / "model.json", controller=2.0, feedback="negative", hansen={"order": 1, "horizon": 5})
     assert again.model("nominal").a.tolist() == run.recommended.a.tolist()
     assert 'name = "log"' in run.settings
 
@@ -128,15 +128,15 @@ def test_figures(run: youla.Run) -> None:
 
 
 def test_stages(run: youla.Run, record: youla.Record, nominal: youla.Model, tmp_path: Path) -> None:
-    found = youla.check(record, nominal=nominal, controller=2.0)
+    found = youla.check(record, nominal=nominal, controller=2.0, feedback="negative")
     assert found.ok
-    assert youla.check(record, nominal=nominal, controller=3.0).findings != found.findings
+    assert youla.check(record, nominal=nominal, controller=3.0, feedback="negative").findings != found.findings
     model = youla.subspace(record, order=1, horizon=5)
     assert model.frequency_response([1.0]).values.shape == (1, 1, 1)
     new = youla.redesign(run)
     assert new.controller.inputs == ("y",)
     assert youla.certify(run.recommended, new.controller, feedback="positive")
-    excitation = youla.excite(nominal, 2.0, amplitude=0.5, band=[0.5, 20], seconds=10)
+    excitation = youla.excite(nominal, 2.0, feedback="negative", amplitude=0.5, band=[0.5, 20], seconds=10)
     assert excitation.signal.shape == (1000, 1)
     assert np.abs(excitation.signal).max() <= 0.5 * (1 + 1e-12)
     compared = youla.compare([run, run], page=tmp_path / "page.html")
@@ -185,7 +185,7 @@ def test_a_run_toml_is_the_same_run(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="u,y,d", comments="", fmt="%.17g")
     log = youla.Record(table, inputs=0, outputs=1, excitation=2, dt=0.01, name="log")
     nominal = {"state_space": {"domain": "discrete", "a": [[0.9]], "b": [[0.1]], "c": [[1.0]]}}
-    run = youla.identify(log, nominal=nominal, controller={"pid": {"kp": 2.0, "discretisation": "tustin"}})
+    run = youla.identify(log, nominal=nominal, controller={"pid": {"kp": 2.0, "discretisation": "tustin", "feedback": "negative"}})
     text = run.settings.replace('file = "log"', 'file = "log.csv"')
     (tmp_path / "run.toml").write_text(text)
     again = youla.identify(tmp_path / "run.toml")

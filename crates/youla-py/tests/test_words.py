@@ -11,7 +11,7 @@ from conftest import loop
 import youla
 
 TABLE = loop(5, samples=1000)
-KNOWN = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+KNOWN = {"nominal": youla.Model([[0.9]], [[0.1]], [[1.0]], [[0.0]], dt=0.01), "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
 SHORT = {"amplitude": 1.0, "band": [0.5, 10.0], "seconds": 10}
 
 
@@ -23,9 +23,9 @@ def test_every_object_shows_itself_in_ten_lines(run: youla.Run) -> None:
     plant = run.recommended
     objects = [
         run, run.verdict, plant, run.modes(), run.frequency_response(), run.predictions, run.plot, run.summary and log(),
-        youla.bootstrap(run, 6, seed=1), youla.study(plant, 2.0, [SHORT], n=2, noise=0.1, seed=1), youla.check(log()),
-        youla.scan(log(), {"hansen.horizon": [5]}, **KNOWN), youla.certify(plant, 2.0), youla.reduce(plant, order=0),
-        youla.excite(plant, 2.0, **SHORT), youla.subspace(log(), order=1), youla.compare([run, run]), youla.redesign(youla.demo("bearing")),
+        youla.bootstrap(run, 6, seed=1), youla.study(plant, 2.0, [SHORT], feedback="negative", n=2, noise=0.1, seed=1), youla.check(log()),
+        youla.scan(log(), {"hansen.horizon": [5]}, **KNOWN), youla.certify(plant, 2.0, feedback="negative"), youla.reduce(plant, order=0),
+        youla.excite(plant, 2.0, feedback="negative", **SHORT), youla.subspace(log(), order=1), youla.compare([run, run]), youla.redesign(youla.demo("bearing")),
         youla.Response([1.0], g=[1j]),
     ]  # fmt: skip
     for shown in map(repr, objects):
@@ -57,7 +57,7 @@ def uneven() -> dict[str, np.ndarray]:
 
 def improper() -> object:
     control = pytest.importorskip("control")
-    return youla.identify(log(), nominal=1.0, controller=control.tf([1, 2, 1], [1, 1]), hold="tustin")
+    return youla.identify(log(), nominal=1.0, controller=control.tf([1, 2, 1], [1, 1]), feedback="negative", hold="tustin")
 
 
 CASES = {
@@ -68,12 +68,12 @@ CASES = {
     "NaN": (lambda run: youla.identify(log(with_nan()), **KNOWN), r"'y' is not finite at sample 17.*\[record\[:17\], record\[18:\]\]"),
     "uneven time": (lambda run: youla.Record(uneven(), inputs="u", outputs="y", time="t"), "comes 0.51 s after.*interpolate"),
     "improper": (lambda run: improper(), "controller is improper: its numerator has degree 2, its denominator 1"),
-    "no nominal": (lambda run: youla.identify(log(), controller=2.0), "nominal is missing; give a rough nominal"),
+    "no sign": (lambda run: youla.identify(log(), controller=2.0), r"feedback is missing: give feedback='negative' for u = K \(r - y\).*; the log "),
     "no seed": (lambda run: youla.bootstrap(run, 3), "seed is missing; give"),
-    "no seed of a study": (lambda run: youla.study(run, 2.0, [SHORT]), "seed is missing; give"),
-    "key of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "shap": 1}], seed=1), r"conditions\[0\] has no argument 'shap'; did you mean 'shape'"),
-    "value of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "band": [1, 80]}], seed=1), r"conditions\[0\]: .*half the sample rate"),
-    "key of excite": (lambda run: youla.excite(run.recommended, 2.0, **SHORT, shap=1), "excite has no argument 'shap'"),
+    "no seed of a study": (lambda run: youla.study(run, 2.0, [SHORT], feedback="negative"), "seed is missing; give"),
+    "key of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "shap": 1}], feedback="negative", seed=1), r"conditions\[0\] has no argument 'shap'; did you mean 'shape'"),
+    "value of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "band": [1, 80]}], feedback="negative", seed=1), r"conditions\[0\]: .*half the sample rate"),
+    "key of excite": (lambda run: youla.excite(run.recommended, 2.0, feedback="negative", **SHORT, shap=1), "excite has no argument 'shap'"),
 }
 
 

@@ -20,7 +20,7 @@ control = pytest.importorskip("control")
 pd = pytest.importorskip("pandas")
 pl = pytest.importorskip("polars")
 
-KNOWN: dict[str, Any] = {"nominal": NOMINAL, "controller": 2.0}
+KNOWN: dict[str, Any] = {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative"}
 READ = {"inputs": "u", "outputs": "y", "dt": 0.01}
 EXCITE: dict[str, Any] = {"amplitude": 1.0, "band": [1, 10]}
 LEVELS = pd.DataFrame(TABLE, columns=pd.MultiIndex.from_tuples([("a", "u"), ("a", "y"), ("b", "d")]))
@@ -107,7 +107,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "large nominal": (lambda: ident(nominal=youla.Model([], [], [], np.ones((2, 2)), dt=0.01)), "nominal has 2 outputs and 2 inputs"),
     "other dt": (lambda: ident(controller=control.tf([1], [1, 0.5], 0.02)), "controller has the sample time 0.02 s, but the record has 0.01 s"),
     "measured response": (lambda: ident(nominal=RESPONSE), "nominal is a FrequencyResponseData; give a state-space system"),
-    "response in a loop": (lambda: youla.certify(RESPONSE, 1.0), "plant is a FrequencyResponseData without a state-space form"),
+    "response in a loop": (lambda: youla.certify(RESPONSE, 1.0, feedback="negative"), "plant is a FrequencyResponseData without a state-space form"),
     "nonlinear": (lambda: ident(nominal=control.nlsys(lambda t, x, u, p: -x, **STATIC)), "nominal is a NonlinearIOSystem, but must be"),
     "improper": (lambda: youla.certify(control.tf([1, 0, 0], [1, 1], 0.01), 1.0), "give a proper model"),
     "nan as gain": (lambda: ident(controller=float("nan")), "controller has an entry that is not finite"),
@@ -131,12 +131,12 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "structure as list": (lambda: youla.greybox(rec(), structure=[1], **KNOWN), "structure is a list, but must be a mapping such as"),
     "seed beyond 64 bits": (lambda: youla.demo(seed=2**70), "but must be below 2^64"),
     "machine as number": (lambda: youla.demo(3), "machine is 3, but must be a text"),
-    "no samples": (lambda: youla.simulate_loop(NOMINAL, 1.0, samples=0), "samples is 0, but must be a whole number of at least 1"),
-    "samples beyond memory": (lambda: youla.simulate_loop(NOMINAL, 1.0, samples=10**16), "which memory does not hold"),
-    "band of one": (lambda: youla.excite(NOMINAL, 1.0, **{**EXCITE, "band": 10, "seconds": 1}), "band has 1 entries, but must be the lowest"),
-    "amplitude as text": (lambda: youla.excite(NOMINAL, 1.0, **{**EXCITE, "amplitude": "big", "seconds": 1}), "amplitude is a str"),
-    "seconds as text": (lambda: youla.excite(NOMINAL, 1.0, **EXCITE, seconds="1"), "seconds is '1', but must be a positive number"),
-    "negative seed": (lambda: youla.excite(NOMINAL, 1.0, **EXCITE, seconds=1, seed=-1), "seed is -1, but must be a whole number"),
+    "no samples": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative", samples=0), "samples is 0, but must be a whole number of at least 1"),
+    "samples beyond memory": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative", samples=10**16), "which memory does not hold"),
+    "band of one": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **{**EXCITE, "band": 10, "seconds": 1}), "band has 1 entries, but must be the lowest"),
+    "amplitude as text": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **{**EXCITE, "amplitude": "big", "seconds": 1}), "amplitude is a str"),
+    "seconds as text": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **EXCITE, seconds="1"), "seconds is '1', but must be a positive number"),
+    "negative seed": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **EXCITE, seconds=1, seed=-1), "seed is -1, but must be a whole number"),
     "one run to compare": (lambda: youla.compare("run"), "runs is 'run', but must be a list of at least two"),
     "number to compare": (lambda: youla.compare([1, 2]), "runs[0] is 1, but must be a path"),
     "order below 0": (lambda: youla.reduce(NOMINAL, order=-1), "order is -1, but must be a whole number"),

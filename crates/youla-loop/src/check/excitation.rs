@@ -182,13 +182,10 @@ impl ExcitationCheck {
         };
         let reached = self.reached.max(self.by_lines);
         if reached < self.order {
-            let what = format!(
-                "it is persistently exciting of order {reached}, but past and future horizon require {}",
-                self.order
-            );
+            let what = format!("it is persistently exciting of order {reached}, but {} are required", self.order);
             // Noise excites a loop too; half of the lines give a model of lower order.
             let severity = if 2 * reached < self.order { Severity::Defect } else { Severity::Caution };
-            let advice = "Use more lines, a longer shift register or noise, or shorter horizons";
+            let advice = "Use more lines, a longer shift register or noise";
             all.push(numbers(Finding::new(Test::Excitation, severity, record, what).channel(&names)).advice(advice));
         } else if self.condition > options.excitation_condition {
             let what = format!(
@@ -199,7 +196,7 @@ impl ExcitationCheck {
                     _ => "more than 1e13".to_owned(),
                 }
             );
-            let advice = "The model is inaccurate at frequencies without power; use short horizons, or excite there";
+            let advice = "The model is inaccurate at frequencies without power; excite there";
             all.push(
                 numbers(Finding::new(Test::Excitation, Severity::Note, record, what).channel(&names)).advice(advice),
             );

@@ -18,14 +18,14 @@ from ._model import FrequencyResponse, _numbered
 from ._record import Record
 from ._response import Response, data_of
 from ._result import Run
-from ._systems import controller_table, nominal_table
+from ._systems import UnstatedSign, controller_table, nominal_table
 from ._types import Log, Table
 
 Records = Record | Sequence[Record]
 
 #: Tables of run.toml that are keywords.
 OPTIONS = (
-    "recommended", "factors", "hansen", "direct", "reduction", "grey_box", "certificate", "redesign",
+    "recommended", "factors", "hansen", "direct", "reduction", "grey_box", "redesign",
     "verification", "check", "frequency_response", "data",
 )  # fmt: skip
 
@@ -43,7 +43,7 @@ def identify(
     *,
     nominal: Any = None,
     controller: Any = None,
-    feedback: str = "negative",
+    feedback: str | None = None,
     hold: str | None = None,
     verify: Records | None = None,
     name: str | None = None,
@@ -57,14 +57,15 @@ def identify(
         Records to identify from; several are several experiments. A measured response: `Response`, `FrequencyResponse` or
         `control.FrequencyResponseData`. The path of a run.toml does what
         ``youla identify run.toml`` does, and takes no other argument.
-    nominal : Model, python-control or SciPy system, number, matrix, mapping or path
-        A rough model of the plant. A continuous-time system is discretised by a zero-order hold. A mapping is the table
-        ``[nominal]`` of run.toml.
+    nominal : Model, python-control or SciPy system, number, matrix, mapping or path, optional
+        A model of the plant that you have, for comparison; it may be rough. A continuous-time system is discretised by a
+        zero-order hold. A mapping is the table ``[nominal]`` of run.toml. ``hansen`` needs it.
     controller : as `nominal`
         The controller that ran; 0 where none ran. A mapping is the table ``[controller]``, for example
         ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``.
     feedback : {"negative", "positive"}
-        Sign with which the controller is written: ``u = K (r - y)`` or ``u = K (y - r)``.
+        Sign with which the controller is written: ``u = K (r - y)`` or ``u = K (y - r)``. Needed where a controller ran and
+        its mapping does not state it; the message for a missing one says with which the record agrees.
     hold : {"tustin", "zoh"}, optional
         How a controller in continuous time was discretised; needed there, and only there.
     verify : Record or sequence of Record, optional
@@ -73,7 +74,7 @@ def identify(
         Name of the machine; that of the first record when absent.
     **options : mapping
         Tables of run.toml as keywords: ``recommended``, ``hansen``, ``direct``, ``reduction``, ``grey_box``,
-        ``certificate``, ``redesign``, ``verification``, ``check``, ``factors``, ``frequency_response``, and
+        ``redesign``, ``verification``, ``check``, ``factors``, ``frequency_response``, and
         ``data`` for ``detrend`` and ``disturbance``.
 
     Returns
@@ -97,8 +98,7 @@ def identify(
     ...     u[k] = -0.5 * y[k] + d[k]
     ...     y[k + 1] = 0.9 * y[k] + 0.1 * u[k] + 0.01 * rng.standard_normal()
     >>> log = youla.Record({"u": u, "y": y, "d": d}, inputs="u", outputs="y", excitation="d", dt=0.01)
-    >>> nominal = youla.Model([[0.8]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
-    >>> run = youla.identify(log, nominal=nominal, controller=0.5)
+    >>> run = youla.identify(log, controller=0.5, feedback="negative")
     >>> run.recommended.order, bool(abs(run.recommended.a[0, 0] - 0.9) < 0.01)
     (1, True)
     """
@@ -121,7 +121,7 @@ def _of_response(
     verify: Records | None,
     nominal: Any,
     controller: Any,
-    feedback: str,
+    feedback: str | None,
     hold: str | None,
     name: str | None,
     options: Mapping[str, Any],
@@ -156,7 +156,7 @@ def prepare(
     verify: Records | None,
     nominal: Any,
     controller: Any,
-    feedback: str,
+    feedback: str | None,
     hold: str | None,
     name: str | None,
     options: Mapping[str, Any],
@@ -185,11 +185,17 @@ def prepare(
     settings = {
         "name": first.name if name is None else text(name, "name"),
         "data": data,
-        "nominal": nominal_table(nominal, first.dt, (p, m)),
-        "controller": controller_table(controller, feedback, hold, first.dt, (m, p)),
+        "nominal": None if nominal is None else nominal_table(nominal, first.dt, (p, m)),
         **tables,
     }
-    return _plain(settings), [_log_of(r) for r in [*estimation, *fresh]]
+    logs = [_log_of(r) for r in [*estimation, *fresh]]
+    try:
+        settings["controller"] = controller_table(controller, feedback, hold, first.dt, (m, p))
+    except UnstatedSign as error:
+        ((form, table),) = controller_table(controller, "negative", hold, first.dt, (m, p)).items()
+        unsigned = {**settings, "controller": {form: {key: value for key, value in table.items() if key != "feedback"}}}
+        raise InputError(f"{error}{_native.agreement(json.dumps(_plain(unsigned)), logs)}") from None
+    return _plain(settings), logs
 
 
 def check_options(options: Mapping[str, Any], function: str) -> None:

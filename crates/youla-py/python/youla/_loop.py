@@ -19,7 +19,7 @@ from ._figures import RECOMMENDED
 from ._identify import _plain, options_json
 from ._model import Complex, Model, _signal
 from ._result import Run
-from ._systems import as_model, check_signs, controller_table, nominal_table
+from ._systems import as_model, controller_table, nominal_table, sign_of
 
 
 #: Further options of `excite`.
@@ -56,10 +56,8 @@ class Certificate:
         return f"<youla.Certificate: {'stable' if self.stable else 'unstable'}, {len(self.poles)} poles, largest |z| {largest}{peak}>"
 
 
-def _loop(plant: Any, controller: Any, feedback: str) -> tuple[Model, Model]:
+def _loop(plant: Any, controller: Any, feedback: str | None) -> tuple[Model, Model]:
     """Plant and controller of one sample time, the controller with positive feedback."""
-    check_signs(feedback)
-    sign = -1.0 if feedback == "negative" else 1.0
     g = as_model(plant, "plant")
     p, m = g.d.shape
     k = as_model(controller, "controller", g.dt)
@@ -69,10 +67,11 @@ def _loop(plant: Any, controller: Any, feedback: str) -> tuple[Model, Model]:
         raise InputError(f"controller is {k.d.shape[0]} x {k.d.shape[1]}, but the plant needs {m} x {p}")
     if abs(k.dt / g.dt - 1) > 1e-6:
         raise InputError(f"controller has the sample time {k.dt:g} s, but the plant has {g.dt:g} s; resample one of them")
+    sign = -1.0 if sign_of(controller, feedback) == "negative" else 1.0
     return g, Model(k.a, k.b, sign * k.c, sign * k.d, dt=g.dt)
 
 
-def certify(plant: Any, controller: Any, *, feedback: str = "negative") -> Certificate:
+def certify(plant: Any, controller: Any, *, feedback: str | None = None) -> Certificate:
     """Test whether a controller stabilises a model.
 
     Parameters
@@ -96,7 +95,7 @@ def certify(plant: Any, controller: Any, *, feedback: str = "negative") -> Certi
     --------
     >>> import youla
     >>> unstable = youla.Model([[1.1]], [[1.0]], [[1.0]], [[0.0]], dt=0.01)
-    >>> bool(youla.certify(unstable, 0.5)), bool(youla.certify(unstable, 0.05))
+    >>> bool(youla.certify(unstable, 0.5, feedback="negative")), bool(youla.certify(unstable, 0.05, feedback="negative"))
     (True, False)
     """
     g, k = _loop(plant, controller, feedback)
@@ -112,7 +111,7 @@ def simulate_loop(
     excitation: Any = None,
     reference: Any = None,
     noise: Any = None,
-    feedback: str = "negative",
+    feedback: str | None = None,
 ) -> tuple[Array, Array]:
     """Simulate a loop ``u = K (r - y) + d`` from rest; y is measured with the noise.
 
@@ -141,7 +140,7 @@ def simulate_loop(
     --------
     >>> import numpy as np, youla
     >>> plant = youla.Model([[1.1]], [[1.0]], [[1.0]], [[0.0]], dt=0.01)
-    >>> u, y = youla.simulate_loop(plant, 0.6, reference=np.ones(200))
+    >>> u, y = youla.simulate_loop(plant, 0.6, feedback="negative", reference=np.ones(200))
     >>> round(float(y[-1, 0]), 3)
     1.2
     """
@@ -283,7 +282,7 @@ def excite(
     band: Sequence[float],
     seconds: float | None = None,
     samples: int | None = None,
-    feedback: str = "negative",
+    feedback: str | None = None,
     hold: str | None = None,
     **options: Any,
 ) -> Excitation:
@@ -319,7 +318,7 @@ def excite(
     --------
     >>> import youla
     >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
-    >>> made = youla.excite(plant, 2.0, amplitude=0.5, band=[0.5, 20], seconds=10)
+    >>> made = youla.excite(plant, 2.0, feedback="negative", amplitude=0.5, band=[0.5, 20], seconds=10)
     >>> made.signal.shape, made.dt
     ((1000, 1), 0.01)
     """

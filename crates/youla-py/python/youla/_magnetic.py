@@ -121,7 +121,7 @@ def magnetic_loop(rotor: Any, *, dt: float, speed: float = 0.0, order: int | Non
     >>> from ross.rotor_assembly import rotor_amb_example                   # doctest: +SKIP
     >>> s = control.TransferFunction.s                                      # doctest: +SKIP
     >>> loop = magnetic_loop(rotor_amb_example(3e3 + 6 * s / (1 + s / 6e3)), dt=1e-4, plane=True)  # doctest: +SKIP
-    >>> bool(youla.certify(loop.plant, loop.controller))                    # doctest: +SKIP
+    >>> bool(youla.certify(loop.plant, loop.controller, feedback="negative"))                    # doctest: +SKIP
     True
     """
     dt, plane = positive(dt, "dt"), truth(plane, "plane")

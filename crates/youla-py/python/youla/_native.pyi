@@ -12,6 +12,7 @@ __all__ = [
     "Region",
     "Run",
     "Subspace",
+    "agreement",
     "certify",
     "check",
     "check_settings",

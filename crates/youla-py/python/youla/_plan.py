@@ -20,7 +20,7 @@ from ._plot import _axes, grid
 from ._record import Record
 from ._result import Run
 from ._study import Folder, _prepared
-from ._systems import as_model, check_signs
+from ._systems import as_model, sign_of
 from ._tasks import Progress, Row, Rows, key_of, run_tasks
 
 #: Quantile of the normal distribution for 95 %.
@@ -185,7 +185,7 @@ def study(
     n: int = 20,
     seed: int | None = None,
     noise: Any = None,
-    feedback: str = "negative",
+    feedback: str | None = None,
     executor: Executor | None = None,
     folder: Folder = None,
     progress: Progress | None = None,
@@ -231,18 +231,18 @@ def study(
     >>> a = r * np.array([[np.cos(w), np.sin(w)], [-np.sin(w), np.cos(w)]])
     >>> plant = youla.Model(a, [[0.0], [0.2]], [[1.0, 0.0]], [[0.0]], dt=0.01)
     >>> short = {"amplitude": 1.0, "band": [0.5, 10.0], "seconds": 10}
-    >>> found = youla.study(plant, 0.1, [short, {**short, "seconds": 40}], n=4, noise=0.05, seed=1)
+    >>> found = youla.study(plant, 0.1, [short, {**short, "seconds": 40}], feedback="negative", n=4, noise=0.05, seed=1)
     >>> [row["failed"] for row in found.table()]
     [0, 0]
     >>> found.cheapest(0.5)["seconds"]
     10
     """
     n, seed = whole(n, "n", 1), seeded(seed)
-    check_signs(feedback)
     twin, spread = _twin(plant, noise)
     of_plant = Model(*twin[0][:4], dt=twin[0][4])
     if isinstance(plant, Run) and isinstance(controller, str) and controller == "own":
         controller, feedback = plant.model("controller"), "positive"
+    feedback = sign_of(controller, feedback)
     k = as_model(controller, "controller", of_plant.dt)
     certificate = certify(of_plant, k, feedback=feedback)
     if certificate.peak_sensitivity is None:

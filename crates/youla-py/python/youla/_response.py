@@ -49,7 +49,7 @@ class Response:
     >>> s, rng = 1 / (1 + 2.0 * g), np.random.default_rng(1)
     >>> e, f = 1e-3 * rng.standard_normal((2, 60, 2)) @ [1, 1j]
     >>> measured = youla.Response(hz=hz, ud=s + e, yd=g * s + f, sd=2**0.5 * 1e-3)
-    >>> run = youla.identify(measured, nominal=plant, controller=2.0)
+    >>> run = youla.identify(measured, nominal=plant, controller=2.0, feedback="negative")
     >>> run.verdict.trusted, run.recommended.order
     (True, 1)
     """

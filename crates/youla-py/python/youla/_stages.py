@@ -61,7 +61,7 @@ class Check:
 
 
 def check(
-    record: Records, *, nominal: Any = None, controller: Any = None, feedback: str = "negative", hold: str | None = None,
+    record: Records, *, nominal: Any = None, controller: Any = None, feedback: str | None = None, hold: str | None = None,
     **options: Mapping[str, Any],
 ) -> Check:  # fmt: skip
     """Check records before identifying from them.
@@ -102,11 +102,7 @@ def check(
     first = _first(record)
     check_options(options, "check")
     known = controller is not None
-    if known and nominal is None:
-        nominal = np.zeros((len(first.outputs), len(first.inputs)))
-    settings, logs = prepare(
-        record, None, 0 if nominal is None else nominal, 0 if controller is None else controller, feedback, hold, None, options
-    )
+    settings, logs = prepare(record, None, nominal, controller if known else 0, feedback, hold, None, options)
     found = json.loads(_native.check(json.dumps(settings), logs, known))
     return Check(tuple(found["findings"]), found["defects"], found["cautions"], found["notes"])
 
@@ -193,7 +189,7 @@ def subspace(record: Records, **options: Any) -> SubspaceEstimate:
     >>> round(float(youla.subspace(log, order=1, horizon=5).model.a[0, 0]), 3)
     0.8
     """
-    settings, logs = prepare(record, None, 0, 0, "positive", None, None, {})
+    settings, logs = prepare(record, None, None, 0, None, None, None, {})
     return SubspaceEstimate(_native.subspace(json.dumps(settings), logs, options_json(options)), _first(record))
 
 
@@ -230,13 +226,13 @@ def greybox(record: Records, *, structure: Mapping[str, Any], grey_box: Mapping[
     >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
     >>> d = np.random.default_rng(1).standard_normal((3000, 1))
     >>> n = 0.01 * np.random.default_rng(2).standard_normal((3000, 1))
-    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=n)
+    >>> u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=n)
     >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
     >>> structure = {
     ...     "parameters": {"pole": {"initial": 4.0, "min": 0.1, "max": 50.0}, "gain": {"initial": 8.0}},
     ...     "a": [["-pole"]], "b": [["gain"]], "c": [[1.0]],
     ... }
-    >>> run = youla.greybox(log, structure=structure, nominal=plant, controller=2.0, hansen={"order": 1, "horizon": 5})
+    >>> run = youla.greybox(log, structure=structure, nominal=plant, controller=2.0, feedback="negative", hansen={"order": 1, "horizon": 5})
     >>> round(float(run.model("grey_box").a[0, 0]), 2)
     0.95
     """

@@ -22,7 +22,7 @@ from ._kept import again
 from ._model import Model
 from ._record import Record
 from ._result import Run
-from ._systems import check_signs
+from ._systems import check_hold, sign_of
 from ._tasks import Progress, Row, Rows, key_of, run_tasks
 from ._types import Log
 
@@ -133,9 +133,9 @@ def bootstrap(
     >>> import numpy as np, youla
     >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
     >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
-    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=0.02 * n)
     >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
-    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> known = {"nominal": plant, "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
     >>> from concurrent.futures import ThreadPoolExecutor
     >>> with ThreadPoolExecutor(2) as executor:
     ...     found = youla.bootstrap(youla.identify(log, **known), 8, seed=1, executor=executor)
@@ -204,9 +204,9 @@ def scan(
     >>> import numpy as np, youla
     >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
     >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
-    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=0.02 * n)
     >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
-    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> known = {"nominal": plant, "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
     >>> [row["order"] for row in youla.scan(log, {"recommended.order": [1, 2]}, **known)]
     [1, 2]
     """
@@ -291,9 +291,9 @@ def identify_many(
     >>> import numpy as np, youla
     >>> plant = youla.Model([[0.95]], [[0.1]], [[1.0]], [[0.0]], dt=0.01)
     >>> d, n = np.random.default_rng(1).standard_normal((2, 1000, 1))
-    >>> u, y = youla.simulate_loop(plant, 2.0, excitation=d, noise=0.02 * n)
+    >>> u, y = youla.simulate_loop(plant, 2.0, feedback="negative", excitation=d, noise=0.02 * n)
     >>> log = youla.Record(np.hstack([u, y, d]), inputs=0, outputs=1, excitation=2, dt=0.01)
-    >>> known = {"nominal": plant, "controller": 2.0, "hansen": {"order": 1, "horizon": 5}}
+    >>> known = {"nominal": plant, "controller": 2.0, "feedback": "negative", "hansen": {"order": 1, "horizon": 5}}
     >>> rows = youla.identify_many([log, "absent.csv"], read={"inputs": "u", "outputs": "y", "dt": 0.01}, **known)
     >>> len(rows.succeeded), rows.failed[0]["error"]
     (1, 'absent.csv: no such file')
@@ -302,7 +302,8 @@ def identify_many(
     known(chosen, list(signature(Record).parameters)[1:], "Record, to which read goes,")
     others = {key: value for key, value in arguments.items() if key not in ("nominal", "controller", "feedback", "hold", "name")}
     check_options(others, "identify_many")
-    check_signs(arguments.get("feedback", "negative"), arguments.get("hold"))
+    sign_of(arguments.get("controller"), arguments.get("feedback"))
+    check_hold(arguments.get("hold"))
     payload = {"read": chosen, "arguments": arguments}
     key = key_of(payload["read"], arguments)
     return run_tasks(_machine, payload, records, key=key, executor=executor, folder=folder, progress=progress)
@@ -348,7 +349,7 @@ def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, A
     """Settings as JSON and the records, from the arguments of `identify`."""
     options = dict(arguments)
     nominal, controller, hold, name = (options.pop(key, None) for key in ("nominal", "controller", "hold", "name"))
-    feedback = options.pop("feedback", "negative")
+    feedback = options.pop("feedback", None)
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
     return json.dumps(settings), logs
 

@@ -32,9 +32,10 @@ def nominal_table(nominal: Any, dt: float, ports: tuple[int, int]) -> Table:
     return {form: table}
 
 
-def controller_table(controller: Any, feedback: str, hold: str | None, dt: float, ports: tuple[int, int]) -> Table:
+def controller_table(controller: Any, feedback: str | None, hold: str | None, dt: float, ports: tuple[int, int]) -> Table:
     """Return [controller]; `ports` are the numbers of inputs and outputs of the plant."""
-    check_signs(feedback, hold)
+    feedback = sign_of(controller, feedback)
+    check_hold(hold)
     if isinstance(controller, Mapping):
         found = _named(controller, CONTROLLERS, "controller")
         ((form, table),) = found.items()
@@ -51,9 +52,30 @@ def controller_table(controller: Any, feedback: str, hold: str | None, dt: float
     return {form: {"feedback": feedback, **table}}
 
 
-def check_signs(feedback: str, hold: str | None = None) -> None:
-    """Refuse another sign or hold."""
-    choice(feedback, "feedback", ("negative (u = K (r - y))", "positive (u = K (y - r))"))
+class UnstatedSign(InputError):
+    """A controller whose sign nobody states."""
+
+
+#: The signs with their equations.
+SIGNS = ("negative (u = K (r - y))", "positive (u = K (y - r))")
+
+
+def sign_of(controller: Any, feedback: Any) -> str:
+    """Return the sign with which a controller is written; it is never guessed. No controller, 0 or None, has none."""
+    if feedback is None:
+        inner = next(iter(controller.values()), None) if isinstance(controller, Mapping) else None
+        if isinstance(inner, Mapping) and "feedback" in inner:
+            feedback = inner["feedback"]
+        elif controller is None or (isinstance(controller, (int, float, np.ndarray)) and not np.any(controller)):
+            return "negative"
+        else:
+            raise UnstatedSign("feedback is missing: give feedback='negative' for u = K (r - y), or feedback='positive' for u = K (y - r)")
+    choice(feedback, "feedback", SIGNS)
+    return str(feedback)
+
+
+def check_hold(hold: Any) -> None:
+    """Refuse another hold."""
     if hold is not None:
         choice(hold, "hold", ("zoh", "tustin"))
 

@@ -162,8 +162,9 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
 }
 
 fn with_order(options: &CheckOptions, hansen: Option<&SubspaceOptions>) -> CheckOptions {
-    let horizon = hansen.map_or_else(Horizon::default, |hansen| hansen.horizon);
-    let horizons = horizon.past.saturating_add(horizon.future);
+    let of = |horizon: Horizon| horizon.past.saturating_add(horizon.future);
+    // A short horizon of the scheme does not make a poor excitation a rich one.
+    let horizons = of(Horizon::default()).max(hansen.map_or(0, |hansen| of(hansen.horizon)));
     CheckOptions { excitation_order: options.excitation_order.or(Some(horizons)), ..options.clone() }
 }
 

@@ -14,7 +14,7 @@ use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
 use crate::stages::nonparametric::lines;
-use crate::stages::recommend::{defects, recommend};
+use crate::stages::recommend::{defects, recommend, weigh};
 use crate::stages::redesign::{pid, redesigned};
 use crate::stages::reduction::run_reduction;
 use crate::stages::responses::{check_grid, grid, indirect};
@@ -53,7 +53,7 @@ pub fn identify(
     let factorisation = factors.map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
     let context = factors.map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
-    let data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
+    let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
             None => rayon::join(|| structures(run, context), || direct(&records, &settings)), // (25), (17)
@@ -65,6 +65,7 @@ pub fn identify(
     let (mut recommended, s) = (own_line(recommended)?, s.map(own_line).transpose()?);
     if let Ok(model) = &mut recommended {
         model.evidence.extend(defects(&data));
+        weigh(&mut data, model);
     }
     let filtered = match (of_nominal, &recommended) {
         (Some(filtered), _) => filtered,

@@ -10,12 +10,23 @@ use youla_loop::check::{Finding, Severity, Test};
 /// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
 /// outliers have tests and consequences of their own.
 pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
-    let own = [Test::Controller, Test::Outliers];
-    let of_data = |f: &&Finding| f.severity == Severity::Defect && f.record != OF_SETTINGS && !own.contains(&f.test);
+    let of_data = |f: &&Finding| f.severity == Severity::Defect && f.record != OF_SETTINGS && !OWN.contains(&f.test);
     let found: Vec<&Finding> = data.findings.iter().filter(of_data).collect();
     let first = found.first()?;
     let question = "Defects that the check of the data found";
     Some(Evidence::new(question, found.len() as f64, 0.0).noted(format!("{}: {}", first.record, first.what)))
+}
+
+/// Tests of the data with a test or a consequence of their own in the verdict.
+const OWN: [Test; 2] = [Test::Controller, Test::Outliers];
+
+/// Defects that the verdict has weighed and found harmless are cautions: no defect stands beside a model that is trusted.
+pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
+    let weighed = |f: &&mut Finding| f.severity == Severity::Defect && OWN.contains(&f.test);
+    for finding in data.findings.iter_mut().filter(weighed).filter(|_| model.trusted()) {
+        finding.severity = Severity::Caution;
+        finding.what += " (the tests of the recommended model find it harmless in this loop)";
+    }
 }
 
 /// The recommended model of the records of a run, or of its measured response.

@@ -46,29 +46,44 @@ impl Recommendation {
         let required = self.evidence.iter().filter(|e| e.required).count();
         let first = match (failed, &self.loop_ratio) {
             (0, Some(r)) => format!(
-                "Trusted for this loop: the uncertainty of the model leaves {:.0} % of the margin at {} Hz",
-                100.0 * (1.0 - r.largest),
+                "Trusted for this loop: the uncertainty of the model leaves {} of the margin at {} Hz",
+                share(1.0 - r.largest),
                 figure(r.largest_hz)
             ),
             (0, None) => "Trusted".to_owned(),
-            (n, _) => format!("Not trusted: {n} of {required} tests of the recommended model failed"),
+            (n, _) => format!("Not trusted: {n} of {required} tests of the recommended model are not passed"),
         };
         let bands: Vec<String> =
             self.bands.iter().map(|[low, high]| format!("{} to {} Hz", figure(*low), figure(*high))).collect();
         match bands.len() {
             0 => format!("{first}. No band is valid to 10 %."),
-            _ if failed > 0 => format!(
-                "{first}. If the reasons do not concern it, its response is within 10 % from {}.",
-                bands.join(", ")
-            ),
-            _ => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
+            _ if failed == 0 => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
+            _ if self.in_doubt() => format!("{first}. They leave the model itself in doubt, at all frequencies."),
+            _ => format!("{first}. Its response is within 10 % from {}.", bands.join(", ")),
         }
+    }
+
+    /// Whether a failed test is about the model, so that its own region says nothing: not about what the region or the stated controller
+    /// mean for the loop.
+    fn in_doubt(&self) -> bool {
+        let of_loop = |e: &Evidence| e.question.ends_with(REGION) || e.question.ends_with(CONTROLLER);
+        self.evidence.iter().any(|e| !e.holds() && !of_loop(e))
     }
 
     /// The required tests that are not passed.
     pub fn reasons(&self) -> Vec<String> {
         self.evidence.iter().filter(|e| !e.holds()).map(Evidence::to_string).collect()
     }
+}
+
+/// End of the question how much of the margin the region takes.
+pub(crate) const REGION: &str = "(region)";
+/// End of the question about the stated controller.
+pub(crate) const CONTROLLER: &str = "(controller)";
+
+/// A share in percent, which is not all where it is less.
+fn share(part: f64) -> String {
+    if part < 1.0 && part >= 0.995 { "more than 99 %".into() } else { format!("{:.0} %", 100.0 * part) }
 }
 
 /// `x+ = A x + B u + K e`, `y = C x + D u + e`, physical units; the states of the plant come first.
@@ -171,8 +186,15 @@ impl Evidence {
     }
 
     #[must_use]
+    /// Where the figure was found, unless there is none.
     pub(crate) fn at(self, hz: [f64; 2]) -> Self {
-        Evidence { hz: Some(hz), ..self }
+        Evidence { hz: (self.figure != 0.0).then_some(hz), ..self }
+    }
+
+    /// With what mends it, where it is not passed.
+    #[must_use]
+    pub(crate) fn remedy(self, remedy: &str) -> Self {
+        if self.outcome == Outcome::Passed { self } else { self.noted(remedy) }
     }
 
     /// With a remark on the figure.

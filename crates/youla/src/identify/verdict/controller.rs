@@ -81,11 +81,11 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
     let worst = worst(law, &gain, plant, |share| excess.near(share, channels.m * channels.p))?;
     let at_limit: usize = residuals.iter().map(|r| r.left_out).sum();
     let samples: usize = all.iter().map(|r| r.seen.nrows()).sum();
-    let note = format!(
-        "the law leaves {:.2} % of the inputs; {:.2} % of the samples are at a limit and left out",
-        100.0 * share,
-        100.0 * at_limit as f64 / samples.max(1) as f64
-    );
+    let mut note = format!("the law leaves {:.2} % of the inputs", 100.0 * share);
+    if at_limit > 0 {
+        let part = 100.0 * at_limit as f64 / samples.max(1) as f64;
+        note += &format!("; {part:.2} % of the samples are at a limit and left out");
+    }
     let [figure, hz, significance] = worst;
     let evidence = Evidence::new(QUESTION, figure, LARGEST_CONTROLLER_ERROR).noted(note).at([hz, hz]);
     Ok(Some(evidence.beyond_chance(significance)))

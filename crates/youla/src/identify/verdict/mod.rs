@@ -274,5 +274,5 @@ fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
     let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &shares, directions);
     let r = LoopRatio::new(&loops.at, |hz| region.at(hz));
     let evidence = Evidence::new(question, r.largest.min(NO_INFORMATION), INFORMATION_RATIO).at([r.largest_hz; 2]);
-    evidence.noted("excite the loop there, or longer")
+    evidence.remedy("excite the loop there, or longer")
 }

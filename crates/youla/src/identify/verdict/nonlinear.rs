@@ -121,8 +121,11 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let nonlinear_part =
         (significance > BEYOND_CHANCE).then(|| NonlinearPart::new(spectra, &shaped, f % spectra.inputs, f, c));
     let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
-    let note = format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1);
-    let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).noted(note).beyond_chance(significance);
+    let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).beyond_chance(significance);
+    let of_size = match significance > BEYOND_CHANCE {
+        true => of_size.noted(format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1)),
+        false => of_size,
+    };
     // Functions of the input behind friction.
     let behind: Vec<usize> =
         rows.filter(|i| *i >= spectra.inputs && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]).collect();

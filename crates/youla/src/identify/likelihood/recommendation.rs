@@ -83,7 +83,7 @@ pub(crate) const CONTROLLER: &str = "(controller)";
 
 /// A share in percent, which is not all where it is less.
 fn share(part: f64) -> String {
-    if part < 1.0 && part >= 0.995 { "more than 99 %".into() } else { format!("{:.0} %", 100.0 * part) }
+    if (0.995..1.0).contains(&part) { "more than 99 %".into() } else { format!("{:.0} %", 100.0 * part) }
 }
 
 /// `x+ = A x + B u + K e`, `y = C x + D u + e`, physical units; the states of the plant come first.

@@ -6,8 +6,8 @@ use crate::run_folder::{OutputFolder, folder_of};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use youla_run::{
-    ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings, agreeing_feedback, agreement,
-    check_run, read_settings,
+    ControllerSettings, DataFile, DataSettings, Feedback, NominalModel, RunSettings, agreement, check_run,
+    read_settings,
 };
 
 pub(crate) const EXAMPLES: &str = "\
@@ -104,11 +104,10 @@ impl IdentifyArgs {
         match (ControllerSettings::from_json(file)?, self.feedback) {
             (None, Some(sign)) => Ok(model(sign.into())),
             (None, None) => {
-                let agrees = agreeing_feedback(|sign| check_run(&with(model(sign)), Path::new("")).ok());
+                let agrees = agreement(|sign| check_run(&with(model(sign)), Path::new("")).ok());
                 refuse(format!(
                     "the sign of this controller is not stated: add --feedback negative for u = K (r - y), or --feedback positive for \
-                     u = K (y - r){}",
-                    agreement(agrees)
+                     u = K (y - r){agrees}"
                 ))
             }
             (Some(controller), None) => Ok(controller),

@@ -5,10 +5,12 @@ use crate::error::refuse;
 use crate::figures::{LoopState, Sizes, least_damping};
 use crate::identify::{CleanRows, identified, loop_response};
 use crate::parameter::{NewLoop, parameter_of};
-use crate::rehearse::{Prediction, on_model, predict};
+use crate::rehearse::{Prediction, predict};
 use crate::{Error, Result};
 use youla::identify::likelihood::Recommendation;
-use youla_loop::redesign::{DeviationRegion, Redesign, RedesignOptions, RedesignProblem, redesign};
+use youla_loop::redesign::{
+    DeviationRegion, Redesign, RedesignOptions, RedesignProblem, disturbance_response, redesign,
+};
 use youla_run::{Identification, ModeEntry, shown_modes};
 use youla_twin::RunningLoop;
 
@@ -112,7 +114,7 @@ fn new_loop(running: &RunningLoop, model: &Recommendation, sizes: Sizes<'_>, wan
         let candidate = redesign(&problem, &options).map_err(Error::from).and_then(|new| loaded(running, new));
         let reason = match refusable(candidate)? {
             Ok(new) => {
-                let response = on_model(&model.plant, &new.controller)?.in_units(sizes.input, sizes.output);
+                let response = disturbance_response(&model.plant, &new.controller)?.in_units(sizes.input, sizes.output);
                 let damping = least_damping(&response)?;
                 if damping >= wanted {
                     return Ok(new);

@@ -14,6 +14,7 @@ use youla::identify::likelihood::{Predictor, Recommendation};
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::{Mat, MatRef};
+use youla_loop::redesign::disturbance_response;
 use youla_twin::RunningLoop;
 
 /// Rehearsals.
@@ -50,7 +51,7 @@ pub(crate) fn predict(
     rows: &CleanRows,
     sizes: Sizes<'_>,
 ) -> Result<Prediction> {
-    let state = LoopState::new(&on_model(&model.plant, &new.controller)?, &new.controller, sizes)?;
+    let state = LoopState::new(&disturbance_response(&model.plant, &new.controller)?, &new.controller, sizes)?;
     let v = at_plant_input(running, Some(&new.q), &rows.alpha)?;
     let noisy = with_noise(&model.predictor, &new.controller)?;
     let measured: Vec<Result<f64>> = (0..REHEARSALS as u64)
@@ -72,17 +73,6 @@ pub(crate) fn predict(
     // The estimate of the loop has a bias that the rehearsals show; it depends on their noise, so both means count.
     let bounds = [mean.min(state.damping) - half, mean.max(state.damping) + half];
     Ok(Prediction { damping: state.damping, deviation, bounds, sensitivity: state.sensitivity })
-}
-
-/// From a disturbance at the plant input to the outputs.
-pub(crate) fn on_model(
-    plant: &StateSpace<Discrete>,
-    controller: &StateSpace<Discrete>,
-) -> youla::Result<StateSpace<Discrete>> {
-    let ports = youla::control::with_input_port(controller)?;
-    let closed = youla::control::closed_loop(plant, &ports)?;
-    let (m, p) = (plant.inputs(), plant.outputs());
-    Ok(closed.part(m..m + p, 0..m))
 }
 
 /// The loop from the disturbance at the plant input and the innovations to the outputs.
@@ -114,7 +104,7 @@ fn rehearsed(noisy: &StateSpace<Discrete>, v: MatRef<'_, f64>, covariance: &Mat<
 /// Standard deviation of the predicted damping by the error of the model, over the region of the model.
 fn model_deviation(model: &Recommendation, new: &NewLoop, sizes: Sizes<'_>) -> Result<f64> {
     let damping = |plant: &StateSpace<Discrete>| {
-        Ok(vec![least_damping(&on_model(plant, &new.controller)?.in_units(sizes.input, sizes.output))?])
+        Ok(vec![least_damping(&disturbance_response(plant, &new.controller)?.in_units(sizes.input, sizes.output))?])
     };
     let intervals = model.region.intervals(LEVEL, damping)?;
     Ok(intervals.first().map_or(f64::INFINITY, |damping| damping.deviation))

@@ -11,8 +11,8 @@ use std::path::Path;
 use youla::identify::subspace::SubspaceModel;
 use youla_loop::excite::ExciteOptions;
 use youla_run::{
-    ExcitationPort, Feedback, RunSettings, agreeing_feedback, check_in_memory, excite_run, parse_subspace_options,
-    records_in_memory,
+    ExcitationPort, Feedback, RunSettings, agreement as agreement_of, check_in_memory, excite_run,
+    parse_subspace_options, records_in_memory,
 };
 
 /// Checks records, with their controller where `controller` says so; the findings as JSON.
@@ -39,7 +39,7 @@ pub(crate) fn agreement(py: Python<'_>, unsigned: &str, logs: Vec<Log<'_>>) -> P
             let records = records_in_memory(&chosen.data, logs.clone()).ok()?;
             check_in_memory(&chosen, &records, Path::new("."), true).ok()
         };
-        Ok(youla_run::agreement(agreeing_feedback(check)))
+        Ok(agreement_of(check))
     })
 }
 

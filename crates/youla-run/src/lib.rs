@@ -21,8 +21,8 @@ mod stages;
 mod summary;
 
 pub use check::{
-    CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, agreeing_feedback, agreement, check_files, check_in_memory,
-    check_run, further, read_check_options, read_settings,
+    CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, agreement, check_files, check_in_memory, check_run,
+    further, read_check_options, read_settings,
 };
 pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use error::no_model::NoModel;

@@ -38,13 +38,24 @@ impl LoopFigures {
         let controller = controller.in_units(output_size, input_size);
         // Refuses an unstable loop with its pole.
         let peak_sensitivity = peak_sensitivity(&plant, &controller)?;
-        let (m, p) = (plant.inputs(), plant.outputs());
-        let response = closed_loop(&plant, &with_input_port(&controller)?)?.part(m..m + p, 0..m);
+        let response = disturbance_response(&plant, &controller)?;
         let modes = loop_modes(&response)?;
         let least_damping = least_damping(&modes);
         let peak_response = hinf_norm(&response, &PeakOptions { tolerance: 1e-6 })?.value;
         Ok(LoopFigures { response, modes, least_damping, peak_response, peak_sensitivity })
     }
+}
+
+/// From a disturbance at the plant input to the outputs, under a controller `u = K y` (positive feedback).
+///
+/// # Errors
+/// Ports, sample times, an algebraic loop.
+pub fn disturbance_response(
+    plant: &StateSpace<Discrete>,
+    controller: &StateSpace<Discrete>,
+) -> youla::Result<StateSpace<Discrete>> {
+    let (m, p) = (plant.inputs(), plant.outputs());
+    Ok(closed_loop(plant, &with_input_port(controller)?)?.part(m..m + p, 0..m))
 }
 
 /// The modes below the Nyquist frequency with their shares in the response of all of them, largest first.

@@ -16,7 +16,7 @@ mod robust;
 pub mod structured;
 mod youla_parameter;
 
-pub use figures::{LoopFigures, least_damping, loop_modes};
+pub use figures::{LoopFigures, disturbance_response, least_damping, loop_modes};
 pub use lqg::Gains;
 pub use robust::DeviationRegion;
 
@@ -332,11 +332,9 @@ fn predicted_intervals(
     level: f64,
 ) -> Result<PredictedIntervals> {
     let (plant, k) = (problem.plant, &controller.system);
-    let (m, p) = (plant.inputs(), plant.outputs());
-    let ports = with_input_port(k)?;
     let damping = |plant: &StateSpace<Discrete>| {
-        let response = closed_loop(plant, &ports)?.part(m..m + p, 0..m);
-        Ok(vec![least_damping(&loop_modes(&response.in_units(problem.input_size, problem.output_size))?)])
+        let response = disturbance_response(plant, k)?.in_units(problem.input_size, problem.output_size);
+        Ok(vec![least_damping(&loop_modes(&response)?)])
     };
     let least_damping = region.intervals(level, damping)?.first().copied();
     let scales = ChannelScales::new(problem.input_size.to_vec(), problem.output_size.to_vec())?;

@@ -207,7 +207,7 @@ impl RunSettings {
         Some(format!("[{table}] needs estimation records, but [data] has a response; leave the table out"))
     }
 
-    /// What stands on a nominal model that is not there.
+    /// What needs a nominal model where none is given.
     fn nominal_problem(&self) -> Option<String> {
         let asked = [
             ("[hansen] identifies the deviation from", self.hansen.is_some()),

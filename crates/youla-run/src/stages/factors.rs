@@ -36,14 +36,15 @@ impl DeclaredLoop {
     /// # Errors
     /// [`youla::Error::Unsupported`] where none is given.
     pub fn required_nominal(&self) -> Result<&StateSpace<Discrete>> {
-        let missing = || {
-            let what = "a factorisation or a prediction before there is a model";
-            let instead = "add [nominal] to run.toml, a model of the plant, which may be rough";
-            Error::Method(youla::Error::Unsupported { what, instead })
-        };
-        self.nominal.as_ref().ok_or_else(missing)
+        self.nominal.as_ref().ok_or(Error::Method(NO_NOMINAL))
     }
 }
+
+/// What is missing where something rests on a nominal model.
+pub(crate) const NO_NOMINAL: youla::Error = youla::Error::Unsupported {
+    what: "a factorisation or a prediction without a nominal model",
+    instead: "add [nominal] to run.toml, a model of the plant, which may be rough",
+};
 
 /// The factors of a loop.
 #[derive(Debug, Clone)]

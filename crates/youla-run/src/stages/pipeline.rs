@@ -9,7 +9,7 @@ use crate::stages::certificate::certificate;
 use crate::stages::clock::{Stage, StageClock};
 use crate::stages::context::{RunContext, SchemeContext};
 use crate::stages::direct::direct;
-use crate::stages::factors::{declared_loop, factorise};
+use crate::stages::factors::{NO_NOMINAL, declared_loop, factorise};
 use crate::stages::grey_box::criterion::SchemeStart;
 use crate::stages::grey_box::{GreyBoxRun, grey_box};
 use crate::stages::hansen::require_length;
@@ -72,7 +72,7 @@ pub fn identify(
         (None, Ok(model)) => {
             own_line(filtered((&model.plant, &declared.running), &settings, &records, clock))?.map_err(of_recommended)
         }
-        (None, Err(_)) => Err(Error::Method(NO_MODEL)),
+        (None, Err(_)) => Err(Error::Method(NO_NOMINAL)),
     };
     let factorisation = filtered.as_ref().ok().map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
@@ -150,12 +150,6 @@ fn own_line<T>(outcome: Result<T>) -> Result<Result<T>> {
         outcome => Ok(outcome),
     }
 }
-
-/// Why there are no factors where neither model is there.
-const NO_MODEL: youla::Error = youla::Error::Unsupported {
-    what: "coprime factors without a nominal and without a recommended model",
-    instead: "add [nominal] to run.toml, a model of the plant, which may be rough",
-};
 
 /// The same reason where the model is the recommended one.
 fn of_recommended(error: Error) -> Error {

@@ -20,7 +20,7 @@ pub(crate) fn defects(data: &DataCheck) -> Option<Evidence> {
 /// Tests of the data with a test or a consequence of their own in the verdict.
 const OWN: [Test; 2] = [Test::Controller, Test::Outliers];
 
-/// Defects that the verdict has weighed and found harmless are cautions: no defect stands beside a model that is trusted.
+/// Defects that the verdict has weighed and found harmless are cautions: a run lists no defect beside a trusted model.
 pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
     let weighed = |f: &&mut Finding| f.severity == Severity::Defect && OWN.contains(&f.test);
     for finding in data.findings.iter_mut().filter(weighed).filter(|_| model.trusted()) {

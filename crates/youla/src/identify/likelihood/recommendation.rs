@@ -58,15 +58,14 @@ impl Recommendation {
         match bands.len() {
             0 => format!("{first}. No band is valid to 10 %."),
             _ if failed == 0 => format!("{first}. Valid to 10 % from {}.", bands.join(", ")),
-            _ if self.in_doubt() => format!("{first}. They leave the model itself in doubt, at all frequencies."),
+            _ if self.in_doubt() => format!("{first}. The model itself is in doubt, at all frequencies."),
             _ => format!("{first}. Its response is within 10 % from {}.", bands.join(", ")),
         }
     }
 
-    /// Whether a failed test is about the model, so that its own region says nothing: not about what the region or the stated controller
-    /// mean for the loop.
+    /// Whether a failed test is about the model, so that its own region is no evidence; the tests [`OF_LOOP`] are about the loop.
     fn in_doubt(&self) -> bool {
-        let of_loop = |e: &Evidence| e.question.ends_with(REGION) || e.question.ends_with(CONTROLLER);
+        let of_loop = |e: &Evidence| OF_LOOP.iter().any(|name| e.question.ends_with(name));
         self.evidence.iter().any(|e| !e.holds() && !of_loop(e))
     }
 
@@ -76,12 +75,10 @@ impl Recommendation {
     }
 }
 
-/// End of the question how much of the margin the region takes.
-pub(crate) const REGION: &str = "(region)";
-/// End of the question about the stated controller.
-pub(crate) const CONTROLLER: &str = "(controller)";
+/// Names of the tests of what the region and the stated controller mean for the loop, at the ends of their questions.
+const OF_LOOP: [&str; 2] = ["(region)", "(controller)"];
 
-/// A share in percent, which is not all where it is less.
+/// A share in percent, never rounded up to all.
 fn share(part: f64) -> String {
     if (0.995..1.0).contains(&part) { "more than 99 %".into() } else { format!("{:.0} %", 100.0 * part) }
 }
@@ -185,13 +182,13 @@ impl Evidence {
         Evidence { required: false, ..self }
     }
 
+    /// Where the figure was found; no place where it is zero.
     #[must_use]
-    /// Where the figure was found, unless there is none.
     pub(crate) fn at(self, hz: [f64; 2]) -> Self {
         Evidence { hz: (self.figure != 0.0).then_some(hz), ..self }
     }
 
-    /// With what mends it, where it is not passed.
+    /// With its remedy, where it is not passed.
     #[must_use]
     pub(crate) fn remedy(self, remedy: &str) -> Self {
         if self.outcome == Outcome::Passed { self } else { self.noted(remedy) }

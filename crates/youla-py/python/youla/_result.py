@@ -81,6 +81,8 @@ class Verdict:
         Bands in Hz in which the standard deviation of every entry is at most a tenth of it.
     loop_ratio, loop_ratio_hz : float or None
         The part of the margin of the loop that the 95 % region takes, and where; ``None`` for an open loop.
+    description : bool or None
+        Whether the description of the loop agrees with the log, whatever the model is worth; ``None`` where nothing could be asked.
     """
 
     trusted: bool
@@ -91,6 +93,7 @@ class Verdict:
     bands: tuple[tuple[float, float], ...] = ()
     loop_ratio: float | None = None
     loop_ratio_hz: float | None = None
+    description: bool | None = None
 
     def __bool__(self) -> bool:
         return self.trusted
@@ -237,7 +240,7 @@ class Run:
         tests = tuple(VerdictTest(**{**test, "hz": test["hz"] and tuple(test["hz"])}) for test in found["tests"])
         bands = tuple((low, high) for low, high in found["bands"])
         ratio = (found["loop_ratio"], found["loop_ratio_hz"])
-        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio)
+        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio, found["description"])
 
     @property
     def fits(self) -> dict[str, dict[str, list[float | None]]]:

@@ -23,7 +23,10 @@ fn evidence(model: &Recommendation) -> EvidenceTable {
             Outcome::NotTested => "not tested",
         };
         let required = if e.required { "yes" } else { "no" };
-        let at = e.hz.map_or(String::new(), |[low, _]| figure(low));
+        let at = e.hz.map_or(String::new(), |[low, high]| match low == high {
+            true => figure(low),
+            false => format!("{} to {}", figure(low), figure(high)),
+        });
         let value = if e.outcome == Outcome::NotTested { String::new() } else { figure(e.figure) };
         let cells = [value, e.limit.to_string(), at, required.into(), outcome.into(), e.note.clone()];
         std::iter::once(e.question.clone()).chain(cells).collect()

@@ -25,6 +25,10 @@ pub struct RecommendedEntry {
     pub trusted: bool,
     /// Why the model is not trusted; empty where it is.
     pub reasons: Vec<String>,
+    /// Whether the description of the loop agrees with the log, whatever the model is worth: the stated controller explains the logged inputs.
+    /// Absent where none was stated or nothing could be asked.
+    #[serde(default)]
+    pub description: Option<bool>,
     /// The model's JSON, relative to the run folder.
     pub file: String,
     /// Number of states without those of the dead time.
@@ -153,6 +157,7 @@ impl From<&Recommendation> for RecommendedEntry {
             method: Method::Likelihood.key().into(),
             trusted: found.trusted(),
             reasons: found.reasons(),
+            description: found.description(),
             file: FILE.into(),
             order: found.order,
             dead_time: found.dead_time.clone(),

@@ -59,9 +59,20 @@ fn summary_has_the_documented_structure() {
 #[test]
 fn summary_recommends_one_model() {
     let recommended = &json(&demo().join("summary.json"))["recommended"];
-    let first = ["bands", "dead_time", "entry_bands", "evidence", "file", "loop_ratio", "loop_ratio_hz", "method"];
+    let first = [
+        "bands",
+        "dead_time",
+        "description",
+        "entry_bands",
+        "evidence",
+        "file",
+        "loop_ratio",
+        "loop_ratio_hz",
+        "method",
+    ];
     let rest = ["modes", "order", "parts", "reasons", "response_deviation", "tests", "trusted"];
     assert_eq!(keys(recommended), [&first[..], &rest[..]].concat());
+    assert_eq!(recommended["description"], true);
     assert_eq!(keys(&recommended["parts"]), ["choice", "distortion", "noise", "variation"]);
     assert!(recommended["loop_ratio"].as_f64().is_some_and(|r| 0.0 < r && r <= 0.5), "{}", recommended["loop_ratio"]);
     let outcomes = recommended["tests"].as_array().expect("an array").iter().map(|t| t["outcome"].as_str());

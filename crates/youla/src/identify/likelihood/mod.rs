@@ -49,8 +49,9 @@ use super::verdict::{self, Judged, Judgement, Parts, Witness};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
-use choose::lines;
+use choose::lines::{self, WithoutLines};
 use choose::problem::Problem;
+use choose::unseen::{WithoutUnseen, without_unseen};
 use data::spectra::Sizes;
 use deviation::Directions;
 
@@ -112,46 +113,79 @@ pub fn recommend(
     let mut candidates = Vec::new();
     let found = lines::solve(&all, verification, &mut candidates);
     let found = found.ok_or(Error::NoCandidate { samples: all.samples().0 })?;
-    let lines = found.evidence(estimation, time.ts());
-    let (estimation, verification) = (found.records(0, estimation), found.records(1, verification));
-    let (problem, verification) = (found.problem(&all, &estimation), verification.as_slice());
-    let solution = found.solution.clone();
-    let choice = &solution.chosen;
-    let spectra = problem.spectra(&choice.delays);
-    let shares = [deviation::slow(spectra.samples()), deviation::grid(spectra.samples())].concat();
-    let parts = Parts::new(&problem, &solution, verification);
-    let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
-    let witness = signals.and_then(|signals| Witness::new(&problem, &solution, signals, verification));
-    let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, &solution);
-    let directions = Directions::new(&spectra, &solution, parts.scatter, witness.clone()).with(nonlinear_part);
-    let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
-    let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
-    let judged = Judged {
-        problem: &problem,
-        spectra: &spectra,
-        solution: &solution,
-        known,
-        witness: witness.as_ref(),
-        parts: &parts,
-        plant: &plant,
-        region: &region,
-        nonlinear,
-    };
-    let Judgement { mut evidence, loop_ratio, entry_bands, bands } = verdict::judge(&judged)?;
-    evidence.extend(lines);
-    Ok(Recommendation {
-        predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
-        plant,
-        dead_time: choice.delays.clone(),
-        order: choice.order(),
-        region,
-        modes: deviation::mode_estimates::modes(&spectra, choice, time),
-        candidates,
-        evidence,
-        loop_ratio,
-        entry_bands,
-        bands,
-    })
+    let on = Records { all: &all, verification, known, time };
+    let (mut recommended, unseen) = on.judged(&found, &mut candidates)?;
+    if let Some(unseen) = unseen {
+        let (without, _) = on.judged(&unseen.found, &mut candidates)?;
+        if without.failures() < recommended.failures() {
+            recommended = without;
+            recommended.evidence.push(unseen.evidence(time.ts()));
+        }
+    }
+    Ok(Recommendation { candidates, ..recommended })
+}
+
+/// What a model is judged on.
+struct Records<'a> {
+    all: &'a Problem<'a>,
+    verification: &'a [Experiment<'a>],
+    known: Option<&'a LoopKnowledge<'a>>,
+    time: Discrete,
+}
+
+impl Records<'_> {
+    /// The model with its evidence, and, where it rests on the noise that the feedback brings to the inputs, the model without the modes that only
+    /// this noise shows.
+    fn judged(
+        &self,
+        found: &WithoutLines,
+        candidates: &mut Vec<Candidate>,
+    ) -> Result<(Recommendation, Option<WithoutUnseen>)> {
+        let (known, time) = (self.known, self.time);
+        let (estimation, verification) = (found.records(0, self.all.experiments), found.records(1, self.verification));
+        let (problem, verification) = (found.problem(self.all, &estimation), verification.as_slice());
+        let solution = &found.solution;
+        let choice = &solution.chosen;
+        let spectra = problem.spectra(&choice.delays);
+        let shares = [deviation::slow(spectra.samples()), deviation::grid(spectra.samples())].concat();
+        let parts = Parts::new(&problem, solution, verification);
+        let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
+        let witness = signals.and_then(|signals| Witness::new(&problem, solution, signals, verification));
+        let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, solution);
+        let directions = Directions::new(&spectra, solution, parts.scatter, witness.clone()).with(nonlinear_part);
+        let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
+        let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
+        let judged = Judged {
+            problem: &problem,
+            spectra: &spectra,
+            solution,
+            known,
+            witness: witness.as_ref(),
+            parts: &parts,
+            plant: &plant,
+            region: &region,
+            nonlinear,
+        };
+        let Judgement { mut evidence, loop_ratio, entry_bands, bands, informed } = verdict::judge(&judged)?;
+        evidence.extend(found.evidence(self.all.experiments, time.ts()));
+        let unseen = witness
+            .filter(|_| !informed)
+            .and_then(|witness| without_unseen(self.all, found, &|turns| witness.shows(turns), candidates));
+        let recommended = Recommendation {
+            predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
+            plant,
+            dead_time: choice.delays.clone(),
+            order: choice.order(),
+            region,
+            modes: deviation::mode_estimates::modes(&spectra, choice, time),
+            candidates: Vec::new(),
+            evidence,
+            loop_ratio,
+            entry_bands,
+            bands,
+        };
+        Ok((recommended, unseen))
+    }
 }
 
 /// The records that are not left out, by their places.

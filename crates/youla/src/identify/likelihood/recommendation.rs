@@ -40,9 +40,14 @@ impl Recommendation {
         self.evidence.iter().all(Evidence::holds)
     }
 
+    /// How many required tests are not passed.
+    pub(super) fn failures(&self) -> usize {
+        self.evidence.iter().filter(|e| !e.holds()).count()
+    }
+
     /// What the model is good for, in a sentence or two.
     pub fn sentence(&self) -> String {
-        let failed = self.evidence.iter().filter(|e| !e.holds()).count();
+        let failed = self.failures();
         let required = self.evidence.iter().filter(|e| e.required).count();
         let first = match (failed, &self.loop_ratio) {
             (0, Some(r)) => format!(
@@ -51,6 +56,10 @@ impl Recommendation {
                 figure(r.largest_hz)
             ),
             (0, None) => "Trusted".to_owned(),
+            (1, _) if self.description() == Some(false) => format!(
+                "Not trusted for this loop: the stated controller disagrees with the log, the model passes its {} other tests",
+                required - 1
+            ),
             (n, _) => format!("Not trusted: {n} of {required} tests of the recommended model are not passed"),
         };
         let bands: Vec<String> =
@@ -61,6 +70,13 @@ impl Recommendation {
             _ if self.in_doubt() => format!("{first}. The model itself is in doubt, at all frequencies."),
             _ => format!("{first}. Its response is within 10 % from {}.", bands.join(", ")),
         }
+    }
+
+    /// Whether the description of the loop agrees with the log, whatever the model is worth: the stated controller explains the logged inputs.
+    /// `None` where no controller was stated or nothing could be asked.
+    pub fn description(&self) -> Option<bool> {
+        let asked = |e: &&Evidence| e.question.ends_with(OF_DESCRIPTION) && e.outcome != Outcome::NotTested;
+        self.evidence.iter().find(asked).map(Evidence::holds)
     }
 
     /// Whether a failed test is about the model, so that its own region is no evidence; the tests [`OF_LOOP`] are about the loop.
@@ -76,7 +92,9 @@ impl Recommendation {
 }
 
 /// Names of the tests of what the region and the stated controller mean for the loop, at the ends of their questions.
-const OF_LOOP: [&str; 2] = ["(region)", "(controller)"];
+const OF_LOOP: [&str; 2] = ["(region)", OF_DESCRIPTION];
+/// Name of the tests of the description of the loop.
+const OF_DESCRIPTION: &str = "(controller)";
 
 /// A share in percent, never rounded up to all.
 fn share(part: f64) -> String {

@@ -5,8 +5,12 @@
 pub(crate) const BAND_LINES: usize = 40;
 /// Lines under a Hann window that count as one: `sum of |correlation|^2 = 1 + 2 (2/3)^2 + 2 (1/6)^2`.
 pub(crate) const HANN_LOSS: f64 = 35.0 / 18.0;
-/// Directions of the excitation with less than this share of its mean power per band are left out: rounding of designed gaps.
-pub(crate) const WEAK_EXCITATION: f64 = 1e-4;
+/// Directions of the excitation with less than this share of its mean power per band are left out: rounding of a log of five digits. A move of
+/// 30 rad fills the mean; beside it an excitation of 0.1 N m has 1e-4 of it.
+pub(crate) const WEAK_EXCITATION: f64 = 1e-10;
+/// Least power of an input that a direction of the excitation explains, over the power of what it leaves per line: of noise alone a band
+/// exceeds it in one of 150 cases, `exp(-5)`.
+pub(crate) const LEAST_EXPLAINED: f64 = 5.0;
 /// Least singular value of the excited inputs over the largest from which a direction counts as excited: below it one per cent of leakage
 /// into the other direction is 30 % of it.
 pub(crate) const LEAST_DIRECTION: f64 = 0.03;

@@ -10,8 +10,8 @@
 //! not speak.
 
 use super::limits::{
-    BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE,
-    WEAK_EXCITATION,
+    BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE,
+    OVERALL_CHANCE, WEAK_EXCITATION,
 };
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
@@ -288,12 +288,20 @@ pub(crate) fn explained_inputs(records: &[RecordLines<'_>], channels: Channels) 
     records.iter().map(of).collect()
 }
 
-/// `S_ux S_xx^-1` along the strong directions of the excitation.
+/// `S_ux S_xx^-1` along the directions of the excitation that explain more of an input than chance does.
 fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
     let eigen = sums.xx.self_adjoint_eigen(Side::Lower).ok()?;
     let along = &sums.ux * eigen.U();
-    let inverse = |k: usize| if eigen.S()[k].re > least.max(TINY) { 1.0 / eigen.S()[k].re } else { 0.0 };
-    let scaled = Mat::from_fn(along.nrows(), along.ncols(), |i, k| along[(i, k)] * inverse(k));
+    let (m, q) = (along.nrows(), along.ncols());
+    let explained = |i: usize, k: usize| along[(i, k)].norm_sqr() / eigen.S()[k].re;
+    let strong: Vec<usize> = (0..q).filter(|k| eigen.S()[*k].re > least.max(TINY)).collect();
+    let free = (sums.lines as f64 - strong.len() as f64).max(1.0);
+    let left = |i: usize| (sums.uu[i] - strong.iter().map(|k| explained(i, *k)).sum::<f64>()).max(0.0) / free;
+    let left: Vec<f64> = (0..m).map(left).collect();
+    let moves = |k: &usize| (0..m).any(|i| explained(i, *k) > LEAST_EXPLAINED * left[i]);
+    let mut inverse = vec![0.0; q];
+    strong.iter().filter(|k| moves(k)).for_each(|k| inverse[*k] = 1.0 / eigen.S()[*k].re);
+    let scaled = Mat::from_fn(m, q, |i, k| along[(i, k)] * inverse[k]);
     Some(&scaled * eigen.U().adjoint())
 }
 

@@ -37,7 +37,7 @@ use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
 use crate::identify::likelihood::deviation::{Directions, grid, slow};
-use crate::identify::likelihood::{Evidence, LoopKnowledge};
+use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
@@ -73,6 +73,8 @@ pub(crate) struct Judgement {
     pub(crate) loop_ratio: Option<LoopRatio>,
     pub(crate) entry_bands: Vec<Vec<Vec<[f64; 2]>>>,
     pub(crate) bands: Vec<[f64; 2]>,
+    /// Whether what the excitation moves suffices for the model; true where that was not asked.
+    pub(crate) informed: bool,
 }
 
 /// The loop of a region: its plant in the feedback, at the frequencies at which it is judged.
@@ -116,21 +118,22 @@ pub(crate) fn judge(on: &Judged<'_>) -> Result<Judgement> {
         evidence.push(indirect(on, witness, &weigh));
     }
     let shown = of_region(on.plant, on.region, loops.as_ref())?;
-    if let (Some(witness), Some(loops)) = (on.witness, &loops) {
-        evidence.push(information(on, witness, loops));
-    }
+    let information = on.witness.zip(loops.as_ref()).map(|(witness, loops)| information(on, witness, loops));
+    let informed = information.as_ref().is_none_or(Evidence::holds);
+    evidence.extend(information);
     let sizes = &on.problem.sizes.y;
     let sensitivity = |share: f64| {
         let at = loops.as_ref()?.near(share / ts)?;
         Some(Mat::from_fn(sizes.len(), sizes.len(), |i, j| at.s[(i, j)] * (sizes[j] / sizes[i])))
     };
-    evidence.extend(on.parts.evidence(ts, &sensitivity));
+    let seen = |share: f64| on.witness.is_none_or(|witness| witness.shows(share));
+    evidence.extend(on.parts.evidence(ts, &sensitivity, &seen));
     if let Some(witness) = on.witness.filter(|witness| !witness.variation.is_empty()) {
         evidence.push(repeatability(on, witness, &weigh));
     }
     evidence.push(shown.0);
     evidence.extend(on.nonlinear.clone());
-    Ok(Judgement { evidence, ..shown.1 })
+    Ok(Judgement { evidence, informed, ..shown.1 })
 }
 
 /// The test of the region, and what it says of the loop and of bands.
@@ -171,7 +174,7 @@ fn of_region(plant: &StateSpace<Discrete>, region: &Region, loops: Option<&Loops
             Evidence::new(question, median((0..region.hz.len()).map(relative)), LARGEST_DEVIATION)
         }
     };
-    let judgement = Judgement { evidence: Vec::new(), loop_ratio, entry_bands, bands: all };
+    let judgement = Judgement { evidence: Vec::new(), loop_ratio, entry_bands, bands: all, informed: true };
     Ok((test, judgement))
 }
 
@@ -227,7 +230,13 @@ fn stability(plant: &StateSpace<Discrete>, region: &Region, k: &StateSpace<Discr
 /// The difference between the responses that the excitation shows in groups of records, in the loop, largest over frequency.
 fn repeatability(on: &Judged<'_>, witness: &Witness, weigh: &dyn Fn(f64, &[f64]) -> f64) -> Evidence {
     let question = "Difference of the responses that the excitation shows in parts of the records and in fresh ones, in the loop, largest over frequency (repeatability)";
-    largest(on, &witness.variation, 0.0, question, weigh)
+    largest(
+        on,
+        &witness.variation,
+        0.0,
+        [question, "the machine changes from part to part, or acts otherwise than linearly"],
+        weigh,
+    )
 }
 
 /// The error of the response that the excitation shows, in the loop, largest over frequency.
@@ -236,29 +245,41 @@ fn indirect(on: &Judged<'_>, witness: &Witness, weigh: &dyn Fn(f64, &[f64]) -> f
     if witness.distortion.is_empty() {
         return Evidence::untested(question, LARGEST_LOOP_ERROR, "the excitation does not reach every input");
     }
-    largest(on, &witness.distortion, witness.whole.significance.unwrap_or(0.0), question, weigh)
+    let significance = witness.whole.significance.unwrap_or(0.0);
+    largest(on, &witness.distortion, significance, [question, "the model is likely wrong there"], weigh)
 }
 
-/// The largest excess over frequency as the loop weighs it.
+/// The largest excess over frequency as the loop weighs it, with the band around it in which it is beyond its limit, and the response there.
 fn largest(
     on: &Judged<'_>,
     excess: &Excess,
     significance: f64,
-    question: &str,
+    [question, cause]: [&str; 2],
     weigh: &dyn Fn(f64, &[f64]) -> f64,
 ) -> Evidence {
-    let entries = on.spectra.inputs * on.spectra.outputs;
-    let (mut worst, mut significance) = ((0.0, 0.0), significance);
-    for share in grid(on.spectra.samples()) {
-        let (squares, deviations) = excess.near(share, entries);
-        significance = significance.max(deviations);
-        let figure = weigh(share, &squares);
-        if figure > worst.0 {
-            worst = (figure, share);
-        }
+    let (ts, entries) = (on.plant.time().ts(), on.spectra.inputs * on.spectra.outputs);
+    let shares = grid(on.spectra.samples());
+    let found: Vec<(Vec<f64>, f64)> = shares.iter().map(|share| excess.near(*share, entries)).collect();
+    let figures: Vec<f64> = shares.iter().zip(&found).map(|(share, (squares, _))| weigh(*share, squares)).collect();
+    let significance = found.iter().map(|(_, deviations)| *deviations).fold(significance, f64::max);
+    let worst = (0..figures.len()).max_by(|a, b| figures[*a].total_cmp(&figures[*b])).unwrap_or(0);
+    let figure = figures.get(worst).copied().unwrap_or(0.0);
+    let evidence = Evidence::new(question, figure, LARGEST_LOOP_ERROR).beyond_chance(significance);
+    if evidence.holds() {
+        return evidence.at([shares.get(worst).map_or(0.0, |share| share / ts); 2]);
     }
-    let ts = on.plant.time().ts();
-    Evidence::new(question, worst.0, LARGEST_LOOP_ERROR).beyond_chance(significance).at([worst.1 / ts; 2])
+    let beyond = |k: &usize| figures[*k] > LARGEST_LOOP_ERROR;
+    let low = (0..worst).rev().take_while(beyond).last().unwrap_or(worst);
+    let high = (worst..figures.len()).take_while(beyond).last().unwrap_or(worst);
+    let hz = shares[worst] / ts;
+    let evidence = evidence.at([shares[low] / ts, shares[high] / ts]);
+    let Ok(g) = frequency_response(on.plant, &[std::f64::consts::TAU * hz]) else { return evidence };
+    let Sizes { u, y } = &on.problem.sizes;
+    let physical = |(at, s): (usize, &f64)| s * (y[at / u.len()] / u[at % u.len()]).powi(2);
+    let difference = found[worst].0.iter().enumerate().map(physical).sum::<f64>().sqrt();
+    let part = 100.0 * difference / g.at(0).norm_l2().max(TINY);
+    let size = format!("{} % of the model's response at {} Hz", figure_of(part), figure_of(hz));
+    evidence.noted(format!("{size}; {cause}"))
 }
 
 /// The region from what the excitation alone moves at the inputs: a model that rests on the noise that the feedback brings to the inputs

@@ -177,8 +177,14 @@ impl Parts {
         Parts { comparisons, scatter: scatter.map_or(1.0, |(_, ratio)| ratio.max(1.0)) }
     }
 
-    /// Whether halves and fresh records agree: `|S dG| / |G|` over a third of an octave, largest over frequency, `s` the sensitivity in units of the sizes.
-    pub(crate) fn evidence(&self, ts: f64, s: &dyn Fn(f64) -> Option<Mat<c64>>) -> Vec<Evidence> {
+    /// Whether halves and fresh records agree: `|S dG| / |G|` over a third of an octave, largest over the frequencies that the excitation shows
+    /// (`shown`): elsewhere models of noise would be compared. `s` is the sensitivity in units of the sizes.
+    pub(crate) fn evidence(
+        &self,
+        ts: f64,
+        s: &dyn Fn(f64) -> Option<Mat<c64>>,
+        shown: &dyn Fn(f64) -> bool,
+    ) -> Vec<Evidence> {
         let of = |c: &Comparison| {
             let question = format!(
                 "Difference of the models from {}, relative to them, where the feedback does not suppress it (same model)",
@@ -188,7 +194,7 @@ impl Parts {
                 let through = s(at.share).map_or_else(|| at.apart.norm_l2(), |s| (s * &at.apart).norm_l2());
                 [through.powi(2) - (at.chance * at.size).powi(2), at.size * at.size, at.share / ts]
             };
-            let squares: Vec<[f64; 3]> = c.differences.iter().map(squares).collect();
+            let squares: Vec<[f64; 3]> = c.differences.iter().filter(|at| shown(at.share)).map(squares).collect();
             let sum = |window: &[[f64; 3]], k: usize| window.iter().map(|w| w[k]).sum::<f64>();
             let of =
                 |window: &[[f64; 3]]| ((sum(window, 0) / sum(window, 1)).max(0.0).sqrt(), window[window.len() / 2][2]);

@@ -1,6 +1,7 @@
 //! What the external excitation says of a model: its error, band by band, in all records, and how this error differs between groups of
 //! records.
 
+use super::limits::BAND_RATIO;
 use super::local_error::{Channels, Excess, LocalErrors, RecordLines, band_count, explained_inputs, hann};
 use crate::identify::likelihood::LoopSignals;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
@@ -103,6 +104,15 @@ impl Witness {
 }
 
 impl Witness {
+    /// Whether the excitation shows the response near a frequency, a share of the sample rate.
+    pub(crate) fn shows(&self, turns: f64) -> bool {
+        let bands = &self.whole.bands;
+        let place = |share: f64| ((2.0 * share * bands.len() as f64) as usize).min(bands.len().saturating_sub(1));
+        bands
+            .get(place(turns / BAND_RATIO)..=place(turns * BAND_RATIO))
+            .is_some_and(|near| near.iter().any(Option::is_some))
+    }
+
     /// The lines of the estimation records with the part of the inputs that the excitation explains; `None` where it does not reach all.
     pub(crate) fn excited(&self, spectra: &Spectra) -> Option<Spectra> {
         if self.whole.bands.iter().all(Option::is_none) || self.excited.len() != spectra.records.len() {

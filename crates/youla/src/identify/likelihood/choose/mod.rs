@@ -9,4 +9,5 @@ pub(crate) mod resize;
 pub(crate) mod solve;
 pub(crate) mod starts;
 pub(crate) mod states;
+pub(crate) mod unseen;
 mod wide;

@@ -150,7 +150,7 @@ impl Problem<'_> {
     }
 
     /// The dead times of a single input next to the best, one after the other from the model before, until one is distinctly worse.
-    fn along_delays(&self, tried: &mut Vec<Choice>, at: &Choice, table: &mut Vec<Candidate>) {
+    pub(super) fn along_delays(&self, tried: &mut Vec<Choice>, at: &Choice, table: &mut Vec<Candidate>) {
         let limit = at.criterion + INDISTINCT;
         let alike = |c: &Choice| c.order() == at.order() && c.found.feedthrough == at.found.feedthrough;
         for later in [false, true] {

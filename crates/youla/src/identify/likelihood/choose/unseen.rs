@@ -1,0 +1,105 @@
+//! Modes that only the noise shows.
+//!
+//! Where the excitation moves nothing, the inputs are what the feedback brings of the noise, and `y = (I - G K)^-1 H e` is all that is seen:
+//! for every G there is an H that explains it. A peak of the noise takes four numbers as a mode of G and many as an autoregression, so
+//! that Schwarz's criterion makes it a mode of the plant. It is left to the noise where the model rests on noise otherwise.
+
+use super::lines::WithoutLines;
+use super::problem::{Problem, Solution, Task};
+use super::solve::best;
+use crate::identify::likelihood::search::with_best_inputs;
+use crate::identify::likelihood::{Candidate, Evidence};
+use crate::identify::subspace::Experiment;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// A model without the modes that the excitation does not show.
+pub(crate) struct WithoutUnseen {
+    /// The model with the outputs that it is the model of.
+    pub(crate) found: WithoutLines,
+    /// Frequencies of the modes that were left out, shares of the sample rate.
+    turns: Vec<f64>,
+}
+
+impl WithoutUnseen {
+    /// The modes that were left out.
+    pub(crate) fn evidence(&self, ts: f64) -> Evidence {
+        let question = "Resonances that only the noise shows, left to the model of the noise (unseen modes)";
+        let hz: Vec<String> = self.turns.iter().map(|turns| format!("{:.4}", turns / ts)).collect();
+        let note = format!(
+            "at {} Hz, where the excitation moves nothing: the response there continues the model",
+            hz.join(", ")
+        );
+        Evidence::new(question, self.turns.len() as f64, 0.0).reported().noted(note)
+    }
+}
+
+/// The model without the modes at frequencies, shares of the sample rate, at which the excitation does not show it; `None` where there are none,
+/// and where the order is given.
+pub(crate) fn without_unseen(
+    all: &Problem<'_>,
+    now: &WithoutLines,
+    shown: &dyn Fn(f64) -> bool,
+    table: &mut Vec<Candidate>,
+) -> Option<WithoutUnseen> {
+    let choice = &now.solution.chosen;
+    let model = choice.found.point.model.separated().filter(|_| all.order.is_none())?;
+    let turns_of = |k: usize| model.blocks[k].poles().into_iter().find(|pole| pole.im > 0.0).map(|z| z.arg() / TAU);
+    let unseen: Vec<(usize, f64)> =
+        (0..model.blocks.len()).filter_map(|k| Some((k, turns_of(k).filter(|turns| !shown(*turns))?))).collect();
+    let (places, turns): (Vec<usize>, Vec<f64>) = unseen.into_iter().unzip();
+    if places.is_empty() || places.len() == model.blocks.len() {
+        return None;
+    }
+    let records: Vec<Experiment<'_>> = now.records(0, all.experiments);
+    let problem = now.problem(all, &records);
+    let spectra = Arc::new(problem.spectra(&choice.delays));
+    let start = with_best_inputs(&spectra, model.without(&places), &choice.found.noise, problem.feedthrough);
+    let (delays, origin) = (choice.delays.clone(), "without what only the noise shows".into());
+    let mut tried = problem.run(vec![Task { spectra, start, delays, origin }], f64::INFINITY, table);
+    let at = best(&tried)?.clone();
+    problem.along_delays(&mut tried, &at, table);
+    let at = best(&tried)?.clone();
+    let solution: Solution = problem.concluded(tried, &at)?;
+    let (lines, outputs) = (now.lines.clone(), now.outputs.clone());
+    Some(WithoutUnseen { found: WithoutLines { solution, lines, outputs }, turns })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::likelihood::{LikelihoodOptions, problem};
+    use crate::lti::{Discrete, StateSpace, simulate};
+    use faer::Mat;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    /// A mode at 0.1 of the sample rate beside a lag: it is left out where the excitation does not show it, and the lag stays.
+    #[test]
+    fn a_mode_that_is_not_shown_is_left_out_and_a_lag_stays() {
+        let rng = &mut ChaCha8Rng::seed_from_u64(4);
+        let mut normal = |size: f64| Mat::from_fn(3000, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+        let (u, noise) = (normal(1.0), normal(0.05));
+        let (cos, sin) = (0.97 * (TAU * 0.1).cos(), 0.97 * (TAU * 0.1).sin());
+        let entries = [[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 0.9]];
+        let a = Mat::from_fn(3, 3, |i, j| entries[i][j]);
+        let (b, c) = (Mat::from_fn(3, 1, |_, _| 0.3), Mat::from_fn(1, 3, |_, _| 1.0));
+        let plant = StateSpace::new(a, b, c, Mat::zeros(1, 1), Discrete::new(1.0).unwrap()).unwrap();
+        let y = simulate(&plant, u.as_ref(), &[0.0; 3]).unwrap() + noise;
+        let records = [Experiment::new(u.as_ref(), y.as_ref())];
+        let all = problem(&records, None, &LikelihoodOptions::default()).unwrap();
+        let solution = all.solve(&mut Vec::new()).unwrap();
+        assert_eq!(solution.chosen.order(), 3);
+        let now = WithoutLines { solution, lines: Vec::new(), outputs: None };
+        let without = |shown: &dyn Fn(f64) -> bool| without_unseen(&all, &now, shown, &mut Vec::new());
+        assert!(without(&|_| true).is_none());
+        let less = without(&|turns| turns < 0.05).unwrap();
+        let left = &less.found.solution.chosen;
+        let pole = left.found.point.model.poles()[0];
+        assert!(left.order() == 1 && pole.im == 0.0 && (0.8..1.0).contains(&pole.re), "{} {pole}", left.order());
+        assert!(less.turns.len() == 1 && (less.turns[0] - 0.1).abs() < 1e-3, "{:?}", less.turns);
+        let evidence = less.evidence(1e-3);
+        assert!(evidence.holds() && evidence.note.starts_with("at 100."), "{evidence}");
+    }
+}

@@ -1,8 +1,9 @@
 //! The tests of a record that depend on its external signals: trends, excitation and noise, lines.
 
 use super::regression::Lagged;
-use super::{ChannelNames, CheckOptions, Finding, LoggedRecord, drift, excitation, lines, noise};
+use super::{ChannelNames, CheckOptions, Finding, LoggedRecord, Severity, Test, drift, excitation, lines, noise};
 use crate::error::Result;
+use faer::{Col, ColRef};
 use youla::MatRef;
 use youla::signal::{Channel, spectral_lines};
 
@@ -74,6 +75,56 @@ pub(super) fn of_excitation(
         all.extend(pairs.map(|(noise, channel)| noise.finding(record.name, channel)));
     }
     Ok(all)
+}
+
+/// Greatest difference, over the peak, up to which two channels hold the same samples: the rounding of a log with six digits.
+const SAME: f64 = 1e-6;
+
+/// Signals from outside whose samples are those of an output or an input, up to a factor and an offset: one signal for two roles.
+/// `open` tells where a controller is declared, and whether it is 0: then the excitation is the input.
+pub(super) fn of_roles(record: &LoggedRecord<'_>, names: &ChannelNames, open: Option<bool>) -> Vec<Finding> {
+    let known = [
+        ("excitation", record.input_excitation, &names.input_excitation),
+        ("reference", record.reference, &names.reference),
+        ("alpha", record.alpha, &names.alpha),
+    ];
+    let plant = [("output", record.y, &names.outputs), ("input", record.u, &names.inputs)];
+    let mut all = Vec::new();
+    for (what, data, channels) in known {
+        let columns = data.into_iter().flat_map(|d| d.col_iter()).zip(channels);
+        for ((signal, channel), (role, of, others)) in columns.flat_map(|c| plant.map(|p| (c, p))) {
+            if role == "input" && open == Some(true) {
+                continue;
+            }
+            let equal = |(x, _): &(_, &Channel)| proportional(*x, signal);
+            let Some((_, other)) = of.col_iter().zip(others).find(equal) else { continue };
+            let undeclared = role == "input" && open.is_none();
+            let severity = if undeclared { Severity::Caution } else { Severity::Defect };
+            let found = format!("the {what} holds the samples of the {role} {}, up to a factor", other.name);
+            let advice = match undeclared {
+                true => {
+                    "If a controller ran, choose the column of what was added to its command; if none ran, leave the excitation out"
+                }
+                false => "Choose the column of the signal that comes from outside, or leave it out",
+            };
+            all.push(
+                Finding::new(Test::Excitation, severity, record.name, found).channel(&channel.name).advice(advice),
+            );
+        }
+    }
+    all
+}
+
+/// Whether two channels that move are the same about their means, up to a factor.
+fn proportional(x: ColRef<'_, f64>, s: ColRef<'_, f64>) -> bool {
+    let centred = |x: ColRef<'_, f64>| {
+        let mean = x.sum() / x.nrows() as f64;
+        Col::from_fn(x.nrows(), |k| x[k] - mean)
+    };
+    let (x, s) = (centred(x), centred(s));
+    let factor = (s.transpose() * &x) / s.squared_norm_l2();
+    let limit = SAME * x.norm_max();
+    limit > 0.0 && factor.is_finite() && (0..x.nrows()).all(|k| (x[k] - factor * s[k]).abs() <= limit)
 }
 
 /// Lines of every output that nothing outside of the loop has.

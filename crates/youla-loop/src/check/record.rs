@@ -1,7 +1,7 @@
 //! All tests but that of the time column on one record.
 
 use super::finding::with_unit;
-use super::outside::{constant, of_excitation, of_lines, trends};
+use super::outside::{constant, of_excitation, of_lines, of_roles, trends};
 use super::regression::Lagged;
 use super::sequence::{self, Break};
 use super::{
@@ -65,6 +65,7 @@ pub fn check_record(
     options: &CheckOptions,
 ) -> Result<Vec<Finding>> {
     options.check()?;
+    let open = declared.map(StateSpace::is_zero);
     let declared = declared.filter(|k| !k.is_zero());
     if record.u.nrows() < SHORTEST {
         let what = format!("it has {} samples; the tests require at least {SHORTEST}", record.u.nrows());
@@ -107,6 +108,7 @@ pub fn check_record(
         let found = delay::of_record(lagged, &places, options)?;
         all.extend(found.findings(record.name, &names.inputs, &names.outputs, fed_back));
     }
+    all.extend(of_roles(record, names, open));
     all.extend(of_excitation(record, names, fed_back, options)?);
     all.extend(of_lines(record, names, fed_back, options));
     all.sort_by_key(|finding| finding.test);
@@ -203,33 +205,71 @@ mod tests {
     use rand_distr::StandardNormal;
     use youla::Mat;
 
-    /// `x+ = 0.9 x + 0.3 u`, `y = x + n`, `u = d - 1.5 y`, all noise white: over 200 seeds nothing but notes, and the notes
-    /// that hold.
-    #[test]
-    fn a_clean_loop_is_clean() {
+    /// `x+ = 0.9 x + 0.3 u`, `y = x + n`, `u = d - 1.5 y`, all noise white: u, y and d.
+    fn clean(seed: u64) -> [Mat<f64>; 3] {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = || rng.sample::<f64, _>(StandardNormal);
+        let (mut x, mut rows) = (0.0, Vec::new());
+        for _ in 0..1200 {
+            let (d, y) = (draw(), x + 0.2 * draw());
+            let u = d - 1.5 * y;
+            rows.push([u, y, d]);
+            x = 0.9 * x + 0.3 * u;
+        }
+        [0, 1, 2].map(|j| Mat::from_fn(1200, 1, |k, _| rows[k][j]))
+    }
+
+    /// What is found in a log with these columns as input, output and excitation under a gain; `None` where none is declared.
+    fn found_in([u, y, d]: [&Mat<f64>; 3], gain: Option<f64>) -> Vec<Finding> {
         let time = Discrete::new(1e-3).unwrap();
-        let empty = |rows, columns| Mat::zeros(rows, columns);
-        let gain = Mat::from_fn(1, 1, |_, _| -1.5);
-        let k = StateSpace::new(empty(0, 0), empty(0, 1), empty(1, 0), gain, time).unwrap();
+        let k = gain.map(|gain| StateSpace::gain(Mat::from_fn(1, 1, |_, _| gain), time).unwrap());
         let one = |name: &str| vec![Channel::new(name, "V")];
         let names =
             ChannelNames { inputs: one("u"), outputs: one("y"), input_excitation: one("d"), ..Default::default() };
         let options = CheckOptions { lags: 8, excitation_order: Some(20), ..CheckOptions::default() };
+        let (input_excitation, name, first_row) = (Some(d.as_ref()), "log", 1);
+        let (u, y) = (u.as_ref(), y.as_ref());
+        let record = LoggedRecord { name, time, first_row, u, y, input_excitation, reference: None, alpha: None };
+        check_record(&record, &names, k.as_ref(), &options).unwrap()
+    }
+
+    /// The excitation is another channel, in its unit or another, with an offset: a defect. Of the input it is a question where nobody
+    /// says whether a controller ran, and right where none did.
+    #[test]
+    fn an_excitation_that_is_another_channel_is_found() {
+        let [u, y, d] = clean(1);
+        let scaled = |x: &Mat<f64>| Mat::from_fn(x.nrows(), 1, |k, _| 1e3 * x[(k, 0)] + 7.0);
+        let role = |d: &Mat<f64>, gain: Option<f64>| {
+            let found = found_in([&u, &y, d], gain).into_iter().find(|f| f.what.contains("holds the samples"));
+            found.map(|f| (f.severity, f.what.contains("of the output y")))
+        };
+        assert_eq!(role(&d, Some(-1.5)), None);
+        assert_eq!(role(&y, Some(-1.5)), Some((Severity::Defect, true)));
+        assert_eq!(role(&scaled(&u), Some(-1.5)), Some((Severity::Defect, false)));
+        assert_eq!(role(&u, None), Some((Severity::Caution, false)));
+        assert_eq!(role(&u, Some(0.0)), None);
+    }
+
+    /// u and y exchanged in the log: the law explains y from u.
+    #[test]
+    fn exchanged_inputs_and_outputs_are_named() {
+        let [u, y, d] = clean(2);
+        let of = |found: Vec<Finding>| found.into_iter().find(|f| f.test == Test::Controller).unwrap();
+        let exchanged = of(found_in([&y, &u, &d], Some(-1.5)));
+        assert_eq!(exchanged.severity, Severity::Defect);
+        assert!(
+            exchanged.advice.contains("inputs and outputs exchanged: u was measured and y was applied"),
+            "{exchanged:?}"
+        );
+        assert_eq!(of(found_in([&u, &y, &d], Some(-1.5))).severity, Severity::Note);
+    }
+
+    /// Over 200 seeds nothing but notes, and the notes that hold.
+    #[test]
+    fn a_clean_loop_is_clean() {
         for seed in 0..200 {
-            let mut rng = ChaCha8Rng::seed_from_u64(seed);
-            let mut draw = || rng.sample::<f64, _>(StandardNormal);
-            let (mut x, mut rows) = (0.0, Vec::new());
-            for _ in 0..1200 {
-                let (d, y) = (draw(), x + 0.2 * draw());
-                let u = d - 1.5 * y;
-                rows.push([u, y, d]);
-                x = 0.9 * x + 0.3 * u;
-            }
-            let [u, y, d] = [0, 1, 2].map(|j| Mat::from_fn(1200, 1, |k, _| rows[k][j]));
-            let (input_excitation, name, first_row) = (Some(d.as_ref()), "log", 1);
-            let (u, y) = (u.as_ref(), y.as_ref());
-            let record = LoggedRecord { name, time, first_row, u, y, input_excitation, reference: None, alpha: None };
-            let found = check_record(&record, &names, Some(&k), &options).unwrap();
+            let [u, y, d] = clean(seed);
+            let found = found_in([&u, &y, &d], Some(-1.5));
             let serious: Vec<_> = found.iter().filter(|f| f.severity > Severity::Note).collect();
             assert!(serious.is_empty(), "seed {seed}: {serious:?}");
             assert!(found.iter().any(|f| f.test == Test::Noise), "seed {seed}");

@@ -171,6 +171,7 @@ def prepare(
             raise InputError(f"record {k + 1} has other inputs or outputs than the first; give the same names in all")
         if abs(other.dt / first.dt - 1) > 1e-6:
             raise InputError(f"record {k + 1} has the sample time {other.dt:g} s, the first has {first.dt:g} s; resample one of them")
+    _check_apart(estimation, fresh)
     check_options(options, "identify")
     m, p = len(first.inputs), len(first.outputs)
     tables = {key: dict(table) for key, table in options.items()}
@@ -196,6 +197,31 @@ def prepare(
         unsigned = {**settings, "controller": {form: {key: value for key, value in table.items() if key != "feedback"}}}
         raise InputError(f"{error}{_native.agreement(json.dumps(_plain(unsigned)), logs)}") from None
     return _plain(settings), logs
+
+
+def _check_apart(estimation: list[Record], fresh: list[Record]) -> None:
+    """Refuse samples that would identify twice, or identify and verify."""
+    every = [*estimation, *fresh]
+    labels = _labels(every)
+    for k, later in enumerate(every):
+        for i, earlier in enumerate(every[: min(k, len(estimation))]):
+            common = _common(earlier, later)
+            if common is not None:
+                what = "would count twice in what identifies" if k < len(estimation) else "would verify nothing, as they identify"
+                raise InputError(f"{labels[i]} and {labels[k]} share {common}, which {what}; cut them apart, for example by record.split()")
+
+
+def _common(a: Record, b: Record) -> str | None:
+    """The samples that two records have in common, as views of one array or as equal copies."""
+    x, y = (r._data[:, r._groups["outputs"][0][2]] for r in (a, b))
+    if np.may_share_memory(x, y) and np.shares_memory(x, y):
+        (step,), (other,) = x.strides, y.strides
+        if step != other or step <= 0:
+            return "samples"
+        offset = (y.ctypes.data - x.ctypes.data) // step
+        return f"samples {max(0, offset)} to {min(len(x), offset + len(y)) - 1} of the first, counted from 0"
+    equal = len(a) == len(b) and np.array_equal(a.y, b.y) and np.array_equal(a.u, b.u)
+    return "all samples" if equal else None
 
 
 def check_options(options: Mapping[str, Any], function: str) -> None:

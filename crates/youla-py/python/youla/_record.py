@@ -114,11 +114,15 @@ class Record:
         for group in ("inputs", "outputs"):
             if not self._groups[group]:
                 raise InputError(f"{group} is missing: name at least one channel, for example {group}=[0] or {group}=['u']")
-        columns = [c for group in ("inputs", "outputs") for _, _, c in self._groups[group]]
-        twice = next((c for c in columns if columns.count(c) > 1), None)
+        plant = [c for group in ("inputs", "outputs") for _, _, c in self._groups[group]]
+        twice = next((c for c in plant if plant.count(c) > 1), None)
         if twice is not None:
             where = source.names[twice] or f"column {twice}"
             raise InputError(f"{where} is chosen twice as input or output; choose each channel once")
+        for group in ("excitation", "reference", "alpha"):
+            for name, _, column in self._groups[group]:
+                if column in plant:
+                    raise InputError(f"{group} names {name!r}, which is an input or output already; choose the column of what is added from outside, or leave {group} out")
         if units:
             raise InputError(f"units names {sorted(units)}, which are no channels; channels are {sorted(self._labels())}")
         if len(self) < 2:

@@ -48,9 +48,10 @@ pub(super) fn check_all(
     let used: Vec<UsedRows> = files
         .iter()
         .zip(&parts)
-        .map(|((_, file), parts)| {
+        .map(|((label, file), parts)| {
             let rows = parts.iter().map(|(record, _)| record.rows).collect();
-            Ok(UsedRows { path: file.file.display().to_string(), sha256: sha256(folder.join(&file.file))?, rows })
+            let (path, sha256) = (file.file.display().to_string(), sha256(folder.join(&file.file))?);
+            Ok(UsedRows { path, label: label.clone(), sha256, rows })
         })
         .collect::<Result<_>>()?;
     refuse_overlap(&used, job.estimation)?;

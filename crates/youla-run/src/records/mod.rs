@@ -129,6 +129,7 @@ fn purpose(settings: &DataSettings, k: usize) -> &'static str {
 fn assembled(settings: &DataSettings, read: Vec<FileRecords>, measured: Option<MeasuredTable>) -> Result<RunRecords> {
     let used = |f: &FileRecords| UsedRows {
         path: f.source.path.clone(),
+        label: f.label.clone(),
         sha256: f.source.sha256.clone(),
         rows: f.rows.clone(),
     };
@@ -173,24 +174,34 @@ fn assembled(settings: &DataSettings, read: Vec<FileRecords>, measured: Option<M
 pub(crate) struct UsedRows {
     /// As in run.toml.
     pub(crate) path: String,
+    /// Name in reports.
+    pub(crate) label: String,
     pub(crate) sha256: String,
     /// First and last row of each stretch, counted from 1.
     pub(crate) rows: Vec<[usize; 2]>,
 }
 
-/// Refuses rows that both identify and verify: of one file under any name, by its bytes. The first files are those to identify from.
+/// Refuses rows that both identify and verify, and rows that would identify twice: of one file under any name, by its bytes. The first
+/// files are those to identify from.
 pub(crate) fn refuse_overlap(files: &[UsedRows], estimation: usize) -> Result<()> {
-    let (used, fresh) = files.split_at(estimation);
-    for fresh in fresh {
-        for used in used.iter().filter(|f| f.sha256 == fresh.sha256) {
-            let pairs = fresh.rows.iter().flat_map(|a| used.rows.iter().map(move |b| [a[0].max(b[0]), a[1].min(b[1])]));
+    for (k, later) in files.iter().enumerate() {
+        for used in files[..k.min(estimation)].iter().filter(|f| f.sha256 == later.sha256) {
+            let pairs = later.rows.iter().flat_map(|a| used.rows.iter().map(move |b| [a[0].max(b[0]), a[1].min(b[1])]));
             if let Some([from, to]) = pairs.into_iter().find(|[from, to]| from <= to) {
                 let (path, at) = (Path::new("run.toml").to_owned(), None);
-                let problem = format!(
-                    "[[data.verification]] {} uses rows {from} to {to}, from which the models are identified: that would verify \
-                     nothing. Keep them apart with `skip` and `take`, for example skip = {to} here",
-                    fresh.path
-                );
+                let problem = if k < estimation {
+                    format!(
+                        "[[data.estimation]] the records {:?} and {:?} share rows {from} to {to} of {}: what they tell would count twice. \
+                         Keep them apart with `skip` and `take`, for example skip = {to} in the second",
+                        used.label, later.label, later.path
+                    )
+                } else {
+                    format!(
+                        "[[data.verification]] {} uses rows {from} to {to}, from which the models are identified: that would verify \
+                         nothing. Keep them apart with `skip` and `take`, for example skip = {to} here",
+                        later.path
+                    )
+                };
                 return Err(Error::File(youla_io::Error::Settings { path, at, problem }));
             }
         }
@@ -200,6 +211,8 @@ pub(crate) fn refuse_overlap(files: &[UsedRows], estimation: usize) -> Result<()
 
 /// What one file gave.
 struct FileRecords {
+    /// Name in reports.
+    label: String,
     records: Vec<LoopRecord>,
     /// First and last row of each record in the file, counted from 1.
     rows: Vec<[usize; 2]>,
@@ -276,7 +289,7 @@ fn file_records(settings: &DataSettings, of: FileOfRun<'_>, read: Vec<Record>) -
         });
     }
     let source = SourceFile { path, purpose: of.purpose.to_owned(), sha256: of.sha256 };
-    Ok(FileRecords { records, rows: all_rows, source, segments })
+    Ok(FileRecords { label: of.label.to_owned(), records, rows: all_rows, source, segments })
 }
 
 /// The record of a loop from the channels of these groups: inputs, outputs, excitation of the inputs, reference, alpha.

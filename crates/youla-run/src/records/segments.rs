@@ -207,6 +207,25 @@ mod tests {
         assert!(folder.read(apart).is_ok());
     }
 
+    /// Rows that identify twice would count twice: both records and the rows are named.
+    #[test]
+    fn estimation_records_do_not_overlap() {
+        let folder = Folder::new("twice");
+        folder.write("whole.csv", 0..1000);
+        folder.write("copy.csv", 0..1000);
+        for second in [
+            "file = \"whole.csv\", name = \"b\", skip = 300",
+            "file = \"copy.csv\", name = \"b\", skip = 300, take = 400",
+        ] {
+            let both = format!("estimation = [{{ file = \"whole.csv\", name = \"a\", take = 600 }}, {{ {second} }}]");
+            let refused = folder.read(&both).unwrap_err().to_string();
+            assert!(refused.contains("the records \"a\" and \"b\" share rows 301 to 600 of"), "{refused}");
+            assert!(refused.contains("skip = 600"), "{refused}");
+        }
+        let apart = "estimation = [{ file = \"whole.csv\", take = 600 }, { file = \"copy.csv\", skip = 600 }]";
+        assert_eq!(folder.read(apart).unwrap().estimation.len(), 2);
+    }
+
     #[test]
     fn stretches_are_chosen_by_rows() {
         let folder = Folder::new("rows");
@@ -226,7 +245,7 @@ mod tests {
             ("estimation = [{ file = \"whole.csv\", skip = 2, segments = [[1, 20]] }]", "give one of them"),
             ("gaps = \"split\"\nestimation = [{ file = \"whole.csv\", segments = [[1, 2000]] }]", "a row of the file"),
             (
-                "gaps = \"split\"\nestimation = [{ file = \"whole.csv\" }, { file = \"whole.csv\", name = \"whole-1\", take = 9 }]",
+                "gaps = \"split\"\nestimation = [{ file = \"whole.csv\", skip = 9 }, { file = \"whole.csv\", name = \"whole-1\", take = 9 }]",
                 "two records are named \"whole-1\"",
             ),
         ] {

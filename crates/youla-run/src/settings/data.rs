@@ -5,6 +5,7 @@ use crate::Result;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
+use youla::error::short;
 use youla::signal::Detrend;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions, Gaps, TimeSource};
 
@@ -248,6 +249,9 @@ impl DataSettings {
                 return Some(format!("[data] {key} is empty, but must list at least one channel"));
             }
         }
+        if let Some(problem) = self.role_problem() {
+            return Some(problem);
+        }
         if !d.alpha.is_empty() && !d.input_excitation.is_empty() {
             return Some("[data] has both alpha and input_excitation; give the one that was injected".into());
         }
@@ -263,6 +267,24 @@ impl DataSettings {
         }
         if let Some(problem) = d.disturbance.as_ref().and_then(DisturbanceSettings::problem) {
             return Some(problem.into());
+        }
+        None
+    }
+    /// A column with two roles. Signals from outside may share one, as a reference that is fed forward does; u and y are signals of their own.
+    fn role_problem(&self) -> Option<String> {
+        let mut plant = HashSet::new();
+        let groups = ["inputs", "outputs", "input_excitation", "reference", "alpha"].into_iter().zip(self.groups());
+        for (k, (key, channel)) in groups.flat_map(|(key, of)| of.iter().map(move |c| (key, c))).enumerate() {
+            if plant.contains(&channel.source()) {
+                let (name, column) = (short(&channel.name), short(&channel.source().to_string()));
+                return Some(format!(
+                    "[data] {key} takes {name:?} from the column {column:?}, which is an input or output already; choose the column of its \
+                     own signal, or leave {key} out"
+                ));
+            }
+            if k < self.inputs.len() + self.outputs.len() {
+                plant.insert(channel.source());
+            }
         }
         None
     }

@@ -31,6 +31,11 @@ impl<'a> Log<'a> {
         let other = d.map_or_else(|| -1.0 * self.record.u, |d| -1.0 * self.record.u - d);
         all.push((Change::InputSign, self.residual(k, &self.e, &other)?));
         let m = self.w.ncols();
+        if m == self.e.ncols() {
+            let exchanged = ControllerRecord { u: self.record.y, y: self.record.u, ..self.record };
+            let log = Log::new(exchanged);
+            all.push((Change::Roles, self.residual(k, &log.e, &log.w)?));
+        }
         for (i, j) in (0..m).flat_map(|i| (i + 1..m).map(move |j| (i, j))) {
             let mut u = self.record.u.to_owned();
             for t in 0..u.nrows() {

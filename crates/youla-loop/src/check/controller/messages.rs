@@ -39,6 +39,7 @@ impl Change {
             Change::Sign => {
                 "the opposite sign: change `feedback` in [controller] between \"negative\" and \"positive\", or the sign of the outputs".into()
             }
+            Change::Roles => format!("inputs and outputs exchanged: {} was measured and {} was applied", input(0), name(0)),
             Change::InputSign => "the opposite sign of the input".into(),
             Change::ExchangedInputs(i, j) => format!("{} and {} exchanged", input(*i), input(*j)),
             Change::Trend => "a linear trend of the outputs added: one of them drifts in the log".into(),
@@ -60,6 +61,7 @@ impl Change {
         match self {
             Change::Sign => ("sign", -1.0),
             Change::InputSign => ("input_sign", -1.0),
+            Change::Roles => ("exchanged_roles", 1.0),
             Change::ExchangedInputs(..) => ("exchanged_inputs", 1.0),
             Change::Trend => ("trend", 1.0),
             Change::Shift(rows) => ("shift", *rows as f64),

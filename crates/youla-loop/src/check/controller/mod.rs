@@ -6,7 +6,7 @@
 //! residual = |w - K e| / |w|     (about their means)
 //! ```
 //! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel of e
-//! by least squares, two channels exchanged, the input limited to its own range, d left out or with the other sign. A change
+//! by least squares, two channels or inputs and outputs exchanged, the input limited to its own range, d left out or with the other sign. A change
 //! is proposed where it brings the residual below a tenth of what it was and below `controller_caution` twice over, or to nearly nothing.
 //! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
 
@@ -28,6 +28,8 @@ pub enum Change {
     Sign,
     /// The other sign of the logged input.
     InputSign,
+    /// Inputs and outputs exchanged in the log.
+    Roles,
     /// Two inputs exchanged in the log.
     ExchangedInputs(usize, usize),
     /// A linear trend in the outputs.

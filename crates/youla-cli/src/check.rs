@@ -119,9 +119,12 @@ fn head(found: &DataCheck) -> String {
         // The median step of a time column has digits of rounding.
         let ts = (r.sample_time * 1e12).round() / 1e12;
         let length = (samples as f64 * r.sample_time * 1e4).round() / 1e4;
-        let row =
-            format!("rows {} to {}: {samples} samples, sample time {ts} s, length {length} s", r.rows[0], r.rows[1]);
-        text += &format!("{}, {row}\n", r.record);
+        let rate = (1e6 / r.sample_time).round() / 1e6;
+        let [first, last] = r.rows;
+        text += &format!(
+            "{}, rows {first} to {last}: {samples} samples, sample time {ts} s ({rate} Hz), length {length} s\n",
+            r.record
+        );
     }
     if found.records.len() > MOST {
         text += &format!("and {} more records\n", found.records.len() - MOST);

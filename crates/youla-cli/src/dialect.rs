@@ -12,6 +12,9 @@ pub(crate) struct Dialect {
     /// Decimal sign of text files: point (default) or comma. Never guessed.
     #[arg(long, value_name = "NAME", value_parser = decimal)]
     decimal: Option<DecimalSign>,
+    /// Lines of text files that are passed over, counted from 1, separated by commas: notes, a line of units.
+    #[arg(long, value_name = "LINES", value_delimiter = ',')]
+    skip_lines: Vec<usize>,
 }
 
 impl Dialect {
@@ -21,12 +24,13 @@ impl Dialect {
             delimiter: self.delimiter.unwrap_or_default(),
             header: HeaderLine::default(),
             decimal: self.decimal.unwrap_or_default(),
+            skip_lines: self.skip_lines.clone(),
         }
     }
 
     /// Whether anything was given.
     pub(crate) fn is_given(&self) -> bool {
-        self.delimiter.is_some() || self.decimal.is_some()
+        self.delimiter.is_some() || self.decimal.is_some() || !self.skip_lines.is_empty()
     }
 }
 

@@ -195,9 +195,12 @@ fn read_name(text: &str) -> ChannelRef {
     name
 }
 
+/// Columns that are listed at most.
+const MOST: usize = 100;
+
 /// The columns with their range.
 fn table(columns: &[SurveyedColumn]) -> String {
-    let names: Vec<String> = columns.iter().map(|c| short(&c.from)).collect();
+    let names: Vec<String> = columns.iter().take(MOST).map(|c| short(&c.from)).collect();
     let width = names.iter().map(|name| name.chars().count()).max().unwrap_or(0).max(6);
     let mut text = format!("{:width$}  {:>9}  {:>12}  {:>12}\n", "column", "rows", "lowest", "highest");
     for (from, SurveyedColumn { content, .. }) in names.iter().zip(columns) {
@@ -208,6 +211,9 @@ fn table(columns: &[SurveyedColumn]) -> String {
             }
             Err(problem) => text += &format!("{from:width$}  no channel: {problem}\n"),
         }
+    }
+    if columns.len() > MOST {
+        text += &format!("and {} more columns\n", columns.len() - MOST);
     }
     text
 }

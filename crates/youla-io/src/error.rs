@@ -204,17 +204,23 @@ pub enum Error {
         /// The sample time in seconds.
         ts: f64,
     },
-    /// The name of the time column states another unit than the second.
+    /// The name of the time column, or a line of units, states another unit than the second.
     #[error(
-        "the time column {column:?} is in {unit} by its name, but times are read in seconds; leave it out and state the sample time in seconds (sample_time in [data], --sample-time), or make seconds of it: time_column = \"seconds\" and, in [data.computed], seconds = \"'{column}' / {per_second:e}\""
+        "{what}: the time column {:?} is in {unit} by its {by}, but times are read in seconds; leave it out and state the sample time in seconds (sample_time in [data], --sample-time), or make seconds of it: time_column = \"seconds\" and, in [data.computed], seconds = \"'{}' {to_seconds}\"",
+        short(column),
+        short(column)
     )]
     TimeUnit {
-        /// The name of the column.
+        /// The record or file.
+        what: String,
+        /// The name of the column, or `#` and its number.
         column: String,
         /// The unit.
         unit: &'static str,
-        /// How many of them are a second.
-        per_second: f64,
+        /// What states it: its name or a line of units.
+        by: &'static str,
+        /// How seconds are made of it, such as `/ 1e3`.
+        to_seconds: &'static str,
     },
     /// Neither a sample time nor a time column is declared.
     #[error(
@@ -286,5 +292,11 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     }
     let remedy =
         |sign| format!(" with the declared decimal sign; set decimal = \"{sign}\" if the whole file uses the {sign}");
-    decimal.map_or(String::new(), remedy)
+    match decimal {
+        Some(sign) => remedy(sign),
+        None if text.chars().any(char::is_alphabetic) => {
+            "; a line of units or notes is passed over where skip_lines in [data] csv (--skip-lines) names it".into()
+        }
+        None => String::new(),
+    }
 }

@@ -38,6 +38,10 @@ impl SystemMatrices {
     /// [`youla::Error::Shape`] and [`youla::Error::NotFinite`] for matrices that do not fit together.
     pub fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
         let (n, m) = (self.a.len(), self.inputs());
+        let nothing = |rows: &Rows| rows.iter().all(Vec::is_empty);
+        if [&self.a, &self.b, &self.c].into_iter().all(nothing) {
+            return Ok(StateSpace::gain(matrix("D", &self.d, m)?, time)?);
+        }
         let (a, b) = (matrix("A", &self.a, n)?, matrix("B", &self.b, m)?);
         let (c, d) = (matrix("C", &self.c, n)?, matrix("D", &self.d, m)?);
         Ok(StateSpace::new(a, b, c, d, time)?)
@@ -57,5 +61,24 @@ pub(crate) fn matrix(what: &str, rows: &Rows, columns: usize) -> Result<Mat<f64>
             found: (1, rows[bad].len()),
         })),
         None => Ok(Mat::from_fn(rows.len(), columns, |i, j| rows[i][j])),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An empty list says nothing of its other size, as `jsonencode([])` and `numpy.zeros((0, 1)).tolist()` write it.
+    #[test]
+    fn a_gain_has_no_states_in_any_form_of_an_empty_matrix() {
+        for empty in [
+            "\"a\": [], \"b\": [], \"c\": []",
+            "\"a\": [], \"b\": [], \"c\": [[]]",
+            "\"a\": [[]], \"b\": [[]], \"c\": [[]]",
+        ] {
+            let read: SystemMatrices = serde_json::from_str(&format!("{{{empty}, \"d\": [[2.0, 3.0]]}}")).unwrap();
+            let system = read.system(Discrete::new(0.1).unwrap()).unwrap();
+            assert_eq!((system.order(), system.outputs(), system.inputs()), (0, 1, 2), "{empty}");
+        }
     }
 }

@@ -1,8 +1,8 @@
 //! One description of a recorded file for the library, configuration files and the program.
 
 use crate::assemble::only;
-use crate::choose::ChannelSpec;
-use crate::csv::{CsvOptions, read_csv_parts};
+use crate::choose::{ChannelRef, ChannelSpec};
+use crate::csv::{CsvOptions, read_csv_parts, require_seconds};
 use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::{self, read_npz};
@@ -88,6 +88,18 @@ pub fn read_parts(source: &Source) -> Result<Vec<Record>> {
     variables.record_parts(&source.channels, &source.time)
 }
 
+/// Refuses a time column in another unit than the second, by its name or a line of units in the file, before anything else is read.
+///
+/// # Errors
+/// [`Error::TimeUnit`]; those of the reader for the head of a text file.
+pub fn check_unit(source: &Source, column: &ChannelRef) -> Result<()> {
+    TimeSource::column(column.clone()).check_unit(&source.path.display().to_string())?;
+    match resolve(source)? {
+        Format::Csv | Format::Detect => require_seconds(&source.path, column, &source.csv),
+        Format::Mat | Format::Npz => Ok(()),
+    }
+}
+
 /// SHA-256 of the bytes of a file in hexadecimal digits, by which a result names its input.
 ///
 /// # Errors
@@ -140,7 +152,7 @@ pub(super) fn resolve(source: &Source) -> Result<Format> {
 mod tests {
     use super::*;
     use crate::scratch::scratch;
-    use crate::{ChannelRef, Packing, Value, Variable, write_mat};
+    use crate::{Packing, Value, Variable, write_mat};
 
     fn source(path: &Path, channels: &str) -> Source {
         toml::from_str(&format!("path = {path:?}\ntime = {{ ts = 0.5 }}\nchannels = {channels}")).unwrap()

@@ -1,7 +1,6 @@
 //! The columns of a file before any is chosen: their range, and which of them can be a time column.
 
-use crate::choose::{ChannelRef, ChannelSpec};
-use crate::csv::{CsvOptions, column_names, read_csv};
+use crate::csv::{CsvOptions, read_each};
 use crate::error::{Error, Result};
 use crate::matfile::read_mat;
 use crate::npz::read_npz;
@@ -70,27 +69,17 @@ pub fn survey(path: impl AsRef<Path>, csv: &CsvOptions) -> Result<Vec<SurveyedCo
 }
 
 fn of_text(path: &Path, csv: &CsvOptions) -> Result<Vec<SurveyedColumn>> {
-    let names = column_names(path, csv)?;
-    let clock = TimeSource::ts(1.0);
-    if let Ok(record) = read_csv(path, &[], &clock, csv) {
-        let of = |(name, values): (&String, &[f64])| column(name.clone(), values);
-        return Ok(names.iter().zip(record.columns()).map(of).collect());
-    }
-    // One of them is not a number: each column by itself, so that the others are listed.
-    let one = |(k, name): (usize, &String)| {
-        let spec = ChannelSpec::from(name, ChannelRef::Column(k + 1), "");
-        match read_csv(path, &[spec], &clock, csv) {
-            Ok(record) => record.columns().map(|values| column(name.clone(), values)).next(),
-            Err(error) => Some(SurveyedColumn { from: name.clone(), content: Err(error.to_string()) }),
-        }
+    let of = |(name, values): (String, Result<Vec<f64>>)| match values {
+        Ok(values) => column(name, &values),
+        Err(error) => SurveyedColumn { from: name, content: Err(error.to_string()) },
     };
-    let columns: Vec<SurveyedColumn> = names.iter().enumerate().filter_map(one).collect();
+    let columns: Vec<SurveyedColumn> = read_each(path, csv)?.into_iter().map(of).collect();
     // Another kind of file: its text is nobody's business.
     match columns.iter().any(|c| c.content.is_ok()) {
         true => Ok(columns),
         false => Err(Error::NoData {
             path: path.to_owned(),
-            problem: "no column of it holds numbers; for decimal commas add --decimal comma (csv = { decimal = \"comma\" } in [data]), put # before a line of units; else it is not a log",
+            problem: "no column of it holds numbers; for decimal commas add --decimal comma (csv = { decimal = \"comma\" } in [data]), for a line of units --skip-lines with its number (csv = { skip_lines = [2] }); else it is not a log",
         }),
     }
 }
@@ -177,9 +166,11 @@ mod tests {
             survey(file.path(), csv).map(|_| ()).map_err(|e| e.to_string())
         };
         let message = refused("t;u\n0,1;3,5\n0,2;4,5\n", &CsvOptions::default()).unwrap_err();
-        assert!(message.contains("--decimal comma") && message.contains("# before a line of units"), "{message}");
+        assert!(message.contains("--decimal comma") && message.contains("--skip-lines"), "{message}");
         let comma = CsvOptions { decimal: crate::DecimalSign::Comma, ..CsvOptions::default() };
         assert!(refused("t;u\ns;V\n0,1;3,5\n0,2;4,5\n", &comma).is_err());
         assert_eq!(refused("t;u\n# s;V\n0,1;3,5\n0,2;4,5\n", &comma), Ok(()));
+        let without = CsvOptions { skip_lines: vec![1, 3], ..comma };
+        assert_eq!(refused("made by a logger\nt;u\ns;V\n0,1;3,5\n0,2;4,5\n", &without), Ok(()));
     }
 }

@@ -22,12 +22,41 @@ pub struct TimeSource {
     pub gaps: Gaps,
 }
 
-/// Words of a name that state a unit of time, and how many of it are a second.
-const UNITS: [(&[&str], &str, f64); 3] = [
-    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], "milliseconds", 1e3),
-    (&["us", "\u{b5}s", "\u{3bc}s", "usec", "usecs", "micros", "microsecond", "microseconds"], "microseconds", 1e6),
-    (&["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"], "nanoseconds", 1e9),
+/// Words of a name that state a unit of time, and how seconds are made of it.
+const UNITS: [(&[&str], &str, &str); 5] = [
+    (&["ms", "msec", "msecs", "millis", "millisecond", "milliseconds"], "milliseconds", "/ 1e3"),
+    (&["us", "\u{b5}s", "\u{3bc}s", "usec", "usecs", "micros", "microsecond", "microseconds"], "microseconds", "/ 1e6"),
+    (&["ns", "nsec", "nsecs", "nanos", "nanosecond", "nanoseconds"], "nanoseconds", "/ 1e9"),
+    (&["min", "mins", "minute", "minutes"], "minutes", "* 60"),
+    (&["h", "hr", "hrs", "hour", "hours"], "hours", "* 3600"),
 ];
+
+/// The unit of time that a heading or a cell of a line of units states, and how seconds are made of it; `None` for seconds and where it
+/// states none. `t_ms`, `time [ms]`, `Time(us)` and `timeMs` state one.
+///
+/// ```
+/// assert_eq!(youla_io::unit_of_time("time [ms]"), Some(("milliseconds", "/ 1e3")));
+/// assert_eq!(youla_io::unit_of_time("systems"), None);
+/// ```
+pub fn unit_of_time(heading: &str) -> Option<(&'static str, &'static str)> {
+    let mut words = String::new();
+    for c in heading.chars() {
+        if c.is_uppercase() && words.ends_with(char::is_lowercase) {
+            words.push(' ');
+        }
+        words.push(if c.is_alphanumeric() { c } else { ' ' });
+    }
+    let words = words.to_lowercase();
+    let found = UNITS.iter().find(|(names, ..)| words.split(' ').any(|word| names.contains(&word)));
+    found.map(|&(_, unit, to_seconds)| (unit, to_seconds))
+}
+
+/// Refuses a column of the time where `heading`, its name or its cell of a line of units, states another unit than the second.
+pub(super) fn require_seconds(what: &str, column: &str, heading: &str) -> Result<()> {
+    let Some((unit, to_seconds)) = unit_of_time(heading) else { return Ok(()) };
+    let by = if heading == column { "name" } else { "line of units" };
+    Err(Error::TimeUnit { what: what.to_owned(), column: column.to_owned(), unit, by, to_seconds })
+}
 
 /// What to do where samples are missing, by the time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
@@ -75,17 +104,14 @@ impl TimeSource {
         assemble(record.name(), record.channels().to_vec(), &columns, self.resolve(record.name(), Some(times))?)
     }
 
-    /// Refuses a time column whose name states another unit than the second, as `t_ms`, `time [ms]` and `Time(us)` do: a sample time
-    /// that is a thousand times too long would be taken in silence.
+    /// Refuses a time column whose name states another unit than the second: a sample time that is a thousand times too long would be
+    /// taken in silence. `what` names the log.
     ///
     /// # Errors
     /// [`Error::TimeUnit`].
-    pub fn check_unit(&self) -> Result<()> {
+    pub fn check_unit(&self, what: &str) -> Result<()> {
         let Some(ChannelRef::Name(column)) = &self.column else { return Ok(()) };
-        let lower = column.to_lowercase();
-        let words = || lower.split(|c: char| !c.is_alphanumeric());
-        let found = UNITS.iter().find(|(names, ..)| words().any(|word| names.contains(&word)));
-        found.map_or(Ok(()), |&(_, unit, per_second)| Err(Error::TimeUnit { column: column.clone(), unit, per_second }))
+        require_seconds(what, column, column)
     }
 
     /// The clock and the parts without gaps from the time column, which is there when `self.column` is set.
@@ -94,7 +120,7 @@ impl TimeSource {
     /// [`Error::SampleTimeMissing`], [`Error::NonUniformTime`] with the first bad row, [`youla::Error::SampleTimeMismatch`]
     /// where column and declaration disagree, [`youla::Error::OutOfRange`] for a bad `ts` or `tolerance`.
     pub(super) fn resolve(&self, what: &str, column: Option<&[f64]>) -> Result<Clock> {
-        self.check_unit()?;
+        self.check_unit(what)?;
         if !(self.tolerance >= 0.0 && self.tolerance < 1.0) {
             let what = format!("{what}: the tolerance of the time column");
             return Err(Error::Method(youla::Error::OutOfRange {
@@ -207,9 +233,12 @@ mod tests {
             ("Time [ms]", "milliseconds"),
             ("time(\u{b5}s)", "microseconds"),
             ("t/ns", "nanoseconds"),
+            ("timestampUs", "microseconds"),
+            ("Time [min]", "minutes"),
         ] {
             let error = of(name).unwrap_err().to_string();
-            assert!(error.contains(unit) && error.contains("sample_time in [data]"), "{error}");
+            assert!(error.starts_with("log: ") && error.contains(unit), "{error}");
+            assert!(error.contains("sample_time in [data]"), "{error}");
         }
         assert!(["t", "time", "t_s", "systems", "Time [s]"].iter().all(|name| of(name).is_ok()));
     }

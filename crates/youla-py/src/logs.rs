@@ -74,7 +74,7 @@ pub(crate) fn read_log<'py>(
         let spec = |(name, from, unit): &(String, String, String)| ChannelSpec::from(name, column(from), unit);
         let channels = channels.iter().map(spec).collect();
         let source = Source { path, format: Default::default(), time, channels, csv: Default::default() };
-        Ok(youla_io::read(&source)?)
+        youla_io::read(&source).map_err(of_log)
     })?;
     let channels = record.channels().iter().map(|c| (c.name.clone(), c.unit.clone())).collect();
     Ok((crate::matrices::array(py, record.data()), record.time().ts(), channels))
@@ -82,6 +82,30 @@ pub(crate) fn read_log<'py>(
 
 fn column(place: &str) -> ChannelRef {
     place.parse().unwrap_or_else(|never: std::convert::Infallible| match never {})
+}
+
+/// What is wrong with a log, with the remedy in the words of Python in place of those of run.toml, which follow a semicolon.
+fn of_log(error: youla_io::Error) -> Failure {
+    use youla_io::Error;
+    let frame = || "read it with pandas.read_csv (sep=, decimal=, skiprows=) and give the data frame".to_owned();
+    let remedy = match &error {
+        Error::TimeUnit { to_seconds, .. } => format!(
+            "leave time out and give the sample time as dt=, or give a mapping with a column of seconds (the column {to_seconds})"
+        ),
+        Error::NonUniformTime { .. } => {
+            "cut at gaps and give identify a list of records, or interpolate to equal steps before".into()
+        }
+        Error::Cell { .. } | Error::FieldCount { .. } | Error::Delimiter { .. } => frame(),
+        _ => return error.into(),
+    };
+    let text = error.to_string();
+    Failure::input(format!("{}; {remedy}", text.split("; ").next().unwrap_or(&text)))
+}
+
+/// The unit that the heading of a time column states, other than seconds, and how seconds are made of it.
+#[pyfunction]
+pub(crate) fn unit_of_time(heading: &str) -> Option<(&'static str, &'static str)> {
+    youla_io::unit_of_time(heading)
 }
 
 /// The sample time that a time column shows; `dt` must agree with it where it is given.

@@ -53,6 +53,26 @@ def test_time_is_read_from_column_index_and_dates(table: np.ndarray) -> None:
     assert youla.Record(frame, **NAMES, time="t").dt == pytest.approx(0.01, rel=1e-12)
 
 
+def test_a_file_with_a_clock_in_milliseconds_is_refused_in_words_of_python(tmp_path: Path) -> None:
+    pd, _ = pytest.importorskip("pandas"), pytest.importorskip("pyarrow")
+    frame = pd.DataFrame({"t_ms": np.arange(9.0), "u": np.arange(9.0), "y": np.arange(9.0) ** 2})
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    (tmp_path / "units.csv").write_text("t;u;y\nms;V;m\n0;1,5;2\n1;2,5;3\n")
+    frame.to_parquet(tmp_path / "log.parquet")
+    for data, time, says in (
+        (tmp_path / "log.csv", "t_ms", "log.csv: the time column .* is in milliseconds by its name.*dt="),
+        (tmp_path / "log.parquet", "t_ms", "in milliseconds by its name.*dt="),
+        (frame.set_index("t_ms"), "index", "the index of data is in milliseconds"),
+        (tmp_path / "units.csv", "t", "units.csv, line 2, column .*pandas.read_csv .sep=, decimal=, skiprows=."),
+    ):
+        with pytest.raises(youla.InputError, match=says) as told:
+            youla.Record(data, inputs="u", outputs="y", time=time)
+        assert "[data]" not in str(told.value)
+    dates = frame.assign(timestamp_ms=pd.to_datetime(frame["t_ms"], unit="ms"))
+    dates.to_parquet(tmp_path / "dates.parquet")
+    assert youla.Record(tmp_path / "dates.parquet", inputs="u", outputs="y", time="timestamp_ms").dt == pytest.approx(1e-3)
+
+
 def test_responses_of_python_control_are_channels_by_time() -> None:
     """Two outputs and two samples more than channels: by its type, never by its shape."""
     control = pytest.importorskip("control")

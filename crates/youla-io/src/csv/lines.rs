@@ -3,6 +3,7 @@
 use crate::error::{CorruptAt, Error, Result};
 use crate::open::open;
 use flate2::bufread::MultiGzDecoder;
+use std::collections::HashSet;
 use std::io::{BufRead, BufReader, ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
@@ -22,7 +23,14 @@ pub(super) struct Lines {
     number: usize,
     /// The next call of [`Lines::advance`] returns the current line again.
     held: bool,
+    /// Numbers of lines to pass over.
+    skip: HashSet<usize>,
+    /// The first lines that were passed over, without their mark: one of them may state units.
+    passed: Vec<Vec<u8>>,
 }
+
+/// Lines that are kept of those that were passed over; units stand near the names.
+const MOST_PASSED: usize = 16;
 
 impl Lines {
     pub(super) fn open(path: &Path) -> Result<Lines> {
@@ -43,7 +51,19 @@ impl Lines {
             line: Vec::new(),
             number: 0,
             held: false,
+            skip: HashSet::new(),
+            passed: Vec::new(),
         })
+    }
+
+    /// Passes over these lines, counted from 1.
+    pub(super) fn skip(&mut self, lines: &[usize]) {
+        self.skip = lines.iter().copied().collect();
+    }
+
+    /// The first lines that were passed over.
+    pub(super) fn passed(&self) -> &[Vec<u8>] {
+        &self.passed
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -97,8 +117,13 @@ impl Lines {
             if self.number == 1 && self.line.starts_with(b"\xef\xbb\xbf") {
                 self.line.drain(..3);
             }
-            if !matches!(self.line.trim_ascii_start().first(), None | Some(b'#' | b'%')) {
+            let text = self.line.trim_ascii();
+            let note = text.strip_prefix(b"#").or_else(|| text.strip_prefix(b"%"));
+            if note.is_none() && !text.is_empty() && !self.skip.contains(&self.number) {
                 return Ok(true);
+            }
+            if self.passed.len() < MOST_PASSED {
+                self.passed.push(note.unwrap_or(text).to_vec());
             }
         }
     }

@@ -12,8 +12,8 @@ mod read;
 mod write;
 
 pub use options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
-pub(crate) use read::{column_names, read_csv_parts};
 pub use read::{csv_from_bytes, read_csv};
+pub(crate) use read::{read_csv_parts, read_each, require_seconds};
 pub(crate) use write::csv_to_bytes;
 pub use write::write_csv;
 

@@ -71,4 +71,8 @@ pub struct CsvOptions {
     pub header: HeaderLine,
     /// The decimal sign of all numbers, also of the time.
     pub decimal: DecimalSign,
+    /// Lines that are passed over, counted from 1: notes above the names, a line of units below them. Lines that begin with `#` or `%`
+    /// and blank lines always are.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub skip_lines: Vec<usize>,
 }

@@ -2,7 +2,9 @@
 
 use super::lines::Lines;
 use super::options::{CsvOptions, DecimalSign, Delimiter, HeaderLine};
+use crate::choose::ChannelRef;
 use crate::error::{Error, Result};
+use crate::time::require_seconds;
 use std::collections::HashSet;
 
 /// Most columns of a table. Rows are samples; a compressed file of some kilobytes may contain millions of cells on one line.
@@ -22,6 +24,7 @@ impl Fields {
     /// Reads the first line that is not a comment; keeps it for the data if it contains numbers.
     pub(super) fn detect(lines: &mut Lines, options: &CsvOptions) -> Result<Fields> {
         let decimal = options.decimal;
+        lines.skip(&options.skip_lines);
         if decimal == DecimalSign::Comma && options.delimiter == Delimiter::Comma {
             let problem =
                 "the comma cannot be both the delimiter and the decimal sign; declare another delimiter".into();
@@ -69,6 +72,73 @@ impl Fields {
     pub(super) fn names(&self) -> &[String] {
         &self.names
     }
+
+    /// The cells of a line.
+    fn cells<'b>(&self, line: &'b [u8]) -> Vec<&'b [u8]> {
+        match self.delimiter {
+            Some(delimiter) => line.split(|&b| b == delimiter).collect(),
+            None => line.split(|b| b.is_ascii_whitespace()).filter(|cell| !cell.is_empty()).collect(),
+        }
+    }
+
+    /// Refuses a time column in another unit than the second, by its name or by a line before the numbers that has a cell for each
+    /// column.
+    pub(super) fn require_seconds(&self, lines: &mut Lines, column: &ChannelRef) -> Result<()> {
+        let what = lines.path().display().to_string();
+        let index = column.index(&what, &self.names)?;
+        let name = &self.names[index];
+        require_seconds(&what, name, name)?;
+        if lines.advance()? {
+            lines.hold();
+        }
+        for line in lines.passed() {
+            let cells = self.cells(line);
+            if cells.len() == self.names.len() {
+                require_seconds(&what, name, String::from_utf8_lossy(cells[index]).trim())?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads all remaining lines; of a column that has a cell that is no number, the error of the first one.
+    pub(super) fn read_each(&self, lines: &mut Lines) -> Result<Vec<Result<Vec<f64>>>> {
+        let expected = self.names.len();
+        let mut columns: Vec<Result<Vec<f64>>> = self.names.iter().map(|_| Ok(Vec::new())).collect();
+        let mut rows = 0;
+        while lines.advance()? {
+            let cells = self.cells(lines.current());
+            if cells.len() != expected {
+                let (path, line, found) = (lines.path().to_owned(), lines.number(), cells.len());
+                return Err(Error::FieldCount { path, line, found, expected });
+            }
+            for (k, (column, cell)) in columns.iter_mut().zip(cells).enumerate() {
+                let Ok(values) = column else { continue };
+                match number(cell, self.decimal) {
+                    Some(value) => values.push(value),
+                    None => *column = Err(self.bad_cell(lines, k, cell)),
+                }
+            }
+            rows += 1;
+            require_room(lines, rows * columns.iter().filter(|c| c.is_ok()).count())?;
+        }
+        if rows == 0 { Err(no_rows(lines)) } else { Ok(columns) }
+    }
+
+    fn bad_cell(&self, lines: &Lines, column: usize, cell: &[u8]) -> Error {
+        let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
+        let other = self.decimal.other();
+        let decimal = number(cell, other).map(|_| other.key());
+        let (path, column) = (lines.path().to_owned(), self.names[column].clone());
+        Error::Cell { path, line: lines.number(), column, text, decimal }
+    }
+}
+
+fn require_room(lines: &Lines, numbers: usize) -> Result<()> {
+    if numbers <= MOST_NUMBERS {
+        return Ok(());
+    }
+    let (found, remedy) = ("a table of more than 50 million numbers", "choose fewer rows or columns");
+    Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy })
 }
 
 /// The columns to read as numbers.
@@ -94,10 +164,7 @@ impl Selection {
         let mut rows = 0;
         while self.next(fields, lines, |position, value| out[position].push(value))? {
             rows += 1;
-            if rows * self.columns > MOST_NUMBERS {
-                let (found, remedy) = ("a table of more than 50 million numbers", "choose fewer rows or columns");
-                return Err(Error::FormatNotRead { path: lines.path().to_owned(), found, remedy });
-            }
+            require_room(lines, rows * self.columns)?;
         }
         if out.iter().all(Vec::is_empty) { Err(no_rows(lines)) } else { Ok(out) }
     }
@@ -148,11 +215,7 @@ impl Selection {
         if found != expected {
             return Error::FieldCount { path, line, found, expected };
         }
-        let text = String::from_utf8_lossy(cell).trim().chars().take(40).collect();
-        let column = fields.names[column].clone();
-        let other = fields.decimal.other();
-        let decimal = number(cell, other).map(|_| other.key());
-        Error::Cell { path, line, column, text, decimal }
+        fields.bad_cell(lines, column, cell)
     }
 }
 
@@ -176,7 +239,7 @@ fn detect_delimiter(lines: &Lines, decimal: DecimalSign) -> Result<Option<u8>> {
         _ => {
             let names: Vec<_> = found.iter().map(|(_, name)| *name).collect();
             let (line, names) = (lines.number(), names.join(" and "));
-            let problem = format!("line {line} contains {names}; declare the delimiter");
+            let problem = format!("line {line} contains {names}; declare it by --delimiter (delimiter in [data] csv)");
             Err(Error::Delimiter { path: lines.path().to_owned(), problem })
         }
     }

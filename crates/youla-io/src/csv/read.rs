@@ -5,7 +5,7 @@ use super::options::CsvOptions;
 use super::parse::{Fields, Selection};
 use super::plan::Plan;
 use crate::assemble::only;
-use crate::choose::ChannelSpec;
+use crate::choose::{ChannelRef, ChannelSpec};
 use crate::error::Result;
 use crate::time::TimeSource;
 use std::io::Cursor;
@@ -81,12 +81,22 @@ fn read_columns(
     options: &CsvOptions,
 ) -> Result<(Plan, Vec<Vec<f64>>)> {
     let fields = Fields::detect(lines, options)?;
+    time.column.iter().try_for_each(|column| fields.require_seconds(lines, column))?;
     let plan = Plan::new(lines.path(), fields.names(), channels, time)?;
     let columns = Selection::new(&fields, &plan.columns).read(&fields, lines)?;
     Ok((plan, columns))
 }
 
-/// Names of all columns, `#1`, `#2` and so on where the file has none.
-pub(crate) fn column_names(path: &Path, options: &CsvOptions) -> Result<Vec<String>> {
-    Ok(Fields::detect(&mut Lines::open(path)?, options)?.names().to_vec())
+/// All columns with their names, `#1`, `#2` and so on where the file has none; an error for one that holds more than numbers.
+pub(crate) fn read_each(path: &Path, options: &CsvOptions) -> Result<Vec<(String, Result<Vec<f64>>)>> {
+    let mut lines = Lines::open(path)?;
+    let fields = Fields::detect(&mut lines, options)?;
+    let columns = fields.read_each(&mut lines).map_err(|error| lines.damage().unwrap_or(error))?;
+    Ok(fields.names().iter().cloned().zip(columns).collect())
+}
+
+/// Refuses a time column in another unit than the second by the head of a text file.
+pub(crate) fn require_seconds(path: &Path, column: &ChannelRef, options: &CsvOptions) -> Result<()> {
+    let mut lines = Lines::open(path)?;
+    Fields::detect(&mut lines, options)?.require_seconds(&mut lines, column)
 }

@@ -42,7 +42,7 @@ fn names_and_numbers_in_every_dialect() {
 #[test]
 fn errors_say_where() {
     for (text, part) in [
-        ("a,b\n1,2\n# x\n3,oops\n", "line 4, column b: \"oops\" is not a finite number"),
+        ("a,b\n1,2\n# x\n3,oops\n", "line 4, column b: \"oops\" is not a finite number; a line of units or notes"),
         ("a,b\n1,NaN\n", "line 2, column b: \"NaN\""),
         ("a,b\n1,inf\n", "line 2, column b: \"inf\""),
         ("a,b\n1,\n", "line 2, column b: \"\""),
@@ -65,6 +65,31 @@ fn errors_say_where() {
     assert!(matches!(error, Error::MissingFile { .. }), "{error}");
     let error = read(b"a,b\n1,2\n", &[ChannelSpec::named("aa")], &second()).unwrap_err().to_string();
     assert!(error.contains("did you mean \"a\"") && error.contains("known: a, b"), "{error}");
+}
+
+/// A clock in milliseconds that the name of a numbered column or a line of units states; the log is named.
+#[test]
+fn a_line_of_units_tells_the_unit_of_the_time() {
+    let of = |text: &str, column: &str, skip_lines: &[usize]| {
+        let (file, time) = (scratch("csv"), TimeSource::column(column.parse().unwrap()));
+        std::fs::write(file.path(), text).unwrap();
+        let options = CsvOptions { skip_lines: skip_lines.to_vec(), ..CsvOptions::default() };
+        let read = read_csv(file.path(), &[], &time, &options).map(|record| record.samples());
+        read.map_err(|e| e.to_string().replace(&file.path().display().to_string(), "LOG"))
+    };
+    for (text, column, skip, by) in [
+        ("t,u\n# ms,V\n0,1\n1,2\n", "t", &[][..], "line of units"),
+        ("t,u\nms,V\n0,1\n1,2\n", "t", &[2], "line of units"),
+        ("# t_ms u\n0 1\n1 2\n", "#1", &[], "line of units"),
+        ("t_ms,u\n0,1\n1,2\n", "#1", &[], "name"),
+    ] {
+        let error = of(text, column, skip).unwrap_err();
+        assert!(error.starts_with("LOG: the time column"), "{error}");
+        assert!(error.contains(&format!("in milliseconds by its {by}")) && error.contains("/ 1e3"), "{error}");
+    }
+    for text in ["t,u\n# s,V\n0,1\n1,2\n", "t,u\n# V,ms\n0,1\n1,2\n", "# every 5 ms\nt,u\n0,1\n1,2\n"] {
+        assert_eq!(of(text, "t", &[]), Ok(2), "{text:?}");
+    }
 }
 
 #[test]

@@ -35,6 +35,7 @@ __all__ = [
     "simulate",
     "simulate_loop",
     "subspace",
+    "unit_of_time",
     "version",
     "write_files",
 ]
@@ -43,6 +44,7 @@ _Array: TypeAlias = npt.NDArray[np.float64]
 _Complex: TypeAlias = npt.NDArray[np.complex128]
 _Region: TypeAlias = tuple[_Complex, tuple[_Array, _Array, float] | None]
 
+def unit_of_time(heading: str) -> tuple[str, str] | None: ...
 def program(args: Sequence[str]) -> int: ...
 def version() -> str: ...
 def identify(chosen: str, logs: Sequence[Log], single: bool = False, response: Table | None = None) -> Run: ...

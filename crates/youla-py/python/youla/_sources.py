@@ -65,12 +65,18 @@ def _is(data: Any, module: str, name: str) -> bool:
     return kind is not None and isinstance(data, kind)
 
 
-def _clock(times: Any, dt: float | None, what: str) -> float:
+def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
     if times is None and dt is None:
         raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
     if times is None:
         assert dt is not None
         return dt
+    other = _native.unit_of_time(str(column))
+    if other is not None:
+        raise InputError(
+            f"{what} is in {other[0]} by its name, but times are read in seconds; give a column of seconds (data[{column!r}] {other[1]}), "
+            "or leave time out and give the sample time as dt="
+        )
     seconds = as_floats(times, what)
     if not np.isfinite(seconds).all():
         raise InputError(f"{what} has a value that is not finite; cut these rows out")
@@ -121,7 +127,7 @@ def _of_columns(columns: dict[str, Any], time: str | int | None, dt: float | Non
     if not arrays:
         raise InputError("inputs and outputs are missing: name the channels of data")
     names = list(arrays)
-    return Source(np.column_stack(list(arrays.values())), _clock(times, dt, f"time {time!r}"), names, [""] * len(names))
+    return Source(np.column_stack(list(arrays.values())), _clock(times, dt, f"time {time!r}", time), names, [""] * len(names))
 
 
 def _needed(known: list[Any], chosen: dict[str, list[str | int]], time: str | int | None) -> list[str]:
@@ -145,13 +151,14 @@ def _of_pandas(data: Any, chosen: dict[str, list[str | int]], time: str | int | 
         raise InputError("data has columns without a text as name; give data.to_numpy() to choose by number, or name them")
     if data.columns.has_duplicates:
         raise InputError(f"data has two columns of one name: {list(data.columns[data.columns.duplicated()])}; rename one")
-    times = None
+    times, unit = None, ""
     if time == "index" and "index" not in data.columns:
         times, time = _index_seconds(data.index), None
+        unit = data.index.name if data.index.dtype.kind in "fiu" else ""
     columns = {name: data[name].to_numpy() for name in _needed(list(data.columns), chosen, time)}
     if times is None:
         return _of_columns(columns, time, dt)
-    return _of_columns(columns, None, _clock(times, dt, "the index of data"))
+    return _of_columns(columns, None, _clock(times, dt, "the index of data", unit))
 
 
 def _index_seconds(index: Any) -> Any:
@@ -220,12 +227,11 @@ def _of_parquet(
     parquet = need("pyarrow.parquet")
     names = _needed(parquet.read_schema(path).names, chosen, time)
     table = parquet.read_table(path, columns=names)
-    return _of_columns({name: _seconds(table.column(name).to_numpy()) for name in names}, time, dt)
-
-
-def _seconds(values: Any) -> Any:
-    """Dates as seconds from the first row; other values as they are."""
-    return (values - values[0]) / np.timedelta64(1, "s") if values.dtype.kind == "M" and len(values) else values
+    columns = {name: table.column(name).to_numpy() for name in names}
+    if time is None or columns[str(time)].dtype.kind != "M":
+        return _of_columns(columns, time, dt)
+    dates = columns.pop(str(time))
+    return _of_columns(columns, None, _clock((dates - dates[:1]) / np.timedelta64(1, "s"), dt, f"time {time!r}"))
 
 
 @dataclass(frozen=True)

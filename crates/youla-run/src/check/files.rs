@@ -11,7 +11,7 @@ use std::path::Path;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::LoopRecord;
 use youla::signal::Record;
-use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, read, sha256};
+use youla_io::{ChannelSpec, CsvOptions, Format, Gaps, Source, TimeSource, check_unit, read, sha256};
 use youla_loop::check::{ChannelNames, CheckOptions, Finding, LoggedRecord, check_record, timing};
 
 /// What all records of a check share.
@@ -78,9 +78,8 @@ fn check_file(
     if job.time.column.is_none() && job.time.ts.is_none() {
         return Err(Error::File(youla_io::Error::SampleTimeMissing { what: path.display().to_string() }));
     }
-    job.time.check_unit()?;
-    let clock = job.time.column.iter().map(|place| ChannelSpec::from(TIME, place.clone(), ""));
-    let wanted: Vec<ChannelSpec> = job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock).collect();
+    let clock = job.time.column.clone().map(|place| ChannelSpec::from(TIME, place, ""));
+    let wanted: Vec<ChannelSpec> = job.groups.iter().flat_map(|g| g.iter().cloned()).chain(clock.clone()).collect();
     let source = Source {
         path,
         format: Format::Detect,
@@ -89,6 +88,9 @@ fn check_file(
         channels: job.computed.to_read(&wanted),
         csv: job.csv.clone(),
     };
+    if let Some(clock) = clock.filter(|clock| job.computed.formula_of(clock).is_none()) {
+        check_unit(&source, &clock.source())?;
+    }
     let record = job.computed.apply(&wanted, read(&source)?, 1)?;
     let continuous = if job.time.gaps == Gaps::Split { between_gaps(job, record)? } else { vec![record] };
     let found = parts(file, label, continuous)?;

@@ -8,7 +8,7 @@ use minijinja::{Environment, context};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use youla::error::{Names, short};
-use youla_io::{ChannelRef, CsvOptions, SurveyedColumn};
+use youla_io::{ChannelRef, CsvOptions, SurveyedColumn, unit_of_time};
 
 const TEMPLATE: &str = include_str!("../../assets/run.toml.j2");
 
@@ -60,6 +60,9 @@ impl Draft {
             return Some("a plant has at least one input and one output".into());
         }
         if let Some(problem) = clock.into_iter().chain(self.channels()).find_map(|c| column(c, columns).err()) {
+            return Some(problem);
+        }
+        if let Some(problem) = clock.and_then(|c| in_another_unit(c, columns)) {
             return Some(problem);
         }
         let all: Vec<&ChannelRef> = clock.into_iter().chain(self.channels()).collect();
@@ -182,6 +185,21 @@ fn column(wanted: &ChannelRef, columns: &[SurveyedColumn]) -> std::result::Resul
             Err(format!("there is no column {:?}; there are {}", short(&wanted.to_string()), Names(&known)))
         }
     }
+}
+
+/// What is wrong with a time column whose name states another unit than the second.
+fn in_another_unit(clock: &ChannelRef, columns: &[SurveyedColumn]) -> Option<String> {
+    let name = match clock {
+        ChannelRef::Name(name) => name,
+        ChannelRef::Column(number) => &columns.get(number.checked_sub(1)?)?.from,
+    };
+    let (unit, to_seconds) = unit_of_time(name)?;
+    Some(format!(
+        "the time column {:?} is in {unit} by its name, but times are read in seconds; state the sample time by --sample-time in place \
+         of it, or compute seconds in run.toml: seconds = \"'{}' {to_seconds}\" in [data.computed]",
+        short(name),
+        short(name)
+    ))
 }
 
 /// A channel of run.toml.

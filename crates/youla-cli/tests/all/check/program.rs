@@ -61,7 +61,7 @@ fn a_defect_has_a_code_and_a_file() {
     let found = run(&folder, &arguments);
     let text = String::from_utf8(found.stdout).expect("UTF-8");
     assert_eq!(found.status.code(), Some(1));
-    let head = "log, rows 1001 to 2990: 1990 samples, sample time 0.01 s, length 19.9 s\n\ndefect (timing) log, row 1001: 10 samples are missing in 1 gaps.";
+    let head = "log, rows 1001 to 2990: 1990 samples, sample time 0.01 s (100 Hz), length 19.9 s\n\ndefect (timing) log, row 1001: 10 samples are missing in 1 gaps.";
     assert!(text.starts_with(head), "{text}");
     let written = fs::read_to_string(folder.join("found/check.json")).expect("written");
     let written: serde_json::Value = serde_json::from_str(&written).expect("JSON");

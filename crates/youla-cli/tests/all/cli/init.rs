@@ -82,6 +82,53 @@ fn what_does_not_fit_the_log_is_refused() {
     assert_eq!(found.code, Some(2));
 }
 
+/// A line of units and decimal commas, with the flags that the message names; the run.toml that is written reads the log.
+#[test]
+fn a_log_with_units_and_decimal_commas_is_read() {
+    let rows: String = (0..600).map(|k| format!("0,{k:03};{};{}\n", k % 7, (k * k) % 11)).collect();
+    let text = format!("t;u;y\ns;V;mm\n{rows}");
+    let folder = loop_folder("init-units", &[("units.csv", text.as_bytes())]);
+    let log = ["init", "units.csv", "--input", "u", "--output", "y", "--time", "t", "--open-loop", "--out", "new.toml"];
+    let refused = youla(&folder, &log);
+    assert_eq!(refused.code, Some(2), "{}", refused.stdout);
+    for flag in ["--decimal comma", "--skip-lines"] {
+        assert!(refused.stderr.contains(flag), "{}", refused.stderr);
+    }
+    let read = youla(&folder, &[&log[..], &["--decimal", "comma", "--skip-lines", "2"]].concat());
+    assert_eq!(read.code, Some(0), "{}", read.stderr);
+    let checked = youla(&folder, &["check", "new.toml"]);
+    assert!(
+        checked.stdout.contains("sample time 0.001 s (1000 Hz), length 0.4 s"),
+        "{}{}",
+        checked.stdout,
+        checked.stderr
+    );
+}
+
+/// 240 kB of names: as many lines as a person reads, and a column in milliseconds is refused.
+#[test]
+fn hostile_names_are_cut() {
+    let names: Vec<String> =
+        (0..48_000).map(|k| format!("x{k:04}")).chain(["t_ms".into(), "y".repeat(60_000)]).collect();
+    let row = |value: &str| vec![value; names.len()].join(",");
+    let text = format!("{}\n{}\n{}\n{}\n", names.join(","), row("1"), row("2"), row("4"));
+    let folder = loop_folder("init-names", &[("wide.csv", text.as_bytes())]);
+    let found =
+        youla(&folder, &["init", "wide.csv", "--input", "x0001", "--output", "x0002", "--time", "none", "--open-loop"]);
+    assert_eq!(found.code, Some(2));
+    assert!(found.stdout.len() + found.stderr.len() < 20_000, "{} bytes", found.stdout.len() + found.stderr.len());
+    let folder = loop_folder("init-ms", &[("ms.csv", b"t_ms,u,y\n0,1,2\n1,2,3\n2,1,4\n")]);
+    let found = youla(
+        &folder,
+        &["init", "ms.csv", "--input", "u", "--output", "y", "--time", "t_ms", "--open-loop", "--out", "new.toml"],
+    );
+    assert!(
+        found.code == Some(2) && found.stderr.contains("in milliseconds") && found.stderr.contains("ms.csv"),
+        "{}",
+        found.stderr
+    );
+}
+
 /// A Parquet file is recognised, and the message names the two ways around it.
 #[test]
 fn a_parquet_log_is_refused() {

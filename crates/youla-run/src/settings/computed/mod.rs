@@ -112,7 +112,8 @@ impl ComputedChannels {
         findings.into_iter().filter(|f| !expected(f)).collect()
     }
 
-    fn formula_of(&self, channel: &ChannelSpec) -> Option<usize> {
+    /// The number of the formula of a channel that is not in the file.
+    pub(crate) fn formula_of(&self, channel: &ChannelSpec) -> Option<usize> {
         let ChannelRef::Name(place) = channel.source() else { return None };
         self.formulas.iter().position(|f| f.name == place)
     }

@@ -256,7 +256,7 @@ impl RunSettings {
     fn number_problem(&self) -> Option<String> {
         let (factors, response) = (&self.factors, &self.frequency_response);
         let positive = |x: f64| x > 0.0 && x.is_finite();
-        let (from, window) = (response.from_hz.unwrap_or(1.0), response.window as f64);
+        let (from, window) = (response.from_hz.unwrap_or(1.0), response.window.map_or(f64::INFINITY, |w| w as f64));
         [
             ("[factors] input_weight", factors.input_weight, "positive", positive as fn(f64) -> bool),
             ("[frequency_response] from_hz", from, "a positive frequency", positive),

@@ -46,18 +46,14 @@ pub struct VerificationSettings {
 }
 
 /// Options of the frequency responses.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FrequencySettings {
-    /// Samples per window of the non-parametric estimate (Welch, Hann, half overlapping).
-    pub window: usize,
+    /// Samples per window of the non-parametric estimate (Welch, Hann, half overlapping); when absent 4096, or a fourth of the shortest
+    /// record where that is less.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub window: Option<usize>,
     /// Lowest frequency of the models' curves, Hz; a 300th of the Nyquist frequency when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_hz: Option<f64>,
-}
-
-impl Default for FrequencySettings {
-    fn default() -> Self {
-        FrequencySettings { window: 4096, from_hz: None }
-    }
 }

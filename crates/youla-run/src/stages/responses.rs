@@ -12,6 +12,14 @@ use youla::signal::LoopRecord;
 use youla::signal::{ExcitedRecord, IndirectResponse, Welch, indirect_response};
 use youla::{Mat, MatRef};
 
+/// Window of the indirect response, samples, unless stated: 5 lines below the lowest frequency of the curves, a 300th of Nyquist.
+/// Chosen, not measured.
+const LONGEST_WINDOW: usize = 4096;
+/// A record has at least so many windows side by side, seven half overlapping: of one alone the coherence is 1, whatever the noise.
+const WINDOWS_OF_A_RECORD: usize = 4;
+/// The least window that settings may state, samples.
+const SHORTEST_WINDOW: usize = 4;
+
 /// The indirect response `S_dy S_du^-1` averaged over all estimation records, `None` where no excitation is known.
 ///
 /// The excitation d is the signal added at the plant input or injected as alpha where it acts alone; where references move
@@ -46,7 +54,9 @@ pub(crate) fn indirect(run: RunContext<'_>, signals: Option<&DeviationSignals>) 
             ExcitedRecord { d: d.as_ref(), u, y }
         })
         .collect();
-    let options = Welch { window: settings.window, ..Welch::default() };
+    let shortest = experiments.iter().map(|e| e.d.nrows()).min().unwrap_or(0);
+    let window = settings.window.unwrap_or(LONGEST_WINDOW.min(shortest / WINDOWS_OF_A_RECORD).max(SHORTEST_WINDOW));
+    let options = Welch { window, ..Welch::default() };
     Some(indirect_response(&experiments, run.records.time, &options).map_err(Error::from))
 }
 

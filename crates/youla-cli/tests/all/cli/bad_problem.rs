@@ -160,4 +160,9 @@ fn side_evidence_that_is_impossible_does_not_end_the_run() {
     let response = std::fs::read_to_string(folder.join("out/response.json")).expect("written");
     let response: serde_json::Value = serde_json::from_str(&response).expect("JSON");
     assert!(response["hz"].is_array() && response["indirect"].as_array().is_some_and(Vec::is_empty));
+    // The default fits a record of 1200 samples.
+    let short = settings("[frequency_response]\nwindow = 256\n", "");
+    let folder = loop_folder("default-window", &[("run.toml", short.as_bytes())]);
+    let found = youla(&folder, &["identify", "run.toml", "--out", "out"]);
+    assert!(found.code == Some(0) && !found.stdout.contains("no indirect"), "{}{}", found.stdout, found.stderr);
 }

@@ -5,6 +5,7 @@ use std::fmt::Write;
 use youla::error::short;
 use youla_paper::run::WrittenPaper;
 use youla_paper::study::{Method, Paper, StudyExperiment};
+use youla_report::numbers::fit;
 use youla_run::{Identification, ModelValidation, WrittenRun, cautions};
 
 /// Fits, orders and loops of all models, and where everything is.
@@ -60,12 +61,7 @@ fn rows(found: &Identification) -> Vec<Vec<String>> {
     let mut rows = vec![row(corner, models.iter().map(|v| v.method.label().into()).collect())];
     for (k, record) in found.records.verification.iter().enumerate() {
         for (i, output) in found.records.outputs.iter().enumerate() {
-            // A model that nearly diverges has a fit that no column holds.
-            let percent = |fit: f64| match fit {
-                _ if !fit.is_finite() => "-".to_owned(),
-                _ if fit < -9999.0 => format!("{fit:.1e}"),
-                _ => format!("{fit:.2}"),
-            };
+            let percent = |of: f64| if of.is_finite() { fit(of, 2) } else { "-".to_owned() };
             let fits = models.iter().map(|v| percent(v.records[k].fit[i])).collect();
             rows.push(row(&format!("{}, {}", short(record.name()), short(&output.name)), fits));
         }

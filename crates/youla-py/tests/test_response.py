@@ -57,6 +57,17 @@ def test_the_plant_alone_and_objects_of_others() -> None:
     assert youla.Response(control.frd(np.moveaxis(values, 0, -1), 2 * np.pi * HZ, dt=0.01)).dt == 0.01
 
 
+def test_a_response_without_noise_needs_its_errors() -> None:
+    """What is left is rounding, which is smooth; the reason says what mends it, and it does."""
+    plant = youla.Model([[1.5, -0.56], [1.0, 0.0]], [[0.06], [0.0]], [[1.0, 0.0]], [[0.0]], dt=0.01)
+    g = plant.frequency_response(2 * np.pi * HZ).values
+    known = {"controller": 2.0, "feedback": "negative"}
+    verdict = youla.identify(youla.Response(hz=HZ, g=g, dt=0.01), **known).verdict
+    assert verdict or "state the errors of the response" in " ".join(verdict.reasons)
+    run = youla.identify(youla.Response(hz=HZ, g=g, dt=0.01, sd=1e-6), **known)
+    assert run.verdict.trusted and run.recommended.order == 2
+
+
 def test_coherence_weighs() -> None:
     ud, yd = loop(7)
     run = youla.identify(youla.Response(hz=HZ, ud=ud, yd=yd, coherence=0.999), **KNOWN)

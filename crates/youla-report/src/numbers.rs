@@ -2,6 +2,16 @@
 
 use serde::{Deserialize, Deserializer};
 
+/// A fit in percent; below -100 %, where the error is more than twice the signal about its mean, its size says nothing more.
+///
+/// ```
+/// use youla_report::numbers::fit;
+/// assert_eq!([fit(89.96, 1), fit(-99.96, 1), fit(-2779.0, 1)], ["90.0", "-100.0", "below -100"]);
+/// ```
+pub fn fit(percent: f64, digits: usize) -> String {
+    if percent < -100.0 { "below -100".to_owned() } else { format!("{percent:.digits$}") }
+}
+
 /// A vector as it is.
 pub fn many<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<f64>, D::Error> {
     let values = Vec::<Option<f64>>::deserialize(deserializer)?;

@@ -7,6 +7,7 @@ use minijinja::syntax::SyntaxConfig;
 use minijinja::{Environment, Value, context};
 
 use super::drawings::Drawings;
+use super::numbers::fit;
 use super::svg::pretty_unit;
 use crate::{Error, Result};
 
@@ -49,6 +50,7 @@ fn rendered(template: &str, page: Value) -> Result<String, minijinja::Error> {
     let mut environment = Environment::new();
     environment.set_syntax(SyntaxConfig::builder().trim_blocks(true).lstrip_blocks(true).build()?);
     environment.add_filter("fixed", |value: f64, digits: usize| with_minus(format!("{value:.digits$}")));
+    environment.add_filter("fit", |value: f64| with_minus(fit(value, 1)));
     environment.add_filter("scientific", |value: f64| with_minus(format!("{value:.1e}")));
     environment.add_filter("significant", |value: f64| with_minus(significant(value)));
     environment.add_filter("two_digits", |value: f64| with_minus(digits(value, 2)));

@@ -4,6 +4,7 @@ use super::run::FinishedRun;
 use crate::page::models;
 use youla_report::data::{EvidenceTable, Mode, Note, ReportData, Status, Verdict};
 use youla_report::match_modes;
+use youla_report::numbers::fit;
 
 /// One row per run: verdict, order, fit.
 pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
@@ -12,9 +13,9 @@ pub(super) fn overview(runs: &[FinishedRun]) -> EvidenceTable {
             run.name.clone(),
             run.summary.name.clone(),
             verdict(&run.report),
-            run.model.system.order().to_string(),
+            run.entry().map_or_else(|| run.model.system.order(), |model| model.order).to_string(),
             format!("{} s", run.model.system.time().ts()),
-            mean_fit(run).map_or("\u{2013}".into(), |fit| format!("{fit:.1} %")),
+            mean_fit(run).map_or("\u{2013}".into(), |of| format!("{} %", fit(of, 1))),
         ]
     };
     let columns = ["Run", "Machine", "Can it be trusted?", "Order", "Sample time", "Mean fit"];
@@ -63,7 +64,7 @@ pub(super) fn modes(runs: &[FinishedRun]) -> EvidenceTable {
 
 fn oscillating(run: &FinishedRun) -> Vec<Mode> {
     let all = run.entry().map_or_else(Vec::new, |model| models::modes(&run.key, model));
-    let mut modes: Vec<Mode> = all.into_iter().filter(|m| m.zeta.abs() < 1.0).collect();
+    let mut modes: Vec<Mode> = all.into_iter().filter(|m| m.hz > 0.0 && m.zeta.abs() < 1.0).collect();
     modes.sort_by(|a, b| a.hz.total_cmp(&b.hz));
     modes
 }

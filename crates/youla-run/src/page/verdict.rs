@@ -10,6 +10,7 @@ use crate::summary::model::{ModelEntry, ResidualEntry};
 use youla::identify::likelihood::{Evidence, Outcome};
 use youla_loop::check::{Finding, Severity};
 use youla_report::data::{ReportPart, Status, Verdict};
+use youla_report::numbers;
 
 /// The lines, each with its evidence.
 pub(crate) fn verdict_lines(found: &Identification, summary: &Summary) -> Vec<Verdict> {
@@ -73,7 +74,8 @@ fn fit_line(found: &Identification, summary: &Summary) -> Option<Verdict> {
         let text = "No verification record was given, so the fit on fresh data is unknown.".into();
         return Some(Verdict { status: Status::Caution, text, evidence: ReportPart::Fits });
     }
-    let percent = |fit: f64| if fit.is_finite() { format!("{fit:.1} %") } else { "no prediction".into() };
+    let percent =
+        |fit: f64| if fit.is_finite() { format!("{} %", numbers::fit(fit, 1)) } else { "no prediction".into() };
     let of = |method: Method| summary.model(method)?.mean_fit();
     let (method, model) = subject(found, summary)?;
     let (fit, nominal) = (model.mean_fit()?, of(Method::Nominal));

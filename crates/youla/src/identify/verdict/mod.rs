@@ -202,7 +202,7 @@ fn in_loop(loops: Option<&Loops>, on: &Judged<'_>, hz: f64, squares: &[f64]) -> 
 }
 
 fn excitation(on: &Judged<'_>) -> Evidence {
-    let question = "No external excitation is known in the estimation records (1: none)";
+    let question = "Lack of a known external excitation in the estimation records (excitation; 1: none is known)";
     Evidence::new(question, if on.witness.is_some() { 0.0 } else { 1.0 }, 0.0)
 }
 

@@ -66,5 +66,7 @@ fn correlation(lines: &WeighedLines, chosen: &Fitted) -> Evidence {
     let figure = if power > 0.0 { sum / power } else { 0.0 };
     let question = "Correlation of the residuals of neighbouring lines (missing dynamics)";
     // the real part of the mean product of independent complex numbers has the variance 1 / (2 n)
-    Evidence::new(question, figure, LARGEST_CORRELATION).beyond_chance(figure * (2.0_f64 * pairs).sqrt())
+    let evidence = Evidence::new(question, figure, LARGEST_CORRELATION);
+    let remedy = "state the errors of the response, as standard deviations or coherence: of one without noise only rounding is left, which counts as dynamics";
+    evidence.beyond_chance(figure * (2.0_f64 * pairs).sqrt()).remedy(remedy)
 }

@@ -43,10 +43,13 @@ pub(crate) fn replicate(
         let records = records_in_memory(&chosen.data, logs)?;
         let again = simulated(&chosen, &records, &predictor, draw)?;
         let found = recommend_alone(&chosen, &again, Path::new("."))?;
-        let modes: Vec<[f64; 2]> = found.modes.iter().map(|m| [m.mode.hz, m.mode.zeta]).collect();
+        let (pairs, real): (Vec<_>, Vec<_>) = found.modes.iter().map(|m| m.mode).partition(|m| m.pole.im != 0.0);
+        let modes: Vec<[f64; 2]> = pairs.iter().map(|m| [m.hz, m.zeta]).collect();
+        let real_poles: Vec<f64> = real.iter().map(|m| m.pole.re).collect();
         let model = youla_io::SystemMatrices::new(&found.plant);
         let row = serde_json::json!({
-            "order": found.order, "dead_time": found.dead_time, "modes": modes, "ts": found.plant.time().ts(), "model": model,
+            "order": found.order, "dead_time": found.dead_time, "modes": modes, "real_poles": real_poles,
+            "ts": found.plant.time().ts(), "model": model,
         });
         Ok(row.to_string())
     })

@@ -14,7 +14,7 @@ FOLDER = ROOT / "docs/notebooks"
 CLAIMS = {
     "first-log": """
 assert run.verdict.trusted and run.recommended.order == 3
-assert abs(run.modes()[1].hz - 29.77) < 0.1 and abs(run.fits["likelihood"]["record-verification"][0] - 90) < 5
+assert abs(run.modes()[0].hz - 29.77) < 0.1 and abs(run.fits["likelihood"]["record-verification"][0] - 90) < 5
 """,
     "unstable-machine": """
 assert direct.poles.real.max() < 1 < run.recommended.poles.real.max()

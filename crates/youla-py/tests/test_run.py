@@ -20,10 +20,12 @@ def test_the_plant_is_found(run: youla.Run) -> None:
     """Pole 0.95 within 0.01; the interval of its frequency holds the truth."""
     assert run.recommended.order == 1
     assert abs(run.recommended.poles[0] - 0.95) < 0.01
-    (mode,) = run.modes()
+    (pole,) = run.real_poles()
     truth = -np.log(0.95) / 0.01 / (2 * np.pi)
-    assert mode.hz_interval is not None
-    assert mode.hz_interval[0] < truth < mode.hz_interval[1]
+    assert pole.hz_interval is not None
+    assert pole.hz_interval[0] < truth < pole.hz_interval[1]
+    assert (run.modes(), run.recommended.modes()) == ((), ())
+    assert abs(run.recommended.real_poles()[0].hz - pole.hz) < 1e-9
     assert run.verdict.evidence
     assert run.fits["likelihood"]["fresh"][0] > 80
 

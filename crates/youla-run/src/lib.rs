@@ -62,7 +62,7 @@ pub use stages::validate::residuals::{RecordResiduals, ResidualPredictor};
 pub use stages::validate::robustness::LoopRobustness;
 pub use stages::validate::{ModelValidation, RecordValidation, Validation};
 pub use summary::certificate::CertificateEntry;
-pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, Refused};
+pub use summary::entries::{BandEntry, Fits, IntervalEntry, ModeEntry, OrRefused, RealPoleEntry, Refused};
 pub use summary::model::{LargestEntry, ModelEntry, ResidualEntry};
 pub use summary::physical::PhysicalEntry;
 pub use summary::pid::{FigureEntry, PidEntry, ProofEntry, StepEntry};

@@ -23,7 +23,7 @@ from ._loop import (
     reduce,
     simulate_loop,
 )
-from ._model import FrequencyResponse, Mode, Model
+from ._model import FrequencyResponse, Mode, Model, RealPole
 from ._plan import Study, study
 from ._record import Record
 from ._response import Response
@@ -49,6 +49,7 @@ __all__ = [
     "NumericalError",
     "Plots",
     "Prediction",
+    "RealPole",
     "Record",
     "Redesign",
     "Reduction",

@@ -23,7 +23,7 @@ Complex = npt.NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Mode:
-    """A mode of a model.
+    """An oscillating mode of a model: a pair of poles. Real poles are apart, as `RealPole`.
 
     Attributes
     ----------
@@ -39,6 +39,25 @@ class Mode:
     zeta: float
     hz_interval: tuple[float, float] | None = None
     zeta_interval: tuple[float, float] | None = None
+
+
+@dataclass(frozen=True)
+class RealPole:
+    """A real pole of a model: a time constant, an integrator or a growth.
+
+    Attributes
+    ----------
+    z : float
+        The pole in z; beyond 1 the model grows.
+    hz : float
+        Corner frequency ``|ln z| / (2 pi dt)``, Hz; the time constant is ``1 / (2 pi hz)``.
+    hz_interval : tuple of float, optional
+        95 % interval where it is known.
+    """
+
+    z: float
+    hz: float
+    hz_interval: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True)
@@ -162,6 +181,7 @@ class Model:
         outputs: Sequence[str] | None = None,
         name: str = "model",
     ) -> None:
+        self._dead_time: tuple[int, ...] = ()
         d = as_matrix(d, "d")
         p, m = d.shape
         if d.size == 0:
@@ -208,8 +228,13 @@ class Model:
 
     @property
     def order(self) -> int:
-        """Number of states."""
-        return int(self.a.shape[0])
+        """Number of states without those of the dead time."""
+        return int(self.a.shape[0]) - sum(self.dead_time)
+
+    @property
+    def dead_time(self) -> tuple[int, ...]:
+        """Dead time of each input in samples, of which the model holds a state each; empty where none is stated."""
+        return self._dead_time
 
     @property
     def poles(self) -> Complex:
@@ -219,8 +244,13 @@ class Model:
         return np.array(both, dtype=np.complex128)
 
     def modes(self) -> tuple[Mode, ...]:
-        """Return the modes by natural frequency."""
-        return tuple(Mode(hz, zeta) for hz, zeta, _, _ in _native.modes(self._native()))
+        """Return the oscillating modes by natural frequency; real poles have no damping ratio, see `real_poles`."""
+        return tuple(Mode(hz, zeta) for hz, zeta, _, im in _native.modes(self._native()) if im != 0)
+
+    def real_poles(self) -> tuple[RealPole, ...]:
+        """Return the real poles by corner frequency, without those at z = 0, which are dead time."""
+        found = _native.modes(self._native())
+        return tuple(RealPole(z, hz) for hz, _, z, im in found if im == 0 and np.isfinite(hz))
 
     def frequency_response(self, omega: Any) -> FrequencyResponse:
         """Return the frequency response.
@@ -246,7 +276,7 @@ class Model:
         ----------
         inputs : array_like, samples x m
             Inputs; one input may be a list of numbers.
-        x0 : array_like, (order,), optional
+        x0 : array_like, (n,), optional
             State before the first sample; zero when absent.
 
         Returns
@@ -255,9 +285,10 @@ class Model:
             Outputs.
         """
         u = _signal(inputs, "inputs", self.d.shape[1])
-        state = np.zeros(self.order) if x0 is None else as_floats(x0, "x0").ravel()
-        if len(state) != self.order:
-            raise InputError(f"x0 has {len(state)} entries, but the model has {self.order} states")
+        states = self.a.shape[0]
+        state = np.zeros(states) if x0 is None else as_floats(x0, "x0").ravel()
+        if len(state) != states:
+            raise InputError(f"x0 has {len(state)} entries, but the model has {states} states")
         return _native.simulate(self._native(), u, state.tolist())
 
     def to_control(self) -> Any:
@@ -284,20 +315,25 @@ class Model:
 
     def __repr__(self) -> str:
         p, m = self.d.shape
-        return f"<youla.Model {self.name!r}: order {self.order}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
+        dead_time = f" and dead time {list(self.dead_time)}" if any(self.dead_time) else ""
+        return f"<youla.Model {self.name!r}: order {self.order}{dead_time}, {m} inputs, {p} outputs, dt={self._dt:g} s>"
 
     def __reduce__(self) -> Any:
-        return _model_of, (self._matrices, self._dt, self.inputs, self.outputs, self.name)
+        return _model_of, (self._matrices, self._dt, self.inputs, self.outputs, self.name, self._dead_time)
 
     def _native(self) -> Matrices:
         a, b, c, d = self._matrices
         return (a, b, c, d, self._dt)
 
 
-def _model_of(matrices: Sequence[Array], dt: float, inputs: Sequence[str], outputs: Sequence[str], name: str) -> Model:
+def _model_of(
+    matrices: Sequence[Array], dt: float, inputs: Sequence[str], outputs: Sequence[str], name: str, dead_time: Sequence[int] = ()
+) -> Model:
     """A model from its state."""
     a, b, c, d = matrices
-    return Model(a, b, c, d, dt=dt, inputs=inputs, outputs=outputs, name=name)
+    model = Model(a, b, c, d, dt=dt, inputs=inputs, outputs=outputs, name=name)
+    model._dead_time = tuple(dead_time)
+    return model
 
 
 def frequencies(omega: Any, dt: float | None = None) -> Array:

@@ -23,6 +23,7 @@ _TYPES = {
     "least_fit": "float64",
     "hz": "list",
     "zeta": "list",
+    "real_poles": "list",
     "ts": "float64",
     "a": "matrix",
     "b": "matrix",

@@ -15,7 +15,7 @@ from ._checks import path_of, text, truth, write_file
 from ._errors import InputError, NumericalError
 from ._figures import RECOMMENDED, Plots
 from ._kept import Kept, Results, files_of, read_folder
-from ._model import FrequencyResponse, Mode, Model, frequencies
+from ._model import FrequencyResponse, Mode, Model, RealPole, _model_of, frequencies
 from ._optional import need
 
 
@@ -135,7 +135,7 @@ class Run:
     >>> run = youla.demo()
     >>> run.verdict.trusted, run.recommended.order
     (True, 3)
-    >>> run.modes()[0].hz_interval is not None
+    >>> run.real_poles()[0].hz_interval is not None
     True
     """
 
@@ -222,7 +222,8 @@ class Run:
         elif name == "deviation":
             u, y = [f"alpha of {n}" for n in u], [f"beta of {n}" for n in y]
         label = "recommended" if name == RECOMMENDED else name
-        return Model(a, b, c, d, dt=dt, inputs=u, outputs=y, name=label)
+        dead_time = self.summary["recommended"]["dead_time"] if name == RECOMMENDED else ()
+        return _model_of((a, b, c, d), dt, u, y, label, dead_time)
 
     @property
     def recommended(self) -> Model:
@@ -255,7 +256,7 @@ class Run:
         return tuple(Prediction(*found) for found in self._native.predictions())
 
     def modes(self, model: str = RECOMMENDED) -> tuple[Mode, ...]:
-        """Return the modes of a model.
+        """Return the oscillating modes of a model; `real_poles` are apart.
 
         Parameters
         ----------
@@ -267,21 +268,34 @@ class Run:
         tuple of Mode
             Natural frequencies in Hz and damping ratios, with 95 % intervals where they are known.
         """
-        entry = self.summary["methods"].get(text(model, "model"))
-        if entry is None:
+        found = self._listed(model, "modes")
+        if found is None:
             return self.model(model).modes()
-        found = self.summary["recommended"]["modes"] if model == RECOMMENDED else entry["modes"]
+        return tuple(Mode(_number(m["hz"]), _number(m["zeta"]), _interval(m, "hz"), _interval(m, "zeta")) for m in found)
 
-        def interval(mode: dict[str, Any], key: str) -> tuple[float, float] | None:
-            bounds = mode.get(key)
-            return None if bounds is None or None in bounds else (bounds[0], bounds[1])
+    def real_poles(self, model: str = RECOMMENDED) -> tuple[RealPole, ...]:
+        """Return the real poles of a model.
 
-        def number(value: float | None) -> float:
-            return float("nan") if value is None else value
+        Parameters
+        ----------
+        model : str
+            One of `models`.
 
-        return tuple(
-            Mode(number(m["hz"]), number(m["zeta"]), interval(m, "hz_interval"), interval(m, "zeta_interval")) for m in found
-        )
+        Returns
+        -------
+        tuple of RealPole
+            Poles in z and their corner frequencies in Hz, with 95 % intervals where they are known.
+        """
+        found = self._listed(model, "real_poles")
+        if found is None:
+            return self.model(model).real_poles()
+        return tuple(RealPole(p["z"], _number(p["hz"]), _interval(p, "hz")) for p in found)
+
+    def _listed(self, model: str, key: str) -> list[dict[str, Any]] | None:
+        """What summary.json lists of a model; `None` for one that it does not describe."""
+        entry = self.summary["methods"].get(text(model, "model"))
+        found: list[dict[str, Any]] | None = None if entry is None else (self.summary["recommended"] if model == RECOMMENDED else entry)[key]
+        return found
 
     def frequency_response(self, omega: Any = None, *, model: str = RECOMMENDED) -> FrequencyResponse:
         """Return the response of a model with its confidence region where one is known.
@@ -307,7 +321,7 @@ class Run:
     def measured_response(self) -> FrequencyResponse | None:
         """The response that rests on no model, where an excitation is known and the record is longer than its window.
 
-        The window, in samples, is ``frequency_response={"window": ...}`` of `identify`.
+        The window, in samples, is ``frequency_response={"window": ...}`` of `identify`; unless stated it fits the record.
         """
         found = self._native.measured_response()
         if found is None:
@@ -409,6 +423,15 @@ class Run:
         from ._html import page
 
         return page(self)
+
+
+def _interval(entry: dict[str, Any], key: str) -> tuple[float, float] | None:
+    bounds = entry.get(f"{key}_interval")
+    return None if bounds is None or None in bounds else (bounds[0], bounds[1])
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
 
 
 #: Files with the times of the stages, or drawn from other files.

@@ -2,10 +2,10 @@
 
 use crate::stages::responses::ports;
 use crate::stages::uncertainty::SystemUncertainty;
-use crate::summary::entries::ModeEntry;
+use crate::summary::entries::{ModeEntry, RealPoleEntry, apart};
 use serde::Serialize;
 
-/// Per output and input the response, the bounds of its magnitude and the covariance of its parts; then the modes.
+/// Per output and input the response, the bounds of its magnitude and the covariance of its parts; then modes and real poles.
 #[derive(Serialize)]
 pub(super) struct UncertaintyFile<'a> {
     level: f64,
@@ -13,6 +13,7 @@ pub(super) struct UncertaintyFile<'a> {
     ellipse: f64,
     entries: Vec<ResponseEntry>,
     modes: Vec<ModeEntry>,
+    real_poles: Vec<RealPoleEntry>,
 }
 
 #[derive(Serialize)]
@@ -40,12 +41,14 @@ impl<'a> UncertaintyFile<'a> {
                 covariance: places().map(|k| known.response.covariance[k]).collect(),
             }
         };
+        let (modes, real_poles) = apart(known.modes.iter().map(|band| (band.mode.pole, ModeEntry::from(band))));
         UncertaintyFile {
             level: known.level,
             hz,
             ellipse: known.response.ellipse,
             entries: ports(first.nrows(), first.ncols()).map(entry).collect(),
-            modes: known.modes.iter().map(ModeEntry::from).collect(),
+            modes,
+            real_poles,
         }
     }
 }

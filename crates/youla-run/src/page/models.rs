@@ -1,6 +1,6 @@
 //! Models on a page, a run's own or those of a comparison, from their entries; `key` names the method of the page.
 
-use crate::summary::entries::ModeEntry;
+use crate::summary::entries::{ModeEntry, RealPoleEntry};
 use crate::summary::model::ModelEntry;
 use youla_report::data as draw;
 
@@ -16,13 +16,20 @@ pub(crate) fn fits(key: &str, model: &ModelEntry) -> Vec<draw::Fit> {
     by_output.map(fit).collect()
 }
 
-/// The modes that the response of the model shows.
+/// The modes that the response of the model shows, and its real poles: without a damping ratio, but 0 for an integrator, -1 for a growth.
 pub(crate) fn modes(key: &str, model: &ModelEntry) -> Vec<draw::Mode> {
     let mode = |m: &ModeEntry| {
         let deviation = m.hz_deviation.zip(m.zeta_deviation).map(|(hz, zeta)| [hz, zeta]);
         Some(draw::Mode { method: key.to_owned(), hz: m.hz?, zeta: m.zeta?, deviation, residue: m.residue.clone() })
     };
-    model.modes.iter().filter_map(mode).collect()
+    let real = |p: &RealPoleEntry| {
+        let zeta = -(p.z - 1.0).partial_cmp(&0.0).map_or(0.0, |sign| f64::from(sign as i8));
+        let deviation = p.hz_deviation.map(|hz| [hz, 0.0]);
+        Some(draw::Mode { method: key.to_owned(), hz: p.hz?, zeta, deviation, residue: p.residue.clone() })
+    };
+    let mut all: Vec<_> = model.modes.iter().filter_map(mode).chain(model.real_poles.iter().filter_map(real)).collect();
+    all.sort_by(|a, b| a.hz.total_cmp(&b.hz));
+    all
 }
 
 /// Poles and zeros in z.

@@ -34,7 +34,7 @@ pub(crate) fn finite_all(values: &[f64]) -> Vec<Option<f64>> {
 /// Fit (26) in percent, per verification record and output.
 pub type Fits = BTreeMap<String, Vec<Option<f64>>>;
 
-/// A mode; deviations and intervals where they are known.
+/// An oscillating mode, a pair of poles; deviations and intervals where they are known.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModeEntry {
     /// Natural frequency, Hz.
@@ -83,6 +83,38 @@ impl From<&ModeBand> for ModeEntry {
             ..ModeEntry::from(&band.mode)
         }
     }
+}
+
+/// A real pole: a time constant, an integrator or, beyond 1, a growth; deviation and interval where they are known.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+pub struct RealPoleEntry {
+    /// The pole in z.
+    pub z: f64,
+    /// Corner frequency `|ln z| / (2 pi ts)`, Hz.
+    pub hz: Option<f64>,
+    /// Standard deviation of the frequency, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hz_deviation: Option<f64>,
+    /// Interval of the frequency, Hz.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hz_interval: Option<[Option<f64>; 2]>,
+    /// Residue, as of a mode.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub residue: Vec<[f64; 2]>,
+}
+
+/// Oscillating modes, and real poles apart from them: these have no damping ratio.
+pub(crate) fn apart(all: impl Iterator<Item = (c64, ModeEntry)>) -> (Vec<ModeEntry>, Vec<RealPoleEntry>) {
+    let (mut modes, mut real) = (Vec::new(), Vec::new());
+    for (pole, mode) in all {
+        if pole.im != 0.0 {
+            modes.push(mode);
+            continue;
+        }
+        let ModeEntry { hz, hz_deviation, hz_interval, residue, .. } = mode;
+        real.push(RealPoleEntry { z: pole.re, hz, hz_deviation, hz_interval, residue });
+    }
+    (modes, real)
 }
 
 /// A figure with its interval.

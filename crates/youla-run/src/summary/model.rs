@@ -1,6 +1,6 @@
 //! One model of a run: the description that summary.json, `7-validate/verdict.json`, the page and the comparison of runs read.
 
-use super::entries::{Fits, ModeEntry, finite, finite_all, pairs};
+use super::entries::{Fits, ModeEntry, RealPoleEntry, apart, finite, finite_all, pairs};
 use super::physical::PhysicalEntry;
 use super::robustness::robustness;
 use crate::Result;
@@ -8,7 +8,7 @@ use crate::method::Method;
 use crate::result::Identification;
 use crate::stages::validate::residuals::{RecordResiduals, ResidualPredictor, step_keys};
 use crate::stages::validate::{ModelValidation, RecordValidation};
-use crate::summary::recommended::shown_modes;
+use crate::summary::recommended::shown;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -19,7 +19,7 @@ use youla_report::data::Robustness;
 /// A model, given or identified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct ModelEntry {
-    /// Number of states.
+    /// Number of states, of the recommended model without those of the dead time.
     pub order: usize,
     /// Whether the controller that ran stabilises this model.
     pub stabilised_by_controller: bool,
@@ -30,9 +30,11 @@ pub struct ModelEntry {
     /// Why a verification record has no prediction.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub diverged: BTreeMap<String, String>,
-    /// Modes that the response shows.
+    /// Oscillating modes that the response shows.
     pub modes: Vec<ModeEntry>,
-    /// Modes left out because zeros of the model cancel them.
+    /// Real poles that the response shows.
+    pub real_poles: Vec<RealPoleEntry>,
+    /// Modes and real poles left out because zeros of the model cancel them.
     pub modes_cancelled: usize,
     /// Modes left out because they lie at or above the Nyquist frequency.
     pub modes_above_nyquist: usize,
@@ -64,13 +66,16 @@ impl ModelEntry {
         };
         let diverged = |r: &RecordValidation| Some((r.record.clone(), r.predicted.as_ref().err()?.clone()));
         let residuals = v.records.iter().filter_map(|r| Some((r.record.clone(), r.residuals.as_ref()?.into())));
+        let (modes, real_poles) = modes(run, v);
+        let recommended = run.recommended.as_ref().ok().filter(|_| v.method == Method::Likelihood);
         Ok(ModelEntry {
-            order: v.model.order(),
+            order: recommended.map_or_else(|| v.model.order(), |found| found.order),
             stabilised_by_controller: v.certificate.stable,
             fit: by_record(&|r| r.fit.clone()),
             vaf: by_record(&|r| r.vaf.clone()),
             diverged: v.records.iter().filter_map(diverged).collect(),
-            modes: modes(run, v),
+            modes,
+            real_poles,
             modes_cancelled: v.visible.as_ref().map_or(0, |shown| shown.cancelled),
             modes_above_nyquist: v.visible.as_ref().map_or(0, |shown| shown.above_nyquist),
             poles: pairs(&v.poles),
@@ -95,18 +100,18 @@ impl ModelEntry {
     }
 }
 
-/// The modes that the response shows, with deviations where they are known. A pole at z = 0 is a sample of delay, and no mode.
-fn modes(run: &Identification, v: &ModelValidation) -> Vec<ModeEntry> {
+/// The modes and real poles that the response shows, with deviations where they are known. A pole at z = 0 is a sample of delay, and no mode.
+fn modes(run: &Identification, v: &ModelValidation) -> (Vec<ModeEntry>, Vec<RealPoleEntry>) {
     if let (Method::Likelihood, Ok(found)) = (v.method, &run.recommended) {
-        return shown_modes(found);
+        return shown(found);
     }
     let known = run.uncertainty(v.method).map_or(&[][..], |known| &known.modes);
     let entry = |(k, mode): (usize, &Mode)| {
         let residue = pairs(v.visible_residue(mode.pole)?);
         let entry = known.get(k).map_or_else(|| ModeEntry::from(mode), ModeEntry::from);
-        Some(ModeEntry { residue, ..entry })
+        Some((mode.pole, ModeEntry { residue, ..entry }))
     };
-    v.modes.iter().enumerate().filter(|(_, m)| m.hz.is_finite()).filter_map(entry).collect()
+    apart(v.modes.iter().enumerate().filter(|(_, m)| m.hz.is_finite()).filter_map(entry))
 }
 
 /// The residual of a model on a record.

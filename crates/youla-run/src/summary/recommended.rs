@@ -2,7 +2,7 @@
 
 use crate::method::Method;
 use crate::stages::validate::residue_at;
-use crate::summary::entries::{ModeEntry, finite, pairs};
+use crate::summary::entries::{ModeEntry, RealPoleEntry, apart, finite, pairs};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use youla::identify::likelihood::{Evidence, ModeEstimate, Outcome, Predictor, Recommendation, RegionParts};
@@ -35,8 +35,10 @@ pub struct RecommendedEntry {
     pub order: usize,
     /// Dead time of each input, samples.
     pub dead_time: Vec<usize>,
-    /// Modes with 95 % intervals.
+    /// Oscillating modes with 95 % intervals.
     pub modes: Vec<ModeEntry>,
+    /// Real poles with 95 % intervals.
+    pub real_poles: Vec<RealPoleEntry>,
     /// Standard deviations of the frequency response.
     pub response_deviation: DeviationEntry,
     /// Bands in Hz in which the standard deviation of every entry is at most a tenth of it.
@@ -153,6 +155,7 @@ impl From<&Evidence> for EvidenceFigure {
 impl From<&Recommendation> for RecommendedEntry {
     fn from(found: &Recommendation) -> Self {
         let deviation = &found.region;
+        let (modes, real_poles) = shown(found);
         RecommendedEntry {
             method: Method::Likelihood.key().into(),
             trusted: found.trusted(),
@@ -161,7 +164,8 @@ impl From<&Recommendation> for RecommendedEntry {
             file: FILE.into(),
             order: found.order,
             dead_time: found.dead_time.clone(),
-            modes: shown_modes(found),
+            modes,
+            real_poles,
             response_deviation: DeviationEntry {
                 hz: deviation.hz.clone(),
                 absolute: deviation.absolute.iter().map(|at| rows(at.as_ref())).collect(),
@@ -177,8 +181,13 @@ impl From<&Recommendation> for RecommendedEntry {
     }
 }
 
-/// The modes that the response shows, with 95 % intervals.
+/// The oscillating modes that the response shows, with 95 % intervals.
 pub fn shown_modes(found: &Recommendation) -> Vec<ModeEntry> {
+    shown(found).0
+}
+
+/// The modes and real poles that the response shows, with 95 % intervals.
+pub(crate) fn shown(found: &Recommendation) -> (Vec<ModeEntry>, Vec<RealPoleEntry>) {
     let visible = found.plant.visible_modes().ok();
     let mode = |m: &ModeEstimate| {
         let residue = match &visible {
@@ -187,16 +196,17 @@ pub fn shown_modes(found: &Recommendation) -> Vec<ModeEntry> {
         };
         let interval =
             |value: f64, deviation: f64| Some([value - LEVEL.1 * deviation, value + LEVEL.1 * deviation].map(finite));
-        Some(ModeEntry {
+        let entry = ModeEntry {
             hz_deviation: finite(m.hz_deviation),
             zeta_deviation: finite(m.zeta_deviation),
             hz_interval: interval(m.mode.hz, m.hz_deviation),
             zeta_interval: interval(m.mode.zeta, m.zeta_deviation),
             residue,
             ..ModeEntry::from(&m.mode)
-        })
+        };
+        Some((m.mode.pole, entry))
     };
-    found.modes.iter().filter_map(mode).collect()
+    apart(found.modes.iter().filter_map(mode))
 }
 
 fn rows(m: MatRef<'_, f64>) -> Vec<Vec<Option<f64>>> {
@@ -213,6 +223,7 @@ pub(crate) struct RecommendedDetails<'a> {
     continuous: Option<SystemMatrices>,
     predictor: PredictorEntry,
     modes: Vec<ModeEntry>,
+    real_poles: Vec<RealPoleEntry>,
     candidates: &'a [youla::identify::likelihood::Candidate],
     evidence: Vec<EvidenceFigure>,
 }
@@ -245,12 +256,14 @@ impl From<&Predictor> for PredictorEntry {
 
 impl<'a> RecommendedDetails<'a> {
     pub(crate) fn new(found: &'a Recommendation) -> Self {
+        let (modes, real_poles) = shown(found);
         RecommendedDetails {
             order: found.order,
             dead_time: &found.dead_time,
             continuous: continuous(found).map(|system| SystemMatrices::new(&system)),
             predictor: PredictorEntry::from(&found.predictor),
-            modes: shown_modes(found),
+            modes,
+            real_poles,
             candidates: &found.candidates,
             evidence: found.evidence.iter().map(EvidenceFigure::from).collect(),
         }

@@ -1,4 +1,4 @@
-"""Licence texts for the wheel: ``python crates/youla-py/licences.py`` before ``maturin build``.
+"""Licence texts for the wheel: the build backend (backend.py) writes them; before ``maturin build``, which calls no backend, run this file.
 
 Writes the licences of this project and THIRD-PARTY.txt, with those of every crate that the extension module uses and of what
 is embedded in it, into ``crates/youla-py/licenses``, from which maturin takes them (`license-files` in pyproject.toml).

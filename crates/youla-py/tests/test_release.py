@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import runpy
 import shutil
 import subprocess
 import sys
+import types
 
 import pytest
 from conftest import ROOT
@@ -28,6 +30,27 @@ def test_every_crate_that_is_used_is_named_with_a_licence() -> None:
     named = [p for p in packages if f"\n{p['name']} {p['version']} (" in text]
     assert 100 < len(named) < len(packages)
     assert len(text.encode()) < 1_000_000, "a wheel has at most 15 MB"
+
+
+def test_the_build_backend_writes_the_licences_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    """`pip install` of the source: each hook that makes metadata or a wheel finds the texts."""
+    hooks = ["build_wheel", "build_sdist", "build_editable", "prepare_metadata_for_build_wheel", "prepare_metadata_for_build_editable"]
+    calls: list[str] = []
+    maturin = types.ModuleType("maturin")
+    for name in hooks:
+        setattr(maturin, name, lambda *_, name=name: calls.append(name))
+    for kind in ("editable", "sdist", "wheel"):
+        setattr(maturin, f"get_requires_for_build_{kind}", list)
+    monkeypatch.setitem(sys.modules, "maturin", maturin)
+    licences = types.ModuleType("licences")
+    licences.main = lambda: calls.append("licences")  # type: ignore[attr-defined]
+    monkeypatch.setitem(sys.modules, "licences", licences)
+    backend = runpy.run_path(str(CRATE / "backend.py"))
+    for name in hooks:
+        backend[name]("folder")
+    assert calls == [call for name in hooks for call in ("licences", name)]
+    settings = (CRATE / "pyproject.toml").read_text()
+    assert 'build-backend = "backend"' in settings and 'path = "backend.py", format = "sdist"' in settings
 
 
 def test_binstall_takes_what_cargo_dist_makes() -> None:

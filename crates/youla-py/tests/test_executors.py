@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -128,13 +128,41 @@ def test_a_task_whose_row_is_kept_is_not_computed_again_by_its_worker(tmp_path: 
     """An engine that hands out a finished task once more, as Dask does with those of a worker that died."""
     computed = []
 
-    def task(payload: None, item: int, index: int) -> dict[str, int]:
+    def task(payload: None, item: int, index: int) -> dict[str, object]:
         computed.append(index)
-        return {"square": item**2}
+        return {"square": item**2, "modes": []}
 
     again = [_tasks.call(task, None, 3, 7, str(tmp_path)) for _ in range(2)]
-    assert again == [{"index": 7, "square": 9}] * 2
+    assert again == [{"index": 7, "square": 9, "modes": []}] * 2
     assert computed == [7]
+
+
+class Garbage(Executor):
+    """Answers each task with the same row."""
+
+    def __init__(self, row: object) -> None:
+        self.row = row
+
+    def submit(self, *_: object, **__: object) -> Future:
+        future: Future = Future()
+        future.set_result(self.row)
+        return future
+
+
+@pytest.mark.parametrize("row", [None, 5, "row", {}, {"index": 1, "modes": []}, {"index": 0, "other": 1}, {"index": 0, "modes": [], "x": object()}])
+def test_a_row_that_is_none_names_executor_and_row(row: object, of_small: youla.Run, tmp_path: Path) -> None:
+    with pytest.raises(youla.InputError, match="Garbage gave as row 0 .*must be a row of the task"):
+        youla.bootstrap(of_small, 1, seed=1, executor=Garbage(row))
+
+
+def test_a_row_in_the_folder_that_is_none_names_its_file(of_small: youla.Run, tmp_path: Path) -> None:
+    youla.bootstrap(of_small, 1, seed=1, folder=tmp_path)
+    file = tmp_path / "000000.json"
+    kept = json.loads(file.read_text())
+    for content in (5, {}, {**kept, "row": {"index": 1}}, {**kept, "row": None}):
+        file.write_text(json.dumps(content))
+        with pytest.raises(youla.InputError, match="000000.json"):
+            youla.bootstrap(of_small, 1, seed=1, folder=tmp_path)
 
 
 def test_a_killed_client_loses_nothing_that_was_finished(
@@ -167,15 +195,17 @@ def test_replicates_scatter_as_the_interval_says(of_small: youla.Run) -> None:
     with ThreadPoolExecutor(2) as executor:
         found = youla.bootstrap(of_small, 60, seed=3, executor=executor)
     assert not found.failed
-    (mode,) = of_small.modes()
-    assert mode.hz_interval is not None
-    deviation = (mode.hz_interval[1] - mode.hz_interval[0]) / 3.92
-    assert 1 / 1.5 < found.modes()[:, 0, 0].std() / deviation < 1.5
-    low, high = found.intervals()[0, 0]
-    assert low < mode.hz < high
+    (pole,) = of_small.real_poles()
+    assert pole.hz_interval is not None
+    deviation = (pole.hz_interval[1] - pole.hz_interval[0]) / 3.92
+    hz = -np.log(found.real_poles()[:, 0]) / (2 * np.pi * 0.01)
+    assert 1 / 1.5 < hz.std() / deviation < 1.5
+    low, high = np.quantile(hz, [0.025, 0.975])
+    assert low < pole.hz < high
+    assert found.modes().shape == (60, 0, 2)  # a real pole has no damping ratio
     frame = found.to_frame()
     assert list(frame["index"]) == list(range(60))
-    assert "hz_1" in frame
+    assert "pole_1" in frame
     assert len(found.models()) == 60
 
 

@@ -73,6 +73,16 @@ CASES = {
     "no seed of a study": (lambda run: youla.study(run, 2.0, [SHORT], feedback="negative"), "seed is missing; give"),
     "key of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "shap": 1}], feedback="negative", seed=1), r"conditions\[0\] has no argument 'shap'; did you mean 'shape'"),
     "value of a condition": (lambda run: youla.study(run, 2.0, [{**SHORT, "band": [1, 80]}], feedback="negative", seed=1), r"conditions\[0\]: .*half the sample rate"),
+    "no end of samples": (lambda run: youla.Record(np.broadcast_to(0.0, (10**11, 2)), inputs=0, outputs=1, dt=1.0), "data has 200000000000 numbers, but may have at most 125000000"),
+    "no end of a column": (lambda run: youla.Record({"u": range(10**30), "y": [1.0]}, inputs="u", outputs="y", dt=1.0), "channel 'u' has .* at most 125000000"),
+    "no end of replicates": (lambda run: youla.bootstrap(run, 10**12, seed=1), "n is 1000000000000, but must be at most 1000000"),
+    "no end of a grid": (lambda run: youla.scan(log(), {f"hansen.{key}": range(1, 1100) for key in ("order", "horizon")}, **KNOWN), "grid has more than 1000000 combinations"),
+    "no end of records": (lambda run: youla.identify_many(range(10**30), **KNOWN), "there are more than 1000000 tasks"),
+    "one column for two roles": (lambda run: youla.Record(TABLE, inputs=0, outputs=1, excitation=1, dt=0.01), "excitation names 'd', which is an input or output already"),
+    "samples twice": (lambda run: (lambda r: youla.identify([r[:300], r[200:]], **KNOWN))(log()), r"share samples 200 to 299 of the first, counted from 0, which would count twice.*record\.split"),
+    "samples that verify": (lambda run: (lambda r: youla.identify(r, verify=r[100:200], **KNOWN))(log()), "share samples 100 to 199 of the first.*which would verify nothing"),
+    "a copy that verifies": (lambda run: youla.identify(log(), verify=log(TABLE.copy()), **KNOWN), "share all samples"),
+    "time in ms": (lambda run: youla.Record({"t_ms": [0, 1, 2], "u": [1, 2, 3], "y": [1, 3, 2]}, inputs="u", outputs="y", time="t_ms"), r"time 't_ms' is in milliseconds by its name.*data\['t_ms'\] / 1e3.*dt="),
     "key of excite": (lambda run: youla.excite(run.recommended, 2.0, feedback="negative", **SHORT, shap=1), "excite has no argument 'shap'"),
 }
 

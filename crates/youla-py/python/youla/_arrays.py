@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import sys
+from collections.abc import Sized
 from decimal import Decimal
 from numbers import Real
 from typing import Any
@@ -13,6 +15,9 @@ from ._checks import kind
 from ._errors import InputError
 
 Array = npt.NDArray[np.float64]
+
+#: Most numbers of one array: 1 GB as float64, as of the files of logs. `numpy.broadcast_to` shows more than any memory holds.
+MOST_NUMBERS = 125_000_000
 
 #: Kinds of arrays that hold no real numbers, and what to do.
 _KINDS = {
@@ -48,6 +53,7 @@ def as_floats(values: Any, what: str) -> Array:
     """
     if isinstance(values, np.ma.MaskedArray) and np.ma.is_masked(values):
         raise InputError(f"{what} has masked values; fill or cut them out first, for example with .compressed()")
+    limited(values, what)
     try:
         array = np.asarray(values)
     except ValueError as error:
@@ -61,6 +67,17 @@ def as_floats(values: Any, what: str) -> Array:
         raise InputError(f"{what} holds {found}, but must hold real numbers; {remedy}")
     floats: Array = np.asarray(array, dtype=np.float64)
     return floats
+
+
+def limited(values: Any, what: str) -> None:
+    """Refuse more numbers than are read, before any of them is copied."""
+    size = getattr(values, "size", None)
+    try:
+        count = size if isinstance(size, int) else len(values) if isinstance(values, Sized) else 0
+    except OverflowError:  # range(10**30)
+        count = sys.maxsize
+    if count > MOST_NUMBERS:
+        raise InputError(f"{what} has {count} numbers, but may have at most {MOST_NUMBERS} (1 GB); give fewer rows or columns, or resample")
 
 
 def as_matrix(values: Any, what: str) -> Array:
@@ -90,10 +107,10 @@ def seeded(value: Any) -> int:
     return whole(value, "seed", 0)
 
 
-def whole(value: Any, what: str, least: int) -> int:
-    """Return a whole number from `least` to 2^64 - 1."""
+def whole(value: Any, what: str, least: int, most: int = 2**64 - 1) -> int:
+    """Return a whole number from `least` to `most`."""
     if isinstance(value, bool) or not isinstance(value, (int, np.integer)) or value < least:
         raise InputError(f"{what} is {value!r}, but must be a whole number of at least {least}")
-    if value >= 2**64:
-        raise InputError(f"{what} is {value}, but must be below 2^64")
+    if value > most:
+        raise InputError(f"{what} is {value}, but must be {'below 2^64' if most >= 2**64 - 1 else f'at most {most}'}")
     return int(value)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from . import _native
-from ._arrays import Array, as_floats, positive, whole
+from ._arrays import MOST_NUMBERS, Array, as_floats, positive, whole
 from ._checks import known, listed, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
@@ -148,7 +148,7 @@ def simulate_loop(
     p, m = g.d.shape
     given = {"excitation": (excitation, m), "reference": (reference, p), "noise": (noise, p)}
     signals = {key: _signal(x, key, n) for key, (x, n) in given.items() if x is not None}
-    lengths = {key: len(x) for key, x in signals.items()} | ({} if samples is None else {"samples": whole(samples, "samples", 1)})
+    lengths = {key: len(x) for key, x in signals.items()} | ({} if samples is None else {"samples": whole(samples, "samples", 1, MOST_NUMBERS)})
     if len(set(lengths.values())) != 1:
         raise InputError(f"the length of the simulation is {lengths or 'not given'}; give signals of one length, or samples=")
     count = next(iter(lengths.values()))
@@ -343,7 +343,7 @@ def excite(
         "nominal": nominal_table(nominal, dt, (p, m)),
         "controller": controller_table(controller, feedback, hold, dt, (m, p)),
     }
-    length: dict[str, float] = {"samples": whole(samples, "samples", 2)} if seconds is None else {"seconds": positive(seconds, "seconds")}
+    length: dict[str, float] = {"samples": whole(samples, "samples", 2, MOST_NUMBERS)} if seconds is None else {"seconds": positive(seconds, "seconds")}
     amplitudes = np.ravel(as_floats(amplitude, "amplitude")).tolist()
     chosen = {"amplitude": amplitudes, "band": edges.tolist(), "length": length, **options}
     for key in ("limit_input", "limit_output", "noise"):

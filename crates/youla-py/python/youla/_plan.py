@@ -21,7 +21,7 @@ from ._record import Record
 from ._result import Run
 from ._study import Folder, _prepared
 from ._systems import as_model, sign_of
-from ._tasks import Progress, Row, Rows, key_of, run_tasks
+from ._tasks import MOST_TASKS, Progress, Row, Rows, key_of, run_tasks
 
 #: Quantile of the normal distribution for 95 %.
 _Z95 = 1.959963984540054
@@ -237,7 +237,7 @@ def study(
     >>> found.cheapest(0.5)["seconds"]
     10
     """
-    n, seed = whole(n, "n", 1), seeded(seed)
+    n, seed = whole(n, "n", 1, MOST_TASKS), seeded(seed)
     twin, spread = _twin(plant, noise)
     of_plant = Model(*twin[0][:4], dt=twin[0][4])
     if isinstance(plant, Run) and isinstance(controller, str) and controller == "own":
@@ -261,6 +261,8 @@ def study(
         "modes": modes,
         "seed": seed,
     }
+    if len(chosen) * n > MOST_TASKS:
+        raise InputError(f"n is {n}, but {len(chosen)} conditions may have at most {MOST_TASKS // len(chosen)} runs each; give a smaller n")
     items = [(c, r) for c in range(len(chosen)) for r in range(n)]
     rows = run_tasks(_trial, payload, items, key=key_of(payload), executor=executor, folder=folder, progress=progress)
     return Study(rows.rows, rows.computed, tuple(chosen), tuple(modes), certificate.peak_sensitivity)
@@ -285,7 +287,7 @@ def _twin(plant: Any, noise: Any) -> tuple[tuple[System, System], Array]:
     sizes = np.ravel(as_floats(noise, "noise"))
     if sizes.size not in (1, p) or np.any(sizes < 0):
         raise InputError(f"noise must be one standard deviation, or {p} of them, not below zero")
-    wide = (g.a, np.hstack([g.b, np.zeros((g.order, p))]), g.c, np.hstack([g.d, np.eye(p)]), g.dt)
+    wide = (g.a, np.hstack([g.b, np.zeros((g.a.shape[0], p))]), g.c, np.hstack([g.d, np.eye(p)]), g.dt)
     return ((g.a, g.b, g.c, g.d, g.dt), wide), np.diag(np.broadcast_to(sizes, (p,)).astype(np.float64))
 
 
@@ -306,7 +308,7 @@ def _condition(given: Any, index: int, plant: Model, k: Model, feedback: str, se
 
 
 def _oscillating(plant: Model) -> list[tuple[float, float]]:
-    return sorted((m.hz, m.zeta) for m in plant.modes() if abs(m.zeta) < 1)
+    return sorted((m.hz, m.zeta) for m in plant.modes())
 
 
 def _trial(payload: Mapping[str, Any], item: tuple[int, int], index: int) -> Row:
@@ -325,7 +327,7 @@ def _identified(payload: Mapping[str, Any], condition: int, replicate: int) -> R
     d = excite(plant, k, feedback=payload["feedback"], **chosen).signal
     draws = np.random.default_rng([payload["seed"], condition, replicate])
     e = draws.standard_normal((len(d), p)) @ payload["spread"].T
-    of_all = Model(k.a, k.b, np.vstack([k.c, np.zeros((p, k.order))]), np.vstack([k.d, np.zeros((p, p))]), dt=k.dt)
+    of_all = Model(k.a, k.b, np.vstack([k.c, np.zeros((p, k.a.shape[0]))]), np.vstack([k.d, np.zeros((p, p))]), dt=k.dt)
     u, y = simulate_loop(wide, of_all, excitation=np.hstack([d, e]), feedback=payload["feedback"])
     columns = np.arange(m + p + m)
     inputs, outputs, excited = (columns[i].tolist() for i in (slice(m), slice(m, m + p), slice(m + p, None)))
@@ -338,6 +340,7 @@ def _identified(payload: Mapping[str, Any], condition: int, replicate: int) -> R
         "trusted": found["trusted"],
         "order": found["order"],
         "modes": [[mode["hz"], mode["zeta"]] for mode in found["modes"]],
+        "real_poles": [p["z"] for p in found["real_poles"]],
         "matched": [_nearest(found["modes"], hz) for hz, _ in payload["modes"]],
         "response_error": _response_error(run.recommended, plant, chosen["band"]),
         "peak": certify(run.recommended, k, feedback=payload["feedback"]).peak_sensitivity,
@@ -346,7 +349,7 @@ def _identified(payload: Mapping[str, Any], condition: int, replicate: int) -> R
 
 def _nearest(modes: Sequence[Mapping[str, Any]], hz: float) -> dict[str, Any] | None:
     """The oscillating mode nearest to a frequency, if one is near."""
-    near = [m for m in modes if m["zeta"] is not None and abs(m["zeta"]) < 1 and abs(m["hz"] / hz - 1) <= _FARTHEST]
+    near = [m for m in modes if m["zeta"] is not None and abs(m["hz"] / hz - 1) <= _FARTHEST]
     best = min(near, key=lambda m: abs(m["hz"] - hz), default=None)
     return None if best is None else {"hz": best["hz"], "zeta": best["zeta"], "zeta_stated": best["zeta_deviation"]}
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ._arrays import Array, as_floats, positive
+from ._arrays import Array, as_floats, limited, positive
 from ._checks import kind, text
 from ._errors import InputError
 from ._model import Complex, FrequencyResponse, _names
@@ -158,6 +158,7 @@ def _of_plant(data: Any, sd: Any, coherence: Any, dt: float | None) -> tuple[Any
 
 def _values(given: Any, what: str, count: int) -> tuple[Complex, Array | None]:
     """A response, (n, rows, columns), and its variance where there are repetitions."""
+    limited(given, what)
     try:
         array = np.asarray(given, dtype=np.complex128)
     except (TypeError, ValueError):

@@ -9,6 +9,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 from inspect import signature
 from itertools import product
+from math import prod
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,7 @@ from ._model import Model
 from ._record import Record
 from ._result import Run
 from ._systems import check_hold, sign_of
-from ._tasks import Progress, Row, Rows, key_of, run_tasks
+from ._tasks import MOST_TASKS, Progress, Row, Rows, key_of, run_tasks
 from ._types import Log
 
 Payload = dict[str, Any]
@@ -54,10 +55,14 @@ class Bootstrap(Rows):
         return [Model(*(r["model"][x] for x in "abcd"), dt=r["ts"]) for r in self.succeeded]
 
     def modes(self) -> Array:
-        """Return frequency in Hz and damping ratio, replicates x modes x 2, of replicates with the usual number of modes."""
-        found = [r["modes"] for r in self.succeeded]
-        usual = max({len(m) for m in found}, key=[len(m) for m in found].count) if found else 0
-        return np.array([m for m in found if len(m) == usual], dtype=np.float64).reshape(-1, usual, 2)
+        """Return frequency in Hz and damping ratio of the oscillating modes, replicates x modes x 2, of replicates with their usual number."""
+        found = _usual([r["modes"] for r in self.succeeded])
+        return np.array(found, dtype=np.float64).reshape(len(found), -1, 2) if found and found[0] else np.empty((len(found), 0, 2))
+
+    def real_poles(self) -> Array:
+        """Return the real poles in z, replicates x poles, of replicates with their usual number."""
+        found = _usual([r["real_poles"] for r in self.succeeded])
+        return np.array(found, dtype=np.float64).reshape(len(found), -1) if found and found[0] else np.empty((len(found), 0))
 
     def intervals(self, level: float = 0.95) -> Array:
         """Compute percentile intervals.
@@ -85,6 +90,12 @@ class Bootstrap(Rows):
         return bounds
 
 
+def _usual(found: list[list[Any]]) -> list[list[Any]]:
+    """The lists of the length that most of them have."""
+    usual = max({len(m) for m in found}, key=[len(m) for m in found].count) if found else 0
+    return [m for m in found if len(m) == usual]
+
+
 def bootstrap(
     run: Run,
     n: int,
@@ -104,7 +115,7 @@ def bootstrap(
     run : Run
         A run of records: of `identify`, of a run.toml, of `demo` or of `load`.
     n : int
-        Number of replicates.
+        Number of replicates, at most 1 000 000.
     seed : int
         Seed of the noise; the same seed gives the same bits on every executor.
     executor : concurrent.futures.Executor, optional
@@ -139,10 +150,10 @@ def bootstrap(
     >>> from concurrent.futures import ThreadPoolExecutor
     >>> with ThreadPoolExecutor(2) as executor:
     ...     found = youla.bootstrap(youla.identify(log, **known), 8, seed=1, executor=executor)
-    >>> found.modes().shape, len(found.failed)
-    ((8, 1, 2), 0)
+    >>> found.real_poles().shape, len(found.failed)
+    ((8, 1), 0)
     """
-    n, seed = whole(n, "n", 1), seeded(seed)
+    n, seed = whole(n, "n", 1, MOST_TASKS), seeded(seed)
     if not isinstance(run, Run):
         raise InputError(f"run is {kind(run)}, but must be a youla.Run, as youla.identify, youla.demo and youla.load return it")
     made_from, records, count = again(run._kept)
@@ -225,6 +236,8 @@ def scan(
         settings = json.dumps(of_run)
     else:
         settings, logs = _prepared(record, arguments.pop("verify", None), arguments)
+    if prod(len(values) for values in grid.values()) > MOST_TASKS:
+        raise InputError(f"grid has more than {MOST_TASKS} combinations, the most of one call; give fewer values")
     points = [dict(zip(grid, values, strict=True)) for values in product(*(list(v) for v in grid.values()))]
     for point in points:
         _check_point(_with(settings, point), point)
@@ -340,6 +353,7 @@ def _row(run: Run) -> Row:
         "dead_time": found["dead_time"],
         "least_fit": min(fits, default=None),
         "modes": [[m["hz"], m["zeta"]] for m in found["modes"]],
+        "real_poles": [p["z"] for p in found["real_poles"]],
         "ts": model.dt,
         "model": {key: getattr(model, key).tolist() for key in "abcd"},
     }

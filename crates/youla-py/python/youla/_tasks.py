@@ -79,6 +79,9 @@ class _Clock:
             print(f"\r{done}  ", end=end, file=sys.stderr, flush=True)
 
 
+#: Most tasks of one call: their files in a folder have six digits.
+MOST_TASKS = 1_000_000
+
 #: Tasks that are handed to an executor at a time: memory does not grow with the number of tasks.
 _WINDOW = 256
 
@@ -123,7 +126,7 @@ class Rows:
     def to_parquet(self, folder: str | os.PathLike[str], *, replace: bool = False) -> str:
         """Write a Parquet data set with a row for each task.
 
-        The columns ``hz`` and ``zeta`` hold the modes as lists, ``a``, ``b``, ``c`` and ``d`` the matrices of the model, and
+        The columns ``hz`` and ``zeta`` hold the oscillating modes as lists, ``real_poles`` the real poles in z, ``a``, ``b``, ``c`` and ``d`` the matrices of the model, and
         ``error`` the reason of a task that failed. Folders of several calls read as one data set.
 
         Parameters
@@ -162,8 +165,9 @@ class Rows:
 
 
 def flat(row: Row) -> Row:
-    """A row with the modes as columns, and without matrices."""
-    found = {key: value for key, value in row.items() if key not in ("modes", "model")}
+    """A row with modes and real poles as columns, and without matrices."""
+    found = {key: value for key, value in row.items() if key not in ("modes", "real_poles", "model")}
+    found |= {f"pole_{k + 1}": pole for k, pole in enumerate(row.get("real_poles", []))}
     for k, mode in enumerate(row.get("modes", [])):
         found |= {f"hz_{k + 1}": mode[0], f"zeta_{k + 1}": mode[1]}
     return found
@@ -187,9 +191,9 @@ def run_tasks(
     if single or not isinstance(items, Iterable):
         raise InputError(f"records is {kind(items)}, but must be a list of them or of paths")
     kept = None if folder is None else _prepared(folder, key)
-    clock = _Clock(progress, len(items) if isinstance(items, Sized) else None)
+    clock = _Clock(progress, _size(items))
     rows: dict[int, Row] = {}
-    missing = ((k, item) for k, item in enumerate(items) if not _known(kept, k, item, rows))
+    missing = ((k, item) for k, item in _counted(items) if not _known(kept, k, item, rows))
     if executor is None:
         computed = 0
         for k, item in missing:
@@ -199,6 +203,22 @@ def run_tasks(
     else:
         computed = _submit(executor, task, payload, missing, kept, rows, clock)
     return Rows(tuple(rows[k] for k in sorted(rows)), computed)
+
+
+def _size(items: Iterable[Any]) -> int | None:
+    """How many items there are, where that is known."""
+    try:
+        return len(items) if isinstance(items, Sized) else None
+    except OverflowError:  # range(10**30)
+        return sys.maxsize
+
+
+def _counted(items: Iterable[Any]) -> Iterator[tuple[int, Any]]:
+    """The items with their numbers; an iterable without end ends at the limit."""
+    for k, item in enumerate(items):
+        if k >= MOST_TASKS or (_size(items) or 0) > MOST_TASKS:
+            raise InputError(f"there are more than {MOST_TASKS} tasks, the most of one call; give parts of them")
+        yield k, item
 
 
 def _check_executor(executor: Any) -> None:
@@ -232,12 +252,24 @@ def _submit(
                 return computed
             done, _ = wait(running, return_when=FIRST_COMPLETED)
             for future in done:
-                rows[running.pop(future)] = future.result()
+                index = running.pop(future)
+                rows[index] = _checked(future.result(), index, f"{type(executor).__name__} gave as row {index}")
                 computed += 1
             clock.tell(rows)
     finally:
         for future in running:
             future.cancel()
+
+
+def _checked(row: Any, index: int, what: str) -> Row:
+    """A row as `call` makes it: of this index, with the modes that were found or an error, of plain numbers and texts."""
+    if isinstance(row, dict) and row.get("index") == index and isinstance(row.get("error", row.get("modes")), (str, list)):
+        try:
+            json.dumps(row)
+            return row
+        except (TypeError, ValueError, RecursionError):
+            pass
+    raise InputError(f"{what} {repr(row)[:80]}, but must be a row of the task that was submitted; use an executor that runs what it is given")
 
 
 def call(task: Task, payload: Any, item: Any, index: int, folder: str | None) -> Row:
@@ -269,9 +301,11 @@ def _known(folder: str | None, index: int, item: Any, rows: dict[int, Row]) -> b
             found = json.load(file)
     except (FileNotFoundError, ValueError):  # absent, or written while the machine failed
         return False
+    if not isinstance(found, dict) or not {"item", "row"} <= set(found):
+        raise InputError(f"{path} is no row of a task; give another folder, or delete this file")
     if found["item"] != name_of(item):
         raise InputError(f"{path} holds the result of {found['item']}, not of {name_of(item)}; give another folder")
-    rows[index] = found["row"]
+    rows[index] = _checked(found["row"], index, f"{path} holds")
     return True
 
 

@@ -74,6 +74,9 @@ pub(crate) fn simulate_loop<'py>(
     Ok((array(py, u.as_ref()), array(py, y.as_ref())))
 }
 
+/// Distance of a pole to the unit circle that is rounding of its computation. Chosen, not measured.
+const ROUNDING: f64 = 1e-9;
+
 /// Whether the loop is stable, real and imaginary parts of its poles, and the peak of the sensitivity.
 type CertificateOut = (bool, Vec<(f64, f64)>, Option<f64>);
 
@@ -82,11 +85,14 @@ type CertificateOut = (bool, Vec<(f64, f64)>, Option<f64>);
 pub(crate) fn certify(model: ModelIn<'_>, controller: ModelIn<'_>) -> PyResult<CertificateOut> {
     let (model, controller) = (model_in(&model)?, model_in(&controller)?);
     let found = youla::validate::certify(&model, &controller).map_err(Failure::from)?;
-    let peak = match found.stable {
-        true => Some(youla::control::peak_sensitivity(&model, &controller).map_err(Failure::from)?),
-        false => None,
+    // A pole within rounding of the circle is none of a stable loop: its sensitivity has no peak that can be computed.
+    let radius = found.poles.iter().map(|p| p.norm()).fold(0.0, f64::max);
+    let peak = match found.stable.then(|| youla::control::peak_sensitivity(&model, &controller)) {
+        None => None,
+        Some(Err(_)) if radius > 1.0 - ROUNDING => None,
+        Some(peak) => Some(peak.map_err(Failure::from)?),
     };
-    Ok((found.stable, found.poles.iter().map(|p| (p.re, p.im)).collect(), peak))
+    Ok((peak.is_some(), found.poles.iter().map(|p| (p.re, p.im)).collect(), peak))
 }
 
 /// A model with fewer states, its Hankel singular values and its bound of the error.

@@ -138,6 +138,8 @@ def test_stages(run: youla.Run, record: youla.Record, nominal: youla.Model, tmp_
     new = youla.redesign(run)
     assert new.controller.inputs == ("y",)
     assert youla.certify(run.recommended, new.controller, feedback="positive")
+    on_the_circle = youla.Model([[-0.4]], [[1.0]], [[1.0]], [[0.0]], dt=0.01)
+    assert not any(youla.certify(on_the_circle, 0.6 - k * 1e-16, feedback="negative") for k in range(5))
     excitation = youla.excite(nominal, 2.0, feedback="negative", amplitude=0.5, band=[0.5, 20], seconds=10)
     assert excitation.signal.shape == (1000, 1)
     assert np.abs(excitation.signal).max() <= 0.5 * (1 + 1e-12)

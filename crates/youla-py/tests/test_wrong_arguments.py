@@ -132,7 +132,7 @@ CASES: dict[str, tuple[Callable[[], Any], str]] = {
     "seed beyond 64 bits": (lambda: youla.demo(seed=2**70), "but must be below 2^64"),
     "machine as number": (lambda: youla.demo(3), "machine is 3, but must be a text"),
     "no samples": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative", samples=0), "samples is 0, but must be a whole number of at least 1"),
-    "samples beyond memory": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative", samples=10**16), "which memory does not hold"),
+    "samples beyond memory": (lambda: youla.simulate_loop(NOMINAL, 1.0, feedback="negative", samples=10**16), "samples is 10000000000000000, but must be at most 125000000"),
     "band of one": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **{**EXCITE, "band": 10, "seconds": 1}), "band has 1 entries, but must be the lowest"),
     "amplitude as text": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **{**EXCITE, "amplitude": "big", "seconds": 1}), "amplitude is a str"),
     "seconds as text": (lambda: youla.excite(NOMINAL, 1.0, feedback="negative", **EXCITE, seconds="1"), "seconds is '1', but must be a positive number"),

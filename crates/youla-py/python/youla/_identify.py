@@ -207,8 +207,8 @@ def _check_apart(estimation: list[Record], fresh: list[Record]) -> None:
         for i, earlier in enumerate(every[: min(k, len(estimation))]):
             common = _common(earlier, later)
             if common is not None:
-                what = "would count twice in what identifies" if k < len(estimation) else "would verify nothing, as they identify"
-                raise InputError(f"{labels[i]} and {labels[k]} share {common}, which {what}; cut them apart, for example by record.split()")
+                what = "which would count twice" if k < len(estimation) else "from which the models are identified: they would verify nothing"
+                raise InputError(f"{labels[i]} and {labels[k]} share {common}, {what}; cut them apart, for example by record.split()")
 
 
 def _common(a: Record, b: Record) -> str | None:

@@ -90,6 +90,8 @@ def certify(plant: Any, controller: Any, *, feedback: str | None = None) -> Cert
     ------
     InputError
         For systems of other sizes or sample times, or in continuous time.
+    NumericalError
+        For a loop that is not well posed: its algebraic loop is singular.
 
     Examples
     --------

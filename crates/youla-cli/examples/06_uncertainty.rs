@@ -7,7 +7,7 @@
 mod machine;
 
 use youla::Result;
-use youla::control::{closed_loop, with_input_port};
+use youla::control::{closed_loop, margins, with_input_port};
 use youla::lti::StateSpace;
 use youla::validate::{BandOptions, certify_region, margin_intervals};
 
@@ -23,7 +23,9 @@ fn main() -> Result<()> {
     }
 
     let controller = machine.factors.controller()?;
-    for margin in margin_intervals(&found.plant, &controller, &found.region, None, 0.95)? {
+    for margin in
+        margin_intervals(&margins(&found.plant, &controller)?, &found.plant, &controller, &found.region, None, 0.95)?
+    {
         let [low, high] = margin.interval.bounds;
         println!("  {}: {:.3} ({low:.3} to {high:.3})", margin.name, margin.interval.value);
     }

@@ -12,7 +12,7 @@ mod loops;
 
 use loops::{Loop, loops};
 use rayon::prelude::*;
-use youla::control::{LinearMargins, MARGIN_NAMES};
+use youla::control::{LinearMargins, MARGIN_NAMES, margins};
 use youla::identify::likelihood::{LikelihoodOptions, ModeEstimate, Recommendation};
 use youla::lti::frequency_response;
 use youla::validate::margin_intervals;
@@ -51,8 +51,9 @@ fn errors(system: &Loop, found: &Recommendation) -> Result<[Vec<Option<f64>>; 3]
 
 /// Errors of the margins over their stated deviations, in the order of their names; none where a margin is missed.
 fn margin_errors(system: &Loop, found: &Recommendation) -> Result<Vec<(&'static str, Option<f64>)>> {
-    let truth = LinearMargins::new(&system.plant, &system.controller, None)?.deviations(|_| Vec::new())?;
-    let stated = margin_intervals(&found.plant, &system.controller, &found.region, None, 0.95)?;
+    let (k, exact) = (&system.controller, margins(&system.plant, &system.controller)?);
+    let truth = LinearMargins::new(&exact, &system.plant, k, None)?.deviations(|_, _| 0.0)?;
+    let stated = margin_intervals(&margins(&found.plant, k)?, &found.plant, k, &found.region, None, 0.95)?;
     let error = |(name, exact): (&&'static str, Option<(f64, f64)>)| {
         let (exact, _) = exact.filter(|(value, _)| value.is_finite() && value.abs() > ROUNDING)?;
         let near = stated.iter().find(|m| m.name == *name);

@@ -23,7 +23,7 @@ pub use robust::DeviationRegion;
 use crate::error::{Error, Result};
 use serde::{Deserialize, Serialize};
 use structured::{PidOptions, Structure};
-use youla::control::{ChannelScales, closed_loop, with_input_port};
+use youla::control::{ChannelScales, closed_loop, margins, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::{Interval, Region};
 use youla::lti::{Discrete, StateSpace};
@@ -338,7 +338,7 @@ fn predicted_intervals(
     };
     let least_damping = region.intervals(level, damping)?.first().copied();
     let scales = ChannelScales::new(problem.input_size.to_vec(), problem.output_size.to_vec())?;
-    let margins = margin_intervals(plant, k, region, Some(&scales), level)?;
+    let margins = margin_intervals(&margins(plant, k)?, plant, k, region, Some(&scales), level)?;
     Ok(PredictedIntervals { least_damping, margins })
 }
 

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::stages::context::RunContext;
 use crate::stages::validate::robustness::channel_scales;
-use youla::control::{closed_loop, with_input_port};
+use youla::control::{Margins, closed_loop, with_input_port};
 use youla::factor::CoprimeFactors;
 use youla::identify::likelihood::Recommendation;
 use youla::lti::Discrete;
@@ -22,7 +22,7 @@ pub struct RunCertificate {
     pub margins: Vec<MarginInterval>,
 }
 
-/// The certificate of a run.
+/// The certificate of a run; `margins` are those of its loop where they are known.
 ///
 /// # Errors
 /// Numerical conditions of the estimate itself.
@@ -30,6 +30,7 @@ pub(crate) fn certificate(
     run: RunContext<'_>,
     factors: &CoprimeFactors<Discrete>,
     model: &Recommendation,
+    margins: Option<&Margins>,
 ) -> Result<RunCertificate> {
     let (plant, k) = (&model.plant, run.declared.controller());
     let exact = certify_deviation(factors, &factors.deviation_of(plant)?, None)?;
@@ -37,9 +38,11 @@ pub(crate) fn certificate(
     let band =
         certify_region(&model.region, &BandOptions::default(), |_| Ok(true), |plant| closed_loop(plant, &ports))?;
     let scales = channel_scales(run.records).ok();
-    let margins = match exact.stable {
-        true => margin_intervals(plant, k, &model.region, scales.as_ref(), band.level)?,
-        false => Vec::new(),
+    let intervals = |margins: &Margins| margin_intervals(margins, plant, k, &model.region, scales.as_ref(), band.level);
+    let margins = match (exact.stable, margins) {
+        (true, Some(margins)) => intervals(margins)?,
+        (true, None) => intervals(&youla::control::margins(plant, k)?)?,
+        (false, _) => Vec::new(),
     };
     Ok(RunCertificate { exact, band, margins })
 }

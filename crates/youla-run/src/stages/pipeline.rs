@@ -2,6 +2,7 @@
 
 use crate::check::check_records;
 use crate::error::no_model::NoModel;
+use crate::method::Method;
 use crate::records::RunRecords;
 use crate::result::{Filtered, Identification, found};
 use crate::settings::RunSettings;
@@ -111,8 +112,9 @@ pub fn identify(
     })?;
     let intervals = found(grey_box.as_ref()).and_then(|run| run.intervals.as_ref().ok());
     let grey_box_uncertainty = intervals.map(|known| structure_uncertainty(known, &hz)).transpose()?;
-    let certificate =
-        clock.run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?)));
+    let margins = validation.of(Method::Likelihood).and_then(|of| of.robustness.margins.as_ref().ok());
+    let certificate = clock
+        .run(Stage::Certify, || Some(certificate(run, &factorisation?.factors, recommended.as_ref().ok()?, margins)));
     let (redesign, pid) = clock.run(Stage::Redesign, || match recommended.as_ref() {
         Ok(model) => match pid(run, model) {
             None => (redesigned(run, model, found(reduction.as_ref())), None),

@@ -19,7 +19,7 @@ mod zeros;
 
 pub use eigen::Eigen;
 pub use eigen::SharedMode;
-pub(crate) use gains::largest_singular_value;
+pub(crate) use gains::{largest_singular_direction, largest_singular_value};
 pub use initial::simulate_best;
 pub use modes::Mode;
 pub(crate) use norms::{Curve, Part, below_level, continuous_image, crossings};

@@ -1,7 +1,7 @@
 //! Margins of the loop of a model, with the intervals that its region gives them.
 
 use crate::Result;
-use crate::control::{ChannelScales, LinearMargins, MARGIN_NAMES};
+use crate::control::{ChannelScales, LinearMargins, MARGIN_NAMES, Margins};
 use crate::identify::likelihood::{Interval, Region};
 use crate::lti::{Discrete, StateSpace};
 use std::f64::consts::TAU;
@@ -15,23 +15,23 @@ pub struct MarginInterval {
     pub interval: Interval,
 }
 
-/// Margins of a plant under `u = K y`, each of its worst channel, with intervals at a level, to first order in the error of the
+/// Margins of a plant under `u = K y`, those of [`margins`](fn@crate::control::margins), each of its worst channel, with intervals at a level, to first order in the error of the
 /// response at the frequency where the margin is critical (equations at [`LinearMargins`]). Margins that do not exist, and those
 /// without a derivative there, are left out.
 ///
 /// # Errors
 /// [`crate::Error::NotStabilising`] with the pole; ports, sample times.
 pub fn margin_intervals(
+    margins: &Margins,
     plant: &StateSpace<Discrete>,
     controller: &StateSpace<Discrete>,
     region: &Region,
     scales: Option<&ChannelScales>,
     level: f64,
 ) -> Result<Vec<MarginInterval>> {
-    let linear = LinearMargins::new(plant, controller, scales)?;
+    let linear = LinearMargins::new(margins, plant, controller, scales)?;
     let nyquist = 0.5 / plant.time().ts();
-    let changes = |omega: f64| region.at((omega / TAU).min(nyquist)).changes().collect();
-    let figures = linear.deviations(changes)?;
+    let figures = linear.deviations(|omega, slopes| region.at((omega / TAU).min(nyquist)).along(slopes))?;
     let named = MARGIN_NAMES.iter().zip(figures).filter_map(|(name, figure)| {
         let (value, deviation) = figure?;
         Some(MarginInterval { name, interval: Interval::normal(value, deviation, level) })

@@ -9,6 +9,7 @@ use super::disk::{DiskMargin, of_gain};
 use super::{IsoZone, peak_of, shifted};
 use crate::lti::{Curve, Part, PeakGain, StateSpace, TimeDomain, crossings};
 use crate::{Result, c64};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Gain of a loop that is none.
@@ -69,7 +70,8 @@ pub struct ChannelMargins {
 
 /// The margins of each channel of a stable sensitivity.
 pub(super) fn each<T: TimeDomain>(sensitivity: &StateSpace<T>) -> Result<Vec<ChannelMargins>> {
-    (0..sensitivity.inputs()).map(|i| of_channel(&sensitivity.part(i..i + 1, i..i + 1))).collect()
+    let all = (0..sensitivity.inputs()).into_par_iter();
+    all.map(|i| of_channel(&sensitivity.part(i..i + 1, i..i + 1))).collect()
 }
 
 fn of_channel<T: TimeDomain>(s: &StateSpace<T>) -> Result<ChannelMargins> {

@@ -16,20 +16,17 @@
 //! boundary where L may have them. At frequency zero and at the end S is real for every plant, and dw is zero. Which channel
 //! and which crossing is worst does not change to first order, unless two are equally bad: there a margin has no derivative.
 
-use super::channel;
 use super::worst::{Critical, FIGURES, Kind, critical};
+use super::{Margins, channel};
 use crate::control::{ChannelScales, closed_loop, with_input_port};
 use crate::linalg::{block, eye};
-use crate::lti::{Curve, StateSpace, TimeDomain, largest_singular_value};
-use crate::{Error, Mat, MatRef, Result, c64};
-use faer::Scale;
-
-/// Step of the differences along an error of the response, in its standard deviations.
-const STEP: f64 = 1e-4;
+use crate::lti::{Curve, StateSpace, TimeDomain, largest_singular_direction};
+use crate::{Mat, MatRef, Result, c64};
 
 /// Margins with what their first derivative needs.
 pub struct LinearMargins {
     scales: Option<ChannelScales>,
+    inputs: usize,
     points: [Option<Point>; FIGURES],
     end: f64,
 }
@@ -42,11 +39,12 @@ struct Point {
 }
 
 impl LinearMargins {
-    /// The exact margins of a plant under `u = K y`, and their derivative.
+    /// The exact margins of a plant under `u = K y`, which are those of [`super::margins()`], and their derivative.
     ///
     /// # Errors
     /// As [`super::margins()`].
     pub fn new<T: TimeDomain>(
+        margins: &Margins,
         plant: &StateSpace<T>,
         controller: &StateSpace<T>,
         scales: Option<&ChannelScales>,
@@ -62,15 +60,14 @@ impl LinearMargins {
             Ok(Point { response: curve.at(margin.frequency)?, slope, margin })
         };
         let mut points = [const { None }; FIGURES];
-        for (place, margin) in points.iter_mut().zip(critical(plant, controller, scales)?) {
+        for (place, margin) in points.iter_mut().zip(critical(margins, plant, controller, scales)?) {
             *place = margin.map(point).transpose()?;
         }
-        Ok(LinearMargins { scales: scales.cloned(), points, end: curve.end() })
+        Ok(LinearMargins { scales: scales.cloned(), inputs: plant.inputs(), points, end: curve.end() })
     }
 
-    /// Margin, and its standard deviation for an error of the plant's response: `changes` gives the independent errors of unit
-    /// variance at a frequency in rad/s, each p x m. In the order of [`super::MARGIN_NAMES`]; `None` where there is
-    /// no margin.
+    /// Margin, and its standard deviation for an error of the plant's response. In the order of [`super::MARGIN_NAMES`]; `None` where there is
+    /// no margin. `deviation` gives that of `Re sum_ij w_ij dG_ij` from the frequency in rad/s and w, p x m.
     ///
     /// ```text
     /// dH = H_n dG H_u,        H_n: columns of H from n,  H_u: rows of H to u
@@ -78,72 +75,84 @@ impl LinearMargins {
     ///
     /// # Errors
     /// Those of singular values.
-    pub fn deviations(&self, changes: impl Fn(f64) -> Vec<Mat<c64>>) -> Result<[Option<(f64, f64)>; FIGURES]> {
+    pub fn deviations(&self, deviation: impl Fn(f64, MatRef<'_, c64>) -> f64) -> Result<[Option<(f64, f64)>; FIGURES]> {
         let mut figures = [None; FIGURES];
         for (figure, point) in figures.iter_mut().zip(&self.points) {
             let Some(point) = point else { continue };
-            let h = &point.response;
-            let mut variance = 0.0;
-            for change in changes(point.margin.frequency) {
-                let inputs = change.ncols();
-                let dh = h.subcols(inputs, h.ncols() - inputs) * change * h.subrows(0, inputs);
-                let moved = |step: f64| self.change(point, (h + Scale(c64::new(step, 0.0)) * &dh).as_ref(), inputs);
-                variance += ((moved(STEP)? - moved(-STEP)?) / (2.0 * STEP)).powi(2);
-            }
-            *figure = Some((point.margin.value, variance.sqrt()));
+            let (left, right) = self.sides(point)?;
+            let (h, m) = (&point.response, self.inputs);
+            let (left, right) = (left * h.subcols(m, h.ncols() - m), h.subrows(0, m) * right);
+            let slopes = left.transpose() * right.transpose();
+            *figure = Some((point.margin.value, deviation(point.margin.frequency, slopes.as_ref())));
         }
         Ok(figures)
     }
 
-    fn change(&self, point: &Point, moved: MatRef<'_, c64>, inputs: usize) -> Result<f64> {
-        let Point { margin: Critical { value, frequency, kind }, response, slope } = point;
-        let inside = *frequency > 0.0 && *frequency < self.end;
-        let of = |i: usize| (response[(i, i)], moved[(i, i)] - response[(i, i)]);
-        Ok(match kind {
-            Kind::Peak(ports) => {
-                let part = |h: MatRef<'_, c64>| {
-                    largest_singular_value(h.submatrix(ports.start, ports.start, ports.len(), ports.len()))
-                };
-                part(moved)? - part(response.as_ref())?
-            }
-            Kind::Disk(i) => {
-                let (s, ds) = of(*i);
-                1.0 / (s + ds - 0.5).norm() - 1.0 / (s - 0.5).norm()
+    /// The row l and the column r by which a margin changes by `Re l dH r`.
+    fn sides(&self, point: &Point) -> Result<(Mat<c64>, Mat<c64>)> {
+        let (h, ports) = (&point.response, point.response.nrows());
+        Ok(match &point.margin.kind {
+            Kind::Peak(range) => {
+                let part = h.submatrix(range.start, range.start, range.len(), range.len());
+                let (_, u, v) = largest_singular_direction(part)?;
+                let place =
+                    |v: &Mat<c64>, k: usize| if range.contains(&k) { v[(k - range.start, 0)] } else { c64::ZERO };
+                (Mat::from_fn(1, ports, |_, k| place(&u, k).conj()), Mat::from_fn(ports, 1, |k, _| place(&v, k)))
             }
             Kind::Coprime => {
-                let margin = |h| Ok::<f64, Error>(1.0 / largest_singular_value(self.gang(h, inputs).as_ref())?);
-                margin(moved)? - margin(response.as_ref())?
+                let (sigma, u, v) = largest_singular_direction(self.gang(h.as_ref()).as_ref())?;
+                let left = |k: usize| u[(k, 0)].conj() * (-1.0 / (sigma * sigma * self.size(k)));
+                (Mat::from_fn(1, ports, |_, k| left(k)), Mat::from_fn(ports, 1, |k, _| v[(k, 0)] * self.size(k)))
             }
-            Kind::Gain(i) => {
-                let (s, ds) = of(*i);
+            Kind::Gain(i) | Kind::Phase(i) | Kind::Delay(i) | Kind::Disk(i) => {
+                let slope = self.slope_in_entry(point, h[(*i, *i)]);
+                let at = |k: usize, value: c64| if k == *i { value } else { c64::ZERO };
+                (Mat::from_fn(1, ports, |_, k| at(k, slope)), Mat::from_fn(ports, 1, |k, _| at(k, c64::ONE)))
+            }
+        })
+    }
+
+    /// The slope c by which a margin of one channel changes by `Re c dS`.
+    fn slope_in_entry(&self, point: &Point, s: c64) -> c64 {
+        let Point { margin: Critical { value, frequency, kind }, slope, .. } = point;
+        let inside = *frequency > 0.0 && *frequency < self.end;
+        let change = |ds: c64| match kind {
+            Kind::Gain(_) => {
                 let dw = if inside { -ds.im / slope.im } else { 0.0 };
                 -(ds.re + slope.re * dw) / (s.re - 1.0).powi(2)
             }
-            Kind::Phase(i) => {
-                let (s, ds) = of(*i);
+            Kind::Phase(_) => {
                 let (_, shift) = crossover(s, ds, *slope);
                 (channel::loop_phase(s).signum() * shift).to_degrees()
             }
             // A loop gain of 1 or more up to the end of all frequencies.
             Kind::Delay(_) if !inside => 0.0,
-            Kind::Delay(i) => {
-                let (s, ds) = of(*i);
+            Kind::Delay(_) => {
                 let (dw, shift) = crossover(s, ds, *slope);
                 (shift - value * dw) / frequency
             }
-        })
+            Kind::Disk(_) | Kind::Peak(_) | Kind::Coprime => {
+                let apart = s - 0.5;
+                -(apart.re * ds.re + apart.im * ds.im) / apart.norm().powi(3)
+            }
+        };
+        c64::new(change(c64::ONE), -change(c64::new(0.0, 1.0)))
+    }
+
+    /// Size of a channel over (u, y).
+    fn size(&self, k: usize) -> f64 {
+        match &self.scales {
+            Some(scales) if k < self.inputs => scales.inputs()[k],
+            Some(scales) => scales.outputs()[k - self.inputs],
+            None => 1.0,
+        }
     }
 
     /// `[I; K] (I - G K)^-1 [I, G]` in scaled channels, its inputs and outputs in the order of H.
-    fn gang(&self, h: MatRef<'_, c64>, inputs: usize) -> Mat<c64> {
-        let size = |k: usize| match &self.scales {
-            Some(scales) if k < inputs => scales.inputs()[k],
-            Some(scales) => scales.outputs()[k - inputs],
-            None => 1.0,
-        };
+    fn gang(&self, h: MatRef<'_, c64>) -> Mat<c64> {
         Mat::from_fn(h.nrows(), h.ncols(), |i, j| {
-            let through = if i == j && i < inputs { 1.0 } else { 0.0 };
-            (h[(i, j)] - through) * (size(j) / size(i))
+            let through = if i == j && i < self.inputs { 1.0 } else { 0.0 };
+            (h[(i, j)] - through) * (self.size(j) / self.size(i))
         })
     }
 }
@@ -177,16 +186,20 @@ fn slope<T: TimeDomain>(closed: &StateSpace<T>, channel: usize, frequency: f64) 
 
 #[cfg(test)]
 mod tests {
+    use super::super::margins;
     use super::super::tests::random_loop;
     use super::*;
     use crate::lti::{Continuous, Discrete};
+    use faer::Scale;
 
     /// Places of the disk margin and of the coprime margin.
     const DISK: usize = 6;
     const COPRIME: usize = 7;
 
     fn exact<T: TimeDomain>(plant: &StateSpace<T>, k: &StateSpace<T>, scales: &ChannelScales) -> [f64; FIGURES] {
-        critical(plant, k, Some(scales)).unwrap().map(|margin| margin.map_or(f64::NAN, |m| m.value))
+        critical(&margins(plant, k).unwrap(), plant, k, Some(scales))
+            .unwrap()
+            .map(|margin| margin.map_or(f64::NAN, |m| m.value))
     }
 
     /// The deviation for one error of the plant is the slope of the exact margins along that error, by central differences.
@@ -212,8 +225,14 @@ mod tests {
             };
             let (fine, coarse, here) = (slope(1e-4), slope(2e-4), exact(&plant, &k, &scales));
             let response = |step: f64, w: f64| Curve::new(&moved(step)).unwrap().at(w).unwrap();
-            let change = |w: f64| vec![(response(1e-5, w) - response(-1e-5, w)) * Scale(c64::new(5e4, 0.0))];
-            let deviations = LinearMargins::new(&plant, &k, Some(&scales)).unwrap().deviations(change).unwrap();
+            let change = |w: f64| (response(1e-5, w) - response(-1e-5, w)) * Scale(c64::new(5e4, 0.0));
+            let along = |change: Mat<c64>, slopes: MatRef<'_, c64>| {
+                let entries = change.col_iter().zip(slopes.col_iter()).flat_map(|(a, b)| a.iter().zip(b.iter()));
+                entries.map(|(change, slope)| (change * slope).re).sum::<f64>().abs()
+            };
+            let deviation = |w: f64, slopes: MatRef<'_, c64>| along(change(w), slopes);
+            let linear = LinearMargins::new(&margins(&plant, &k).unwrap(), &plant, &k, Some(&scales)).unwrap();
+            let deviations = linear.deviations(deviation).unwrap();
             for (place, figure) in deviations.into_iter().enumerate() {
                 let direct = better(fine[place], coarse[place]).abs();
                 let Some((value, deviation)) = figure else {

@@ -1,6 +1,6 @@
 //! The margins of a loop in one figure each, of the worst channel, with the places where it is critical.
 
-use super::{ChannelMargins, GainLimit, Loop, channel};
+use super::{ChannelMargins, GainLimit, Loop, Margins};
 use crate::Result;
 use crate::control::ChannelScales;
 use crate::lti::{StateSpace, TimeDomain};
@@ -41,20 +41,18 @@ pub(super) enum Kind {
     Disk(usize),
 }
 
-/// The exact margins in the order of [`MARGIN_NAMES`]; `None` where there is none, and the coprime margin without scales.
+/// The margins of a loop in the order of [`MARGIN_NAMES`]; `None` where there is none, and the coprime margin without scales.
 pub(super) fn critical<T: TimeDomain>(
+    margins: &Margins,
     plant: &StateSpace<T>,
     controller: &StateSpace<T>,
     scales: Option<&ChannelScales>,
 ) -> Result<[Option<Critical>; FIGURES]> {
-    let closed = Loop::new(plant, controller)?;
     let (inputs, outputs) = (plant.inputs(), plant.inputs()..plant.inputs() + plant.outputs());
-    let mut channels = channel::each(&closed.input_sensitivity())?;
-    channels.extend(channel::each(&closed.output_sensitivity())?);
-    let all = closed.peak(&Loop::output_sensitivity)?;
+    let all = margins.output_sensitivity;
     let all = Critical { value: all.value, frequency: all.frequency, kind: Kind::Peak(outputs) };
     let each = |of: &dyn Fn(usize, &ChannelMargins) -> Option<Critical>, worse: Ordering| {
-        let found = channels.iter().enumerate().filter_map(|(i, margins)| of(i, margins));
+        let found = margins.channels().enumerate().filter_map(|(i, margins)| of(i, margins));
         found.reduce(|a, b| if b.value.total_cmp(&a.value) == worse { b } else { a })
     };
     let peak = |i: usize, c: &ChannelMargins| {

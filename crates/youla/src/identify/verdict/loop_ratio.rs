@@ -12,12 +12,14 @@
 //! high, little where it is low.
 
 use super::limits::{BELOW_ONE_PERIOD, EDGE, LARGEST_IN_BAND};
-use crate::identify::likelihood::deviation::region::{Region, ResponseError};
+use crate::identify::likelihood::deviation::region::Region;
+use crate::identify::likelihood::deviation::response_error::{Covariance, ResponseError};
 use crate::linalg::TINY;
 use crate::lti::{Discrete, StateSpace, frequency_response, largest_singular_value};
 use crate::{Mat, MatRef, Result, c64};
 use faer::linalg::solvers::Solve;
-use faer::{Scale, Side};
+use faer::linalg::triangular_solve::solve_lower_triangular_in_place;
+use faer::{Par, Scale, Side};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -46,7 +48,7 @@ pub(crate) struct LoopAt {
     chordal: Vec<Chordal>,
 }
 
-/// The matrices on both sides of dG, the right one over rho.
+/// The matrices on both sides of dG, `(I + G G*)^-1/2` and `(I + G* G)^-1/2`, the right one over rho.
 struct Chordal {
     left: Mat<c64>,
     right: Mat<c64>,
@@ -60,7 +62,7 @@ impl LoopAt {
     pub(crate) fn all(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>, hz: &[f64]) -> Result<Vec<LoopAt>> {
         let omega: Vec<f64> = hz.iter().map(|hz| TAU * hz).collect();
         let (g, k) = (frequency_response(plant, &omega)?, frequency_response(k, &omega)?);
-        Ok(hz.iter().enumerate().map(|(i, hz)| LoopAt::new(*hz, g.at(i).to_owned(), k.at(i))).collect())
+        Ok(hz.par_iter().enumerate().map(|(i, hz)| LoopAt::new(*hz, g.at(i).to_owned(), k.at(i))).collect())
     }
 
     fn new(hz: f64, g: Mat<c64>, k: MatRef<'_, c64>) -> Self {
@@ -71,16 +73,17 @@ impl LoopAt {
         LoopAt { hz, s, ks, chordal }
     }
 
-    /// `kappa / rho` of independent errors of unit variance: the root of the largest mean square.
-    pub(crate) fn error(&self, changes: &[Mat<c64>]) -> f64 {
-        let additive = size(changes.iter().map(|e| e * &self.ks));
-        let chordal = |c: &Chordal| size(changes.iter().map(|e| &c.left * e * &c.right));
+    /// `kappa / rho` of an error: the root of the largest mean square.
+    pub(crate) fn error(&self, error: &ResponseError) -> f64 {
+        let (all, one) = (error.all(), identity(self.s.nrows()));
+        let additive = size(&all, one.as_ref(), self.ks.as_ref());
+        let chordal = |c: &Chordal| size(&all, c.left.as_ref(), c.right.as_ref());
         self.chordal.iter().map(chordal).fold(additive, f64::min)
     }
 
     /// `kappa / rho` of the edge of the 95 % region.
     pub(crate) fn ratio(&self, error: &ResponseError) -> f64 {
-        EDGE * self.error(&error.changes().collect::<Vec<_>>())
+        EDGE * self.error(error)
     }
 }
 
@@ -94,12 +97,18 @@ impl Chordal {
         let unit = (size * feedback.max(TINY) / gain.max(TINY)).sqrt();
         let (g, k) = (g * Scale(c64::new(unit, 0.0)), k * Scale(c64::new(1.0 / unit, 0.0)));
         let (p, m) = (g.nrows(), g.ncols());
-        let tall = Mat::from_fn(p + m, p, |i, j| if i < p { identity(p)[(i, j)] } else { k[(i - p, j)] });
-        let wide = Mat::from_fn(p, p + m, |i, j| if j < p { identity(p)[(i, j)] } else { g[(i, j - p)] });
-        let nearest = largest_singular_value((&tall * s * &wide).as_ref()).ok()?;
-        let left = inverse_root(&(identity(p) + &g * g.adjoint()))?;
-        let right = inverse_root(&(identity(m) + g.adjoint() * &g))? * Scale(c64::new(unit * nearest, 0.0));
-        Some(Chordal { left, right })
+        // The roots are triangular: norms do not depend on which root it is.
+        let [of_outputs, of_inputs] = [identity(p) + &g * g.adjoint(), identity(m) + g.adjoint() * &g];
+        let (outputs, inputs) = (of_outputs.llt(Side::Lower).ok()?, of_inputs.llt(Side::Lower).ok()?);
+        let of_controller = (identity(p) + k.adjoint() * &k).llt(Side::Lower).ok()?;
+        let nearest = largest_singular_value((of_controller.L().adjoint() * s * outputs.L()).as_ref()).ok()?;
+        let inverse = |root: MatRef<'_, c64>| {
+            let mut inverse = identity(root.nrows());
+            solve_lower_triangular_in_place(root, inverse.as_mut(), Par::Seq);
+            inverse
+        };
+        let right = inverse(inputs.L()).adjoint() * Scale(c64::new(unit * nearest, 0.0));
+        Some(Chordal { left: inverse(outputs.L()), right })
     }
 }
 
@@ -107,35 +116,21 @@ fn identity(n: usize) -> Mat<c64> {
     Mat::identity(n, n)
 }
 
-/// `A^-1/2` of a Hermitian matrix that is at least the identity.
-fn inverse_root(a: &Mat<c64>) -> Option<Mat<c64>> {
-    let eigen = a.self_adjoint_eigen(Side::Lower).ok()?;
-    let scaled = Mat::from_fn(a.nrows(), a.nrows(), |i, k| eigen.U()[(i, k)] / eigen.S()[k].re.max(1.0).sqrt());
-    Some(&scaled * eigen.U().adjoint())
+/// Root of the largest mean square of `|x* left E right y|` over unit vectors on one side.
+fn size(error: &Covariance, left: MatRef<'_, c64>, right: MatRef<'_, c64>) -> f64 {
+    let (inner, outer) = (right * right.adjoint(), left.adjoint() * left);
+    let [rows, columns] = error.sides(inner.as_ref(), outer.as_ref());
+    // All eigenvalues of a positive semidefinite matrix are its singular values.
+    let largest = |m: Mat<c64>| m.self_adjoint_eigenvalues(Side::Lower).ok()?.last().copied();
+    let largest = |m: Mat<c64>| largest(m).filter(|e| !e.is_nan()).unwrap_or(f64::INFINITY);
+    let (rows, columns) = (left * whole(&rows) * left.adjoint(), right.adjoint() * whole(&columns) * right);
+    largest(rows).max(largest(columns)).max(0.0).sqrt()
 }
 
-/// Root of the largest mean square of `|x* E y|` over unit vectors on one side, of a sum of independent matrices.
-fn size(changes: impl Iterator<Item = Mat<c64>>) -> f64 {
-    let mut sides: Option<[Mat<c64>; 2]> = None;
-    for e in changes {
-        let squares = [&e * e.adjoint(), e.adjoint() * &e];
-        sides = Some(match sides {
-            None => squares,
-            Some([a, b]) => [a + &squares[0], b + &squares[1]],
-        });
-    }
-    let largest = |m: &Mat<c64>| largest_singular_value(m.as_ref()).unwrap_or(f64::INFINITY);
-    sides.map_or(0.0, |[a, b]| largest(&a).max(largest(&b)).sqrt())
-}
-
-/// Changes of one entry each, from the mean squares of the entries, row by row.
-pub(crate) fn entries(squares: &[f64], inputs: usize) -> impl Iterator<Item = Mat<c64>> + '_ {
-    let outputs = squares.len() / inputs.max(1);
-    let one = move |(at, square): (usize, &f64)| {
-        let size = c64::new(square.max(0.0).sqrt(), 0.0);
-        Mat::from_fn(outputs, inputs, |i, j| if i * inputs + j == at { size } else { c64::ZERO })
-    };
-    squares.iter().enumerate().map(one)
+/// A Hermitian matrix from its lower half.
+fn whole(lower: &Mat<c64>) -> Mat<c64> {
+    let entry = |i: usize, j: usize| if i >= j { lower[(i, j)] } else { lower[(j, i)].conj() };
+    Mat::from_fn(lower.nrows(), lower.ncols(), entry)
 }
 
 impl LoopRatio {

@@ -36,6 +36,7 @@ use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
+use crate::identify::likelihood::deviation::response_error::ResponseError;
 use crate::identify::likelihood::deviation::{Directions, grid, slow};
 use crate::identify::likelihood::{Evidence, LoopKnowledge, figure as figure_of};
 use crate::linalg::TINY;
@@ -43,7 +44,7 @@ use crate::lti::{Discrete, StateSpace, frequency_response};
 use crate::statistics::median;
 use crate::{Mat, Result};
 use limits::{INFORMATION_RATIO, LARGEST_DEVIATION, LARGEST_LOOP_ERROR, LARGEST_RATIO_OF_LOOP, NO_INFORMATION};
-use loop_ratio::{LoopAt, bands, entries, judged_hz, valid};
+use loop_ratio::{LoopAt, bands, judged_hz, valid};
 
 /// What the verdict rests on.
 pub(crate) struct Judged<'a> {
@@ -192,7 +193,7 @@ fn in_loop(loops: Option<&Loops>, on: &Judged<'_>, hz: f64, squares: &[f64]) -> 
     let physical = |(at, s): (usize, &f64)| s * (y[at / u.len()] / u[at % u.len()]).powi(2);
     let squares: Vec<f64> = squares.iter().enumerate().map(physical).collect();
     match loops.and_then(|loops| loops.near(hz)) {
-        Some(at) => at.error(&entries(&squares, u.len()).collect::<Vec<_>>()),
+        Some(at) => at.error(&ResponseError::of_entries(&squares, u.len())),
         None => {
             let g = frequency_response(on.plant, &[std::f64::consts::TAU * hz]);
             let size = g.map_or(0.0, |g| g.at(0).norm_l2());

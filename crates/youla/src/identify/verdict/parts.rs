@@ -255,16 +255,16 @@ fn differences(
         Some([Some(a), Some(b)]) => [a.1, b.1],
         _ => [1.0; 2],
     };
+    let apart = chart.change(model, &sa.iter().zip(&sb).map(|(a, b)| a - b).collect::<Vec<_>>());
     let (p, m) = (problem.outputs(), problem.inputs());
     let matrix = |g: &[c64]| Mat::from_fn(p, m, |i, j| g[i * m + j]);
     let at = |share: f64| {
         let z = c64::cis(std::f64::consts::TAU * share);
-        let slopes = chart.response_slopes(model, z);
-        let along =
-            |i: usize, v: &dyn Fn(usize) -> f64| (0..slopes.ncols()).fold(c64::ZERO, |s, j| s + slopes[(i, j)] * v(j));
-        let (ra, rb) = (ra.seen(&slopes), rb.seen(&slopes));
-        let of = |seen: &Mat<c64>, i: usize| (0..seen.ncols()).map(|c| seen[(i, c)].norm_sqr()).sum::<f64>();
-        let variance: f64 = (0..slopes.nrows()).map(|i| every[0] * of(&ra, i) + every[1] * of(&rb, i)).sum();
+        let of = |root: &Root| {
+            let (own, shared) = root.seen(&chart, model, z);
+            own.iter().map(Mat::squared_norm_l2).sum::<f64>() + shared.squared_norm_l2()
+        };
+        let variance = every[0] * of(&ra) + every[1] * of(&rb);
         let g = model.response(z);
         let norm = |g: &[c64]| g.iter().map(|g| g.norm_sqr()).sum::<f64>().sqrt();
         let (apart, size) = match &models {
@@ -272,7 +272,7 @@ fn differences(
                 let (a, b) = (a.0.response(z), b.0.response(z));
                 (a.iter().zip(&b).map(|(a, b)| a - b).collect(), norm(&a).hypot(norm(&b)) / 2.0_f64.sqrt())
             }
-            _ => ((0..slopes.nrows()).map(|i| along(i, &|j| sa[j] - sb[j])).collect::<Vec<_>>(), norm(&g)),
+            _ => (model.response_change(&apart, z), norm(&g)),
         };
         let known = variance < (KNOWN * norm(&g)).powi(2);
         known.then(|| At { share, apart: matrix(&apart), chance: variance.sqrt() / size, size })

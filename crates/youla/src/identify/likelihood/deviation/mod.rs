@@ -12,6 +12,7 @@ pub(crate) mod innovation;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
+pub(crate) mod response_error;
 pub(crate) mod root;
 #[cfg(feature = "serde")]
 mod stored;
@@ -23,6 +24,7 @@ use crate::identify::likelihood::search::model::Model;
 use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
+use response_error::ResponseError;
 use root::Root;
 
 /// Rivals of less weight are left out.
@@ -169,35 +171,27 @@ impl Directions {
         })
     }
 
-    /// Errors of the entries of G, row by row, in independent directions of unit variance, column by column.
-    pub(crate) fn at(&self, share: f64) -> Mat<c64> {
-        let parts = self.columns(share);
-        let beyond = parts.beyond();
-        let (entries, count) = (parts.parameters.nrows(), parts.parameters.ncols() + parts.rivals.ncols());
+    /// The error of the response, scaled channels.
+    pub(crate) fn at(&self, share: f64) -> ResponseError {
+        let Columns { parameters, rivals, variation, distortion, .. } = self.columns(share);
         // What the excitation shows of an error is its size, not its phase.
-        let first = parts.parameters.ncols();
-        Mat::from_fn(entries, count + 2 * entries, |i, k| match k.checked_sub(count) {
-            None if k < first => parts.parameters[(i, k)],
-            None => parts.rivals[(i, k - first)],
-            Some(k) if k / 2 == i => {
-                let size = (0.5 * beyond[i]).sqrt();
-                if k % 2 == 0 { c64::new(size, 0.0) } else { c64::new(0.0, size) }
-            }
-            Some(_) => c64::ZERO,
-        })
+        let alone = variation.iter().zip(&distortion).map(|(a, b)| a + b).collect();
+        let (first, entries) = (parameters.shared.ncols(), rivals.nrows());
+        let mut shared = Mat::<c64>::zeros(entries, first + rivals.ncols());
+        shared.subcols_mut(0, first).copy_from(&parameters.shared);
+        shared.subcols_mut(first, rivals.ncols()).copy_from(&rivals);
+        ResponseError { shared, alone, ..parameters }
     }
 
     /// Mean squares of the error of each entry by their causes.
     pub(crate) fn parts(&self, share: f64) -> Parts {
-        let Columns { parameters, rivals, variation, distortion } = self.columns(share);
-        let squares = |m: &Mat<c64>, i: usize| (0..m.ncols()).map(|k| m[(i, k)].norm_sqr()).sum::<f64>();
-        let noise = |i: usize| squares(&parameters, i) / self.scatter;
-        let moved = |i: usize| (self.scatter - 1.0) * noise(i);
-        let all = 0..parameters.nrows();
+        let Columns { squares, rivals, variation, distortion, .. } = self.columns(share);
+        let noise: Vec<f64> = squares.iter().map(|square| square / self.scatter).collect();
+        let choice = |i: usize| (0..rivals.ncols()).map(|k| rivals[(i, k)].norm_sqr()).sum::<f64>();
         Parts {
-            noise: all.clone().map(noise).collect(),
-            choice: all.clone().map(|i| squares(&rivals, i)).collect(),
-            variation: all.map(|i| moved(i) + variation[i]).collect(),
+            choice: (0..rivals.nrows()).map(choice).collect(),
+            variation: noise.iter().zip(variation).map(|(noise, v)| (self.scatter - 1.0) * noise + v).collect(),
+            noise,
             distortion,
         }
     }
@@ -205,11 +199,13 @@ impl Directions {
     fn columns(&self, share: f64) -> Columns {
         let z = c64::cis(std::f64::consts::TAU * share);
         let (entries, m) = (self.model.inputs * self.model.outputs, self.model.inputs);
-        let (slopes, phases) = (self.chart.response_slopes(&self.model, z), phases(&self.delays, z));
+        let phases = phases(&self.delays, z);
         let g = delayed(&self.model, &self.delays, share);
         let others: Vec<_> = self.rivals.iter().map(|(model, delays, _)| delayed(model, delays, share)).collect();
-        let seen = self.root.seen(&slopes);
-        let parameters = Mat::from_fn(entries, seen.ncols(), |i, k| seen[(i, k)] * phases[i % m]);
+        let (own, shared) = self.root.seen(&self.chart, &self.model, z);
+        let parameters = ResponseError { own, shared, alone: vec![0.0; entries], inputs: m };
+        let parameters = parameters.scaled(|_, j| phases[j]);
+        let squares = parameters.squares();
         let rivals = Mat::from_fn(entries, others.len(), |i, k| (others[k][i] - g[i]) * self.rivals[k].2);
         let near = |k: usize| self.seen.as_ref().map(|seen| (&seen[k], seen[k].near(share, entries).0));
         let mut distortion = near(0).map_or_else(|| vec![0.0; entries], |(_, squares)| squares);
@@ -223,28 +219,22 @@ impl Directions {
         }
         // What moved parameters explain of the differences between records is not counted twice.
         for (i, variation) in variation.iter_mut().enumerate() {
-            let moved: f64 = (0..parameters.ncols()).map(|k| parameters[(i, k)].norm_sqr()).sum();
-            *variation = (*variation - moved * (1.0 - 1.0 / self.scatter)).max(0.0);
+            *variation = (*variation - squares[i] * (1.0 - 1.0 / self.scatter)).max(0.0);
         }
         // It moves the outputs as the input does, and does not average out over records of the same kind.
         if let Some(nonlinear_part) = &self.nonlinear_part {
             let ratio = nonlinear_part.near(share);
             (nonlinear_part.input..entries).step_by(m).for_each(|i| distortion[i] += g[i].norm_sqr() * ratio);
         }
-        Columns { parameters, rivals, variation, distortion }
+        Columns { parameters, squares, rivals, variation, distortion }
     }
 }
 
-/// Errors at a frequency: columns of independent errors, and mean squares of what has no phase.
+/// Errors at a frequency: those of the parameters with their mean squares, columns of rivals, and mean squares of what has no phase.
 struct Columns {
-    parameters: Mat<c64>,
+    parameters: ResponseError,
+    squares: Vec<f64>,
     rivals: Mat<c64>,
     variation: Vec<f64>,
     distortion: Vec<f64>,
-}
-
-impl Columns {
-    fn beyond(&self) -> Vec<f64> {
-        self.variation.iter().zip(&self.distortion).map(|(a, b)| a + b).collect()
-    }
 }

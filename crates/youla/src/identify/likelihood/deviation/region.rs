@@ -7,13 +7,13 @@
 //! for what the excitation shows beyond both. Figures that depend on the response at one frequency take the directions
 //! there; figures of the poles take the directions of the parameters.
 
+use super::response_error::{EntryErrors, ResponseError};
 use super::{Directions, Parts, physical};
 use crate::control::ChannelScales;
 use crate::identify::likelihood::data::spectra::Sizes;
 use crate::lti::{Discrete, StateSpace};
 use crate::statistics::two_sided_student;
-use crate::{Mat, MatRef, Result};
-use faer::c64;
+use crate::{Mat, Result, c64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -127,17 +127,11 @@ impl Region {
     /// The error at a frequency, Hz; below and above all of `hz` that at the first and at the last of them, but for frequency zero and
     /// that of Nyquist, where the model itself says it.
     pub fn at(&self, hz: f64) -> ResponseError {
-        let inputs = self.sizes.u.len();
         let ends = hz <= 0.0 || hz * self.time.ts() >= 0.5;
         let within =
             if ends { hz.clamp(0.0, 0.5 / self.time.ts()) } else { hz.clamp(self.hz[0], self.hz[self.hz.len() - 1]) };
-        let mut directions = self.directions.at(within * self.time.ts());
-        for k in 0..directions.ncols() {
-            for i in 0..directions.nrows() {
-                directions[(i, k)] *= self.sizes.y[i / inputs] / self.sizes.u[i % inputs];
-            }
-        }
-        ResponseError { directions, inputs }
+        let Sizes { u, y } = &self.sizes;
+        self.directions.at(within * self.time.ts()).scaled(|i, j| c64::new(y[i] / u[j], 0.0))
     }
 
     /// The errors of the entries at frequencies, Hz: what [`Self::at`] says of each entry by itself.
@@ -157,14 +151,26 @@ impl Region {
     where
         F: Fn(&StateSpace<Discrete>) -> Result<Vec<f64>> + Sync,
     {
-        let values = of(&self.plant_at(&vec![0.0; self.directions.errors()])?)?;
+        self.intervals_by(level, &of, &of)
+    }
+
+    /// The same with figures of plants near the estimate that are equal to first order and cost less.
+    ///
+    /// # Errors
+    /// As [`Self::intervals`].
+    pub(crate) fn intervals_by<N, F>(&self, level: f64, near: N, of: F) -> Result<Vec<Interval>>
+    where
+        N: Fn(&StateSpace<Discrete>) -> Result<Vec<f64>> + Sync,
+        F: Fn(&StateSpace<Discrete>) -> Result<Vec<f64>> + Sync,
+    {
+        let values = of(&self.estimate()?)?;
         let slopes: Vec<Result<Vec<f64>>> = (0..self.directions.errors())
             .into_par_iter()
             .map(|k| {
                 let moved = |step: f64| {
                     let mut errors = vec![0.0; self.directions.errors()];
                     errors[k] = step;
-                    of(&self.plant_at(&errors)?)
+                    near(&self.plant_at(&errors)?)
                 };
                 let (up, down) = (moved(STEP)?, moved(-STEP)?);
                 Ok(up.iter().zip(down).map(|(up, down)| (up - down) / (2.0 * STEP)).collect())
@@ -206,6 +212,11 @@ impl Region {
         (0..count as u64).into_par_iter().filter_map(draw).collect()
     }
 
+    /// The plant without errors.
+    pub(crate) fn estimate(&self) -> Result<StateSpace<Discrete>> {
+        self.plant_at(&vec![0.0; self.directions.errors()])
+    }
+
     /// The plant with independent errors of its parameters, in standard deviations.
     fn plant_at(&self, errors: &[f64]) -> Result<StateSpace<Discrete>> {
         let (model, delays) = self.directions.moved(errors);
@@ -216,130 +227,5 @@ impl Region {
     fn rivals(&self) -> impl Iterator<Item = (Result<StateSpace<Discrete>>, f64)> + '_ {
         let realised = |(model, delays, weight)| (physical::realised(model, delays, &self.sizes, self.time), weight);
         self.directions.rivals().map(realised)
-    }
-}
-
-/// The error of the response at a frequency, physical units.
-#[derive(Debug, Clone)]
-pub struct ResponseError {
-    /// Entries of G, row by row; columns are independent errors of unit variance.
-    directions: Mat<c64>,
-    inputs: usize,
-}
-
-impl ResponseError {
-    /// Covariance `[re re, re im, im im]` of the error of an entry (output, input).
-    fn covariance(&self, (output, input): (usize, usize)) -> [f64; 3] {
-        let row = output * self.inputs + input;
-        let mut sums = [0.0; 3];
-        for k in 0..self.directions.ncols() {
-            let e = self.directions[(row, k)];
-            sums = [sums[0] + e.re * e.re, sums[1] + e.re * e.im, sums[2] + e.im * e.im];
-        }
-        sums
-    }
-
-    /// The errors of the entries, without how they hang together: less memory by the number of independent errors.
-    pub fn entries(&self) -> EntryErrors {
-        let (p, m) = (self.directions.nrows() / self.inputs.max(1), self.inputs);
-        let ports = (0..p).flat_map(|i| (0..m).map(move |j| (i, j)));
-        EntryErrors { covariances: ports.map(|port| self.covariance(port)).collect(), inputs: m }
-    }
-
-    /// The error of `left G right` (matrices of this frequency, q x p and m x r) in place of G: for example of S, with the loop on
-    /// both sides.
-    #[must_use]
-    pub fn between(&self, left: MatRef<'_, c64>, right: MatRef<'_, c64>) -> ResponseError {
-        let (q, r) = (left.nrows(), right.ncols());
-        let moved: Vec<Mat<c64>> = self.changes().map(|change| left * change * right).collect();
-        let directions = Mat::from_fn(q * r, moved.len(), |i, k| moved[k][(i / r, i % r)]);
-        ResponseError { directions, inputs: r }
-    }
-
-    /// The independent errors of unit variance, each a p x m change of G.
-    pub fn changes(&self) -> impl Iterator<Item = Mat<c64>> + '_ {
-        let (p, m) = (self.directions.nrows() / self.inputs.max(1), self.inputs);
-        let change = move |k: usize| Mat::from_fn(p, m, |i, j| self.directions[(i * m + j, k)]);
-        (0..self.directions.ncols()).map(change)
-    }
-
-    /// Standard deviation of `Re sum_ij w_ij dG_ij`, `w` p x m: what a figure with these slopes inherits, errors of the entries that
-    /// hang together included. A peak of the sensitivity is such a figure.
-    pub fn along(&self, slopes: MatRef<'_, c64>) -> f64 {
-        let of = |k: usize| {
-            let entry = |i: usize| (self.directions[(i, k)] * slopes[(i / self.inputs, i % self.inputs)]).re;
-            (0..self.directions.nrows()).map(entry).sum::<f64>()
-        };
-        (0..self.directions.ncols()).map(|k| of(k).powi(2)).sum::<f64>().sqrt()
-    }
-}
-
-/// The errors of the entries of G at a frequency, each by itself, physical units.
-#[derive(Debug, Clone)]
-pub struct EntryErrors {
-    /// `[re re, re im, im im]`, row by row.
-    covariances: Vec<[f64; 3]>,
-    inputs: usize,
-}
-
-impl EntryErrors {
-    /// Covariance `[re re, re im, im im]` of the error of an entry (output, input).
-    pub fn covariance(&self, (output, input): (usize, usize)) -> [f64; 3] {
-        self.covariances[output * self.inputs + input]
-    }
-
-    /// Standard deviation of the magnitude of an entry with the response `g`, to first order.
-    pub fn of_magnitude(&self, g: c64, port: (usize, usize)) -> f64 {
-        let (re, im) = if g.norm() > 0.0 { (g.re / g.norm(), g.im / g.norm()) } else { (1.0, 0.0) };
-        let [rr, ri, ii] = self.covariance(port);
-        (re * re * rr + 2.0 * re * im * ri + im * im * ii).max(0.0).sqrt()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use crate::identify::likelihood::{Experiment, LikelihoodOptions, ResponseError, recommend};
-    use crate::lti::{Discrete, frequency_response};
-    use crate::{Mat, c64};
-    use rand::{RngExt, SeedableRng};
-
-    /// A first-order plant behind a dead time: its error at some frequencies, with its response there.
-    fn errors(dead_time: usize) -> Vec<(ResponseError, c64)> {
-        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(3);
-        let mut random = || rng.random::<f64>() - 0.5;
-        let u = Mat::from_fn(2000, 1, |_, _| random());
-        let (mut x, mut y) = (0.0, Mat::zeros(2000, 1));
-        for t in dead_time..2000 {
-            y[(t, 0)] = x + 0.1 * random();
-            x = 0.9 * x + u[(t - dead_time, 0)];
-        }
-        let options = LikelihoodOptions { order: Some(1), dead_time: Some(vec![dead_time]), ..Default::default() };
-        let (records, time) = ([Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(1e-3).unwrap());
-        let found = recommend(&records, &[], None, time, &options).unwrap();
-        [1.0, 5.0, 20.0, 90.0, 300.0]
-            .map(|hz| {
-                let g = frequency_response(&found.plant, &[std::f64::consts::TAU * hz]).unwrap().at(0)[(0, 0)];
-                (found.region.at(hz), g)
-            })
-            .into()
-    }
-
-    /// The error turns with the response, at 90 Hz by 194 degrees. Other noise changes the deviations by a few per cent.
-    #[test]
-    fn the_deviation_of_the_magnitude_does_not_depend_on_a_dead_time() {
-        for ((plain, g), (delayed, of_delayed)) in errors(0).iter().zip(errors(6)) {
-            let ratio = delayed.entries().of_magnitude(of_delayed, (0, 0)) / plain.entries().of_magnitude(*g, (0, 0));
-            assert!((0.85..1.15).contains(&ratio), "{ratio}");
-        }
-    }
-
-    #[test]
-    fn a_figure_that_is_the_real_part_of_an_entry_has_its_deviation() {
-        for (error, g) in errors(2) {
-            let one = Mat::from_fn(1, 1, |_, _| c64::ONE);
-            assert!((error.along(one.as_ref()).powi(2) / error.covariance((0, 0))[0] - 1.0).abs() < 1e-12);
-            let turned = Mat::from_fn(1, 1, |_, _| g.conj() / g.norm());
-            assert!((error.along(turned.as_ref()) / error.entries().of_magnitude(g, (0, 0)) - 1.0).abs() < 1e-9);
-        }
     }
 }

@@ -12,6 +12,7 @@ use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
 use faer::{Mat, Scale, c64};
+use std::ops::AddAssign;
 
 /// The root, in parts.
 #[derive(Debug, Clone)]
@@ -97,42 +98,32 @@ impl Root {
         step
     }
 
-    /// `slopes root`: errors of the entries of G, row by row of the outputs.
-    pub(crate) fn seen(&self, slopes: &Mat<c64>) -> Mat<c64> {
+    /// Errors of the entries of G(z), slopes times root: those of each output alone, m x errors, and those of all, p m x errors.
+    pub(crate) fn seen(&self, chart: &Chart, model: &Model, z: c64) -> (Vec<Mat<c64>>, Mat<c64>) {
         if self.own.is_empty() {
-            let all: Vec<usize> = (0..slopes.ncols()).collect();
-            let mut out = Mat::<c64>::zeros(slopes.nrows(), self.shared.ncols());
-            put(&mut out, (0, 0), &(real(slopes, 0..slopes.nrows(), &all) * &self.shared));
-            return out;
+            return (Vec::new(), product(&chart.response_slopes(model, z), &self.shared));
         }
-        let m = slopes.nrows() / self.own.len();
-        let mut out = Mat::<c64>::zeros(slopes.nrows(), self.errors());
-        let mut at = 0;
+        let slopes = chart.slopes(model, z);
+        let rows =
+            |places: &[usize]| Mat::from_fn(places.len(), self.shared.ncols(), |i, k| self.shared[(places[i], k)]);
         let plant: Vec<usize> = self.places.plant.iter().map(|e| e.place).collect();
-        let first = self.errors() - self.shared.ncols();
-        for (o, (own, of)) in self.own.iter().zip(&self.places.own).enumerate() {
-            put(&mut out, (o * m, at), &(real(slopes, o * m..(o + 1) * m, of) * own));
-            at += own.ncols();
-            let all = [of.as_slice(), &plant].concat();
-            let root = Mat::from_fn(all.len(), self.shared.ncols(), |i, k| self.shared[(all[i], k)]);
-            put(&mut out, (o * m, first), &(real(slopes, o * m..(o + 1) * m, &all) * root));
+        let mut shared = product(&slopes.shared, &rows(&plant));
+        for (o, (slopes, of)) in slopes.own.iter().zip(&self.places.own).enumerate() {
+            let m = slopes.nrows();
+            shared.subrows_mut(o * m, m).add_assign(product(slopes, &rows(of)));
         }
-        out
+        let own = slopes.own.iter().zip(&self.own).map(|(slopes, root)| product(slopes, root));
+        (own.collect(), shared)
     }
 }
 
-/// Some entries of some rows, real parts above imaginary parts.
-fn real(slopes: &Mat<c64>, rows: std::ops::Range<usize>, places: &[usize]) -> Mat<f64> {
-    let m = rows.len();
-    Mat::from_fn(2 * m, places.len(), |i, k| {
-        let value = slopes[(rows.start + i % m, places[k])];
-        if i < m { value.re } else { value.im }
-    })
-}
-
-fn put(out: &mut Mat<c64>, (row, column): (usize, usize), parts: &Mat<f64>) {
-    let m = parts.nrows() / 2;
-    for k in 0..parts.ncols() {
-        (0..m).for_each(|i| out[(row + i, column + k)] = c64::new(parts[(i, k)], parts[(m + i, k)]));
-    }
+/// A product of a complex matrix and a real one: its real parts above its imaginary parts.
+fn product(left: &Mat<c64>, right: &Mat<f64>) -> Mat<c64> {
+    let rows = left.nrows();
+    let parts = Mat::from_fn(2 * rows, left.ncols(), |i, k| match i.checked_sub(rows) {
+        None => left[(i, k)].re,
+        Some(i) => left[(i, k)].im,
+    });
+    let parts = parts * right;
+    Mat::from_fn(rows, right.ncols(), |i, k| c64::new(parts[(i, k)], parts[(rows + i, k)]))
 }

@@ -80,6 +80,17 @@ impl Block {
         }
     }
 
+    /// `(z I - A)^-1 B` and `C (z I - A)^-1`.
+    pub(crate) fn sides(&self, z: c64) -> (Mat<c64>, Mat<c64>) {
+        let s = self.states;
+        let (m, p) = (self.b.len() / s, self.c.len() / s);
+        let mut inverse = vec![c64::ZERO; s * s];
+        self.resolvent(z, &mut inverse);
+        let x = |i: usize, j: usize| (0..s).fold(c64::ZERO, |sum, l| sum + inverse[i * s + l] * self.b[l * m + j]);
+        let left = |o: usize, j: usize| (0..s).fold(c64::ZERO, |sum, i| sum + inverse[i * s + j] * self.c[o * s + i]);
+        (Mat::from_fn(s, m, x), Mat::from_fn(p, s, left))
+    }
+
     /// States scaled so that each has a like share of B and C, in units of one.
     pub(crate) fn levelled(mut self) -> Self {
         let s = self.states;

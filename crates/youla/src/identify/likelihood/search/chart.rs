@@ -4,7 +4,7 @@
 use super::block::Block;
 use super::model::Model;
 use super::separable::separable;
-use faer::{Mat, c64};
+use faer::{Mat, MatRef, c64};
 
 /// The local coordinates of a model.
 #[derive(Debug, Clone)]
@@ -36,6 +36,14 @@ pub(crate) struct Places {
     pub(crate) plant: Vec<Entry>,
     /// Places of the row of C and that of D of each output.
     pub(crate) own: Vec<Vec<usize>>,
+}
+
+/// Slopes of G(z) in the parameters, rows by entries of G, row by row.
+pub(crate) struct Slopes {
+    /// In the rows of C and D of each output, m x parameters.
+    pub(crate) own: Vec<Mat<c64>>,
+    /// In all other parameters, p m x parameters.
+    pub(crate) shared: Mat<c64>,
 }
 
 impl Chart {
@@ -129,39 +137,54 @@ impl Chart {
         Chart { directions, units: Vec::new(), feedthrough: false, inputs: m, outputs: p }
     }
 
-    /// Slopes of G(z) in the parameters, `[row][column]` of G row by row, then parameters.
+    /// Slopes of G(z) where entries move alone.
+    pub(crate) fn slopes(&self, model: &Model, z: c64) -> Slopes {
+        let (m, p) = (self.inputs, self.outputs);
+        let mut own = vec![Vec::new(); p];
+        let mut shared = Vec::new();
+        for (block, units) in model.blocks.iter().zip(&self.units) {
+            let (x, left) = block.sides(z);
+            let (s, b, c) = (block.states, block.a.len(), block.a.len() + block.b.len());
+            for e in units {
+                match *e {
+                    e if e >= c => own[(e - c) / s].extend((0..m).map(|j| x[((e - c) % s, j)])),
+                    e if e >= b => {
+                        let (i, input) = ((e - b) / m, (e - b) % m);
+                        let of = |row: usize| if row % m == input { left[(row / m, i)] } else { c64::ZERO };
+                        shared.extend((0..p * m).map(of));
+                    }
+                    e => shared.extend((0..p * m).map(|row| left[(row / m, e / s)] * x[(e % s, row % m)])),
+                }
+            }
+        }
+        if self.feedthrough {
+            let identity = (0..m * m).map(|k| if k / m == k % m { c64::ONE } else { c64::ZERO });
+            own.iter_mut().for_each(|own| own.extend(identity.clone()));
+        }
+        let matrix = |values: &Vec<c64>, rows: usize| {
+            MatRef::from_column_major_slice(values, rows, values.len() / rows.max(1)).to_owned()
+        };
+        Slopes { own: own.iter().map(|own| matrix(own, m)).collect(), shared: matrix(&shared, p * m) }
+    }
+
+    /// The same in one matrix, `[row][column]` of G row by row, then parameters.
     pub(crate) fn response_slopes(&self, model: &Model, z: c64) -> Mat<c64> {
         let (m, p) = (self.inputs, self.outputs);
         let mut out = Mat::<c64>::zeros(p * m, self.parameters());
-        let mut at = 0;
-        for (k, block) in model.blocks.iter().enumerate() {
-            let s = block.states;
-            let mut inverse = vec![c64::ZERO; s * s];
-            block.resolvent(z, &mut inverse);
-            let x = Mat::<c64>::from_fn(s, m, |i, j| {
-                (0..s).fold(c64::ZERO, |sum, l| sum + inverse[i * s + l] * block.b[l * m + j])
-            });
-            let left = Mat::<c64>::from_fn(p, s, |o, j| {
-                (0..s).fold(c64::ZERO, |sum, i| sum + inverse[i * s + j] * block.c[o * s + i])
-            });
-            if let Some(units) = self.units.get(k) {
-                let (b, c) = (s * s, s * (s + m));
-                for (q, e) in units.iter().enumerate() {
-                    if *e >= c {
-                        let (o, i) = ((e - c) / s, (e - c) % s);
-                        (0..m).for_each(|j| out[(o * m + j, at + q)] = x[(i, j)]);
-                    } else if *e >= b {
-                        let (i, j) = ((e - b) / m, (e - b) % m);
-                        (0..p).for_each(|o| out[(o * m + j, at + q)] = left[(o, i)]);
-                    } else {
-                        let of = |row: usize| left[(row / m, e / s)] * x[(e % s, row % m)];
-                        (0..p * m).for_each(|row| out[(row, at + q)] = of(row));
-                    }
-                }
-                at += units.len();
-                continue;
+        if !self.units.is_empty() {
+            let (Slopes { own, shared }, places) = (self.slopes(model, z), self.places(model));
+            let columns = places.plant.iter().zip(shared.col_iter());
+            columns.for_each(|(entry, column)| out.col_mut(entry.place).copy_from(column));
+            for (o, (own, of)) in own.iter().zip(&places.own).enumerate() {
+                let columns = of.iter().zip(own.col_iter());
+                columns.for_each(|(place, column)| out.subrows_mut(o * m, m).col_mut(*place).copy_from(column));
             }
-            let directions = &self.directions[k];
+            return out;
+        }
+        let mut at = 0;
+        for (block, directions) in model.blocks.iter().zip(&self.directions) {
+            let s = block.states;
+            let (x, left) = block.sides(z);
             for q in 0..directions.ncols() {
                 for o in 0..p {
                     for j in 0..m {
@@ -183,6 +206,14 @@ impl Chart {
             (0..p * m).for_each(|k| out[(k, at + k)] = c64::ONE);
         }
         out
+    }
+
+    /// The change of the entries of a model by a step.
+    pub(crate) fn change(&self, model: &Model, step: &[f64]) -> Model {
+        let mut nothing = model.clone();
+        let entries = nothing.blocks.iter_mut().flat_map(|b| [&mut b.a, &mut b.b, &mut b.c]);
+        entries.chain([&mut nothing.d]).for_each(|entries| entries.fill(0.0));
+        self.moved(&nothing, step)
     }
 
     /// Number of parameters.

@@ -152,6 +152,22 @@ impl Model {
         }
         g
     }
+
+    /// `dG = C R dA R B + C R dB + dC R B + dD` with `R = (z I - A)^-1`, p x m row by row, for a change of the entries.
+    pub(crate) fn response_change(&self, change: &Model, z: c64) -> Vec<c64> {
+        let (m, p) = (self.inputs, self.outputs);
+        let mut out: Vec<c64> = change.d.iter().map(|d| c64::new(*d, 0.0)).collect();
+        for (block, by) in self.blocks.iter().zip(&change.blocks) {
+            let (s, (x, left)) = (block.states, block.sides(z));
+            let complex = |values: &[f64], columns: usize| {
+                let rows = values.len() / columns.max(1);
+                Mat::from_fn(rows, columns, |i, j| c64::new(values[i * columns + j], 0.0))
+            };
+            let g = left * (complex(&by.a, s) * &x + complex(&by.b, m)) + complex(&by.c, s) * &x;
+            (0..p * m).for_each(|row| out[row] += g[(row / m, row % m)]);
+        }
+        out
+    }
 }
 
 /// Share of the norm of a block below which an entry under its diagonal is rounding: the bases of the invariant subspaces come from

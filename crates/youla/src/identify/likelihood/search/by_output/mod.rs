@@ -100,16 +100,16 @@ impl Normal {
     ) -> Self {
         let columns = Columns::new(point, chart, extra.count, ends);
         let own = columns.nuisance() + columns.parameters_of_an_output();
-        let of = |output: usize| {
-            let width = own + columns.shared() + 1;
-            let mut sum = Mat::<f64>::zeros(width, width);
+        let width = own + columns.shared() + 1;
+        let mut grams = vec![Mat::<f64>::zeros(width, width); spectra.outputs];
+        // Outputs of one thread share the states; the sums of an output are the same on any number of threads.
+        let piece = spectra.outputs.div_ceil(rayon::current_num_threads()).max(1);
+        grams.par_chunks_mut(piece).enumerate().for_each(|(k, sums)| {
             for (record, lines) in spectra.records.iter().enumerate() {
                 let more = extra.values.get(record).map_or(&[][..], Vec::as_slice);
-                Rows { lines, point, noise, columns: &columns, output, record, more }.add_to(&mut sum, own);
+                Rows { lines, point, noise, columns: &columns, record, more }.add_to(k * piece, sums, own);
             }
-            sum
-        };
-        let grams = (0..spectra.outputs).into_par_iter().map(of).collect();
+        });
         Normal { grams, own, slope: vec![0.0; columns.parameters], columns }
     }
 

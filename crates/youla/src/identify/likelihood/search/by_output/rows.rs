@@ -14,22 +14,49 @@ use pulp::{Arch, NullaryFnOnce};
 /// Lines whose rows are multiplied together.
 const CHUNK: usize = 16 * LANES;
 
-/// The rows of one output in one record.
+/// The rows of outputs in one record.
 pub(super) struct Rows<'a> {
     pub(super) lines: &'a Lines,
     pub(super) point: &'a Point,
     pub(super) noise: &'a Noise,
     pub(super) columns: &'a Columns,
-    pub(super) output: usize,
     pub(super) record: usize,
     /// Further columns, lines x p x count.
     pub(super) more: &'a [faer::c64],
 }
 
-/// One group of lines, computed with the widest instructions that the processor has.
-struct Group<'a, 'b> {
+/// What all outputs share on [`LANES`] lines.
+struct Shared {
+    z: Lanes,
+    ends: Lanes,
+    u: Vec<Lanes>,
+    drift: Lanes,
+    /// States of all blocks, and `(z I - A)^-1` of each, row by row.
+    x: Vec<Lanes>,
+    inverses: Vec<Lanes>,
+}
+
+/// The lines on which it is computed, with the widest instructions that the processor has.
+struct At<'a, 'b> {
     rows: &'a Rows<'b>,
     first: usize,
+}
+
+impl NullaryFnOnce for At<'_, '_> {
+    type Output = Shared;
+
+    #[inline(always)]
+    fn call(self) -> Shared {
+        self.rows.shared(self.first)
+    }
+}
+
+/// The rows of one output there.
+struct Group<'a, 'b> {
+    rows: &'a Rows<'b>,
+    output: usize,
+    first: usize,
+    shared: &'a Shared,
     out: &'a mut [Lanes],
 }
 
@@ -38,32 +65,39 @@ impl NullaryFnOnce for Group<'_, '_> {
 
     #[inline(always)]
     fn call(self) {
-        self.rows.group(self.first, self.out);
+        self.rows.group((self.output, self.first), self.shared, self.out);
     }
 }
 
 impl Rows<'_> {
-    /// Adds the products of the rows to normal equations with `own` own columns.
-    pub(super) fn add_to(&self, sum: &mut Mat<f64>, own: usize) {
+    /// Adds the products of the rows of outputs from `output` on to their normal equations with `own` own columns.
+    pub(super) fn add_to(&self, output: usize, sums: &mut [Mat<f64>], own: usize) {
         let places = self.places(own);
         let (width, total) = (places.len(), self.lines.z.len());
         let mut out = vec![Lanes::ZERO; width];
         let mut work = Mat::<f64>::zeros(2 * CHUNK, width);
-        let mut gram = Mat::<f64>::zeros(width, width);
+        let mut grams = vec![Mat::<f64>::zeros(width, width); sums.len()];
         let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
         for first in (0..total).step_by(CHUNK) {
-            let mut filled = 0;
-            for first in (first..total.min(first + CHUNK)).step_by(LANES) {
-                Arch::new().dispatch(Group { rows: self, first, out: &mut out });
-                filled += self.put(first, &out, &mut work, filled);
+            let groups: Vec<usize> = (first..total.min(first + CHUNK)).step_by(LANES).collect();
+            let shared: Vec<Shared> =
+                groups.iter().map(|first| Arch::new().dispatch(At { rows: self, first: *first })).collect();
+            for (output, gram) in (output..).zip(&mut grams) {
+                let mut filled = 0;
+                for (&first, shared) in groups.iter().zip(&shared) {
+                    Arch::new().dispatch(Group { rows: self, output, first, shared, out: &mut out });
+                    filled += self.put(first, &out, &mut work, filled);
+                }
+                let all = work.subrows(0, filled);
+                triangular::matmul(gram.as_mut(), lower, Accum::Add, all.transpose(), whole, all, whole, 1.0, Par::Seq);
             }
-            let all = work.subrows(0, filled);
-            triangular::matmul(gram.as_mut(), lower, Accum::Add, all.transpose(), whole, all, whole, 1.0, Par::Seq);
         }
-        for j in 0..width {
-            for i in j..width {
-                let (a, b) = (places[i].max(places[j]), places[i].min(places[j]));
-                sum[(a, b)] += gram[(i, j)];
+        for (sum, gram) in sums.iter_mut().zip(grams) {
+            for j in 0..width {
+                for i in j..width {
+                    let (a, b) = (places[i].max(places[j]), places[i].min(places[j]));
+                    sum[(a, b)] += gram[(i, j)];
+                }
             }
         }
     }
@@ -86,37 +120,58 @@ impl Rows<'_> {
         out
     }
 
-    /// The columns of [`LANES`] lines: drift, own ends, C, D, entries of A and B, shared ends, further ones, residual.
+    /// What all outputs share on [`LANES`] lines.
     #[inline(always)]
-    fn group(&self, first: usize, out: &mut [Lanes]) {
-        let Rows { lines, columns, output, .. } = *self;
+    fn shared(&self, first: usize) -> Shared {
+        let Rows { lines, columns, .. } = *self;
         let (model, t) = (&self.point.model, &self.point.ends[self.record]);
-        let (m, p, n) = (model.inputs, model.outputs, columns.states);
-        let last = lines.z.len() - 1;
-        let line = |l: usize| (first + l).min(last);
+        let line = |l: usize| (first + l).min(lines.z.len() - 1);
         let z = Lanes::gather(|l| lines.z[line(l)]);
         let ends = Lanes::gather(|l| lines.ends[line(l)]).times(&z);
+        let m = model.inputs;
         let u: Vec<Lanes> = (0..m).map(|j| Lanes::gather(|l| lines.u[line(l) * m + j])).collect();
+        let entries = model.blocks.iter().map(|b| b.a.len()).sum();
+        let (mut inverses, mut x) = (vec![Lanes::ZERO; entries], vec![Lanes::ZERO; columns.states]);
+        let (mut state, mut entry) = (0, 0);
+        for block in &model.blocks {
+            let (s, squared) = (block.states, block.a.len());
+            let parts = (&mut inverses[entry..entry + squared], &mut x[state..state + s]);
+            states(block, (&z, &ends, &u), &t[state..state + s], parts);
+            (state, entry) = (state + s, entry + squared);
+        }
         let drift = ends.times(&z.shifted(-1.0).inverse());
+        Shared { z, ends, u, drift, x, inverses }
+    }
+
+    /// The columns of [`LANES`] lines: drift, own ends, C, D, entries of A and B, shared ends, further ones, residual.
+    #[inline(always)]
+    fn group(&self, (output, first): (usize, usize), shared: &Shared, out: &mut [Lanes]) {
+        let Rows { lines, columns, .. } = *self;
+        let Shared { z, ends, u, drift, .. } = shared;
+        let (model, t) = (&self.point.model, &self.point.ends[self.record]);
+        let (m, p, n) = (model.inputs, model.outputs, columns.states);
+        let line = |l: usize| (first + l).min(lines.z.len() - 1);
         let mut v = Lanes::gather(|l| lines.y[line(l) * p + output]);
-        v.add_scaled(&drift, -t[n + output]);
-        out[0] = drift;
+        v.add_scaled(drift, -t[n + output]);
+        out[0] = *drift;
         let c_first = 1 + if columns.ends == Ends::Own { n } else { 0 };
         let d_first = c_first + if columns.moving[0] { n } else { 0 };
         let plant_first = d_first + if columns.moving[1] { m } else { 0 };
         let ends_first = if columns.ends == Ends::Own { 1 } else { plant_first + columns.plant.len() };
         let largest = model.blocks.iter().map(|b| b.states).max().unwrap_or(0);
-        let (mut inverse, mut x) = (vec![Lanes::ZERO; largest * largest], vec![Lanes::ZERO; largest]);
         let mut left = vec![Lanes::ZERO; largest];
-        let (mut state, mut entry) = (0, 0);
+        let (mut state, mut entry, mut first_of_block) = (0, 0, 0);
         for (k, block) in model.blocks.iter().enumerate() {
             let s = block.states;
-            states(block, (&z, &ends, &u), &t[state..state + s], (&mut inverse, &mut x));
+            let (x, inverse) = (&shared.x[state..state + s], &shared.inverses[first_of_block..]);
+            let triangular = block.is_triangular();
             for j in 0..s {
                 left[j] = Lanes::ZERO;
-                (0..s).for_each(|i| left[j].add_scaled(&inverse[i * s + j], block.c[output * s + i]));
+                // Below its diagonal blocks of one or two states the inverse of a triangular block is zero.
+                let rows = if triangular { (j + 2).min(s) } else { s };
+                (0..rows).for_each(|i| left[j].add_scaled(&inverse[i * s + j], block.c[output * s + i]));
                 v.add_scaled(&x[j], -block.c[output * s + j]);
-                out[ends_first + state + j] = left[j].times(&ends);
+                out[ends_first + state + j] = left[j].times(ends);
                 if columns.moving[0] {
                     out[c_first + state + j] = x[j];
                 }
@@ -128,7 +183,7 @@ impl Rows<'_> {
                 };
                 entry += 1;
             }
-            state += s;
+            (state, first_of_block) = (state + s, first_of_block + s * s);
         }
         for (j, u) in u.iter().enumerate() {
             v.add_scaled(u, -model.d[output * m + j]);

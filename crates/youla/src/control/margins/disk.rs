@@ -61,7 +61,7 @@ pub(super) fn of_gain(peak: PeakGain, sigma: f64) -> DiskMargin {
 pub(super) fn all_channels<T: TimeDomain>(sensitivity: &StateSpace<T>) -> Result<DiskMargins> {
     let margin = |sigma: f64| -> Result<DiskMargin> {
         let system = shifted(sensitivity, 0.5 * (sigma - 1.0))?;
-        let peak = if system.inputs() < 2 { peak_of(&system)? } else { structured_peak(&system)? };
+        let peak = if system.inputs() < 2 { peak_of(&system)? } else { structured_peak(&system, 0.5 * (1.0 + sigma))? };
         Ok(of_gain(peak, sigma))
     };
     Ok(DiskMargins { balanced: margin(0.0)?, sensitivity: margin(1.0)? })

@@ -5,7 +5,7 @@
 //! expect, not about what no record shows (an operating point never visited, a mode never excited).
 
 use crate::identify::likelihood::{Draw, Interval, Region};
-use crate::lti::{Discrete, StateSpace};
+use crate::lti::{Discrete, Eigen, StateSpace};
 use crate::{Error, Result};
 use rayon::prelude::*;
 
@@ -96,8 +96,24 @@ where
         unstable: unstable(&tested),
         unstable_within: unstable(&tested[..within]),
         worst_within: tested[..within].iter().map(|(_, radius)| *radius).fold(0.0, f64::max),
-        radius: region.intervals(LEVEL, |plant| Ok(vec![radius(plant)?]))?[0],
+        radius: radius_interval(region, closed)?,
     })
+}
+
+/// The interval of the largest magnitude of a pole: to first order `dz = w' dA v` by its eigenvectors.
+fn radius_interval<F>(region: &Region, closed: F) -> Result<Interval>
+where
+    F: Fn(&StateSpace<Discrete>) -> Result<StateSpace<Discrete>> + Sync,
+{
+    let nominal = closed(&region.estimate()?)?;
+    let exact = |plant: &StateSpace<Discrete>| Ok(vec![spectral_radius(&closed(plant)?)?]);
+    let eigen = Eigen::new(&nominal)?;
+    let largest = eigen.poles().iter().copied().max_by(|a, b| a.norm().total_cmp(&b.norm()));
+    let near = |plant: &StateSpace<Discrete>| {
+        let change = closed(plant)?.a() - nominal.a();
+        Ok(vec![largest.map_or(0.0, |pole| (pole + eigen.change(pole, &change)).norm())])
+    };
+    Ok(region.intervals_by(LEVEL, near, exact)?[0])
 }
 
 /// Level of regions and intervals.

@@ -3,7 +3,7 @@
 >>> import youla
 >>> run = youla.demo()                              # simulates a levitated mass and identifies it
 >>> run.verdict.trusted, run.recommended.order
-(True, 3)
+(True, 2)
 """
 
 from . import _native

@@ -134,7 +134,7 @@ class Run:
     >>> import youla
     >>> run = youla.demo()
     >>> run.verdict.trusted, run.recommended.order
-    (True, 3)
+    (True, 2)
     >>> run.real_poles()[0].hz_interval is not None
     True
     """

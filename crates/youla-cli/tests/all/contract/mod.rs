@@ -70,7 +70,7 @@ fn summary_recommends_one_model() {
         "loop_ratio_hz",
         "method",
     ];
-    let rest = ["modes", "order", "parts", "reasons", "response_deviation", "tests", "trusted"];
+    let rest = ["modes", "order", "parts", "real_poles", "reasons", "response_deviation", "tests", "trusted"];
     assert_eq!(keys(recommended), [&first[..], &rest[..]].concat());
     assert_eq!(recommended["description"], true);
     assert_eq!(keys(&recommended["parts"]), ["choice", "distortion", "noise", "variation"]);
@@ -118,6 +118,7 @@ fn summary_describes_every_method() {
         "modes_cancelled",
         "order",
         "poles",
+        "real_poles",
         "residuals",
         "robustness",
         "stabilised_by_controller",

@@ -38,7 +38,7 @@ fn run((settings, folder): (RunSettings, PathBuf)) -> Identification {
 #[ignore = "needs the measured data: YOULA_DATA or ../shared/data"]
 fn flexible_drive() {
     let found = run(example("flexible-drive"));
-    assert_eq!(found.settings.frequency_response.window, 8000);
+    assert_eq!(found.settings.frequency_response.window, Some(8000));
     let measured = &found.indirect.as_ref().unwrap().as_ref().unwrap().response;
     let hz: Vec<f64> = measured.omega.iter().map(|w| w / std::f64::consts::TAU).collect();
     let decibels = |response: &FrequencyResponse| -> Vec<f64> {

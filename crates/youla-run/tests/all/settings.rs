@@ -45,7 +45,7 @@ fn settings_without_a_record_are_refused_not_run() {
     refused(check_run(&settings, Path::new(".")).map(|_| ()));
     assert_eq!(whole.clone().checked().unwrap(), whole);
     let mut points = whole;
-    points.frequency_response.window = 1;
+    points.frequency_response.window = Some(1);
     assert!(points.checked().unwrap_err().to_string().contains("[frequency_response] window is 1"));
 }
 

@@ -241,7 +241,7 @@ class Run:
         tests = tuple(VerdictTest(**{**test, "hz": test["hz"] and tuple(test["hz"])}) for test in found["tests"])
         bands = tuple((low, high) for low, high in found["bands"])
         ratio = (found["loop_ratio"], found["loop_ratio_hz"])
-        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio, found["description"])
+        return Verdict(found["trusted"], tuple(found["reasons"]), evidence, lines, tests, bands, *ratio, found.get("description"))
 
     @property
     def fits(self) -> dict[str, dict[str, list[float | None]]]:

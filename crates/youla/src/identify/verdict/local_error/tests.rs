@@ -1,0 +1,64 @@
+//! Errors of bands by chance, beside a move, and in units of the response.
+
+use super::*;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::Exp1;
+
+/// Mean squares of bands of unequal chance, drawn without an error of the model: deviations beyond 3 are as rare as those of a normal
+/// variable (1.35 of 1000), within the factor of two that the approximation of Wilson and Hilferty leaves at two degrees of freedom.
+#[test]
+fn chance_alone_exceeds_three_deviations_as_rarely_as_a_normal_variable() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(3);
+    for means in [[1.0; 5], [1.0, 0.3, 3.0, 1.0, 10.0], [0.01, 1.0, 1.0, 1.0, 1.0]] {
+        let drawn = |rng: &mut ChaCha8Rng| {
+            let band = |(k, mean): (usize, &f64)| {
+                let square = mean * rng.sample::<f64, _>(Exp1);
+                let share = 0.1 + 1e-3 * k as f64;
+                ExcessBand { share, squares: vec![square - mean], chance: vec![*mean], freedom: 1.0 }
+            };
+            Excess { bands: means.iter().enumerate().map(band).collect(), least: 3.0 }
+        };
+        let beyond = (0..100_000).filter(|_| drawn(rng).near(0.102, 1).0[0] > 0.0).count();
+        assert!((70..=270).contains(&beyond), "{beyond} of 100000 with chances {means:?}");
+    }
+}
+
+/// Errors of 30 % of a response that falls by 12 dB per octave are 30 % at each frequency in its units; as they are, the bands of least chance
+/// above speak for the low ones.
+#[test]
+fn an_error_that_follows_the_response_is_found_in_its_units() {
+    let response = |share: f64| vec![(0.01 / share).powi(4)];
+    let band = |k: usize| {
+        let share = 0.005 + 0.01 * k as f64;
+        let power = response(share)[0];
+        ExcessBand { share, squares: vec![0.09 * power], chance: vec![1e-4 * power], freedom: 1.0 }
+    };
+    let excess = Excess { bands: (0..50).map(band).collect(), least: 4.0 };
+    for share in [0.006, 0.02, 0.1] {
+        let power = response(share)[0];
+        assert!((excess.near_in_units(share, &response).0[0] / (0.09 * power) - 1.0).abs() < 1e-12);
+    }
+    assert!(excess.near(0.006, 1).0[0] < 0.01 * 0.09 * response(0.006)[0]);
+}
+
+/// A move fills the first bands with 1e12 times the power of the excitation, which counts beside it in every band.
+#[test]
+fn an_excitation_counts_beside_a_move() {
+    let rng = &mut ChaCha8Rng::seed_from_u64(5);
+    let mut unit = || c64::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5);
+    let (mut u, mut v, mut x) = (Vec::new(), Vec::new(), Vec::new());
+    for k in 0..400 {
+        let moves = unit() * if k < 80 { 1e6 } else { 1e-2 };
+        let excitation = unit();
+        x.extend([moves, excitation]);
+        u.push(moves + excitation);
+        v.push((moves + excitation) * 0.1 + unit() * 1e-3);
+    }
+    let channels = Channels { m: 1, p: 1, q: 2 };
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 5, 0);
+    for band in &found.bands {
+        let error = band.as_ref().unwrap().error[0];
+        assert!((error - 0.1).norm() < 2e-3, "{error}");
+    }
+}

@@ -42,14 +42,14 @@ fn an_error_that_follows_the_response_is_found_in_its_units() {
     assert!(excess.near(0.006, 1).0[0] < 0.01 * 0.09 * response(0.006)[0]);
 }
 
-/// A move fills the first bands with 1e12 times the power of the excitation, which counts beside it in every band.
+/// A move fills the first bands with 1e8 times the power of the excitation, which counts beside it in every band.
 #[test]
 fn an_excitation_counts_beside_a_move() {
     let rng = &mut ChaCha8Rng::seed_from_u64(5);
     let mut unit = || c64::new(rng.random::<f64>() - 0.5, rng.random::<f64>() - 0.5);
     let (mut u, mut v, mut x) = (Vec::new(), Vec::new(), Vec::new());
     for k in 0..400 {
-        let moves = unit() * if k < 80 { 1e6 } else { 1e-2 };
+        let moves = unit() * if k < 80 { 1e4 } else { 1e-2 };
         let excitation = unit();
         x.extend([moves, excitation]);
         u.push(moves + excitation);

@@ -76,7 +76,13 @@ impl Rows<'_> {
         let (width, total) = (places.len(), self.lines.z.len());
         let mut out = vec![Lanes::ZERO; width];
         let mut work = Mat::<f64>::zeros(2 * CHUNK, width);
-        let mut grams = vec![Mat::<f64>::zeros(width, width); sums.len()];
+        // With one record they are the normal equations themselves.
+        let same = sums.first().is_some_and(|sum| places.iter().copied().eq(0..sum.nrows()));
+        let start = |sum: &mut Mat<f64>| match same {
+            true => std::mem::replace(sum, Mat::new()),
+            false => Mat::zeros(width, width),
+        };
+        let mut grams: Vec<Mat<f64>> = sums.iter_mut().map(start).collect();
         let (whole, lower) = (BlockStructure::Rectangular, BlockStructure::TriangularLower);
         for first in (0..total).step_by(CHUNK) {
             let groups: Vec<usize> = (first..total.min(first + CHUNK)).step_by(LANES).collect();
@@ -93,6 +99,10 @@ impl Rows<'_> {
             }
         }
         for (sum, gram) in sums.iter_mut().zip(grams) {
+            if same {
+                *sum = gram;
+                continue;
+            }
             for j in 0..width {
                 for i in j..width {
                     let (a, b) = (places[i].max(places[j]), places[i].min(places[j]));

@@ -8,8 +8,8 @@ use crate::matfile::read_mat;
 use crate::npz::{self, read_npz};
 use crate::open::open;
 use crate::time::TimeSource;
+use hmac_sha256::Hash;
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use youla::signal::Record;
@@ -107,7 +107,7 @@ pub fn check_unit(source: &Source, column: &ChannelRef) -> Result<()> {
 pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
     let path = path.as_ref();
     let mut file = open(path)?;
-    let mut hash = Sha256::new();
+    let mut hash = Hash::new();
     let mut buffer = vec![0; 1 << 16];
     loop {
         match file.read(&mut buffer) {
@@ -121,7 +121,7 @@ pub fn sha256(path: impl AsRef<Path>) -> Result<String> {
 
 /// SHA-256 of the values of columns in memory, each as its eight bytes from the lowest, as [`sha256`] names a file.
 pub fn sha256_of<'a>(columns: impl Iterator<Item = &'a [f64]>) -> String {
-    let mut hash = Sha256::new();
+    let mut hash = Hash::new();
     for piece in columns.flat_map(|column| column.chunks(1 << 10)) {
         hash.update(piece.iter().flat_map(|value| value.to_le_bytes()).collect::<Vec<u8>>());
     }

@@ -2,7 +2,7 @@
 
 use super::run::FinishedRun;
 use crate::Result;
-use sha2::{Digest, Sha256};
+use hmac_sha256::Hash;
 use std::collections::BTreeMap;
 use youla_io::toml_file;
 use youla_report::data::EvidenceTable;
@@ -57,6 +57,6 @@ fn shortened(text: &str) -> String {
     if text.chars().count() <= LONGEST {
         return text.to_owned();
     }
-    let digest: String = Sha256::digest(text).iter().take(4).map(|byte| format!("{byte:02x}")).collect();
+    let digest: String = Hash::hash(text.as_bytes()).iter().take(4).map(|byte| format!("{byte:02x}")).collect();
     format!("{}\u{2026} (SHA-256 {digest})", text.chars().take(LONGEST - 20).collect::<String>())
 }

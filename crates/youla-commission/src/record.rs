@@ -90,7 +90,7 @@ pub struct BetweenRecord {
 
 impl BetweenRecord {
     /// Both points by their names; also its folder.
-    pub fn name(&self) -> String {
+    pub(crate) fn name(&self) -> String {
         way_name(&self.from, &self.to)
     }
 }
@@ -118,13 +118,13 @@ pub struct Evidence {
 
 impl Evidence {
     /// Whether the figures are the same but for rounding.
-    pub fn equals(&self, other: &Self) -> bool {
+    pub(crate) fn equals(&self, other: &Self) -> bool {
         let figures = |e: &Self| [e.gain, e.room, e.change, e.region, e.q_room, e.q_error];
         figures(self).iter().zip(figures(other)).all(|(a, b)| (a - b).abs() <= 1e-6 * a.abs().max(b.abs()).max(1e-9))
     }
 
     /// Whether S has room for its region and Q for its error.
-    pub fn holds(&self) -> bool {
+    pub(crate) fn holds(&self) -> bool {
         self.gain < 1.0 && self.region < self.room && self.q_error < self.q_room
     }
 }

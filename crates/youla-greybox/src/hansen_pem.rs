@@ -13,7 +13,7 @@
 //! spurious lightly damped modes of G(S). With `W_jj^2 = Phi_alpha,jj domega` it is a quadrature of the criterion that follows, and since
 //! S errs by `(Mt + S Ut) n / alpha`, the error has the same size at all frequencies.
 
-pub use crate::projected_pem::{PemRun, PemStart, SUSPICION_POINTS};
+pub use crate::projected_pem::{PemRun, PemStart};
 
 use crate::Result;
 use crate::projected_pem::{Grid, Searches, Task, falls_behind, fit_of, pem_from_targets, plant_target};
@@ -85,7 +85,7 @@ pub struct HansenPem {
 }
 
 impl HansenPem {
-    /// Whether the fit of the structure is more than [`SUSPICION_POINTS`] below that of G(S), or below that of a constant, on an
+    /// Whether the fit of the structure is more than one point below that of G(S), or below that of a constant, on an
     /// output: the search ended in a local minimum, or the structure does not describe the plant.
     pub fn local_minimum_suspected(&self) -> bool {
         falls_behind(&self.model.simulation_fit, &self.fit_of_plant)

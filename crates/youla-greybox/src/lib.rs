@@ -78,7 +78,7 @@ pub use projection::{
 };
 pub use result::{GreyBoxModel, Stop};
 pub use search::bounds::{AtBound, Side};
-pub use search::cost::greybox_cost;
+pub(crate) use search::cost::greybox_cost;
 pub use search::identifiability::{Combination, Part, Undetermined};
 pub use structure::{Matrix, Slope, Structure};
 

@@ -20,7 +20,7 @@ use youla::{Mat, MatRef};
 
 /// A local minimum is suspected where the fit of the structure is this many percentage points below that of the model from which it was
 /// projected, on an output. Chosen: ten times the 0.1 point by which `docs/hansen-pem.md` counts a search as converged to the truth.
-pub const SUSPICION_POINTS: f64 = 1.0;
+pub(crate) const SUSPICION_POINTS: f64 = 1.0;
 
 /// Shortest segment of a spectrum.
 const SHORTEST_WINDOW: usize = 16;
@@ -145,7 +145,7 @@ fn first_error(runs: Vec<PemRun>) -> Error {
     first.unwrap_or(Error::NoStart).within("the prediction-error method from the projection of G(S)")
 }
 
-/// Whether a fit is more than [`SUSPICION_POINTS`] below another, or below that of a constant, on an output.
+/// Whether a fit is more than one point below another, or below that of a constant, on an output.
 pub(super) fn falls_behind(fit: &[f64], other: &[f64]) -> bool {
     fit.iter().zip(other).any(|(fit, other)| *fit < other.max(0.0) - SUSPICION_POINTS)
 }

@@ -278,7 +278,7 @@ pub fn replace_file(path: &Path, text: &str) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Unwritable`].
-pub fn require_writable(path: &Path) -> Result<()> {
+fn require_writable(path: &Path) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let probe = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
     let made = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));

@@ -10,8 +10,7 @@
 //! | [`read_csv`], [`write_csv`] | text: comma, semicolon, tab or blanks, plain or gzip |
 //! | [`read_mat`], [`write_mat`] | MATLAB version 5; version 7.3 and HDF5 with the feature `mat73` |
 //! | [`read_npz`] | NumPy archives |
-//! | [`read_uff58`] | universal files, dataset 58: measured responses |
-//! | [`read_response`] | tables of measured responses |
+//! | [`read_response`] | measured responses: tables, universal files with dataset 58 |
 //! | [`Variables`] | the contents of a MATLAB or NumPy file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
 //! | [`ModelFile`] | the JSON form of a discrete-time model |
@@ -73,5 +72,4 @@ pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, check_unit, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
 pub use time::{Gaps, TimeSource, unit_of_time};
-pub use uff::{UffFunction, UffKind, is_uff, read_uff58};
 pub use values::{Value, Variable, Variables};

@@ -25,7 +25,7 @@ const HEADER: usize = 11;
 
 /// What a function of a dataset 58 is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UffKind {
+pub(crate) enum UffKind {
     /// Frequency response function.
     Response,
     /// Coherence.
@@ -36,24 +36,24 @@ pub enum UffKind {
 
 /// One function of a file.
 #[derive(Debug, Clone, PartialEq)]
-pub struct UffFunction {
+pub(crate) struct UffFunction {
     /// What it is.
-    pub kind: UffKind,
+    pub(crate) kind: UffKind,
     /// Degree of freedom of the response, `node:direction` as in `12:+Z`, after the name of its entity where there is one.
-    pub response: String,
+    pub(crate) response: String,
     /// Degree of freedom of the reference.
-    pub reference: String,
+    pub(crate) reference: String,
     /// Abscissa, for a response the frequency in Hz.
-    pub abscissa: Vec<f64>,
+    pub(crate) abscissa: Vec<f64>,
     /// Ordinates.
-    pub values: Vec<c64>,
+    pub(crate) values: Vec<c64>,
 }
 
 /// Whether the first bytes of a file are those of a universal file.
 ///
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`].
-pub fn is_uff(path: &Path) -> Result<bool> {
+pub(crate) fn is_uff(path: &Path) -> Result<bool> {
     let mut start = Vec::new();
     let read = open(path)?.take(8).read_to_end(&mut start);
     read.map_err(|source| Error::Io { path: path.to_owned(), source })?;
@@ -65,7 +65,7 @@ pub fn is_uff(path: &Path) -> Result<bool> {
 /// # Errors
 /// [`Error::MissingFile`], [`Error::Io`]; [`Error::Corrupt`] with the line; [`Error::FormatNotRead`] for binary data and files above
 /// 256 MB; [`Error::NoData`] without a dataset 58.
-pub fn read_uff58(path: &Path) -> Result<Vec<UffFunction>> {
+pub(crate) fn read_uff58(path: &Path) -> Result<Vec<UffFunction>> {
     let bytes = crate::open::whole(path, LARGEST, "a universal file of more than 256 MB")?;
     let refused = |found, remedy| Err(Error::FormatNotRead { path: path.to_owned(), found, remedy });
     // labels may be in any encoding; numbers are not

@@ -121,7 +121,7 @@ impl Description {
     }
 
     /// Columns of a log: time, y, u, alpha, beta, status.
-    pub fn columns(&self) -> Vec<String> {
+    pub(crate) fn columns(&self) -> Vec<String> {
         let y = self.outputs.iter().map(|channel| channel.name.clone());
         let u = self.inputs.iter().map(|channel| channel.name.clone());
         let alpha = (1..=self.inputs.len()).map(|number| format!("alpha_{number}"));

@@ -27,7 +27,7 @@ pub enum ExcitationPort {
 
 impl ExcitationPort {
     /// In words.
-    pub fn words(self) -> &'static str {
+    pub(crate) fn words(self) -> &'static str {
         match self {
             ExcitationPort::Alpha => "port alpha of the controller (u = F xh + alpha)",
             ExcitationPort::Input => "plant input (u = K y + alpha)",

@@ -164,7 +164,7 @@ impl Identification {
     }
 
     /// The uncertainty of a model beside the recommended one.
-    pub fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
+    pub(crate) fn uncertainty(&self, method: Method) -> Option<&SystemUncertainty> {
         self.grey_box_uncertainty.as_ref().filter(|_| method == Method::GreyBox)
     }
 

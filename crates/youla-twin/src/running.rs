@@ -25,7 +25,7 @@ impl LoopDescription {
     ///
     /// # Errors
     /// [`youla_io::Error::Settings`] with line and key.
-    pub fn of_file(path: &Path) -> Result<Self> {
+    pub(crate) fn of_file(path: &Path) -> Result<Self> {
         #[derive(Deserialize)]
         struct Tables {
             nominal: NominalModel,
@@ -101,7 +101,7 @@ impl RunningLoop {
     }
 
     /// A loop that need not fit the firmware of a campaign.
-    pub fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
+    pub(crate) fn of_any_size(description: LoopDescription, path: &Path, time: Discrete) -> Result<Self> {
         let folder = path.parent().unwrap_or(Path::new(""));
         let nominal = description.nominal.realise(folder, time)?;
         let running = description.controller.realise(nominal.time(), Some(&nominal), folder)?;

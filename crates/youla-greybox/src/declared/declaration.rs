@@ -115,7 +115,7 @@ impl Declaration {
     ///
     /// # Errors
     /// None for the templates of the library.
-    pub fn whole(&self) -> Result<Declaration> {
+    pub(crate) fn whole(&self) -> Result<Declaration> {
         let Some(template) = self.template else { return Ok(self.clone()) };
         let Declaration { sample_time, a, b, c, d, mut parameters, mut derived, .. } = template.declaration()?;
         let amended = self.clone();

@@ -70,7 +70,7 @@ impl ResidualTest {
     }
 
     /// The auto-correlation that is largest in magnitude, with its lag.
-    pub fn largest_autocorrelation(&self) -> (usize, f64) {
+    pub(crate) fn largest_autocorrelation(&self) -> (usize, f64) {
         let all = self.autocorrelation.iter().flat_map(|of| of.iter().copied().enumerate());
         all.max_by(|a, b| a.1.abs().total_cmp(&b.1.abs())).map_or((0, 0.0), |(k, r)| (k + 1, r))
     }

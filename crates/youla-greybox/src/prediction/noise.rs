@@ -56,7 +56,7 @@ pub struct InnovationStart {
 
 impl InnovationStart {
     /// At a gain K, n x p.
-    pub fn of(gain: MatRef<'_, f64>) -> Self {
+    pub(crate) fn of(gain: MatRef<'_, f64>) -> Self {
         InnovationStart { gain: rows(gain) }
     }
 }
@@ -81,21 +81,6 @@ pub struct NoiseFilter {
 }
 
 impl NoiseFilter {
-    /// The filter of a system whose feedthrough is the identity.
-    ///
-    /// # Errors
-    /// [`youla::Error::OutOfRange`] for another feedthrough: H is not monic.
-    pub fn of(system: &StateSpace<Discrete>) -> Result<Self> {
-        let direct = system.d();
-        let one = |i: usize, j: usize| if i == j { 1.0 } else { 0.0 };
-        let off = Mat::from_fn(direct.nrows(), direct.ncols(), |i, j| direct[(i, j)] - one(i, j)).norm_max();
-        if off > 0.0 || direct.nrows() != direct.ncols() {
-            let what = "the distance of D of the noise filter from the identity".into();
-            return Err(Error::Method(youla::Error::OutOfRange { what, value: off, must: "0: H must be monic" }));
-        }
-        Ok(NoiseFilter { a: rows(system.a()), b: rows(system.b()), c: rows(system.c()) })
-    }
-
     /// `H^-1`, checked for `outputs` outputs.
     pub(crate) fn inverse(&self, outputs: usize, time: Discrete) -> Result<StateSpace<Discrete>> {
         let [a, b, c] = [("A", &self.a), ("B", &self.b), ("C", &self.c)]

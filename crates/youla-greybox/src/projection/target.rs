@@ -97,7 +97,7 @@ impl FrequencyTarget {
     ///
     /// # Errors
     /// [`youla::Error::Ports`], [`youla::Error::Shape`], [`youla::Error::OutOfRange`] for a weight that is not a number from 0.
-    pub fn weighted(mut self, weights: Vec<Mat<f64>>) -> Result<Self> {
+    pub(crate) fn weighted(mut self, weights: Vec<Mat<f64>>) -> Result<Self> {
         if weights.len() != self.omega.len() {
             let what = "the number of weights of the frequency response".into();
             return Err(Error::Method(youla::Error::Ports { what, expected: self.omega.len(), found: weights.len() }));
@@ -137,7 +137,7 @@ impl FrequencyTarget {
     ///
     /// # Errors
     /// [`youla::Error::Ports`] for another number of delays than inputs.
-    pub fn behind_delays(mut self, delays: &[usize]) -> Result<Self> {
+    pub(crate) fn behind_delays(mut self, delays: &[usize]) -> Result<Self> {
         if delays.is_empty() {
             return Ok(self);
         }
@@ -171,7 +171,7 @@ impl FrequencyTarget {
     }
 
     /// Number of excitations r; m for a plain response.
-    pub fn columns(&self) -> usize {
+    pub(crate) fn columns(&self) -> usize {
         self.values[0].ncols()
     }
 

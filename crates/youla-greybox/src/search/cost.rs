@@ -12,22 +12,7 @@ use crate::{GreyBoxOptions, Problem};
 ///
 /// # Errors
 /// As [`crate::greybox`] with the start `theta`.
-///
-/// ```
-/// use youla_greybox::{DeclaredStructure, GreyBoxOptions, Problem, Structure, Template, greybox_cost};
-/// use youla::identify::subspace::Experiment;
-/// use youla::lti::{Discrete, simulate};
-/// use youla::Mat;
-/// let time = Discrete::new(2e-4)?;
-/// let u = Mat::from_fn(500, 2, |k, j| if (k * k / 400 + k / (9 + j)) % 2 == 0 { 0.5 } else { -0.5 });
-/// let bearing = DeclaredStructure::new(&Template::Bearing.declaration()?)?;
-/// let y = simulate(&bearing.model(&bearing.start())?.zoh(time)?, u.as_ref(), &[0.0; 6])?;
-/// let truth = bearing.start();
-/// let records = [Experiment::new(u.as_ref(), y.as_ref())];
-/// assert!(greybox_cost(&Problem::new(&bearing, &records, time), &truth, &GreyBoxOptions::default())? < 1e-15);
-/// # Ok::<(), youla_greybox::Error>(())
-/// ```
-pub fn greybox_cost(problem: &Problem<'_>, theta: &[f64], options: &GreyBoxOptions) -> Result<f64> {
+pub(crate) fn greybox_cost(problem: &Problem<'_>, theta: &[f64], options: &GreyBoxOptions) -> Result<f64> {
     let shifted = Shifted::new(problem.experiments, &options.delays)?;
     let compared = comparison(problem, options);
     let criterion = Criterion::new(problem.structure, theta, &shifted.experiments(), problem.time, compared)?;

@@ -76,11 +76,6 @@ impl Variables {
         Variables { path: path.to_owned(), variables }
     }
 
-    /// The file that was read.
-    pub fn path(&self) -> &Path {
-        &self.path
-    }
-
     /// The variables in their order.
     pub fn variables(&self) -> &[Variable] {
         &self.variables
@@ -147,7 +142,7 @@ impl Value {
     }
 
     /// What it is, in words: `240000 x 1 real`, `text`, `function handle (not read)`.
-    pub fn description(&self) -> String {
+    pub(crate) fn description(&self) -> String {
         let sized = |dims: &[usize], what: &str| {
             let dims: Vec<_> = dims.iter().map(usize::to_string).collect();
             format!("{} {what}", dims.join(" x "))

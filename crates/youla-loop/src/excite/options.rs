@@ -21,16 +21,6 @@ pub enum Shape {
 impl Shape {
     /// All shapes.
     pub const ALL: [Shape; 4] = [Shape::Square, Shape::Prbs, Shape::Multisine, Shape::Chirp];
-
-    /// Its name in options.
-    pub fn key(self) -> &'static str {
-        match self {
-            Shape::Square => "square",
-            Shape::Prbs => "prbs",
-            Shape::Multisine => "multisine",
-            Shape::Chirp => "chirp",
-        }
-    }
 }
 
 /// How long the sequence is.
@@ -90,7 +80,7 @@ impl Notch {
     }
 
     /// The bands, lowest and highest frequency in Hz.
-    pub fn bands(&self) -> Vec<[f64; 2]> {
+    pub(crate) fn bands(&self) -> Vec<[f64; 2]> {
         let around = |h: &u32| f64::from(*h) * self.hz;
         self.harmonics.iter().map(around).map(|f| [f - self.width / 2.0, f + self.width / 2.0]).collect()
     }

@@ -33,7 +33,7 @@ impl DataCheck {
 
     /// Findings of the same test, severity and channel in several records as one: the first of them, with the number of further
     /// ones. In the order of the findings.
-    pub fn grouped(&self) -> Vec<(&Finding, usize)> {
+    pub(crate) fn grouped(&self) -> Vec<(&Finding, usize)> {
         let mut groups: Vec<(&Finding, usize)> = Vec::new();
         for finding in &self.findings {
             let same = |g: &&mut (&Finding, usize)| {
@@ -81,7 +81,7 @@ impl DataCheck {
     }
 
     /// The findings that are more than notes, grouped, as plain text.
-    pub fn sentences(&self) -> Vec<String> {
+    pub(crate) fn sentences(&self) -> Vec<String> {
         let worth = self.grouped().into_iter().filter(|(f, _)| f.severity > Severity::Note);
         worth.map(|(f, more)| format!("data, {}{}", f.sentence(), further(more))).collect()
     }

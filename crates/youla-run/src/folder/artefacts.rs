@@ -4,7 +4,7 @@ use crate::records::SourceFile;
 use crate::settings::RunSettings;
 use serde::{Deserialize, Serialize};
 
-/// Version of the layout of all artefacts; that of summary.json is [`crate::SUMMARY_SCHEMA`].
+/// Version of the layout of all artefacts; that of summary.json is `schema` of [`crate::Summary`].
 pub const SCHEMA: u32 = 1;
 
 /// Where an artefact comes from.

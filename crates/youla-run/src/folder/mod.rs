@@ -36,7 +36,7 @@ use youla_report::{figure_csv, svg};
 ///
 /// # Errors
 /// [`youla_io::Error::Io`].
-pub fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()> {
+pub(crate) fn write_artefacts(found: &Identification, folder: &RunFolder) -> Result<()> {
     let provenance = Provenance {
         schema: SCHEMA,
         program: concat!("youla ", env!("CARGO_PKG_VERSION")).into(),

@@ -31,7 +31,7 @@ impl MeasuredTable {
     ///
     /// # Errors
     /// Those of [`MeasuredResponse::of_plant`] and [`MeasuredResponse::of_loop`].
-    pub fn response(&self, time: Discrete) -> Result<MeasuredResponse> {
+    pub(crate) fn response(&self, time: Discrete) -> Result<MeasuredResponse> {
         let made = match self.of_loop {
             true => MeasuredResponse::of_loop(&self.table, time),
             false => MeasuredResponse::of_plant(&self.table, time),

@@ -147,7 +147,7 @@ fn labelled<'a>(files: &[&'a DataFile]) -> Vec<(String, &'a DataFile)> {
 impl DataSettings {
     /// The estimation files, then the verification files, with their names in reports and in summary.json: the declared one, else that
     /// of the file. Entries of one file without declared names are numbered.
-    pub fn labelled(&self) -> Vec<(String, &DataFile)> {
+    pub(crate) fn labelled(&self) -> Vec<(String, &DataFile)> {
         labelled(&self.estimation.iter().chain(&self.verification).collect::<Vec<_>>())
     }
 
@@ -162,7 +162,7 @@ impl DataSettings {
     }
 
     /// Whether an excitation or a reference is known.
-    pub fn excitation_is_known(&self) -> bool {
+    pub(crate) fn excitation_is_known(&self) -> bool {
         !(self.alpha.is_empty() && self.input_excitation.is_empty() && self.reference.is_empty())
     }
 

@@ -65,7 +65,7 @@ impl DisturbanceSettings {
     }
 
     /// Each line in words, as the columns of the known signals are.
-    pub fn labels(&self) -> Vec<String> {
+    pub(crate) fn labels(&self) -> Vec<String> {
         match &self.tacho {
             None => self.frequencies_hz.iter().map(|hz| format!("{hz} Hz")).collect(),
             Some(_) => self.harmonics.iter().map(|n| format!("{n}x")).collect(),

@@ -35,7 +35,7 @@ impl DeclaredLoop {
     ///
     /// # Errors
     /// [`youla::Error::Unsupported`] where none is given.
-    pub fn required_nominal(&self) -> Result<&StateSpace<Discrete>> {
+    pub(crate) fn required_nominal(&self) -> Result<&StateSpace<Discrete>> {
         self.nominal.as_ref().ok_or(Error::Method(NO_NOMINAL))
     }
 }

@@ -54,7 +54,7 @@ impl DeviationSignals {
 ///
 /// # Errors
 /// [`youla::Error::TooFewSamples`] for a record that the settling samples use up; shapes.
-pub fn deviation_signals(
+pub(crate) fn deviation_signals(
     factors: &CoprimeFactors<Discrete>,
     records: &[LoopRecord],
     settle: Option<usize>,

@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 /// Version of the layout of summary.json.
-pub const SUMMARY_SCHEMA: u32 = 4;
+const SUMMARY_SCHEMA: u32 = 4;
 
 /// summary.json. A number that does not exist is `null`.
 ///

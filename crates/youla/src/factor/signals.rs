@@ -47,7 +47,7 @@ impl YoulaSignals {
     }
 
     /// Known signals of disturbances of the measured outputs, samples x signals, where there are any.
-    pub fn disturbance(&self) -> Option<MatRef<'_, f64>> {
+    pub(crate) fn disturbance(&self) -> Option<MatRef<'_, f64>> {
         self.disturbance.as_ref().map(|signals| self.counted(signals))
     }
 

@@ -42,7 +42,7 @@ pub fn hansen(
 
 impl YoulaSignals {
     /// alpha as input and beta as output of S, with the known disturbance.
-    pub fn experiment(&self) -> Experiment<'_> {
+    pub(crate) fn experiment(&self) -> Experiment<'_> {
         Experiment { disturbance: self.disturbance(), ..Experiment::new(self.alpha(), self.beta()) }
     }
 }

@@ -12,7 +12,7 @@ use faer::{Mat, MatRef};
 
 /// Least damping, relative to the squared lengths of the columns: what keeps the step finite where the columns of J depend on each other, and
 /// below the rounding of J' J.
-pub const LEAST_DAMPING: f64 = 1e-20;
+pub(crate) const LEAST_DAMPING: f64 = 1e-20;
 
 /// The damping and how fast it grows.
 #[derive(Debug, Clone, Copy)]

@@ -41,7 +41,7 @@ impl SequentialQr {
     }
 
     /// Number of columns.
-    pub fn width(&self) -> usize {
+    pub(crate) fn width(&self) -> usize {
         self.work.ncols()
     }
 

@@ -79,11 +79,6 @@ impl<T: TimeDomain> ReductionLoop<T> {
         &self.plant
     }
 
-    /// `Mt + S Ut` and `M + U S`.
-    pub fn weights(&self) -> &FrequencyWeights<T> {
-        &self.weights
-    }
-
     /// The closed loop from alpha to y, `N + V S`.
     pub fn response(&self) -> &StateSpace<T> {
         &self.response

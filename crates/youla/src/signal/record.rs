@@ -29,15 +29,6 @@ pub struct SplitRecord {
     pub second: Record,
 }
 
-/// A record cut into pieces of equal length.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Segments {
-    /// The pieces, in order of time.
-    pub segments: Vec<Record>,
-    /// Samples at the end that did not fill another piece.
-    pub unused: usize,
-}
-
 impl Record {
     /// Builds a record that starts at time zero from `data` (samples x channels).
     ///
@@ -176,22 +167,6 @@ impl Record {
         Ok(SplitRecord { first: self.rows(0, at), second: self.rows(at, self.samples() - at) })
     }
 
-    /// Pieces of `length` samples, each starting `step` samples after the one before.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for a `step` of zero or a `length` that is zero or longer than the record.
-    pub fn segments(&self, length: usize, step: usize) -> Result<Segments> {
-        if length == 0 || length > self.samples() {
-            return Err(self.too_short("the length of a segment", length, "at least 1 and at most the samples"));
-        }
-        if step == 0 {
-            return Err(self.too_short("the step between segments", step, "at least 1"));
-        }
-        let count = (self.samples() - length) / step + 1;
-        let segments = (0..count).map(|i| self.rows(i * step, length)).collect();
-        Ok(Segments { segments, unused: self.samples() - ((count - 1) * step + length) })
-    }
-
     /// The same record with its columns changed in place, for the operations of this module.
     pub(super) fn map_columns(mut self, change: impl Fn(usize, &mut [f64])) -> Result<Record> {
         (0..self.channels.len()).for_each(|j| change(j, self.data.col_as_slice_mut(j)));
@@ -258,9 +233,6 @@ mod tests {
         assert_eq!((trimmed.start(), trimmed.samples(), trimmed.column("u").unwrap()), (1.0, 3, &[2.0, 3.0, 4.0][..]));
         let split = record.split(4).unwrap();
         assert_eq!((split.second.start(), split.second.samples()), (2.0, 6));
-        let pieces = record.segments(4, 2).unwrap();
-        assert_eq!((pieces.segments.len(), pieces.unused), (4, 0));
-        assert_eq!(record.segments(4, 4).unwrap().unused, 2);
         for bad in [record.trim(10, None), record.trim(8, Some(3)), record.trim(0, Some(0))] {
             assert!(matches!(bad, Err(Error::OutOfRange { .. })));
         }

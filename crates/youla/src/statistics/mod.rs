@@ -6,5 +6,5 @@ mod student;
 
 pub use chi_square::chi_square_tail;
 pub(crate) use chi_square::{chi_square_deviations, chi_square_limit, f_deviations};
-pub use sample::{NORMAL_MEDIAN, median, quantile, robust_deviation};
+pub use sample::{median, quantile, robust_deviation};
 pub use student::{ellipse, normal_quantile, student, two_sided_student};

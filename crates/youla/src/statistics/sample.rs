@@ -1,7 +1,7 @@
 //! Quantiles of a sample, and its deviation where a few values are far too large.
 
 /// Median of the magnitude of a standard normal variable, `Phi^-1(3/4)`.
-pub const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
+const NORMAL_MEDIAN: f64 = 0.674_489_750_196_081_7;
 
 /// Of sorted values at a share from 0 to 1, linear between neighbours (definition 7 of Hyndman and Fan 1996); NaN for no
 /// values. Infinite values are allowed.

@@ -29,12 +29,12 @@ pub enum PidTerms {
 
 impl PidTerms {
     /// Whether there is an integral part.
-    pub fn integral(self) -> bool {
+    pub(crate) fn integral(self) -> bool {
         matches!(self, PidTerms::Pi | PidTerms::Pid)
     }
 
     /// Whether there is a derivative part.
-    pub fn derivative(self) -> bool {
+    pub(crate) fn derivative(self) -> bool {
         matches!(self, PidTerms::Pd | PidTerms::Pid)
     }
 }

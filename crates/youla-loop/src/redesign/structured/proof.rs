@@ -65,7 +65,7 @@ impl PidProof {
     }
 
     /// Whether the running controller keeps the limits by the same standard.
-    pub fn running_holds(&self) -> bool {
+    pub(crate) fn running_holds(&self) -> bool {
         at_most(self.running_missed, self.models) <= 1.0 - LEVEL
     }
 }

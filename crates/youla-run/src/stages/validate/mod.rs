@@ -64,7 +64,7 @@ pub struct ModelValidation {
 
 impl ModelValidation {
     /// The mode of a pole and its residue, where the response shows it.
-    pub fn visible_residue(&self, pole: c64) -> Option<&[c64]> {
+    pub(crate) fn visible_residue(&self, pole: c64) -> Option<&[c64]> {
         match &self.visible {
             None => Some(&[]),
             Some(visible) => residue_at(visible, pole),

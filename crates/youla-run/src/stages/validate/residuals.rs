@@ -40,7 +40,7 @@ pub enum ResidualPredictor {
 
 impl RecordResiduals {
     /// Whether the residual does not depend on past excitation; `None` where nothing from outside is known.
-    pub fn independent(&self) -> Option<bool> {
+    pub(crate) fn independent(&self) -> Option<bool> {
         self.external.then_some(self.correlations.independent)
     }
 }

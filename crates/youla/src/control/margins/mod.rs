@@ -85,7 +85,7 @@ impl Margins {
     }
 
     /// All plant inputs, then all plant outputs.
-    pub fn channels(&self) -> impl Iterator<Item = &ChannelMargins> {
+    pub(crate) fn channels(&self) -> impl Iterator<Item = &ChannelMargins> {
         self.inputs.iter().chain(&self.outputs)
     }
 }

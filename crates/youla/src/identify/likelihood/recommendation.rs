@@ -196,7 +196,7 @@ impl Evidence {
 
     /// The size of an imperfection, which decides nothing by itself: its consequence is in the region of the model.
     #[must_use]
-    pub fn reported(self) -> Self {
+    pub(crate) fn reported(self) -> Self {
         Evidence { required: false, ..self }
     }
 

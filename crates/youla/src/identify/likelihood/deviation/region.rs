@@ -39,7 +39,7 @@ pub struct Interval {
 
 impl Interval {
     /// The normal interval of a figure at a level, for example 0.95.
-    pub fn normal(value: f64, deviation: f64, level: f64) -> Self {
+    pub(crate) fn normal(value: f64, deviation: f64, level: f64) -> Self {
         let half = two_sided_student(level, f64::INFINITY) * deviation;
         Interval { value, deviation, bounds: [value - half, value + half] }
     }
@@ -120,7 +120,7 @@ impl Region {
     ///
     /// # Errors
     /// [`crate::Error::OutOfRange`] for a channel of size zero.
-    pub fn channel_scales(&self) -> Result<ChannelScales> {
+    pub(crate) fn channel_scales(&self) -> Result<ChannelScales> {
         ChannelScales::new(self.sizes.u.clone(), self.sizes.y.clone())
     }
 

@@ -93,7 +93,7 @@ put('model', 'model.mat', matlab({**model, 'inputs': np.array([['u']], dtype=obj
 put('npz', 'two.npz', saved(u=np.arange(4.0), y=np.arange(4, dtype=np.float32).reshape(2, 2)))
 put('npz', 'text.npz', saved(names=np.array(['u', 'y']), n=np.int16(3)))
 put('run_toml', 'drive.toml', (root / 'examples/flexible-drive/run.toml').read_bytes())
-put('subspace_toml', 'options.toml', 'horizon = 20\nmethod = "cva"\norder = { auto = { max = 6 } }\n[uncertainty]\nmethod = "delta"\n')
+put('subspace_toml', 'options.toml', 'horizon = 20\nmethod = "cva"\norder = "auto"\n')
 put('subspace_toml', 'fixed.toml', 'horizon = 10\npast = 20\norder = 4\nstability = "allow"\n')
 for template in sorted((root / 'crates/youla-greybox/src/declared/templates').glob('*.toml')):
     put('structure', template.name, template.read_bytes())

@@ -7,7 +7,7 @@ use youla::Mat;
 use youla::control::{LqrWeights, NoiseCovariance, closed_loop, kalman, lqr};
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Experiment, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
 use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace, frequency_response, simulate};
 use youla_twin::rig::degraded;
@@ -60,8 +60,7 @@ impl Loop {
     /// Six states from u and y.
     pub(crate) fn identify(&self, method: SubspaceMethod, u: &Mat<f64>, y: &Mat<f64>) -> StateSpace<Discrete> {
         let past = if method.is_for_closed_loops() { 100 } else { 30 };
-        let horizon = Horizon { future: 30, past };
-        let options = SubspaceOptions { method, horizon, order: Order::Fixed(6), ..options() };
+        let options = SubspaceOptions { method, past: Some(past), order: Order::Fixed(6), ..options() };
         let experiment = [Experiment::new(u.as_ref(), y.as_ref())];
         subspace(&experiment, self.plant.time(), &options).unwrap().model
     }
@@ -85,5 +84,5 @@ impl Loop {
 }
 
 pub(crate) fn options() -> SubspaceOptions {
-    SubspaceOptions { horizon: 30.into(), stability: Stability::Allow, ..SubspaceOptions::default() }
+    SubspaceOptions { horizon: 30, stability: Stability::Allow, ..SubspaceOptions::default() }
 }

@@ -59,7 +59,7 @@ fn published(order: usize, horizon: usize) -> SubspaceOptions {
     SubspaceOptions {
         scaling: ChannelScaling::None,
         order: Order::Fixed(order),
-        horizon: horizon.into(),
+        horizon,
         feedthrough: Feedthrough::Estimated,
         ..Default::default()
     }

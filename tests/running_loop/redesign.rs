@@ -142,7 +142,7 @@ impl Bench {
         let (v, y) = (self.clean(log.alpha.as_ref()), self.clean(log.y.as_ref()));
         let options = SubspaceOptions {
             method: SubspaceMethod::Cva,
-            horizon: 30.into(),
+            horizon: 30,
             order: Order::Fixed(8),
             initial_state: InitialState::Estimated,
             ..Default::default()

@@ -161,7 +161,7 @@ fn kernels(single: &rayon::ThreadPool) -> Result<()> {
     let by_qr = 2.0 * (SAMPLES * width * width) as f64;
     let time = Discrete::new(TS)?;
     let factor = |factorisation| {
-        let options = SubspaceOptions { horizon: horizon.into(), factorisation, ..SubspaceOptions::default() };
+        let options = SubspaceOptions { horizon, factorisation, ..SubspaceOptions::default() };
         SubspaceData::new(&experiments, time, &options).map(drop)
     };
     let double = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads can be had");
@@ -238,7 +238,7 @@ fn whole_identification(single: &rayon::ThreadPool) -> Result<()> {
     for (samples, horizon) in [(5_000, 20), (100_000, 20), (1_000_000, 20), (1_000_000, 40)] {
         let (_, u, y) = bearing_record(samples)?;
         let experiments = [Experiment::new(u.as_ref(), y.as_ref())];
-        let options = SubspaceOptions { order: Order::Fixed(6), horizon: horizon.into(), ..SubspaceOptions::default() };
+        let options = SubspaceOptions { order: Order::Fixed(6), horizon, ..SubspaceOptions::default() };
         let by_qr = SubspaceOptions { factorisation: Factorisation::Qr, ..options.clone() };
         let call = || subspace(&experiments, time, &options);
         let name = format!("{samples} samples, horizon {horizon}");

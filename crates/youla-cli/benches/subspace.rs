@@ -175,7 +175,7 @@ fn one(folder: &Path, horizon: usize, order: usize) -> Result<()> {
     let [u, y, uv, yv] = ["u", "y", "uv", "yv"].map(read);
     let options = SubspaceOptions {
         method: SubspaceMethod::N4sid,
-        horizon: horizon.into(),
+        horizon,
         order: Order::Fixed(order),
         ..SubspaceOptions::default()
     };

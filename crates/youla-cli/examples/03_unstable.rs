@@ -17,7 +17,7 @@ fn main() -> Result<()> {
     let log = machine.log(60_000, 0.1, 1)?;
 
     let signals = machine.factors.signals(log.u.as_ref(), log.y.as_ref())?;
-    let options = |order| SubspaceOptions { horizon: 80.into(), order: Order::Fixed(order), ..Default::default() };
+    let options = |order| SubspaceOptions { horizon: 80, order: Order::Fixed(order), ..Default::default() };
     let scheme = hansen(&machine.factors, &[signals], &options(4))?;
     let record = [Experiment::new(log.u.as_ref(), log.y.as_ref())];
     // An unstable estimate is refused unless it is asked for.

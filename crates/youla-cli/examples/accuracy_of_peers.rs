@@ -16,7 +16,7 @@ use loops::{Loop, loops};
 use std::fmt::Write;
 use std::path::Path;
 use youla::identify::likelihood::LikelihoodOptions;
-use youla::identify::subspace::{Experiment, Horizon, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
+use youla::identify::subspace::{Experiment, Order, Stability, SubspaceMethod, SubspaceOptions, subspace};
 use youla::lti::{Discrete, StateSpace, frequency_response};
 use youla_report::data::{Method, Role};
 use youla_report::figure::{Axis, Content, Curve, Drawn, Figure, Panel};
@@ -100,7 +100,8 @@ fn write_records(folder: &Path) -> Result<()> {
                 method: SubspaceMethod::PbsidOpt,
                 order: Order::Fixed(system.plant.order()),
                 stability: Stability::Allow,
-                horizon: Horizon { future: 20, past: 80 },
+                horizon: 20,
+                past: Some(80),
                 ..SubspaceOptions::default()
             };
             let experiment = Experiment::new(u.subrows(0, kept), y.subrows(0, kept));

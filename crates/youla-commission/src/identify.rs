@@ -78,7 +78,7 @@ pub(crate) fn loop_response(
 pub(crate) fn response_to(v: MatRef<'_, f64>, y: MatRef<'_, f64>, time: Discrete) -> Result<StateSpace<Discrete>> {
     let options = SubspaceOptions {
         method: SubspaceMethod::Cva,
-        horizon: 30.into(),
+        horizon: 30,
         initial_state: InitialState::Estimated,
         ..Default::default()
     };

@@ -90,7 +90,7 @@
 //! use youla::identify::{Order, SubspaceOptions, hansen};
 //! # let factors = youla::factor::CoprimeFactors::observer(&nominal, f.as_ref(), l.as_ref())?;
 //! let signals = factors.signals(u.as_ref(), y.as_ref())?;
-//! let options = SubspaceOptions { horizon: 20.into(), order: Order::Fixed(4), ..Default::default() };
+//! let options = SubspaceOptions { horizon: 20, order: Order::Fixed(4), ..Default::default() };
 //! let found = hansen(&factors, &[signals], &options)?; // (25): S; (17): G(S)
 //! let modes = found.plant.modes()?;
 //! assert!(modes.iter().any(|mode| (mode.hz - 10.0).abs() < 0.1)); // the nominal model says 9 Hz
@@ -103,7 +103,7 @@
 #![doc = include_str!("../assets/docs/loop.txt")]
 //! use youla::identify::{Experiment, Order, SubspaceMethod, SubspaceOptions, direct};
 //! let method = SubspaceMethod::PbsidOpt; // consistent in closed loop
-//! let options = SubspaceOptions { method, horizon: 20.into(), order: Order::Fixed(2), ..Default::default() };
+//! let options = SubspaceOptions { method, horizon: 20, order: Order::Fixed(2), ..Default::default() };
 //! let found = direct(&[Experiment::new(u.as_ref(), y.as_ref())], time, &options)?;
 //! assert!((found.model.modes()?[0].hz - 10.0).abs() < 0.1);
 //! # Ok::<(), youla::Error>(())

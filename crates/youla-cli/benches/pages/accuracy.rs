@@ -7,7 +7,7 @@ use crate::timing::middle;
 use youla::Result;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Horizon, Order, SubspaceMethod, SubspaceOptions};
+use youla::identify::subspace::{Order, SubspaceMethod, SubspaceOptions};
 use youla::lti::{Discrete, FrequencyResponse, frequency_response};
 
 /// The page.
@@ -57,12 +57,7 @@ fn plants() -> Result<String> {
     for (noise, horizon, order) in
         [(0.0, 20, Order::Fixed(12)), (0.03, 30, Order::Fixed(12)), (0.3, 30, Order::Fixed(10))]
     {
-        let options = SubspaceOptions {
-            horizon: Horizon::from(horizon),
-            order,
-            method: SubspaceMethod::Moesp,
-            ..Default::default()
-        };
+        let options = SubspaceOptions { horizon, order, method: SubspaceMethod::Moesp, ..Default::default() };
         let errors = (0..5)
             .map(|seed| {
                 let found = hansen(&bearing.factors, &[bearing.record(20_000, noise, seed)], &options)?;

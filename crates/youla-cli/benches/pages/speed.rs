@@ -8,7 +8,7 @@ use std::f64::consts::PI;
 use std::path::Path;
 use youla::factor::CoprimeFactors;
 use youla::identify::hansen::hansen;
-use youla::identify::subspace::{Horizon, Order, SubspaceOptions};
+use youla::identify::subspace::{Order, SubspaceOptions};
 use youla::lti::{frequency_response, simulate};
 use youla_run::{Identification, StageClock, identify, write_run};
 use youla_twin::rig::{Bearing, degraded};
@@ -51,8 +51,7 @@ fn steps() -> Result<String> {
     let f = Mat::zeros(2, 6);
     let factors = CoprimeFactors::observer(&nominal, f.as_ref(), f.transpose())?;
     let signals = [factors.signals(u.as_ref(), y.as_ref())?];
-    let options =
-        |horizon| SubspaceOptions { horizon: Horizon::from(horizon), order: Order::Fixed(12), ..Default::default() };
+    let options = |horizon| SubspaceOptions { horizon, order: Order::Fixed(12), ..Default::default() };
     let omega: Vec<f64> = (1..=1000).map(|k| 0.999 * PI / TS * f64::from(k) / 1000.0).collect();
     hansen(&factors, &signals, &options(10))?;
     let row = |name: &str, seconds: f64| vec![name.to_owned(), milliseconds(seconds)];

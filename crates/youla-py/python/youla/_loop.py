@@ -205,7 +205,7 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
     """
     g = as_model(system, "system")
     if isinstance(options.get("order"), int):
-        options["order"] = {"fixed": whole(options["order"], "order", 0)}
+        options["order"] = whole(options["order"], "order", 0)
     scale = None if output_scale is None else np.ravel(as_floats(output_scale, "output_scale")).tolist()
     found, hankel, bound = _native.reduce(g._native(), options_json(options), scale)
     a, b, c, d, dt = found

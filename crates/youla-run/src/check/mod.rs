@@ -21,7 +21,7 @@ use rayon::prelude::*;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use youla::ErrorKind;
-use youla::identify::subspace::{Horizon, SubspaceOptions};
+use youla::identify::subspace::SubspaceOptions;
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::LoopRecord;
 use youla_io::{ChannelRef, ChannelSpec, CsvOptions};
@@ -162,9 +162,12 @@ fn place(settings: &RunSettings, records: &RunRecords, name: &str) -> (String, u
 }
 
 fn with_order(options: &CheckOptions, hansen: Option<&SubspaceOptions>) -> CheckOptions {
-    let of = |horizon: Horizon| horizon.past.saturating_add(horizon.future);
+    let rows = |options: &SubspaceOptions| {
+        let (past, future) = options.block_rows();
+        past.saturating_add(future)
+    };
     // A short horizon of the scheme does not make a poor excitation a rich one.
-    let horizons = of(Horizon::default()).max(hansen.map_or(0, |hansen| of(hansen.horizon)));
+    let horizons = rows(&SubspaceOptions::default()).max(hansen.map_or(0, rows));
     CheckOptions { excitation_order: options.excitation_order.or(Some(horizons)), ..options.clone() }
 }
 

@@ -150,7 +150,7 @@ mod tests {
         assert_eq!(cut.segments.iter().map(|s| s.rows).collect::<Vec<_>>(), [[1, 400], [401, 963]]);
         assert_eq!(cut.estimation.iter().map(|r| r.name()).collect::<Vec<_>>(), ["whole-1", "whole-2"]);
         assert!(apart.segments.is_empty() && apart.sources.len() == 2 && cut.sources.len() == 1);
-        let options = SubspaceOptions { horizon: 4.into(), order: Order::Fixed(1), ..SubspaceOptions::default() };
+        let options = SubspaceOptions { horizon: 4, order: Order::Fixed(1), ..SubspaceOptions::default() };
         let model = |records: &RunRecords| direct(&records.experiments(), records.time, &options).unwrap().model;
         assert_eq!(model(&cut), model(&apart));
         assert!((model(&cut).a()[(0, 0)] - 0.8).abs() < 1e-9);

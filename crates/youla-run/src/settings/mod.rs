@@ -8,10 +8,8 @@ mod explain;
 mod grey_box;
 mod models;
 mod options;
-mod order;
 mod pid;
 mod reference_path;
-mod shown;
 
 pub use controller::{ControllerSettings, Feedback, Hold};
 pub use data::{DataFile, DataSettings};
@@ -25,7 +23,6 @@ pub use pid::{Discretisation, IdealPid, ParallelPid};
 use crate::{Error, Result};
 use explain::{explain, problem_at};
 use serde::{Deserialize, Serialize};
-use shown::{RecommendedTable, ReductionTable, SubspaceTable};
 use std::path::{Path, PathBuf};
 use youla::identify::likelihood::LikelihoodOptions;
 use youla::identify::subspace::SubspaceOptions;
@@ -48,23 +45,19 @@ pub struct RunSettings {
     /// The controller that ran while the data were logged.
     pub controller: ControllerSettings,
     /// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
-    #[serde(default, with = "shown")]
-    #[schemars(with = "RecommendedTable")]
+    #[serde(default)]
     pub recommended: LikelihoodOptions,
     /// How the coprime factors are built.
     #[serde(default)]
     pub factors: FactorSettings,
     /// Identification of S from (alpha, beta) by the modified Hansen scheme, for comparison; left out when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
-    #[schemars(with = "Option<SubspaceTable>")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub hansen: Option<SubspaceOptions>,
     /// Direct identification from (u, y), for comparison; left out when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
-    #[schemars(with = "Option<SubspaceTable>")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direct: Option<SubspaceOptions>,
     /// Reduction of G(S); left out when absent.
-    #[serde(default, skip_serializing_if = "Option::is_none", with = "shown::optional")]
-    #[schemars(with = "Option<ReductionTable>")]
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduction: Option<ReductionOptions>,
     /// A physical structure, estimated from the result of the scheme on; left out when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -281,7 +274,7 @@ pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: 
 /// # Errors
 /// [`youla_io::Error::Settings`] with line, column and key.
 pub fn parse_subspace_options(text: &str, path: &Path) -> Result<SubspaceOptions> {
-    Ok(parse_table::<SubspaceTable>(text, path, "direct")?.into())
+    parse_table(text, path, "direct")
 }
 
 /// Whether a file that should be a run.toml is data: not named so, and no TOML.

@@ -9,7 +9,7 @@ use youla::identify::subspace::SubspaceOptions;
 /// # Errors
 /// [`youla::Error::TooFewSamples`].
 pub(crate) fn require_length(options: &SubspaceOptions, records: &RunRecords, settle: usize) -> Result<()> {
-    let (past, horizon) = (options.horizon.past, options.horizon.future);
+    let (past, horizon) = options.block_rows();
     let delay = options.delays.iter().copied().max().unwrap_or(0);
     let needed = [past, horizon, delay, settle].into_iter().fold(0, usize::saturating_add);
     let of_file = |name: &str| records.segments.iter().any(|segment| segment.record == name);

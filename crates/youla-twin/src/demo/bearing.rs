@@ -131,7 +131,7 @@ fn settings(seed: u64, nominal: &StateSpace<Continuous>, f: &Mat<f64>, l: &Mat<f
     };
     let subspace = SubspaceOptions {
         method: SubspaceMethod::Cva,
-        horizon: 40.into(),
+        horizon: 40,
         order: Order::Fixed(10),
         ..SubspaceOptions::default()
     };

@@ -11,5 +11,5 @@ pub use direct::direct;
 pub use hansen::{HansenModel, hansen};
 pub use identified::{Deviation, Identified, identify, identify_response};
 pub use subspace::{
-    Experiment, Horizon, Order, Stability, SubspaceData, SubspaceMethod, SubspaceModel, SubspaceOptions, subspace,
+    Experiment, Order, Stability, SubspaceData, SubspaceMethod, SubspaceModel, SubspaceOptions, subspace,
 };

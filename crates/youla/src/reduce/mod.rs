@@ -27,6 +27,8 @@ mod in_loop;
 #[cfg(test)]
 mod loop_tests;
 mod options;
+#[cfg(feature = "serde")]
+mod order_form;
 mod reducer;
 #[cfg(test)]
 mod reference_tests;

@@ -33,11 +33,10 @@ impl std::fmt::Display for ReductionMethod {
     }
 }
 
-/// How many states are kept.
+/// How many states are kept; in files a number, `"minimal"`, `"auto"`, or a table with the key `bound` or `closed-loop`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case"))]
+#[cfg_attr(feature = "serde", serde(from = "super::order_form::ReducedForm", into = "super::order_form::ReducedForm"))]
 pub enum ReducedOrder {
     /// All that are controllable and observable to working precision: removes exact cancellations only.
     #[default]
@@ -62,19 +61,19 @@ pub struct ReductionOptions {
     pub method: ReductionMethod,
     /// Number of states that are kept.
     pub order: ReducedOrder,
-    /// States whose Hankel singular value is below this fraction of the largest count as not minimal.
-    pub minimality: f64,
-    /// Poles at or beyond this boundary are kept as they are and only the rest is reduced: a modulus from 0 to 1 in discrete, a
-    /// real part of at most 0 in continuous time. Absent: everything is reduced, and must be stable but for normalised coprime
-    /// factors.
+    /// Poles at or beyond this boundary are kept as they are and only the rest is reduced: a modulus from 0 to 1 in discrete, a real part
+    /// of at most 0 in continuous time. Absent: everything is reduced, and must be stable but for normalised coprime factors.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub stability_boundary: Option<f64>,
-    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent. A run takes the rms of its estimation records
-    /// for normalised coprime factors.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    /// States whose Hankel singular value is below this fraction of the largest count as not minimal; no key of run.toml.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub minimality: f64,
+    /// Sizes of the outputs, one per output, that matter equally; 1 each when absent; no key of run.toml. A run takes the rms of its
+    /// estimation records for normalised coprime factors.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub output_scale: Option<Vec<f64>>,
     /// Sizes of the inputs, one per input; 1 each, or the rms, when absent, as for the outputs.
-    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub input_scale: Option<Vec<f64>>,
 }
 

@@ -158,16 +158,14 @@ fn systems_without_states_or_without_effect_reduce_to_their_gain() {
 
 #[test]
 fn options_read_as_they_are_written() {
-    let options: ReductionOptions =
-        toml::from_str("method = \"singular-perturbation\"\norder = { fixed = 6 }").unwrap();
+    let options: ReductionOptions = toml::from_str("method = \"singular-perturbation\"\norder = 6").unwrap();
     assert_eq!(options.order, ReducedOrder::Fixed(6));
     assert_eq!(options.method, ReductionMethod::SingularPerturbation);
     assert!(toml::from_str::<ReductionOptions>("methode = 1").is_err());
-    let options: ReductionOptions = toml::from_str(
-        "method = \"normalised-coprime\"\norder = { closed-loop = 0.05 }\noutput_scale = [3.0]\nstability_boundary = 0.99",
-    )
-    .unwrap();
-    assert_eq!((options.order, options.output_scale), (ReducedOrder::ClosedLoop(0.05), Some(vec![3.0])));
+    let options: ReductionOptions =
+        toml::from_str("method = \"normalised-coprime\"\norder = { closed-loop = 0.05 }\nstability_boundary = 0.99")
+            .unwrap();
+    assert_eq!(options.order, ReducedOrder::ClosedLoop(0.05));
     assert_eq!((options.method, options.stability_boundary), (ReductionMethod::NormalisedCoprime, Some(0.99)));
 }
 

@@ -8,7 +8,7 @@ use youla::reduce::ReducedOrder;
 /// One sentence each.
 pub(super) fn choices(paper: &Paper) -> Vec<String> {
     let (rig, s) = (&paper.rig, &paper.settings);
-    let subspace = |o: &SubspaceOptions| format!("{} and {} block rows", order(&o.order), o.horizon.future);
+    let subspace = |o: &SubspaceOptions| format!("{} and {} block rows", order(&o.order), o.horizon);
     let reduced = match s.reduction.order {
         ReducedOrder::Minimal => "the minimal order".into(),
         ReducedOrder::Fixed(n) => format!("order {n}"),

@@ -16,7 +16,7 @@ fn settings() -> PaperSettings {
     let mut settings = PaperSettings::shipped().with_models(MODELS);
     let e = &mut settings.experiments;
     (e.samples, e.verification_samples, e.settle, e.start_factors) = (1500, 1200, 100, vec![0.5, 2.0]);
-    (settings.hansen.horizon, settings.pem.max_iterations) = (15.into(), 10);
+    (settings.hansen.horizon, settings.pem.max_iterations) = (15, 10);
     settings
 }
 

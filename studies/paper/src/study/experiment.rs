@@ -178,7 +178,8 @@ fn require_rest(record: &ExperimentRecord, settle: usize) -> Result<()> {
 
 /// Persistency up to the block rows that the identification of S needs.
 fn described(record: &ExperimentRecord, settings: &PaperSettings) -> Result<ExcitationReport> {
-    let order = settings.hansen.horizon.future.saturating_add(settings.hansen.horizon.past);
+    let (past, future) = settings.hansen.block_rows();
+    let order = past.saturating_add(future);
     // At least eight half-overlapping windows, of a record of 20 000 samples those of the default.
     let welch = Welch::default();
     let window = welch.window.min(record.alpha.nrows() / 4).max(2);
@@ -232,7 +233,7 @@ fn data<'a>(
         signals: YoulaSignals::new(clean(signals.alpha())?.as_ref(), clean(signals.beta())?.as_ref())?,
         verification_u: later(verification.u_applied.as_ref()),
         verification_y: later(verification.y.as_ref()),
-        initial_state: if settle > 0 { InitialState::Estimated } else { settings.hansen.initial_state },
+        initial_state: if settle > 0 { InitialState::Estimated } else { settings.pem.initial_state },
     })
 }
 

@@ -16,7 +16,7 @@ use youla::factor::YoulaSignals;
 use youla::identify::direct::direct;
 use youla::identify::hansen::{HansenModel, hansen};
 use youla::identify::likelihood::{LikelihoodOptions, recommend};
-use youla::identify::subspace;
+use youla::identify::subspace::{self, InitialState, SubspaceOptions};
 use youla::linalg::block;
 use youla::lti::{Discrete, StateSpace, simulate};
 use youla::reduce::reduce;
@@ -196,7 +196,7 @@ impl LoopData<'_> {
             Method::Nominal => Ok(black_box(self.design.factors.nominal().clone())),
             Method::Pem => self.single(settings).map(grey_box),
             Method::PemMultiStart => self.best_pem(settings).map(|found| grey_box(&found)),
-            Method::Direct => direct(&self.experiment(), self.time(), &settings.direct)
+            Method::Direct => direct(&self.experiment(), self.time(), &at_rest(&settings.direct))
                 .map(|found| black_box(found.model))
                 .map_err(text),
             Method::Hansen => self.hansen(settings).map(|found| from_s(found.plant.clone(), found)),
@@ -244,7 +244,7 @@ impl LoopData<'_> {
     }
 
     fn hansen(&self, settings: &PaperSettings) -> Result<&HansenModel, String> {
-        let found = || hansen(&self.design.factors, &[self.signals()?], &settings.hansen).map_err(text);
+        let found = || hansen(&self.design.factors, &[self.signals()?], &at_rest(&settings.hansen)).map_err(text);
         self.hansen.get_or_init(found).as_ref().map_err(String::clone)
     }
 
@@ -264,6 +264,11 @@ impl LoopData<'_> {
         let model = lower(from_projection.map(|found| found.model).map_err(text), self.single(settings).cloned())?;
         Ok(Found { note, ..grey_box(&model) })
     }
+}
+
+/// The records of the study begin at rest.
+fn at_rest(options: &SubspaceOptions) -> SubspaceOptions {
+    SubspaceOptions { initial_state: InitialState::Zero, ..options.clone() }
 }
 
 /// Fit (26) per axis on the noise-free record; minus infinity for a simulation that leaves the numbers.

@@ -24,9 +24,9 @@ pub(crate) fn settings() -> String {
         ("verification_samples = 10000", "verification_samples = 2000"),
         ("settle = 1000", "settle = 500"),
         ("start_factors = [0.5, 0.7, 1.0, 1.4, 2.0, 2.8, 4.0]", "start_factors = [0.7, 1.0, 1.4]"),
-        ("order = { fixed = 12 }", "order = { fixed = 8 }"),
-        ("horizon = 30\norder = { fixed = 8 }", "horizon = 20\norder = { fixed = 8 }"),
-        ("horizon = 30\norder = { fixed = 6 }", "horizon = 20\norder = { fixed = 6 }"),
+        ("order = 12", "order = 8"),
+        ("horizon = 30\norder = 8", "horizon = 20\norder = 8"),
+        ("horizon = 30\norder = 6", "horizon = 20\norder = 6"),
     ];
     replaced.into_iter().fold(PaperSettings::TOML.to_owned(), |text, (from, to)| {
         assert!(text.contains(from), "{from}");

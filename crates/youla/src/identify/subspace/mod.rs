@@ -11,12 +11,13 @@
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
 
-mod horizon;
 mod innovation;
 mod inputs;
 mod open_loop;
 mod options;
 mod order;
+#[cfg(feature = "serde")]
+pub(super) mod order_form;
 mod output_pair;
 mod predictor_form;
 mod projected;
@@ -26,7 +27,6 @@ mod stability;
 mod tests;
 mod triangle;
 
-pub use horizon::Horizon;
 pub use innovation::{Innovation, NoInnovation};
 pub use inputs::output_error::{InputFit, OutputFit};
 pub use options::{
@@ -131,7 +131,7 @@ impl SubspaceModel {
 /// for k in 0..299 {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
-/// let options = SubspaceOptions { horizon: 5.into(), order: Order::Fixed(1), ..Default::default() };
+/// let options = SubspaceOptions { horizon: 5, order: Order::Fixed(1), ..Default::default() };
 /// let found = subspace(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// assert!((found.poles()[0].re - 0.5).abs() < 1e-9);
 /// # Ok::<(), youla::Error>(())
@@ -156,7 +156,7 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
 /// for k in 0..299 {
 ///     y[(k + 1, 0)] = 0.5 * y[(k, 0)] + u[(k, 0)];
 /// }
-/// let options = SubspaceOptions { horizon: 5.into(), ..Default::default() };
+/// let options = SubspaceOptions { horizon: 5, ..Default::default() };
 /// let data = SubspaceData::new(&[Experiment::new(u.as_ref(), y.as_ref())], Discrete::new(0.1)?, &options)?;
 /// for n in 1..3 {
 ///     let found = data.identify(&SubspaceOptions { order: Order::Fixed(n), ..options.clone() })?;
@@ -184,9 +184,9 @@ impl<'a> SubspaceData<'a> {
 
     fn factored(experiments: &[Experiment<'a>], time: Discrete, options: &SubspaceOptions) -> Result<Self> {
         let channels = Channels::new(experiments, options)?;
-        let Horizon { future, past } = options.horizon;
-        channels.check_lengths((past, future))?;
-        let triangle = HankelLq::new(&channels, (past, future), HankelLayout::of(options), options.factorisation)?;
+        let rows = options.block_rows();
+        channels.check_lengths(rows)?;
+        let triangle = HankelLq::new(&channels, rows, HankelLayout::of(options), options.factorisation)?;
         Ok(SubspaceData { channels, triangle, time, factored: options.clone() })
     }
 
@@ -251,8 +251,8 @@ impl<'a> SubspaceData<'a> {
             delays: options.delays.clone(),
             stability,
             fit: fitted.quality,
-            horizon: options.horizon.future,
-            past: options.horizon.past,
+            horizon: options.horizon,
+            past: options.block_rows().0,
             columns,
             excitation_rcond: projected.excitation_rcond(),
             factor,

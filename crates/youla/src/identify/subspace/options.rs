@@ -1,6 +1,5 @@
-//! The choices of [`crate::identify::subspace::subspace`], one plain struct for library, run.toml and artefacts.
+//! The choices of [`crate::identify::subspace::subspace`], one plain struct for library, run.toml and Python.
 
-use crate::identify::subspace::Horizon;
 use crate::{Error, Result};
 
 /// Choices of [`crate::identify::subspace::subspace`].
@@ -8,33 +7,65 @@ use crate::{Error, Result};
 /// ```
 /// use youla::identify::subspace::{Order, SubspaceOptions, SubspaceMethod};
 /// let options = SubspaceOptions { method: SubspaceMethod::Cva, order: Order::Fixed(8), ..Default::default() };
-/// assert_eq!(options.horizon, 20.into());
+/// assert_eq!(options.horizon, 20);
 /// ```
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct SubspaceOptions {
     /// The method: it sets the weights of the singular value decomposition.
     pub method: SubspaceMethod,
-    /// Block rows of past and future: a number for both, or `{ future, past }`.
-    pub horizon: Horizon,
-    /// Order of the model, of S in `[hansen]`; the singular value criterion proposes one when absent.
+    /// Block rows s of the future, and of the past unless said otherwise. They should cover one to two periods of the slowest mode.
+    pub horizon: usize,
+    /// Block rows p of the past; absent: as many as of the future. For the methods of closed loops it is the order of the predictor and
+    /// should cover the time in which `(A - K C)^p` decays: with white noise at the outputs of a stable plant K is small, and this is
+    /// the decay of the plant itself.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub past: Option<usize>,
+    /// Order of the model, of S in `[hansen]`.
     pub order: Order,
     /// Whether there is a direct path from u to y in the same sample.
     pub feedthrough: Feedthrough,
-    /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model
-    /// has them as states with poles at 0, after those of [`Self::order`].
+    /// Known delay of each input in samples, beyond the one of a system without direct path; none where empty. The model has them as
+    /// states with poles at 0, after those of `order`.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Vec::is_empty"))]
     pub delays: Vec<usize>,
-    /// How the block-Hankel data are factored.
-    pub factorisation: Factorisation,
     /// What to do with an unstable estimate.
     pub stability: Stability,
-    /// Units in which the least-squares problems are posed. The model always comes in the units of the record.
+    /// How the block-Hankel data are factored; no key of run.toml.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub factorisation: Factorisation,
+    /// Units in which the least-squares problems are posed; no key of run.toml. The model always comes in the units of the record.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub scaling: ChannelScaling,
-    /// The state at the first sample of each experiment.
+    /// The state at the first sample of each experiment; no key of run.toml.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub initial_state: InitialState,
+}
+
+impl Default for SubspaceOptions {
+    fn default() -> Self {
+        SubspaceOptions {
+            method: SubspaceMethod::default(),
+            horizon: 20,
+            past: None,
+            order: Order::default(),
+            feedthrough: Feedthrough::default(),
+            delays: Vec::new(),
+            stability: Stability::default(),
+            factorisation: Factorisation::default(),
+            scaling: ChannelScaling::default(),
+            initial_state: InitialState::default(),
+        }
+    }
+}
+
+impl SubspaceOptions {
+    /// Block rows of the past and of the future.
+    pub fn block_rows(&self) -> (usize, usize) {
+        (self.past.unwrap_or(self.horizon), self.horizon)
+    }
 }
 
 /// The method: weight `W1 O W2` of the projection O of the future outputs along the past, and the way to A and C.
@@ -76,11 +107,10 @@ impl SubspaceMethod {
     }
 }
 
-/// How the order is found.
+/// How the order is found; in files a number, or `"auto"`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
-#[cfg_attr(feature = "serde", serde(rename_all = "kebab-case", deny_unknown_fields))]
+#[cfg_attr(feature = "serde", serde(from = "super::order_form::OrderForm", into = "super::order_form::OrderForm"))]
 pub enum Order {
     /// The order given.
     Fixed(usize),

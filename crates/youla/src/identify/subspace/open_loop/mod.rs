@@ -26,7 +26,8 @@ pub(super) struct OpenLoop {
 
 impl OpenLoop {
     pub(super) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
-        let factor = HankelFactor::new(data, options.horizon.past, options.horizon.future)?;
+        let (past, horizon) = options.block_rows();
+        let factor = HankelFactor::new(data, past, horizon)?;
         let (excitation_rcond, projection) =
             rayon::join(|| factor.require_excitation(), || project(&factor, options.method));
         let (excitation_rcond, projection) = (excitation_rcond?, projection?);

@@ -57,7 +57,7 @@ pub(crate) struct StateMap {
 impl Varx {
     pub(crate) fn new(data: &HankelLq, options: &SubspaceOptions) -> Result<Self> {
         let (inputs, outputs, columns, report) = (data.inputs, data.outputs, data.columns, data.report);
-        let (past, horizon) = (options.horizon.past, options.horizon.future);
+        let (past, horizon) = options.block_rows();
         let r = data.arranged(HankelLayout::Chronological, past, horizon)?;
         let direct = options.feedthrough.inputs_of_outputs(inputs, outputs);
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));

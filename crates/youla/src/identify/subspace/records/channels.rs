@@ -213,7 +213,7 @@ pub(crate) fn check_ports(inputs: usize, outputs: usize) -> Result<()> {
 
 /// Block rows that each experiment must hold, whatever horizon is found.
 pub(crate) fn least_blocks(options: &SubspaceOptions) -> (usize, usize) {
-    (options.horizon.past, options.horizon.future)
+    options.block_rows()
 }
 
 /// Refuses an experiment without a Hankel column.
@@ -256,8 +256,8 @@ pub(crate) fn check_blocks(options: &SubspaceOptions) -> Result<()> {
             instead: "it serves physical structures only; take \"estimated\" or \"zero\"",
         });
     }
-    at_least("the horizon", options.horizon.future, 2, "at least 2 block rows")?;
-    at_least("the past", options.horizon.past, 1, "at least 1 block row")
+    at_least("the horizon", options.horizon, 2, "at least 2 block rows")?;
+    at_least("the past", options.block_rows().0, 1, "at least 1 block row")
 }
 
 fn at_least(what: &str, value: usize, least: usize, must: &'static str) -> Result<()> {

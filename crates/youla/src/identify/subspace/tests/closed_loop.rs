@@ -46,8 +46,7 @@ fn noise_free_systems_are_recovered() {
             let system = random_system(magnitudes, m, p, true, 10 + case as u64);
             let u = uniform(1500, m, &mut ChaCha8Rng::seed_from_u64(20 + case as u64));
             let y = respond(&system, &u, 0.7, None);
-            let options =
-                SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, ..fixed(2 * magnitudes.len(), 6) };
+            let options = SubspaceOptions { method, horizon: 6, past: Some(9), ..fixed(2 * magnitudes.len(), 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             let error = distance(&found.model, &system);
             assert!(error < 1e-8, "{method:?}, {m} x {p}: {error:e}");
@@ -84,12 +83,8 @@ fn unstable_system_and_several_experiments_without_noise() {
 #[test]
 fn feedback_does_not_bias() {
     let (plant, gain, u, y) = noisy_loop(40_000, 1);
-    let options = |method| SubspaceOptions {
-        method,
-        horizon: Horizon { future: 10, past: 20 },
-        order: Order::Fixed(2),
-        ..Default::default()
-    };
+    let options =
+        |method| SubspaceOptions { method, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
     for method in METHODS {
         let found = subspace(&one(&u, &y), clock(), &options(method)).unwrap();
         let error = distance(&found.model, &plant);
@@ -112,12 +107,8 @@ fn feedback_does_not_bias() {
 fn parsim_needs_a_controller_that_delays() {
     let (plant, _, u, y) = noisy_loop(40_000, 0);
     let error = |method| {
-        let options = SubspaceOptions {
-            method,
-            horizon: Horizon { future: 10, past: 20 },
-            order: Order::Fixed(2),
-            ..Default::default()
-        };
+        let options =
+            SubspaceOptions { method, horizon: 10, past: Some(20), order: Order::Fixed(2), ..Default::default() };
         distance(&subspace(&one(&u, &y), clock(), &options).unwrap().model, &plant)
     };
     let errors = METHODS.map(error);
@@ -128,12 +119,8 @@ fn parsim_needs_a_controller_that_delays() {
 fn automatic_order_is_the_true_one_in_closed_loop() {
     let (plant, _, u, y) = noisy_loop(5000, 1);
     for method in METHODS {
-        let options = SubspaceOptions {
-            method,
-            horizon: Horizon { future: 10, past: 20 },
-            order: Order::Auto(8),
-            ..Default::default()
-        };
+        let options =
+            SubspaceOptions { method, horizon: 10, past: Some(20), order: Order::Auto(8), ..Default::default() };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!(found.order.order, 2, "{:?}", found.order);
         let error = distance(&found.model, &plant);
@@ -159,7 +146,7 @@ fn order_and_units_of_the_channels_do_not_matter() {
     let u2 = Mat::from_fn(u.nrows(), 2, |k, j| 1e3 * u[(k, swap[j])]);
     let y2 = Mat::from_fn(y.nrows(), 3, |k, j| units[j] * y[(k, turn[j])]);
     for method in METHODS {
-        let options = SubspaceOptions { method, horizon: Horizon { future: 8, past: 15 }, ..fixed(4, 8) };
+        let options = SubspaceOptions { method, horizon: 8, past: Some(15), ..fixed(4, 8) };
         let run = |u, y| subspace(&one(u, y), clock(), &options).unwrap().model;
         let (plain, other) = (run(&u, &y), run(&u2, &y2));
         let b = Mat::from_fn(4, 2, |i, j| 1e3 * other.b()[(i, swap[j])]);
@@ -176,8 +163,7 @@ fn factorisations_agree_and_threads_do_not_matter() {
     let (u, y) = noisy_record(17_000);
     for method in METHODS {
         let run = |factorisation, threads| {
-            let options =
-                SubspaceOptions { method, horizon: Horizon { future: 8, past: 15 }, factorisation, ..fixed(4, 8) };
+            let options = SubspaceOptions { method, horizon: 8, past: Some(15), factorisation, ..fixed(4, 8) };
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             let found = pool.install(|| subspace(&one(&u, &y), clock(), &options)).unwrap();
             (found.model, found.innovation.gain().unwrap().to_owned(), found.factor.by)
@@ -213,7 +199,7 @@ fn past_and_future_of_different_length_for_open_loops() {
     let y = respond(&system, &u, 0.5, None);
     for method in [SubspaceMethod::Moesp, SubspaceMethod::N4sid, SubspaceMethod::Cva] {
         for past in [3, 12] {
-            let options = SubspaceOptions { method, horizon: Horizon { future: 6, past }, ..fixed(4, 6) };
+            let options = SubspaceOptions { method, horizon: 6, past: Some(past), ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap();
             assert!(
                 distance(&found.model, &system) < 1e-8,
@@ -223,6 +209,6 @@ fn past_and_future_of_different_length_for_open_loops() {
             assert_eq!(found.columns, 801 - past - 6);
         }
     }
-    let none = SubspaceOptions { horizon: Horizon { future: 6, past: 0 }, ..fixed(4, 6) };
+    let none = SubspaceOptions { horizon: 6, past: Some(0), ..fixed(4, 6) };
     assert!(matches!(subspace(&one(&u, &y), clock(), &none), Err(crate::Error::OutOfRange { .. })));
 }

@@ -57,7 +57,7 @@ fn lines_are_taken_out_exactly() {
     let system = random_system(&[0.95, 0.8], 2, 2, true, 3);
     let data = Disturbed::new(&system, two_lines, 30.0, 0.0);
     for method in WEIGHTS {
-        let found = data.identify(&SubspaceOptions { method, horizon: Horizon { future: 7, past: 8 }, ..fixed(4, 7) });
+        let found = data.identify(&SubspaceOptions { method, horizon: 7, past: Some(8), ..fixed(4, 7) });
         let error = distance(&found.model, &system);
         assert!(error < 1e-7, "{method:?}: {error:.1e}");
         for (one, other) in found.disturbances.iter().zip(&data.coefficients) {
@@ -83,12 +83,7 @@ fn unstable_systems_have_their_lines_found_by_prediction() {
     let a = uniform(4, 2, &mut ChaCha8Rng::seed_from_u64(9));
     let y = respond(&system, &u, 0.1, None) + &w * &a;
     for method in [SubspaceMethod::Moesp, SubspaceMethod::PbsidOpt] {
-        let options = SubspaceOptions {
-            method,
-            stability: Stability::Allow,
-            horizon: Horizon { future: 7, past: 8 },
-            ..fixed(4, 7)
-        };
+        let options = SubspaceOptions { method, stability: Stability::Allow, horizon: 7, past: Some(8), ..fixed(4, 7) };
         let found = subspace(&[one(&u, &y)[0].with_disturbance(w.as_ref())], clock(), &options).unwrap();
         assert_ne!(found.fit.by, InputFit::Simulation);
         assert!(distance(&found.model, &system) < 1e-5, "{method:?}: {:.1e}", distance(&found.model, &system));

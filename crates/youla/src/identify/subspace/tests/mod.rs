@@ -84,10 +84,5 @@ fn one<'a>(u: &'a Mat<f64>, y: &'a Mat<f64>) -> [Experiment<'a>; 1] {
 }
 
 fn fixed(order: usize, horizon: usize) -> SubspaceOptions {
-    SubspaceOptions {
-        order: Order::Fixed(order),
-        horizon: horizon.into(),
-        feedthrough: Feedthrough::Estimated,
-        ..Default::default()
-    }
+    SubspaceOptions { order: Order::Fixed(order), horizon, feedthrough: Feedthrough::Estimated, ..Default::default() }
 }

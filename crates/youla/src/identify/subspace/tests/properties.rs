@@ -17,12 +17,7 @@ const PAST: usize = 15;
 const HORIZON: usize = 8;
 
 fn options(method: SubspaceMethod) -> SubspaceOptions {
-    SubspaceOptions {
-        method,
-        horizon: Horizon { future: HORIZON, past: PAST },
-        feedthrough: Feedthrough::None,
-        ..fixed(4, HORIZON)
-    }
+    SubspaceOptions { method, horizon: HORIZON, past: Some(PAST), feedthrough: Feedthrough::None, ..fixed(4, HORIZON) }
 }
 
 fn model(experiments: &[Experiment<'_>], method: SubspaceMethod) -> SubspaceModel {

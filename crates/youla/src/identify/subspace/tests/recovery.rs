@@ -29,7 +29,7 @@ fn automatic_order_is_the_true_one() {
     let gain = Mat::zeros(4, 2);
     let y = respond(&system, &u, 0.0, Some((&gain, &e)));
     for method in [SubspaceMethod::Moesp, SubspaceMethod::Cva] {
-        let options = SubspaceOptions { method, order: Order::Auto(10), horizon: 10.into(), ..Default::default() };
+        let options = SubspaceOptions { method, order: Order::Auto(10), horizon: 10, ..Default::default() };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!(found.order.order, 4);
         assert!(distance(&found.model, &system) < 0.02);

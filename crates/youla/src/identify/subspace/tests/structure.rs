@@ -33,8 +33,7 @@ fn marked_entries_of_d_are_found_and_the_others_stay_zero() {
         let y = respond(&system, &u, 0.3, None) + noise * &e;
         for method in WEIGHTS {
             let feedthrough = Feedthrough::Entries(marks());
-            let options =
-                SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
+            let options = SubspaceOptions { method, horizon: 6, past: Some(9), feedthrough, ..fixed(4, 6) };
             let found = subspace(&one(&u, &y), clock(), &options).unwrap().model;
             let error = distance(&found, &system);
             let limit = if noise > 0.0 { 0.1 } else { 1e-8 };
@@ -53,7 +52,7 @@ fn all_entries_or_none_are_the_other_choices() {
     let u = uniform(700, 2, rng);
     let y = respond(&system, &u, 0.3, None) + 0.1 * uniform(700, 3, rng);
     let with = |method, feedthrough| {
-        let options = SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, feedthrough, ..fixed(4, 6) };
+        let options = SubspaceOptions { method, horizon: 6, past: Some(9), feedthrough, ..fixed(4, 6) };
         subspace(&one(&u, &y), clock(), &options).map(|found| found.model)
     };
     for method in WEIGHTS {
@@ -85,8 +84,7 @@ fn delays_are_states_of_the_model() {
         let u = uniform(900, 2, rng);
         let delayed = Mat::from_fn(900, 2, |k, j| if j == 0 && k >= 3 { u[(k - 3, 0)] } else { u[(k, 1)] * j as f64 });
         let y = respond(&system, &delayed, 0.3, None);
-        let options =
-            SubspaceOptions { method, horizon: Horizon { future: 6, past: 9 }, delays: vec![3, 0], ..fixed(4, 6) };
+        let options = SubspaceOptions { method, horizon: 6, past: Some(9), delays: vec![3, 0], ..fixed(4, 6) };
         let found = subspace(&one(&u, &y), clock(), &options).unwrap();
         assert_eq!((found.order.order, found.model.order(), found.delays.clone()), (4, 7, vec![3, 0]));
         assert_eq!((found.columns, found.poles().len()), (900 - 3 - 14, 7));

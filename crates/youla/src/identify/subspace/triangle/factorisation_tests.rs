@@ -20,7 +20,7 @@ fn experiments(noise: f64) -> Vec<(Mat<f64>, Mat<f64>)> {
 fn factors(noise: f64, horizon: usize, by: Factorisation) -> Result<HankelLq> {
     let records = experiments(noise);
     let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
-    let data = Channels::new(&experiments, &SubspaceOptions { horizon: horizon.into(), ..Default::default() })?;
+    let data = Channels::new(&experiments, &SubspaceOptions { horizon, ..Default::default() })?;
     HankelLq::new(&data, (horizon, horizon), HankelLayout::InputsFirst, by)
 }
 
@@ -59,7 +59,7 @@ fn data_without_noise_are_left_to_qr() {
 fn a_shorter_horizon_comes_from_the_same_factor() {
     let records = experiments(0.3);
     let experiments: Vec<_> = records.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
-    let data = Channels::new(&experiments, &SubspaceOptions { horizon: 9.into(), ..Default::default() }).unwrap();
+    let data = Channels::new(&experiments, &SubspaceOptions { horizon: 9, ..Default::default() }).unwrap();
     let whole = HankelLq::new(&data, (9, 9), HankelLayout::InputsFirst, Factorisation::Qr).unwrap();
     let r = whole.arranged(HankelLayout::Chronological, 4, 3).unwrap();
     // The Gram matrix of the same rows over the same columns.

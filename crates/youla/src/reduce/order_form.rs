@@ -1,67 +1,17 @@
-//! Orders in run.toml: a number, a word, or a table with one key.
+//! The order of a reduced model in files: a number, a word, or a table with one key.
 
-use schemars::JsonSchema;
+use super::ReducedOrder;
 use serde::{Deserialize, Serialize};
-use youla::identify::subspace::Order;
-use youla::reduce::ReducedOrder;
-
-/// The order of a model.
-#[derive(Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected a whole number, zero or positive, or \"auto\"")]
-pub(in crate::settings) enum OrderForm {
-    /// This order.
-    Number(usize),
-    /// The order that the records ask for.
-    Word(AutoWord),
-}
-
-/// The word for a choice by the program.
-#[derive(Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(in crate::settings) enum AutoWord {
-    /// The program chooses.
-    Auto,
-}
-
-impl OrderForm {
-    /// The number, where one is given.
-    pub(in crate::settings) fn number(&self) -> Option<usize> {
-        match self {
-            OrderForm::Number(order) => Some(*order),
-            OrderForm::Word(AutoWord::Auto) => None,
-        }
-    }
-}
-
-impl From<Option<usize>> for OrderForm {
-    fn from(order: Option<usize>) -> Self {
-        order.map_or(OrderForm::Word(AutoWord::Auto), OrderForm::Number)
-    }
-}
-
-impl From<Order> for OrderForm {
-    fn from(order: Order) -> Self {
-        match order {
-            Order::Fixed(order) => OrderForm::Number(order),
-            Order::Auto(_) => OrderForm::Word(AutoWord::Auto),
-        }
-    }
-}
-
-impl From<OrderForm> for Order {
-    fn from(form: OrderForm) -> Self {
-        form.number().map_or_else(Order::default, Order::Fixed)
-    }
-}
 
 /// The order of a reduced model.
-#[derive(Serialize, Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(
     untagged,
     deny_unknown_fields,
     expecting = "expected a whole number, \"minimal\", \"auto\", or a table with the key bound or closed-loop"
 )]
-pub(in crate::settings) enum ReducedForm {
+pub(super) enum ReducedForm {
     /// This number of states, with those of the poles that are kept apart.
     Number(usize),
     /// A choice that needs no number.
@@ -80,9 +30,10 @@ pub(in crate::settings) enum ReducedForm {
 }
 
 /// A reduced order that needs no number.
-#[derive(Serialize, Deserialize, JsonSchema)]
+#[derive(Serialize, Deserialize)]
+#[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[serde(rename_all = "kebab-case")]
-pub(in crate::settings) enum ReducedWord {
+pub(super) enum ReducedWord {
     /// All states that are controllable and observable to working precision: only exact cancellations are removed.
     Minimal,
     /// `{ closed-loop = 0.05 }`: the fewest states that change the closed loop by at most 5 %.
@@ -114,5 +65,16 @@ impl From<ReducedForm> for ReducedOrder {
             ReducedForm::Bound { bound } => ReducedOrder::Bound(bound),
             ReducedForm::ClosedLoop { closed_loop } => ReducedOrder::ClosedLoop(closed_loop),
         }
+    }
+}
+
+#[cfg(feature = "schema")]
+impl schemars::JsonSchema for ReducedOrder {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        ReducedForm::schema_name()
+    }
+
+    fn json_schema(generator: &mut schemars::SchemaGenerator) -> schemars::Schema {
+        ReducedForm::json_schema(generator)
     }
 }

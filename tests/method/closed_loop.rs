@@ -13,7 +13,7 @@ fn median(mut values: [f64; 3]) -> f64 {
 }
 
 /// Noise of 1 um at the outputs, medians of three seeds. Direct N4SID and CVA stay at 0.8 and 0.9 however long the record;
-/// PBSIDopt, SSARX, PARSIM-S and the Hansen scheme fall to about 0.07 and 0.10 with 64000 samples.
+/// PBSIDopt, SSARX and the Hansen scheme fall to about 0.07 and 0.10 with 64000 samples.
 #[test]
 fn only_the_methods_for_open_loops_have_an_error_floor() {
     let bearing = Loop::new(0.0);
@@ -23,7 +23,7 @@ fn only_the_methods_for_open_loops_have_an_error_floor() {
             |method| median([0, 1, 2].map(|k| bearing.error(&bearing.identify(method, &records[k].0, &records[k].1))));
         let scheme = median([0, 1, 2].map(|k| bearing.error(&bearing.hansen(&records[k].0, &records[k].1))));
         let direct = [SubspaceMethod::N4sid, SubspaceMethod::Cva].map(by);
-        let predictor = [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS].map(by);
+        let predictor = [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx].map(by);
         (direct, predictor, scheme)
     };
     let [short, medium, long] = [4_000, 16_000, 64_000].map(errors);
@@ -31,7 +31,7 @@ fn only_the_methods_for_open_loops_have_an_error_floor() {
     for k in 0..2 {
         assert!(long.0[k] > 0.6 && long.0[k] > 0.85 * short.0[k], "a floor is expected\n{all}");
     }
-    for k in 0..3 {
+    for k in 0..2 {
         let fallen = [short.1[k] / medium.1[k], medium.1[k] / long.1[k]];
         assert!(fallen.iter().all(|f| *f > 1.5) && long.1[k] < 0.12, "{fallen:?}\n{all}");
     }
@@ -50,7 +50,7 @@ fn an_unstable_bearing_is_found_unstable() {
     assert!((truth.norm() - 1.0084).abs() < 2e-4);
     for seed in 1..=3 {
         let (u, y) = bearing.record(8_000, 0.1, seed);
-        for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx, SubspaceMethod::ParsimS] {
+        for method in [SubspaceMethod::PbsidOpt, SubspaceMethod::Ssarx] {
             let found = outside(&bearing.identify(method, &u, &y));
             assert_eq!(found.len(), 1, "{method:?}, seed {seed}: {found:?}");
             let (radius, angle) = ((found[0].norm() - truth.norm()).abs(), (found[0].arg() - truth.arg()).abs());

@@ -165,7 +165,7 @@ def subspace(record: Records, **options: Any) -> SubspaceEstimate:
         Records.
     **options
         Keys of ``[direct]`` of run.toml: ``method`` (``"n4sid"``, ``"moesp"``, ``"cva"``; for closed loops ``"ssarx"``,
-        ``"pbsid-opt"``, ``"parsim-s"``), ``order`` (states), ``horizon`` and ``past`` (samples), ``feedthrough``, ``delays``,
+        ``"pbsid-opt"``), ``order`` (states), ``horizon`` and ``past`` (samples), ``feedthrough``, ``delays``,
         ``stability``.
 
     Returns

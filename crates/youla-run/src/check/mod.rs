@@ -182,8 +182,7 @@ fn method_finding(settings: &RunSettings) -> Option<Finding> {
     let what = format!(
         "[direct] method = \"{method}\" assumes inputs that do not depend on the noise, but the records are from a closed loop"
     );
-    let advice =
-        "Use method = \"pbsid-opt\", \"ssarx\" or \"parsim-s\" in [direct], or keep this one only for comparison";
+    let advice = "Use method = \"pbsid-opt\" or \"ssarx\" in [direct], or keep this one only for comparison";
     Some(finding(Severity::Caution, OF_SETTINGS, what, advice))
 }
 

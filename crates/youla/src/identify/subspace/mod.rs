@@ -6,7 +6,7 @@
 //!
 //! The estimates of MOESP, N4SID and CVA are consistent for inputs that do not depend on the noise. Measurements from a
 //! closed loop do not satisfy this: filter them by the coprime factors first, eq. (28), and identify S from alpha and beta,
-//! eq. (25); or take PBSIDopt, SSARX or PARSIM-S, which start from the one-step predictor (`varx.rs` and beside it).
+//! eq. (25); or take PBSIDopt or SSARX, which start from the one-step predictor (`varx.rs` and beside it).
 //!
 //! References: Verhaegen, Automatica 30, 61 (1994), PO-MOESP; Van Overschee and De Moor, Subspace Identification for Linear
 //! Systems, Kluwer 1996, chapters 4 and 6; Larimore, ACC 1983 and CDC 1990, CVA; Sima, Varga, SLICOT working note 2000-4.
@@ -49,7 +49,7 @@ use triangle::factorisation::HankelLq;
 use triangle::hankel_layout::HankelLayout;
 
 /// Result of [`subspace`]. The states of MOESP, N4SID and CVA are those in which the observability matrix over the horizon
-/// has orthonormal columns (with output scaling: of the scaled outputs); those of PBSIDopt and PARSIM-S those in which the
+/// has orthonormal columns (with output scaling: of the scaled outputs); those of PBSIDopt those in which the
 /// leading singular vectors of the predicted outputs are their observability matrix; those of SSARX have unit variance.
 #[derive(Debug, Clone)]
 pub struct SubspaceModel {
@@ -101,7 +101,7 @@ impl SubspaceModel {
 /// K, Lambda : from the residuals of the state and output equations by a Riccati equation
 /// B, D, x0  : min sum |y - yhat|^2 over the simulated (for unstable A: one-step predicted) outputs
 /// ```
-/// for MOESP, N4SID and CVA, and for PBSIDopt, SSARX and PARSIM-S with `z = [u; y]` and a state T read from the past p
+/// for MOESP, N4SID and CVA, and for PBSIDopt and SSARX with `z = [u; y]` and a state T read from the past p
 /// ```text
 /// y(k) = sum_{i=1..p} Xi_i z(k-i) + D u(k) + e(k),   x(k) = T [z(k-p); ...; z(k-1)] by the method, and its shift x(k+1)
 /// C, e : y(k) on x(k), u(k);    A : x(k+1) on x(k), u(k), e(k);    K, Lambda : from the residuals by a Riccati equation

@@ -95,15 +95,12 @@ pub enum SubspaceMethod {
     /// SSARX: canonical variates of the past with the future outputs, freed of what the regression takes from the future
     /// inputs and outputs. As PBSIDopt, independent of the units of the outputs also without scaling.
     Ssarx,
-    /// PARSIM-S: the future outputs regressed block row by block row on the past and one input; `W2` the past signals. For
-    /// controllers that delay y by at least one sample.
-    ParsimS,
 }
 
 impl SubspaceMethod {
     /// Whether the method stays consistent when the inputs contain fed-back noise.
     pub fn is_for_closed_loops(self) -> bool {
-        matches!(self, SubspaceMethod::PbsidOpt | SubspaceMethod::Ssarx | SubspaceMethod::ParsimS)
+        matches!(self, SubspaceMethod::PbsidOpt | SubspaceMethod::Ssarx)
     }
 }
 

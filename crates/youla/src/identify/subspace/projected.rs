@@ -15,7 +15,7 @@ use crate::lti::Discrete;
 pub(super) enum Projected {
     /// MOESP, N4SID, CVA.
     OpenLoop(OpenLoop),
-    /// PBSIDopt, SSARX, PARSIM-S.
+    /// PBSIDopt, SSARX.
     Predictor(PredictorForm),
 }
 

@@ -7,7 +7,6 @@
 //! u(k) does not bias it. K comes from the covariance of `[K e + rest; e]` by a Riccati equation: this is the K of the
 //! regression where A - K C is stable and the rest is small, and gives a stable predictor always.
 
-mod parsim;
 mod pbsid;
 mod ssarx;
 mod varx;
@@ -39,7 +38,6 @@ impl PredictorForm {
         let canonical_correlations = canonical.singular_values.clone();
         let map = match options.method {
             SubspaceMethod::PbsidOpt => pbsid::states(&varx)?,
-            SubspaceMethod::ParsimS => parsim::states(&varx)?,
             _ => canonical,
         };
         Ok(PredictorForm { varx, map, excitation_rcond, canonical_correlations })

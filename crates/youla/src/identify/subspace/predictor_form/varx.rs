@@ -38,14 +38,6 @@ pub(crate) struct Varx {
     d: Mat<f64>,
 }
 
-/// The outputs as they follow from the past and the inputs of the same sample.
-pub(crate) struct Present {
-    /// A row per past signal.
-    pub(crate) by_past: Mat<f64>,
-    /// D transposed, zero where it is not sought.
-    pub(crate) d: Mat<f64>,
-}
-
 /// How the state is read from the past, and the singular values it came with.
 pub(crate) struct StateMap {
     /// A column per state, by falling singular value: `x(k)' = [z(k-p)' ... z(k-1)'] T'`.
@@ -62,14 +54,13 @@ impl Varx {
         let direct = options.feedthrough.inputs_of_outputs(inputs, outputs);
         let (xi, d) = (Mat::zeros(0, 0), Mat::zeros(inputs, outputs));
         let mut varx = Varx { r, inputs, outputs, past, horizon, columns, direct, report, xi, d };
-        let present = varx.present()?;
-        (varx.xi, varx.d) = (present.by_past, present.d);
+        (varx.xi, varx.d) = varx.present()?;
         Ok(varx)
     }
 
     /// `y(k)` on the past and, output by output, on those of the inputs `u(k)` that reach it: first D from what the past
-    /// leaves of both, then the rest from the past.
-    pub(crate) fn present(&self) -> Result<Present> {
+    /// leaves of both, then the rest from the past. Coefficients of the past and D, transposed.
+    fn present(&self) -> Result<(Mat<f64>, Mat<f64>)> {
         let past = self.past_signals();
         let (u, y) = (self.inputs_at(0), self.outputs_at(0));
         let (from, to) = (self.rank(past), self.rank(past + self.inputs));
@@ -81,7 +72,7 @@ impl Varx {
             inputs.iter().enumerate().for_each(|(j, input)| d[(*input, i)] = found[(j, 0)]);
         }
         let by_past = self.regress(past, (y - u * &d).as_ref())?;
-        Ok(Present { by_past, d })
+        Ok((by_past, d))
     }
 
     /// Number of past signals, p (m + l).
@@ -132,7 +123,7 @@ impl Varx {
     }
 
     /// Coefficients of columns of the factor on its `count` leading columns, of least norm where these are dependent.
-    pub(crate) fn regress(&self, count: usize, targets: MatRef<'_, f64>) -> Result<Mat<f64>> {
+    pub(super) fn regress(&self, count: usize, targets: MatRef<'_, f64>) -> Result<Mat<f64>> {
         if self.report.by == Factorisation::Gram {
             let mut found = targets.subrows(0, count).to_owned();
             self.r.as_ref().submatrix(0, 0, count, count).solve_upper_triangular_in_place(found.as_mut());

@@ -3,13 +3,12 @@
 use super::*;
 use crate::lti::Discrete;
 
-const WEIGHTS: [SubspaceMethod; 6] = [
+const WEIGHTS: [SubspaceMethod; 5] = [
     SubspaceMethod::Moesp,
     SubspaceMethod::N4sid,
     SubspaceMethod::Cva,
     SubspaceMethod::PbsidOpt,
     SubspaceMethod::Ssarx,
-    SubspaceMethod::ParsimS,
 ];
 
 /// Two experiments with lines of 0.031 and 0.062 per sample, each with amplitudes of its own; `noise` on the outputs.

@@ -5,13 +5,12 @@ use super::*;
 use crate::signal::Channel;
 use crate::signal::{Detrend, Record};
 
-const WEIGHTS: [SubspaceMethod; 6] = [
+const WEIGHTS: [SubspaceMethod; 5] = [
     SubspaceMethod::Moesp,
     SubspaceMethod::N4sid,
     SubspaceMethod::Cva,
     SubspaceMethod::PbsidOpt,
     SubspaceMethod::Ssarx,
-    SubspaceMethod::ParsimS,
 ];
 const PAST: usize = 15;
 const HORIZON: usize = 8;

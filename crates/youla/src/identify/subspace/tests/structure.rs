@@ -3,13 +3,12 @@
 use super::*;
 use crate::lti::simulate;
 
-const WEIGHTS: [SubspaceMethod; 6] = [
+const WEIGHTS: [SubspaceMethod; 5] = [
     SubspaceMethod::Moesp,
     SubspaceMethod::N4sid,
     SubspaceMethod::Cva,
     SubspaceMethod::PbsidOpt,
     SubspaceMethod::Ssarx,
-    SubspaceMethod::ParsimS,
 ];
 
 fn marks() -> Vec<Vec<bool>> {

@@ -105,7 +105,7 @@ pub fn pid_for_export(run: &Path) -> Result<PidExport> {
             "this run has no new PID; add structure = \"pid\" to [redesign] and run `youla identify` again",
         ));
     }
-    let found: PidEntry = serde_json::from_slice(&youla_io::read_bytes(&path)?)
+    let found: PidEntry = serde_json::from_str(&youla_io::read_text(&path)?)
         .map_err(|source| Error::NotASummary { path: path.clone(), source })?;
     let model = read_model(run.join("8-redesign/new_controller.json"))?;
     let (c, ts) = (&found.controller, model.system.time().ts());

@@ -44,7 +44,7 @@ pub fn write_into(found: &Identification, folder: RunFolder, clock: &mut StageCl
         let page = page(found, &summary(found, &so_far)?, &name)?;
         folder.compact_json("report.json", &page)?;
         // Drawn from the rounded numbers of report.json, so that `youla report` draws the same page again.
-        let as_written = serde_json::to_vec(&page).and_then(|bytes| serde_json::from_slice(&bytes));
+        let as_written = serde_json::to_string(&page).and_then(|text| serde_json::from_str(&text));
         let page: ReportData = as_written.map_err(|source| youla_report::Error::ReportData { source })?;
         folder.compact_json("response.json", &page.frequency)?;
         Ok::<_, Error>(folder.text("report.html", &html(&page)?)?)

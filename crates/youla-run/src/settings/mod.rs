@@ -142,7 +142,8 @@ impl RunSettings {
             let mut table = table.clone();
             let controller = table.get_mut("controller")?.get_mut(&form)?.as_table_mut()?;
             controller.insert("feedback".into(), toml::Value::try_from(sign).ok()?);
-            table.try_into::<Self>().ok()?.checked().ok()
+            // Through text, as the file itself: a second reader of tables would be a megabyte of the program.
+            toml::from_str::<Self>(&toml::to_string(&table).ok()?).ok()?.checked().ok()
         })
     }
 

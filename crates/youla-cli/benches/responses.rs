@@ -14,9 +14,9 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 use std::f64::consts::TAU;
 use timing::median;
-use youla::identify::likelihood::{
-    LikelihoodOptions, MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response,
-};
+use youla::control::RunningController;
+use youla::identify::identify_response;
+use youla::identify::likelihood::{MeasuredResponse, ResponseTable, ResponseVariance};
 use youla::lti::Discrete;
 use youla::signal::{ExcitedRecord, PeriodicExperiment, Welch, indirect_response, line_response, local_response};
 
@@ -34,7 +34,8 @@ fn main() {
     println!("Welch: {:.3} s", median(|| indirect_response(&excited, time, &Welch::default()).unwrap()));
     for channels in [1, 2] {
         let response = MeasuredResponse::of_plant(&table(channels), time).unwrap();
-        let found = || recommend_from_response(&response, None, &LikelihoodOptions::default()).unwrap();
+        let open = RunningController::none(channels, channels, time).unwrap();
+        let found = || identify_response(&response, &open, None, &Default::default()).unwrap().model;
         let order = found().order;
         println!("model of 500 frequencies, {channels} x {channels}: order {order}, {:.3} s", median(found));
     }

@@ -17,7 +17,7 @@ use youla_loop::redesign::{Redesign, RedesignOptions};
 /// The recommended model of a run without anything else; paths are relative to `folder`.
 ///
 /// # Errors
-/// Those of [`crate::identify`] and of [`youla::identify::likelihood::recommend`].
+/// Those of [`crate::identify`] and of [`youla::identify()`].
 pub fn recommend_alone(settings: &RunSettings, records: &RunRecords, folder: &Path) -> Result<Recommendation> {
     settings.check()?;
     let declared = declared_loop(settings, records, folder)?;

@@ -3,8 +3,8 @@
 use crate::check::{DataCheck, OF_SETTINGS};
 use crate::stages::context::RunContext;
 use crate::{Error, Result};
-use youla::identify::likelihood::{self, Evidence, Recommendation};
-use youla::identify::{Identified, identify};
+use youla::identify::likelihood::{Evidence, Recommendation};
+use youla::identify::{Identified, identify, identify_response};
 use youla_loop::check::{Finding, Severity, Test};
 
 /// What a defect of the data means for the verdict: a record that is not what it is said to be supports no model. The controller and single
@@ -35,17 +35,16 @@ pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
 /// Those of [`identify`], within `[recommended]`.
 pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
     let (records, running, options) = (run.records, &run.declared.running, &run.settings.recommended);
+    let nominal = run.declared.nominal.as_ref();
     let within = |e: youla::Error| Error::from(e).within("[recommended]");
     if let Some(measured) = &records.measured {
-        let controller = (!running.is_open_loop()).then_some(running.system());
         let response = measured.response(records.time)?;
-        let mut found = likelihood::recommend_from_response(&response, controller, options).map_err(within)?;
-        if !run.settings.data.input_excitation.is_empty() {
-            found.evidence.extend(controller.map(|k| measured.controller(k)).transpose()?.flatten());
+        let mut found = identify_response(&response, running, nominal, options).map_err(within)?.model;
+        if !run.settings.data.input_excitation.is_empty() && !running.is_open_loop() {
+            found.evidence.extend(measured.controller(running.system())?);
         }
         return Ok(found);
     }
-    let nominal = run.declared.nominal.as_ref();
     let found = identify(&records.estimation, &records.verification, running, nominal, options);
     found.map(|Identified { model, .. }| model).map_err(within)
 }

@@ -111,8 +111,24 @@ pub fn identify(
 
 /// Identifies the plant of a loop from a measured frequency response in place of records.
 ///
+/// Without a stated variance the lines state it by their distance from the model; a model that misses dynamics is then noticed only by
+/// errors of neighbouring lines that agree. The predictor has no gain: lines do not tell how noise and initial state share the outputs.
+///
 /// # Errors
-/// As [`identify`], and [`likelihood::recommend_from_response`].
+/// As [`identify`]; [`Error::TooFewSamples`] says how many lines are needed.
+///
+/// ```
+/// use youla::identify::{identify_response, likelihood::{MeasuredResponse, ResponseTable, ResponseVariance}};
+/// use youla::{Mat, c64, control::RunningController, lti::Discrete};
+/// let (time, omega) = (Discrete::new(1.0)?, (1..60).map(|k| 0.05 * f64::from(k)).collect::<Vec<f64>>());
+/// let exact = |w: &f64| 0.5 / (c64::cis(*w) - 0.9);
+/// let values = omega.iter().map(|w| Mat::from_fn(1, 1, |_, _| exact(w) * (1.0 + 1e-3 * (w * 1e4).sin()))).collect();
+/// let table = ResponseTable { omega, values, variance: ResponseVariance::Unknown };
+/// let response = MeasuredResponse::of_plant(&table, time)?;
+/// let found = identify_response(&response, &RunningController::none(1, 1, time)?, None, &Default::default())?.model;
+/// assert!(found.order == 1 && (found.plant.a()[(0, 0)] - 0.9).abs() < 1e-3);
+/// # Ok::<(), youla::Error>(())
+/// ```
 pub fn identify_response(
     response: &MeasuredResponse,
     controller: &RunningController,

@@ -42,7 +42,8 @@ pub use deviation::mode_estimates::ModeEstimate;
 pub use deviation::region::{Draw, Interval, Region, RegionParts};
 pub use deviation::response_error::{EntryErrors, ResponseError};
 pub use known_loop::{LoopKnowledge, LoopSignals};
-pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance, recommend_from_response};
+pub(crate) use measured::recommend_from_response;
+pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance};
 pub use options::LikelihoodOptions;
 pub use recommendation::{Candidate, Evidence, Outcome, Predictor, Recommendation, figure};
 

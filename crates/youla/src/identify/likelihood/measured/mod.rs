@@ -55,21 +55,7 @@ use std::f64::consts::TAU;
 /// # Errors
 /// [`Error::TooFewSamples`] says how many lines are needed, [`Error::Ports`] and [`Error::OutOfRange`] name an option that cannot
 /// be met; [`Error::NoCandidate`] where no search ends; ports of the controller.
-///
-/// ```
-/// use youla::identify::likelihood::{LikelihoodOptions, MeasuredResponse, ResponseTable, ResponseVariance};
-/// use youla::identify::likelihood::recommend_from_response;
-/// use youla::{Mat, c64, lti::Discrete};
-/// let omega: Vec<f64> = (1..60).map(|k| 0.05 * f64::from(k)).collect();
-/// let exact = |w: &f64| 0.5 / (c64::cis(*w) - 0.9);
-/// let values = omega.iter().map(|w| Mat::from_fn(1, 1, |_, _| exact(w) * (1.0 + 1e-3 * (w * 1e4).sin()))).collect();
-/// let table = ResponseTable { omega, values, variance: ResponseVariance::Unknown };
-/// let response = MeasuredResponse::of_plant(&table, Discrete::new(1.0)?)?;
-/// let found = recommend_from_response(&response, None, &LikelihoodOptions::default())?;
-/// assert!(found.order == 1 && (found.plant.a()[(0, 0)] - 0.9).abs() < 1e-3);
-/// # Ok::<(), youla::Error>(())
-/// ```
-pub fn recommend_from_response(
+pub(crate) fn recommend_from_response(
     response: &MeasuredResponse,
     controller: Option<&StateSpace<Discrete>>,
     options: &LikelihoodOptions,

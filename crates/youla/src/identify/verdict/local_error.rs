@@ -9,16 +9,16 @@
 //! Neighbouring bands are averaged with the weights of their information, so that a band in which the excitation shows nothing does
 //! not speak.
 
+use super::excess::{Excess, ExcessBand};
 use super::limits::{
-    BAND_LINES, BAND_RATIO, HANN_LOSS, LEAST_BANDS, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE,
-    OVERALL_CHANCE, WEAK_EXCITATION,
+    BAND_LINES, HANN_LOSS, LEAST_DIRECTION, LEAST_EXPLAINED, LEAST_MOVED, LOCAL_CHANCE, OVERALL_CHANCE, WEAK_EXCITATION,
 };
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, Side, c64};
 
-/// Unit of a band over that at the frequency in question, below which the band says nothing: half an octave of a double integrator.
-const LEAST_UNIT: f64 = 0.5;
+/// Octaves of the first band that count apart: a band of `BAND_LINES` lines for each of six excitations has eight.
+const OCTAVES: usize = 8;
 
 /// One record: lines of the inputs, of what the model leaves, and of the excitation.
 pub(crate) struct RecordLines<'a> {
@@ -56,6 +56,8 @@ pub(crate) struct Band {
     pub(crate) error: Vec<c64>,
     /// Variance of each entry.
     pub(crate) variance: Vec<f64>,
+    /// Of the first band: frequencies, shares of the sample rate, with their portions of the power of the inputs.
+    pub(crate) power: Vec<(f64, f64)>,
 }
 
 /// The errors of all bands; `None` where the excitation does not reach every input.
@@ -65,29 +67,6 @@ pub(crate) struct LocalErrors {
     /// By how many standard deviations the errors of all bands exceed chance; `None` where the bands have no more degrees of
     /// freedom than the model has parameters.
     pub(crate) significance: Option<f64>,
-}
-
-/// Mean squares over bands, beyond what chance explains.
-#[derive(Debug, Clone, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Excess {
-    bands: Vec<ExcessBand>,
-    /// Standard deviations by which a mean must exceed chance.
-    least: f64,
-}
-
-/// The excess of one band, entry by entry.
-#[derive(Debug, Clone)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct ExcessBand {
-    /// Middle of the band as a share of the sample rate.
-    share: f64,
-    /// Mean square of each entry less its mean by chance.
-    squares: Vec<f64>,
-    /// Mean square of each entry by chance.
-    chance: Vec<f64>,
-    /// Complex degrees of freedom of a mean square: its variance by chance is the square of its mean over them.
-    freedom: f64,
 }
 
 /// Bands for so many lines.
@@ -110,7 +89,8 @@ impl LocalErrors {
             }
             let whole = found.filter(|f| f.degrees == (2 * channels.m * channels.p) as f64);
             let share = 0.5 * (k as f64 + 0.5) / count as f64;
-            bands.push(whole.map(|f| Band { share, error: f.error, variance: f.variance }));
+            let power = if k == 0 { sums.power() } else { Vec::new() };
+            bands.push(whole.map(|f| Band { share, error: f.error, variance: f.variance, power }));
         }
         let significance = (degrees > 0.0).then(|| chi_square_deviations(statistic, degrees));
         LocalErrors { bands, significance }
@@ -120,7 +100,7 @@ impl LocalErrors {
     pub(crate) fn excess(&self) -> Excess {
         let of = |b: &Band| {
             let squares = b.error.iter().zip(&b.variance).map(|(e, v)| e.norm_sqr() - v).collect();
-            ExcessBand { share: b.share, squares, chance: b.variance.clone(), freedom: 1.0 }
+            ExcessBand { share: b.share, squares, chance: b.variance.clone(), freedom: 1.0, power: b.power.clone() }
         };
         let overall = self.significance.is_some_and(|s| s > OVERALL_CHANCE);
         let least = if overall { OVERALL_CHANCE } else { LOCAL_CHANCE };
@@ -134,7 +114,8 @@ impl LocalErrors {
             let all: Vec<&Band> = groups.iter().filter_map(|g| g.bands[k].as_ref()).collect();
             let entries = all.first().filter(|_| all.len() > 1)?.error.len();
             let (squares, chance) = (0..entries).map(|i| scatter_of(&all, i)).unzip();
-            Some(ExcessBand { share: all[0].share, squares, chance, freedom: all.len() as f64 - 1.0 })
+            let (share, power) = (all[0].share, all[0].power.clone());
+            Some(ExcessBand { share, squares, chance, freedom: all.len() as f64 - 1.0, power })
         });
         Excess { bands: bands.collect(), least: LOCAL_CHANCE }
     }
@@ -147,7 +128,7 @@ impl LocalErrors {
             let chance: Vec<f64> = a.variance.iter().zip(&b.variance).map(|(a, b)| a + b).collect();
             let apart = a.error.iter().zip(&b.error).map(|(a, b)| (a - b).norm_sqr());
             let squares = apart.zip(&chance).map(|(square, chance)| square - chance).collect();
-            Some(ExcessBand { share: a.share, squares, chance, freedom: 1.0 })
+            Some(ExcessBand { share: a.share, squares, chance, freedom: 1.0, power: a.power.clone() })
         };
         Excess { bands: one.bands.iter().zip(&other.bands).filter_map(of).collect(), least: LOCAL_CHANCE }
     }
@@ -164,74 +145,6 @@ fn scatter_of(groups: &[&Band], entry: usize) -> (f64, f64) {
     ((spread - freedom) / unit, freedom / unit)
 }
 
-impl Excess {
-    /// Whether any band speaks.
-    pub(crate) fn is_empty(&self) -> bool {
-        self.bands.is_empty()
-    }
-
-    /// Whether every band states so many entries.
-    #[cfg(feature = "serde")]
-    pub(crate) fn is_of(&self, entries: usize) -> bool {
-        let fits = |b: &ExcessBand| b.freedom >= 1.0 && [b.squares.len(), b.chance.len()] == [entries; 2];
-        self.bands.iter().all(fits)
-    }
-
-    /// Mean square of each of `entries` near a frequency beyond chance, by how many standard deviations of a normal variable the largest
-    /// exceeds it.
-    pub(crate) fn near(&self, share: f64, entries: usize) -> (Vec<f64>, f64) {
-        self.near_in_units(share, &|_| vec![1.0; entries])
-    }
-
-    /// The same where the errors are alike in other units from band to band: `squares` gives the square of the unit of each entry. Of few wide
-    /// bands around a low frequency a response falls by decades, and its errors with it. Bands in which the unit is less than half are left
-    /// out.
-    pub(crate) fn near_in_units(&self, share: f64, squares: &dyn Fn(f64) -> Vec<f64>) -> (Vec<f64>, f64) {
-        let near: Vec<(&ExcessBand, Vec<f64>)> = self.window(share).iter().map(|b| (b, squares(b.share))).collect();
-        let (mut out, mut largest) = (squares(share), 0.0_f64);
-        for (i, value) in out.iter_mut().enumerate() {
-            let alike = near.iter().filter(|(_, units)| units[i] >= LEAST_UNIT * LEAST_UNIT * *value);
-            let (excess, deviations) = beyond_chance(alike.map(|(band, units)| (*band, i, units[i].max(TINY))));
-            largest = largest.max(deviations);
-            *value *= if deviations > self.least { excess.max(0.0) } else { 0.0 };
-        }
-        (out, largest)
-    }
-
-    /// The bands around a frequency; none where the nearest is farther away than the window is wide.
-    fn window(&self, share: f64) -> &[ExcessBand] {
-        let (from, to) = (share / BAND_RATIO, share * BAND_RATIO);
-        let mut first = self.bands.partition_point(|b| b.share < from);
-        let mut end = self.bands.partition_point(|b| b.share <= to);
-        while end - first < LEAST_BANDS.min(self.bands.len()) {
-            first = first.saturating_sub(1);
-            end = (end + 1).min(self.bands.len());
-        }
-        &self.bands[first..end]
-    }
-}
-
-/// Mean square of an entry over some bands less its mean by chance, with the squares of their units, and by how many standard deviations of a
-/// normal variable the mean square exceeds chance.
-///
-/// The bands count with the inverse variances `w = freedom / chance^2` of their mean squares. By chance the sum of these is nearly
-/// chi-square with `2 (sum w chance)^2 / sum w` degrees of freedom (F. E. Satterthwaite, Biometrics Bull. 2 (1946), 110).
-fn beyond_chance<'a>(bands: impl Iterator<Item = (&'a ExcessBand, usize, f64)>) -> (f64, f64) {
-    let (mut excess, mut chance, mut weights) = (0.0, 0.0, 0.0);
-    for (band, entry, unit) in bands {
-        let by_chance = band.chance[entry] / unit;
-        let weight = band.freedom / (by_chance * by_chance).max(TINY);
-        excess += weight * band.squares[entry] / unit;
-        chance += weight * by_chance.max(TINY);
-        weights += weight;
-    }
-    if weights == 0.0 {
-        return (0.0, 0.0);
-    }
-    let degrees = 2.0 * chance * chance / weights;
-    (excess / weights, chi_square_deviations(degrees * (1.0 + excess / chance), degrees))
-}
-
 /// Sums of products over the lines of a band.
 struct Sums {
     lines: usize,
@@ -240,19 +153,44 @@ struct Sums {
     vx: Mat<c64>,
     vv: Vec<f64>,
     uu: Vec<f64>,
+    /// Of each octave below the upper edge of the band, as far as it lies in the band: `sum |u|^2`, `sum share |u|^2`.
+    octaves: [[f64; 2]; OCTAVES],
+}
+
+impl Sums {
+    /// Mean frequency of each octave, a share of the sample rate, and its portion of the power of the inputs.
+    fn power(&self) -> Vec<(f64, f64)> {
+        let total: f64 = self.octaves.iter().map(|octave| octave[0]).sum();
+        let of = |[power, moment]: &[f64; 2]| (moment / power, power / total);
+        self.octaves.iter().filter(|octave| octave[0] > 0.0).map(of).collect()
+    }
 }
 
 fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usize) -> Vec<Sums> {
     let zeros = |rows: usize| Mat::<c64>::zeros(rows, q);
-    let empty = |_| Sums { lines: 0, xx: zeros(q), ux: zeros(m), vx: zeros(p), vv: vec![0.0; p], uu: vec![0.0; m] };
+    let empty = |_| Sums {
+        lines: 0,
+        xx: zeros(q),
+        ux: zeros(m),
+        vx: zeros(p),
+        vv: vec![0.0; p],
+        uu: vec![0.0; m],
+        octaves: [[0.0; 2]; OCTAVES],
+    };
     let mut all: Vec<Sums> = (0..count).map(empty).collect();
     for r in records {
         let total = r.v.len() / p.max(1);
         for k in 0..total {
-            let sums = &mut all[(k * count / total).min(count - 1)];
+            let band = (k * count / total).min(count - 1);
+            let sums = &mut all[band];
             sums.lines += 1;
             (0..p).for_each(|i| sums.vv[i] += r.v[k * p + i].norm_sqr());
             (0..m).for_each(|j| sums.uu[j] += r.u[k * m + j].norm_sqr());
+            let share = 0.5 * (k + 1) as f64 / total as f64;
+            let below = (0.5 * (band + 1) as f64 / (share * count as f64)).log2() as usize;
+            let power: f64 = r.u[k * m..][..m].iter().map(c64::norm_sqr).sum();
+            let octave = &mut sums.octaves[below.min(OCTAVES - 1)];
+            *octave = [octave[0] + power, octave[1] + share * power];
             for a in 0..q {
                 let xa = r.x[k * q + a].conj();
                 (0..q).for_each(|b| sums.xx[(b, a)] += r.x[k * q + b] * xa);

@@ -16,6 +16,7 @@
 //! A model is trusted where every required test is passed. Limits: `limits`.
 
 mod controller;
+mod excess;
 pub(crate) mod limits;
 mod local_error;
 pub(crate) mod loop_ratio;
@@ -26,7 +27,7 @@ mod tests;
 mod witness;
 
 pub(crate) use controller::explains;
-pub(crate) use local_error::Excess;
+pub(crate) use excess::Excess;
 pub use loop_ratio::LoopRatio;
 pub(crate) use nonlinear::{NonlinearPart, nonlinear};
 pub(crate) use parts::Parts;

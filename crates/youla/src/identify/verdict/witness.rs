@@ -1,8 +1,9 @@
 //! What the external excitation says of a model: its error, band by band, in all records, and how this error differs between groups of
 //! records.
 
+use super::excess::Excess;
 use super::limits::BAND_RATIO;
-use super::local_error::{Channels, Excess, LocalErrors, RecordLines, band_count, explained_inputs, hann};
+use super::local_error::{Channels, LocalErrors, RecordLines, band_count, explained_inputs, hann};
 use crate::identify::likelihood::LoopSignals;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Spectra, lines_of, long_enough};

@@ -15,7 +15,7 @@ fn chance_alone_exceeds_three_deviations_as_rarely_as_a_normal_variable() {
             let band = |(k, mean): (usize, &f64)| {
                 let square = mean * rng.sample::<f64, _>(Exp1);
                 let share = 0.1 + 1e-3 * k as f64;
-                ExcessBand { share, squares: vec![square - mean], chance: vec![*mean], freedom: 1.0 }
+                ExcessBand { share, squares: vec![square - mean], chance: vec![*mean], freedom: 1.0, power: Vec::new() }
             };
             Excess { bands: means.iter().enumerate().map(band).collect(), least: 3.0 }
         };
@@ -32,7 +32,7 @@ fn an_error_that_follows_the_response_is_found_in_its_units() {
     let band = |k: usize| {
         let share = 0.005 + 0.01 * k as f64;
         let power = response(share)[0];
-        ExcessBand { share, squares: vec![0.09 * power], chance: vec![1e-4 * power], freedom: 1.0 }
+        ExcessBand { share, squares: vec![0.09 * power], chance: vec![1e-4 * power], freedom: 1.0, power: Vec::new() }
     };
     let excess = Excess { bands: (0..50).map(band).collect(), least: 4.0 };
     for share in [0.006, 0.02, 0.1] {
@@ -40,6 +40,22 @@ fn an_error_that_follows_the_response_is_found_in_its_units() {
         assert!((excess.near_in_units(share, &response).0[0] / (0.09 * power) - 1.0).abs() < 1e-12);
     }
     assert!(excess.near(0.006, 1).0[0] < 0.01 * 0.09 * response(0.006)[0]);
+}
+
+/// Of a first band over which the response falls by four decades, the error is that of the mean response over the power of the inputs.
+#[test]
+fn the_unit_of_the_first_band_is_a_mean_over_its_power() {
+    let response = |share: f64| vec![(1e-6 / (share * share)).powi(2)];
+    let lines = 80;
+    let mean = (1..=lines).map(|k| response(k as f64 * 1e-4)[0].sqrt()).sum::<f64>() / lines as f64;
+    let (u, x) = (vec![c64::ONE; 10 * lines], vec![c64::ONE; 10 * lines]);
+    let v: Vec<c64> = (1..=10 * lines).map(|k| c64::from(0.01 * response(k as f64 * 1e-4)[0].sqrt())).collect();
+    let channels = Channels { m: 1, p: 1, q: 1 };
+    let share = 0.5 / (10 * lines) as f64;
+    let found = LocalErrors::new(&[RecordLines { u: &u, v: &v, x: &x }], channels, 10, 0);
+    let unit = found.excess().bands[0].units(&|s| response(s * 1e-4 / share))[0].sqrt();
+    assert!((unit / mean - 1.0).abs() < 0.2, "{unit} {mean}");
+    assert!((found.bands[0].as_ref().unwrap().error[0].re / (0.01 * unit) - 1.0).abs() < 0.2);
 }
 
 /// A move fills the first bands with 1e8 times the power of the excitation, which counts beside it in every band.

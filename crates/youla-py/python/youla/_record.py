@@ -119,9 +119,12 @@ class Record:
         if twice is not None:
             where = source.names[twice] or f"column {twice}"
             raise InputError(f"{where} is chosen twice as input or output; choose each channel once")
+        # Of several inputs one may be its own excitation: no controller drives it.
+        inputs = [c for _, _, c in self._groups["inputs"]]
+        own = inputs if len(inputs) > 1 else []
         for group in ("excitation", "reference", "alpha"):
-            for name, _, column in self._groups[group]:
-                if column in plant:
+            for k, (name, _, column) in enumerate(self._groups[group]):
+                if column in plant and not (group == "excitation" and own[k : k + 1] == [column]):
                     raise InputError(f"{group} names {name!r}, which is an input or output already; choose the column of what is added from outside, or leave {group} out")
         if units:
             raise InputError(f"units names {sorted(units)}, which are no channels; channels are {sorted(self._labels())}")

@@ -271,19 +271,25 @@ impl DataSettings {
         None
     }
     /// A column with two roles. Signals from outside may share one, as a reference that is fed forward does; u and y are signals of their own.
+    /// Of several inputs one may be its own excitation: no controller drives it.
     fn role_problem(&self) -> Option<String> {
         let mut plant = HashSet::new();
         let groups = ["inputs", "outputs", "input_excitation", "reference", "alpha"].into_iter().zip(self.groups());
-        for (k, (key, channel)) in groups.flat_map(|(key, of)| of.iter().map(move |c| (key, c))).enumerate() {
-            if plant.contains(&channel.source()) {
-                let (name, column) = (short(&channel.name), short(&channel.source().to_string()));
-                return Some(format!(
-                    "[data] {key} takes {name:?} from the column {column:?}, which is an input or output already; choose the column of its \
-                     own signal, or leave {key} out"
-                ));
-            }
-            if k < self.inputs.len() + self.outputs.len() {
-                plant.insert(channel.source());
+        for (key, channels) in groups {
+            let of_plant = key == "inputs" || key == "outputs";
+            let may_be_own = key == "input_excitation" && self.inputs.len() > 1;
+            for (k, channel) in channels.iter().enumerate() {
+                let own = may_be_own && self.inputs.get(k).is_some_and(|input| input.source() == channel.source());
+                if plant.contains(&channel.source()) && !own {
+                    let (name, column) = (short(&channel.name), short(&channel.source().to_string()));
+                    return Some(format!(
+                        "[data] {key} takes {name:?} from the column {column:?}, which is an input or output already; choose the column of its \
+                         own signal, or leave {key} out"
+                    ));
+                }
+                if of_plant {
+                    plant.insert(channel.source());
+                }
             }
         }
         None

@@ -78,7 +78,7 @@ pub fn stuck(values: &[f64], options: &CheckOptions) -> Option<Standstill> {
 }
 
 /// Whether a channel has more than `levels` values.
-fn several(values: &[f64], levels: usize) -> bool {
+pub(super) fn several(values: &[f64], levels: usize) -> bool {
     let mut seen: Vec<f64> = Vec::new();
     for v in values {
         if !seen.contains(v) {

@@ -42,8 +42,14 @@ fn evidence(model: &Recommendation) -> EvidenceTable {
     }
 }
 
+/// The candidates for all samples: criteria of a part of a record compare with none of the whole.
+fn compared(model: &Recommendation) -> Vec<&Candidate> {
+    let samples = model.candidates.iter().map(|c| c.samples).max().unwrap_or(0);
+    model.candidates.iter().filter(|c| c.samples == samples).collect()
+}
+
 fn candidates(model: &Recommendation) -> EvidenceTable {
-    let mut sorted: Vec<&Candidate> = model.candidates.iter().collect();
+    let mut sorted = compared(model);
     sorted.sort_by(|a, b| b.stabilised.cmp(&a.stabilised).then(a.criterion.total_cmp(&b.criterion)));
     let least = sorted.first().map_or(0.0, |c| c.criterion);
     let origin = |c: &Candidate| match c.stabilised {
@@ -140,7 +146,11 @@ fn means(kind: Detrend) -> Row {
 /// By how much the criterion of the best other candidate is larger.
 fn margin(model: &Recommendation, other: impl Fn(&Candidate) -> bool, what: &str) -> String {
     let least = |of: &dyn Fn(&&Candidate) -> bool| {
-        model.candidates.iter().filter(|c| c.stabilised).filter(of).min_by(|a, b| a.criterion.total_cmp(&b.criterion))
+        compared(model)
+            .into_iter()
+            .filter(|c| c.stabilised)
+            .filter(of)
+            .min_by(|a, b| a.criterion.total_cmp(&b.criterion))
     };
     let (Some(next), Some(chosen)) = (least(&|c| other(c)), least(&|c| !other(c))) else {
         return format!("no other {what} was tried");

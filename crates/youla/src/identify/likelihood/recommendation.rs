@@ -130,8 +130,10 @@ pub struct Candidate {
     pub order: usize,
     /// -2 log likelihood up to a constant.
     pub deviance: f64,
-    /// Schwarz's criterion, deviance plus log N per parameter: the least is best.
+    /// Schwarz's criterion, deviance plus log N per parameter: of candidates for as many samples the least is best.
     pub criterion: f64,
+    /// Samples, or lines of a measured response, for which it was found: of a long record the first ones see a part.
+    pub samples: usize,
     /// Steps of the search.
     pub steps: usize,
     /// Whether the feedback stabilises it, as far as one is known that explains the records; others come before it whatever its criterion.

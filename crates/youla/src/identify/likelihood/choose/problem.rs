@@ -234,19 +234,19 @@ impl Problem<'_> {
         let tasks = self.promising_tasks(tasks);
         let found: Vec<Option<Choice>> = tasks.into_par_iter().map(searched).collect();
         let found: Vec<Choice> = found.into_iter().flatten().collect();
-        table.extend(found.iter().map(Candidate::of));
+        table.extend(found.iter().map(|choice| self.noted(choice)));
         found
     }
-}
 
-impl Candidate {
-    pub(super) fn of(choice: &Choice) -> Self {
+    /// A choice as it is listed.
+    pub(super) fn noted(&self, choice: &Choice) -> Candidate {
         Candidate {
             origin: choice.origin.clone(),
             dead_time: choice.delays.clone(),
             order: choice.order(),
             deviance: choice.found.deviance,
             criterion: choice.without_penalty().criterion,
+            samples: self.samples().0,
             steps: choice.found.steps,
             stabilised: choice.stabilised(),
         }

@@ -134,7 +134,7 @@ impl Problem<'_> {
         let walked = walked.into_iter().skip(1).map(|choice| self.with_penalty(choice));
         let first = tried.len();
         tried.extend(walked);
-        table.extend(tried[first..].iter().map(Candidate::of));
+        table.extend(tried[first..].iter().map(|choice| self.noted(choice)));
     }
 
     /// The best models with fewer states, along their dead times: a pole in excess makes several dead times look alike, and without it

@@ -281,7 +281,8 @@ impl<'a> Problem<'a> {
     fn run(&self, tasks: Vec<Task>, table: &mut Vec<Candidate>) -> Vec<Fitted> {
         let found: Vec<Option<Fitted>> = tasks.into_par_iter().map(|task| self.searched(task, STEPS[0])).collect();
         let found: Vec<Fitted> = found.into_iter().flatten().collect();
-        table.extend(found.iter().map(Fitted::noted));
+        let lines = self.response.omega.len();
+        table.extend(found.iter().map(|fitted| fitted.noted(lines)));
         found
     }
 
@@ -301,13 +302,14 @@ impl Task {
 }
 
 impl Fitted {
-    fn noted(&self) -> Candidate {
+    fn noted(&self, lines: usize) -> Candidate {
         Candidate {
             origin: self.origin.into(),
             dead_time: self.delays.clone(),
             order: self.model.order(),
             deviance: self.energy,
             criterion: self.criterion,
+            samples: lines,
             steps: self.steps,
             stabilised: true,
         }

@@ -99,9 +99,9 @@ fn rotary_pendulum() {
 fn thermal_board() {
     let found = run(example("thermal-board")).recommended.unwrap();
     assert!(found.trusted(), "{:?}", found.reasons());
-    // That record has no set points; their columns are not looked at.
-    let [of_r1, of_r2] = [r#"name = "r1", from = "y1""#, r#"name = "r2", from = "y2""#];
-    let changes = [("steps_constrained_ml_2", "prbs_open_loop"), (r#"name = "r1""#, of_r1), (r#"name = "r2""#, of_r2)];
+    // That record has no set points; nobody looks at them.
+    let zero = "[data]\ncomputed = { r1 = \"0 * y1\", r2 = \"0 * y2\" }\n";
+    let changes = [("steps_constrained_ml_2", "prbs_open_loop"), ("[data]\n", zero)];
     let (settings, folder) = example_with("thermal-board", &changes);
     let open = read_records(&settings.data, &folder).unwrap().estimation.remove(0);
     let predicted = predict_open_loop(&found.plant, open.u(), open.y()).unwrap();

@@ -8,8 +8,7 @@
 //! |---|---|
 //! | `timing` | steps of the time column: irregular, missing, repeated, of another unit |
 //! | `clipping` | saturation at a limit |
-//! | `flatline` | a constant stretch of a channel |
-//! | `held` | a channel of a sensor or task that is slower than the log |
+//! | `flatline` | a constant stretch of a channel; a channel that a slower sensor or task holds |
 //! | `quantisation` | resolution of a channel relative to its innovation |
 //! | `drift` | a trend not explained by the input |
 //! | `outliers` | wrong samples, bursts, jumps of an offset |
@@ -34,7 +33,6 @@ mod excitation;
 mod feedback;
 mod finding;
 mod flatline;
-mod held;
 mod lines;
 mod noise;
 mod options;
@@ -55,8 +53,7 @@ pub use drift::{Drift, drift};
 pub use excitation::{ExcitationCheck, excitation};
 pub use feedback::{FeedbackCheck, feedback};
 pub use finding::{Finding, Severity, Test, by_severity};
-pub use flatline::{Standstill, stuck};
-pub use held::held;
+pub use flatline::{Standstill, held, stuck};
 pub use noise::{Noise, noise};
 pub use options::CheckOptions;
 pub use outliers::{Outliers, outliers};

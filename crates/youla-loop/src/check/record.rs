@@ -6,7 +6,7 @@ use super::regression::Lagged;
 use super::sequence::{self, Break};
 use super::{
     CheckOptions, ControllerCheck, ControllerRecord, Finding, Outliers, Severity, Test, clipping, controller, delay,
-    feedback, held, outliers, quantisation, stuck,
+    feedback, flatline, outliers, quantisation, stuck,
 };
 use crate::error::{Error, Result};
 use youla::MatRef;
@@ -189,8 +189,8 @@ fn of_channels(
             if let Some(standstill) = stuck(&values, options).filter(|s| !held(s.value)) {
                 all.push(standstill.finding(record.name, record.first_row, channel));
             }
-            if let Some(period) = held::held(&values, options) {
-                all.push(held::finding(period, record.name, channel, output));
+            if let Some(period) = flatline::held(&values, options) {
+                all.push(flatline::of_held(period, record.name, channel, output));
             }
             let innovation = innovations.filter(|_| output).and_then(|i| i.get(j)).map(|(_, sigma)| *sigma);
             if let Some(steps) = quantisation(&values, options).filter(|_| output) {

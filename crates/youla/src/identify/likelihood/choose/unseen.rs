@@ -2,7 +2,8 @@
 //!
 //! Where the excitation moves nothing, the inputs are what the feedback brings of the noise, and `y = (I - G K)^-1 H e` is all that is seen:
 //! for every G there is an H that explains it. A peak of the noise takes four numbers as a mode of G and many as an autoregression, so
-//! that Schwarz's criterion makes it a mode of the plant. It is left to the noise where the model rests on noise otherwise.
+//! that Schwarz's criterion makes it a mode of the plant. It is left to the noise where the model rests on noise otherwise. Cogging of an axis
+//! that moves back and forth is such a peak beside an excitation: a mode that its zeros nearly cancel, at which the model fails its tests.
 
 use super::lines::WithoutLines;
 use super::problem::{Problem, Solution, Task};
@@ -26,10 +27,8 @@ impl WithoutUnseen {
     pub(crate) fn evidence(&self, ts: f64) -> Evidence {
         let question = "Resonances that only the noise shows, left to the model of the noise (unseen modes)";
         let hz: Vec<String> = self.turns.iter().map(|turns| format!("{:.4}", turns / ts)).collect();
-        let note = format!(
-            "at {} Hz, where the excitation moves nothing: the response there continues the model",
-            hz.join(", ")
-        );
+        let note =
+            format!("at {} Hz, where the excitation shows none: the response there continues the model", hz.join(", "));
         Evidence::new(question, self.turns.len() as f64, 0.0).reported().noted(note)
     }
 }

@@ -62,7 +62,7 @@ const LARGEST_DEAD_TIME: usize = 20;
 /// Ratio of the frequency of a mode to that at which a test fails up to which the mode may be the reason: a third of an octave in all.
 const NEAR: f64 = 1.122;
 /// What the squares of the deviations of a model are multiplied with that leaves a mode to the noise at a frequency that the excitation shows: no
-/// autoregression is as narrow. Of four axes with cogging the errors were up to 3.5 deviations.
+/// autoregression is as narrow. Of three axes with cogging the errors were up to 3.5 deviations.
 const CANCELLED: f64 = 9.0;
 /// Samples per parameter of the smallest model, below which nothing is tried.
 const SAMPLES_PER_PARAMETER: usize = 10;

@@ -89,8 +89,8 @@ impl LocalErrors {
             }
             let whole = found.filter(|f| f.degrees == (2 * channels.m * channels.p) as f64);
             let share = 0.5 * (k as f64 + 0.5) / count as f64;
-            let power = if k == 0 { sums.power() } else { Vec::new() };
-            bands.push(whole.map(|f| Band { share, error: f.error, variance: f.variance, power }));
+            let band = |f: BandError| Band { share, error: f.error, variance: f.variance, power: sums.power() };
+            bands.push(whole.map(band));
         }
         let significance = (degrees > 0.0).then(|| chi_square_deviations(statistic, degrees));
         LocalErrors { bands, significance }
@@ -153,12 +153,12 @@ struct Sums {
     vx: Mat<c64>,
     vv: Vec<f64>,
     uu: Vec<f64>,
-    /// Of each octave below the upper edge of the band, as far as it lies in the band: `sum |u|^2`, `sum share |u|^2`.
+    /// Of the first band, of each octave below its upper edge: `sum |u|^2`, `sum share |u|^2`; zero of the others.
     octaves: [[f64; 2]; OCTAVES],
 }
 
 impl Sums {
-    /// Mean frequency of each octave, a share of the sample rate, and its portion of the power of the inputs.
+    /// Of the first band, the mean frequency of each octave, a share of the sample rate, and its portion of the power of the inputs.
     fn power(&self) -> Vec<(f64, f64)> {
         let total: f64 = self.octaves.iter().map(|octave| octave[0]).sum();
         let of = |[power, moment]: &[f64; 2]| (moment / power, power / total);
@@ -186,11 +186,13 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
             sums.lines += 1;
             (0..p).for_each(|i| sums.vv[i] += r.v[k * p + i].norm_sqr());
             (0..m).for_each(|j| sums.uu[j] += r.u[k * m + j].norm_sqr());
-            let share = 0.5 * (k + 1) as f64 / total as f64;
-            let below = (0.5 * (band + 1) as f64 / (share * count as f64)).log2() as usize;
-            let power: f64 = r.u[k * m..][..m].iter().map(c64::norm_sqr).sum();
-            let octave = &mut sums.octaves[below.min(OCTAVES - 1)];
-            *octave = [octave[0] + power, octave[1] + share * power];
+            if band == 0 {
+                let share = 0.5 * (k + 1) as f64 / total as f64;
+                let below = (0.5 / (share * count as f64)).log2() as usize;
+                let power: f64 = r.u[k * m..][..m].iter().map(c64::norm_sqr).sum();
+                let octave = &mut sums.octaves[below.min(OCTAVES - 1)];
+                *octave = [octave[0] + power, octave[1] + share * power];
+            }
             for a in 0..q {
                 let xa = r.x[k * q + a].conj();
                 (0..q).for_each(|b| sums.xx[(b, a)] += r.x[k * q + b] * xa);

@@ -146,12 +146,10 @@ pub(super) fn of_held(period: usize, record: &str, channel: &Channel, output: bo
     let what = format!(
         "it changes in one row of {period} only, always the same: its {source} is {period} times slower than the log"
     );
+    let found =
+        Finding::new(Test::Timing, severity, record, what).channel(&channel.name).number("period", period as f64);
     let advice = format!("Keep one row of {period}, in which it changes, and give the sample time of those rows");
-    let advice = if output { advice } else { String::new() };
-    Finding::new(Test::Timing, severity, record, what)
-        .channel(&channel.name)
-        .number("period", period as f64)
-        .advice(&advice)
+    if output { found.advice(&advice) } else { found }
 }
 
 #[cfg(test)]

@@ -47,6 +47,7 @@ pub use measured::{MeasuredResponse, ResponseTable, ResponseVariance};
 pub use options::LikelihoodOptions;
 pub use recommendation::{Candidate, Evidence, Outcome, Predictor, Recommendation, figure};
 
+use super::verdict::limits::{BAND_RATIO, CANCELLED_MODE};
 use super::verdict::{self, Judged, Judgement, Parts, Witness};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
@@ -59,11 +60,6 @@ use deviation::Directions;
 
 /// Largest dead time that is tried, samples.
 const LARGEST_DEAD_TIME: usize = 20;
-/// Ratio of the frequency of a mode to that at which a test fails up to which the mode may be the reason: a third of an octave in all.
-const NEAR: f64 = 1.122;
-/// What the squares of the deviations of a model are multiplied with that leaves a mode to the noise at a frequency that the excitation shows: no
-/// autoregression is as narrow. Of three axes with cogging the errors were up to 3.5 deviations.
-const CANCELLED: f64 = 9.0;
 /// Samples per parameter of the smallest model, below which nothing is tried.
 const SAMPLES_PER_PARAMETER: usize = 10;
 
@@ -121,9 +117,9 @@ pub fn recommend(
     let found = lines::solve(&all, verification, &mut candidates);
     let found = found.ok_or(Error::NoCandidate { samples: all.samples().0 })?;
     let on = Records { all: &all, verification, known, time };
-    let (mut recommended, unseen) = on.judged(&found, 1.0, &mut candidates)?;
-    if let Some((unseen, widening)) = unseen {
-        let (without, _) = on.judged(&unseen.found, widening, &mut candidates)?;
+    let (mut recommended, doubts) = on.judged(&found, 1.0)?;
+    if let Some((unseen, widening)) = on.without_unseen(&found, &recommended, &doubts, &mut candidates) {
+        let (without, _) = on.judged(&unseen.found, widening)?;
         if without.failures() < recommended.failures() {
             recommended = without;
             recommended.evidence.push(unseen.evidence(time.ts()));
@@ -140,15 +136,36 @@ struct Records<'a> {
     time: Discrete,
 }
 
+/// What says whether modes of a model are those of the noise.
+struct Doubts {
+    witness: Option<Witness>,
+    /// Whether what the excitation moves alone determines the loop.
+    informed: bool,
+}
+
 impl Records<'_> {
-    /// The model with its evidence, the squares of its deviations times `widening`. Where it rests on the noise that the feedback brings to the
-    /// inputs, or fails a test at the frequency of a mode, also the model without the modes that only this noise may have shown, and its widening.
-    fn judged(
+    /// The model without the modes that only the noise may have shown, and the widening of its region: those that the excitation does not show,
+    /// where the model rests on the noise that the feedback brings to the inputs, or those at whose frequencies it fails a test.
+    fn without_unseen(
         &self,
         found: &WithoutLines,
-        widening: f64,
+        judged: &Recommendation,
+        Doubts { witness, informed }: &Doubts,
         candidates: &mut Vec<Candidate>,
-    ) -> Result<(Recommendation, Option<(WithoutUnseen, f64)>)> {
+    ) -> Option<(WithoutUnseen, f64)> {
+        let witness = witness.as_ref().filter(|_| !judged.trusted())?;
+        let shown = |turns: f64| *informed || witness.shows(turns);
+        if let Some(without) = without_unseen(self.all, found, &shown, candidates) {
+            return Some((without, 1.0));
+        }
+        let failed: Vec<[f64; 2]> = judged.evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
+        let near = |hz: f64| failed.iter().any(|[low, high]| (low / BAND_RATIO..high * BAND_RATIO).contains(&hz));
+        let passed = |turns: f64| !near(turns / self.time.ts());
+        without_unseen(self.all, found, &passed, candidates).map(|without| (without, CANCELLED_MODE))
+    }
+
+    /// The model with its evidence, the squares of its deviations times `widening`, and what says whether its modes are those of the noise.
+    fn judged(&self, found: &WithoutLines, widening: f64) -> Result<(Recommendation, Doubts)> {
         let (known, time) = (self.known, self.time);
         let (estimation, verification) = (found.records(0, self.all.experiments), found.records(1, self.verification));
         let (problem, verification) = (found.problem(self.all, &estimation), verification.as_slice());
@@ -177,15 +194,6 @@ impl Records<'_> {
         };
         let Judgement { mut evidence, loop_ratio, entry_bands, bands, informed } = verdict::judge(&judged)?;
         evidence.extend(found.evidence(self.all.experiments, time.ts()));
-        let failed: Vec<[f64; 2]> = evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
-        let fails = |hz: f64| failed.iter().any(|[low, high]| (low / NEAR..high * NEAR).contains(&hz));
-        let unseen = witness.and_then(|witness| {
-            let shown = |turns: f64| informed || witness.shows(turns);
-            let unexcited = without_unseen(self.all, found, &shown, candidates).map(|without| (without, 1.0));
-            let passed = |turns: f64| !fails(turns / time.ts());
-            let cancelled = || without_unseen(self.all, found, &passed, candidates).map(|without| (without, CANCELLED));
-            unexcited.or_else(cancelled)
-        });
         let recommended = Recommendation {
             predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
             plant,
@@ -199,7 +207,7 @@ impl Records<'_> {
             entry_bands,
             bands,
         };
-        Ok((recommended, unseen))
+        Ok((recommended, Doubts { witness, informed }))
     }
 }
 

@@ -124,14 +124,12 @@ impl Region {
         ChannelScales::new(self.sizes.u.clone(), self.sizes.y.clone())
     }
 
-    /// The error at a frequency, Hz; below and above all of `hz` that at the first and at the last of them, but for frequency zero and
-    /// that of Nyquist, where the model itself says it.
+    /// The error at a frequency, Hz, up to that of Nyquist, by the errors of the parameters: also beyond `hz`, as below the lowest frequency
+    /// of a record, where a slow pole moves the response most. What the excitation shows beyond the parameters is that of the nearest band.
     pub fn at(&self, hz: f64) -> ResponseError {
-        let ends = hz <= 0.0 || hz * self.time.ts() >= 0.5;
-        let within =
-            if ends { hz.clamp(0.0, 0.5 / self.time.ts()) } else { hz.clamp(self.hz[0], self.hz[self.hz.len() - 1]) };
+        let share = (hz * self.time.ts()).clamp(0.0, 0.5);
         let Sizes { u, y } = &self.sizes;
-        self.directions.at(within * self.time.ts()).scaled(|i, j| c64::new(y[i] / u[j], 0.0))
+        self.directions.at(share).scaled(|i, j| c64::new(y[i] / u[j], 0.0))
     }
 
     /// The errors of the entries at frequencies, Hz: what [`Self::at`] says of each entry by itself.

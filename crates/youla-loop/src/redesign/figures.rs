@@ -3,7 +3,7 @@
 
 use crate::error::Result;
 use youla::control::{closed_loop, peak_sensitivity, with_input_port};
-use youla::lti::{Discrete, PeakOptions, SharedMode, StateSpace, hinf_norm};
+use youla::lti::{Discrete, Mode, PeakOptions, SharedMode, StateSpace, hinf_norm};
 
 /// Figures of one loop.
 #[derive(Debug, Clone, PartialEq)]
@@ -76,8 +76,25 @@ pub fn loop_modes(response: &StateSpace<Discrete>) -> youla::Result<Vec<SharedMo
 
 /// Least damping ratio of the oscillating modes with a share of [`LoopFigures::LEAST_SHARE`] or more; 1 where there is none.
 pub fn least_damping(modes: &[SharedMode]) -> f64 {
+    least_damped(modes).map_or(1.0, |m| m.mode.zeta)
+}
+
+/// The mode with that damping.
+fn least_damped(modes: &[SharedMode]) -> Option<&SharedMode> {
     let matter = modes.iter().filter(|m| m.share >= LoopFigures::LEAST_SHARE && m.mode.pole.im > 0.0);
-    matter.map(|m| m.mode.zeta).fold(1.0, f64::min)
+    matter.min_by(|a, b| a.mode.zeta.total_cmp(&b.mode.zeta))
+}
+
+/// The damping ratio of the least damped mode of a loop, followed to loops near it: that of the pole nearest to its pole. The shares of
+/// the modes would jump where a pole of dead time, of order n at zero, splits into a circle of radius `|change|^(1/n)`.
+pub(super) fn followed_damping(modes: &[SharedMode]) -> impl Fn(&StateSpace<Discrete>) -> youla::Result<f64> + use<> {
+    let pole = least_damped(modes).map(|m| m.mode.pole);
+    move |response| {
+        let Some(pole) = pole else { return Ok(1.0) };
+        let distance = |mode: &Mode| (mode.pole - pole).norm();
+        let modes = response.modes()?.into_iter();
+        Ok(modes.min_by(|a, b| distance(a).total_cmp(&distance(b))).map_or(1.0, |nearest| nearest.zeta))
+    }
 }
 
 #[cfg(test)]
@@ -97,5 +114,25 @@ mod tests {
         let modes = loop_modes(&response).unwrap();
         let zeta = all.iter().find(|m| m.mode.pole.im > 0.0).unwrap().mode.zeta;
         assert_eq!((least_damping(&modes), modes.len(), modes[0].share), (zeta, 1, 1.0));
+    }
+
+    /// Twelve poles at zero that a change of 1e-4 moves to the radius 0.46 do not change the damping of the mode beside them.
+    #[test]
+    fn the_damping_of_a_mode_is_that_of_its_pole() {
+        let loop_of = |change: f64| {
+            let shift = |i: usize, j: usize| f64::from(i == j + 1) + if (i, j) == (0, 11) { change } else { 0.0 };
+            let of = |i: usize, j: usize| match (i, j) {
+                (0..2, 0..2) => [[0.9, 0.3], [-0.3, 0.9]][i][j],
+                (2.., 2..) => shift(i - 2, j - 2),
+                _ => 0.0,
+            };
+            let (b, c) = (Mat::from_fn(14, 1, |_, _| 1.0), Mat::from_fn(1, 14, |_, _| 1.0));
+            StateSpace::new(Mat::from_fn(14, 14, of), b, c, Mat::zeros(1, 1), Discrete::new(1.0).unwrap()).unwrap()
+        };
+        let modes = loop_modes(&loop_of(0.0)).unwrap();
+        let damping = followed_damping(&modes);
+        let (here, moved) = (damping(&loop_of(0.0)).unwrap(), damping(&loop_of(1e-4)).unwrap());
+        assert_eq!(here, least_damping(&modes));
+        assert!((here - moved).abs() < 1e-9, "{here} {moved}");
     }
 }

@@ -16,6 +16,7 @@ mod robust;
 pub mod structured;
 mod youla_parameter;
 
+use figures::followed_damping;
 pub use figures::{LoopFigures, disturbance_response, least_damping, loop_modes};
 pub use lqg::Gains;
 pub use robust::DeviationRegion;
@@ -332,10 +333,9 @@ fn predicted_intervals(
     level: f64,
 ) -> Result<PredictedIntervals> {
     let (plant, k) = (problem.plant, &controller.system);
-    let damping = |plant: &StateSpace<Discrete>| {
-        let response = disturbance_response(plant, k)?.in_units(problem.input_size, problem.output_size);
-        Ok(vec![least_damping(&loop_modes(&response)?)])
-    };
+    let response = disturbance_response(plant, k)?.in_units(problem.input_size, problem.output_size);
+    let followed = followed_damping(&loop_modes(&response)?);
+    let damping = |plant: &StateSpace<Discrete>| Ok(vec![followed(&disturbance_response(plant, k)?)?]);
     let least_damping = region.intervals(level, damping)?.first().copied();
     let scales = ChannelScales::new(problem.input_size.to_vec(), problem.output_size.to_vec())?;
     let margins = margin_intervals(&margins(plant, k)?, plant, k, region, Some(&scales), level)?;

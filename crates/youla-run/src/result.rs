@@ -63,12 +63,12 @@ pub struct Identification {
 }
 
 /// Factors and signals of the scheme.
-#[derive(Debug, Clone)]
+#[derive(Debug)]
 pub struct Filtered {
     /// The factors of nominal model and controller.
     pub factorisation: LoopFactors,
-    /// alpha and beta of the estimation records.
-    pub signals: DeviationSignals,
+    /// alpha and beta of the estimation records; none of records that are shorter than the transient of the filter.
+    pub signals: Result<DeviationSignals>,
 }
 
 /// Something that was asked for but is impossible; the run goes on without it.
@@ -91,6 +91,11 @@ impl Identification {
                 "factors",
                 "coprime factorisation, and so no Hansen scheme (the recommended model needs neither)",
                 Some(&self.filtered),
+            ),
+            refusal(
+                "signals",
+                "alpha and beta, and so no Hansen scheme (the recommended model needs neither)",
+                self.filtered.as_ref().ok().map(|filtered| &filtered.signals),
             ),
             refusal(Method::Hansen.key(), "model by the Hansen scheme", self.hansen.as_ref()),
             refusal(Method::Direct.key(), "direct model", self.direct.as_ref()),
@@ -170,7 +175,12 @@ impl Identification {
 
     /// Whether and how well the declared controller explains the inputs; see [`DeviationSignals::controller_mismatch`].
     pub fn controller_mismatch(&self) -> Option<f64> {
-        self.filtered.as_ref().ok()?.signals.controller_mismatch
+        self.signals()?.controller_mismatch
+    }
+
+    /// alpha and beta of the estimation records, where they exist.
+    pub(crate) fn signals(&self) -> Option<&DeviationSignals> {
+        self.filtered.as_ref().ok()?.signals.as_ref().ok()
     }
 }
 

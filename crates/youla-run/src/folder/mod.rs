@@ -12,7 +12,7 @@ use crate::folder::subspace_details::SubspaceDetails;
 use crate::folder::uncertainty::UncertaintyFile;
 use crate::page::pid;
 use crate::page::redesign::{figure, loops};
-use crate::result::{Filtered, Identification};
+use crate::result::Identification;
 use crate::summary::certificate::CertificateEntry;
 use crate::summary::entries::Refused;
 use crate::summary::physical::PhysicalDetails;
@@ -125,7 +125,7 @@ impl Writer<'_> {
 
     /// `3-signals/`: alpha and beta of each estimation record.
     fn signals(&self) -> Result<()> {
-        let Ok(Filtered { signals: s, .. }) = &self.found.filtered else { return Ok(()) };
+        let Some(s) = self.found.signals() else { return Ok(()) };
         for (record, signals) in self.found.records.estimation.iter().zip(&s.experiments) {
             let variables = [
                 number("ts", record.time().ts()),

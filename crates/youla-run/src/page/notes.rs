@@ -5,6 +5,7 @@ use super::verdict::verdict_lines;
 use crate::method::Method;
 use crate::records::segments::RecordSegment;
 use crate::result::Identification;
+use crate::stages::signals::DeviationSignals;
 use crate::summary::Summary;
 use youla::identify::likelihood::SHORTEST_RECORD;
 use youla::identify::subspace::{SubspaceModel, amplitudes};
@@ -115,9 +116,8 @@ fn disturbance(found: &Identification) -> Vec<Note> {
 }
 
 fn settling(found: &Identification) -> Vec<Note> {
-    match &found.filtered {
-        Ok(filtered) if filtered.signals.settle > 0 && found.records.measured.is_none() => {
-            let settle = filtered.signals.settle;
+    match found.signals() {
+        Some(DeviationSignals { settle, .. }) if *settle > 0 && found.records.measured.is_none() => {
             vec![info(format!(
                 "The first {settle} samples of alpha and beta of each record were discarded (transient of the signal filter)."
             ))]

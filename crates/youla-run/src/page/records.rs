@@ -102,8 +102,8 @@ fn experiment(found: &Identification, k: usize, record: &LoopRecord) -> Result<d
     }
     add(SignalKind::Input, u, record.u())?;
     add(SignalKind::Output, y, record.y())?;
-    if let Ok(filtered) = &found.filtered {
-        let signals = &filtered.signals.experiments[k];
+    if let Some(signals) = found.signals() {
+        let signals = &signals.experiments[k];
         add(SignalKind::Alpha, &named("alpha", u), signals.alpha())?;
         add(SignalKind::Beta, &named("beta", y), signals.beta())?;
     }

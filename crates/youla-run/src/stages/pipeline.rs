@@ -53,7 +53,10 @@ pub fn identify(
     let factors = found(of_nominal.as_ref());
     let factorisation = factors.map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
-    let context = factors.map(|f| SchemeContext { run, factorisation: &f.factorisation, signals: &f.signals });
+    let context = factors.and_then(|f| {
+        let signals = f.signals.as_ref().ok()?;
+        Some(SchemeContext { run, factorisation: &f.factorisation, signals })
+    });
     let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
@@ -93,7 +96,10 @@ pub fn identify(
         let asked = direct.is_some();
         let outcomes = [
             ("the recommended model", recommended.err()),
-            ("the modified Hansen scheme", settings.hansen.as_ref().and_then(|_| filtered.err().or_else(|| s?.err()))),
+            (
+                "the modified Hansen scheme",
+                settings.hansen.as_ref().and_then(|_| filtered.and_then(|f| f.signals).err().or_else(|| s?.err())),
+            ),
             ("direct identification", direct.and_then(Result::err)),
             ("the physical structure", grey_box.and_then(Result::err)),
         ];
@@ -105,7 +111,7 @@ pub fn identify(
     // (26), the loop certificate and the response that rests on no model.
     let ((indirect, lines), validation) = clock.run(Stage::Validate, || {
         let indirect = match &records.measured {
-            None => indirect(run, filtered.as_ref().ok().map(|f| &f.signals)),
+            None => indirect(run, filtered.as_ref().ok().and_then(|f| f.signals.as_ref().ok())),
             Some(measured) => Some(measured.shown()),
         };
         Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))
@@ -174,8 +180,8 @@ fn filtered(
     let of_loop = || factorise((model, running), records.sizes(), &settings.factors); // (13)-(15)
     let factorisation = clock.run(Stage::Factor, of_loop)?;
     let settle = settings.factors.settle;
-    let signals =
-        clock.run(Stage::Signals, || deviation_signals(&factorisation.factors, &records.estimation, settle))?; // (28)
+    let of_records = || deviation_signals(&factorisation.factors, &records.estimation, settle); // (28)
+    let signals = own_line(clock.run(Stage::Signals, of_records))?;
     Ok(Filtered { factorisation, signals })
 }
 

@@ -105,3 +105,20 @@ fn what_no_run_can_do_is_refused_before_it() {
         assert!(stderr.contains(key), "{stderr}");
     }
 }
+
+/// Certificate and redesign rest on the factors, not on alpha and beta of the records.
+#[test]
+fn records_shorter_than_the_transient_of_the_filter_keep_certificate_and_redesign() {
+    let (folder, code, stderr) = run("transient", 0.98, "[redesign]\n[factors]\nsettle = 5000\n");
+    assert_eq!(code, Some(0), "{stderr}");
+    let summary = json(&folder.join("run/summary.json"));
+    let refused = &summary["refused"];
+    assert!(refused["signals"].as_str().expect("the reason").contains("`settle` in [factors]"), "{refused}");
+    assert!(refused.get("factors").is_none() && refused.get("redesign").is_none(), "{refused}");
+    assert_eq!(
+        (&summary["certificate"]["stable"], &summary["recommended"]["trusted"]),
+        (&Value::Bool(true), &Value::Bool(true))
+    );
+    assert!(summary["redesign"]["predicted"]["least_damping"].is_f64(), "{}", summary["redesign"]);
+    assert!(!folder.join("run/3-signals").exists() && folder.join("run/2-factor/right.json").exists());
+}

@@ -28,7 +28,7 @@ describe("the first screen", () => {
     assert.ok(await top("frequency") < 600, `${await top("frequency")}`);
     assert.ok(await top("modes") < 1600, `${await top("modes")}`);
     const tops = [];
-    for (const part of ["trust", "frequency", "modes", "recommended", "verification", "residuals", "poles", "stabilisation", "data", "run"]) tops.push(await top(part));
+    for (const part of ["trust", "frequency", "modes", "recommended", "verification", "residuals", "poles", "order", "data", "run"]) tops.push(await top(part));
     assert.deepEqual(tops, [...tops].sort((a, b) => a - b));
   });
 
@@ -93,9 +93,10 @@ describe("figures over time", () => {
 describe("frequency responses", () => {
   test("as Bode diagram, Nyquist diagram and singular values", async () => {
     const part = page.locator("#frequency"), show = name => part.getByRole("button", { name, exact: true }).click();
-    assert.equal(await part.locator("canvas").count(), 3);
+    // Magnitude, phase, coherence, deviation by its causes.
+    assert.equal(await part.locator("canvas").count(), 4);
     await show("Nyquist");
-    assert.ok(await part.locator(".legend button", { hasText: "Hansen G(S), 95 %" }).isVisible(), "regions");
+    assert.ok(await part.locator(".legend button", { hasText: "recommended, 95 %" }).isVisible(), "regions");
     assert.equal(await part.locator("canvas").count(), 1);
     assert.match(await part.getByRole("img", { name: /^Locus/ }).getAttribute("aria-label"), /y_h from u_h/);
     await part.getByRole("button", { name: "y_v from u_h" }).click();
@@ -104,7 +105,7 @@ describe("frequency responses", () => {
     assert.equal(await part.locator("canvas").count(), 1);
     assert.equal(await part.getByRole("group", { name: "Response of" }).isVisible(), false);
     await show("Bode");
-    assert.equal(await part.locator("canvas").count(), 3);
+    assert.equal(await part.locator("canvas").count(), 4);
   });
 });
 

@@ -4,7 +4,7 @@ use super::files::{manifest, members};
 use std::collections::BTreeSet;
 
 /// Each crate with all crates of the workspace that it uses.
-const ARROWS: [(&str, &[&str]); 15] = [
+const ARROWS: [(&str, &[&str]); 16] = [
     ("youla-rt", &[]),
     ("youla-link", &["youla-rt"]),
     ("youla-rig", &["youla-link", "youla-rt"]),
@@ -32,6 +32,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "youla-twin",
         ],
     ),
+    ("youla-workbench", &["youla", "youla-io", "youla-loop", "youla-report", "youla-run"]),
     ("youla-paper", &["youla", "youla-greybox", "youla-io", "youla-report", "youla-rt", "youla-twin"]),
     (
         "youla-cli",
@@ -45,6 +46,7 @@ const ARROWS: [(&str, &[&str]); 15] = [
             "youla-rig",
             "youla-run",
             "youla-twin",
+            "youla-workbench",
         ],
     ),
     (

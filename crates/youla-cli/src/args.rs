@@ -2,7 +2,7 @@
 
 use crate::output::Form;
 use crate::run_folder::OutputFolder;
-use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig};
+use crate::{check, commission, compare, excite, export, identify, init, paper, plot, rig, workbench};
 use clap::{Parser, Subcommand};
 use std::path::PathBuf;
 
@@ -123,6 +123,11 @@ pub(crate) enum Command {
     /// inputs and outputs are checked, and the accuracy of the modes is predicted.
     #[command(after_help = excite::EXAMPLES)]
     Excite(Box<excite::ExciteArgs>),
+    /// Write the workbench, one HTML file that does all of this in a browser, and open it.
+    ///
+    /// The file needs no network and sends nothing: logs are dropped on it, the method runs in the page.
+    #[command(after_help = workbench::EXAMPLES)]
+    Workbench(workbench::WorkbenchArgs),
     /// Record a machine that speaks youla-link, read its status, load Q, or simulate such a machine.
     #[command(subcommand)]
     Rig(rig::RigCommand),

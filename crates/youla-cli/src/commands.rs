@@ -4,7 +4,7 @@ use crate::args::{Args, Command};
 use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, commission, compare, excite, export, init, paper, plot, rig, table};
+use crate::{check, commission, compare, excite, export, init, paper, plot, rig, table, workbench};
 use std::path::Path;
 use youla_io::folder::RunFolder;
 use youla_run::{
@@ -41,6 +41,7 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
         Command::Export(args) => export::export(form, args),
         Command::Plot(args) => plot::plot(form, args),
         Command::Paper(args) => paper::reproduce(form, args),
+        Command::Workbench(args) => workbench::workbench(form, args),
         Command::Rig(command) => rig::run(form, command),
         Command::Study(paper::StudyCommand::Merge { parts, out }) => paper::merge_parts(form, parts, out.as_deref()),
     }

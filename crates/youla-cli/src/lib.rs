@@ -5,7 +5,6 @@ mod check;
 mod commands;
 mod commission;
 mod compare;
-mod dialect;
 mod excite;
 mod export;
 mod identify;
@@ -20,6 +19,7 @@ mod rig;
 mod run_folder;
 mod table;
 mod terminal;
+mod workbench;
 
 pub use output::Failure;
 

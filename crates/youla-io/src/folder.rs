@@ -64,7 +64,7 @@ impl RunFolder {
         if let Some(partial) = remove_left_over(target.parent().unwrap_or(Path::new("")), &prefix) {
             return Err(taken(partial));
         }
-        let partial = target.with_file_name(format!("{prefix}{}", std::process::id()));
+        let partial = target.with_file_name(format!("{prefix}{}", process()));
         let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
         let parents = target.ancestors().skip(1).take_while(new).map(Path::to_owned).collect();
         let io = |source| Error::Unwritable { path: target.to_owned(), source };
@@ -193,6 +193,11 @@ impl Drop for RunFolder {
     }
 }
 
+/// What tells this program from others that write beside it; in a browser there are none.
+fn process() -> u32 {
+    if cfg!(target_family = "wasm") { 0 } else { std::process::id() }
+}
+
 /// All files below a folder, relative to it, in order.
 fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let (mut found, mut open) = (Vec::new(), vec![PathBuf::new()]);
@@ -266,7 +271,7 @@ fn remove_left_over(parent: &Path, prefix: &str) -> Option<PathBuf> {
 /// Writes a text beside its final place and moves it there when whole; an older file stays until then.
 pub fn replace_file(path: &Path, text: &str) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let partial = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let partial = path.with_file_name(format!(".{name}.partial-{}", process()));
     fs::write(&partial, text).and_then(|()| fs::rename(&partial, path)).map_err(|source| {
         // Best effort: the error that led here is the one to report.
         let _ = fs::remove_file(&partial);
@@ -280,7 +285,7 @@ pub fn replace_file(path: &Path, text: &str) -> Result<()> {
 /// [`Error::Unwritable`].
 fn require_writable(path: &Path) -> Result<()> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let probe = path.with_file_name(format!(".{name}.partial-{}", std::process::id()));
+    let probe = path.with_file_name(format!(".{name}.partial-{}", process()));
     let made = fs::write(&probe, "").and_then(|()| fs::remove_file(&probe));
     made.map_err(|source| Error::Unwritable { path: path.to_owned(), source })
 }
@@ -330,7 +335,7 @@ pub fn refuse_existing(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<()>
 pub fn replace_files(folder: &Path, files: &[(String, Vec<u8>)]) -> Result<Vec<PathBuf>> {
     let new = |p: &&Path| !p.as_os_str().is_empty() && !p.exists();
     let parents: Vec<PathBuf> = folder.ancestors().take_while(new).map(Path::to_owned).collect();
-    let partial = |name: &str| folder.join(format!(".{name}.partial-{}", std::process::id()));
+    let partial = |name: &str| folder.join(format!(".{name}.partial-{}", process()));
     let written = fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.to_owned(), source });
     let written = written.and_then(|()| {
         files.iter().try_for_each(|(name, bytes)| {

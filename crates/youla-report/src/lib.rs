@@ -47,7 +47,7 @@ pub use data::ReportData;
 pub use error::{Error, Result};
 pub use figure::Figure;
 pub use html::html;
-pub use page::with_minus;
+pub use page::{PageParts, page_parts, with_minus};
 pub use run_figures::{FigureChoice, RunDrawing, RunFigure, run_drawings, run_figures};
 pub use same_mode::match_modes;
 pub use story::Story;

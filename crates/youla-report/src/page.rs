@@ -28,6 +28,26 @@ const UPLOT: &str = include_str!("../assets/uplot/uPlot.iife.min.js");
 const UPLOT_STYLE: &str = include_str!("../assets/uplot/uPlot.min.css");
 const UPLOT_LICENCE: &str = include_str!("../assets/uplot/LICENSE");
 
+/// What another page needs to look and to write numbers as a report does.
+#[derive(Debug, Clone)]
+pub struct PageParts {
+    /// Style sheet, with that of the plotting library.
+    pub style: String,
+    /// The plotting library, uPlot, with its licence.
+    pub library: String,
+    /// Elements, choices, numbers and axes as text.
+    pub helpers: &'static str,
+}
+
+/// The parts of a page that do not depend on what it shows.
+pub fn page_parts() -> PageParts {
+    PageParts {
+        style: format!("{UPLOT_STYLE}\n{STYLE}"),
+        library: format!("/*!\nuPlot\n{UPLOT_LICENCE}*/\n{UPLOT}"),
+        helpers: SCRIPT[0],
+    }
+}
+
 /// Most points of all lines of a page together; about 16 bytes each keep the file below 5 MB.
 pub(super) const ALL_POINTS: usize = 230_000;
 
@@ -36,9 +56,10 @@ pub(super) const ALL_POINTS: usize = 230_000;
 /// `template` extends the frame and reads `content`; the script draws `data`.
 pub(super) fn render(template: &str, content: Value, data: &Drawings) -> Result<String> {
     let json = serde_json::to_string(data).map_err(|source| Error::ReportData { source })?;
+    let parts = page_parts();
     let page = context! {
-        style => safe(format!("{UPLOT_STYLE}\n{STYLE}")),
-        library => safe(format!("/*!\nuPlot\n{UPLOT_LICENCE}*/\n{UPLOT}")),
+        style => safe(parts.style),
+        library => safe(parts.library),
         script => safe(SCRIPT.concat()),
         json => safe(json.replace('<', "\\u003c")),
         ..content

@@ -22,7 +22,7 @@ mod summary;
 
 pub use check::{
     CheckedFiles, CheckedRecord, DataCheck, DataCheckEntry, agreement, check_files, check_in_memory, check_run,
-    further, read_check_options, read_settings,
+    further, parse_settings, read_check_options, read_settings,
 };
 pub use compare::{Comparison, Distance, compare, write_comparison};
 pub use error::no_model::NoModel;

@@ -9,7 +9,7 @@ mod result;
 mod sign;
 
 pub use result::{CheckedRecord, DataCheck, DataCheckEntry, further};
-pub use sign::{agreement, read_settings};
+pub use sign::{agreement, parse_settings, read_settings};
 
 use crate::records::RunRecords;
 use crate::settings::computed::ComputedChannels;

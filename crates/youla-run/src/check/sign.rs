@@ -24,13 +24,25 @@ pub fn agreement(check: impl Fn(Feedback) -> Option<DataCheck>) -> &'static str 
 /// # Errors
 /// Those of [`RunSettings::read`].
 pub fn read_settings(path: &Path) -> Result<RunSettings> {
-    RunSettings::read(path).map_err(|error| {
-        let Error::File(youla_io::Error::Settings { path: file, at, problem }) = error else { return error };
-        let with = youla_io::read_text(path).ok().and_then(|text| RunSettings::without_feedback(&text));
-        let shown = with.map_or("", |with| {
-            let folder = path.parent().unwrap_or(Path::new(""));
-            agreement(|sign| check_run(&with(sign)?, folder).ok())
-        });
-        Error::File(youla_io::Error::Settings { path: file, at, problem: problem + shown })
+    RunSettings::read(path).map_err(|error| match youla_io::read_text(path) {
+        Ok(text) => with_agreement(error, &text, path),
+        Err(_) => error,
     })
+}
+
+/// The same for the text of a run.toml; `path` is named in errors, and its folder is that of the files.
+///
+/// # Errors
+/// Those of [`RunSettings::parse`].
+pub fn parse_settings(text: &str, path: &Path) -> Result<RunSettings> {
+    RunSettings::parse(text, path).map_err(|error| with_agreement(error, text, path))
+}
+
+fn with_agreement(error: Error, text: &str, path: &Path) -> Error {
+    let Error::File(youla_io::Error::Settings { path: file, at, problem }) = error else { return error };
+    let shown = RunSettings::without_feedback(text).map_or("", |with| {
+        let folder = path.parent().unwrap_or(Path::new(""));
+        agreement(|sign| check_run(&with(sign)?, folder).ok())
+    });
+    Error::File(youla_io::Error::Settings { path: file, at, problem: problem + shown })
 }

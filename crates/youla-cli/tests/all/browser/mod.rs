@@ -10,7 +10,8 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-const FILES: [&str; 5] = ["package.json", "package-lock.json", "browser.mjs", "pages.test.mjs", "report.test.mjs"];
+const FILES: [&str; 6] =
+    ["package.json", "package-lock.json", "browser.mjs", "pages.test.mjs", "report.test.mjs", "workbench.test.mjs"];
 
 #[test]
 #[ignore = "needs npm, node 20 or later and Chromium"]
@@ -35,9 +36,15 @@ fn prepared() -> Result<Command, String> {
             "--test-reporter=spec",
             "pages.test.mjs",
             "report.test.mjs",
+            "workbench.test.mjs",
         ])
         .current_dir(&folder);
+    let workbench = json!({
+        "workbench": folder.join("pages/workbench.html").display().to_string(), "program": env!("CARGO_BIN_EXE_youla"),
+        "scripts": Path::new(env!("CARGO_MANIFEST_DIR")).join("../youla-workbench/web").display().to_string(),
+    });
     command.env("YOULA_CHROMIUM", chromium).env("YOULA_PAGES", pages.to_string());
+    command.env("YOULA_WORKBENCH", workbench.to_string());
     Ok(command)
 }
 
@@ -111,6 +118,7 @@ fn pages(folder: &Path) -> Value {
         serde_json::from_slice(&fs::read(folder.join("demo/report.json")).expect("written")).expect("JSON");
     redrawn(folder, "partial", without_most(whole));
     let empty = youla_report::ReportData::default();
+    youla(folder, &["workbench", "--no-open"]);
     redrawn(folder, "empty", serde_json::to_value(empty).expect("plain data"));
     let path = |name: &str| folder.join(name).display().to_string();
     json!({

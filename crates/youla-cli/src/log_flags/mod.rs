@@ -1,6 +1,9 @@
 //! Flags that say what the columns of a log mean, for the verbs that work without a run.toml.
 
-use crate::dialect::Dialect;
+mod dialect;
+
+pub(crate) use dialect::Dialect;
+
 use clap::{Args, ValueEnum};
 use youla_io::{ChannelRef, ChannelSpec};
 use youla_run::Feedback;

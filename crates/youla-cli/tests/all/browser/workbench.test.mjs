@@ -1,0 +1,233 @@
+// The workbench: from a log to a verdict and other gains, by pointer and keyboard, with the method in the page.
+
+import assert from "node:assert/strict";
+import { execFileSync } from "node:child_process";
+import { mkdtempSync, readFileSync, writeFileSync } from "node:fs";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { after, before, test } from "node:test";
+import { launch, open } from "./browser.mjs";
+
+const { workbench, program, scripts } = JSON.parse(process.env.YOULA_WORKBENCH);
+const folder = mkdtempSync(join(tmpdir(), "youla-workbench-"));
+let browser;
+before(async () => { browser = await launch(); });
+after(() => browser.close());
+
+// Uniform numbers of a linear congruential generator (Numerical Recipes), and normal ones by the sum of twelve.
+function chance(seed) {
+  let state = seed >>> 0;
+  const uniform = () => (state = (Math.imul(state, 1664525) + 1013904223) >>> 0) / 2 ** 32;
+  return { uniform, normal: () => Array.from({ length: 12 }, uniform).reduce((a, b) => a + b) - 6 };
+}
+
+// A light resonance at 40 Hz, damping 3 %, under a PID computed by backward differences, with a binary excitation at the input.
+function axis({ samples = 12000, channels = 1, seed = 3 } = {}) {
+  const ts = 1e-3, rows = [], { uniform, normal } = chance(seed);
+  const loops = Array.from({ length: channels }, (_, k) => {
+    const w = 2 * Math.PI * (40 + 15 * k), r = Math.exp(-0.03 * w * ts), p = 2 * r * Math.cos(w * ts * Math.sqrt(1 - 0.03 ** 2));
+    return { p, q: r * r, b: 0.5 * (1 - p + r * r), x: [0, 0], u: [0, 0], sum: 0, e: 0, v: 0, d: 0 };
+  });
+  for (let k = 0; k < samples; k++) {
+    const us = [], ys = [], ds = [];
+    for (const one of loops) {
+      const x = one.p * one.x[0] - one.q * one.x[1] + one.b * (one.u[0] + one.u[1]);
+      one.x = [x, one.x[0]];
+      one.v = 0.9 * one.v + 0.01 * normal();
+      if (k % 5 === 0) one.d = uniform() < 0.5 ? -0.5 : 0.5;
+      const e = -(x + one.v);
+      one.sum += e * ts;
+      const u = 0.4 * e + 6 * one.sum + 0.002 * (e - one.e) / ts + one.d;
+      [one.e, one.u] = [e, [u, one.u[0]]];
+      us.push(u); ys.push(-e); ds.push(one.d);
+    }
+    rows.push([k * ts, ...us, ...ys, ...ds]);
+  }
+  const names = role => loops.map((_, k) => channels === 1 ? role : `${role}${k + 1}`);
+  return { names: ["time [s]", ...names("u"), ...names("y"), ...names("d")], rows };
+}
+
+function csv(name, { names, rows }, { separator = ",", decimal = "." } = {}) {
+  const path = join(folder, name), number = value => String(Number(value.toPrecision(9))).replace(".", decimal);
+  writeFileSync(path, [names.join(separator), ...rows.map(row => row.map(number).join(separator))].join("\n") + "\n");
+  return path;
+}
+
+async function opened(options) {
+  const found = await open(browser, workbench, options);
+  await found.page.waitForSelector("body.ready");
+  return found;
+}
+
+async function field(page, label, value) {
+  const input = page.locator("#controller .fields label.field", { hasText: label }).first().locator("input");
+  await input.fill(value);
+  await input.press("Tab");
+  await page.waitForFunction(() => document.activeElement !== null);
+}
+
+// The controller of the axis; with `asked` the page is left to say which sign the log agrees with.
+async function pid(page, asked = false) {
+  await page.selectOption("#controller select >> nth=0", "pid");
+  for (const [label, value] of [["kp", "0,4"], ["ki", "6"], ["kd", "0.002"]]) await field(page, label, value);
+  if (asked) await page.waitForFunction(() => document.getElementById("controller-said").textContent.includes("the log agrees with negative"));
+  await page.check("input[name=feedback][value=negative]");
+}
+
+async function identified(page) {
+  await page.waitForFunction(() => !document.getElementById("identify").disabled);
+  await page.click("#identify");
+  await page.waitForSelector(".verdict-line", { timeout: 100000 });
+  return page.textContent("#verdict");
+}
+
+const kept = (page, name) => page.evaluate(name => new TextDecoder().decode(engine.files.get(name) ?? new Uint8Array()), name);
+
+test("from a log to a verdict and other gains", async () => {
+  const { page, complaints, close } = await opened();
+  await page.setInputFiles("#open-file", csv("axis.csv", axis()));
+  await page.waitForSelector("#traces canvas");
+  assert.deepEqual(await page.locator("#columns select").evaluateAll(all => all.slice(0, 4).map(s => s.value)), ["time", "input", "output", "excitation"]);
+  await pid(page, true);
+  await page.waitForFunction(() => document.getElementById("controller-said").textContent.includes("agrees with the log"));
+  assert.match(await page.textContent("#findings"), /no defect/);
+  assert.equal(await page.getAttribute("svg.loop", "aria-label"), "Loop with negative feedback");
+  assert.match(await identified(page), /Trusted for this loop/);
+  assert.match(await page.frameLocator("#report").locator("h1").textContent(), /axis/);
+
+  // The same text by the program gives the same model.
+  writeFileSync(join(folder, "run.toml"), await page.inputValue("#toml"));
+  execFileSync(program, ["identify", "run.toml", "--out", "by-program", "--quiet"], { cwd: folder });
+  const [here, there] = [await kept(page, "run-001/response.json"), readFileSync(join(folder, "by-program/response.json"), "utf8")].map(text => JSON.parse(text));
+  assert.equal(JSON.stringify(Object.keys(here)), JSON.stringify(Object.keys(there)));
+  const [a, b] = [numbers(here), numbers(there)], largest = Math.max(...b.map(Math.abs));
+  assert.equal(a.length, b.length);
+  a.forEach((value, k) => assert.ok(Math.abs(value - b[k]) <= 1e-6 * Math.max(Math.abs(b[k]), 1e-6 * largest), `${value} for ${b[k]}`));
+
+  // The run folder of the program opens as well.
+  await page.setInputFiles("#open-folder", join(folder, "by-program"));
+  await page.waitForFunction(() => runs.shown === "by-program" && document.body.classList.contains("has-gains"));
+
+  // Gains: the running ones are stable on the region, a hundred times kp is not, and then nothing is drawn as safe.
+  await page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Stable on all"));
+  const gain = page.locator("#gain-fields .fields label.field", { hasText: "kp" }).first().locator("input");
+  await gain.fill("40");
+  await gain.press("Tab");
+  await page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Unstable"));
+  assert.ok(await page.locator("#gain-plots.unsafe").count());
+  const slider = page.locator("#gain-fields input[type=range]").first();
+  await slider.focus();
+  await slider.press("Home");
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+// All numbers of a result, in order.
+function numbers(value) {
+  if (typeof value === "number") return [value];
+  return value && typeof value === "object" ? Object.keys(value).sort().flatMap(key => numbers(value[key])) : [];
+}
+
+test("an order is picked from the stabilisation chart", async () => {
+  const { page, complaints, close } = await opened();
+  await page.setInputFiles("#open-file", csv("axis.csv", axis({ samples: 6000 })));
+  await page.waitForSelector("#traces canvas");
+  await pid(page);
+  await page.click("#show-orders");
+  const chart = page.locator("#orders .uplot");
+  await chart.waitFor();
+  await chart.focus();
+  for (let k = 0; k < 4; k++) await chart.press("ArrowUp");
+  await page.waitForFunction(() => document.getElementById("toml").value.includes("order = 4"));
+  await chart.press("Enter");
+  await page.waitForSelector(".verdict-line", { timeout: 100000 });
+  assert.equal(JSON.parse(await kept(page, "run-001/summary.json")).recommended.order, 4);
+  await chart.press("Escape");
+  await page.waitForFunction(() => !document.getElementById("toml").value.includes("order = "));
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+test("every choice is a line of run.toml, undone and redone", async () => {
+  const { page, complaints, close } = await opened();
+  await page.setInputFiles("#open-file", csv("axis.csv", axis({ samples: 3000 })));
+  await page.waitForSelector("#traces canvas");
+  const text = () => page.inputValue("#toml");
+  const first = await text();
+  await pid(page);
+  await page.waitForFunction(() => document.getElementById("toml").value.includes("kd = 0.002"));
+  await page.locator("h1").click();
+  for (let k = 0; k < 5; k++) { await page.keyboard.press("Control+z"); await page.waitForTimeout(60); }
+  assert.equal(await text(), first);
+  await page.keyboard.press("Control+y");
+  await page.waitForFunction(() => document.getElementById("toml").value.includes("[controller.pid]"));
+  // A range is dragged on the trace.
+  await page.getByRole("button", { name: "verify on it" }).click();
+  const box = await page.locator("#traces .u-over").first().boundingBox();
+  await page.mouse.move(box.x + 0.5 * box.width, box.y + 20);
+  await page.mouse.down();
+  await page.mouse.move(box.x + 0.75 * box.width, box.y + 20, { steps: 4 });
+  await page.mouse.up();
+  await page.waitForFunction(() => /\[\[data\.verification\]\][^[]*skip = 1[45]\d\d/.test(document.getElementById("toml").value));
+  // Text that cannot be read is said, and nothing is lost.
+  await page.fill("#toml", "name = ");
+  await page.locator("h1").click();
+  await page.waitForFunction(() => document.getElementById("toml-error").textContent !== "");
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+test("decimal commas, two inputs and two outputs, a page that is saved and opened again", async () => {
+  const { page, complaints, close } = await opened({ colorScheme: "dark" });
+  await page.setInputFiles("#open-file", csv("paar.csv", axis({ channels: 2 }), { separator: ";", decimal: "," }));
+  await page.waitForSelector("#traces canvas");
+  assert.match(await page.textContent("#log-status"), /decimal comma/);
+  const controller = { difference_equation: { feedback: "negative", numerator: [[[2.406, -4.4, 2], [0]], [[0], [2.406, -4.4, 2]]], denominator: [1, -1] } };
+  await page.selectOption("#controller select >> nth=0", "json");
+  await page.fill("#controller textarea", JSON.stringify(controller));
+  await page.locator("h1").click();
+  assert.match(await identified(page), /Trusted for this loop/);
+  await page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Stable on all"));
+  const [saved] = await Promise.all([page.waitForEvent("download"), page.click("#save")]);
+  const path = join(folder, "saved.html");
+  await saved.saveAs(path);
+  assert.deepEqual(complaints, []);
+  await close();
+  const again = await open(browser, path, { width: 390, height: 800 });
+  await again.page.waitForSelector("body.has-run");
+  await again.page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Stable on all"));
+  assert.match(await again.page.textContent("#verdict"), /Trusted/);
+  assert.ok(await again.page.evaluate(() => document.documentElement.scrollWidth <= innerWidth + 1), "nothing is wider than a phone");
+  assert.deepEqual(again.complaints, []);
+  await again.close();
+});
+
+test("files that are no logs, a wrong sign, a run that is cancelled", async () => {
+  const { page, complaints, close } = await opened();
+  const hostile = { "empty.csv": "", "words.csv": "a,b\nc,d\n", "short.npz": "PK\u0003\u0004", "head.mat": "MATLAB 5.0 MAT-file, nothing", "rows.csv": "t,u,y\n0,1,2\n1,2\n" };
+  for (const [name, content] of Object.entries(hostile)) {
+    writeFileSync(join(folder, name), content);
+    await page.setInputFiles("#open-file", join(folder, name));
+    await page.waitForFunction(() => !/^Reading|^Ready|^$/.test(document.getElementById("log-status").textContent));
+    const said = await page.textContent("#log-status");
+    assert.ok(said.includes(name) && !/panicked|unreachable/.test(said), said);
+    await page.evaluate(() => { document.getElementById("log-status").textContent = ""; });
+  }
+  await page.setInputFiles("#open-file", csv("axis.csv", axis()));
+  await page.waitForSelector("#traces canvas");
+  await pid(page);
+  await page.check("input[name=feedback][value=positive]");
+  await page.waitForFunction(() => /feedback/.test(document.getElementById("findings").textContent) && /Defect/.test(document.getElementById("findings").textContent));
+  await page.waitForFunction(() => !document.getElementById("identify").disabled);
+  await page.click("#identify");
+  await page.click("#cancel");
+  await page.waitForFunction(() => document.getElementById("progress").textContent.startsWith("Cancelled"));
+  await page.check("input[name=feedback][value=negative]");
+  assert.match(await identified(page), /Trusted for this loop/);
+  assert.deepEqual(complaints, []);
+  await close();
+});
+
+test("the scripts agree with their types", () => {
+  for (const project of ["tsconfig.json", "tsconfig.worker.json"]) execFileSync(process.execPath, ["node_modules/typescript/bin/tsc", "-p", join(scripts, project)], { stdio: "inherit" });
+});

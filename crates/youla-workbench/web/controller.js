@@ -1,0 +1,96 @@
+// The controller that ran, in the form in which it was programmed, and the sign of the feedback as a drawing of the loop.
+
+/** A loop without a controller. @param {any} data */
+const openLoop = data => ({ state_space: { feedback: "positive", a: [], b: [], c: data.inputs.map(() => []), d: data.inputs.map(() => data.outputs.map(() => 0)) } });
+
+/** Forms with their fields: name, label, kind, unit. @type {Record<string, { name: string, start: any, fields: [string, string, string, string?][] }>} */
+const FORMS = {
+  pid: { name: "PID, parallel: kp + ki/s + kd s/(1 + tf s)", start: { discretisation: "backward-euler", kp: 1 },
+    fields: [["kp", "kp", "number"], ["ki", "ki", "number?", "1/s"], ["kd", "kd", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
+  ideal_pid: { name: "PID, ideal: kp (1 + 1/(ti s) + td s/(1 + tf s))", start: { discretisation: "backward-euler", kp: 1 },
+    fields: [["kp", "kp", "number"], ["ti", "ti", "number?", "s"], ["td", "td", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
+  difference_equation: { name: "Difference equation in z⁻¹", start: { numerator: [1], denominator: [1] },
+    fields: [["numerator", "Numerator, ascending powers of z⁻¹", "list"], ["denominator", "Denominator", "list"], ["delay", "Further delay", "count", "samples"]] },
+  transfer_function: { name: "Transfer function in s or z", start: { domain: "continuous", hold: "tustin", numerator: [1], denominator: [1] },
+    fields: [["domain", "In", "domain"], ["hold", "Discretised by", "hold"], ["numerator", "Numerator, descending powers", "list"], ["denominator", "Denominator", "list"], ["delay", "Further delay", "count", "samples"]] },
+  state_space: { name: "State space, matrices by rows", start: { a: [], b: [], c: [[]], d: [[1]] },
+    fields: [["a", "A", "json"], ["b", "B", "json"], ["c", "C", "json"], ["d", "D", "json"]] },
+  open_loop: { name: "No controller ran", start: {}, fields: [] },
+  json: { name: "JSON as [controller] of run.toml", start: {}, fields: [] },
+};
+const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
+  rule: [["backward-euler", "backward Euler"], ["tustin", "Tustin"]],
+  domain: [["continuous", "s"], ["discrete", "z"]], hold: [["tustin", "Tustin"], ["zoh", "zero-order hold"]],
+});
+
+/** Fields of a form. @param {string} form @param {any} values @param {(name: string, value: any) => void} changed */
+function formFields(form, values, changed) {
+  return FORMS[form].fields.filter(([name]) => name !== "hold" || values.domain === "continuous").map(([name, label, kind, unit]) => {
+    if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
+    if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
+    const input = element("input", { type: "text", size: 34, value: kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
+    input.addEventListener("change", () => {
+      let read = null;
+      try { read = kind === "json" || input.value.includes("[") ? JSON.parse(input.value) : numbersOf(input.value); } catch { read = null; }
+      input.setAttribute("aria-invalid", String(read == null));
+      if (read != null) changed(name, read);
+    });
+    return element("label", { class: "field" }, element("span", {}, label), input);
+  });
+}
+
+const controllerPart = (() => {
+  const place = /** @type {HTMLElement} */ (document.getElementById("controller")), drawing = /** @type {HTMLElement} */ (document.getElementById("loop-drawing"));
+  const isOpen = (/** @type {any} */ c) => c?.state_space && c.state_space.a.length === 0 && c.state_space.d.flat().every(v => v === 0);
+  const formOf = (/** @type {any} */ c) => !c ? "" : isOpen(c) ? "open_loop" : Object.keys(c)[0] in FORMS ? Object.keys(c)[0] : "json";
+
+  function drawn() {
+    const { controller, data } = settings.table, form = formOf(controller), values = controller ? Object.values(controller)[0] : {};
+    const options = /** @type {[string, string][]} */ ([["", "choose its form"], ...Object.entries(FORMS).map(([key, f]) => [key, f.name])]);
+    const parts = [choiceField({ label: "Controller that ran", value: form, options, changed: chosen => settings.change(table => {
+      if (chosen === "" || chosen === "json") delete table.controller;
+      else table.controller = chosen === "open_loop" ? openLoop(data) : { [chosen]: { ...(values.feedback && form !== "open_loop" ? { feedback: values.feedback } : {}), ...structuredClone(FORMS[chosen].start) } };
+      if (chosen === "json") pasted();
+    }) })];
+    if (form && form !== "open_loop") {
+      parts.push(element("fieldset", { class: "sign" }, element("legend", {}, "Sign in which it is written down; it is never guessed"),
+        ...[["negative", "u = K (r − y)"], ["positive", "u = K (y − r)"]].map(([sign, equation]) => {
+          const radio = element("input", { type: "radio", name: "feedback", value: sign, checked: values.feedback === sign ? "" : null });
+          radio.addEventListener("change", () => settings.change(table => { Object.values(table.controller)[0].feedback = sign; }));
+          return element("label", {}, radio, ` ${sign}: ${equation}`);
+        })));
+    }
+    if (FORMS[form]?.fields.length) parts.push(element("div", { class: "fields" }, ...formFields(form, values, (name, value) => settings.change(table => {
+      const of = Object.values(table.controller)[0];
+      if (value === undefined) delete of[name]; else of[name] = value;
+      if (name === "domain") value === "discrete" ? delete of.hold : of.hold ??= "tustin";
+    }))));
+    place.replaceChildren(...parts);
+    drawing.innerHTML = loopDrawing(form === "open_loop" ? null : values.feedback ?? "unknown", !!form);
+  }
+
+  function pasted() {
+    const field = element("textarea", { rows: 6, cols: 60, "aria-label": "Controller as JSON", placeholder: "{\"pid\": {\"feedback\": \"negative\", \"discretisation\": \"tustin\", \"kp\": 2.0, \"ki\": 10.0}}" }), said = element("p", { class: "note", hidden: "" });
+    field.addEventListener("change", () => {
+      try { const read = JSON.parse(field.value); settings.change(table => { table.controller = read; }); } catch (problem) { said.hidden = false; said.textContent = `This is not JSON: ${/** @type {Error} */ (problem).message}`; }
+    });
+    place.append(field, said);
+    field.focus();
+  }
+
+  settings.listen(drawn);
+  return { drawn };
+})();
+
+/** The loop as a drawing. @param {string | null} sign null without a controller @param {boolean} known */
+function loopDrawing(sign, known) {
+  if (!known) return "";
+  const box = (x, text) => `<rect x="${x}" y="22" width="70" height="36" rx="3"/><text x="${x + 35}" y="45">${text}</text>`;
+  const arrow = (x0, y0, x1, y1) => `<path d="M${x0} ${y0}L${x1} ${y1}" marker-end="url(#tip)"/>`;
+  const head = `<svg viewBox="0 0 470 110" class="loop" role="img" aria-label="${sign == null ? "Open loop" : `Loop with ${sign} feedback`}"><defs><marker id="tip" markerWidth="8" markerHeight="8" refX="7" refY="4" orient="auto"><path d="M0 0L8 4L0 8Z" class="solid"/></marker></defs>`;
+  const plant = `${box(285, "machine")}${arrow(355, 40, 440, 40)}<text x="450" y="45">y</text><text x="262" y="32">u</text>`;
+  if (sign == null) return `${head}${arrow(230, 40, 285, 40)}${plant}</svg>`;
+  const [ofR, ofY] = sign === "positive" ? ["−", "+"] : sign === "negative" ? ["+", "−"] : ["?", "?"];
+  return `${head}<text x="12" y="45">r</text>${arrow(22, 40, 72, 40)}<circle cx="84" cy="40" r="12"/>${arrow(96, 40, 140, 40)}${box(140, "K")}${arrow(210, 40, 285, 40)}${plant}
+    <path d="M400 40V92H84" /><path d="M84 92V52" marker-end="url(#tip)"/><text x="62" y="32" class="sign-mark">${ofR}</text><text x="98" y="70" class="sign-mark">${ofY}</text></svg>`;
+}

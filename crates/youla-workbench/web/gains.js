@@ -1,0 +1,104 @@
+// The loop that other gains would have, on the whole region of the model, while they are edited.
+
+const gains = (() => {
+  const place = /** @type {HTMLElement} */ (document.getElementById("gain-fields")), said = /** @type {HTMLElement} */ (document.getElementById("gain-verdict")), host = /** @type {HTMLElement} */ (document.getElementById("gain-plots"));
+  let run = "", asked = false, again = false, shape = "";
+  /** @type {any} */
+  let edited = null, ran = null, plots = {};
+
+  /** @param {string} shown */
+  async function show(shown) {
+    run = shown;
+    const drawn = await engine.ask({ verb: "draw", run });
+    if (run !== shown) return;
+    document.body.classList.toggle("has-gains", !drawn.error);
+    if (drawn.error) return;
+    const answer = await engine.ask({ verb: "table", toml: new TextDecoder().decode(engine.files.get(`${run}/run.toml`)) });
+    ran = answer.controller;
+    edited = structuredClone(ran);
+    fields();
+    ask();
+  }
+
+  function fields() {
+    const form = Object.keys(edited)[0], values = edited[form];
+    const changed = (name, value) => { if (value === undefined) delete values[name]; else values[name] = value; ask(); };
+    const sliders = ["kp", "ki", "kd", "ti", "td"].filter(name => values[name] > 0).map(name => slider(name, values, changed));
+    place.replaceChildren(...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && f[2].startsWith("number"))) fields(); }) : [])),
+      element("div", { class: "fields" }, element("button", { type: "button", class: "action", onclick: () => { edited = structuredClone(ran); fields(); ask(); } }, "Back to the controller that ran"),
+        element("button", { type: "button", class: "action", onclick: () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))) }, "Save these gains")));
+  }
+
+  /** A factor from a tenth to ten times the value. @param {string} name @param {any} values @param {(name: string, value: number) => void} changed */
+  function slider(name, values, changed) {
+    const base = values[name], input = element("input", { type: "range", min: -1, max: 1, step: 0.005, value: 0, "aria-label": `${name}, from a tenth to ten times` }), shown = element("output", {}, readOut(base));
+    input.addEventListener("input", () => { const value = Number((base * 10 ** Number(input.value)).toPrecision(4)); shown.textContent = readOut(value); changed(name, value); });
+    return element("label", { class: "slider" }, element("span", {}, name), input, shown);
+  }
+
+  // The newest gains are asked for as soon as the answer before is there.
+  async function ask() {
+    if (asked) { again = true; return; }
+    asked = true;
+    const open = edited.state_space && !edited.state_space.a.length, answer = await engine.ask({ verb: "loop", run, controller: open ? null : edited });
+    asked = false;
+    if (again) { again = false; ask(); }
+    draw(answer);
+  }
+
+  /** @param {any} found */
+  function draw(found) {
+    const note = (/** @type {string} */ kind, /** @type {string} */ text) => { said.className = `headline ${kind}`; said.textContent = text; };
+    if (found.error) return note("bad", found.error);
+    const safe = found.stable && !found.unstable;
+    if (!found.stable) note("bad", `Unstable on the recommended model: largest pole ${readOut(found.worst_pole)}.`);
+    else if (found.unstable) note("bad", `Unstable on ${found.unstable} of ${found.draws} models of the region.`);
+    else {
+      const m = found.margins, parts = [`peak sensitivity ${readOut(m.sensitivity)}, at worst ${readOut(found.worst_sensitivity)} over the region`, m.phase != null ? `phase margin ${readOut(m.phase)}°` : null,
+        m.gain_up != null ? `unstable at ${readOut(m.gain_up)} times the gain` : null, m.gain_down > 1e-6 ? `and at ${readOut(m.gain_down)} times` : null, m.delay != null ? `delay margin ${readOut(m.delay * 1e3)} ms` : null].filter(Boolean);
+      note(found.worst_sensitivity <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.`);
+    }
+    const wanted = JSON.stringify([run, found.outputs, found.inputs, !!found.locus]);
+    if (wanted !== shape) { shape = wanted; build(found); }
+    host.classList.toggle("unsafe", !safe);
+    const empty = p => p.setData(p.series.map(() => [null]));
+    if (safe) {
+      const s = found.sensitivity, db = values => values.map(v => 20 * Math.log10(v));
+      plots.s.setData([found.hz, db(s.centre), db(s.high), db(s.low)]);
+      found.outputs.forEach((_, k) => plots.step[k].setData([found.t, found.step[k].centre, found.step[k].high, found.step[k].low]));
+      found.inputs.forEach((_, k) => plots.command[k].setData([found.t, found.command[k].centre, found.command[k].high, found.command[k].low]));
+    } else [plots.s, ...plots.step, ...plots.command].forEach(empty);
+    if (found.locus) locus(found);
+  }
+
+  function build(found) {
+    const cell = title => { const div = element("div", {}, element("p", { class: "panel-title" }, title)); host.append(div); return div; };
+    host.replaceChildren();
+    const lines = [{ label: "recommended model", colour: "--recommended" }, { label: "highest", colour: "--recommended", width: 0.4 }, { label: "lowest", colour: "--recommended", width: 0.4 }];
+    const banded = (title, x, y, logX) => curves(cell(title), { x, y, logX, height: 200, lines, bands: [[2, 3, "--recommended"]] });
+    plots = { s: banded("Sensitivity, with its range over the region", "Frequency (Hz)", "dB", true) };
+    if (found.locus) { plots.canvas = element("canvas", { class: "locus", role: "img", "aria-label": "Locus of the loop gain" }); cell("Loop gain; circles: peak sensitivity 2 and 4").append(plots.canvas); }
+    plots.step = found.outputs.map(name => banded(`Step of the reference: ${name}`, "Time (s)", "", false));
+    plots.command = found.inputs.map(name => banded(`and the command: ${name}`, "Time (s)", "", false));
+  }
+
+  // A locus runs back and forth over its axis, which uPlot does not draw.
+  function locus({ locus: [re, im], loci }) {
+    const { canvas } = plots, ratio = devicePixelRatio, size = Math.min(360, canvas.parentElement.clientWidth);
+    Object.assign(canvas, { width: size * ratio, height: size * 0.8 * ratio });
+    canvas.style.width = `${size}px`;
+    const ctx = canvas.getContext("2d"), scale = canvas.width / 6, X = v => canvas.width * 0.62 + v * scale, Y = v => canvas.height / 2 - v * scale;
+    const line = (xs, ys, ink, width) => { ctx.beginPath(); xs.forEach((x, k) => ctx.lineTo(X(x), Y(ys[k]))); Object.assign(ctx, { strokeStyle: ink, lineWidth: width * ratio }); ctx.stroke(); };
+    line([-9, 9], [0, 0], colour("--grid"), 1);
+    line([0, 0], [-9, 9], colour("--grid"), 1);
+    for (const radius of [0.5, 0.25]) { ctx.beginPath(); ctx.arc(X(-1), Y(0), radius * scale, 0, 7); ctx.strokeStyle = colour("--soft"); ctx.setLineDash([4, 3]); ctx.stroke(); ctx.setLineDash([]); }
+    ctx.globalAlpha = 0.3;
+    for (const [xs, ys] of loci) line(xs, ys, colour("--recommended"), 0.8);
+    ctx.globalAlpha = 1;
+    line(re, im, colour("--recommended"), 1.6);
+    ctx.fillStyle = colour("--ink");
+    ctx.beginPath(); ctx.arc(X(-1), Y(0), 3 * ratio, 0, 7); ctx.fill();
+  }
+
+  return { show };
+})();

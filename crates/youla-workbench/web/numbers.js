@@ -1,0 +1,33 @@
+// Numbers as people write them.
+
+/** A number with a decimal point or a decimal comma; null for anything else. @param {string} text */
+function numberOf(text) {
+  const plain = text.trim().replace("−", "-"), value = Number(/^[^.]*,[^.,]*$/.test(plain) ? plain.replace(",", ".") : plain);
+  return plain !== "" && Number.isFinite(value) ? value : null;
+}
+
+/** Numbers separated by blanks, semicolons or commas; with semicolons, or blanks alone, a comma is a decimal sign. Null where one cannot be read.
+ * @param {string} text @returns {number[] | null} */
+function numbersOf(text) {
+  const plain = text.trim().replace(/^\[|\]$/g, "").trim(), parts = plain.includes(";") ? plain.split(";") : /,\s|^[^\s]*$/.test(plain) ? plain.split(",") : plain.split(/\s+/);
+  const values = parts.map(part => numberOf(part));
+  return plain === "" || values.includes(null) ? null : /** @type {number[]} */ (values);
+}
+
+/** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, id?: string }} of */
+function numberField({ label, value, unit, changed, optional, id }) {
+  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), id, autocomplete: "off" });
+  input.addEventListener("change", () => {
+    const empty = input.value.trim() === "", read = numberOf(input.value), wrong = read == null && !(empty && optional);
+    input.setAttribute("aria-invalid", String(wrong));
+    if (!wrong) changed(read);
+  });
+  return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
+}
+
+/** A choice. @param {{ label: string, value: string, options: [string, string][], changed: (value: string) => void }} of */
+function choiceField({ label, value, options, changed }) {
+  const select = element("select", { "aria-label": label }, ...options.map(([key, name]) => element("option", { value: key, selected: key === value ? "" : null }, name)));
+  select.addEventListener("change", () => changed(select.value));
+  return element("label", { class: "field" }, element("span", {}, label), select);
+}

@@ -1,0 +1,126 @@
+// Identification and its results: verdict, report, comparison of two results, files.
+
+const runs = (() => {
+  const by = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
+  const start = by("identify"), stop = by("cancel"), progress = by("progress"), bar = by("progress-bar"), verdict = by("verdict"), frame = by("report"), list = by("run-list"), order = by("order");
+  /** Finished runs by their folders. @type {Map<string, { name: string, sentence: string, reasons: string[], summary: any }>} */
+  const done = new Map();
+  let shown = "", next = 1, running = false;
+  const fileOf = (/** @type {string} */ run, /** @type {string} */ name) => engine.files.get(`${run}/${name}`);
+  const text = (/** @type {Uint8Array} */ bytes) => new TextDecoder().decode(bytes);
+  const trusted = (/** @type {any} */ summary) => summary?.recommended?.trusted === true;
+
+  async function identify() {
+    if (running) return;
+    running = start.disabled = true;
+    await settings.settled();
+    const out = `run-${String(next++).padStart(3, "0")}`, begun = performance.now();
+    stop.hidden = bar.hidden = false;
+    bar.value = 0;
+    const ticking = setInterval(() => { const s = (performance.now() - begun) / 1000; progress.dataset.seconds = s.toFixed(1); progress.textContent = `${progress.dataset.stage ?? "starting"}, ${s.toFixed(0)} s${remaining(s)}`; }, 250);
+    const answer = await engine.ask({ verb: "identify", toml: settings.text, out }, { collect: out, said: line => {
+      const [at, of, stage] = line.split(" ");
+      if (!stage) return;
+      [bar.value, bar.max, progress.dataset.stage] = [Number(at) - 1, Number(of), `stage ${at} of ${of}, ${stage}`];
+    } });
+    clearInterval(ticking);
+    running = start.disabled = false;
+    stop.hidden = bar.hidden = true;
+    const seconds = (performance.now() - begun) / 1000;
+    progress.textContent = answer.cancelled ? "Cancelled; log and settings are as they were." : answer.error ? "" : `Finished in ${seconds.toFixed(1)} s.`;
+    if (answer.cancelled) return;
+    if (answer.error) return told("bad", answer.error, []);
+    took(settings.text, seconds);
+    done.set(out, { name: out, sentence: answer.sentence, reasons: answer.reasons, summary: answer.summary });
+    show(out);
+  }
+
+  // The time that the same samples took before says what remains.
+  const known = { samples: 0, seconds: 0 };
+  const samples = () => ["estimation", "verification"].flatMap(p => settings.table.data[p] ?? []).reduce((sum, f) => sum + (f.take ?? 0), 0);
+  function took(_, seconds) { Object.assign(known, { samples: samples(), seconds }); }
+  function remaining(seconds) {
+    if (!known.seconds) return "";
+    const left = known.seconds * Math.max(0.2, samples() / Math.max(1, known.samples)) - seconds;
+    return left > 0.5 ? `, about ${left.toFixed(0)} s to go` : "";
+  }
+
+  /** @param {string} kind @param {string} sentence @param {string[]} reasons */
+  function told(kind, sentence, reasons) {
+    verdict.replaceChildren(element("p", { class: `headline verdict-line ${kind}` }, element("span", { class: `status ${kind}`, "aria-hidden": "true" }, kind === "good" ? "✓" : "!"), sentence),
+      ...(reasons.length ? [element("ul", { class: "points" }, ...reasons.map(r => element("li", {}, r)))] : []));
+  }
+
+  /** @param {string} run */
+  function show(run) {
+    const found = done.get(run);
+    if (!found) return;
+    shown = run;
+    document.body.classList.add("has-run");
+    told(trusted(found.summary) ? "good" : "caution", found.sentence, found.reasons);
+    const page = fileOf(run, "report.html");
+    frame.srcdoc = page ? text(page) : "";
+    listed();
+    gains.show(run);
+    document.dispatchEvent(new CustomEvent("run-shown", { detail: run }));
+  }
+
+  function listed() {
+    const names = [...done.keys()];
+    order.hidden = false;
+    const pick = (/** @type {string} */ label, /** @type {string} */ value) => choiceField({ label, value, options: names.map(n => /** @type {[string, string]} */ ([n, `${n}: ${done.get(n)?.name}`.replace(/^(.*): \1$/, "$1")])), changed: chosen => { if (label === "Result") show(chosen); else other = chosen; } });
+    const save = (/** @type {string} */ label, /** @type {() => void} */ action) => element("button", { type: "button", class: "action", onclick: action }, label);
+    if (!names.includes(other) || other === shown) other = names.find(n => n !== shown) ?? "";
+    list.replaceChildren(pick("Result", shown), ...(names.length > 1 ? [pick("Compare with", other), save("Compare", compare)] : []),
+      save("Save report.html", () => download(`${shown}-report.html`, fileOf(shown, "report.html"))), save("Save run folder (zip)", archive), save("Save run.toml", () => download("run.toml", new TextEncoder().encode(settings.text))));
+  }
+  let other = "";
+
+  async function compare() {
+    if (!other) return;
+    const answer = await engine.ask({ verb: "compare", runs: [shown, other] });
+    if (answer.error) return told("caution", answer.error, []);
+    frame.srcdoc = answer.html;
+    frame.scrollIntoView();
+  }
+
+  async function archive() {
+    const file = `${shown}.zip`, answer = await engine.ask({ verb: "archive", run: shown, file }, { collect: file });
+    if (answer.error) return told("caution", answer.error, []);
+    download(file, engine.files.get(file));
+  }
+
+  /** Opens a run folder whose files are there, as one that was dropped. @param {string} run */
+  function dropped(run) {
+    const [summary, report] = ["summary.json", "report.json"].map(name => fileOf(run, name));
+    if (!summary || !report) return told("bad", `${run} is no run folder: it has no summary.json or no report.json.`, []);
+    try {
+      const read = JSON.parse(text(summary));
+      done.set(run, { name: run, sentence: JSON.parse(text(report)).verdict[0].text, reasons: read.recommended?.reasons ?? [], summary: read });
+    } catch { return told("bad", `summary.json or report.json of ${run} is not what a run writes.`, []); }
+    show(run);
+  }
+
+  start.addEventListener("click", identify);
+  stop.addEventListener("click", () => engine.cancel());
+  order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => settings.change(table => {
+    const value = numberOf(event.target.value);
+    if (value == null) { if (table.recommended) delete table.recommended.order; } else (table.recommended ??= {}).order = Math.round(value);
+    if (table.recommended && !Object.keys(table.recommended).length) delete table.recommended;
+  }));
+  settings.listen(table => {
+    const { data, controller } = table, ready = data.inputs.length && data.outputs.length && log.sampleTime() && controller;
+    start.disabled = running || !ready;
+    by("missing").textContent = ready ? "" : `Still needed: ${[!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran"].filter(Boolean).join(", ")}.`;
+    order.querySelector("input").value = table.recommended?.order ?? "";
+  });
+  return { identify, show, dropped, done, get shown() { return shown; } };
+})();
+
+/** Hands a file to the user. @param {string} name @param {Uint8Array | undefined} bytes */
+function download(name, bytes) {
+  if (!bytes) return;
+  const address = URL.createObjectURL(new Blob([/** @type {any} */ (bytes)])), link = element("a", { href: address, download: name });
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(address), 1000);
+}

@@ -18,17 +18,24 @@ const FORMS = {
   open_loop: { name: "No controller ran", start: {}, fields: [] },
   json: { name: "JSON as [controller] of run.toml", start: {}, fields: [] },
 };
+/** Forms of a nominal model. @type {typeof FORMS} */
+const NOMINAL = {
+  transfer_function: { name: "transfer function in s or z", start: { domain: "continuous", numerator: [1], denominator: [1, 1] },
+    fields: [["domain", "In", "domain"], ["numerator", "Numerator, descending powers", "list"], ["denominator", "Denominator", "list"]] },
+  state_space: { name: "state space, matrices by rows", start: { domain: "continuous", a: [[-1]], b: [[1]], c: [[1]] },
+    fields: [["domain", "In", "domain"], ["a", "A", "json"], ["b", "B", "json"], ["c", "C", "json"], ["d", "D", "json"]] },
+};
 const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
   rule: [["backward-euler", "backward Euler"], ["tustin", "Tustin"]],
   domain: [["continuous", "s"], ["discrete", "z"]], hold: [["tustin", "Tustin"], ["zoh", "zero-order hold"]],
 });
 
-/** Fields of a form. @param {string} form @param {any} values @param {(name: string, value: any) => void} changed */
-function formFields(form, values, changed) {
-  return FORMS[form].fields.filter(([name]) => name !== "hold" || values.domain === "continuous").map(([name, label, kind, unit]) => {
+/** Fields of a form. @param {string} form @param {any} values @param {(name: string, value: any) => void} changed @param {typeof FORMS} forms */
+function formFields(form, values, changed, forms = FORMS) {
+  return forms[form].fields.filter(([name]) => name !== "hold" || values.domain === "continuous").map(([name, label, kind, unit]) => {
     if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
     if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
-    const input = element("input", { type: "text", size: 34, value: kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
+    const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;
       try { read = kind === "json" || input.value.includes("[") ? JSON.parse(input.value) : numbersOf(input.value); } catch { read = null; }
@@ -80,6 +87,18 @@ const controllerPart = (() => {
 
   settings.listen(drawn);
   return { drawn };
+})();
+
+// A model of the plant that the user has, for comparison; the result does not rest on it.
+(() => {
+  const place = /** @type {HTMLElement} */ (document.getElementById("nominal"));
+  settings.listen(({ nominal }) => {
+    const form = nominal ? Object.keys(nominal)[0] : "", options = /** @type {[string, string][]} */ ([["", "none"], ...Object.entries(NOMINAL).map(([key, f]) => [key, f.name])]);
+    if (form && !NOMINAL[form]) options.push([form, "as in run.toml"]);
+    place.replaceChildren(choiceField({ label: "Nominal model, for comparison", value: form, options, changed: chosen => settings.change(table => {
+      if (chosen) table.nominal = { [chosen]: structuredClone(NOMINAL[chosen].start) }; else delete table.nominal;
+    }) }), ...(NOMINAL[form] ? formFields(form, nominal[form], (name, value) => settings.change(table => { table.nominal[form][name] = value; }), NOMINAL) : []));
+  });
 })();
 
 /** The loop as a drawing. @param {string | null} sign null without a controller @param {boolean} known */

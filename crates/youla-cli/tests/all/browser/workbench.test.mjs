@@ -142,6 +142,17 @@ test("an order is picked from the stabilisation chart", async () => {
   await chart.press("Enter");
   await page.waitForSelector(".verdict-line", { timeout: 100000 });
   assert.equal(JSON.parse(await kept(page, "run-001/summary.json")).recommended.order, 4);
+  // A nominal model is stated and compared.
+  await page.selectOption("#nominal select >> nth=0", "transfer_function");
+  await page.waitForFunction(() => document.getElementById("toml").value.includes("[nominal.transfer_function]"));
+  for (const [label, value] of [["Numerator", "63165"], ["Denominator", "1, 15, 63165"]]) {
+    const input = page.locator("#nominal label.field", { hasText: label }).locator("input");
+    await input.fill(value);
+    await input.press("Tab");
+  }
+  await page.click("#identify");
+  await page.waitForFunction(() => engine.files.has("run-002/summary.json"), null, { timeout: 100000 });
+  assert.ok((await kept(page, "run-002/report.json")).includes("nominal G(0)"), "the nominal model is compared");
   await chart.press("Escape");
   await page.waitForFunction(() => !document.getElementById("toml").value.includes("order = "));
   assert.deepEqual(complaints, []);

@@ -57,6 +57,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "greybox": (youla.greybox, {"record": RECORD, "structure": STRUCTURE, "grey_box": None, **KNOWN}),
     "certify": (youla.certify, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative", "feedback": "negative"}),
     "simulate_loop": (youla.simulate_loop, {"plant": NOMINAL, "controller": 2.0, "feedback": "negative", "samples": None, "excitation": np.ones(9), "noise": None}),
+    "workbench": (youla.workbench, {"record": RECORD, "height": 400}),
     "reduce": (youla.reduce, {"system": NOMINAL, "output_scale": None, "order": 1, "method": "balanced-truncation"}),
     "redesign": (youla.redesign, {"run": RUN, "method": "youla", "peak_sensitivity": 2.0}),
     "excite": (youla.excite, {"nominal": NOMINAL, "controller": 2.0, "feedback": "negative", "dt": None, **EXCITATION, **LOOP}),

@@ -32,6 +32,7 @@
 
   settings.listen(() => {
     if (document.activeElement !== toml) toml.value = settings.text;
+    tell({ settings: settings.text });
     undo.disabled = !settings.canUndo;
     redo.disabled = !settings.canRedo;
   });
@@ -82,8 +83,17 @@
     runs.show(state.shown);
   }
 
+  // In a notebook the page is a frame: files and settings come from outside, settings and summaries go there.
+  const outside = parent === window ? null : parent, tell = (/** @type {any} */ said) => outside?.postMessage({ youla: said }, "*");
+  addEventListener("message", async ({ source, data }) => {
+    if (source !== outside || !data?.youla?.files) return;
+    if (data.youla.settings) await settings.read(data.youla.settings);
+    for (const [name, bytes] of Object.entries(data.youla.files)) await log.opened([new File([bytes], name)]);
+  });
+  document.addEventListener("run-shown", event => tell({ summary: runs.done.get(/** @type {CustomEvent} */ (event).detail)?.summary }));
+
   engine.start();
   controllerPart.drawn();
-  engine.ready().then(() => { document.body.classList.add("ready"); by("log-status").textContent ||= "Ready. Nothing that you open here leaves this page."; return restored(); },
+  engine.ready().then(() => { document.body.classList.add("ready"); by("log-status").textContent ||= "Ready. Nothing that you open here leaves this page."; tell({ ready: true }); return restored(); },
     problem => { by("log-status").textContent = `The method cannot be started in this browser: ${problem.message}`; });
 })();

@@ -7,11 +7,12 @@ const orders = (() => {
   let highest = 24;
   const chosen = () => settings.table.recommended?.order ?? null;
 
-  /** @param {number | null} order */
-  function pick(order) {
+  /** Fixes the order, from the one before it where keys follow each other fast. @param {(before: number | null) => number | null} next */
+  function pick(next) {
     return settings.change(table => {
-      if (order == null) { delete table.recommended?.order; if (table.recommended && !Object.keys(table.recommended).length) delete table.recommended; }
-      else (table.recommended ??= {}).order = Math.min(highest, Math.max(1, order));
+      const order = next(table.recommended?.order ?? null);
+      if (order != null) (table.recommended ??= {}).order = Math.max(1, order);
+      else if (table.recommended) { delete table.recommended.order; if (!Object.keys(table.recommended).length) delete table.recommended; }
     });
   }
 
@@ -36,10 +37,10 @@ const orders = (() => {
     Object.assign(plot.root, { tabIndex: 0 });
     plot.root.setAttribute("role", "slider");
     plot.root.setAttribute("aria-label", "Order of the model; arrows choose, Enter identifies, Escape leaves it to the evidence");
-    plot.over.addEventListener("click", async event => { await pick(Math.round(plot.posToVal(event.offsetY, "y"))); runs.identify(); });
+    plot.over.addEventListener("click", async event => { const order = Math.round(plot.posToVal(event.offsetY, "y")); await pick(() => order); runs.identify(); });
     plot.root.addEventListener("keydown", event => {
       const step = { ArrowUp: 1, ArrowDown: -1 }[event.key];
-      if (step) pick((chosen() ?? 0) + step); else if (event.key === "Enter") runs.identify(); else if (event.key === "Escape") pick(null); else return;
+      if (step) pick(before => (before ?? 0) + step); else if (event.key === "Enter") runs.identify(); else if (event.key === "Escape") pick(() => null); else return;
       event.preventDefault();
     });
     host.append(element("p", { class: "caption" }, `PBSIDopt on ${found.samples} samples. A click on a height, or arrows and Enter, identifies with that order; Escape leaves the order to the evidence, which is the default.`));
@@ -79,5 +80,5 @@ const orders = (() => {
 
   button.addEventListener("click", show);
   settings.listen(() => { button.hidden = !document.body.classList.contains("has-signals"); told(); });
-  return { show };
+  return { pick };
 })();

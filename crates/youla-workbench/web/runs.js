@@ -103,11 +103,7 @@ const runs = (() => {
 
   start.addEventListener("click", identify);
   stop.addEventListener("click", () => engine.cancel());
-  order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => settings.change(table => {
-    const value = numberOf(event.target.value);
-    if (value == null) { if (table.recommended) delete table.recommended.order; } else (table.recommended ??= {}).order = Math.round(value);
-    if (table.recommended && !Object.keys(table.recommended).length) delete table.recommended;
-  }));
+  order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => { const value = numberOf(event.target.value); orders.pick(() => value == null ? null : Math.round(value)); });
   settings.listen(table => {
     const { data, controller } = table, ready = data.inputs.length && data.outputs.length && log.sampleTime() && controller;
     start.disabled = running || !ready;

@@ -31,6 +31,7 @@ from ._result import Evidence, Prediction, Run, Verdict, VerdictTest, load
 from ._stages import Check, SubspaceEstimate, check, greybox, subspace
 from ._study import Bootstrap, bootstrap, identify_many, scan
 from ._tasks import Rows
+from ._workbench import workbench
 
 __version__ = _native.version()
 
@@ -76,4 +77,5 @@ __all__ = [
     "simulate_loop",
     "study",
     "subspace",
+    "workbench",
 ]

@@ -9,6 +9,7 @@ from ._errors import InputError
 
 #: The extra of this package that installs each of them.
 _EXTRAS = {
+    "anywidget": "notebook",
     "control": "control",
     "matplotlib.pyplot": "plot",
     "pandas": "frames",
@@ -16,6 +17,7 @@ _EXTRAS = {
     "pyarrow.parquet": "parquet",
     "scipy.linalg": "rotor",
     "scipy.signal": "control",
+    "traitlets": "notebook",
 }
 
 

@@ -239,6 +239,27 @@ test("files that are no logs, a wrong sign, a run that is cancelled", async () =
   await close();
 });
 
+test("in the frame of a notebook", async () => {
+  const text = readFileSync(csv("axis.csv", axis({ samples: 3000 })), "utf8");
+  // A document of its own, whose policy lets the frame run.
+  const context = await browser.newContext(), page = await context.newPage();
+  await page.goto("about:blank");
+  const said = await page.evaluate(([html, text]) => new Promise(done => {
+    const frame = document.createElement("iframe"), heard = {};
+    frame.setAttribute("sandbox", "allow-scripts allow-downloads");
+    addEventListener("message", ({ source, data }) => {
+      if (source !== frame.contentWindow) return;
+      if (data.youla.ready) frame.contentWindow.postMessage({ youla: { files: { "axis.csv": new TextEncoder().encode(text) } } }, "*");
+      Object.assign(heard, data.youla);
+      if (heard.settings?.includes("axis.csv")) done(heard.settings);
+    });
+    frame.srcdoc = html;
+    document.body.append(frame);
+  }), [readFileSync(workbench, "utf8"), text]);
+  assert.match(said, /file = "axis.csv"/);
+  await context.close();
+});
+
 test("the scripts agree with their types", () => {
   for (const project of ["tsconfig.json", "tsconfig.worker.json"]) execFileSync(process.execPath, ["node_modules/typescript/bin/tsc", "-p", join(scripts, project)], { stdio: "inherit" });
 });

@@ -6,36 +6,19 @@ use serde_json::{Value, json};
 use std::path::Path;
 use youla_io::{CsvOptions, DecimalSign, SurveyedColumn, unit_of_time};
 
-/// Words of headings for each role, in the order in which they are tried; `time` needs even steps besides.
-const WORDS: [(&str, &[&str]); 5] = [
-    ("time", &["t", "time", "zeit", "timestamp", "seconds", "sec"]),
-    ("excitation", &["d", "exc", "excitation", "dither", "injection", "prbs", "chirp", "sweep", "noise"]),
-    ("reference", &["r", "ref", "reference", "setpoint", "sp", "target", "desired", "soll", "demand"]),
-    ("input", &["u", "in", "input", "cmd", "command", "torque", "force", "current", "voltage", "pwm", "duty", "valve"]),
+/// Words of headings for each role, English and German, in the order in which they are tried; `time` needs even steps besides.
+const WORDS: [(&str, &str); 5] = [
+    ("time", "t time zeit timestamp seconds sec"),
+    ("excitation", "d exc excitation dither injection prbs chirp sweep noise anregung rauschen"),
+    ("reference", "r ref reference setpoint sp target desired demand soll sollwert w"),
+    (
+        "input",
+        "u in input cmd command torque force current voltage pwm duty valve strom spannung moment kraft stellgröße ventil",
+    ),
     (
         "output",
-        &[
-            "y",
-            "out",
-            "output",
-            "pos",
-            "position",
-            "angle",
-            "theta",
-            "speed",
-            "velocity",
-            "rate",
-            "gyro",
-            "temp",
-            "temperature",
-            "level",
-            "x",
-            "q",
-            "meas",
-            "measured",
-            "sensor",
-            "ist",
-        ],
+        "y out output pos position angle theta speed velocity rate gyro acc accel temp temperature level pressure x q meas measured sensor \
+         ist istwert lage weg winkel drehzahl temperatur druck",
     ),
 ];
 
@@ -79,7 +62,9 @@ fn suggested(heading: &str, even: bool) -> &'static str {
         .map(|word| word.trim_matches(|c: char| c.is_ascii_digit()))
         .filter(|word| !word.is_empty())
         .collect();
-    let fits = |(role, of): &&(&str, &[&str])| words.iter().any(|word| of.contains(word)) && (*role != "time" || even);
+    let fits = |(role, of): &&(&str, &str)| {
+        of.split_whitespace().any(|known| words.contains(&known)) && (*role != "time" || even)
+    };
     WORDS.iter().find(fits).map_or(if even { "time" } else { "" }, |(role, _)| role)
 }
 
@@ -118,7 +103,8 @@ mod tests {
         assert_eq!([of("y"), of("pos (mm)"), of("gyro[0]")], ["output"; 3]);
         assert_eq!([of("ref_pos"), of("Sollwert soll")], ["reference"; 2]);
         assert_eq!(of("d"), "excitation");
-        assert_eq!(of("temperatur"), "");
+        assert_eq!([of("Strom"), of("Drehzahl"), of("Sollwert")], ["input", "output", "reference"]);
+        assert_eq!(of("status"), "");
     }
 
     #[test]

@@ -54,9 +54,9 @@ const gains = (() => {
     if (!found.stable) note("bad", `Unstable on the recommended model: largest pole ${readOut(found.worst_pole)}.`);
     else if (found.unstable) note("bad", `Unstable on ${found.unstable} of ${found.draws} models of the region.`);
     else {
-      const m = found.margins, parts = [`peak sensitivity ${readOut(m.sensitivity)}, at worst ${readOut(found.worst_sensitivity)} over the region`, m.phase != null ? `phase margin ${readOut(m.phase)}°` : null,
+      const m = found.margins, worst = Math.max(m.sensitivity, found.worst_sensitivity), parts = [`peak sensitivity ${readOut(m.sensitivity)}, at worst ${readOut(worst)} over the region`, m.phase != null ? `phase margin ${readOut(m.phase)}°` : null,
         m.gain_up != null ? `unstable at ${readOut(m.gain_up)} times the gain` : null, m.gain_down > 1e-6 ? `and at ${readOut(m.gain_down)} times` : null, m.delay != null ? `delay margin ${readOut(m.delay * 1e3)} ms` : null].filter(Boolean);
-      note(found.worst_sensitivity <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.`);
+      note(worst <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.`);
     }
     const wanted = JSON.stringify([run, found.outputs, found.inputs, !!found.locus]);
     if (wanted !== shape) { shape = wanted; build(found); }

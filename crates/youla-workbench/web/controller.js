@@ -5,9 +5,9 @@ const openLoop = data => ({ state_space: { feedback: "positive", a: [], b: [], c
 
 /** Forms with their fields: name, label, kind, unit. @type {Record<string, { name: string, start: any, fields: [string, string, string, string?][] }>} */
 const FORMS = {
-  pid: { name: "PID, parallel: kp + ki/s + kd s/(1 + tf s)", start: { discretisation: "backward-euler", kp: 1 },
+  pid: { name: "PID, parallel: kp + ki/s + kd s/(1 + tf s)", start: { discretisation: "backward-euler" },
     fields: [["kp", "kp", "number"], ["ki", "ki", "number?", "1/s"], ["kd", "kd", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
-  ideal_pid: { name: "PID, ideal: kp (1 + 1/(ti s) + td s/(1 + tf s))", start: { discretisation: "backward-euler", kp: 1 },
+  ideal_pid: { name: "PID, ideal: kp (1 + 1/(ti s) + td s/(1 + tf s))", start: { discretisation: "backward-euler" },
     fields: [["kp", "kp", "number"], ["ti", "ti", "number?", "s"], ["td", "td", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   difference_equation: { name: "Difference equation in z⁻¹", start: { numerator: [1], denominator: [1] },
     fields: [["numerator", "Numerator, ascending powers of z⁻¹", "list"], ["denominator", "Denominator", "list"], ["delay", "Further delay", "count", "samples"]] },
@@ -34,7 +34,7 @@ const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
 function formFields(form, values, changed, forms = FORMS) {
   return forms[form].fields.filter(([name]) => name !== "hold" || values.domain === "continuous").map(([name, label, kind, unit]) => {
     if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
-    if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
+    if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, name, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
     const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;

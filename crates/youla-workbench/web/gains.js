@@ -4,18 +4,22 @@ const gains = (() => {
   const place = /** @type {HTMLElement} */ (document.getElementById("gain-fields")), said = /** @type {HTMLElement} */ (document.getElementById("gain-verdict")), host = /** @type {HTMLElement} */ (document.getElementById("gain-plots"));
   let run = "", asked = false, again = false, shape = "";
   /** @type {any} */
-  let edited = null, ran = null, plots = {};
+  let edited = null, ran = null, before = null, plots = {};
 
   /** @param {string} shown */
   async function show(shown) {
     run = shown;
+    said.textContent = "";
+    document.body.classList.remove("has-gains");
     const drawn = await engine.ask({ verb: "draw", run });
     if (run !== shown) return;
-    document.body.classList.toggle("has-gains", !drawn.error);
     if (drawn.error) return;
     const answer = await engine.ask({ verb: "table", toml: new TextDecoder().decode(engine.files.get(`${run}/run.toml`)) });
     ran = answer.controller;
     edited = structuredClone(ran);
+    before = await engine.ask({ verb: "loop", run, controller: null });
+    if (run !== shown) return;
+    document.body.classList.add("has-gains");
     fields();
     ask();
   }
@@ -29,12 +33,35 @@ const gains = (() => {
         element("button", { type: "button", class: "action", onclick: () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))) }, "Save these gains")));
   }
 
-  /** A factor from a tenth to ten times the value. @param {string} name @param {any} values @param {(name: string, value: number) => void} changed */
+  /** A factor from a tenth to ten times the value of the controller that ran. @param {string} name @param {any} values @param {(name: string, value: number) => void} changed */
   function slider(name, values, changed) {
-    const base = values[name], input = element("input", { type: "range", min: -1, max: 1, step: 0.005, value: 0, "aria-label": `${name}, from a tenth to ten times` }), shown = element("output", {}, readOut(base));
-    input.addEventListener("input", () => { const value = Number((base * 10 ** Number(input.value)).toPrecision(4)); shown.textContent = readOut(value); changed(name, value); });
+    const base = Object.values(ran)[0][name] || values[name], place10 = Math.max(-1, Math.min(1, Math.log10(values[name] / base)));
+    const input = element("input", { type: "range", min: -1, max: 1, step: 0.005, value: place10, "aria-label": `${name}, from a tenth to ten times that of the controller that ran` }), shown = element("output", {}, readOut(values[name]));
+    input.addEventListener("input", () => {
+      const value = Number((base * 10 ** Number(input.value)).toPrecision(4)), field = place.querySelector(`.fields input[data-name="${name}"]`);
+      shown.textContent = readOut(value);
+      if (field instanceof HTMLInputElement) field.value = String(value);
+      changed(name, value);
+    });
     return element("label", { class: "slider" }, element("span", {}, name), input, shown);
   }
+
+  // Where S first exceeds -3 dB, overshoot of the first output, largest command for a unit step of the reference.
+  function figuresOf(found) {
+    if (!found?.sensitivity) return null;
+    const k = found.sensitivity.centre.findIndex(v => v > Math.SQRT1_2);
+    return [k > 0 ? found.hz[k] : null, 100 * Math.max(0, Math.max(...found.step[0].centre) - 1), Math.max(...found.command.flatMap(c => c.centre.map(Math.abs)))];
+  }
+
+  function compared(found) {
+    const now = figuresOf(found), then = figuresOf(before), words = ["S below −3 dB up to", "overshoot", "largest command for a unit step"], units = [" Hz", " %", ""];
+    if (!now || !then) return "";
+    const said = words.map((word, k) => now[k] == null || then[k] == null ? null : `${word} ${readOut(now[k])}${units[k]} (controller that ran: ${readOut(then[k])}${units[k]})`).filter(Boolean);
+    return said.length ? ` ${said.join("; ")}.`.replace(" S below", " S is below") : "";
+  }
+
+  // The running loop's curve at the places of the new one, held at its end.
+  const held = (t, xs, ys) => t.map(at => { const k = xs.findIndex(x => x >= at); return k < 0 ? ys[ys.length - 1] : ys[k]; });
 
   // The newest gains are asked for as soon as the answer before is there.
   async function ask() {
@@ -56,17 +83,18 @@ const gains = (() => {
     else {
       const m = found.margins, worst = Math.max(m.sensitivity, found.worst_sensitivity), parts = [`peak sensitivity ${readOut(m.sensitivity)}, at worst ${readOut(worst)} over the region`, m.phase != null ? `phase margin ${readOut(m.phase)}°` : null,
         m.gain_up != null ? `unstable at ${readOut(m.gain_up)} times the gain` : null, m.gain_down > 1e-6 ? `and at ${readOut(m.gain_down)} times` : null, m.delay != null ? `delay margin ${readOut(m.delay * 1e3)} ms` : null].filter(Boolean);
-      note(worst <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.`);
+      note(worst <= 4 ? "good" : "caution", `Stable on all ${found.draws} models of the region; ${parts.join(", ")}.${compared(found)}`);
     }
     const wanted = JSON.stringify([run, found.outputs, found.inputs, !!found.locus]);
     if (wanted !== shape) { shape = wanted; build(found); }
     host.classList.toggle("unsafe", !safe);
     const empty = p => p.setData(p.series.map(() => [null]));
     if (safe) {
+      const then = (of, k) => before?.[of] ? held(found.t, before.t, before[of][k].centre) : found.t.map(() => null);
       const s = found.sensitivity, db = values => values.map(v => 20 * Math.log10(v));
-      plots.s.setData([found.hz, db(s.centre), db(s.high), db(s.low)]);
-      found.outputs.forEach((_, k) => plots.step[k].setData([found.t, found.step[k].centre, found.step[k].high, found.step[k].low]));
-      found.inputs.forEach((_, k) => plots.command[k].setData([found.t, found.command[k].centre, found.command[k].high, found.command[k].low]));
+      plots.s.setData([found.hz, db(s.centre), db(s.high), db(s.low), before?.sensitivity ? db(before.sensitivity.centre) : found.hz.map(() => null)]);
+      found.outputs.forEach((_, k) => plots.step[k].setData([found.t, found.step[k].centre, found.step[k].high, found.step[k].low, then("step", k)]));
+      found.inputs.forEach((_, k) => plots.command[k].setData([found.t, found.command[k].centre, found.command[k].high, found.command[k].low, then("command", k)]));
     } else [plots.s, ...plots.step, ...plots.command].forEach(empty);
     if (found.locus) locus(found);
   }
@@ -74,7 +102,8 @@ const gains = (() => {
   function build(found) {
     const cell = title => { const div = element("div", {}, element("p", { class: "panel-title" }, title)); host.append(div); return div; };
     host.replaceChildren();
-    const lines = [{ label: "recommended model", colour: "--recommended" }, { label: "highest", colour: "--recommended", width: 0.4 }, { label: "lowest", colour: "--recommended", width: 0.4 }];
+    const lines = [{ label: "recommended model", colour: "--recommended" }, { label: "highest", colour: "--recommended", width: 0.4 }, { label: "lowest", colour: "--recommended", width: 0.4 }, { label: "controller that ran", colour: "--soft", dash: [4, 3] }];
+    host.append(key([lines[0], lines[3]]));
     const banded = (title, x, y, logX) => curves(cell(title), { x, y, logX, height: 200, lines, bands: [[2, 3, "--recommended"]] });
     plots = { s: banded("Sensitivity, with its range over the region", "Frequency (Hz)", "dB", true) };
     if (found.locus) { plots.canvas = element("canvas", { class: "locus", role: "img", "aria-label": "Locus of the loop gain" }); cell("Loop gain; circles: peak sensitivity 2 and 4").append(plots.canvas); }

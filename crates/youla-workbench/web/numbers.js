@@ -14,9 +14,9 @@ function numbersOf(text) {
   return plain === "" || values.includes(null) ? null : /** @type {number[]} */ (values);
 }
 
-/** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, id?: string }} of */
-function numberField({ label, value, unit, changed, optional, id }) {
-  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), id, autocomplete: "off" });
+/** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, name?: string }} of */
+function numberField({ label, value, unit, changed, optional, name }) {
+  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), "data-name": name, autocomplete: "off" });
   input.addEventListener("change", () => {
     const empty = input.value.trim() === "", read = numberOf(input.value), wrong = read == null && !(empty && optional);
     input.setAttribute("aria-invalid", String(wrong));

@@ -3,7 +3,7 @@
 const runs = (() => {
   const by = (/** @type {string} */ id) => /** @type {any} */ (document.getElementById(id));
   const start = by("identify"), stop = by("cancel"), progress = by("progress"), bar = by("progress-bar"), verdict = by("verdict"), frame = by("report"), list = by("run-list"), order = by("order");
-  /** Finished runs by their folders. @type {Map<string, { name: string, sentence: string, reasons: string[], summary: any }>} */
+  /** Finished runs by their folders. @type {Map<string, { name: string, sentence: string, reasons: string[], summary: any, toml?: string }>} */
   const done = new Map();
   let shown = "", next = 1, running = false;
   const fileOf = (/** @type {string} */ run, /** @type {string} */ name) => engine.files.get(`${run}/${name}`);
@@ -14,11 +14,11 @@ const runs = (() => {
     if (running) return;
     running = start.disabled = true;
     await settings.settled();
-    const out = `run-${String(next++).padStart(3, "0")}`, begun = performance.now();
+    const asked = settings.text, out = `run-${String(next++).padStart(3, "0")}`, begun = performance.now();
     stop.hidden = bar.hidden = false;
     bar.value = 0;
     const ticking = setInterval(() => { const s = (performance.now() - begun) / 1000; progress.dataset.seconds = s.toFixed(1); progress.textContent = `${progress.dataset.stage ?? "starting"}, ${s.toFixed(0)} s${remaining(s)}`; }, 250);
-    const answer = await engine.ask({ verb: "identify", toml: settings.text, out }, { collect: out, said: line => {
+    const answer = await engine.ask({ verb: "identify", toml: asked, out }, { collect: out, said: line => {
       const [at, of, stage] = line.split(" ");
       if (!stage) return;
       [bar.value, bar.max, progress.dataset.stage] = [Number(at) - 1, Number(of), `stage ${at} of ${of}, ${stage}`];
@@ -31,7 +31,7 @@ const runs = (() => {
     if (answer.cancelled) return;
     if (answer.error) return told("bad", answer.error, []);
     took(settings.text, seconds);
-    done.set(out, { name: out, sentence: answer.sentence, reasons: answer.reasons, summary: answer.summary });
+    done.set(out, { name: out, sentence: answer.sentence, reasons: answer.reasons, summary: answer.summary, toml: asked });
     show(out);
   }
 
@@ -51,6 +51,13 @@ const runs = (() => {
       ...(reasons.length ? [element("ul", { class: "points" }, ...reasons.map(r => element("li", {}, r)))] : []));
   }
 
+  // A result of other settings than those on the page says so.
+  function aged() {
+    const of = done.get(shown)?.toml, stale = of != null && of !== settings.text;
+    document.body.classList.toggle("stale", stale);
+    by("stale").textContent = stale ? `This is ${shown}: the settings have changed since.` : "";
+  }
+
   /** @param {string} run */
   function show(run) {
     const found = done.get(run);
@@ -61,6 +68,7 @@ const runs = (() => {
     const page = fileOf(run, "report.html");
     frame.srcdoc = page ? text(page) : "";
     listed();
+    aged();
     gains.show(run);
     document.dispatchEvent(new CustomEvent("run-shown", { detail: run }));
   }
@@ -105,9 +113,15 @@ const runs = (() => {
   stop.addEventListener("click", () => engine.cancel());
   order.querySelector("input").addEventListener("change", (/** @type {any} */ event) => { const value = numberOf(event.target.value); orders.pick(() => value == null ? null : Math.round(value)); });
   settings.listen(table => {
-    const { data, controller } = table, ready = data.inputs.length && data.outputs.length && log.sampleTime() && controller;
-    start.disabled = running || !ready;
-    by("missing").textContent = ready ? "" : `Still needed: ${[!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran"].filter(Boolean).join(", ")}.`;
+    const { data, controller } = table, form = Object.keys(controller ?? {})[0], of = controller?.[form] ?? {}, pid = ["pid", "ideal_pid"].includes(form);
+    const needed = [!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran",
+      controller && !of.feedback && "the sign of its feedback", pid && of.kp == null && "its kp"].filter(Boolean);
+    const names = (/** @type {any[]} */ list) => list.map(c => c.from ?? c.name).join(", ");
+    const many = !needed.length && pid && (data.inputs.length > 1 || data.outputs.length > 1);
+    start.disabled = running || needed.length > 0 || many;
+    by("missing").textContent = needed.length ? `Still needed: ${needed.join(", ")}.` : many
+      ? `A PID drives one input and reads one output, but the inputs are ${names(data.inputs)} and the outputs ${names(data.outputs)}. Is one of them the excitation, or not used?` : "";
+    aged();
     order.querySelector("input").value = table.recommended?.order ?? "";
   });
   return { identify, show, dropped, done, get shown() { return shown; } };

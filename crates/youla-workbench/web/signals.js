@@ -57,7 +57,7 @@ const signals = (() => {
   async function draw() {
     const file = log.file(), ts = log.sampleTime(), found = log.survey(file ?? "");
     const columns = found.columns.filter(c => !c.problem && ["input", "output", "excitation", "reference"].includes(log.roleOf(c.name))).map(c => c.name);
-    const wanted = JSON.stringify([file, ts, columns, [...engine.files.keys()].length]);
+    const wanted = JSON.stringify([file, ts, columns, columns.map(log.roleOf), [...engine.files.keys()].length]);
     if (wanted !== loaded) {
       loaded = wanted;
       host.replaceChildren();
@@ -70,7 +70,7 @@ const signals = (() => {
       if (answer.error) return void host.replaceChildren(element("p", { class: "note" }, answer.error));
       for (const curve of answer.curves) {
         const role = log.roleOf(curve.name);
-        const u = curves(host, { x: "", y: curve.name, height: 118, sync: "signals", lines: [{ label: curve.name, colour: { output: "--measured", input: "--soft" }[role] ?? "--excitation", width: 1 }],
+        const u = curves(host, { x: "", y: curve.name.replace(/\s*[[(][^\])]*[\])]\s*$/, "").slice(0, 16), height: 118, sync: "signals", lines: [{ label: curve.name, colour: { output: "--measured", input: "--soft" }[role] ?? "--excitation", width: 1 }],
           drag: { x: true, y: false, setScale: false }, hooks: { drawClear: [shade], setSelect: [selected] } });
         Object.assign(u, { channel: curve.name, short: Object.values(LISTS).flatMap(list => settings.table.data[list] ?? []).find(c => c.from === curve.name)?.name });
         u.over.addEventListener("dblclick", () => plots.forEach(p => p.setScale("x", { min: 0, max: answer.samples * ts })));

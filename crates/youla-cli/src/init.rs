@@ -1,7 +1,6 @@
 //! `youla init`: a first run.toml from a log, by questions or flags.
 
-use crate::log_flags::Dialect;
-use crate::log_flags::{Sign, places};
+use crate::log_flags::{Dialect, Sign, places};
 use crate::output::{Failure, Form, ask_line, say};
 use clap::Args;
 use std::io::IsTerminal;

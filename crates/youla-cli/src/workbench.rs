@@ -3,6 +3,7 @@
 use crate::output::{Failure, Form};
 use clap::Args;
 use std::path::PathBuf;
+use youla_io::export::write_export;
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -25,11 +26,8 @@ pub(crate) struct WorkbenchArgs {
 
 /// Writes the page and opens it; a machine without a browser is told where it is.
 pub(crate) fn workbench(form: Form, args: &WorkbenchArgs) -> Result<(), Failure> {
-    if args.out.exists() && !args.force {
-        return Err(youla_io::Error::FileExists { path: args.out.clone() }.into());
-    }
     let page = youla_workbench::page().map_err(youla_run::Error::from)?;
-    std::fs::write(&args.out, page).map_err(|source| Failure::io(&args.out, source))?;
+    write_export(&args.out, page.as_bytes(), args.force)?;
     let opened = !args.no_open && open::that_detached(&args.out).is_ok();
     let file = args.out.display().to_string();
     form.print(

@@ -199,7 +199,10 @@ fn process() -> u32 {
 }
 
 /// All files below a folder, relative to it, in order.
-fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+///
+/// # Errors
+/// Those of the file system.
+pub fn files_below(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
     let (mut found, mut open) = (Vec::new(), vec![PathBuf::new()]);
     while let Some(inner) = open.pop() {
         for entry in fs::read_dir(folder.join(&inner))? {

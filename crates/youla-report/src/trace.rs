@@ -156,7 +156,7 @@ impl Trace {
     }
 
     /// Row and value of each point.
-    pub(crate) fn points(&self) -> impl Iterator<Item = (usize, f64)> {
+    pub fn points(&self) -> impl Iterator<Item = (usize, f64)> {
         let rows = self.steps.iter().scan(0, |row, step| {
             *row += step;
             Some(*row)

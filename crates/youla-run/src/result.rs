@@ -71,6 +71,13 @@ pub struct Filtered {
     pub signals: Result<DeviationSignals>,
 }
 
+impl Filtered {
+    /// alpha and beta, where they exist.
+    pub(crate) fn signals(&self) -> Option<&DeviationSignals> {
+        self.signals.as_ref().ok()
+    }
+}
+
 /// Something that was asked for but is impossible; the run goes on without it.
 #[derive(Debug, Clone, Copy)]
 pub struct Refusal<'a> {
@@ -180,7 +187,7 @@ impl Identification {
 
     /// alpha and beta of the estimation records, where they exist.
     pub(crate) fn signals(&self) -> Option<&DeviationSignals> {
-        self.filtered.as_ref().ok()?.signals.as_ref().ok()
+        self.filtered.as_ref().ok()?.signals()
     }
 }
 

@@ -89,12 +89,11 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     let ports = with_input_port(&k)?;
     let close = |plant: &StateSpace<Discrete>| closed_loop(plant, &ports);
     let centre = close(&plant)?;
-    let mut loops = Vec::with_capacity(draws.len());
-    for (place, draw) in draws.iter().enumerate() {
-        let looped = close(draw)?;
-        loops.push((place, looped.is_stable()?, looped));
+    let loops = draws.iter().map(close).collect::<youla::Result<Vec<_>>>()?;
+    let mut unstable = 0;
+    for looped in &loops {
+        unstable += usize::from(!looped.is_stable()?);
     }
-    let unstable = loops.iter().filter(|(_, stable, _)| !stable).count();
     let stable = centre.is_stable()?;
     let mut answer = json!({
         "stable": stable, "draws": draws.len(), "unstable": unstable, "inputs": kept.inputs, "outputs": kept.outputs,
@@ -113,13 +112,13 @@ pub(crate) fn predicted(run: &Path, controller: Option<&ControllerSettings>) -> 
     }
     let (m, p) = (plant.inputs(), plant.outputs());
     let all: Vec<Vec<f64>> = std::iter::once(&centre)
-        .chain(loops.iter().map(|(.., looped)| looped))
+        .chain(&loops)
         .map(|looped| Ok(largest(&frequency_response(&looped.part(m..m + p, m..m + p), &omega)?)))
         .collect::<Result<_>>()?;
     answer["sensitivity"] = band(&all);
     let samples = settling(&centre)?;
     let steps = std::iter::once(&centre)
-        .chain(loops.iter().take(SHOWN).map(|(.., looped)| looped))
+        .chain(loops.iter().take(SHOWN))
         .map(|looped| step(looped, (m, p), samples))
         .collect::<Result<Vec<_>>>()?;
     let every = samples.div_ceil(POINTS);

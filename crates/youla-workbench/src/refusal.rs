@@ -14,23 +14,17 @@ pub(crate) enum Refusal {
 
 pub(crate) type Result<T> = std::result::Result<T, Refusal>;
 
-impl From<youla::Error> for Refusal {
-    fn from(error: youla::Error) -> Self {
-        Refusal::Run(error.into())
-    }
+macro_rules! of_a_run {
+    ($($error:ty),*) => {$(
+        impl From<$error> for Refusal {
+            fn from(error: $error) -> Self {
+                Refusal::Run(error.into())
+            }
+        }
+    )*};
 }
 
-impl From<youla_io::Error> for Refusal {
-    fn from(error: youla_io::Error) -> Self {
-        Refusal::Run(error.into())
-    }
-}
-
-impl From<youla_report::Error> for Refusal {
-    fn from(error: youla_report::Error) -> Self {
-        Refusal::Run(error.into())
-    }
-}
+of_a_run!(youla::Error, youla_io::Error, youla_report::Error);
 
 impl From<serde_json::Error> for Refusal {
     fn from(error: serde_json::Error) -> Self {

@@ -37,14 +37,7 @@ pub(crate) fn traces(wanted: &Wanted) -> Result<Value> {
     let mut curves = Vec::new();
     for (name, values) in wanted.columns.iter().zip(record.columns()) {
         let trace = Trace::new(name, values, &clock)?;
-        let rows: Vec<usize> = trace
-            .steps
-            .iter()
-            .scan(0, |row, step| {
-                *row += step;
-                Some(*row)
-            })
-            .collect();
+        let rows: Vec<usize> = trace.points().map(|(row, _)| row).collect();
         let x = MatRef::from_column_major_slice(values, values.len(), 1);
         let spectrum = cross_spectrum(x, x, time, &welch)?.density;
         let density: Vec<f64> = spectrum.entry(0, 0).iter().skip(1).map(|s| s.re.max(0.0).sqrt()).collect();

@@ -14,6 +14,10 @@ const log = (() => {
   /** The file that the settings name first. @returns {string | undefined} */
   const file = () => settings.table.data.estimation?.[0]?.file;
 
+  /** The records that the settings name. @returns {any[]} */
+  const named = () => [...(settings.table.data.estimation ?? []), ...(settings.table.data.verification ?? [])];
+  const survey = (/** @type {string} */ path) => engine.ask({ verb: "survey", file: path, csv: settings.table.data.csv ?? {} });
+
   /** @param {Iterable<File>} list */
   async function opened(list) {
     const files = [...list], folder = files[0]?.webkitRelativePath.split("/")[0];
@@ -28,7 +32,7 @@ const log = (() => {
     const path = one.name, bytes = new Uint8Array(await one.arrayBuffer());
     if (path.endsWith(".toml")) return ofSettings(path, new TextDecoder().decode(bytes));
     engine.put(path, bytes);
-    const found = await engine.ask({ verb: "survey", file: path, csv: settings.table.data.csv ?? {} });
+    const found = await survey(path);
     if (found.error) {
       engine.files.delete(path);
       status.textContent = found.error;
@@ -37,8 +41,7 @@ const log = (() => {
     surveys.set(path, found);
     const good = found.columns.filter(c => !c.problem), rows = Math.max(...good.map(c => c.rows));
     status.textContent = `${path}: ${good.length} columns, ${rows} rows.` + (found.csv.decimal === "comma" ? " Read with a decimal comma." : "");
-    const named = [...(settings.table.data.estimation ?? []), ...(settings.table.data.verification ?? [])].some(f => f.file === path);
-    if (named) return settings.told();
+    if (named().some(f => f.file === path)) return settings.told();
     await settings.change(table => {
       const { data } = table, first = !data.estimation?.length || !surveys.has(data.estimation[0].file);
       if (!first) return void data.estimation.push({ file: path });
@@ -72,16 +75,19 @@ const log = (() => {
     for (const [list, as] of [["input_excitation", "inputs"], ["reference", "outputs"]]) if (data[list] && data[list].length !== data[as].length) delete data[list];
   }
 
+  /** Whether a column is that of the time, or the one from which its seconds are computed. @param {any} data @param {string} name */
+  const isTime = (data, name) => data.time_column === name || data.computed?.seconds?.startsWith(`'${name}'`);
+
   /** @param {any} data @param {any} column @param {string} role */
   function give(data, column, role) {
     const name = column.name;
     for (const list of Object.values(LISTS)) if (data[list]) data[list] = data[list].filter(c => (c.from ?? c.name) !== name);
-    if (data.time_column === name || data.computed?.seconds?.startsWith(`'${name}'`)) { delete data.time_column; delete data.computed; }
+    if (isTime(data, name)) { delete data.time_column; delete data.computed; }
     if (role === "time") {
       if (column.to_seconds) { data.computed = { seconds: `'${name}' ${column.to_seconds}` }; data.time_column = "seconds"; } else data.time_column = name;
       delete data.sample_time;
     } else if (role) {
-      const short = column.unit ? name.replace(/\s*[[(][^\])]*[\])]\s*$/, "") || name : name;
+      const short = column.unit ? withoutUnit(name) || name : name;
       (data[LISTS[role]] ??= []).push({ name: short, ...(short === name ? {} : { from: name }), ...(column.unit ? { unit: column.unit } : {}) });
     }
     for (const list of ["input_excitation", "reference"]) if (data[list] && !data[list].length) delete data[list];
@@ -90,7 +96,7 @@ const log = (() => {
   /** @param {string} name */
   function roleOf(name) {
     const { data } = settings.table;
-    if (data.time_column === name || data.computed?.seconds?.startsWith(`'${name}'`)) return "time";
+    if (isTime(data, name)) return "time";
     return Object.keys(LISTS).find(role => data[LISTS[role]]?.some(c => (c.from ?? c.name) === name)) ?? "";
   }
 
@@ -105,7 +111,6 @@ const log = (() => {
 
   function drawn() {
     const path = file(), found = path ? shown(path) : { columns: [] };
-    document.body.classList.toggle("has-log", found.columns.length > 0);
     const rows = found.columns.map(column => {
       const role = roleOf(column.name), select = element("select", { "aria-label": `Role of ${column.name}`, disabled: column.problem ? "" : null },
         ...ROLES.map(([key, name]) => element("option", { value: key, selected: key === role ? "" : null }, name)));
@@ -126,9 +131,9 @@ const log = (() => {
 
   /** Surveys the files that the settings name, as after a saved page was opened. */
   async function surveyAgain() {
-    for (const { file: path } of [...(settings.table.data.estimation ?? []), ...(settings.table.data.verification ?? [])]) {
+    for (const { file: path } of named()) {
       if (surveys.has(path) || !engine.files.has(path)) continue;
-      const found = await engine.ask({ verb: "survey", file: path, csv: settings.table.data.csv ?? {} });
+      const found = await survey(path);
       if (!found.error) surveys.set(path, found);
     }
     settings.told();

@@ -14,6 +14,9 @@ function numbersOf(text) {
   return plain === "" || values.includes(null) ? null : /** @type {number[]} */ (values);
 }
 
+/** A heading without the unit in brackets behind it. @param {string} heading */
+const withoutUnit = heading => heading.replace(/\s*[[(][^\])]*[\])]\s*$/, "");
+
 /** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, name?: string }} of */
 function numberField({ label, value, unit, changed, optional, name }) {
   const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), "data-name": name, autocomplete: "off" });

@@ -1,9 +1,9 @@
 // Curves on uPlot, drawn once and fed anew: for signals and for the predicted loop.
 
 /**
- * @typedef {{ label: string, colour: string, dash?: number[], width?: number, low?: boolean }} Line
+ * @typedef {{ label: string, colour: string, dash?: number[], width?: number }} Line
  * @param {HTMLElement} host
- * @param {{ title?: string, x: string, y: string, logX?: boolean, logY?: boolean, height?: number, lines: Line[], bands?: [number, number, string][],
+ * @param {{ x: string, y: string, logX?: boolean, logY?: boolean, height?: number, lines: Line[], bands?: [number, number, string][],
  *   hooks?: any, drag?: any, range?: (low: number, high: number) => [number, number], points?: boolean, sync?: string }} what
  */
 function curves(host, what) {

@@ -30,7 +30,7 @@ const runs = (() => {
     progress.textContent = answer.cancelled ? "Cancelled; log and settings are as they were." : answer.error ? "" : `Finished in ${seconds.toFixed(1)} s.`;
     if (answer.cancelled) return;
     if (answer.error) return told("bad", answer.error, []);
-    took(settings.text, seconds);
+    Object.assign(known, { samples: samples(), seconds });
     done.set(out, { name: out, sentence: answer.sentence, reasons: answer.reasons, summary: answer.summary, toml: asked });
     show(out);
   }
@@ -38,7 +38,6 @@ const runs = (() => {
   // The time that the same samples took before says what remains.
   const known = { samples: 0, seconds: 0 };
   const samples = () => ["estimation", "verification"].flatMap(p => settings.table.data[p] ?? []).reduce((sum, f) => sum + (f.take ?? 0), 0);
-  function took(_, seconds) { Object.assign(known, { samples: samples(), seconds }); }
   function remaining(seconds) {
     if (!known.seconds) return "";
     const left = known.seconds * Math.max(0.2, samples() / Math.max(1, known.samples)) - seconds;

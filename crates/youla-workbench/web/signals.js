@@ -5,6 +5,7 @@ const signals = (() => {
   const modes = /** @type {HTMLElement} */ (document.getElementById("range-mode")), saidOfController = /** @type {HTMLElement} */ (document.getElementById("controller-said"));
   /** @type {any[]} */
   let plots = [];
+  const PALETTE = ["--hansen", "--direct", "--hansen-reduced", "--pem", "--other-1", "--other-4"];
   let mode = "zoom", loaded = "", checking = 0;
   /** @type {any[]} */
   let findings = [], drawnCurves = [];
@@ -70,7 +71,7 @@ const signals = (() => {
       if (answer.error) return void host.replaceChildren(element("p", { class: "note" }, answer.error));
       for (const curve of answer.curves) {
         const role = log.roleOf(curve.name);
-        const u = curves(host, { x: "", y: curve.name.replace(/\s*[[(][^\])]*[\])]\s*$/, "").slice(0, 16), height: 118, sync: "signals", lines: [{ label: curve.name, colour: { output: "--measured", input: "--soft" }[role] ?? "--excitation", width: 1 }],
+        const u = curves(host, { x: "", y: withoutUnit(curve.name).slice(0, 16), height: 118, sync: "signals", lines: [{ label: curve.name, colour: { output: "--measured", input: "--soft" }[role] ?? "--excitation", width: 1 }],
           drag: { x: true, y: false, setScale: false }, hooks: { drawClear: [shade], setSelect: [selected] } });
         Object.assign(u, { channel: curve.name, short: Object.values(LISTS).flatMap(list => settings.table.data[list] ?? []).find(c => c.from === curve.name)?.name });
         u.over.addEventListener("dblclick", () => plots.forEach(p => p.setScale("x", { min: 0, max: answer.samples * ts })));
@@ -87,14 +88,18 @@ const signals = (() => {
     check();
   }
 
+  /** Curves over the frequency with their names. @param {HTMLElement} place @param {string} title @param {any[]} all @param {(curve: any) => number[]} of @param {object} how */
+  function overFrequency(place, title, all, of, how) {
+    const lines = all.map((curve, k) => ({ label: curve.name, colour: PALETTE[k % PALETTE.length] }));
+    place.replaceChildren(element("p", { class: "panel-title" }, title), key(lines));
+    curves(place, { x: "Frequency (Hz)", y: "", logX: true, height: 210, lines, ...how }).setData(joined(all.map(c => [c.hz, of(c)])));
+  }
+
   /** @param {any[]} all */
   function drawSpectra(all) {
-    const palette = ["--hansen", "--direct", "--hansen-reduced", "--pem", "--other-1", "--other-4"], lines = all.map((curve, k) => ({ label: curve.name, colour: palette[k % palette.length] }));
     const left = element("div"), right = element("div", { id: "coherence" });
     spectra.replaceChildren(left, right);
-    left.append(element("p", { class: "panel-title" }, "Spectra, root of the density per Hz"), key(lines));
-    const u = curves(left, { x: "Frequency (Hz)", y: "", logX: true, logY: true, height: 210, lines });
-    u.setData(joined(all.map(c => [c.hz, c.density.map(v => v > 0 ? v : null)])));
+    overFrequency(left, "Spectra, root of the density per Hz", all, c => c.density.map(v => v > 0 ? v : null), { logY: true });
   }
 
   async function drawCoherence() {
@@ -102,10 +107,7 @@ const signals = (() => {
     if (!place || !(data.input_excitation || data.reference || data.alpha)) return place?.replaceChildren();
     const answer = await engine.ask({ verb: "coherence", toml: settings.text });
     if (answer.error || !answer.curves.length) return place.replaceChildren();
-    const palette = ["--hansen", "--direct", "--hansen-reduced", "--pem"], lines = answer.curves.map((c, k) => ({ label: c.name, colour: palette[k % palette.length] }));
-    place.replaceChildren(element("p", { class: "panel-title" }, "Coherence with the known excitation"), key(lines));
-    const u = curves(place, { x: "Frequency (Hz)", y: "", logX: true, height: 210, lines, range: () => [0, 1.02] });
-    u.setData(joined(answer.curves.map(c => [c.hz, c.coherence])));
+    overFrequency(place, "Coherence with the known excitation", answer.curves, c => c.coherence, { range: () => [0, 1.02] });
   }
 
   // The check runs again after each change, once nothing has changed for a moment.
@@ -137,5 +139,5 @@ const signals = (() => {
   }
 
   settings.listen(draw);
-  return { setRange, ofOutputs: () => drawnCurves.filter(c => log.roleOf(c.name) === "output") };
+  return { ofOutputs: () => drawnCurves.filter(c => log.roleOf(c.name) === "output") };
 })();

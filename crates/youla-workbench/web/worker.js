@@ -61,7 +61,6 @@ let queue = Promise.resolve();
 addEventListener("message", ({ data }) => {
   if (data.packed) method = compiled(data.packed);
   for (const [path, bytes] of data.files ?? []) put(path, bytes);
-  if (data.remove) root.delete(data.remove);
   if (!data.request) return void (data.packed && method.then(() => postMessage({ ready: true }), problem => postMessage({ failed: String(problem) })));
   queue = queue.then(async () => {
     const answer = await run(data.request, line => postMessage({ id: data.id, line }));

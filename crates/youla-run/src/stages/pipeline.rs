@@ -53,10 +53,8 @@ pub fn identify(
     let factors = found(of_nominal.as_ref());
     let factorisation = factors.map(|f| &f.factorisation);
     let run = RunContext { settings: &settings, records: &records, declared: &declared, factorisation };
-    let context = factors.and_then(|f| {
-        let signals = f.signals.as_ref().ok()?;
-        Some(SchemeContext { run, factorisation: &f.factorisation, signals })
-    });
+    let context =
+        factors.and_then(|f| Some(SchemeContext { run, factorisation: &f.factorisation, signals: f.signals()? }));
     let mut data = clock.run(Stage::Check, || check_records(&settings, &records, Some(declared.controller())))?;
     let (recommended, (s, direct)) = clock.run(Stage::Identify, || {
         let others = || match records.measured {
@@ -111,7 +109,7 @@ pub fn identify(
     // (26), the loop certificate and the response that rests on no model.
     let ((indirect, lines), validation) = clock.run(Stage::Validate, || {
         let indirect = match &records.measured {
-            None => indirect(run, filtered.as_ref().ok().and_then(|f| f.signals.as_ref().ok())),
+            None => indirect(run, filtered.as_ref().ok().and_then(Filtered::signals)),
             Some(measured) => Some(measured.shown()),
         };
         Ok::<_, Error>(((indirect, lines(run)), verify(run, &candidates)?))

@@ -42,9 +42,10 @@ pub use records::{RunRecords, SourceFile, read_records, records_in_memory, respo
 pub use result::{Filtered, Identification, Refusal};
 pub use schema::{settings_schema, summary_schema};
 pub use settings::{
-    AlternativeStructure, ControllerSettings, DataFile, DataSettings, Discretisation, DisturbanceSettings, Domain,
-    FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid, NominalModel, ParallelPid,
-    Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings, parse_subspace_options, parse_table,
+    AlternativeStructure, Cascade, CascadeGains, ControllerSettings, DataFile, DataSettings, Discretisation,
+    DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
+    NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
+    parse_subspace_options, parse_table,
 };
 pub use stages::certificate::RunCertificate;
 pub use stages::clock::{Stage, StageClock, StageTimes};

@@ -1,5 +1,6 @@
 //! `[controller]` of run.toml: every form in which users have their controllers.
 
+use super::cascade::Cascade;
 use super::explain::forms;
 use super::models::{Domain, Polynomials, matrix, model_file, sized};
 use super::pid::{IdealPid, ParallelPid};
@@ -108,6 +109,8 @@ pub enum ControllerSettings {
     Pid(ParallelPid),
     /// PID in its ideal form, `kp (1 + 1/(ti s) + td s/(1 + derivative_filter s))`; one input and one output.
     IdealPid(IdealPid),
+    /// A velocity loop inside a position loop with feedforward, as servo drives compute it; one input and one output.
+    Cascade(Cascade),
     /// A discrete-time model from y to u in a file: `a`, `b`, `c`, `d` and the sample time `ts` in JSON, MATLAB (5 or 7.3) or NumPy
     /// form. A MATLAB file may lack `ts`.
     ModelFile {
@@ -176,6 +179,7 @@ impl ControllerSettings {
             | Self::StateSpace { delay, .. } => *delay,
             Self::Pid(pid) => pid.delay,
             Self::IdealPid(pid) => pid.delay,
+            Self::Cascade(cascade) => cascade.delay,
             Self::ModelFile { .. } | Self::Observer { .. } => 0,
         }
     }
@@ -187,6 +191,7 @@ impl ControllerSettings {
             Self::StateSpace { domain, hold, .. } => hold_problem(*domain, *hold),
             Self::Pid(pid) => pid.parts().problem(),
             Self::IdealPid(pid) => pid.parts().problem(),
+            Self::Cascade(cascade) => cascade.problem(),
             Self::DifferenceEquation { .. } | Self::ModelFile { .. } | Self::Observer { .. } => None,
         }
     }
@@ -227,6 +232,7 @@ impl ControllerSettings {
             }
             Self::Pid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
             Self::IdealPid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
+            Self::Cascade(cascade) => return cascade.feedback_path(time.ts()).controller(time, nominal, folder),
             Self::ModelFile { feedback, file } => {
                 (feedback, 0, model_file(&folder.join(file), Domain::Discrete, time)?)
             }

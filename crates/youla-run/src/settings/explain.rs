@@ -218,7 +218,7 @@ mod tests {
     fn forms_come_from_the_types() {
         assert_eq!(
             forms::<ControllerSettings>(),
-            "difference_equation, transfer_function, state_space, pid, ideal_pid, model_file, observer"
+            "difference_equation, transfer_function, state_space, pid, ideal_pid, cascade, model_file, observer"
         );
     }
 }

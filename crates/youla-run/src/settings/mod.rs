@@ -1,5 +1,6 @@
 //! run.toml: everything that a run is asked to do, one struct for TOML, library and documentation.
 
+mod cascade;
 pub(crate) mod computed;
 mod controller;
 mod data;
@@ -11,6 +12,7 @@ mod options;
 mod pid;
 mod reference_path;
 
+pub use cascade::{Cascade, CascadeGains};
 pub use controller::{ControllerSettings, Feedback, Hold};
 pub use data::{DataFile, DataSettings};
 pub(crate) use disturbance::TACHO;

@@ -21,6 +21,7 @@ impl RunSettings {
     /// # Errors
     /// What the path lacks, in a sentence.
     pub(super) fn with_reference_path(mut self) -> Result<Self, String> {
+        self.state_cascade()?;
         let ControllerSettings::DifferenceEquation { feedback, numerator, denominator, delay, reference_numerator } =
             &mut self.controller
         else {
@@ -73,6 +74,29 @@ impl RunSettings {
         data.input_excitation = excitation;
         Ok(self)
     }
+
+    /// A cascade with a reference as the difference equation that it is.
+    fn state_cascade(&mut self) -> Result<(), String> {
+        let ControllerSettings::Cascade(cascade) = &self.controller else { return Ok(()) };
+        let (u, y, r) = (self.data.inputs.len(), self.data.outputs.len(), self.data.reference.len());
+        if (u, y) != (1, 1) || r > 1 {
+            return Err(format!(
+                "[controller.cascade] is from one position to one input, but [data] has {u} inputs, {y} outputs and {r} reference channels"
+            ));
+        }
+        if r == 0 {
+            return Ok(());
+        }
+        let ts = self.data.sample_time.filter(|ts| *ts > 0.0 && ts.is_finite()).ok_or(
+            "[data] has no sample_time, on which the path from the reference of [controller.cascade] depends: state it, \
+             in seconds, beside time_column",
+        )?;
+        if let Some(problem) = cascade.problem() {
+            return Err(problem);
+        }
+        self.controller = cascade.difference_equation(ts);
+        Ok(())
+    }
 }
 
 /// `(T + sign S) / R` without the roots at 1 that both share; `None` where R has one that is left.
@@ -114,14 +138,17 @@ mod tests {
     use youla::lti::Discrete;
     use youla::signal::{Channel, Record};
 
-    fn settings(keys: &str) -> crate::Result<RunSettings> {
-        let text = format!(
+    fn text_of(keys: &str) -> String {
+        format!(
             "name = \"rst\"\n[data]\nsample_time = 0.1\ninputs = [{{ name = \"u\" }}]\noutputs = [{{ name = \"y\" }}]\n\
              reference = [{{ name = \"r\" }}]\n[[data.estimation]]\nfile = \"log.csv\"\n\
              [nominal.transfer_function]\ndomain = \"discrete\"\nnumerator = [1.0]\ndenominator = [1.0, -0.9]\n\
              [controller.difference_equation]\nfeedback = \"negative\"\n{keys}"
-        );
-        RunSettings::parse(&text, Path::new("run.toml"))
+        )
+    }
+
+    fn settings(keys: &str) -> crate::Result<RunSettings> {
+        RunSettings::parse(&text_of(keys), Path::new("run.toml"))
     }
 
     /// `u = I(r - y) + P (b r - y)`: the integrator cancels, and the known signal is `P (b - 1) r`.
@@ -146,6 +173,26 @@ mod tests {
             chosen.controller,
             settings("numerator = [2.3, -2.0]\ndenominator = [1.0, -1.0]\n").unwrap().controller
         );
+    }
+
+    /// A cascade with integrators in both loops has a known signal that does not ramp; without a sample time its path is refused.
+    #[test]
+    fn a_cascade_is_a_difference_equation_with_a_path_of_the_reference() {
+        let keys = "discretisation = \"backward-euler\"\nposition = { kp = 8.0, ki = 1.0 }\nvelocity = { kp = 0.5, ki = 3.0 }\n\
+                    velocity_feedforward = 0.5\n";
+        let form = |text: &str| text.replace("difference_equation", "cascade");
+        let text = form(&text_of(keys));
+        let chosen = RunSettings::parse(&text, Path::new("run.toml")).unwrap();
+        assert!(matches!(chosen.controller, ControllerSettings::DifferenceEquation { .. }));
+        // T - S = Bv Ap (0.5 - 1) (1 - q), the denominator is Ap Av ts, Ap = Av = 1 - q: what is left is -0.5 Bv / ts.
+        let path = &chosen.data.computed["reference_path_1_1"];
+        let inside = path.strip_prefix("filter('r', [").and_then(|p| p.strip_suffix("])")).unwrap();
+        let numbers: Vec<f64> = inside.replace("], [", ", ").split(", ").map(|c| c.parse().unwrap()).collect();
+        let expected = [-0.4, 0.25, 0.0, 0.0, 0.1, 0.0];
+        assert!(numbers.iter().zip(expected).all(|(c, e)| (c - e).abs() < 1e-13), "{path}");
+        let without = text.replace("sample_time = 0.1", "time_column = \"t\"");
+        let error = RunSettings::parse(&without, Path::new("run.toml")).unwrap_err().to_string();
+        assert!(error.contains("sample_time") && error.contains("[controller.cascade]"), "{error}");
     }
 
     #[test]

@@ -1,18 +1,24 @@
-//! Nonlinear functions at the inputs: does a function of the input, or of the velocity that it causes, explain what the model
+//! What is neither linear nor constant: does a function of the input, of the velocity that it causes, or of time explain what the model
 //! leaves?
 //!
 //! ```text
-//! y - G u = G f theta + e,     f = u^3, u |u|, u^2, u beyond a limit, tanh(velocity / small)
+//! y - G u = G f theta + b beta + x G u delta + e,     f = u^3, u |u|, u^2, u beyond a limit, tanh(velocity / small)
 //! ```
-//! theta is estimated together with the parameters of the model, to which the linear part of f belongs.
+//! Dry friction is a function of the velocity at the input, backlash one at the output, b = tanh(velocity / small), and a drift of the gain
+//! has x from -1 to 1 over the records. theta, beta and delta are estimated together with the parameters of the model, to which the
+//! linear and constant parts belong.
 
-use super::limits::{BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LASTING};
+use super::limits::{
+    BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LARGEST_PLAY,
+    LASTING,
+};
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra};
 use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
+use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
 use crate::identify::likelihood::search::unstable::{self, with_slope_of_growth};
@@ -26,12 +32,16 @@ const OF_INPUT: [fn(f64) -> f64; 5] =
     [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
 /// Velocity of which friction changes its sign, in standard deviations.
 const SMALL_VELOCITY: f64 = 0.1;
-/// Functions for each input: friction first, so that what stands behind it is what friction does not explain.
-const FUNCTIONS: usize = OF_INPUT.len() + 1;
+/// Functions of the velocity for each input, first, so that what stands behind them is what they do not explain.
+const OF_VELOCITY: usize = 2;
+/// Functions for each input.
+const FUNCTIONS: usize = OF_VELOCITY + OF_INPUT.len();
+/// Place of backlash among the functions of the velocity, behind dry friction.
+const BACKLASH: usize = 1;
 
-/// Names of the functions of the input.
+/// Names of the functions.
 const NAMES: [&str; FUNCTIONS] =
-    ["dry friction", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations"];
+    ["dry friction", "backlash", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations"];
 
 /// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
 struct Shaped {
@@ -98,14 +108,23 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
     let mut planner = FftPlanner::new();
     let pairs = spectra.records.iter().zip(&clean);
-    let mut shaped: Vec<Shaped> =
-        pairs.map(|(lines, clean)| columns(spectra, solution, lines, clean, &mut planner)).collect();
+    let total: usize = spectra.records.iter().map(|lines| lines.samples).sum();
+    let mut first = 0;
+    let mut shaped: Vec<Shaped> = pairs
+        .map(|(lines, clean)| {
+            let time = |t: usize| 2.0 * (first + t) as f64 / total as f64 - 1.0;
+            let found = columns(spectra, solution, lines, (clean, &time), &mut planner);
+            first += lines.samples;
+            found
+        })
+        .collect();
     let sizes: Vec<f64> = (0..FUNCTIONS * spectra.inputs)
         .map(|f| shaped.iter().map(|s| s.sizes[f]).sum::<f64>() / shaped.len().max(1) as f64)
         .collect();
     let values: Vec<Vec<c64>> = shaped.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
     let chart = Chart::new(&found.point.model, found.feedthrough);
-    let count = FUNCTIONS * spectra.inputs;
+    let drift = FUNCTIONS * spectra.inputs;
+    let count = drift + 1;
     let extra = Extra { count, values: &values, quick: false };
     let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
     let rows = 0..factor.nrows();
@@ -115,8 +134,12 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
         let own: f64 = rows.clone().map(|i| factor[(i, f)].powi(2)).sum();
         if own > DISTINCT * lengths[f] { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
     };
-    let telling = (0..count).map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-    let (f, (c, significance)) = telling.unwrap_or((0, (0.0, 0.0)));
+    let telling = |backlash: bool| {
+        let these = (0..drift).filter(|f| (f / spectra.inputs == BACKLASH) == backlash);
+        let telling = these.map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
+        telling.unwrap_or((0, (0.0, 0.0)))
+    };
+    let (f, (c, significance)) = telling(false);
     let size = c * sizes[f];
     let nonlinear_part =
         (significance > BEYOND_CHANCE).then(|| NonlinearPart::new(spectra, &shaped, f % spectra.inputs, f, c));
@@ -126,15 +149,39 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
         true => of_size.noted(format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1)),
         false => of_size,
     };
-    // Functions of the input behind friction.
-    let behind: Vec<usize> =
-        rows.filter(|i| *i >= spectra.inputs && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]).collect();
+    let of_play = play(&found.point.model, telling(true).1, significance);
+    let (c, significance) = single(drift);
+    let question = "Change of the gain from the first sample to the last, over the gain (drift of the gain)";
+    let of_drift =
+        Evidence::new(question, 2.0 * c.abs(), LARGEST_CHANGE_OF_GAIN).beyond_chance(significance).reported();
+    // Functions of the input behind friction and backlash.
+    let behind: Vec<usize> = rows
+        .filter(|i| {
+            (OF_VELOCITY * spectra.inputs..drift).contains(i) && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]
+        })
+        .collect();
     let statistic: f64 = behind.iter().map(|i| factor[(*i, count)].powi(2)).sum();
     let moved = energy(spectra, &clean, &found.noise).max(TINY);
     let share = ((statistic - behind.len() as f64).max(0.0) / moved).sqrt();
     let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
     let significance = chi_square_deviations(statistic, behind.len() as f64);
-    (vec![of_size, Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance)], nonlinear_part)
+    let of_input = Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance);
+    (vec![of_size, of_input, of_play, of_drift], nonlinear_part)
+}
+
+/// Play by its coefficient, with its deviations beyond chance: friction that is more so moves the output where its velocity changes sign, too.
+fn play(model: &Model, (c, significance): (f64, f64), friction: f64) -> Evidence {
+    let question = "Play of an output where its velocity changes sign, over the output (backlash)";
+    if runs_away(model) {
+        let why = "the plant is unstable, and its motion without noise is not known";
+        return Evidence::untested(question, LARGEST_PLAY, why).reported();
+    }
+    // tanh goes from -1 to 1: the play is twice its coefficient.
+    let of_play = Evidence::new(question, 2.0 * c.abs(), LARGEST_PLAY).beyond_chance(significance).reported();
+    match significance > BEYOND_CHANCE.max(friction) {
+        true => of_play.noted("beyond chance, and more so than dry friction"),
+        false => of_play,
+    }
 }
 
 /// The triangle `[R r]` of further columns beside the parameters, and the squared lengths of these columns.
@@ -156,40 +203,62 @@ fn beside_parameters(spectra: &Spectra, solution: &Solution, chart: &Chart, extr
 /// Share of a function that must be left beside the parameters of the model: of an input with two values every function is linear.
 const DISTINCT: f64 = 1e-8;
 
+/// Growth of a pole from which the motion without noise is not known: what the model makes of u rests on later samples, and so on the noise
+/// that the feedback brings to them, over `1 / ln` of it, 200 samples. Chosen, not measured.
+const SLOW_GROWTH: f64 = 1.005;
+
+fn runs_away(model: &Model) -> bool {
+    model.poles().iter().any(|p| p.norm() > SLOW_GROWTH)
+}
+
 /// The functions of one record seen through the model, lines x p x functions.
 fn columns(
     spectra: &Spectra,
     solution: &Solution,
     lines: &Lines,
-    clean: &[c64],
+    (clean, time): (&[c64], &dyn Fn(usize) -> f64),
     planner: &mut FftPlanner<f64>,
 ) -> Shaped {
     let (m, p, half) = (spectra.inputs, spectra.outputs, lines.z.len());
-    let count = FUNCTIONS * m;
+    let (drift, count) = (FUNCTIONS * m, FUNCTIONS * m + 1);
     let model = &solution.chosen.found.point.model;
     let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
     let mut columns = vec![c64::ZERO; half * p * count];
-    let (mut sizes, mut plain) = (vec![0.0; count], vec![Vec::new(); count]);
+    let (mut sizes, mut plain) = (vec![0.0; drift], vec![Vec::new(); drift]);
+    // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
+    let moved = if model.poles().iter().any(|p| p.norm() > 1.0) { &lines.y } else { clean };
+    let root = (lines.samples as f64).sqrt();
+    for i in 0..p {
+        let (size, y) = in_time(lines, planner, |k| moved[k * p + i]);
+        let work = lines_of(planner, y.iter().enumerate().map(|(t, y)| time(t) * size * y / lines.samples as f64));
+        (0..half).for_each(|k| columns[(k * p + i) * count + drift] = work[k + 1]);
+    }
     for j in 0..m {
-        let u = in_time(lines, planner, |k| lines.u[k * m + j]);
+        let (_, u) = in_time(lines, planner, |k| lines.u[k * m + j]);
         // velocity of the output that this input moves most
         let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
         let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
-        // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
-        let moved = if model.poles().iter().any(|p| p.norm() > 1.0) { &lines.y } else { clean };
-        let velocity = in_time(lines, planner, |k| moved[k * p + seen] * (c64::ONE - lines.z[k].conj()));
+        let mut velocity_of =
+            |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen] * (c64::ONE - lines.z[k].conj())).1;
+        let (velocity, without_noise) = (velocity_of(moved), velocity_of(clean));
         for f in 0..FUNCTIONS {
-            let shaped = |t: usize| {
-                f.checked_sub(1).map_or_else(|| (velocity[t] / SMALL_VELOCITY).tanh(), |f| OF_INPUT[f](u[t]))
+            let of_input = f.checked_sub(OF_VELOCITY);
+            let base = match f {
+                BACKLASH => &without_noise,
+                _ if of_input.is_some() => &u,
+                _ => &velocity,
             };
-            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), if f > 0 { u[t] } else { velocity[t] })));
-            let root = (lines.samples as f64).sqrt();
-            let mut work: Vec<c64> = (0..lines.samples).map(|t| c64::new(shaped(t) / root, 0.0)).collect();
-            planner.plan_fft_forward(lines.samples).process(&mut work);
+            let shaped =
+                |t: usize| of_input.map_or_else(|| (base[t] / SMALL_VELOCITY).tanh(), |f| OF_INPUT[f](base[t]));
+            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), base[t])));
+            let work = lines_of(planner, (0..lines.samples).map(|t| shaped(t) / root));
             plain[f * m + j] = work[1..=half].to_vec();
             for k in 0..half {
-                for i in 0..p {
-                    columns[(k * p + i) * count + f * m + j] = responses[k][i * m + j] * work[k + 1];
+                let column = |i: usize| (k * p + i) * count + f * m + j;
+                match f {
+                    BACKLASH if runs_away(model) => {}
+                    BACKLASH => columns[column(seen)] = work[k + 1],
+                    _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * work[k + 1]),
                 }
             }
         }
@@ -207,8 +276,16 @@ fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     (square / count - (mean / count).powi(2) - (along / count).powi(2)).max(0.0).sqrt()
 }
 
-/// A signal in time from its lines, without its mean and of unit size.
-fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) -> c64) -> Vec<f64> {
+/// Lines of a signal, from the constant on.
+fn lines_of(planner: &mut FftPlanner<f64>, signal: impl ExactSizeIterator<Item = f64>) -> Vec<c64> {
+    let samples = signal.len();
+    let mut work: Vec<c64> = signal.map(|v| c64::new(v, 0.0)).collect();
+    planner.plan_fft_forward(samples).process(&mut work);
+    work
+}
+
+/// Size of a signal and the signal in time from its lines, without its mean and of unit size.
+fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) -> c64) -> (f64, Vec<f64>) {
     let samples = lines.samples;
     let mut work = vec![c64::ZERO; samples];
     for k in 0..lines.z.len() {
@@ -218,5 +295,5 @@ fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) ->
     }
     planner.plan_fft_inverse(samples).process(&mut work);
     let size = (work.iter().map(|v| v.re * v.re).sum::<f64>() / samples.max(1) as f64).sqrt().max(TINY);
-    work.iter().map(|v| v.re / size).collect()
+    (size, work.iter().map(|v| v.re / size).collect())
 }

@@ -184,19 +184,37 @@ fn a_model_of_neither_half_is_no_model() {
     assert!(test.outcome == Outcome::Failed && test.figure > 0.5, "{test}");
 }
 
-/// The clean loop with dry friction at the input of the plant, over the standard deviation of the excitation.
-fn with_friction(level: f64) -> Identified {
+/// What is neither linear nor constant in the clean loop.
+struct Fault {
+    /// Dry friction at the input of the plant, over the standard deviation of the excitation.
+    friction: f64,
+    /// Play at the output, whose size is about 0.5.
+    play: f64,
+    /// Change of the gain from the first sample to the last.
+    drift: f64,
+    noise: f64,
+}
+
+const NONE: Fault = Fault { friction: 0.0, play: 0.0, drift: 0.0, noise: 0.05 };
+
+fn with_friction(friction: f64) -> Identified {
+    with(&Fault { friction, ..NONE })
+}
+
+fn with(fault: &Fault) -> Identified {
     let (g, rng) = (plant(1.0), &mut ChaCha8Rng::seed_from_u64(2));
     let rows = CLEAN.samples;
     let mut normal = |size: f64| Mat::from_fn(rows, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
-    let (d, n) = (normal(1.0), normal(CLEAN.noise));
+    let (d, n) = (normal(1.0), normal(fault.noise));
     let (mut u, mut y) = (Mat::<f64>::zeros(rows, 1), Mat::<f64>::zeros(rows, 1));
-    let (mut x, mut before) = (Mat::<f64>::zeros(3, 1), 0.0);
+    let (mut x, mut before, mut gap) = (Mat::<f64>::zeros(3, 1), 0.0, 0.0_f64);
     for k in 0..rows {
         let moved = (g.c() * &x)[(0, 0)];
-        y[(k, 0)] = moved + n[(k, 0)];
+        gap = gap.clamp(moved - 0.5 * fault.play, moved + 0.5 * fault.play);
+        y[(k, 0)] = gap + n[(k, 0)];
         u[(k, 0)] = -0.8 * y[(k, 0)] + d[(k, 0)];
-        let acts = u[(k, 0)] - level * ((moved - before) / 0.005).tanh();
+        let gain = 1.0 + fault.drift * (k as f64 / rows as f64 - 0.5);
+        let acts = gain * u[(k, 0)] - fault.friction * ((moved - before) / 0.005).tanh();
         x = g.a() * &x + g.b() * acts;
         before = moved;
     }
@@ -217,4 +235,26 @@ fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
     let [of_none, of_little] = [&none, &little].map(distortion);
     assert!(of_none == 0.0 && of_little > 0.005, "{of_none} {of_little}");
     assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
+}
+
+/// Play of 0.02 at an output of size 0.5 is named with its size and is not dry friction; the clean loop has none.
+#[test]
+fn play_at_the_output_is_named() {
+    let [clean, loose] = [0.0, 0.02].map(|play| with(&Fault { play, noise: 0.005, ..NONE }));
+    let play = |found: &Identified| outcome(found, "(backlash)").clone();
+    assert!(play(&clean).note.is_empty() && play(&clean).figure < 0.002, "{}", play(&clean));
+    assert!(play(&loose).note.contains("beyond chance") && play(&loose).figure > 0.02, "{}", play(&loose));
+    assert!(!play(&loose).required && loose.trusted(), "{:?}", loose.reasons());
+    let friction = outcome(&loose, "(nonlinearity)");
+    assert!(friction.figure < 0.01, "{friction}");
+}
+
+/// A gain that rises by 6 % is named within a tenth of its size; that of the clean loop is chance.
+#[test]
+fn a_gain_that_drifts_is_named_with_its_size() {
+    let [clean, drifts] =
+        [0.0, 0.06].map(|drift| outcome(&with(&Fault { drift, ..NONE }), "(drift of the gain)").clone());
+    assert!(clean.significance.unwrap() < 3.0 && clean.outcome == Outcome::Passed, "{clean}");
+    assert!(drifts.outcome == Outcome::Failed && !drifts.required, "{drifts}");
+    assert!((drifts.figure / 0.06 - 1.0).abs() < 0.1, "{drifts}");
 }

@@ -32,16 +32,15 @@ const OF_INPUT: [fn(f64) -> f64; 5] =
     [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
 /// Velocity of which friction changes its sign, in standard deviations.
 const SMALL_VELOCITY: f64 = 0.1;
-/// Functions of the velocity for each input, first, so that what stands behind them is what they do not explain.
-const OF_VELOCITY: usize = 2;
+/// Place of backlash among the functions for each input: friction first, so that what stands behind it is what friction does not explain,
+/// and backlash last.
+const BACKLASH: usize = 1 + OF_INPUT.len();
 /// Functions for each input.
-const FUNCTIONS: usize = OF_VELOCITY + OF_INPUT.len();
-/// Place of backlash among the functions of the velocity, behind dry friction.
-const BACKLASH: usize = 1;
+const FUNCTIONS: usize = BACKLASH + 1;
 
 /// Names of the functions.
 const NAMES: [&str; FUNCTIONS] =
-    ["dry friction", "backlash", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations"];
+    ["dry friction", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations", "backlash"];
 
 /// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
 struct Shaped {
@@ -154,10 +153,10 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
     let question = "Change of the gain from the first sample to the last, over the gain (drift of the gain)";
     let of_drift =
         Evidence::new(question, 2.0 * c.abs(), LARGEST_CHANGE_OF_GAIN).beyond_chance(significance).reported();
-    // Functions of the input behind friction and backlash.
+    // Functions of the input behind friction.
     let behind: Vec<usize> = rows
         .filter(|i| {
-            (OF_VELOCITY * spectra.inputs..drift).contains(i) && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]
+            (spectra.inputs..BACKLASH * spectra.inputs).contains(i) && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]
         })
         .collect();
     let statistic: f64 = behind.iter().map(|i| factor[(*i, count)].powi(2)).sum();
@@ -242,21 +241,21 @@ fn columns(
             |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen] * (c64::ONE - lines.z[k].conj())).1;
         let (velocity, without_noise) = (velocity_of(moved), velocity_of(clean));
         for f in 0..FUNCTIONS {
-            let of_input = f.checked_sub(OF_VELOCITY);
             let base = match f {
+                0 => &velocity,
                 BACKLASH => &without_noise,
-                _ if of_input.is_some() => &u,
-                _ => &velocity,
+                _ => &u,
             };
-            let shaped =
-                |t: usize| of_input.map_or_else(|| (base[t] / SMALL_VELOCITY).tanh(), |f| OF_INPUT[f](base[t]));
+            let shaped = |t: usize| match f {
+                0 | BACKLASH => (base[t] / SMALL_VELOCITY).tanh(),
+                _ => OF_INPUT[f - 1](base[t]),
+            };
             sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), base[t])));
             let work = lines_of(planner, (0..lines.samples).map(|t| shaped(t) / root));
             plain[f * m + j] = work[1..=half].to_vec();
             for k in 0..half {
                 let column = |i: usize| (k * p + i) * count + f * m + j;
                 match f {
-                    BACKLASH if runs_away(model) => {}
                     BACKLASH => columns[column(seen)] = work[k + 1],
                     _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * work[k + 1]),
                 }

@@ -9,6 +9,8 @@ const FORMS = {
     fields: [["kp", "kp", "number"], ["ki", "ki", "number?", "1/s"], ["kd", "kd", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   ideal_pid: { name: "PID, ideal: kp (1 + 1/(ti s) + td s/(1 + tf s))", start: { discretisation: "backward-euler" },
     fields: [["kp", "kp", "number"], ["ti", "ti", "number?", "s"], ["td", "td", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
+  cascade: { name: "Cascade: velocity loop inside a position loop", start: { discretisation: "backward-euler", position: {}, velocity: {} },
+    fields: [["position.kp", "Position kp", "number", "1/s"], ["velocity.kp", "Velocity kp", "number"], ["velocity.ki", "Velocity ki", "number?", "1/s"], ["velocity_filter", "Filter of the velocity", "number?", "s"], ["velocity_feedforward", "Velocity feedforward", "number?"], ["acceleration_feedforward", "Acceleration feedforward", "number?"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   difference_equation: { name: "Difference equation in z⁻¹", start: { numerator: [1], denominator: [1] },
     fields: [["numerator", "Numerator, ascending powers of z⁻¹", "list"], ["denominator", "Denominator", "list"], ["delay", "Further delay", "count", "samples"]] },
   transfer_function: { name: "Transfer function in s or z", start: { domain: "continuous", hold: "tustin", numerator: [1], denominator: [1] },
@@ -30,16 +32,18 @@ const CHOICES = /** @type {Record<string, [string, string][]>} */ ({
   domain: [["continuous", "s"], ["discrete", "z"]], hold: [["tustin", "Tustin"], ["zoh", "zero-order hold"]],
 });
 
-/** Fields of a form. @param {string} form @param {any} values @param {(name: string, value: any) => void} changed @param {typeof FORMS} forms */
-function formFields(form, values, changed, forms = FORMS) {
-  return forms[form].fields.filter(([name]) => name !== "hold" || values.domain === "continuous").map(([name, label, kind, unit]) => {
+/** Fields of a form; a name with a point is that of a key in a table of its own. @param {string} form @param {any} of @param {(name: string, value: any) => void} changes @param {typeof FORMS} forms */
+function formFields(form, of, changes, forms = FORMS) {
+  return forms[form].fields.filter(([name]) => name !== "hold" || of.domain === "continuous").map(([path, label, kind, unit]) => {
+    const [table, name] = path.includes(".") ? path.split(".") : ["", path], values = table ? of[table] ?? {} : of;
+    const changed = (/** @type {string} */ key, /** @type {any} */ value) => table ? changes(table, { ...values, [key]: value }) : changes(key, value);
     if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
     if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, name, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
     const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;
       try { read = kind === "json" || input.value.includes("[") ? JSON.parse(input.value) : numbersOf(input.value); } catch { read = null; }
-      input.setAttribute("aria-invalid", String(read == null));
+      complain(input, read == null && (kind === "json" ? "A matrix by rows, such as [[1, 0], [0, 1]]" : "Numbers with commas between them, such as 1, -0.5"));
       if (read != null) changed(name, read);
     });
     return element("label", { class: "field" }, element("span", {}, label), input);

@@ -17,12 +17,19 @@ function numbersOf(text) {
 /** A heading without the unit in brackets behind it. @param {string} heading */
 const withoutUnit = heading => heading.replace(/\s*[[(][^\])]*[\])]\s*$/, "");
 
+/** Says beside a field what it takes; nothing where it is right. @param {HTMLInputElement} input @param {string | false} what */
+function complain(input, what) {
+  input.setAttribute("aria-invalid", String(!!what));
+  input.setCustomValidity(what || "");
+  if (what) input.reportValidity();
+}
+
 /** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, name?: string }} of */
 function numberField({ label, value, unit, changed, optional, name }) {
   const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), "data-name": name, autocomplete: "off" });
   input.addEventListener("change", () => {
     const empty = input.value.trim() === "", read = numberOf(input.value), wrong = read == null && !(empty && optional);
-    input.setAttribute("aria-invalid", String(wrong));
+    complain(input, wrong && "A number, such as 0.5 or 2e-3");
     if (!wrong) changed(read);
   });
   return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);

@@ -134,7 +134,7 @@ const signals = (() => {
     const line = f => element("li", {}, element("span", { class: `status ${{ defect: "bad", caution: "caution" }[f.severity] ?? ""}`, "aria-hidden": "true" }, { defect: "!", caution: "!" }[f.severity] ?? "i"), element("span", {}, `${f.severity[0].toUpperCase()}${f.severity.slice(1)}: ${f.sentence}`));
     const serious = found.filter(f => f.severity !== "note"), notes = found.filter(f => f.severity === "note");
     listed.replaceChildren(element("ul", { class: "notes plain" }, ...(serious.length ? serious.map(line) : [element("li", {}, settings.table.data.inputs.length && !controller?.sentence.includes("feedback") ? "The check found no defect." : "")])),
-      ...(notes.length ? [element("details", {}, element("summary", {}, `${notes.length} notes`), element("ul", { class: "notes plain" }, ...notes.map(line)))] : []));
+      ...(notes.length ? [element("details", { open: listed.querySelector("details")?.open ? "" : null }, element("summary", {}, `${notes.length} notes`), element("ul", { class: "notes plain" }, ...notes.map(line)))] : []));
     saidOfController.textContent = controller ? `${controller.sentence}.` : "";
   }
 

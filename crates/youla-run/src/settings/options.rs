@@ -53,7 +53,8 @@ pub struct FrequencySettings {
     /// record where that is less.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window: Option<usize>,
-    /// Lowest frequency of the models' curves, Hz; a 300th of the Nyquist frequency when absent.
+    /// Lowest frequency of the models' curves, Hz; when absent a 300th of the Nyquist frequency, or less where the recommended model is
+    /// valid below it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub from_hz: Option<f64>,
 }

@@ -105,7 +105,8 @@ pub fn identify(
         return Err(Error::NoModel(NoModel::new(reasons, asked, records.time)));
     }
     let models: Vec<_> = declared.nominal.iter().chain(identified).collect();
-    let hz = grid(&settings.frequency_response, &models, records.time)?;
+    let valid = recommended.as_ref().ok().and_then(|model| Some(model.bands.first()?[0]));
+    let hz = grid(&settings.frequency_response, &models, records.time, valid)?;
     // (26), the loop certificate and the response that rests on no model.
     let ((indirect, lines), validation) = clock.run(Stage::Validate, || {
         let indirect = match &records.measured {

@@ -89,9 +89,8 @@ pub(crate) fn check_grid(settings: &FrequencySettings, time: Discrete) -> Result
     }
 }
 
-/// Frequencies of the logarithmic grid: 160 to a decade over two decades and a half, below the width of a line in a figure (chosen, not
-/// measured).
-const POINTS: usize = 400;
+/// Frequencies of the logarithmic grid to a decade: below the width of a line in a figure (chosen, not measured).
+const PER_DECADE: f64 = 160.0;
 
 /// Modes with less damping have frequencies of their own.
 /// A resonance with more damping is wider than 20 % of its frequency, several points of the grid. Chosen, not measured.
@@ -101,16 +100,22 @@ const LIGHT: f64 = 0.1;
 /// From -15 to 15 degrees the response and its chords differ by less than 1 % of the peak, `1 - cos(7.5 degrees)`.
 const AROUND_A_PEAK: [f64; 13] = [-80.0, -70.0, -58.0, -45.0, -30.0, -15.0, 0.0, 15.0, 30.0, 45.0, 58.0, 70.0, 80.0];
 
-/// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist) up to just
-/// below Nyquist, and around each lightly damped mode of the models, at `f (1 + zeta tan(angle))`:
+/// Frequencies in Hz, rising: logarithmic from the lowest one asked for (or two decades and a half below Nyquist, or the lowest `valid`
+/// frequency of the recommended model) up to just below Nyquist, and around each lightly damped mode of the models, at `f (1 + zeta tan(angle))`:
 /// between the points of the logarithmic grid a peak would be cut off.
 ///
 /// # Errors
 /// [`youla::Error::NoConvergence`] of the eigenvalues.
-pub(crate) fn grid(settings: &FrequencySettings, models: &[&StateSpace<Discrete>], time: Discrete) -> Result<Vec<f64>> {
+pub(crate) fn grid(
+    settings: &FrequencySettings,
+    models: &[&StateSpace<Discrete>],
+    time: Discrete,
+    valid: Option<f64>,
+) -> Result<Vec<f64>> {
     let nyquist = 0.5 / time.ts();
-    let (from, to) = (settings.from_hz.unwrap_or(nyquist / 300.0), HIGHEST * nyquist);
-    let last = POINTS - 1;
+    let lowest = valid.unwrap_or(f64::INFINITY).min(nyquist / 300.0);
+    let (from, to) = (settings.from_hz.unwrap_or(lowest), HIGHEST * nyquist);
+    let last = (PER_DECADE * (to / from).log10()).ceil() as usize;
     let mut hz: Vec<f64> = (0..=last).map(|k| from * (to / from).powf(k as f64 / last as f64)).collect();
     for model in models {
         for mode in model.modes()?.into_iter().filter(|m| m.pole.im != 0.0 && m.zeta.abs() < LIGHT) {

@@ -68,9 +68,12 @@ pub(crate) const LASTING: f64 = 0.25;
 /// Largest share of the output that a function of the inputs explains behind friction: a command logged before it is cut at 1.2 deviations
 /// leaves 0.02 and more, a measured pendulum 0.008.
 pub(crate) const LARGEST_OF_INPUT: f64 = 0.015;
-/// Play of an output over its size from which backlash is named as large. Chosen: a tenth of what a band of validity allows.
+/// Play of an output over its size from which backlash is named as large. Chosen: a tenth of what a band of validity allows. A note says where
+/// it is beyond chance and more so than friction: in all of 10 loops with play of 0.4 to 1 %, in none of 10 with friction, in 1 of 138 others
+/// (a log that was described wrongly).
 pub(crate) const LARGEST_PLAY: f64 = 0.01;
-/// Change of the gain over the records from which a drift is named as large. Chosen: a fifth of what a band of validity allows.
+/// Change of the gain over the records from which a drift is named as large. Chosen: a fifth of what a band of validity allows. Of 10 loops
+/// with a drift of 3.3 % all are named, with 3.2 to 3.5 %; none of 148 others.
 pub(crate) const LARGEST_CHANGE_OF_GAIN: f64 = 0.02;
 /// Largest difference of the models from parts of the records over the response, averaged over a third of an octave, where the feedback does
 /// not suppress it. Measured drives and pendulums have up to 0.31, a resonance that moved by 20 % 0.79 and more.

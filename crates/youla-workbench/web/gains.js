@@ -3,8 +3,7 @@
 const gains = (() => {
   const place = /** @type {HTMLElement} */ (document.getElementById("gain-fields")), said = /** @type {HTMLElement} */ (document.getElementById("gain-verdict")), host = /** @type {HTMLElement} */ (document.getElementById("gain-plots"));
   let run = "", asked = false, again = false, shape = "";
-  /** @type {any} */
-  let edited = null, ran = null, before = null, plots = {};
+  let /** @type {any} */ edited = null, /** @type {any} */ ran = null, /** @type {any} */ before = null, /** @type {any} */ plots = {};
 
   /** @param {string} shown */
   async function show(shown) {

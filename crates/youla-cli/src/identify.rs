@@ -39,6 +39,9 @@ pub(crate) struct IdentifyArgs {
     /// No controller ran.
     #[arg(long, requires = "input")]
     open_loop: bool,
+    /// Time for the search of the model; then the best one found is kept, and the result says that the search was ended.
+    #[arg(long, value_name = "SECONDS")]
+    time_limit: Option<u32>,
     #[command(flatten)]
     pub(crate) output_folder: OutputFolder,
 }
@@ -46,6 +49,12 @@ pub(crate) struct IdentifyArgs {
 impl IdentifyArgs {
     /// The settings, and the folder to which their paths are relative.
     pub(crate) fn settings(&self) -> Result<(RunSettings, PathBuf), Failure> {
+        let (mut settings, folder) = self.stated()?;
+        settings.recommended.time_limit = self.time_limit.or(settings.recommended.time_limit);
+        Ok((settings, folder))
+    }
+
+    fn stated(&self) -> Result<(RunSettings, PathBuf), Failure> {
         if !self.log.input.is_empty() {
             return Ok((self.of_log()?, PathBuf::new()));
         }

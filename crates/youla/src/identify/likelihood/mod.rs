@@ -52,6 +52,7 @@ use super::verdict::{self, Judged, Judgement, Parts, Witness};
 use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
+use choose::deadline::Deadline;
 use choose::lines::{self, WithoutLines};
 use choose::problem::Problem;
 use choose::unseen::{WithoutUnseen, without_unseen};
@@ -125,6 +126,7 @@ pub fn recommend(
             recommended.evidence.push(unseen.evidence(time.ts()));
         }
     }
+    recommended.evidence.extend(all.deadline.as_ref().and_then(Deadline::evidence));
     Ok(Recommendation { candidates, ..recommended })
 }
 
@@ -291,5 +293,6 @@ fn problem<'a>(
         largest_order: options.largest_order,
         masked: Vec::new(),
         feedback: stated.and_then(|known| known.feedback).filter(|k| !k.is_zero()),
+        deadline: options.time_limit.map(Deadline::after),
     })
 }

@@ -18,10 +18,14 @@ pub struct LikelihoodOptions {
     pub feedthrough: Option<bool>,
     /// Largest order that is tried.
     pub largest_order: usize,
+    /// Seconds after which no further order or dead time is tried; the best model until then is kept, and a line of the result says that the search
+    /// was ended. A search that has begun ends first. The result depends on the speed of the machine. No limit when absent.
+    #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
+    pub time_limit: Option<u32>,
 }
 
 impl Default for LikelihoodOptions {
     fn default() -> Self {
-        LikelihoodOptions { order: None, dead_time: None, feedthrough: None, largest_order: 100 }
+        LikelihoodOptions { order: None, dead_time: None, feedthrough: None, largest_order: 100, time_limit: None }
     }
 }

@@ -237,6 +237,16 @@ fn dry_friction_widens_the_region_and_half_of_the_torque_is_refused() {
     assert_eq!(outcome(&much, "(nonlinearity)").outcome, Outcome::Failed);
 }
 
+/// Without time for a second round the best start is kept, and a line says so; with time enough nothing is said and nothing changes.
+#[test]
+fn a_time_limit_keeps_what_is_found() {
+    let [none, all, free] = [Some(0), Some(600), None]
+        .map(|time_limit| CLEAN.identified(1.0, &LikelihoodOptions { time_limit, ..Default::default() }));
+    assert_eq!(outcome(&none, "(time limit").outcome, Outcome::Failed);
+    assert!(none.model.candidates.len() < free.model.candidates.len(), "{}", none.model.candidates.len());
+    assert!(all.model.evidence == free.model.evidence);
+}
+
 /// Play of 0.02 at an output of size 0.5 is named with its size and is not dry friction; the clean loop has none.
 #[test]
 fn play_at_the_output_is_named() {

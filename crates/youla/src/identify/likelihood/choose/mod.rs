@@ -1,6 +1,7 @@
 //! The choice of order, dead time and direct path: starts from long regressions, then models one step away.
 
 pub(crate) mod dead_time;
+pub(crate) mod deadline;
 pub(crate) mod grow;
 pub(crate) mod lines;
 pub(crate) mod neighbours;

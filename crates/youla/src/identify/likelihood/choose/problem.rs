@@ -1,5 +1,6 @@
 //! The records with what is fixed about the model, and the searches that are made on them.
 
+use super::deadline::Deadline;
 use crate::control::{closed_loop, with_input_port};
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::spectra::{Mask, Sizes, Spectra};
@@ -123,6 +124,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) masked: Vec<Mask>,
     /// The feedback that ran, where it explains the log: what it does not stabilise is not the plant.
     pub(crate) feedback: Option<&'a StateSpace<Discrete>>,
+    /// When the search for a better model ends.
+    pub(crate) deadline: Option<Deadline>,
 }
 
 impl Problem<'_> {
@@ -227,6 +230,10 @@ impl Problem<'_> {
     /// Searches all tasks side by side and notes them in their order.
     pub(crate) fn run(&self, tasks: Vec<Task>, aim: f64, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let searched = |task: Task| {
+            // What begins a search is always tried.
+            if aim.is_finite() && self.out_of_time() {
+                return None;
+            }
             let options = SearchOptions { aim, ..self.options(25, 0.3, &task.delays) };
             let found = search(&task.spectra, task.start, &options)?;
             Some(self.choice(found, task.spectra.samples(), task.delays, task.origin))
@@ -236,6 +243,11 @@ impl Problem<'_> {
         let found: Vec<Choice> = found.into_iter().flatten().collect();
         table.extend(found.iter().map(|choice| self.noted(choice)));
         found
+    }
+
+    /// Whether nothing better is tried any more.
+    pub(super) fn out_of_time(&self) -> bool {
+        self.deadline.as_ref().is_some_and(Deadline::ends)
     }
 
     /// A choice as it is listed.

@@ -111,6 +111,9 @@ impl Problem<'_> {
     fn improved(&self, tried: &mut Vec<Choice>, rounds: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
         let mut at = best(tried)?.clone();
         for _ in 0..rounds {
+            if self.out_of_time() {
+                break;
+            }
             let tasks = self.neighbours(&at);
             tried.extend(self.run(tasks, at.criterion, table));
             let before = std::mem::replace(&mut at, best(tried)?.clone());

@@ -53,6 +53,9 @@ impl Problem<'_> {
     fn settled(&self, tried: &mut Vec<Choice>, table: &mut Vec<Candidate>) -> Option<Choice> {
         let mut at = best(tried)?.clone();
         for _ in 0..ROUNDS {
+            if self.out_of_time() {
+                break;
+            }
             let spectra = Arc::new(self.spectra(&at.delays));
             let mut tasks = Vec::new();
             if self.order.is_none() {

@@ -10,8 +10,7 @@
 //! Ap Av Aw u = T r - S y,     S = Bv (Bp Aw + Bw Ap),     T = Bv Aw (Bp + kv D Ap) + ka D^2 Ap Av Aw
 //! ```
 
-use super::controller::{ControllerSettings, Feedback};
-use super::models::Polynomials;
+use super::feedback::Feedback;
 use super::pid::{Discretisation, Pid};
 use serde::{Deserialize, Serialize};
 use youla_loop::redesign::structured::PidGains;
@@ -82,17 +81,9 @@ impl Cascade {
         self.parts().iter().find_map(Pid::problem)
     }
 
-    /// The path from the position alone.
-    pub(super) fn feedback_path(&self, ts: f64) -> ControllerSettings {
-        let mut all = self.difference_equation(ts);
-        if let ControllerSettings::DifferenceEquation { reference_numerator, .. } = &mut all {
-            *reference_numerator = None;
-        }
-        all
-    }
-
-    /// The same as a difference equation from position and reference to the command, at a sample time in seconds.
-    pub(super) fn difference_equation(&self, ts: f64) -> ControllerSettings {
+    /// Denominator, path from the position and path from the reference of the difference equation of the cascade at a sample time in seconds,
+    /// ascending powers of `z^-1`.
+    pub(super) fn polynomials(&self, ts: f64) -> [Vec<f64>; 3] {
         let [(bp, ap), (bv, av), (bw, aw)] = self.parts().map(|Pid { discretisation, kp, ki, kd, filter, .. }| {
             quotient(&PidGains { discretisation, kp, ki, kd, derivative_filter: filter }, ts)
         });
@@ -105,13 +96,7 @@ impl Cascade {
         let from_reference = sum(&product(&product(&bv, &aw), &asked), &product(&acceleration, &denominator));
         // With positive feedback the whole law has the other sign: u = K (y - r) and what is beside it.
         let sign = if self.feedback == Feedback::Negative { 1.0 } else { -1.0 };
-        ControllerSettings::DifferenceEquation {
-            feedback: self.feedback,
-            numerator: Polynomials::Single(from_output),
-            denominator: Polynomials::Single(denominator),
-            delay: self.delay,
-            reference_numerator: Some(Polynomials::Single(scaled(sign, &from_reference))),
-        }
+        [denominator, from_output, scaled(sign, &from_reference)]
     }
 }
 
@@ -156,13 +141,7 @@ mod tests {
             acceleration_feedforward: 0.05,
             delay: 0,
         };
-        let ControllerSettings::DifferenceEquation { numerator, denominator, reference_numerator, .. } =
-            cascade.difference_equation(ts)
-        else {
-            panic!("no difference equation");
-        };
-        let of = |p: &Polynomials| p.spread(1, 1)[0][0].clone();
-        let (s, r, t) = (of(&numerator), of(&denominator), of(&reference_numerator.unwrap()));
+        let [r, s, t] = cascade.polynomials(ts);
         let (mut u, mut y, mut reference) = (Vec::new(), Vec::new(), Vec::new());
         let (mut filtered, mut integral) = (0.0, 0.0);
         for k in 0..200 {

@@ -2,6 +2,7 @@
 
 use super::cascade::Cascade;
 use super::explain::forms;
+use super::feedback::Feedback;
 use super::models::{Domain, Polynomials, matrix, model_file, sized};
 use super::pid::{IdealPid, ParallelPid};
 use super::refuse;
@@ -13,27 +14,6 @@ use youla::Mat;
 use youla::control::RunningController;
 use youla::linalg::{check_shape, eye};
 use youla::lti::{Continuous, Discrete, StateSpace};
-
-/// Which sign the controller was written down with; never guessed.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Feedback {
-    /// `u = K (r - y)`; for observer gains `u = -F x` and `x+ = A x + B u + L (y - C x - D u)`, as MATLAB's lqr and place
-    /// return them.
-    Negative,
-    /// `u = K (y - r)`; for observer gains `u = F x` and `x+ = A x + B u + L (C x + D u - y)`.
-    Positive,
-}
-
-impl Feedback {
-    /// The factor that turns a gain written in this convention into one of positive feedback.
-    fn sign(self) -> f64 {
-        match self {
-            Feedback::Negative => -1.0,
-            Feedback::Positive => 1.0,
-        }
-    }
-}
 
 /// How a controller in s was brought to the sample time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -232,7 +212,7 @@ impl ControllerSettings {
             }
             Self::Pid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
             Self::IdealPid(pid) => (&pid.feedback, pid.delay, pid.parts().system(time)?),
-            Self::Cascade(cascade) => return cascade.feedback_path(time.ts()).controller(time, nominal, folder),
+            Self::Cascade(cascade) => return cascade_path(cascade, time.ts(), false).controller(time, nominal, folder),
             Self::ModelFile { feedback, file } => {
                 (feedback, 0, model_file(&folder.join(file), Domain::Discrete, time)?)
             }
@@ -251,6 +231,18 @@ impl ControllerSettings {
         };
         let system = if *feedback == Feedback::Negative { system.negated() } else { system };
         Ok(RunningController::new(delayed(system, delay)?))
+    }
+}
+
+/// A cascade as the difference equation that it is, with or without the path from the reference.
+pub(super) fn cascade_path(cascade: &Cascade, ts: f64, with_reference: bool) -> ControllerSettings {
+    let [denominator, numerator, reference] = cascade.polynomials(ts).map(Polynomials::Single);
+    ControllerSettings::DifferenceEquation {
+        feedback: cascade.feedback,
+        numerator,
+        denominator,
+        delay: cascade.delay,
+        reference_numerator: with_reference.then_some(reference),
     }
 }
 

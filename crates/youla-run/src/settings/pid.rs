@@ -1,6 +1,6 @@
 //! PID controllers of run.toml, in parallel and in ideal form; how they are computed is in [`youla_loop::redesign::structured`].
 
-use super::controller::Feedback;
+use super::feedback::Feedback;
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use youla::lti::{Discrete, StateSpace};

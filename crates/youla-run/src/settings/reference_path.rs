@@ -7,7 +7,8 @@
 //! share is left out, so that an integrator does not ramp.
 
 use super::RunSettings;
-use super::controller::{ControllerSettings, Feedback};
+use super::controller::{ControllerSettings, cascade_path};
+use super::feedback::Feedback;
 use youla_io::ChannelSpec;
 
 /// Sum of coefficients over the sum of their magnitudes that is zero but for rounding.
@@ -94,7 +95,7 @@ impl RunSettings {
         if let Some(problem) = cascade.problem() {
             return Err(problem);
         }
-        self.controller = cascade.difference_equation(ts);
+        self.controller = cascade_path(cascade, ts, true);
         Ok(())
     }
 }

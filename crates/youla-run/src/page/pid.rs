@@ -56,7 +56,10 @@ fn key(step: &PlannedStep) -> &'static str {
 }
 
 fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
-    let band = |[low, middle, high]: Band| format!("{} ({} to {})", shown(middle), shown(low), shown(high));
+    let band = |[low, middle, high]: Band| match [shown(low), shown(high)] {
+        [from, to] if from == to => shown(middle),
+        [from, to] => format!("{} ({from} to {to})", shown(middle)),
+    };
     let row = |f: &FigureBand| {
         let name = format!("{} {}", f.name.replace('_', " "), f.unit).trim_end().to_owned();
         vec![name, f.limit.map_or("–".into(), digits), band(f.running), band(f.new)]

@@ -25,7 +25,7 @@ use crate::stages::validate::{Candidates, verify};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::ErrorKind;
-use youla::control::RunningController;
+use youla::control::{RunningController, closed_loop, with_input_port};
 use youla::identify::{HansenModel, hansen};
 use youla::lti::{Discrete, StateSpace};
 
@@ -104,7 +104,12 @@ pub fn identify(
         let reasons = outcomes.into_iter().filter_map(|(name, reason)| Some((name, reason?))).collect();
         return Err(Error::NoModel(NoModel::new(reasons, asked, records.time)));
     }
-    let models: Vec<_> = declared.nominal.iter().chain(identified).collect();
+    // The loop has resonances of its own, at the peaks of the sensitivity.
+    let looped = recommended
+        .as_ref()
+        .ok()
+        .and_then(|model| closed_loop(&model.plant, &with_input_port(declared.controller()).ok()?).ok());
+    let models: Vec<_> = declared.nominal.iter().chain(identified).chain(&looped).collect();
     let valid = recommended.as_ref().ok().and_then(|model| Some(model.bands.first()?[0]));
     let hz = grid(&settings.frequency_response, &models, records.time, valid)?;
     // (26), the loop certificate and the response that rests on no model.

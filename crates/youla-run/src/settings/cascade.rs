@@ -84,9 +84,7 @@ impl Cascade {
     /// Denominator, path from the position and path from the reference of the difference equation of the cascade at a sample time in seconds,
     /// ascending powers of `z^-1`.
     pub(super) fn polynomials(&self, ts: f64) -> [Vec<f64>; 3] {
-        let [(bp, ap), (bv, av), (bw, aw)] = self.parts().map(|Pid { discretisation, kp, ki, kd, filter, .. }| {
-            quotient(&PidGains { discretisation, kp, ki, kd, derivative_filter: filter }, ts)
-        });
+        let [(bp, ap), (bv, av), (bw, aw)] = self.parts().map(|pid| quotient(&pid.gains(), ts));
         let slope = [1.0 / ts, -1.0 / ts];
         let scaled = |gain: f64, c: &[f64]| c.iter().map(|c| gain * c).collect::<Vec<_>>();
         let denominator = product(&product(&ap, &av), &aw);

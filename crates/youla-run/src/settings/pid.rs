@@ -108,7 +108,11 @@ impl Pid {
 
     /// From the error to the command, with a state for each part that is there.
     pub(super) fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
+        Ok(self.gains().system(time)?)
+    }
+
+    pub(super) fn gains(&self) -> PidGains {
         let Pid { discretisation, kp, ki, kd, filter, .. } = *self;
-        Ok(PidGains { discretisation, kp, ki, kd, derivative_filter: filter }.system(time)?)
+        PidGains { discretisation, kp, ki, kd, derivative_filter: filter }
     }
 }

@@ -225,7 +225,8 @@ fn columns(
     let mut columns = vec![c64::ZERO; half * p * count];
     let (mut sizes, mut plain) = (vec![0.0; drift], vec![Vec::new(); drift]);
     // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
-    let moved = if model.poles().iter().any(|p| p.norm() > 1.0) { &lines.y } else { clean };
+    let grows = model.poles().iter().any(|p| p.norm() > 1.0);
+    let moved = if grows { &lines.y } else { clean };
     let root = (lines.samples as f64).sqrt();
     for i in 0..p {
         let (size, y) = in_time(lines, planner, |k| moved[k * p + i]);
@@ -239,10 +240,12 @@ fn columns(
         let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
         let mut velocity_of =
             |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen] * (c64::ONE - lines.z[k].conj())).1;
-        let (velocity, without_noise) = (velocity_of(moved), velocity_of(clean));
+        let without_noise = velocity_of(clean);
+        let measured = grows.then(|| velocity_of(moved));
+        let velocity = measured.as_ref().unwrap_or(&without_noise);
         for f in 0..FUNCTIONS {
             let base = match f {
-                0 => &velocity,
+                0 => velocity,
                 BACKLASH => &without_noise,
                 _ => &u,
             };

@@ -53,7 +53,7 @@ use crate::linalg::{check_finite, check_shape};
 use crate::lti::Discrete;
 use crate::{Error, MatRef, Result};
 use choose::deadline::Deadline;
-use choose::lines::{self, WithoutLines};
+use choose::lines::{self, Cleaned};
 use choose::problem::Problem;
 use choose::unseen::{WithoutUnseen, without_unseen};
 use data::spectra::Sizes;
@@ -150,7 +150,7 @@ impl Records<'_> {
     /// where the model rests on the noise that the feedback brings to the inputs, or those at whose frequencies it fails a test.
     fn without_unseen(
         &self,
-        found: &WithoutLines,
+        found: &Cleaned,
         judged: &Recommendation,
         Doubts { witness, informed }: &Doubts,
         candidates: &mut Vec<Candidate>,
@@ -167,7 +167,7 @@ impl Records<'_> {
     }
 
     /// The model with its evidence, the squares of its deviations times `widening`, and what says whether its modes are those of the noise.
-    fn judged(&self, found: &WithoutLines, widening: f64) -> Result<(Recommendation, Doubts)> {
+    fn judged(&self, found: &Cleaned, widening: f64) -> Result<(Recommendation, Doubts)> {
         let (known, time) = (self.known, self.time);
         let (estimation, verification) = (found.records(0, self.all.experiments), found.records(1, self.verification));
         let (problem, verification) = (found.problem(self.all, &estimation), verification.as_slice());
@@ -179,8 +179,9 @@ impl Records<'_> {
         let signals = known.map(|known| [known.estimation.as_slice(), known.verification.as_slice()]);
         let witness = signals.and_then(|signals| Witness::new(&problem, solution, signals, verification));
         let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, solution);
-        let directions =
-            Directions::new(&spectra, solution, widening * parts.scatter, witness.clone()).with(nonlinear_part);
+        let nuisance = found.nuisance(&problem, &spectra);
+        let scatter = (widening * parts.scatter, &nuisance);
+        let directions = Directions::new(&spectra, solution, scatter, witness.clone()).with(nonlinear_part);
         let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
         let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
         let judged = Judged {
@@ -195,14 +196,14 @@ impl Records<'_> {
             nonlinear,
         };
         let Judgement { mut evidence, loop_ratio, entry_bands, bands, informed } = verdict::judge(&judged)?;
-        evidence.extend(found.evidence(self.all.experiments, time.ts()));
+        evidence.extend(found.evidence(self.all, time.ts()));
         let recommended = Recommendation {
             predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
             plant,
             dead_time: choice.delays.clone(),
             order: choice.order(),
             region,
-            modes: deviation::mode_estimates::modes(&spectra, choice, time),
+            modes: deviation::mode_estimates::modes(&spectra, choice, &nuisance, time),
             candidates: Vec::new(),
             evidence,
             loop_ratio,

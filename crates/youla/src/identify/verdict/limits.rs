@@ -84,6 +84,8 @@ pub(crate) const INFORMATION_RATIO: f64 = 1.0;
 pub(crate) const NO_INFORMATION: f64 = 1e3;
 /// Amplitude of a line of a disturbance, over the size of the outputs, that is named as large.
 pub(crate) const LARGEST_LINE: f64 = 1.0;
+/// Size of a load that changes in steps, over the size of the inputs, that is named as large.
+pub(crate) const LARGEST_LOAD: f64 = 1.0;
 /// Residual of the controller's equation over its inputs up to which the controller enters the estimate: it decides whether a direct path of
 /// the plant can be told from the feedback.
 pub(crate) const AS_STATED: f64 = 0.02;

@@ -34,6 +34,7 @@ pub(crate) use parts::Parts;
 pub(crate) use witness::Witness;
 
 use crate::control::{closed_loop, with_input_port};
+use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::choose::problem::{Problem, Solution};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::identify::likelihood::deviation::region::Region;
@@ -292,7 +293,7 @@ fn information(on: &Judged<'_>, witness: &Witness, loops: &Loops) -> Evidence {
         return Evidence::untested(question, INFORMATION_RATIO, "the excitation does not reach every input");
     };
     let alone = Solution { rivals: Vec::new(), ..on.solution.clone() };
-    let directions = Directions::new(&excited, &alone, 1.0, None);
+    let directions = Directions::new(&excited, &alone, (1.0, &Nuisance::default()), None);
     let shares = [slow(on.spectra.samples()), grid(on.spectra.samples())].concat();
     let region = Region::new(on.problem.sizes.clone(), on.plant.time(), &shares, directions);
     let r = LoopRatio::new(&loops.at, |hz| region.at(hz));

@@ -4,6 +4,7 @@
 //! acts on the outputs alone, `y = G u + cos, sin + v`: its amplitudes are those of the residual without the mode. What is left of the
 //! outputs, without the lines next to it (weight zero), says whether it was one: then the criterion is less without the mode.
 
+use super::loads::{self, Nuisance, Steps};
 use super::problem::{Choice, Problem, Solution, Task};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
 use crate::identify::likelihood::search::block::Block;
@@ -65,31 +66,58 @@ impl Line {
     }
 }
 
-/// A model and the outputs that it is the model of.
-pub(crate) struct WithoutLines {
+/// A model and the inputs and outputs that it is the model of.
+#[derive(Clone)]
+pub(crate) struct Cleaned {
     /// The model.
     pub(crate) solution: Solution,
     /// What was taken out of the outputs.
     pub(crate) lines: Vec<Line>,
     /// The outputs without it, of the estimation and of the fresh records; `None` where there is nothing.
     pub(crate) outputs: Option<[Vec<Mat<f64>>; 2]>,
+    /// Steps of load.
+    pub(crate) steps: Option<Steps>,
+    /// The inputs with them; `None` where there are none.
+    pub(crate) inputs: Option<[Vec<Mat<f64>>; 2]>,
 }
 
-impl WithoutLines {
+impl Cleaned {
+    /// A model of the records as they are.
+    pub(crate) fn untouched(solution: Solution) -> Self {
+        Cleaned { solution, lines: Vec::new(), outputs: None, steps: None, inputs: None }
+    }
+
     /// The problem that its model solves, on records with its outputs.
     pub(crate) fn problem<'a>(&self, all: &Problem<'a>, experiments: &'a [Experiment<'a>]) -> Problem<'a> {
         let masked = self.lines.iter().map(|line| line.mask).collect();
         Problem { experiments, masked, feedthrough: self.solution.chosen.found.feedthrough, ..all.clone() }
     }
 
-    /// Records, those of estimation (0) or fresh (1), with its outputs.
+    /// Records, those of estimation (0) or fresh (1), with its inputs and outputs.
     pub(crate) fn records<'a>(&'a self, which: usize, records: &[Experiment<'a>]) -> Vec<Experiment<'a>> {
-        let Some(outputs) = &self.outputs else { return records.to_vec() };
-        records.iter().zip(&outputs[which]).map(|(e, y)| Experiment { y: y.as_ref(), ..*e }).collect()
+        let pick = |own: &'a Option<[Vec<Mat<f64>>; 2]>, k: usize| own.as_ref().map(|own| own[which][k].as_ref());
+        let of = |(k, e): (usize, &Experiment<'a>)| Experiment {
+            u: pick(&self.inputs, k).unwrap_or(e.u),
+            y: pick(&self.outputs, k).unwrap_or(e.y),
+            ..*e
+        };
+        records.iter().enumerate().map(of).collect()
+    }
+
+    /// The columns of what was estimated beside the model of the records of estimation.
+    pub(crate) fn nuisance(&self, problem: &Problem<'_>, spectra: &Spectra) -> Nuisance {
+        let of = |steps: &Steps| loads::nuisance(problem, &self.solution.chosen, &steps[0], spectra);
+        self.steps.as_ref().map(of).unwrap_or_default()
+    }
+
+    /// What was taken out of the records.
+    pub(crate) fn evidence(&self, all: &Problem<'_>, ts: f64) -> Vec<Evidence> {
+        let load = self.steps.as_ref().map(|steps| loads::evidence(steps, all.experiments, &all.sizes.u, ts));
+        self.of_lines(all.experiments, ts).into_iter().chain(load).collect()
     }
 
     /// The lines that were taken out, and their size over that of what is left of the outputs; `None` where there are none.
-    pub(crate) fn evidence(&self, records: &[Experiment<'_>], ts: f64) -> Option<Evidence> {
+    fn of_lines(&self, records: &[Experiment<'_>], ts: f64) -> Option<Evidence> {
         let [outputs, _] = self.outputs.as_ref()?;
         let (mut taken, mut left) = (0.0, 0.0);
         for (e, y) in records.iter().zip(outputs) {
@@ -109,8 +137,8 @@ impl WithoutLines {
 }
 
 /// The model that records support, and what it takes out of them.
-pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<WithoutLines> {
-    let mut now = WithoutLines { solution: all.solve(table)?, lines: Vec::new(), outputs: None };
+pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
+    let mut now = loads::with_steps(all, fresh, Cleaned::untouched(all.solve(table)?), table);
     for _ in 0..ROUNDS {
         let Some(next) = less_lines(all, fresh, &now, table) else { break };
         now = next;
@@ -122,9 +150,9 @@ pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec
 fn less_lines(
     all: &Problem<'_>,
     fresh: &[Experiment<'_>],
-    now: &WithoutLines,
+    now: &Cleaned,
     table: &mut Vec<Candidate>,
-) -> Option<WithoutLines> {
+) -> Option<Cleaned> {
     let clean = now.records(0, all.experiments);
     let narrow = Narrow::of(&now.problem(all, &clean), now)?;
     let choice = &now.solution.chosen;
@@ -147,7 +175,7 @@ fn less_lines(
             };
             records.iter().zip(residuals).map(of).collect()
         });
-        let mut next = WithoutLines { solution: now.solution.clone(), lines: taken, outputs: Some(outputs) };
+        let mut next = Cleaned { lines: taken, outputs: Some(outputs), ..now.clone() };
         let records = next.records(0, all.experiments);
         let problem = next.problem(all, &records);
         let spectra = Arc::new(problem.spectra(delays));
@@ -217,7 +245,7 @@ struct Narrow {
 }
 
 impl Narrow {
-    fn of(problem: &Problem<'_>, now: &WithoutLines) -> Option<Self> {
+    fn of(problem: &Problem<'_>, now: &Cleaned) -> Option<Self> {
         let choice = &now.solution.chosen;
         let model = choice.found.point.model.separated()?;
         let longest = problem.experiments.iter().map(|e| e.u.nrows()).max()? as f64;

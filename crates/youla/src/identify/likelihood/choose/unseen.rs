@@ -5,7 +5,7 @@
 //! that Schwarz's criterion makes it a mode of the plant. It is left to the noise where the model rests on noise otherwise. Cogging of an axis
 //! that moves back and forth is such a peak beside an excitation: a mode that its zeros nearly cancel, at which the model fails its tests.
 
-use super::lines::WithoutLines;
+use super::lines::Cleaned;
 use super::problem::{Problem, Solution, Task};
 use super::solve::best;
 use crate::identify::likelihood::search::with_best_inputs;
@@ -17,7 +17,7 @@ use std::sync::Arc;
 /// A model without the modes that the excitation does not show.
 pub(crate) struct WithoutUnseen {
     /// The model with the outputs that it is the model of.
-    pub(crate) found: WithoutLines,
+    pub(crate) found: Cleaned,
     /// Frequencies of the modes that were left out, shares of the sample rate.
     turns: Vec<f64>,
 }
@@ -37,7 +37,7 @@ impl WithoutUnseen {
 /// and where the order is given.
 pub(crate) fn without_unseen(
     all: &Problem<'_>,
-    now: &WithoutLines,
+    now: &Cleaned,
     shown: &dyn Fn(f64) -> bool,
     table: &mut Vec<Candidate>,
 ) -> Option<WithoutUnseen> {
@@ -60,8 +60,7 @@ pub(crate) fn without_unseen(
     problem.along_delays(&mut tried, &at, table);
     let at = best(&tried)?.clone();
     let solution: Solution = problem.concluded(tried, &at)?;
-    let (lines, outputs) = (now.lines.clone(), now.outputs.clone());
-    Some(WithoutUnseen { found: WithoutLines { solution, lines, outputs }, turns })
+    Some(WithoutUnseen { found: Cleaned { solution, ..now.clone() }, turns })
 }
 
 #[cfg(test)]
@@ -90,7 +89,7 @@ mod tests {
         let all = problem(&records, None, &LikelihoodOptions::default()).unwrap();
         let solution = all.solve(&mut Vec::new()).unwrap();
         assert_eq!(solution.chosen.order(), 3);
-        let now = WithoutLines { solution, lines: Vec::new(), outputs: None };
+        let now = Cleaned::untouched(solution);
         let without = |shown: &dyn Fn(f64) -> bool| without_unseen(&all, &now, shown, &mut Vec::new());
         assert!(without(&|_| true).is_none());
         let less = without(&|turns| turns < 0.05).unwrap();

@@ -17,6 +17,7 @@ pub(crate) mod root;
 #[cfg(feature = "serde")]
 mod stored;
 
+use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::choose::problem::{Choice, Solution};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::chart::Chart;
@@ -110,11 +111,16 @@ impl Parts {
 }
 
 impl Directions {
-    /// `scatter` is the factor of the variance of the parameters by their scatter over pieces of the records.
-    pub(crate) fn new(spectra: &Spectra, solution: &Solution, scatter: f64, witness: Option<Witness>) -> Self {
+    /// `scatter` is the factor of the variance of the parameters by their scatter over pieces of the records, `nuisance` what else was estimated.
+    pub(crate) fn new(
+        spectra: &Spectra,
+        solution: &Solution,
+        (scatter, nuisance): (f64, &Nuisance),
+        witness: Option<Witness>,
+    ) -> Self {
         let found = &solution.chosen.found;
         let chart = Chart::new(&found.point.model, found.feedthrough);
-        let root = Root::new(spectra, &found.point, &chart, &found.noise).scaled(scatter.sqrt());
+        let root = Root::new(spectra, &found.point, &chart, &found.noise, nuisance).scaled(scatter.sqrt());
         let model = (found.point.model.clone(), solution.chosen.delays.clone());
         let of = |c: &Choice| (c.found.point.model.clone(), c.delays.clone(), c.as_rival(solution.samples));
         let rivals = solution.rivals.iter().map(of);

@@ -5,6 +5,7 @@
 //! ```
 
 use super::root::Root;
+use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::choose::problem::Choice;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
@@ -31,10 +32,10 @@ pub struct ModeEstimate {
 }
 
 /// Modes of a choice, by natural frequency.
-pub(crate) fn modes(spectra: &Spectra, choice: &Choice, time: Discrete) -> Vec<ModeEstimate> {
+pub(crate) fn modes(spectra: &Spectra, choice: &Choice, nuisance: &Nuisance, time: Discrete) -> Vec<ModeEstimate> {
     let found = &choice.found;
     let chart = Chart::new(&found.point.model, found.feedthrough);
-    let root = Root::new(spectra, &found.point, &chart, &found.noise);
+    let root = Root::new(spectra, &found.point, &chart, &found.noise, nuisance);
     of_blocks(&found.point.model, &chart, &root, time)
 }
 

@@ -4,10 +4,11 @@
 //! touch every parameter. Time and memory are linear in the outputs then.
 
 use super::inverse_root;
+use crate::identify::likelihood::choose::loads::Nuisance;
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::by_output::{Arrow, Ends, Normal, inverse};
 use crate::identify::likelihood::search::chart::{Chart, Places};
-use crate::identify::likelihood::search::linearise::linearise;
+use crate::identify::likelihood::search::linearise::{Extra, compressed, linearise_with};
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::Point;
@@ -41,10 +42,12 @@ impl Root {
         fits.then_some(Root { shared, own, places })
     }
 
-    /// Of a point of records.
-    pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise) -> Self {
+    /// Of a point of records, with what else was estimated from them.
+    pub(crate) fn new(spectra: &Spectra, point: &Point, chart: &Chart, noise: &Noise, nuisance: &Nuisance) -> Self {
         if chart.units.is_empty() {
-            return Root::dense(inverse_root(&linearise(spectra, point, chart, noise).factor, chart.parameters()));
+            let extra = Extra { count: nuisance.count, values: &nuisance.values, quick: false };
+            let factor = linearise_with(spectra, point, chart, noise, &extra).factor;
+            return Root::dense(inverse_root(&without_last(factor, nuisance.count), chart.parameters()));
         }
         let normal = Normal::new(spectra, point, chart, noise, Ends::Shared).reduced();
         Root::of_arrow(&normal.factor(0.0), chart, &point.model)
@@ -115,6 +118,25 @@ impl Root {
         let own = slopes.own.iter().zip(&self.own).map(|(slopes, root)| product(slopes, root));
         (own.collect(), shared)
     }
+}
+
+/// The factor `[J N r]` without its columns N, their coefficients free: that of `[N J r]` below and behind N.
+fn without_last(factor: Mat<f64>, count: usize) -> Mat<f64> {
+    let kept = factor.ncols().saturating_sub(count + 1);
+    if count == 0 {
+        return factor;
+    }
+    let place = |j: usize| {
+        if j < count {
+            kept + j
+        } else if j < count + kept {
+            j - count
+        } else {
+            j
+        }
+    };
+    let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
+    factor.submatrix(count, count, factor.nrows().saturating_sub(count), kept + 1).to_owned()
 }
 
 /// A product of a complex matrix and a real one: its real parts above its imaginary parts.

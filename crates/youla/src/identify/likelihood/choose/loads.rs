@@ -1,0 +1,236 @@
+//! Steps of load: what acts at an input beside it and changes in steps, `y = G (u + w) + v`.
+//!
+//! A few large steps are no stationary noise: a model that has to describe them as such bends the plant at low frequencies, which the feedback
+//! hides from the loop that ran. Places and sizes are estimated with the parameters of the model (`places`), one round of search after the
+//! other, and stay free in its region.
+
+use super::lines::Cleaned;
+use super::places::{Places, turned};
+use super::problem::{Choice, Problem, Task};
+use crate::identify::likelihood::data::spectra::{Lines, Spectra, long_enough};
+use crate::identify::likelihood::search::separable::separable;
+use crate::identify::likelihood::{Candidate, Evidence};
+use crate::identify::subspace::Experiment;
+use crate::identify::verdict::limits::LARGEST_LOAD;
+use faer::{Mat, c64};
+use rayon::prelude::*;
+use std::sync::Arc;
+
+/// Rounds of a model and the steps that it shows.
+const ROUNDS: usize = 4;
+/// Turns of sizes and model in a round, and the change of a size below which they end.
+const TURNS: usize = 8;
+const NOTICED: f64 = 1e-4;
+/// Least samples of a record for each step in it: what changes more often is friction, or a noise.
+const SAMPLES_PER_STEP: usize = 500;
+/// Samples of a record above which steps are not looked for: time and memory of the transforms. Of a longer record the load is a noise.
+const LONGEST: usize = 100_000;
+
+/// A step of load.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Step {
+    /// Its first sample.
+    sample: usize,
+    /// Its input.
+    input: usize,
+    /// Its size in units of the input.
+    size: f64,
+}
+
+/// The steps of the records of estimation (0) and of the fresh ones (1).
+pub(crate) type Steps = [Vec<Vec<Step>>; 2];
+
+/// The inputs with the load that acts beside them.
+fn loaded(records: &[Experiment<'_>], steps: &[Vec<Step>]) -> Vec<Mat<f64>> {
+    let with = |(e, steps): (&Experiment<'_>, &Vec<Step>)| {
+        let mut u = e.u.to_owned();
+        for step in steps {
+            (step.sample..u.nrows()).for_each(|t| u[(t, step.input)] += step.size);
+        }
+        u
+    };
+    records.iter().zip(steps).map(with).collect()
+}
+
+/// Parameters of some steps: place and size.
+fn parameters(steps: &Steps) -> f64 {
+    2.0 * steps[0].iter().map(Vec::len).sum::<usize>() as f64
+}
+
+/// The model with the steps of load that it shows, as long as Schwarz's criterion falls.
+pub(super) fn with_steps(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    mut now: Cleaned,
+    table: &mut Vec<Candidate>,
+) -> Cleaned {
+    if all.is_wide() || separable(all.outputs()) || all.open_loop {
+        return now;
+    }
+    let log = (all.samples().0.max(2) as f64).ln();
+    let total = |of: &Cleaned| of.solution.chosen.criterion + log * of.steps.as_ref().map_or(0.0, parameters);
+    for _ in 0..ROUNDS {
+        let Some(steps) = steps(all, fresh, &now) else { break };
+        let inputs = [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(records, steps)| loaded(records, steps));
+        let next = Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() };
+        let Some(next) = refined(all, fresh, next, table) else { break };
+        if total(&next) >= total(&now) {
+            break;
+        }
+        now = next;
+    }
+    now
+}
+
+/// The model with the sizes of its steps: in turn one step of Gauss and Newton of all together and a search of the model with these sizes, then
+/// models one step away.
+fn refined(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    mut now: Cleaned,
+    table: &mut Vec<Candidate>,
+) -> Option<Cleaned> {
+    for turn in 0..TURNS {
+        if turn > 0 && !resized(all, fresh, &mut now)? {
+            break;
+        }
+        let records = now.records(0, all.experiments);
+        let problem = now.problem(all, &records);
+        let choice = now.solution.chosen.clone();
+        let (spectra, delays) = (Arc::new(problem.spectra(&choice.delays)), choice.delays);
+        let task = Task { spectra, start: choice.found.point, delays, origin: "with steps of load".into() };
+        let chosen = problem.run(vec![task], f64::INFINITY, &mut Vec::new()).pop()?;
+        now.solution.chosen = chosen;
+    }
+    let records = now.records(0, all.experiments);
+    let solution = now.problem(all, &records).solve_from(vec![now.solution.chosen.clone()], table)?;
+    Some(Cleaned { solution, ..now.clone() })
+}
+
+/// Changes the sizes of all steps together with the parameters of the model, and says whether one changed noticeably.
+fn resized(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &mut Cleaned) -> Option<bool> {
+    let (mut steps, mut noticed) = (now.steps.clone()?, false);
+    let choice = &now.solution.chosen;
+    for (which, experiments) in [all.experiments, fresh].into_iter().enumerate() {
+        let records = now.records(which, experiments);
+        for (e, steps) in records.iter().zip(&mut steps[which]).filter(|(_, steps)| !steps.is_empty()) {
+            let spectra = all.spectra_of(std::slice::from_ref(e), &choice.delays);
+            let place = |s: &Step| ((s.sample + choice.delays[s.input]).saturating_sub(all.skip), s.input);
+            let changes = Places::new(&spectra, choice)?.changes(steps.iter().map(place).collect())?;
+            for (step, change) in steps.iter_mut().zip(changes) {
+                let change = change * all.sizes.u[step.input];
+                step.size += change;
+                noticed |= change.abs() > NOTICED * step.size.abs();
+            }
+        }
+    }
+    let inputs = [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(records, steps)| loaded(records, steps));
+    (now.inputs, now.steps) = (Some(inputs), Some(steps));
+    Some(noticed)
+}
+
+/// The steps that the model of some records shows in them; `None` where the records of estimation have none, and where a record has more than
+/// are steps.
+fn steps(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &Cleaned) -> Option<Steps> {
+    let choice = &now.solution.chosen;
+    let of = |which: usize, records: &[Experiment<'_>]| {
+        let outputs = now.outputs.as_ref().map(|outputs| &outputs[which]);
+        let of = |(k, e): (usize, &Experiment<'_>)| {
+            let e = outputs.map_or(*e, |outputs| Experiment { y: outputs[k].as_ref(), ..*e });
+            of_record(all, choice, &e)
+        };
+        records.par_iter().enumerate().map(of).collect::<Option<Vec<Vec<Step>>>>()
+    };
+    let found = [of(0, all.experiments)?, of(1, fresh)?];
+    found[0].iter().any(|steps| !steps.is_empty()).then_some(found)
+}
+
+/// The steps of one record.
+fn of_record(all: &Problem<'_>, choice: &Choice, e: &Experiment<'_>) -> Option<Vec<Step>> {
+    let rows = e.u.nrows();
+    if !long_enough(rows, all.skip) || !(SAMPLES_PER_STEP..=LONGEST).contains(&rows) {
+        return Some(Vec::new());
+    }
+    let spectra = all.spectra_of(std::slice::from_ref(e), &choice.delays);
+    let shown = Places::new(&spectra, choice)?.steps(rows / SAMPLES_PER_STEP)?;
+    let step = |(place, input, size): (usize, usize, f64)| {
+        let sample = place + all.skip - choice.delays[input];
+        Step { sample, input, size: size * all.sizes.u[input] }
+    };
+    Some(shown.into_iter().map(step).collect())
+}
+
+/// What the size and the place of each step do to the outputs of the records of estimation, lines x p x columns: nuisance beside the
+/// parameters of the model.
+pub(crate) fn nuisance(problem: &Problem<'_>, choice: &Choice, steps: &[Vec<Step>], spectra: &Spectra) -> Nuisance {
+    let count = 2 * steps.iter().map(Vec::len).sum::<usize>();
+    let (m, p, model) = (spectra.inputs, spectra.outputs, &choice.found.point.model);
+    let kept = problem.experiments.iter().zip(steps).filter(|(e, _)| long_enough(e.u.nrows(), problem.skip));
+    let mut first = 0;
+    let of = |(lines, (_, steps)): (&Lines, (_, &Vec<Step>))| {
+        let mut values = vec![c64::ZERO; lines.z.len() * p * count];
+        for (k, of_line) in values.chunks_exact_mut(p * count).enumerate() {
+            let response = model.response(lines.z[k]);
+            for (s, step) in steps.iter().enumerate() {
+                let place = (step.sample + choice.delays[step.input]).saturating_sub(problem.skip);
+                let pulse = turned(k + 1, place, lines.samples) / (lines.samples as f64).sqrt();
+                let column = first + 2 * s;
+                for i in 0..p {
+                    let pulse = response[i * m + step.input] * pulse;
+                    of_line[i * count + column] = pulse / (c64::ONE - lines.z[k].conj());
+                    of_line[i * count + column + 1] = pulse;
+                }
+            }
+        }
+        first += 2 * steps.len();
+        values
+    };
+    Nuisance { count, values: spectra.records.iter().zip(kept).map(of).collect() }
+}
+
+/// Columns of the steps, per record.
+#[derive(Default)]
+pub(crate) struct Nuisance {
+    /// Their number.
+    pub(crate) count: usize,
+    /// Lines x p x columns of each record.
+    pub(crate) values: Vec<Vec<c64>>,
+}
+
+/// The steps of the records of estimation: their size over that of the inputs, where they are.
+pub(crate) fn evidence(steps: &Steps, records: &[Experiment<'_>], sizes: &[f64], ts: f64) -> Evidence {
+    let (mut square, mut count) = (0.0, 0.0);
+    for (e, steps) in records.iter().zip(&steps[0]) {
+        let load = loaded(
+            &[Experiment { u: Mat::zeros(e.u.nrows(), e.u.ncols()).as_ref(), ..*e }],
+            std::slice::from_ref(steps),
+        );
+        let load = &load[0];
+        for j in 0..load.ncols() {
+            let mean = load.col(j).iter().sum::<f64>() / load.nrows() as f64;
+            square += load.col(j).iter().map(|w| ((w - mean) / sizes[j]).powi(2)).sum::<f64>();
+        }
+        count += load.nrows() as f64;
+    }
+    let several = records.len() > 1;
+    let mut listed: Vec<(usize, &Step)> =
+        steps[0].iter().enumerate().flat_map(|(k, of)| of.iter().map(move |s| (k, s))).collect();
+    listed.sort_by(|a, b| (b.1.size / sizes[b.1.input]).abs().total_cmp(&(a.1.size / sizes[a.1.input]).abs()));
+    let place = |(k, step): &(usize, &Step)| {
+        let of = if several { format!(" of record {}", k + 1) } else { String::new() };
+        let input = if sizes.len() > 1 { format!(" at input {}", step.input + 1) } else { String::new() };
+        format!("{:.3}{input} at {:.4} s{of}", step.size, step.sample as f64 * ts)
+    };
+    let largest: Vec<String> = listed.iter().take(LISTED).map(place).collect();
+    let question = "Load that changes in steps beside the inputs, over the inputs (load)";
+    let listing = if listed.len() == 1 { "1 step".into() } else { format!("{} steps", listed.len()) };
+    let note = format!("estimated and added to the inputs: {listing}, the largest {}", largest.join(", "));
+    Evidence::new(question, (square / f64::max(count, 1.0)).sqrt(), LARGEST_LOAD).reported().noted(note)
+}
+
+/// Steps that are listed.
+const LISTED: usize = 3;
+
+#[cfg(test)]
+#[path = "loads_tests.rs"]
+mod tests;

@@ -1,0 +1,94 @@
+//! Steps of load in a loop with a plant that integrates.
+
+use crate::identify::likelihood::{LikelihoodOptions, Recommendation, recommend};
+use crate::identify::likelihood::{LoopKnowledge, LoopSignals};
+use crate::identify::subspace::Experiment;
+use crate::lti::{Discrete, Simulator, StateSpace, frequency_response};
+use faer::{Mat, mat};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+const SAMPLES: usize = 6000;
+
+/// A double integrator with friction and a mode, and its controller u = -k (y(t) - 0.97 y(t - 1)).
+fn plant() -> StateSpace<Discrete> {
+    let a = mat![[1.0, 0.05, 0.0, 0.0], [0.0, 0.99, 0.0, 0.0], [0.0, 0.0, 0.6, 0.78], [0.0, 0.0, -0.78, 0.6]];
+    let (b, c) = (mat![[0.0], [0.05], [0.01], [0.02]], mat![[1.0, 0.0, 0.3, 0.0]]);
+    StateSpace::new(a, b, c, Mat::zeros(1, 1), Discrete::new(1e-3).unwrap()).unwrap()
+}
+
+fn controller() -> StateSpace<Discrete> {
+    let matrix = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+    StateSpace::new(matrix(0.0), matrix(1.0), matrix(9.7), matrix(-10.0), Discrete::new(1e-3).unwrap()).unwrap()
+}
+
+/// The loop under a load, with an excitation at the input; the recommended model of it.
+fn found(load: &dyn Fn(usize, f64) -> f64, seed: u64) -> Recommendation {
+    let rng = &mut ChaCha8Rng::seed_from_u64(seed);
+    let (plant, k) = (Simulator::new(&plant()), Simulator::new(&controller()));
+    let (mut x, mut at) = (plant.start(&[0.0; 4]).unwrap(), k.start(&[0.0]).unwrap());
+    let [mut u, mut y, mut d] = [(); 3].map(|()| Mat::<f64>::zeros(SAMPLES, 1));
+    // The plant has no direct path: y comes before u.
+    let mut velocity = 0.0;
+    for t in 0..SAMPLES {
+        let clean = x.x()[0] + 0.3 * x.x()[2];
+        velocity = if t > 0 { x.x()[1] } else { velocity };
+        y[(t, 0)] = clean + 0.002 * rng.sample::<f64, _>(StandardNormal);
+        d[(t, 0)] = rng.sample::<f64, _>(StandardNormal);
+        u[(t, 0)] = d[(t, 0)] + k.step(&mut at, &[y[(t, 0)]])[0];
+        plant.step(&mut x, &[u[(t, 0)] + load(t, velocity)]);
+    }
+    let (explained, system) = (&u - &d, controller());
+    let signals = LoopSignals {
+        seen: y.as_ref(),
+        explained: explained.as_ref(),
+        applied: u.as_ref(),
+        excitation: Some(d.as_ref()),
+    };
+    let known = LoopKnowledge::new(Some(&system), Some(&system), vec![signals], vec![]).unwrap();
+    let records = [Experiment::new(u.as_ref(), y.as_ref())];
+    recommend(&records, &[], Some(&known), Discrete::new(1e-3).unwrap(), &LikelihoodOptions::default()).unwrap()
+}
+
+fn load_of(found: &Recommendation) -> Option<&str> {
+    found.evidence.iter().find(|e| e.question.ends_with("(load)")).map(|e| e.note.as_str())
+}
+
+/// Error of the response at a frequency over the stated deviation, and over the response.
+fn error(found: &Recommendation, hz: f64) -> (f64, f64) {
+    let omega = [std::f64::consts::TAU * hz];
+    let at = |system: &StateSpace<Discrete>| frequency_response(system, &omega).unwrap().at(0)[(0, 0)];
+    let (own, truth) = (at(&found.plant), at(&plant()));
+    let [re, _, im] = found.region.at(hz).entries().covariance((0, 0));
+    let deviation = (re + im).sqrt();
+    ((own - truth).norm() / deviation, (own - truth).norm() / truth.norm())
+}
+
+#[test]
+fn steps_of_load_are_found_where_they_are_and_do_not_bend_the_model() {
+    let steps = |t: usize, _: f64| {
+        [(700, 2.0), (2100, -3.0), (3600, 1.5), (4000, -2.0)].iter().filter(|s| t >= s.0).map(|s| s.1).sum()
+    };
+    let mut squares = 0.0;
+    for seed in 0..4 {
+        let found = found(&steps, seed);
+        let note = load_of(&found).expect("steps");
+        assert!(note.starts_with("estimated and added to the inputs: 4 steps") && note.contains(" at 2.10"), "{note}");
+        for hz in [1.0, 3.0, 10.0, 50.0, 140.0] {
+            let (deviations, share) = error(&found, hz);
+            squares += deviations * deviations / 20.0;
+            assert!(share < 0.1 || hz < 10.0, "{seed}, {hz} Hz: {share}");
+        }
+    }
+    // 20 figures, alike within a loop.
+    assert!((0.2..2.5).contains(&squares), "{squares}");
+}
+
+#[test]
+fn no_load_and_dry_friction_are_no_steps() {
+    for seed in 10..16 {
+        assert_eq!(load_of(&found(&|_, _| 0.0, seed)), None);
+    }
+    assert_eq!(load_of(&found(&|_, velocity| -0.4 * velocity.signum(), 20)), None);
+}

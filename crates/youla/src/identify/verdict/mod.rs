@@ -281,7 +281,9 @@ fn largest(
     let physical = |(at, s): (usize, &f64)| s * (y[at / u.len()] / u[at % u.len()]).powi(2);
     let difference = found[worst].0.iter().enumerate().map(physical).sum::<f64>().sqrt();
     let part = 100.0 * difference / g.at(0).norm_l2().max(TINY);
-    let size = format!("{} % of the model's response at {} Hz", figure_of(part), figure_of(hz));
+    let times =
+        if part > 1000.0 { format!("{} times", figure_of(part / 100.0)) } else { format!("{} % of", figure_of(part)) };
+    let size = format!("{times} the model's response at {} Hz", figure_of(hz));
     evidence.noted(format!("{size}; {cause}"))
 }
 

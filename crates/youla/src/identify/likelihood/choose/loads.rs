@@ -57,7 +57,8 @@ fn parameters(steps: &Steps) -> f64 {
     2.0 * steps[0].iter().map(Vec::len).sum::<usize>() as f64
 }
 
-/// The model with the steps of load that it shows, as long as Schwarz's criterion falls.
+/// The model with the steps of load that it shows, as long as Schwarz's criterion falls. Not tried in an open loop, in which no feedback hides
+/// what a load does to the model.
 pub(super) fn with_steps(
     all: &Problem<'_>,
     fresh: &[Experiment<'_>],
@@ -70,6 +71,9 @@ pub(super) fn with_steps(
     let log = (all.samples().0.max(2) as f64).ln();
     let total = |of: &Cleaned| of.solution.chosen.criterion + log * of.steps.as_ref().map_or(0.0, parameters);
     for _ in 0..ROUNDS {
+        if all.out_of_time() {
+            break;
+        }
         let Some(steps) = steps(all, fresh, &now) else { break };
         let inputs = [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(records, steps)| loaded(records, steps));
         let next = Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() };

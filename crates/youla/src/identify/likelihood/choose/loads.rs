@@ -37,6 +37,13 @@ pub(crate) struct Step {
     size: f64,
 }
 
+impl Step {
+    /// Its place on the lines of a record, whose first samples are the past of the delayed inputs.
+    fn place(&self, delays: &[usize], skip: usize) -> usize {
+        (self.sample + delays[self.input]).saturating_sub(skip)
+    }
+}
+
 /// The steps of the records of estimation (0) and of the fresh ones (1).
 pub(crate) type Steps = [Vec<Vec<Step>>; 2];
 
@@ -75,7 +82,7 @@ pub(super) fn with_steps(
             break;
         }
         let Some(steps) = steps(all, fresh, &now) else { break };
-        let inputs = [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(records, steps)| loaded(records, steps));
+        let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
         let next = Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() };
         let Some(next) = refined(all, fresh, next, table) else { break };
         if total(&next) >= total(&now) {
@@ -119,7 +126,7 @@ fn resized(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &mut Cleaned) -> Op
         let records = now.records(which, experiments);
         for (e, steps) in records.iter().zip(&mut steps[which]).filter(|(_, steps)| !steps.is_empty()) {
             let spectra = all.spectra_of(std::slice::from_ref(e), &choice.delays);
-            let place = |s: &Step| ((s.sample + choice.delays[s.input]).saturating_sub(all.skip), s.input);
+            let place = |s: &Step| (s.place(&choice.delays, all.skip), s.input);
             let changes = Places::new(&spectra, choice)?.changes(steps.iter().map(place).collect())?;
             for (step, change) in steps.iter_mut().zip(changes) {
                 let change = change * all.sizes.u[step.input];
@@ -128,7 +135,7 @@ fn resized(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &mut Cleaned) -> Op
             }
         }
     }
-    let inputs = [(all.experiments, &steps[0]), (fresh, &steps[1])].map(|(records, steps)| loaded(records, steps));
+    let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
     (now.inputs, now.steps) = (Some(inputs), Some(steps));
     Some(noticed)
 }
@@ -137,13 +144,10 @@ fn resized(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &mut Cleaned) -> Op
 /// are steps.
 fn steps(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &Cleaned) -> Option<Steps> {
     let choice = &now.solution.chosen;
+    let unloaded = Cleaned { inputs: None, ..now.clone() };
     let of = |which: usize, records: &[Experiment<'_>]| {
-        let outputs = now.outputs.as_ref().map(|outputs| &outputs[which]);
-        let of = |(k, e): (usize, &Experiment<'_>)| {
-            let e = outputs.map_or(*e, |outputs| Experiment { y: outputs[k].as_ref(), ..*e });
-            of_record(all, choice, &e)
-        };
-        records.par_iter().enumerate().map(of).collect::<Option<Vec<Vec<Step>>>>()
+        let records = unloaded.records(which, records);
+        records.par_iter().map(|e| of_record(all, choice, e)).collect::<Option<Vec<Vec<Step>>>>()
     };
     let found = [of(0, all.experiments)?, of(1, fresh)?];
     found[0].iter().any(|steps| !steps.is_empty()).then_some(found)
@@ -176,7 +180,7 @@ pub(crate) fn nuisance(problem: &Problem<'_>, choice: &Choice, steps: &[Vec<Step
         for (k, of_line) in values.chunks_exact_mut(p * count).enumerate() {
             let response = model.response(lines.z[k]);
             for (s, step) in steps.iter().enumerate() {
-                let place = (step.sample + choice.delays[step.input]).saturating_sub(problem.skip);
+                let place = step.place(&choice.delays, problem.skip);
                 let pulse = turned(k + 1, place, lines.samples) / (lines.samples as f64).sqrt();
                 let column = first + 2 * s;
                 for i in 0..p {

@@ -30,10 +30,9 @@ fn found(load: &dyn Fn(usize, f64) -> f64, seed: u64) -> Recommendation {
     let (mut x, mut at) = (plant.start(&[0.0; 4]).unwrap(), k.start(&[0.0]).unwrap());
     let [mut u, mut y, mut d] = [(); 3].map(|()| Mat::<f64>::zeros(SAMPLES, 1));
     // The plant has no direct path: y comes before u.
-    let mut velocity = 0.0;
     for t in 0..SAMPLES {
         let clean = x.x()[0] + 0.3 * x.x()[2];
-        velocity = if t > 0 { x.x()[1] } else { velocity };
+        let velocity = x.x()[1];
         y[(t, 0)] = clean + 0.002 * rng.sample::<f64, _>(StandardNormal);
         d[(t, 0)] = rng.sample::<f64, _>(StandardNormal);
         u[(t, 0)] = d[(t, 0)] + k.step(&mut at, &[y[(t, 0)]])[0];

@@ -126,15 +126,8 @@ fn without_last(factor: Mat<f64>, count: usize) -> Mat<f64> {
     if count == 0 {
         return factor;
     }
-    let place = |j: usize| {
-        if j < count {
-            kept + j
-        } else if j < count + kept {
-            j - count
-        } else {
-            j
-        }
-    };
+    let moved = count + kept;
+    let place = |j: usize| if j < moved { (j + kept) % moved } else { j };
     let factor = compressed(&Mat::from_fn(factor.nrows(), factor.ncols(), |i, j| factor[(i, place(j))]));
     factor.submatrix(count, count, factor.nrows().saturating_sub(count), kept + 1).to_owned()
 }

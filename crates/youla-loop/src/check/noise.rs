@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 use youla::MatRef;
 use youla::lti::Discrete;
 use youla::signal::Channel;
-use youla::signal::{ExcitedRecord, Welch, cross_spectrum, indirect_response};
+use youla::signal::{Welch, explained_power};
 
 /// Signal and noise in one output.
 #[derive(Debug, Clone, PartialEq)]
@@ -74,14 +74,12 @@ fn with_windows(
     time: Discrete,
     windows: usize,
 ) -> Result<Option<Vec<Noise>>> {
-    let window = if windows == WINDOWS { (y.nrows() / windows).min(WINDOW[1]) } else { y.nrows() / windows };
+    let window = if windows == WINDOWS { (y.nrows() / windows).min(WINDOW[1]) } else { smooth(y.nrows() / windows) };
     if window < WINDOW[0] {
         return Ok(None);
     }
     let welch = Welch { window, ..Welch::default() };
-    // Its response is the quotient of spectra of the excitation with itself, which is not looked at; coherences are.
-    let record = ExcitedRecord { d: excitation, u: excitation, y };
-    let found = match indirect_response(&[record], time, &welch) {
+    let found = match explained_power(excitation, y, time, &welch) {
         Ok(found) => found,
         Err(youla::Error::Singular { .. }) => return Ok(None),
         Err(e) => return Err(e.into()),
@@ -90,24 +88,32 @@ fn with_windows(
     if bias > 0.3 {
         return Ok(None);
     }
-    let mut all = Vec::new();
-    for i in 0..y.ncols() {
-        let power = cross_spectrum(y.subcols(i, 1), y.subcols(i, 1), time, &welch)?.density;
+    let of_output = |i: usize| {
         let (mut signal, mut rest, mut seen) = (0.0, 0.0, Vec::new());
-        for (k, omega) in found.response.omega.iter().enumerate() {
-            let coherence = ((found.coherence_y[(k, i)] - bias) / (1.0 - bias)).clamp(0.0, 1.0);
-            let s = power.at(k + 1)[(0, 0)].re;
-            signal += coherence * s;
-            rest += (1.0 - coherence) * s;
+        for (k, omega) in found.omega.iter().enumerate() {
+            let coherence = ((found.coherence[(k, i)] - bias) / (1.0 - bias)).clamp(0.0, 1.0);
+            signal += coherence * found.power[(k, i)];
+            rest += (1.0 - coherence) * found.power[(k, i)];
             if coherence >= 0.5 {
                 seen.push(omega / TAU);
             }
         }
         let band = seen.first().zip(seen.last()).map(|(from, to)| [*from, *to]);
         let ratio = if rest > 0.0 { signal / rest } else { f64::INFINITY };
-        all.push(Noise { ratio, seen: seen.len() as f64 / found.response.omega.len() as f64, band });
-    }
-    Ok(Some(all))
+        Noise { ratio, seen: seen.len() as f64 / found.omega.len() as f64, band }
+    };
+    Ok(Some((0..y.ncols()).map(of_output).collect()))
+}
+
+/// The largest number up to this one whose only prime factors are 2, 3 and 5: its Fourier transform is fast.
+fn smooth(most: usize) -> usize {
+    let without = |mut n: usize, prime: usize| {
+        while n.is_multiple_of(prime) {
+            n /= prime;
+        }
+        n
+    };
+    (1..=most).rev().find(|n| [2, 3, 5].into_iter().fold(*n, without) == 1).unwrap_or(0)
 }
 
 /// Share of the frequencies, and signal-to-noise ratio, below which a caution is reported.

@@ -27,5 +27,8 @@ pub use periodic::{
 pub(crate) use periodic::{Excited, inverse, output_rest};
 pub use persistency::{Persistency, persistency, persistency_order};
 pub use record::{Record, SplitRecord};
-pub use spectrum::{CrossSpectrum, ExcitedRecord, IndirectResponse, Welch, cross_spectrum, indirect_response};
+pub use spectrum::{
+    CrossSpectrum, ExcitedRecord, ExplainedPower, IndirectResponse, Welch, cross_spectrum, explained_power,
+    indirect_response,
+};
 pub(crate) use transform::of_two_real;

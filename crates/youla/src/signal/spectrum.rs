@@ -130,26 +130,58 @@ pub fn indirect_response(records: &[ExcitedRecord], time: Discrete, welch: &Welc
     let first = usize::from(welch.remove_mean);
     let omega = joint.omega[first..].to_vec();
     let mut values = Vec::new();
-    let mut coherence_y = Mat::zeros(omega.len(), p);
-    let mut coherence_u = Mat::zeros(omega.len(), m);
-    for (k, s) in joint.matrices().skip(first).enumerate() {
-        let part = |rows: &Range<usize>, columns: &Range<usize>| {
-            s.submatrix(rows.start, columns.start, rows.len(), columns.len())
-        };
-        let what = || format!("the cross spectrum of input and excitation at {:.6} rad/s", omega[k]);
-        let response = divide(part(&in_y, &in_d), part(&in_u, &in_d), what)?;
-        values.extend(entries(response.as_ref()));
-        for (signals, out) in [(&in_y, &mut coherence_y), (&in_u, &mut coherence_u)] {
-            let what = || format!("the spectrum of the excitation at {:.6} rad/s", omega[k]);
-            let explained = divide(part(signals, &in_d), part(&in_d, &in_d), what)? * part(&in_d, signals);
-            for i in 0..signals.len() {
-                let power = part(signals, signals)[(i, i)].re;
-                out[(k, i)] = if power > 0.0 { explained[(i, i)].re / power } else { 0.0 };
-            }
-        }
+    for (omega, s) in omega.iter().zip(joint.matrices().skip(first)) {
+        let what = || format!("the cross spectrum of input and excitation at {omega:.6} rad/s");
+        values.extend(entries(divide(part(s, &in_y, &in_d), part(s, &in_u, &in_d), what)?.as_ref()));
     }
+    let (coherence_y, coherence_u) = (joint.explained(first, &in_d, &in_y)?, joint.explained(first, &in_d, &in_u)?);
     let response = FrequencyResponse::new(omega, values, p, m);
     Ok(IndirectResponse { response, coherence_y, coherence_u, segments: joint.segments })
+}
+
+/// What an excitation explains of some signals.
+#[derive(Debug, Clone)]
+pub struct ExplainedPower {
+    /// Frequencies, rad/s.
+    pub omega: Vec<f64>,
+    /// Part of the power of each signal that the excitation explains, frequencies x p, from 0 to 1.
+    pub coherence: Mat<f64>,
+    /// One-sided power density of each signal per Hz, frequencies x p.
+    pub power: Mat<f64>,
+    /// Number of segments in the mean.
+    pub segments: usize,
+}
+
+/// The part of the power of `y` (samples x p) that `d` (samples x m) explains, `S_yd S_dd^-1 S_dy` over `S_yy`.
+///
+/// # Errors
+/// Those of [`cross_spectrum`]; [`Error::Singular`] with the first frequency at which channels of `d` depend on each other.
+///
+/// ```
+/// use youla::{Mat, lti::Discrete, signal::{Welch, explained_power}};
+/// let d = Mat::from_fn(4096, 1, |k, _| ((k * k) as f64 * 0.7).sin());
+/// let y = Mat::from_fn(4096, 1, |k, _| 3.0 * d[(k, 0)]);
+/// let welch = Welch { window: 64, ..Welch::default() };
+/// let found = explained_power(d.as_ref(), y.as_ref(), Discrete::new(1.0)?, &welch)?;
+/// assert!((found.coherence[(5, 0)] - 1.0).abs() < 1e-12);
+/// # Ok::<(), youla::Error>(())
+/// ```
+pub fn explained_power(d: MatRef<f64>, y: MatRef<f64>, time: Discrete, welch: &Welch) -> Result<ExplainedPower> {
+    let (m, p) = (d.ncols(), y.ncols());
+    check_shape("the excitation", d, (y.nrows(), m))?;
+    let joint = Joint::estimate(&[block(&[&[d, y]])], time, welch)?;
+    let first = usize::from(welch.remove_mean);
+    let omega = joint.omega[first..].to_vec();
+    let coherence = joint.explained(first, &(0..m), &(m..m + p))?;
+    let mut power = Mat::zeros(omega.len(), p);
+    for (k, s) in joint.matrices().skip(first).enumerate() {
+        (0..p).for_each(|i| power[(k, i)] = s[(m + i, m + i)].re);
+    }
+    Ok(ExplainedPower { omega, coherence, power, segments: joint.segments })
+}
+
+fn part<'a>(s: MatRef<'a, c64>, rows: &Range<usize>, columns: &Range<usize>) -> MatRef<'a, c64> {
+    s.submatrix(rows.start, columns.start, rows.len(), columns.len())
 }
 
 /// The spectrum of all signals with each other.
@@ -189,6 +221,21 @@ impl Joint {
         let n = self.signals;
         (0..self.omega.len())
             .map(move |k| MatRef::from_column_major_slice(&self.values[k * n * n..(k + 1) * n * n], n, n))
+    }
+
+    /// Part of the power of `signals` that `d` explains, from the frequency `first` on.
+    fn explained(&self, first: usize, d: &Range<usize>, signals: &Range<usize>) -> Result<Mat<f64>> {
+        let omega = &self.omega[first..];
+        let mut out = Mat::zeros(omega.len(), signals.len());
+        for (k, s) in self.matrices().skip(first).enumerate() {
+            let what = || format!("the spectrum of the excitation at {:.6} rad/s", omega[k]);
+            let explained = divide(part(s, signals, d), part(s, d, d), what)? * part(s, d, signals);
+            for (i, signal) in signals.clone().enumerate() {
+                let power = s[(signal, signal)].re;
+                out[(k, i)] = if power > 0.0 { explained[(i, i)].re / power } else { 0.0 };
+            }
+        }
+        Ok(out)
     }
 }
 
@@ -273,6 +320,9 @@ impl Cut {
 
 /// `a b^-1`, refused where `b` is singular.
 fn divide(a: MatRef<c64>, b: MatRef<c64>, what: impl Fn() -> String) -> Result<Mat<c64>> {
+    if b.nrows() == 1 && b[(0, 0)] != c64::ZERO {
+        return Ok(Mat::from_fn(a.nrows(), 1, |i, _| a[(i, 0)] / b[(0, 0)]));
+    }
     let rcond = match b.singular_values() {
         Ok(s) if s.first().is_some_and(|largest| *largest > 0.0) => s[s.len() - 1] / s[0],
         _ => 0.0,

@@ -158,7 +158,7 @@ impl Records<'_> {
         let witness = witness.as_ref().filter(|_| !judged.trusted())?;
         let shown = |turns: f64| *informed || witness.shows(turns);
         if let Some(without) = without_unseen(self.all, found, &shown, candidates) {
-            return Some((without, 1.0));
+            return Some((without.beside(&found.solution.chosen), 1.0));
         }
         let failed: Vec<[f64; 2]> = judged.evidence.iter().filter(|e| !e.holds()).filter_map(|e| e.hz).collect();
         let near = |hz: f64| failed.iter().any(|[low, high]| (low / BAND_RATIO..high * BAND_RATIO).contains(&hz));

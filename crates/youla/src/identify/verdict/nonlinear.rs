@@ -23,9 +23,11 @@ use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
 use crate::identify::likelihood::search::unstable::{self, with_slope_of_growth};
 use crate::linalg::TINY;
+use crate::signal::of_two_real;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
-use rustfft::FftPlanner;
+use rayon::prelude::*;
+use rustfft::{Fft, FftPlanner};
 
 /// Functions of the input in units of its standard deviation: smooth ones, and what saturation takes away.
 const OF_INPUT: [fn(f64) -> f64; 5] =
@@ -243,26 +245,31 @@ fn columns(
         let without_noise = velocity_of(clean);
         let measured = grows.then(|| velocity_of(moved));
         let velocity = measured.as_ref().unwrap_or(&without_noise);
-        for f in 0..FUNCTIONS {
-            let base = match f {
-                0 => velocity,
-                BACKLASH => &without_noise,
-                _ => &u,
-            };
-            let shaped = |t: usize| match f {
-                0 | BACKLASH => (base[t] / SMALL_VELOCITY).tanh(),
-                _ => OF_INPUT[f - 1](base[t]),
-            };
-            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(t), base[t])));
-            let work = lines_of(planner, (0..lines.samples).map(|t| shaped(t) / root));
-            plain[f * m + j] = work[1..=half].to_vec();
+        let base = |f: usize| match f {
+            0 => velocity,
+            BACKLASH => &without_noise,
+            _ => &u,
+        };
+        let shaped = |f: usize, t: usize| match f {
+            0 | BACKLASH => (base(f)[t] / SMALL_VELOCITY).tanh(),
+            _ => OF_INPUT[f - 1](base(f)[t]),
+        };
+        let fft = planner.plan_fft_forward(lines.samples);
+        let pairs = (0..FUNCTIONS).into_par_iter().step_by(2).map(|f| {
+            let second = |t: usize| if f + 1 < FUNCTIONS { shaped(f + 1, t) } else { 0.0 };
+            lines_of_two(&*fft, lines.samples, root, |t| c64::new(shaped(f, t), second(t)))
+        });
+        let pairs: Vec<[Vec<c64>; 2]> = pairs.collect();
+        for (f, of_function) in pairs.into_iter().flatten().take(FUNCTIONS).enumerate() {
+            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(f, t), base(f)[t])));
             for k in 0..half {
                 let column = |i: usize| (k * p + i) * count + f * m + j;
                 match f {
-                    BACKLASH => columns[column(seen)] = work[k + 1],
-                    _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * work[k + 1]),
+                    BACKLASH => columns[column(seen)] = of_function[k],
+                    _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * of_function[k]),
                 }
             }
+            plain[f * m + j] = of_function;
         }
     }
     Shaped { columns, sizes, plain }
@@ -276,6 +283,13 @@ fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
     }
     let count = f64::max(count, 1.0);
     (square / count - (mean / count).powi(2) - (along / count).powi(2)).max(0.0).sqrt()
+}
+
+/// Lines of two signals, the real and the imaginary parts of `both`, from the first above zero, over the root of their number of samples.
+fn lines_of_two(fft: &dyn Fft<f64>, samples: usize, root: f64, both: impl Fn(usize) -> c64 + Sync) -> [Vec<c64>; 2] {
+    let mut work: Vec<c64> = (0..samples).map(both).collect();
+    fft.process(&mut work);
+    (1..=samples / 2).map(|k| <(c64, c64)>::from(of_two_real(&work, k, 0.5 / root))).unzip().into()
 }
 
 /// Lines of a signal, from the constant on.

@@ -30,7 +30,7 @@ pub struct ExcitationPeriod {
 
 /// Detects the period of `d` (samples x m) that all channels share; constant parts and fades at the ends are allowed.
 ///
-/// Costs one transform of twice the record for every two channels, up to three where the ends do not repeat.
+/// Costs one transform of twice the record for every two channels, up to three where the ends rest or do not repeat.
 ///
 /// # Errors
 /// [`Error::NotPeriodic`] unless at least two whole periods repeat within 1e-9 of the variance, [`Error::NotFinite`].
@@ -47,7 +47,9 @@ pub fn detect_period(d: MatRef<f64>) -> Result<ExcitationPeriod> {
     let active = active_rows(d);
     let quarter = active.len() / 4;
     let inner = active.start + quarter..active.end - quarter;
-    for rows in [0..d.nrows(), active, inner] {
+    let mut tried = vec![0..d.nrows(), active, inner];
+    tried.dedup();
+    for rows in tried {
         if let Some(samples) = shortest_shift(d.subrows(rows.start, rows.len())) {
             let rows = extend(d, rows, samples);
             let lines = excited_lines(d.subrows(rows.start, samples));

@@ -6,7 +6,7 @@
 //! that moves back and forth is such a peak beside an excitation: a mode that its zeros nearly cancel, at which the model fails its tests.
 
 use super::lines::Cleaned;
-use super::problem::{Problem, Solution, Task};
+use super::problem::{Choice, Problem, Solution, Task};
 use super::solve::best;
 use crate::identify::likelihood::search::with_best_inputs;
 use crate::identify::likelihood::{Candidate, Evidence};
@@ -23,6 +23,15 @@ pub(crate) struct WithoutUnseen {
 }
 
 impl WithoutUnseen {
+    /// The same with the model that has the modes as a rival of equal weight: where the excitation shows nothing, the records do not say whether
+    /// plant or noise has them, and the region holds what they would do in the plant.
+    pub(crate) fn beside(mut self, with: &Choice) -> Self {
+        let Solution { chosen, rivals, samples } = &mut self.found.solution;
+        let criterion = with.criterion + chosen.as_rival(*samples) - with.as_rival(*samples);
+        rivals.push(Choice { criterion, ..with.clone() });
+        self
+    }
+
     /// The modes that were left out.
     pub(crate) fn evidence(&self, ts: f64) -> Evidence {
         let question = "Resonances that only the noise shows, left to the model of the noise (unseen modes)";
@@ -97,6 +106,10 @@ mod tests {
         let pole = left.found.point.model.poles()[0];
         assert!(left.order() == 1 && pole.im == 0.0 && (0.8..1.0).contains(&pole.re), "{} {pole}", left.order());
         assert!(less.turns.len() == 1 && (less.turns[0] - 0.1).abs() < 1e-3, "{:?}", less.turns);
+        let beside = without(&|turns| turns < 0.05).unwrap().beside(&now.solution.chosen).found.solution;
+        let (last, samples) = (beside.rivals.last().unwrap(), beside.samples);
+        assert_eq!(last.order(), 3);
+        assert!((last.as_rival(samples) - beside.chosen.as_rival(samples)).abs() < 1e-6);
         let evidence = less.evidence(1e-3);
         assert!(evidence.holds() && evidence.note.starts_with("at 100."), "{evidence}");
     }

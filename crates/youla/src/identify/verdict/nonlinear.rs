@@ -230,10 +230,11 @@ fn columns(
     let grows = model.poles().iter().any(|p| p.norm() > 1.0);
     let moved = if grows { &lines.y } else { clean };
     let root = (lines.samples as f64).sqrt();
+    let fft = planner.plan_fft_forward(lines.samples);
     for i in 0..p {
         let (size, y) = in_time(lines, planner, |k| moved[k * p + i]);
-        let work = lines_of(planner, y.iter().enumerate().map(|(t, y)| time(t) * size * y / lines.samples as f64));
-        (0..half).for_each(|k| columns[(k * p + i) * count + drift] = work[k + 1]);
+        let [drifted, _] = lines_of_two(&*fft, lines.samples, |t| c64::new(time(t) * size * y[t] / root, 0.0));
+        (0..half).for_each(|k| columns[(k * p + i) * count + drift] = drifted[k]);
     }
     for j in 0..m {
         let (_, u) = in_time(lines, planner, |k| lines.u[k * m + j]);
@@ -254,10 +255,9 @@ fn columns(
             0 | BACKLASH => (base(f)[t] / SMALL_VELOCITY).tanh(),
             _ => OF_INPUT[f - 1](base(f)[t]),
         };
-        let fft = planner.plan_fft_forward(lines.samples);
         let pairs = (0..FUNCTIONS).into_par_iter().step_by(2).map(|f| {
             let second = |t: usize| if f + 1 < FUNCTIONS { shaped(f + 1, t) } else { 0.0 };
-            lines_of_two(&*fft, lines.samples, root, |t| c64::new(shaped(f, t), second(t)))
+            lines_of_two(&*fft, lines.samples, |t| c64::new(shaped(f, t), second(t)))
         });
         let pairs: Vec<[Vec<c64>; 2]> = pairs.collect();
         for (f, of_function) in pairs.into_iter().flatten().take(FUNCTIONS).enumerate() {
@@ -286,18 +286,11 @@ fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
 }
 
 /// Lines of two signals, the real and the imaginary parts of `both`, from the first above zero, over the root of their number of samples.
-fn lines_of_two(fft: &dyn Fft<f64>, samples: usize, root: f64, both: impl Fn(usize) -> c64 + Sync) -> [Vec<c64>; 2] {
+fn lines_of_two(fft: &dyn Fft<f64>, samples: usize, both: impl Fn(usize) -> c64) -> [Vec<c64>; 2] {
     let mut work: Vec<c64> = (0..samples).map(both).collect();
     fft.process(&mut work);
-    (1..=samples / 2).map(|k| <(c64, c64)>::from(of_two_real(&work, k, 0.5 / root))).unzip().into()
-}
-
-/// Lines of a signal, from the constant on.
-fn lines_of(planner: &mut FftPlanner<f64>, signal: impl ExactSizeIterator<Item = f64>) -> Vec<c64> {
-    let samples = signal.len();
-    let mut work: Vec<c64> = signal.map(|v| c64::new(v, 0.0)).collect();
-    planner.plan_fft_forward(samples).process(&mut work);
-    work
+    let half = 0.5 / (samples as f64).sqrt();
+    (1..=samples / 2).map(|k| <(c64, c64)>::from(of_two_real(&work, k, half))).unzip().into()
 }
 
 /// Size of a signal and the signal in time from its lines, without its mean and of unit size.

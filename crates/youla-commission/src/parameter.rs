@@ -29,6 +29,8 @@ pub(crate) struct NewLoop {
     pub(crate) models: usize,
     /// Largest magnitude of a closed-loop pole over them.
     pub(crate) worst_pole: f64,
+    /// Standard deviation of its least damping by the region of the model.
+    pub(crate) damping_deviation: f64,
 }
 
 /// Q from beta to alpha with K(Q) = `controller`, `J_G` closed with it; its order is the sum of both.

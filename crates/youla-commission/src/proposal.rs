@@ -132,10 +132,12 @@ fn loaded(running: &RunningLoop, new: Redesign) -> Result<NewLoop> {
     let Some(band) = new.band.filter(|band| band.holds()) else {
         return refuse("there is no certificate over the region of S".into());
     };
+    let damping = new.intervals.and_then(|intervals| intervals.least_damping);
     let controller = new.controller.system;
     if !controller.is_stable()? {
         return refuse("the new controller is unstable itself".into());
     }
     let q = parameter_of(running, &controller)?;
-    Ok(NewLoop { controller, q, models: band.within, worst_pole: band.worst_within })
+    let damping_deviation = damping.map_or(f64::INFINITY, |interval| interval.deviation);
+    Ok(NewLoop { controller, q, models: band.within, worst_pole: band.worst_within, damping_deviation })
 }

@@ -64,9 +64,8 @@ pub(crate) fn predict(
         .collect();
     let measured: Vec<f64> = measured.into_iter().collect::<Result<_>>()?;
     let (mean, spread) = moments(&measured);
-    let of_model = model_deviation(model, new, sizes)?;
     // A further measurement beside the mean of the rehearsals, the error of the model, and what it does not hold.
-    let of_rest = UNMODELLED * state.damping;
+    let (of_model, of_rest) = (new.damping_deviation, UNMODELLED * state.damping);
     let deviation =
         (spread * spread * (1.0 + 1.0 / REHEARSALS as f64) + of_model * of_model + of_rest * of_rest).sqrt();
     let half = STUDENT * deviation;
@@ -99,15 +98,6 @@ fn rehearsed(noisy: &StateSpace<Discrete>, v: MatRef<'_, f64>, covariance: &Mat<
     let e = white * root.L().transpose();
     let signals = block(&[&[v, e.as_ref()]]);
     Ok(simulate(noisy, signals.as_ref(), &vec![0.0; noisy.order()])?)
-}
-
-/// Standard deviation of the predicted damping by the error of the model, over the region of the model.
-fn model_deviation(model: &Recommendation, new: &NewLoop, sizes: Sizes<'_>) -> Result<f64> {
-    let damping = |plant: &StateSpace<Discrete>| {
-        Ok(vec![least_damping(&disturbance_response(plant, &new.controller)?.in_units(sizes.input, sizes.output))?])
-    };
-    let intervals = model.region.intervals(LEVEL, damping)?;
-    Ok(intervals.first().map_or(f64::INFINITY, |damping| damping.deviation))
 }
 
 /// Mean and standard deviation.

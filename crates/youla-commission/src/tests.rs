@@ -120,7 +120,8 @@ fn short() -> Campaign {
 #[test]
 fn a_campaign_that_was_stopped_goes_on_and_keeps_what_is_done() {
     let place = Place::new("circle");
-    let campaign = short();
+    // Over the region of this record the shares of two modes pass the least that counts: the damping is that of one pole, followed.
+    let campaign = Campaign { seed: 30, ..short() };
     let refused = place.run(&campaign, "out", false).0.unwrap();
     let point = &refused.points[0];
     assert_eq!((point.status, point.switches, refused.done), (PointStatus::Stopped, 0, false));

@@ -8,7 +8,7 @@
 //! behind an integrator. Samples of inputs at a limit, and those whose equation contains them, are left out. The error dF of the law counts as
 //! `|dF T (I - F T)^-1|` with `s = T u` in the loop: a wrong gain or delay where the loop gain is small harms nobody.
 
-use super::limits::{AS_STATED, AT_LIMIT, LARGEST_CONTROLLER_ERROR, NEARLY_EXACT};
+use super::limits::{AS_STATED, AT_LIMIT, LARGEST_CONTROLLER_ERROR, LARGEST_INPUTS, NEARLY_EXACT};
 use super::local_error::{Channels, LocalErrors, RecordLines, band_count, hann};
 use crate::identify::likelihood::data::spectra::lines_of;
 use crate::identify::likelihood::{Evidence, LoopKnowledge, LoopSignals};
@@ -41,13 +41,14 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
     // An observer sees inputs and outputs, which the excitation moves together: its error counts per input of the plant, `dF T`.
     let observer = law.inputs() > plant.outputs();
     let gain = filter_gain(law, &all);
-    let residuals: Vec<Residual> = all.iter().map(|r| residual(law, &gain, r)).collect();
+    let (residuals, beyond) = residuals(law, &gain, &all);
     let share = rest(&residuals, &all);
     if share < NEARLY_EXACT {
-        return Ok(Some(
-            Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR)
-                .noted(format!("the stated controller reproduces the logged inputs to {:.1e}", share)),
-        ));
+        let mut note = format!("the stated controller reproduces the logged inputs to {share:.1e}");
+        if beyond {
+            note += " but for those after the largest ones: they were logged before a limit";
+        }
+        return Ok(Some(Evidence::new(QUESTION, 0.0, LARGEST_CONTROLLER_ERROR).noted(note)));
     }
     let lines: Vec<[Vec<c64>; 3]> = all
         .iter()
@@ -94,8 +95,7 @@ pub(crate) fn controller(known: &LoopKnowledge<'_>, plant: &StateSpace<Discrete>
 pub(crate) fn explains(known: &LoopKnowledge<'_>) -> bool {
     let Some(law) = known.controller else { return true };
     let all: Vec<&LoopSignals<'_>> = known.estimation.iter().collect();
-    let gain = filter_gain(law, &all);
-    let residuals: Vec<Residual> = all.iter().map(|r| residual(law, &gain, r)).collect();
+    let (residuals, _) = residuals(law, &filter_gain(law, &all), &all);
     rest(&residuals, &all) < AS_STATED
 }
 
@@ -234,9 +234,25 @@ struct Residual {
     left_out: usize,
 }
 
-fn residual(law: &StateSpace<Discrete>, gain: &Mat<f64>, r: &LoopSignals<'_>) -> Residual {
+/// The residuals, and whether the largest inputs had to be left out for the law to hold: a command that is logged before a limit shows it where
+/// the controller goes on with what the limit left.
+fn residuals(law: &StateSpace<Discrete>, gain: &Mat<f64>, records: &[&LoopSignals<'_>]) -> (Vec<Residual>, bool) {
+    let without = |limited: fn(&LoopSignals<'_>) -> Vec<bool>| -> Vec<Residual> {
+        records.iter().map(|r| residual(law, gain, r, &limited(r))).collect()
+    };
+    let all = without(at_limit);
+    if rest(&all, records) < NEARLY_EXACT {
+        return (all, false);
+    }
+    let below = without(among_largest);
+    match rest(&below, records) < NEARLY_EXACT {
+        true => (below, true),
+        false => (all, false),
+    }
+}
+
+fn residual(law: &StateSpace<Discrete>, gain: &Mat<f64>, r: &LoopSignals<'_>, limited: &[bool]) -> Residual {
     let (rows, n, m, q) = (r.seen.nrows(), law.order(), law.outputs(), law.inputs());
-    let limited = at_limit(r);
     let (mut x, mut values, mut left_out) = (vec![0.0; n], Mat::<f64>::zeros(rows, m), 0);
     // The first samples show where the states started.
     let mut blind = n;
@@ -281,6 +297,20 @@ fn at_limit(r: &LoopSignals<'_>) -> Vec<bool> {
             if (AT_LIMIT.0..=values.len() / AT_LIMIT.1).contains(&count) {
                 values.iter().zip(&mut out).for_each(|(v, out)| *out |= at(v));
             }
+        }
+    }
+    out
+}
+
+/// Samples in which an input is among the [`LARGEST_INPUTS`] of a record.
+fn among_largest(r: &LoopSignals<'_>) -> Vec<bool> {
+    let mut out = vec![false; r.applied.nrows()];
+    for column in r.applied.col_iter() {
+        let mut sizes: Vec<f64> = column.iter().map(|v| v.abs()).collect();
+        let place = (LARGEST_INPUTS * sizes.len() as f64) as usize;
+        if let Some(most) = sizes.len().checked_sub(1) {
+            let limit = *sizes.select_nth_unstable_by(most.saturating_sub(place), f64::total_cmp).1;
+            column.iter().zip(&mut out).for_each(|(v, out)| *out |= v.abs() >= limit);
         }
     }
     out

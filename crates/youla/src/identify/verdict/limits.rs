@@ -48,6 +48,9 @@ pub(crate) const BELOW_ONE_PERIOD: f64 = 1.0;
 /// Residual of the controller's equation over its inputs up to which the log is that of the controller: rounding of nine digits in a log
 /// gives 1e-8, of five 1e-4.
 pub(crate) const NEARLY_EXACT: f64 = 1e-4;
+/// Share of the samples, those of the largest inputs, that may have been logged before a limit: the law of the controller must hold exactly in
+/// all others. A tenth leaves half of the samples to a law of four states.
+pub(crate) const LARGEST_INPUTS: f64 = 0.1;
 /// An input is at a limit where its extreme value occurs at least so often, and in at most one of so many samples.
 pub(crate) const AT_LIMIT: (usize, usize) = (3, 2);
 /// Largest relative deviation of the difference of two parts of the records where they are compared.

@@ -17,6 +17,7 @@
 
 mod controller;
 mod excess;
+mod functions;
 pub(crate) mod limits;
 mod local_error;
 pub(crate) mod loop_ratio;

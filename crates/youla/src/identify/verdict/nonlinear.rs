@@ -8,13 +8,14 @@
 //! has x from -1 to 1 over the records. theta, beta and delta are estimated together with the parameters of the model, to which the
 //! linear and constant parts belong.
 
+use super::functions::{FINE_LIMITS, LIMITS, Shape, Shaped, columns};
 use super::limits::{
     BAND_LINES, BAND_RATIO, BEYOND_CHANCE, LARGEST_CHANGE_OF_GAIN, LARGEST_NONLINEAR, LARGEST_OF_INPUT, LARGEST_PLAY,
     LASTING,
 };
 use crate::identify::likelihood::Evidence;
 use crate::identify::likelihood::choose::problem::Solution;
-use crate::identify::likelihood::data::spectra::{Lines, Spectra};
+use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::by_output::{Ends, Normal};
 use crate::identify::likelihood::search::chart::Chart;
 use crate::identify::likelihood::search::linearise::{Extra, linearise_with};
@@ -23,36 +24,9 @@ use crate::identify::likelihood::search::point::energy;
 use crate::identify::likelihood::search::separable::separable;
 use crate::identify::likelihood::search::unstable::{self, with_slope_of_growth};
 use crate::linalg::TINY;
-use crate::signal::of_two_real;
 use crate::statistics::chi_square_deviations;
 use faer::{Mat, c64};
-use rayon::prelude::*;
-use rustfft::{Fft, FftPlanner};
-
-/// Functions of the input in units of its standard deviation: smooth ones, and what saturation takes away.
-const OF_INPUT: [fn(f64) -> f64; 5] =
-    [|u| u.powi(3), |u| u * u.abs(), |u| u * u, |u| u - u.clamp(-1.0, 1.0), |u| u - u.clamp(-1.5, 1.5)];
-/// Velocity of which friction changes its sign, in standard deviations.
-const SMALL_VELOCITY: f64 = 0.1;
-/// Place of backlash among the functions for each input: friction first, so that what stands behind it is what friction does not explain,
-/// and backlash last.
-const BACKLASH: usize = 1 + OF_INPUT.len();
-/// Functions for each input.
-const FUNCTIONS: usize = BACKLASH + 1;
-
-/// Names of the functions.
-const NAMES: [&str; FUNCTIONS] =
-    ["dry friction", "u^3", "u |u|", "u^2", "saturation at one deviation", "saturation at 1.5 deviations", "backlash"];
-
-/// The functions of one record: what they do to the outputs, and how large they are without their linear parts.
-struct Shaped {
-    /// Lines x p x functions.
-    columns: Vec<c64>,
-    /// Root mean square of each function without its part along the input or the velocity.
-    sizes: Vec<f64>,
-    /// Lines of the functions, those of one after the other.
-    plain: Vec<Vec<c64>>,
-}
+use rustfft::FftPlanner;
 
 /// What acts at an input and is no linear function of it, over frequency.
 #[derive(Debug, Clone)]
@@ -101,73 +75,131 @@ impl NonlinearPart {
 }
 
 /// Which nonlinear function of the input, or of the velocity, acts at the input, and how large is it against the input? Beyond chance it comes
-/// with its power over frequency.
+/// with its power over frequency. Where one of a few functions explains too much of the output, its limit is searched, and what counts as
+/// unknown is what it leaves.
 pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence>, Option<NonlinearPart>) {
-    let found = &solution.chosen.found;
-    let residuals = found.point.residuals(spectra);
-    let pairs = spectra.records.iter().zip(&residuals);
-    let clean: Vec<Vec<c64>> = pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
-    let mut planner = FftPlanner::new();
-    let pairs = spectra.records.iter().zip(&clean);
-    let total: usize = spectra.records.iter().map(|lines| lines.samples).sum();
-    let mut first = 0;
-    let mut shaped: Vec<Shaped> = pairs
-        .map(|(lines, clean)| {
-            let time = |t: usize| 2.0 * (first + t) as f64 / total as f64 - 1.0;
-            let found = columns(spectra, solution, lines, (clean, &time), &mut planner);
-            first += lines.samples;
-            found
-        })
-        .collect();
-    let sizes: Vec<f64> = (0..FUNCTIONS * spectra.inputs)
-        .map(|f| shaped.iter().map(|s| s.sizes[f]).sum::<f64>() / shaped.len().max(1) as f64)
-        .collect();
-    let values: Vec<Vec<c64>> = shaped.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
-    let chart = Chart::new(&found.point.model, found.feedthrough);
-    let drift = FUNCTIONS * spectra.inputs;
-    let count = drift + 1;
-    let extra = Extra { count, values: &values, quick: false };
-    let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
-    let rows = 0..factor.nrows();
-    // Each function alone: its coefficient beside the parameters, with its deviation.
-    let single = |f: usize| {
-        let along: f64 = rows.clone().map(|i| factor[(i, f)] * factor[(i, count)]).sum();
-        let own: f64 = rows.clone().map(|i| factor[(i, f)].powi(2)).sum();
-        if own > DISTINCT * lengths[f] { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
-    };
-    let telling = |backlash: bool| {
-        let these = (0..drift).filter(|f| (f / spectra.inputs == BACKLASH) == backlash);
-        let telling = these.map(|f| (f, single(f))).max_by(|a, b| a.1.1.total_cmp(&b.1.1));
-        telling.unwrap_or((0, (0.0, 0.0)))
-    };
-    let (f, (c, significance)) = telling(false);
-    let size = c * sizes[f];
-    let nonlinear_part =
-        (significance > BEYOND_CHANCE).then(|| NonlinearPart::new(spectra, &shaped, f % spectra.inputs, f, c));
-    let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
-    let of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).beyond_chance(significance);
-    let of_size = match significance > BEYOND_CHANCE {
-        true => of_size.noted(format!("most likely {} at input {}", NAMES[f / spectra.inputs], f % spectra.inputs + 1)),
-        false => of_size,
-    };
-    let of_play = play(&found.point.model, telling(true).1, significance);
-    let (c, significance) = single(drift);
-    let question = "Change of the gain from the first sample to the last, over the gain (drift of the gain)";
-    let of_drift =
-        Evidence::new(question, 2.0 * c.abs(), LARGEST_CHANGE_OF_GAIN).beyond_chance(significance).reported();
-    // Functions of the input behind friction.
-    let behind: Vec<usize> = rows
-        .filter(|i| {
-            (spectra.inputs..BACKLASH * spectra.inputs).contains(i) && factor[(*i, *i)].powi(2) > DISTINCT * lengths[*i]
-        })
-        .collect();
-    let statistic: f64 = behind.iter().map(|i| factor[(*i, count)].powi(2)).sum();
-    let moved = energy(spectra, &clean, &found.noise).max(TINY);
-    let share = ((statistic - behind.len() as f64).max(0.0) / moved).sqrt();
-    let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
-    let significance = chi_square_deviations(statistic, behind.len() as f64);
-    let of_input = Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(significance);
-    (vec![of_size, of_input, of_play, of_drift], nonlinear_part)
+    let beside = Beside::new(spectra, solution, Shape::all(&LIMITS));
+    let unknown = beside.unknown(None);
+    if unknown.holds() {
+        return beside.evidence(unknown);
+    }
+    let beside = Beside::new(spectra, solution, Shape::all(&FINE_LIMITS));
+    let unknown = beside.unknown(Some(beside.telling()));
+    beside.evidence(unknown)
+}
+
+/// The functions beside the parameters of the model.
+struct Beside<'a> {
+    spectra: &'a Spectra,
+    model: &'a Model,
+    shapes: Vec<Shape>,
+    records: Vec<Shaped>,
+    /// Energy of what the model explains, in standard deviations of the noise.
+    explained: f64,
+    /// `[R r]` of the functions, those of a shape for each input together, then the drift of the gain.
+    factor: Mat<f64>,
+    /// Squared lengths of their columns before the parameters are taken out.
+    lengths: Vec<f64>,
+}
+
+impl<'a> Beside<'a> {
+    fn new(spectra: &'a Spectra, solution: &'a Solution, shapes: Vec<Shape>) -> Self {
+        let found = &solution.chosen.found;
+        let model = &found.point.model;
+        let residuals = found.point.residuals(spectra);
+        let pairs = spectra.records.iter().zip(&residuals);
+        let clean: Vec<Vec<c64>> =
+            pairs.map(|(lines, v)| lines.y.iter().zip(v).map(|(y, v)| y - v).collect()).collect();
+        let mut planner = FftPlanner::new();
+        let total: usize = spectra.records.iter().map(|lines| lines.samples).sum();
+        let mut first = 0;
+        let pairs = spectra.records.iter().zip(&clean);
+        let mut records: Vec<Shaped> = pairs
+            .map(|(lines, clean)| {
+                let time = |t: usize| 2.0 * (first + t) as f64 / total as f64 - 1.0;
+                let found = columns(spectra, (model, &shapes), lines, (clean, &time), &mut planner);
+                first += lines.samples;
+                found
+            })
+            .collect();
+        let values: Vec<Vec<c64>> = records.iter_mut().map(|s| std::mem::take(&mut s.columns)).collect();
+        let chart = Chart::new(model, found.feedthrough);
+        let extra = Extra { count: shapes.len() * spectra.inputs + 1, values: &values, quick: false };
+        let (factor, lengths) = beside_parameters(spectra, solution, &chart, &extra);
+        let explained = energy(spectra, &clean, &found.noise).max(TINY);
+        Beside { spectra, model, shapes, records, explained, factor, lengths }
+    }
+
+    fn drift(&self) -> usize {
+        self.shapes.len() * self.spectra.inputs
+    }
+
+    /// Functions of inputs and velocities; backlash is at the output.
+    fn at_inputs(&self) -> std::ops::Range<usize> {
+        0..self.drift() - self.spectra.inputs
+    }
+
+    /// A function alone: its coefficient beside the parameters, with its deviations beyond chance.
+    fn single(&self, f: usize) -> (f64, f64) {
+        let (along, own) = self.along(f, 0);
+        if own > DISTINCT * self.lengths[f] { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
+    }
+
+    /// Products of a function with the residuals and with itself, without their parts along the functions before `first`.
+    fn along(&self, f: usize, first: usize) -> (f64, f64) {
+        let rows = first..self.factor.nrows();
+        let residual = self.drift() + 1;
+        let along = rows.clone().map(|i| self.factor[(i, f)] * self.factor[(i, residual)]).sum();
+        (along, rows.map(|i| self.factor[(i, f)].powi(2)).sum())
+    }
+
+    fn most(&self, among: impl Iterator<Item = usize>) -> usize {
+        among.max_by(|a, b| self.single(*a).1.total_cmp(&self.single(*b).1)).unwrap_or(0)
+    }
+
+    /// The function at an input that is farthest beyond chance.
+    fn telling(&self) -> usize {
+        self.most(self.at_inputs())
+    }
+
+    /// What the functions of the inputs explain of the output beyond friction and a known one.
+    fn unknown(&self, known: Option<usize>) -> Evidence {
+        let first = self.spectra.inputs;
+        let distinct = |i: &usize| self.factor[(*i, *i)].powi(2) > DISTINCT * self.lengths[*i];
+        let behind: Vec<usize> = (first..self.at_inputs().end.min(self.factor.nrows())).filter(distinct).collect();
+        let residual = self.drift() + 1;
+        let all: f64 = behind.iter().map(|i| self.factor[(*i, residual)].powi(2)).sum();
+        let of_known = known.filter(|f| *f >= first).map_or(0.0, |f| {
+            let (along, own) = self.along(f, first);
+            if own > DISTINCT * self.lengths[f] { along * along / own } else { 0.0 }
+        });
+        let (statistic, count) = (all - of_known, behind.len() as f64 - f64::from(u8::from(of_known > 0.0)));
+        let share = ((statistic - count).max(0.0) / self.explained).sqrt();
+        let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
+        Evidence::new(question, share, LARGEST_OF_INPUT).beyond_chance(chi_square_deviations(statistic, count))
+    }
+
+    fn evidence(&self, unknown: Evidence) -> (Vec<Evidence>, Option<NonlinearPart>) {
+        let inputs = self.spectra.inputs;
+        let f = self.telling();
+        let (c, significance) = self.single(f);
+        let size = c * self.records.iter().map(|s| s.sizes[f]).sum::<f64>() / self.records.len().max(1) as f64;
+        let found = significance > BEYOND_CHANCE;
+        let nonlinear_part = found.then(|| NonlinearPart::new(self.spectra, &self.records, f % inputs, f, c));
+        let question = "Nonlinear part of what acts at the inputs, over the inputs (nonlinearity)";
+        let mut of_size = Evidence::new(question, size.abs(), LARGEST_NONLINEAR).beyond_chance(significance);
+        if found {
+            let name = self.shapes[f / inputs].name();
+            of_size = of_size.noted(format!("most likely {name} at input {}", f % inputs + 1));
+        }
+        let backlash = self.single(self.most(self.at_inputs().end..self.drift()));
+        let of_play = play(self.model, backlash, significance);
+        let (c, significance) = self.single(self.drift());
+        let question = "Change of the gain from the first sample to the last, over the gain (drift of the gain)";
+        let of_drift =
+            Evidence::new(question, 2.0 * c.abs(), LARGEST_CHANGE_OF_GAIN).beyond_chance(significance).reported();
+        (vec![of_size, unknown, of_play, of_drift], nonlinear_part)
+    }
 }
 
 /// Play by its coefficient, with its deviations beyond chance: friction that is more so moves the output where its velocity changes sign, too.
@@ -210,99 +242,4 @@ const SLOW_GROWTH: f64 = 1.005;
 
 fn runs_away(model: &Model) -> bool {
     model.poles().iter().any(|p| p.norm() > SLOW_GROWTH)
-}
-
-/// The functions of one record seen through the model, lines x p x functions.
-fn columns(
-    spectra: &Spectra,
-    solution: &Solution,
-    lines: &Lines,
-    (clean, time): (&[c64], &dyn Fn(usize) -> f64),
-    planner: &mut FftPlanner<f64>,
-) -> Shaped {
-    let (m, p, half) = (spectra.inputs, spectra.outputs, lines.z.len());
-    let (drift, count) = (FUNCTIONS * m, FUNCTIONS * m + 1);
-    let model = &solution.chosen.found.point.model;
-    let responses: Vec<Vec<c64>> = lines.z.iter().map(|z| model.response(*z)).collect();
-    let mut columns = vec![c64::ZERO; half * p * count];
-    let (mut sizes, mut plain) = (vec![0.0; drift], vec![Vec::new(); drift]);
-    // What the model of an unstable plant makes of u rests on later samples too, which depend on the noise.
-    let grows = model.poles().iter().any(|p| p.norm() > 1.0);
-    let moved = if grows { &lines.y } else { clean };
-    let root = (lines.samples as f64).sqrt();
-    let fft = planner.plan_fft_forward(lines.samples);
-    for i in 0..p {
-        let (size, y) = in_time(lines, planner, |k| moved[k * p + i]);
-        let [drifted, _] = lines_of_two(&*fft, lines.samples, |t| c64::new(time(t) * size * y[t] / root, 0.0));
-        (0..half).for_each(|k| columns[(k * p + i) * count + drift] = drifted[k]);
-    }
-    for j in 0..m {
-        let (_, u) = in_time(lines, planner, |k| lines.u[k * m + j]);
-        // velocity of the output that this input moves most
-        let power = |i: usize| responses.iter().map(|g| g[i * m + j].norm_sqr()).sum::<f64>();
-        let seen = (0..p).max_by(|a, b| power(*a).total_cmp(&power(*b))).unwrap_or(0);
-        let mut velocity_of =
-            |y: &[c64]| in_time(lines, planner, |k| y[k * p + seen] * (c64::ONE - lines.z[k].conj())).1;
-        let without_noise = velocity_of(clean);
-        let measured = grows.then(|| velocity_of(moved));
-        let velocity = measured.as_ref().unwrap_or(&without_noise);
-        let base = |f: usize| match f {
-            0 => velocity,
-            BACKLASH => &without_noise,
-            _ => &u,
-        };
-        let shaped = |f: usize, t: usize| match f {
-            0 | BACKLASH => (base(f)[t] / SMALL_VELOCITY).tanh(),
-            _ => OF_INPUT[f - 1](base(f)[t]),
-        };
-        let pairs = (0..FUNCTIONS).into_par_iter().step_by(2).map(|f| {
-            let second = |t: usize| if f + 1 < FUNCTIONS { shaped(f + 1, t) } else { 0.0 };
-            lines_of_two(&*fft, lines.samples, |t| c64::new(shaped(f, t), second(t)))
-        });
-        let pairs: Vec<[Vec<c64>; 2]> = pairs.collect();
-        for (f, of_function) in pairs.into_iter().flatten().take(FUNCTIONS).enumerate() {
-            sizes[f * m + j] = beside((0..lines.samples).map(|t| (shaped(f, t), base(f)[t])));
-            for k in 0..half {
-                let column = |i: usize| (k * p + i) * count + f * m + j;
-                match f {
-                    BACKLASH => columns[column(seen)] = of_function[k],
-                    _ => (0..p).for_each(|i| columns[column(i)] = responses[k][i * m + j] * of_function[k]),
-                }
-            }
-            plain[f * m + j] = of_function;
-        }
-    }
-    Shaped { columns, sizes, plain }
-}
-
-/// Root mean square of a signal without its mean and its part along another one of mean zero and unit size.
-fn beside(pairs: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let (mut count, mut mean, mut square, mut along) = (0.0, 0.0, 0.0, 0.0);
-    for (value, base) in pairs {
-        (count, mean, square, along) = (count + 1.0, mean + value, square + value * value, along + value * base);
-    }
-    let count = f64::max(count, 1.0);
-    (square / count - (mean / count).powi(2) - (along / count).powi(2)).max(0.0).sqrt()
-}
-
-/// Lines of two signals, the real and the imaginary parts of `both`, from the first above zero, over the root of their number of samples.
-fn lines_of_two(fft: &dyn Fft<f64>, samples: usize, both: impl Fn(usize) -> c64) -> [Vec<c64>; 2] {
-    let mut work: Vec<c64> = (0..samples).map(both).collect();
-    fft.process(&mut work);
-    let half = 0.5 / (samples as f64).sqrt();
-    (1..=samples / 2).map(|k| <(c64, c64)>::from(of_two_real(&work, k, half))).unzip().into()
-}
-
-/// Size of a signal and the signal in time from its lines, without its mean and of unit size.
-fn in_time(lines: &Lines, planner: &mut FftPlanner<f64>, pick: impl Fn(usize) -> c64) -> (f64, Vec<f64>) {
-    let samples = lines.samples;
-    let mut work = vec![c64::ZERO; samples];
-    for k in 0..lines.z.len() {
-        let v = pick(k);
-        work[k + 1] = v;
-        work[samples - 1 - k] = v.conj();
-    }
-    planner.plan_fft_inverse(samples).process(&mut work);
-    let size = (work.iter().map(|v| v.re * v.re).sum::<f64>() / samples.max(1) as f64).sqrt().max(TINY);
-    (size, work.iter().map(|v| v.re / size).collect())
 }

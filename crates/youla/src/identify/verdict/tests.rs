@@ -192,10 +192,13 @@ struct Fault {
     play: f64,
     /// Change of the gain from the first sample to the last.
     drift: f64,
+    /// Limit and dead zone of what acts, whose size is about 1; the log holds the command.
+    limit: f64,
+    dead: f64,
     noise: f64,
 }
 
-const NONE: Fault = Fault { friction: 0.0, play: 0.0, drift: 0.0, noise: 0.05 };
+const NONE: Fault = Fault { friction: 0.0, play: 0.0, drift: 0.0, limit: f64::INFINITY, dead: 0.0, noise: 0.05 };
 
 fn with_friction(friction: f64) -> Identified {
     with(&Fault { friction, ..NONE })
@@ -214,7 +217,9 @@ fn with(fault: &Fault) -> Identified {
         y[(k, 0)] = gap + n[(k, 0)];
         u[(k, 0)] = -0.8 * y[(k, 0)] + d[(k, 0)];
         let gain = 1.0 + fault.drift * (k as f64 / rows as f64 - 0.5);
-        let acts = gain * u[(k, 0)] - fault.friction * ((moved - before) / 0.005).tanh();
+        let command = u[(k, 0)].clamp(-fault.limit, fault.limit);
+        let acts = gain * (command - command.clamp(-fault.dead, fault.dead))
+            - fault.friction * ((moved - before) / 0.005).tanh();
         x = g.a() * &x + g.b() * acts;
         before = moved;
     }
@@ -267,4 +272,48 @@ fn a_gain_that_drifts_is_named_with_its_size() {
     assert!(clean.significance.unwrap() < 3.0 && clean.outcome == Outcome::Passed, "{clean}");
     assert!(drifts.outcome == Outcome::Failed && !drifts.required, "{drifts}");
     assert!((drifts.figure / 0.06 - 1.0).abs() < 0.1, "{drifts}");
+}
+
+/// One sample in a hundred is cut: the model holds and the limit is named. One in four: what acts is not the log.
+#[test]
+fn a_command_logged_before_its_limit_is_judged_by_what_the_limit_takes() {
+    let [rare, often, dead] = [(2.9, 0.0), (1.1, 0.0), (f64::INFINITY, 0.07)]
+        .map(|(limit, dead)| with(&Fault { limit, dead, noise: 0.005, ..NONE }));
+    for (found, name) in [(&rare, "saturation at 2"), (&often, "saturation at 1 "), (&dead, "a dead zone of 0.0")] {
+        let test = outcome(found, "(nonlinearity)");
+        assert!(test.note.contains(name), "{test}");
+        assert_eq!(outcome(found, "(saturation)").outcome, Outcome::Passed, "{}", outcome(found, "(saturation)"));
+    }
+    assert!(rare.trusted() && dead.trusted(), "{:?} {:?}", rare.reasons(), dead.reasons());
+    assert_eq!(outcome(&often, "(nonlinearity)").outcome, Outcome::Failed);
+}
+
+/// `u = 0.8 (what the limit left) - 0.05 y`: the law of the file holds but for the samples after those at the limit.
+#[test]
+fn a_law_that_goes_on_from_the_limited_input_is_the_stated_one() {
+    let law = |gain: f64| {
+        let of = |value: f64| Mat::from_fn(1, 1, |_, _| value);
+        StateSpace::new(of(0.8), of(-0.04 * gain), of(1.0), of(-0.05 * gain), time()).unwrap()
+    };
+    let (g, rng) = (plant(1.0), &mut ChaCha8Rng::seed_from_u64(3));
+    let mut normal = |size: f64| Mat::from_fn(CLEAN.samples, 1, |_, _| size * rng.sample::<f64, _>(StandardNormal));
+    let (d, n) = (normal(1.0), normal(0.05));
+    let (mut u, mut y) = (d.clone(), n.clone());
+    let (mut x, mut kept) = (Mat::<f64>::zeros(3, 1), 0.0);
+    for k in 0..CLEAN.samples {
+        y[(k, 0)] += (g.c() * &x)[(0, 0)];
+        u[(k, 0)] += 0.8 * kept - 0.05 * y[(k, 0)];
+        let acts = u[(k, 0)].clamp(-2.6, 2.6);
+        kept = acts - d[(k, 0)];
+        x = g.a() * &x + g.b() * acts;
+    }
+    let record = LoopRecord::new(time(), u, y).unwrap().with_input_excitation(d).unwrap();
+    let [right, wrong] = [1.0, 3.0].map(|gain| {
+        let running = RunningController::new(law(gain));
+        identify(std::slice::from_ref(&record), &[], &running, None, &LikelihoodOptions::default()).unwrap()
+    });
+    let test = outcome(&right, "(controller)");
+    assert!(test.outcome == Outcome::Passed && test.note.contains("logged before a limit"), "{test}");
+    assert!(right.trusted(), "{:?}", right.reasons());
+    assert!(!outcome(&wrong, "(controller)").note.contains("before a limit"), "{}", outcome(&wrong, "(controller)"));
 }

@@ -91,7 +91,8 @@ pub struct Region {
     pub absolute: Vec<Mat<f64>>,
     /// What causes it: the squares of the parts sum to that of `absolute`.
     pub parts: RegionParts,
-    /// The frequencies as shares of the sample rate.
+    /// The frequencies as shares of the sample rate, from which a stored region is computed again to the bit.
+    #[cfg(feature = "serde")]
     pub(super) shares: Vec<f64>,
     pub(super) sizes: Sizes,
     pub(super) time: Discrete,
@@ -113,7 +114,16 @@ impl Region {
             variation: all(|p| &p.variation),
             distortion: all(|p| &p.distortion),
         };
-        Region { hz, absolute, parts, shares: shares.to_vec(), sizes, time, directions }
+        Region {
+            hz,
+            absolute,
+            parts,
+            #[cfg(feature = "serde")]
+            shares: shares.to_vec(),
+            sizes,
+            time,
+            directions,
+        }
     }
 
     /// Sizes of the channels, root mean square over the records.

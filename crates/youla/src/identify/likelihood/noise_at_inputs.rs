@@ -1,11 +1,12 @@
 //! Noise that enters at the inputs of a plant: its likelihood, its predictor, and a control without it.
 
 use super::deviation::innovation::predictor;
-use super::search::deviance;
+use super::search::chart::Chart;
 use super::search::model::Model;
 use super::search::noise::Noise;
 use super::search::with_best_ends;
-use super::{Discrete, Experiment, LikelihoodOptions, recommend};
+use super::search::{deviance, driven_slope};
+use super::{Discrete, Experiment, LikelihoodOptions, Predictor, recommend};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::lti::{StateSpace, frequency_response, simulate};
 use crate::{Mat, c64};
@@ -112,9 +113,49 @@ fn noise_at_the_input_leaves_no_modes_beside_those_of_the_plant() {
     let time = Discrete::new(1e-3).unwrap();
     let found = recommend(&records, &[], None, time, &LikelihoodOptions::default()).unwrap();
     assert_eq!(found.order, 3, "{:?}", found.modes);
+    // After the steps of a search the predictor is still that of the noise.
+    let Predictor { a, c, k, covariance, .. } = found.predictor;
+    let h = StateSpace::new(a, k.unwrap(), c, Mat::identity(1, 1), time).unwrap();
     // Not at the peak, three lines wide, where the noise leaves 10 %.
     for share in [0.005, 0.018, 0.024, 0.05] {
         let (own, of_machine) = (gain(&found.plant, share), gain(&machine(0.98), share));
         assert!((own / of_machine).ln().abs() < 0.1, "{share}: {own} and {of_machine}");
+        let stated = gain(&h, share) * covariance[(0, 0)];
+        let true_power = 0.005_f64.powi(2) + 0.3_f64.powi(2) * of_machine;
+        assert!((stated / true_power).ln().abs() < 0.3, "{share}: {stated} and {true_power}");
+    }
+}
+
+/// `1/2 sum log (1 + lambda |G|^2) + |e|^2 / Lambda`, the size of e that of its filter, by central differences.
+#[test]
+fn the_slope_of_noise_at_the_input_is_that_of_its_likelihood() {
+    let (u, y) = record(0.3, 0.02, 6);
+    let (spectra, plant) = (unscaled(&u, &y), machine(0.97));
+    let model = Model::of(plant.a(), plant.b(), plant.c(), vec![0.0]).unwrap();
+    let point = with_best_ends(&spectra, model.clone(), &Noise::white(1));
+    let (_, noise) = deviance(&spectra, &point, 40);
+    let ratio = noise.regression[0].driven.as_ref().unwrap().ratio;
+    let (lines, residuals) = (&spectra.records[0], point.residuals(&spectra));
+    let shape = |model: &Model, k: usize| 1.0 + ratio * model.response(lines.z[k])[0].norm_sqr();
+    let value = |moved: &Model| -> f64 {
+        let of_line = |k: usize| {
+            let mut filter = [c64::ZERO];
+            noise.filters(lines.z[k], &mut filter);
+            let e = (filter[0] * residuals[0][k]).norm_sqr() * lines.weight[k].powi(2) / noise.covariance[(0, 0)];
+            lines.share[k] * shape(moved, k).ln() + e * shape(&model, k) / shape(moved, k)
+        };
+        0.5 * (0..lines.z.len()).map(of_line).sum::<f64>()
+    };
+    let chart = Chart::new(&model, false);
+    let slope = driven_slope::slope(&spectra, &point, &chart, &noise);
+    let largest = slope.iter().fold(0.0_f64, |most, s| most.max(s.abs()));
+    for q in 0..chart.parameters() {
+        let at = |h: f64| {
+            let mut step = vec![0.0; chart.parameters()];
+            step[q] = h;
+            value(&chart.moved(&model, &step))
+        };
+        let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
+        assert!((slope[q] - difference).abs() < 1e-5 * largest, "{q}: {} and {difference}", slope[q]);
     }
 }

@@ -148,7 +148,16 @@ impl Problem<'_> {
             .map_or_else(Mat::new, |known| Mat::from_fn(m, p, |j, i| if delays[j] == 0 { known[(j, i)] } else { 0.0 }));
         let radius = if self.open_loop { 1.0 + GROWTH / self.samples().0 as f64 } else { f64::INFINITY };
         let aim = f64::INFINITY;
-        SearchOptions { feedthrough: self.feedthrough, noise_order: NOISE_ORDER, steps, tolerance, aim, direct, radius }
+        SearchOptions {
+            feedthrough: self.feedthrough,
+            noise_order: NOISE_ORDER,
+            steps,
+            tolerance,
+            aim,
+            direct,
+            radius,
+            filter_moves: false,
+        }
     }
 
     /// The same with D moving or not.

@@ -6,7 +6,7 @@ use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use super::wide;
 use crate::identify::likelihood::Candidate;
 use crate::identify::likelihood::data::lag_sums::LagSums;
-use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
+use crate::identify::likelihood::search::{SearchOptions, search, with_best_ends, with_best_inputs};
 use crate::identify::subspace::Experiment;
 use std::sync::Arc;
 
@@ -96,7 +96,8 @@ impl Problem<'_> {
         let mut chosen = calmest(&tried, at)?.clone();
         let spectra = self.spectra(&chosen.delays);
         let last = self.with_feedthrough(chosen.found.feedthrough);
-        if let Some(found) = search(&spectra, chosen.found.point.clone(), &last.options(40, 0.01, &chosen.delays)) {
+        let options = SearchOptions { filter_moves: true, ..last.options(40, 0.01, &chosen.delays) };
+        if let Some(found) = search(&spectra, chosen.found.point.clone(), &options) {
             let last = self.choice(found, spectra.samples(), chosen.delays.clone(), chosen.origin.clone());
             if last.stabilised() || !chosen.stabilised() {
                 chosen = last;

@@ -35,7 +35,13 @@ impl Regression {
         filter
     }
 
-    /// `(1 + a_1 / z + ...) / (1 - b / z)`, given `1 / z`.
+    /// `(1 + a_1 / z + ...) / (1 - b / z)` at one line, given `1 / z`.
+    pub(crate) fn at(&self, back: c64) -> c64 {
+        let sum = self.coefficients.iter().rev().fold(c64::ZERO, |sum, a| (sum + *a) * back);
+        (sum + c64::ONE) / (c64::ONE - back * self.zero)
+    }
+
+    /// The same of several, as lanes.
     #[inline(always)]
     pub(crate) fn behind(&self, back: &Lanes) -> Lanes {
         let mut filter = Lanes::ZERO;

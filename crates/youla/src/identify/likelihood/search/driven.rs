@@ -7,6 +7,7 @@
 //! of the order that it takes does not describe at a resonance of few lines; modes beside it in G would. K_i is the gain of a Kalman
 //! filter, so that H_i has its zeros inside of the unit circle. An autoregression describes what is left.
 
+use super::autoregression::Regression;
 use super::block::Block;
 use super::model::Model;
 use super::state_lanes::resolvent;
@@ -36,6 +37,8 @@ const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 pub(crate) struct Driven {
     /// Quadratics of numerator and denominator: `(1 + c_1 / z + c_2 / z^2) / (1 + d_1 / z + d_2 / z^2)`.
     sections: Vec<[f64; 4]>,
+    /// lambda.
+    pub(crate) ratio: f64,
     /// Product of the magnitudes of the poles outside of the unit circle, which the filter mirrors: `1 / H_i` over its size.
     pub(crate) unstable: f64,
     /// K_i, one for each state of the model.
@@ -47,12 +50,13 @@ pub(crate) struct Driven {
 }
 
 impl Driven {
-    /// The most likely size of such noise in the residual of an output, on the lines of each record; `None` where there is none.
+    /// The most likely size of such noise in the residual of an output, on the lines of each record, with an autoregression behind it; `None` where
+    /// there is none.
     pub(crate) fn new(
         model: &Model,
         (spectra, gains): (&Spectra, &Gains),
         residual: &[Vec<c64>],
-        output: usize,
+        (output, behind): (usize, &Regression),
     ) -> Option<Self> {
         let samples = spectra.samples() as f64;
         let poles = model.poles();
@@ -62,7 +66,7 @@ impl Driven {
         }
         let hidden = &gains.hidden[output];
         let seen = model.without(hidden);
-        let ratio = size(&lines((spectra, gains), residual, output), samples)?;
+        let ratio = size(&lines((spectra, gains), residual, (output, behind)), samples)?;
         let (a, b, c) = seen.matrices();
         let c = c.subrows(output, 1).to_owned();
         let q = &b * b.transpose() * Scale(ratio);
@@ -81,7 +85,7 @@ impl Driven {
             at += used;
         }
         let (a, _, c) = model.matrices();
-        Some(Driven { sections, unstable, gain, a, c: c.subrows(output, 1).to_owned() })
+        Some(Driven { sections, ratio, unstable, gain, a, c: c.subrows(output, 1).to_owned() })
     }
 
     /// Multiplies by `1 / H_i`, given `1 / z`.
@@ -151,16 +155,16 @@ impl NullaryFnOnce for Rest<'_> {
 /// `|G_i|^2` of the blocks that an output sees, on some of the lines.
 pub(crate) struct Gains {
     /// Per record lines x p.
-    values: Vec<Vec<f64>>,
+    pub(crate) values: Vec<Vec<f64>>,
     /// Every how many lines.
-    every: usize,
+    pub(crate) every: usize,
     /// Blocks that are left out, for each output.
-    hidden: Vec<Vec<usize>>,
+    pub(crate) hidden: Vec<Vec<usize>>,
 }
 
 impl Gains {
     pub(crate) fn new(model: &Model, spectra: &Spectra) -> Self {
-        let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64;
+        let longest = longest(spectra);
         let hidden: Vec<Vec<usize>> = (0..model.outputs).map(|output| hidden(model, longest, output)).collect();
         let every = spectra.lines().div_ceil(LINES).max(1);
         let triangular = |block: &Block| block.triangular(&[]).map_or_else(|| block.clone(), |(block, _)| block);
@@ -181,9 +185,22 @@ fn hidden(model: &Model, longest: f64, output: usize) -> Vec<usize> {
         size(&block.b) * size(&block.c[output * block.states..(output + 1) * block.states])
     };
     let largest = model.blocks.iter().map(reach).fold(0.0, f64::max);
-    let narrow = |p: &c64| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU;
-    let left_out = |block: &Block| reach(block) <= UNSEEN * largest || block.poles().iter().any(narrow);
+    let left_out = |block: &Block| reach(block) <= UNSEEN * largest || is_line(block, longest);
     (0..model.blocks.len()).filter(|k| left_out(&model.blocks[*k])).collect()
+}
+
+fn is_line(block: &Block, longest: f64) -> bool {
+    block.poles().iter().any(|p| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU)
+}
+
+/// Whether a mode is a line of the noise.
+pub(crate) fn has_line(model: &Model, spectra: &Spectra) -> bool {
+    let longest = longest(spectra);
+    model.blocks.iter().any(|block| is_line(block, longest))
+}
+
+fn longest(spectra: &Spectra) -> f64 {
+    spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64
 }
 
 /// The gains on the lines of a record, with the widest instructions that the processor has.
@@ -231,13 +248,18 @@ impl NullaryFnOnce for GainsOf<'_> {
     }
 }
 
-/// Of some of the lines how many of the full circle each stands for, power of the residual of these, and `|G_i|^2`.
-fn lines((spectra, gains): (&Spectra, &Gains), residual: &[Vec<c64>], output: usize) -> Vec<[f64; 3]> {
+/// Of some of the lines how many of the full circle each stands for, power of the residual of these behind an autoregression, and `|G_i|^2`.
+fn lines(
+    (spectra, gains): (&Spectra, &Gains),
+    residual: &[Vec<c64>],
+    (output, behind): (usize, &Regression),
+) -> Vec<[f64; 3]> {
     let (p, every) = (spectra.outputs, gains.every);
     let mut out = Vec::with_capacity(LINES);
     for ((lines, v), gains) in spectra.records.iter().zip(residual).zip(&gains.values) {
         for (k, gains) in (0..lines.z.len()).step_by(every).zip(gains.chunks_exact(p)) {
             let (count, power) = (lines.share[k], lines.weight[k].powi(2) * v[k].norm_sqr());
+            let power = power * behind.at(lines.z[k].conj()).norm_sqr();
             out.push([count * every as f64, power * every as f64, gains[output]]);
         }
     }

@@ -12,6 +12,7 @@ pub(crate) mod block;
 pub(crate) mod by_output;
 pub(crate) mod chart;
 pub(crate) mod driven;
+pub(crate) mod driven_slope;
 pub(crate) mod feedthrough;
 pub(crate) mod grouping;
 pub(crate) mod groups;
@@ -29,6 +30,7 @@ use crate::identify::likelihood::data::spectra::Spectra;
 use crate::linalg::{Damping, LEAST_DAMPING, Trial, damped_step, decrease};
 use by_output::{Ends, Normal};
 use chart::Chart;
+use driven::has_line;
 use faer::Mat;
 use groups::grouped;
 use linearise::{Linearised, linearise_quickly};
@@ -54,6 +56,8 @@ pub(crate) struct SearchOptions {
     pub(crate) direct: Mat<f64>,
     /// Largest magnitude of a pole.
     pub(crate) radius: f64,
+    /// Whether the last steps count what the plant does to the spectrum of noise at its inputs.
+    pub(crate) filter_moves: bool,
 }
 
 /// Damping of the first step, relative to the squared lengths of the columns of the Jacobian: starts from long regressions lie near enough
@@ -185,10 +189,16 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
     }
     let (mut damping, mut steps) = (Damping::new(FIRST_DAMPING), 0);
     let mut parameters = Chart::new(&point.model, options.feedthrough).parameters();
+    // First with the filter of the noise held, which takes the fewest steps; noise at the inputs then moves it with the plant.
+    let mut filter_moves = false;
     while steps < options.steps {
         let chart = Chart::new(&point.model, options.feedthrough);
         parameters = chart.parameters();
-        let slope = slope(spectra, &point.model, &chart, options);
+        let mut slope = slope(spectra, &point.model, &chart, options);
+        if filter_moves {
+            let of_noise = driven_slope::slope(spectra, &point, &chart, &noise);
+            slope.iter_mut().zip(of_noise).for_each(|(slope, of_noise)| *slope += of_noise);
+        }
         let slopes = Slopes::new(spectra, &point, (&chart, &noise), slope);
         let lower = damping.descend(|damping| {
             let (trial, promised) = slopes.trial(&point, damping);
@@ -203,17 +213,29 @@ fn on_lines(spectra: &Spectra, start: Point, options: &SearchOptions) -> Option<
             }
             Trial::Rejected
         });
-        let Some((trial, value, lower_noise)) = lower else { break };
-        steps += 1;
-        let gain = least - value;
-        (point, least, noise) = (reblocked(&trial)?, value, lower_noise);
+        let mut gain = 0.0;
+        if let Some((trial, value, lower_noise)) = lower {
+            steps += 1;
+            gain = least - value;
+            (point, least, noise) = (reblocked(&trial)?, value, lower_noise);
+        }
         if gain < options.tolerance {
-            break;
+            // A mode that is a line of the noise is first taken out of the outputs, at the frequency that it has here.
+            let last = || filter_moves || !noise.enters_at_inputs() || has_line(&point.model, spectra);
+            if !options.filter_moves || last() {
+                break;
+            }
+            (filter_moves, damping) = (true, Damping::new(FIRST_DAMPING));
+            continue;
         }
         let penalty = penalty(parameters + noise.parameters(), spectra.samples(), &point);
         if steps >= 3 && least + penalty - options.aim > STEPS_TO_AIM * gain {
             break;
         }
+    }
+    // The gain of noise at the inputs belongs to the coordinates of its model, which are others after `reblocked`.
+    if noise.enters_at_inputs() {
+        noise = cost(spectra, &point, options).1;
     }
     Some(Found { point, noise, deviance: least, parameters, steps, feedthrough: options.feedthrough })
 }

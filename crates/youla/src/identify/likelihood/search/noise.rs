@@ -33,6 +33,8 @@ pub(crate) struct Noise {
     pub(crate) log_det: f64,
 }
 
+/// Sizes of noise at the inputs that are tried one after the other.
+const SIZES: usize = 2;
 /// Residuals below this share of the (unit) outputs are rounding.
 const ROUNDING: f64 = 1e-7;
 
@@ -54,11 +56,23 @@ impl Noise {
             let own = |v: &Vec<c64>| v.iter().skip(i).step_by(p).copied().collect();
             let own: Vec<Vec<c64>> = residuals.iter().map(own).collect();
             let (plain, least) = behind(&own);
-            let Some(driven) = Driven::new(model, (spectra, &gains), &own, i) else { return (plain, own) };
-            let rest = driven.rest(spectra, &own);
-            let (noise, criterion) = behind(&rest);
-            let better = criterion + log < least;
-            if better { (Regression { driven: Some(Arc::new(driven)), ..noise }, rest) } else { (plain, own) }
+            // The size of noise at the inputs first as if white noise were left, then with the autoregression that is.
+            let (mut best, mut known) = ((plain, own.clone(), least - log), Regression::default());
+            for _ in 0..SIZES {
+                let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known)) else { break };
+                let rest = driven.rest(spectra, &own);
+                let (noise, criterion) = behind(&rest);
+                if criterion >= best.2 {
+                    break;
+                }
+                let white = noise.coefficients.is_empty();
+                known.clone_from(&noise);
+                best = (Regression { driven: Some(Arc::new(driven)), ..noise }, rest, criterion);
+                if white {
+                    break;
+                }
+            }
+            (best.0, best.1)
         };
         let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise { regression, ..Noise::white(p) };
@@ -114,18 +128,16 @@ impl Noise {
     pub(crate) fn filters(&self, z: c64, out: &mut [c64]) {
         let back = z.conj();
         for (value, regression) in out.iter_mut().zip(&self.regression) {
-            let mut sum = c64::ZERO;
-            for a in regression.coefficients.iter().rev() {
-                sum = (sum + c64::new(*a, 0.0)) * back;
-            }
-            *value = sum + c64::ONE;
-            if regression.zero != 0.0 {
-                *value /= c64::ONE - back * regression.zero;
-            }
+            *value = regression.at(back);
             if let Some(driven) = &regression.driven {
                 *value *= driven.at(back);
             }
         }
+    }
+
+    /// Whether the plant shapes it at an output.
+    pub(crate) fn enters_at_inputs(&self) -> bool {
+        self.regression.iter().any(|regression| regression.driven.is_some())
     }
 
     /// Number of its coefficients.

@@ -57,22 +57,21 @@ impl Noise {
             let own: Vec<Vec<c64>> = residuals.iter().map(own).collect();
             let (plain, least) = behind(&own);
             // The size of noise at the inputs first as if white noise were left, then with the autoregression that is.
-            let (mut best, mut known) = ((plain, own.clone(), least - log), Regression::default());
+            let (mut best, mut least, mut known) = (None, least - log, Regression::default());
             for _ in 0..SIZES {
                 let Some(driven) = Driven::new(model, (spectra, &gains), &own, (i, &known)) else { break };
                 let rest = driven.rest(spectra, &own);
                 let (noise, criterion) = behind(&rest);
-                if criterion >= best.2 {
+                if criterion >= least {
                     break;
                 }
-                let white = noise.coefficients.is_empty();
-                known.clone_from(&noise);
-                best = (Regression { driven: Some(Arc::new(driven)), ..noise }, rest, criterion);
-                if white {
+                (least, known) = (criterion, noise.clone());
+                best = Some((Regression { driven: Some(Arc::new(driven)), ..noise }, rest));
+                if known.coefficients.is_empty() {
                     break;
                 }
             }
-            (best.0, best.1)
+            best.unwrap_or((plain, own))
         };
         let (regression, rest): (Vec<Regression>, Vec<Vec<Vec<c64>>>) = (0..p).into_par_iter().map(of).unzip();
         let mut noise = Noise { regression, ..Noise::white(p) };

@@ -5,7 +5,7 @@ use super::search::chart::Chart;
 use super::search::model::Model;
 use super::search::noise::Noise;
 use super::search::with_best_ends;
-use super::search::{deviance, driven_slope};
+use super::search::{SearchOptions, deviance, driven_slope, search};
 use super::{Discrete, Experiment, LikelihoodOptions, Predictor, recommend};
 use crate::identify::likelihood::data::spectra::{Sizes, Spectra};
 use crate::lti::{StateSpace, frequency_response, simulate};
@@ -157,5 +157,36 @@ fn the_slope_of_noise_at_the_input_is_that_of_its_likelihood() {
         };
         let difference = (at(1e-6) - at(-1e-6)) / 2e-6;
         assert!((slope[q] - difference).abs() < 1e-5 * largest, "{q}: {} and {difference}", slope[q]);
+    }
+}
+
+/// After steps of a search, which form the blocks of the model anew, `H(z)` of the predictor is one over the filter of the noise.
+#[test]
+fn the_predictor_after_a_search_has_the_filter_of_its_noise() {
+    let (u, y) = record(0.3, 0.02, 7);
+    let (spectra, plant) = (unscaled(&u, &y), machine(0.97));
+    let start = Model::of(plant.a(), (plant.b() * faer::Scale(0.8)).as_ref(), plant.c(), vec![0.0]).unwrap();
+    let start = with_best_ends(&spectra, start, &Noise::white(1));
+    let options = SearchOptions {
+        feedthrough: false,
+        noise_order: 40,
+        steps: 20,
+        tolerance: 0.01,
+        aim: f64::INFINITY,
+        direct: Mat::zeros(0, 0),
+        radius: f64::INFINITY,
+        filter_moves: true,
+    };
+    let found = search(&spectra, start, &options).unwrap();
+    assert!(found.steps > 0 && found.noise.enters_at_inputs());
+    let (a, b, c) = found.point.model.matrices();
+    let stated = predictor(&StateSpace::new(a, b, c, Mat::zeros(1, 1), plant.time()).unwrap(), &found.noise, &[1.0]);
+    let h = StateSpace::new(stated.a, stated.k.unwrap(), stated.c, Mat::identity(1, 1), plant.time()).unwrap();
+    for share in [0.005, 0.02, 0.0207, 0.022, 0.1, 0.4] {
+        let omega = std::f64::consts::TAU * share;
+        let mut filter = [c64::ZERO];
+        found.noise.filters(c64::new(omega.cos(), omega.sin()), &mut filter);
+        let response = frequency_response(&h, &[omega / plant.time().ts()]).unwrap().at(0)[(0, 0)];
+        assert!((response * filter[0] - c64::ONE).norm() < 1e-6, "{share}: {response} and {}", filter[0]);
     }
 }

@@ -22,7 +22,7 @@ pub(super) enum Shape {
 
 /// Velocity of which friction changes its sign, in standard deviations.
 const SMALL_VELOCITY: f64 = 0.1;
-/// Limits that are tried first, and those of which the most telling is taken where a function of the input explains too much of the output:
+/// Limits that are tried first, and those of which the most significant is taken where a function of the input explains too much of the output:
 /// from a dead zone of a twentieth of the input to a limit that one sample in 700 of normal noise exceeds. What a limit between two of them
 /// takes away is nearly a sum of what both take.
 pub(super) const LIMITS: [f64; 2] = [1.0, 1.5];

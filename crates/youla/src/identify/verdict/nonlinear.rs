@@ -84,7 +84,7 @@ pub(crate) fn nonlinear(spectra: &Spectra, solution: &Solution) -> (Vec<Evidence
         return beside.evidence(unknown);
     }
     let beside = Beside::new(spectra, solution, Shape::all(&FINE_LIMITS));
-    let unknown = beside.unknown(Some(beside.telling()));
+    let unknown = beside.unknown(Some(beside.most_significant()));
     beside.evidence(unknown)
 }
 
@@ -141,16 +141,17 @@ impl<'a> Beside<'a> {
 
     /// A function alone: its coefficient beside the parameters, with its deviations beyond chance.
     fn single(&self, f: usize) -> (f64, f64) {
-        let (along, own) = self.along(f, 0);
-        if own > DISTINCT * self.lengths[f] { (along / own, along.abs() / own.sqrt()) } else { (0.0, 0.0) }
+        self.along(f, 0).map_or((0.0, 0.0), |(along, own)| (along / own, along.abs() / own.sqrt()))
     }
 
-    /// Products of a function with the residuals and with itself, without their parts along the functions before `first`.
-    fn along(&self, f: usize, first: usize) -> (f64, f64) {
+    /// Products of a function with the residuals and with itself, without their parts along the parameters and the functions before `first`; `None`
+    /// where these leave nothing of it.
+    fn along(&self, f: usize, first: usize) -> Option<(f64, f64)> {
         let rows = first..self.factor.nrows();
         let residual = self.drift() + 1;
         let along = rows.clone().map(|i| self.factor[(i, f)] * self.factor[(i, residual)]).sum();
-        (along, rows.map(|i| self.factor[(i, f)].powi(2)).sum())
+        let own: f64 = rows.map(|i| self.factor[(i, f)].powi(2)).sum();
+        (own > DISTINCT * self.lengths[f]).then_some((along, own))
     }
 
     fn most(&self, among: impl Iterator<Item = usize>) -> usize {
@@ -158,7 +159,7 @@ impl<'a> Beside<'a> {
     }
 
     /// The function at an input that is farthest beyond chance.
-    fn telling(&self) -> usize {
+    fn most_significant(&self) -> usize {
         self.most(self.at_inputs())
     }
 
@@ -169,10 +170,8 @@ impl<'a> Beside<'a> {
         let behind: Vec<usize> = (first..self.at_inputs().end.min(self.factor.nrows())).filter(distinct).collect();
         let residual = self.drift() + 1;
         let all: f64 = behind.iter().map(|i| self.factor[(*i, residual)].powi(2)).sum();
-        let of_known = known.filter(|f| *f >= first).map_or(0.0, |f| {
-            let (along, own) = self.along(f, first);
-            if own > DISTINCT * self.lengths[f] { along * along / own } else { 0.0 }
-        });
+        let of_known = known.filter(|f| *f >= first).and_then(|f| self.along(f, first));
+        let of_known = of_known.map_or(0.0, |(along, own)| along * along / own);
         let (statistic, count) = (all - of_known, behind.len() as f64 - f64::from(u8::from(of_known > 0.0)));
         let share = ((statistic - count).max(0.0) / self.explained).sqrt();
         let question = "Output that a nonlinear function of the inputs explains beyond friction, over what the model explains (saturation)";
@@ -181,7 +180,7 @@ impl<'a> Beside<'a> {
 
     fn evidence(&self, unknown: Evidence) -> (Vec<Evidence>, Option<NonlinearPart>) {
         let inputs = self.spectra.inputs;
-        let f = self.telling();
+        let f = self.most_significant();
         let (c, significance) = self.single(f);
         let size = c * self.records.iter().map(|s| s.sizes[f]).sum::<f64>() / self.records.len().max(1) as f64;
         let found = significance > BEYOND_CHANCE;

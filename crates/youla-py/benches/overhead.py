@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import subprocess
 import sys
 import tempfile
@@ -14,7 +13,7 @@ import numpy as np
 
 import youla
 from youla import _native
-from youla._identify import options_json, prepare
+from youla._identify import plain, prepare
 
 DT = 0.01
 
@@ -52,9 +51,9 @@ def n4sid() -> None:
     options = {"method": "n4sid", "order": 4, "horizon": 20}
     print(f"memory of the first N4SID: {added(lambda: youla.subspace(log, **options)):.1f} MB beside the record")
     settings, logs = prepare(log, None, 0, 0, "positive", None, None, {})
-    text, chosen = json.dumps(settings), options_json(options)
+    chosen = plain(options)
     # In turn, so that other work on the machine meets both alike.
-    pairs = [(median(lambda: youla.subspace(log, **options), 1), median(lambda: _native.subspace(text, logs, chosen), 1)) for _ in range(15)]
+    pairs = [(median(lambda: youla.subspace(log, **options), 1), median(lambda: _native.subspace(settings, logs, chosen), 1)) for _ in range(15)]
     whole, native = (float(np.median(x)) for x in zip(*pairs, strict=True))
     print(f"N4SID, horizon 20: {whole:.1f} ms by youla.subspace, {native:.1f} ms by the extension module; best {np.min(pairs, axis=0)}; ratio of medians {whole / native:.3f}")
     small = [median(lambda: youla.subspace(log, method="n4sid", order=1, horizon=2, past=2), 1) for _ in range(9)]

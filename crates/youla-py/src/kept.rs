@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Result};
 use crate::logs::{Log, records};
 use crate::matrices::{ModelIn, ModelOut, model_in, model_out};
-use crate::options::{options, settings};
+use crate::options::Options;
 use crate::region::{self, RegionOut};
 use crate::worker;
 use numpy::ndarray::{Array2, ShapeBuilder};
@@ -82,8 +82,8 @@ pub(crate) fn settings_json(toml: &str) -> PyResult<String> {
 
 /// Refuses settings with keys or values that do not exist.
 #[pyfunction]
-pub(crate) fn check_settings(chosen: &str) -> PyResult<()> {
-    settings(chosen)?.check().map_err(Failure::from)?;
+pub(crate) fn check_settings(chosen: Options) -> PyResult<()> {
+    chosen.settings()?.check().map_err(Failure::from)?;
     Ok(())
 }
 
@@ -112,17 +112,17 @@ pub(crate) fn write_files(
 #[pyfunction]
 pub(crate) fn redesign<'py>(
     py: Python<'py>,
-    chosen: &str,
+    chosen: Options,
     logs: Vec<Log<'py>>,
     models: [ModelIn<'py>; 2],
     region: &Region,
-    choices: String,
+    choices: Options,
 ) -> PyResult<(String, ModelOut<'py>)> {
-    let (chosen, logs, region) = (settings(chosen)?, records(py, logs)?, region.region.clone());
+    let (chosen, logs, region) = (chosen.settings()?, records(py, logs)?, region.region.clone());
     let (plant, model) = (model_in(&models[0])?, model_in(&models[1])?);
     let new = worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;
-        let options = options(&choices, "redesign")?;
+        let options = choices.of("redesign")?;
         Ok(redesign_kept(&chosen, &records, (&plant, &model), &region, &options)?)
     })?;
     let promised = serde_json::to_string(&youla_run::RedesignEntry::from(&new)).map_err(Failure::from)?;

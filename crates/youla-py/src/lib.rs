@@ -1,5 +1,5 @@
-//! The extension module `youla._native`: what the Python package computes. Settings come as JSON, records and matrices as NumPy
-//! arrays; results go back as JSON and arrays. The package around it gives them their types.
+//! The extension module `youla._native`: what the Python package computes. Settings come as mappings, records and matrices as
+//! NumPy arrays; results go back as JSON and arrays. The package around it gives them their types.
 
 mod failure;
 mod kept;

@@ -2,7 +2,7 @@
 
 use crate::failure::Failure;
 use crate::matrices::{ModelIn, ModelOut, array, matrix, model_in, model_out};
-use crate::options::options;
+use crate::options::Options;
 use crate::region::{omega, response_array};
 use crate::worker;
 use numpy::{Complex64, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
@@ -104,12 +104,12 @@ type Reduced<'py> = (ModelOut<'py>, Vec<f64>, Option<f64>);
 pub(crate) fn reduce<'py>(
     py: Python<'py>,
     model: ModelIn<'py>,
-    chosen: String,
+    chosen: Options,
     output_scale: Option<Vec<f64>>,
 ) -> PyResult<Reduced<'py>> {
     let model = model_in(&model)?;
     let found = worker::run(py, false, move |_| {
-        let chosen = ReductionOptions { output_scale, ..options(&chosen, "reduction")? };
+        let chosen = ReductionOptions { output_scale, ..chosen.of("reduction")? };
         Ok(reduced(&model, &chosen)?)
     })?;
     Ok((model_out(py, &found.model), found.hankel.clone(), found.error_bound))

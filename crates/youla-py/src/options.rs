@@ -1,22 +1,37 @@
-//! Settings and options from the JSON of keyword arguments, by way of the text of run.toml: the same structs, checks and sentences.
+//! Settings and options from mappings of Python: what run.toml states, with the same structs, checks and sentences.
 
 use crate::failure::{Failure, OPTIONS, Result};
+use pyo3::prelude::*;
 use serde::de::DeserializeOwned;
 use std::path::Path;
 use youla_run::RunSettings;
 
-/// The TOML of a JSON object.
-pub(crate) fn as_toml(json: &str) -> Result<String> {
-    let table: toml::Table = serde_json::from_str(json)?;
-    toml::to_string(&table).map_err(|e| Failure::input(format!("these options cannot be written as run.toml: {e}")))
+/// A table of run.toml, from a mapping of numbers, text, lists and mappings. It is kept as text: the one parser of run.toml states what is wrong.
+pub(crate) struct Options(String);
+
+impl<'py> FromPyObject<'_, 'py> for Options {
+    type Error = PyErr;
+
+    fn extract(given: Borrowed<'_, 'py, PyAny>) -> PyResult<Self> {
+        let refused = |e: String| Failure::input(format!("these options are none of run.toml: {e}"));
+        let table: toml::Table = pythonize::depythonize(&given).map_err(|e| refused(e.to_string()))?;
+        Ok(Options(toml::to_string(&table).map_err(|e| refused(e.to_string()))?))
+    }
 }
 
-/// The settings of a run.
-pub(crate) fn settings(json: &str) -> Result<RunSettings> {
-    Ok(RunSettings::parse(&as_toml(json)?, Path::new(OPTIONS))?)
-}
+impl Options {
+    /// The settings of a run.
+    pub(crate) fn settings(&self) -> Result<RunSettings> {
+        Ok(RunSettings::parse(&self.0, Path::new(OPTIONS))?)
+    }
 
-/// A struct of options, as the table `table` of run.toml would hold them.
-pub(crate) fn options<T: DeserializeOwned>(json: &str, table: &str) -> Result<T> {
-    Ok(youla_run::parse_table(&as_toml(json)?, Path::new(OPTIONS), table)?)
+    /// For settings that lack `feedback` and nothing else: those with either sign.
+    pub(crate) fn without_feedback(&self) -> Option<impl Fn(youla_run::Feedback) -> Option<RunSettings> + use<>> {
+        RunSettings::without_feedback(&self.0)
+    }
+
+    /// A struct of options, as the table `table` of run.toml would hold them.
+    pub(crate) fn of<T: DeserializeOwned>(&self, table: &str) -> Result<T> {
+        Ok(youla_run::parse_table(&self.0, Path::new(OPTIONS), table)?)
+    }
 }

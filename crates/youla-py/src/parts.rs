@@ -1,24 +1,21 @@
 //! Stages that need no run: the check of records, subspace identification, an excitation.
 
-use crate::failure::{Failure, OPTIONS};
+use crate::failure::Failure;
 use crate::logs::{Log, records};
 use crate::matrices::{ModelOut, array, model_out};
-use crate::options::{as_toml, options, settings};
+use crate::options::Options;
 use crate::worker;
 use numpy::PyArray2;
 use pyo3::prelude::*;
 use std::path::Path;
-use youla::identify::subspace::SubspaceModel;
+use youla::identify::subspace::{SubspaceModel, SubspaceOptions};
 use youla_loop::excite::ExciteOptions;
-use youla_run::{
-    ExcitationPort, Feedback, RunSettings, agreement as agreement_of, check_in_memory, excite_run,
-    parse_subspace_options, records_in_memory,
-};
+use youla_run::{ExcitationPort, Feedback, agreement as agreement_of, check_in_memory, excite_run, records_in_memory};
 
 /// Checks records, with their controller where `controller` says so; the findings as JSON.
 #[pyfunction]
-pub(crate) fn check(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, controller: bool) -> PyResult<String> {
-    let chosen = settings(chosen)?;
+pub(crate) fn check(py: Python<'_>, chosen: Options, logs: Vec<Log<'_>>, controller: bool) -> PyResult<String> {
+    let chosen = chosen.settings()?;
     let logs = records(py, logs)?;
     worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;
@@ -29,11 +26,10 @@ pub(crate) fn check(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, controller
 
 /// What the records say of the sign of a controller that states none, for a message; the settings lack `feedback` only.
 #[pyfunction]
-pub(crate) fn agreement(py: Python<'_>, unsigned: &str, logs: Vec<Log<'_>>) -> PyResult<&'static str> {
-    let unsigned = as_toml(unsigned)?;
+pub(crate) fn agreement(py: Python<'_>, unsigned: Options, logs: Vec<Log<'_>>) -> PyResult<&'static str> {
     let logs = records(py, logs)?;
     worker::run(py, false, move |_| {
-        let Some(with) = RunSettings::without_feedback(&unsigned) else { return Ok("") };
+        let Some(with) = unsigned.without_feedback() else { return Ok("") };
         let check = |sign: Feedback| {
             let chosen = with(sign)?;
             let records = records_in_memory(&chosen.data, logs.clone()).ok()?;
@@ -51,9 +47,8 @@ pub(crate) struct Subspace {
 
 /// Identifies from u and y by a subspace method.
 #[pyfunction]
-pub(crate) fn subspace(py: Python<'_>, chosen: &str, logs: Vec<Log<'_>>, choices: &str) -> PyResult<Subspace> {
-    let chosen = settings(chosen)?;
-    let choices = parse_subspace_options(&as_toml(choices)?, Path::new(OPTIONS)).map_err(Failure::from)?;
+pub(crate) fn subspace(py: Python<'_>, chosen: Options, logs: Vec<Log<'_>>, choices: Options) -> PyResult<Subspace> {
+    let (chosen, choices) = (chosen.settings()?, choices.of::<SubspaceOptions>("direct")?);
     let logs = records(py, logs)?;
     worker::run(py, false, move |_| {
         let records = records_in_memory(&chosen.data, logs)?;
@@ -85,8 +80,13 @@ type ExcitationOut<'py> = (Bound<'py, PyArray2<f64>>, f64, String);
 
 /// An excitation for the loop of the nominal model; `port` is `input` or `alpha`.
 #[pyfunction]
-pub(crate) fn excite<'py>(py: Python<'py>, chosen: &str, choices: &str, port: &str) -> PyResult<ExcitationOut<'py>> {
-    let (chosen, choices) = (settings(chosen)?, options::<ExciteOptions>(choices, "excite")?);
+pub(crate) fn excite<'py>(
+    py: Python<'py>,
+    chosen: Options,
+    choices: Options,
+    port: &str,
+) -> PyResult<ExcitationOut<'py>> {
+    let (chosen, choices) = (chosen.settings()?, choices.of::<ExciteOptions>("excite")?);
     let port = match port {
         "input" => ExcitationPort::Input,
         "alpha" => ExcitationPort::Alpha,

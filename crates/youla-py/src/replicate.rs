@@ -9,7 +9,7 @@
 use crate::failure::{Failure, Result};
 use crate::logs::{Log, records};
 use crate::matrices::matrix;
-use crate::options::settings;
+use crate::options::Options;
 use crate::worker;
 use numpy::PyReadonlyArray2;
 use pyo3::prelude::*;
@@ -31,12 +31,12 @@ type Draw = (u64, u64);
 #[pyfunction]
 pub(crate) fn replicate(
     py: Python<'_>,
-    chosen: &str,
+    chosen: Options,
     logs: Vec<Log<'_>>,
     predictor: [PyReadonlyArray2<'_, f64>; 6],
     draw: Draw,
 ) -> PyResult<String> {
-    let chosen = settings(chosen)?;
+    let chosen = chosen.settings()?;
     let logs = records(py, logs)?;
     let predictor = predictor.map(|m| matrix(&m));
     worker::run(py, true, move |_| {

@@ -3,7 +3,7 @@
 use crate::failure::{Failure, Result};
 use crate::logs::{Log, TableIn, records, table};
 use crate::matrices::{ModelOut, array, model_out};
-use crate::options::{options, settings};
+use crate::options::Options;
 use crate::region::{Region, RegionOut, response_array};
 use crate::worker::{self, Stop};
 use numpy::{Complex64, PyArray1, PyArray2, PyArray3, PyReadonlyArray1, PyReadonlyArray2};
@@ -31,12 +31,12 @@ pub(crate) struct Run {
 #[pyo3(signature = (chosen, logs, single = false, response = None))]
 pub(crate) fn identify(
     py: Python<'_>,
-    chosen: &str,
+    chosen: Options,
     logs: Vec<Log<'_>>,
     single: bool,
     response: Option<TableIn<'_>>,
 ) -> PyResult<Run> {
-    let chosen = settings(chosen)?;
+    let chosen = chosen.settings()?;
     let logs = records(py, logs)?;
     let response = response.map(table);
     worker::run(py, single, move |stop| {
@@ -211,9 +211,9 @@ impl Run {
     }
 
     /// A new controller: what it promises as JSON, and its matrices (positive feedback).
-    fn redesign<'py>(&self, py: Python<'py>, chosen: String) -> PyResult<(String, ModelOut<'py>)> {
+    fn redesign<'py>(&self, py: Python<'py>, chosen: Options) -> PyResult<(String, ModelOut<'py>)> {
         let found = self.found.clone();
-        let new = worker::run(py, false, move |_| Ok(redesign_of(&found, &options(&chosen, "redesign")?)?))?;
+        let new = worker::run(py, false, move |_| Ok(redesign_of(&found, &chosen.of("redesign")?)?))?;
         let promised = serde_json::to_string(&youla_run::RedesignEntry::from(&new)).map_err(Failure::from)?;
         Ok((promised, model_out(py, &new.controller.system)))
     }

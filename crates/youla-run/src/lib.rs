@@ -44,8 +44,7 @@ pub use schema::{settings_schema, summary_schema};
 pub use settings::{
     AlternativeStructure, Cascade, CascadeGains, ControllerSettings, DataFile, DataSettings, Discretisation,
     DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
-    NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
-    parse_subspace_options, parse_table,
+    NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings, parse_table,
 };
 pub use stages::certificate::RunCertificate;
 pub use stages::clock::{Stage, StageClock, StageTimes};

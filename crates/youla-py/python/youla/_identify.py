@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -109,11 +108,11 @@ def identify(
     response = data_of(record)
     if response is not None:
         settings, logs, table = _of_response(response, verify, nominal, controller, feedback, hold, name, options)
-        return Run(_native.identify(json.dumps(settings), logs, False, table))
+        return Run(_native.identify(settings, logs, False, table))
     assert not isinstance(record, (Response, FrequencyResponse))
     settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
     _check_moves(records_of(record, "record"))
-    return Run(_native.identify(json.dumps(settings), logs))
+    return Run(_native.identify(settings, logs))
 
 
 def _of_response(
@@ -195,8 +194,8 @@ def prepare(
     except UnstatedSign as error:
         ((form, table),) = controller_table(controller, "negative", hold, first.dt, (m, p)).items()
         unsigned = {**settings, "controller": {form: {key: value for key, value in table.items() if key != "feedback"}}}
-        raise InputError(f"{error}{_native.agreement(json.dumps(_plain(unsigned)), logs)}") from None
-    return _plain(settings), logs
+        raise InputError(f"{error}{_native.agreement(plain(unsigned), logs)}") from None
+    return plain(settings), logs
 
 
 def _check_apart(estimation: list[Record], fresh: list[Record]) -> None:
@@ -274,15 +273,15 @@ def _labels(records: list[Record]) -> list[str]:
     return [n if names.count(n) == 1 else f"{n}-{names[: k + 1].count(n)}" for k, n in enumerate(names)]
 
 
-def _plain(value: Any, where: str = "an option") -> Any:
-    """Settings as JSON has them; what is None is absent. `where` is the place of the value, for messages."""
+def plain(value: Any, where: str = "an option") -> Any:
+    """Settings as numbers, text, lists and mappings; what is None is absent. `where` is the place of the value, for messages."""
     if isinstance(value, Mapping):
         inside = "" if where == "an option" else f"{where}."
-        return {str(key): _plain(v, f"{inside}{key}") for key, v in value.items() if v is not None}
+        return {str(key): plain(v, f"{inside}{key}") for key, v in value.items() if v is not None}
     if isinstance(value, (np.ndarray, np.generic)):
         value = value.tolist()
     if isinstance(value, (list, tuple)):
-        return [_plain(v, where) for v in value]
+        return [plain(v, where) for v in value]
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     if isinstance(value, float) and not math.isfinite(value):
@@ -290,11 +289,6 @@ def _plain(value: Any, where: str = "an option") -> Any:
     if isinstance(value, (str, bool, int, float)):
         return value
     raise InputError(f"{where} is {value!r}, but options are numbers, text, lists and mappings")
-
-
-def options_json(options: Mapping[str, Any]) -> str:
-    """Options of a stage as JSON."""
-    return json.dumps(_plain(options))
 
 
 def demo(machine: str = "levitation", *, seed: int = 1) -> Run:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 import os
 import tempfile
+from collections.abc import Mapping
 from typing import Any, Protocol
 
 import numpy as np
@@ -54,7 +55,7 @@ class Results(Protocol):
     def page(self) -> str: ...
     def html(self) -> str: ...
     def write(self, folder: str, replace: bool) -> str: ...
-    def redesign(self, chosen: str) -> tuple[str, Matrices]: ...
+    def redesign(self, chosen: Mapping[str, Any]) -> tuple[str, Matrices]: ...
 
 
 def files_of(run: Results) -> Files:
@@ -219,13 +220,13 @@ class Kept:
     def write(self, folder: str, replace: bool) -> str:
         return _native.write_files(folder, replace, {**self.files, "report.html": self.html().encode()})
 
-    def redesign(self, chosen: str) -> tuple[str, Matrices]:
+    def redesign(self, chosen: Mapping[str, Any]) -> tuple[str, Matrices]:
         plant, region = self.model("likelihood"), self._region()
         if plant is None or region is None:
             raise NumericalError("the run has no recommended model, on which a controller is designed; see its summary['refused']")
         settings, logs, _ = again(self)
         model = self.model("hansen_reduced") or plant
-        return _native.redesign(json.dumps(settings), logs, [plant, model], region, chosen)
+        return _native.redesign(settings, logs, [plant, model], region, chosen)
 
 
 def again(run: Kept) -> tuple[dict[str, Any], list[Log], int]:

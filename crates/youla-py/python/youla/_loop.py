@@ -16,7 +16,7 @@ from ._arrays import MOST_NUMBERS, Array, as_floats, positive, whole
 from ._checks import known, listed, path_of, text
 from ._errors import InputError
 from ._figures import RECOMMENDED
-from ._identify import _plain, options_json
+from ._identify import plain
 from ._model import Complex, Model, _signal
 from ._result import Run
 from ._systems import as_model, controller_table, nominal_table, sign_of
@@ -207,7 +207,7 @@ def reduce(system: Any, *, output_scale: Sequence[float] | None = None, **option
     if isinstance(options.get("order"), int):
         options["order"] = whole(options["order"], "order", 0)
     scale = None if output_scale is None else np.ravel(as_floats(output_scale, "output_scale")).tolist()
-    found, hankel, bound = _native.reduce(g._native(), options_json(options), scale)
+    found, hankel, bound = _native.reduce(g._native(), plain(options), scale)
     a, b, c, d, dt = found
     model = Model(a, b, c, d, dt=dt, inputs=g.inputs, outputs=g.outputs, name=f"{g.name}, reduced")
     return Reduction(model, np.array(hankel), bound)
@@ -256,7 +256,7 @@ def redesign(run: Run, **options: Any) -> Redesign:
     """
     if not isinstance(run, Run):
         raise InputError(f"run is {type(run).__name__}, but must be a youla.Run, as youla.identify returns it")
-    promised, (a, b, c, d, dt) = run._native.redesign(options_json(options))
+    promised, (a, b, c, d, dt) = run._native.redesign(plain(options))
     u, y = ([name for name, _ in channels] for channels in run._native.ports())
     return Redesign(Model(a, b, c, d, dt=dt, inputs=y, outputs=u, name="new controller"), json.loads(promised))
 
@@ -353,7 +353,7 @@ def excite(
             chosen[key] = np.ravel(as_floats(chosen[key], key)).tolist()
     if "seed" in chosen:
         whole(chosen["seed"], "seed", 0)
-    signal, time, promised = _native.excite(json.dumps(_plain(settings)), options_json(chosen), "input")
+    signal, time, promised = _native.excite(plain(settings), plain(chosen), "input")
     return Excitation(signal, time, json.loads(promised))
 
 

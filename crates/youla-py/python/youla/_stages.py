@@ -13,7 +13,7 @@ from . import _native
 from ._arrays import Array
 from ._checks import table
 from ._errors import InputError
-from ._identify import Records, check_options, identify, options_json, prepare, records_of
+from ._identify import Records, check_options, identify, plain, prepare, records_of
 from ._model import FrequencyResponse, Mode, Model
 from ._optional import need
 from ._record import Record
@@ -103,7 +103,7 @@ def check(
     check_options(options, "check")
     known = controller is not None
     settings, logs = prepare(record, None, nominal, controller if known else 0, feedback, hold, None, options)
-    found = json.loads(_native.check(json.dumps(settings), logs, known))
+    found = json.loads(_native.check(settings, logs, known))
     return Check(tuple(found["findings"]), found["defects"], found["cautions"], found["notes"])
 
 
@@ -190,7 +190,7 @@ def subspace(record: Records, **options: Any) -> SubspaceEstimate:
     0.8
     """
     settings, logs = prepare(record, None, None, 0, None, None, None, {})
-    return SubspaceEstimate(_native.subspace(json.dumps(settings), logs, options_json(options)), _first(record))
+    return SubspaceEstimate(_native.subspace(settings, logs, plain(options)), _first(record))
 
 
 def greybox(record: Records, *, structure: Mapping[str, Any], grey_box: Mapping[str, Any] | None = None, **arguments: Any) -> Run:

@@ -18,7 +18,7 @@ from . import _native
 from ._arrays import Array, seeded, whole
 from ._checks import kind, known, share, table
 from ._errors import Error, InputError, NumericalError
-from ._identify import OPTIONS, Records, check_options, options_json, prepare
+from ._identify import OPTIONS, Records, check_options, plain, prepare
 from ._kept import again
 from ._model import Model
 from ._record import Record
@@ -164,7 +164,7 @@ def bootstrap(
     fixed = {"order": found["order"], "dead_time": found["dead_time"]}
     logs = records[:count]
     data = {**made_from["data"], "verification": []}
-    settings = json.dumps({**made_from, "data": data, "recommended": {**made_from["recommended"], **fixed}})
+    settings = {**made_from, "data": data, "recommended": {**made_from["recommended"], **fixed}}
     payload = {"settings": settings, "logs": logs, "predictor": predictor, "seed": seed}
     key = key_of(settings, *_bytes(logs), *predictor, seed)
     rows = run_tasks(_replicate, payload, range(n), key=key, executor=executor, folder=folder, progress=progress)
@@ -232,8 +232,7 @@ def scan(
     if isinstance(record, Run):
         if arguments:
             raise InputError(f"{', '.join(arguments)} is given for a run, which holds its settings; change them by the grid")
-        of_run, logs, _ = again(record._kept)
-        settings = json.dumps(of_run)
+        settings, logs, _ = again(record._kept)
     else:
         settings, logs = _prepared(record, arguments.pop("verify", None), arguments)
     if prod(len(values) for values in grid.values()) > MOST_TASKS:
@@ -246,7 +245,7 @@ def scan(
     return run_tasks(_point, payload, points, key=key, executor=executor, folder=folder, progress=progress)
 
 
-def _check_point(settings: str, point: Mapping[str, Any]) -> None:
+def _check_point(settings: Mapping[str, Any], point: Mapping[str, Any]) -> None:
     """Refuse a key or a value that no run takes, before the first task."""
     try:
         _native.check_settings(settings)
@@ -254,17 +253,17 @@ def _check_point(settings: str, point: Mapping[str, Any]) -> None:
         raise InputError(f"grid with {', '.join(f'{key!r}: {value!r}' for key, value in point.items())}: {error}") from None
 
 
-def _with(settings: str, point: Mapping[str, Any]) -> str:
-    found = json.loads(settings)
+def _with(settings: Mapping[str, Any], point: Mapping[str, Any]) -> dict[str, Any]:
+    found = {key: dict(value) if isinstance(value, Mapping) else value for key, value in settings.items()}
     for key, value in point.items():
         table, name = key.split(".")
         found.setdefault(table, {})[name] = value.item() if isinstance(value, np.generic) else value
-    return options_json(found)
+    made: dict[str, Any] = plain(found)
+    return made
 
 
 def _point(payload: Payload, item: Mapping[str, Any], index: int) -> Row:
-    plain = {key: value.item() if isinstance(value, np.generic) else value for key, value in item.items()}
-    return _identified(plain, lambda: (_with(payload["settings"], item), payload["logs"]))
+    return _identified(plain(item), lambda: (_with(payload["settings"], item), payload["logs"]))
 
 
 def identify_many(
@@ -323,7 +322,7 @@ def identify_many(
 
 
 def _machine(payload: Payload, item: Any, index: int) -> Row:
-    def prepared() -> tuple[str, list[Log]]:
+    def prepared() -> tuple[dict[str, Any], list[Log]]:
         record = item if isinstance(item, Record) else Record(item, **payload["read"])
         return _prepared(record, None, payload["arguments"])
 
@@ -332,7 +331,7 @@ def _machine(payload: Payload, item: Any, index: int) -> Row:
     return _identified({"record": name}, prepared)
 
 
-def _identified(labels: Row, prepared: Callable[[], tuple[str, list[Log]]]) -> Row:
+def _identified(labels: Row, prepared: Callable[[], tuple[dict[str, Any], list[Log]]]) -> Row:
     """The labels of a task with the row of its run on one core, or with the reason why there is none."""
     try:
         settings, logs = prepared()
@@ -359,13 +358,12 @@ def _row(run: Run) -> Row:
     }
 
 
-def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, Any]) -> tuple[str, list[Log]]:
-    """Settings as JSON and the records, from the arguments of `identify`."""
+def _prepared(record: Records, verify: Records | None, arguments: Mapping[str, Any]) -> tuple[dict[str, Any], list[Log]]:
+    """Settings and the records, from the arguments of `identify`."""
     options = dict(arguments)
     nominal, controller, hold, name = (options.pop(key, None) for key in ("nominal", "controller", "hold", "name"))
     feedback = options.pop("feedback", None)
-    settings, logs = prepare(record, verify, nominal, controller, feedback, hold, name, options)
-    return json.dumps(settings), logs
+    return prepare(record, verify, nominal, controller, feedback, hold, name, options)
 
 
 def _bytes(logs: list[Log]) -> list[Any]:

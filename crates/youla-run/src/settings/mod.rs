@@ -274,14 +274,6 @@ pub fn parse_table<T: serde::de::DeserializeOwned>(text: &str, path: &Path, at: 
     toml::from_str(text).map_err(|e| explain(&e, text, path, at))
 }
 
-/// Parses options of a subspace identification, with the keys of `[direct]`; `path` is named in errors.
-///
-/// # Errors
-/// [`youla_io::Error::Settings`] with line, column and key.
-pub fn parse_subspace_options(text: &str, path: &Path) -> Result<SubspaceOptions> {
-    parse_table(text, path, "direct")
-}
-
 /// Whether a file that should be a run.toml is data: not named so, and no TOML.
 fn is_log(path: &Path, bytes: &[u8]) -> bool {
     let named = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("toml"));

@@ -4,9 +4,7 @@
 use crate::common::Folder;
 use std::fmt::Write;
 use std::path::Path;
-use youla_run::{
-    Method, RunSettings, StageClock, Summary, check_run, identify, parse_subspace_options, read_records, write_run,
-};
+use youla_run::{Method, RunSettings, StageClock, Summary, check_run, identify, parse_table, read_records, write_run};
 
 const MINIMAL: &str = r#"name = "drive"
 
@@ -52,13 +50,14 @@ fn settings_without_a_record_are_refused_not_run() {
 /// Every form of an order, in run.toml and in the options of the Python `subspace`; what is written reads back.
 #[test]
 fn orders_are_numbers_words_or_rules() {
-    use youla::identify::subspace::Order;
+    use youla::identify::subspace::{Order, SubspaceOptions};
     use youla::reduce::ReducedOrder;
     for (text, order) in [("8", Order::Fixed(8)), ("\"auto\"", Order::default())] {
         let settings = parse(&format!("{MINIMAL}{NOMINAL}\n[hansen]\norder = {text}\n")).unwrap();
         assert_eq!(settings.hansen.as_ref().unwrap().order, order);
         assert_eq!(parse(&settings.to_toml().unwrap()).unwrap(), settings);
-        assert_eq!(parse_subspace_options(&format!("order = {text}"), Path::new("o.toml")).unwrap().order, order);
+        let direct: SubspaceOptions = parse_table(&format!("order = {text}"), Path::new("o.toml"), "direct").unwrap();
+        assert_eq!(direct.order, order);
     }
     for (text, order) in [("4", Some(4)), ("\"auto\"", None)] {
         let settings = parse(&format!("{MINIMAL}\n[recommended]\norder = {text}\n")).unwrap();

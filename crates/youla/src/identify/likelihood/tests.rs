@@ -154,7 +154,15 @@ fn dead_time_becomes_states_at_zero() {
     .unwrap();
     let model = blocks_of(&plant);
     let point = Point { model, ends: Vec::new() };
-    let found = Found { point, noise: Noise::white(1), deviance: 0.0, parameters: 0, steps: 0, feedthrough: true };
+    let found = Found {
+        point,
+        noise: Noise::white(1),
+        deviance: 0.0,
+        parameters: 0,
+        steps: 0,
+        given_up: false,
+        feedthrough: true,
+    };
     let choice = Choice { found, delays: vec![0, 3], criterion: 0.0, origin: String::new() };
     let sizes = Sizes { u: vec![2.0, 0.5], y: vec![3.0] };
     let delayed = physical::plant(&choice, &sizes, time()).unwrap();

@@ -6,11 +6,10 @@
 
 use super::loads::{self, Nuisance, Steps};
 use super::problem::{Choice, Problem, Solution, Task};
+use super::unmoved::{Motion, NARROW};
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
-use crate::identify::likelihood::search::block::Block;
 use crate::identify::likelihood::search::model::Model;
-use crate::identify::likelihood::search::noise::Noise;
-use crate::identify::likelihood::search::point::{Point, energy};
+use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};
 use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
@@ -27,8 +26,6 @@ const ROUNDS: usize = 5;
 /// Slow changes of a disturbance, `cos(pi j t / N)` with `j` below the first number, and lines on each side that do not count: the first of
 /// these that are enough. A rotor whose speed wanders has sidebands.
 const SHAPES: [(usize, f64); 5] = [(1, 5.0), (9, 5.0), (9, 10.0), (9, 20.0), (9, 40.0)];
-/// Half width of a mode below which it is narrower than a line, in lines of the longest record: what a disturbance leaves has 0.005 to 0.1.
-const NARROW: f64 = 0.3;
 /// Largest half width of the band that does not count, over its middle.
 const WIDEST: f64 = 0.25;
 /// Lowest frequency of such a mode, in lines: below it a drift of the record is one.
@@ -36,11 +33,6 @@ const LOWEST: f64 = 8.0;
 /// Half bands of a disturbance within which a mode may stand for its sidebands, and half width of such a mode, in lines of the longest record.
 const SIDEBANDS: f64 = 2.0;
 const SIDEBAND: f64 = 0.6;
-/// Lines on each side of a mode at which it is not asked what moves it.
-const AWAY: f64 = 5.0;
-/// Power of the free motion of a mode over that which the inputs cause, away from its frequency, from which it is a disturbance: both are alike
-/// for a mode on the unit circle that the inputs move. Modes of plants have 0.01 to 0.3, what unbalance and hum leave 3 to 8000.
-const UNMOVED: f64 = 2.0;
 /// Samples of a record for each slow change at least.
 const SAMPLES_PER_CHANGE: usize = 8;
 /// Sweeps over the disturbances, which are nearly orthogonal.
@@ -138,7 +130,7 @@ impl Cleaned {
 
 /// The model that records support, and what it takes out of them.
 pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
-    let mut now = loads::with_steps(all, fresh, Cleaned::untouched(all.solve(table)?), table);
+    let mut now = loads::with_steps(all, fresh, loads::solve(all, fresh, table)?, table);
     for _ in 0..ROUNDS {
         let Some(next) = less_lines(all, fresh, &now, table) else { break };
         now = next;
@@ -194,32 +186,6 @@ fn less_lines(
     None
 }
 
-/// Whether a mode is hardly moved by the inputs: away from its frequency `|C M B U|` is far below `|C M z t|`, or does not pay for B by
-/// Schwarz's criterion. A disturbance with whole periods in a record has no ends, and B stands for its one line.
-fn unmoved(block: &Block, first: usize, turns: f64, (spectra, noise): (&Spectra, &Noise), point: &Point) -> bool {
-    let (m, s, p) = (spectra.inputs, block.states, spectra.outputs);
-    let mut inverse = [c64::ZERO; 4];
-    let [mut by_inputs, mut by_ends] = [(); 2].map(|()| Vec::with_capacity(spectra.records.len()));
-    for (lines, t) in spectra.records.iter().zip(&point.ends) {
-        let away = |k: usize| (k as f64 + 1.0 - turns * lines.samples as f64).abs() > AWAY;
-        let [mut inputs, mut ends] = [(); 2].map(|()| vec![c64::ZERO; lines.z.len() * p]);
-        for k in (0..lines.z.len()).filter(|k| away(*k)) {
-            block.resolvent(lines.z[k], &mut inverse);
-            let through = |out: &mut [c64], drive: &dyn Fn(usize) -> c64| {
-                let x = [0, 1].map(|i| inverse[2 * i] * drive(0) + inverse[2 * i + 1] * drive(1));
-                out.iter_mut().zip(block.c.chunks_exact(s)).for_each(|(out, c)| *out = x[0] * c[0] + x[1] * c[1]);
-            };
-            let input = |i: usize| (0..m).fold(c64::ZERO, |sum, j| sum + lines.u[k * m + j] * block.b[i * m + j]);
-            through(&mut inputs[k * p..(k + 1) * p], &input);
-            through(&mut ends[k * p..(k + 1) * p], &|i| lines.z[k] * t[first + i]);
-        }
-        by_inputs.push(inputs);
-        by_ends.push(ends);
-    }
-    let [by_inputs, by_ends] = [by_inputs, by_ends].map(|signal| energy(spectra, &signal, noise));
-    by_ends > UNMOVED * by_inputs || by_inputs < (spectra.samples() as f64).ln() * (m * s) as f64
-}
-
 /// Adds a disturbance, or widens one whose sidebands the mode stands for.
 fn beside(lines: &mut Vec<Line>, middle: f64, (changes, half): (usize, f64)) {
     match lines.iter_mut().find(|line| line.near(middle)) {
@@ -266,7 +232,7 @@ impl Narrow {
         let spectra = problem.spectra(&choice.delays);
         let point = with_best_ends(&spectra, model.clone(), &choice.found.noise);
         let known = (&spectra, &choice.found.noise);
-        found.retain(|(k, turns, first)| unmoved(&model.blocks[*k], *first, *turns, known, &point));
+        found.retain(|(k, turns, first)| Motion::of((&model.blocks[*k], *first), *turns, known, &point).is_unmoved());
         let (places, turns): (Vec<usize>, Vec<f64>) = found.into_iter().map(|(k, turns, _)| (k, turns)).unzip();
         (!places.is_empty()).then_some(Narrow { model, places, turns, longest })
     }

@@ -6,9 +6,11 @@
 
 use super::lines::Cleaned;
 use super::places::{Places, turned};
-use super::problem::{Choice, Problem, Task};
+use super::problem::{Choice, Problem, Solution, Task};
+use super::unmoved::free_modes;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, long_enough};
 use crate::identify::likelihood::search::separable::separable;
+use crate::identify::likelihood::search::{with_best_ends, with_best_inputs};
 use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
 use crate::identify::verdict::limits::LARGEST_LOAD;
@@ -25,6 +27,8 @@ const NOTICED: f64 = 1e-4;
 const SAMPLES_PER_STEP: usize = 500;
 /// Samples of a record above which steps are not looked for: time and memory of the transforms. Of a longer record the load is a noise.
 const LONGEST: usize = 100_000;
+/// Modes of a model that the inputs hardly move, from which they may stand for steps of load. Chosen: loops without load have at most one.
+const FREE: usize = 2;
 
 /// A step of load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -64,33 +68,92 @@ fn parameters(steps: &Steps) -> f64 {
     2.0 * steps[0].iter().map(Vec::len).sum::<usize>() as f64
 }
 
-/// The model with the steps of load that it shows, as long as Schwarz's criterion falls. Not tried in an open loop, in which no feedback hides
-/// what a load does to the model.
+/// The model with the steps of load that it shows, as long as Schwarz's criterion falls.
 pub(super) fn with_steps(
     all: &Problem<'_>,
     fresh: &[Experiment<'_>],
     mut now: Cleaned,
     table: &mut Vec<Candidate>,
 ) -> Cleaned {
-    if all.is_wide() || separable(all.outputs()) || all.open_loop {
+    if !are_sought(all) {
         return now;
     }
-    let log = (all.samples().0.max(2) as f64).ln();
-    let total = |of: &Cleaned| of.solution.chosen.criterion + log * of.steps.as_ref().map_or(0.0, parameters);
     for _ in 0..ROUNDS {
         if all.out_of_time() {
             break;
         }
-        let Some(steps) = steps(all, fresh, &now) else { break };
-        let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
-        let next = Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() };
-        let Some(next) = refined(all, fresh, next, table) else { break };
-        if total(&next) >= total(&now) {
-            break;
-        }
+        // Of a model whose steps are known, the modes that stood for them go first.
+        let less = now.steps.as_ref().and_then(|_| without_free_modes(all, &now, table));
+        let next = less
+            .into_iter()
+            .chain([now.clone()])
+            .find_map(|from| with_shown(all, fresh, &from, table).filter(|next| total(all, next) < total(all, &now)));
+        let Some(next) = next else { break };
         now = next;
     }
     now
+}
+
+/// The model with the steps that it shows; `None` where it shows none.
+fn with_shown(
+    all: &Problem<'_>,
+    fresh: &[Experiment<'_>],
+    now: &Cleaned,
+    table: &mut Vec<Candidate>,
+) -> Option<Cleaned> {
+    let steps = steps(all, fresh, now)?;
+    let inputs = [loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])];
+    refined(all, fresh, Cleaned { inputs: Some(inputs), steps: Some(steps), ..now.clone() }, table)
+}
+
+/// Whether steps of load are looked for: not of many channels, and not in an open loop, in which no feedback hides what a load does to the model.
+fn are_sought(all: &Problem<'_>) -> bool {
+    !(all.is_wide() || separable(all.outputs()) || all.open_loop)
+}
+
+/// Schwarz's criterion of a model and its steps.
+fn total(all: &Problem<'_>, of: &Cleaned) -> f64 {
+    let log = (all.samples().0.max(2) as f64).ln();
+    of.solution.chosen.criterion + log * of.steps.as_ref().map_or(0.0, parameters)
+}
+
+/// The model that records support, on their inputs with steps of load where a transient shows on the way to it.
+///
+/// A load that ends some samples after the start of a record is what free modes describe too, two numbers in place of one step each, and the walk
+/// would add modes up to the largest order. It stops at a model with several modes that the inputs hardly move: they are left out, and what is
+/// left shows the steps. Where these explain no more than the modes did, the walk goes on.
+pub(super) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
+    let watched = Problem { most_free: if are_sought(all) { FREE } else { usize::MAX }, ..all.clone() };
+    let first = all.first(table)?;
+    let now = Cleaned::untouched(watched.solve_from(first, table)?);
+    if !watched.stops_at(&now.solution.chosen) {
+        return Some(now);
+    }
+    if let Some(less) = without_free_modes(all, &now, table) {
+        let next = with_steps(all, fresh, less, table);
+        if next.steps.is_some() && total(all, &next) < total(all, &now) {
+            return Some(next);
+        }
+    }
+    Some(Cleaned::untouched(all.solve_from(vec![now.solution.chosen], table)?))
+}
+
+/// The model without the modes that the inputs hardly move; `None` where there are none or no others, and where the order is given.
+fn without_free_modes(all: &Problem<'_>, now: &Cleaned, table: &mut Vec<Candidate>) -> Option<Cleaned> {
+    let choice = &now.solution.chosen;
+    let records = now.records(0, all.experiments);
+    let problem = now.problem(all, &records);
+    let spectra = Arc::new(problem.spectra(&choice.delays));
+    let noise = &choice.found.noise;
+    let point = with_best_ends(&spectra, choice.found.point.model.separated()?, noise);
+    let free = free_modes(&spectra, &point, noise);
+    if all.order.is_some() || free.is_empty() || free.len() == point.model.blocks.len() {
+        return None;
+    }
+    let start = with_best_inputs(&spectra, point.model.without(&free), noise, problem.feedthrough);
+    let task = Task { spectra, start, delays: choice.delays.clone(), origin: "without free modes".into() };
+    let chosen = problem.run(vec![task], f64::INFINITY, table).pop()?;
+    Some(Cleaned { solution: Solution { chosen, ..now.solution.clone() }, ..now.clone() })
 }
 
 /// The model with the sizes of its steps: in turn one step of Gauss and Newton of all together and a search of the model with these sizes, then

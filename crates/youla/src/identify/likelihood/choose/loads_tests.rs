@@ -84,6 +84,19 @@ fn steps_of_load_are_found_where_they_are_and_do_not_bend_the_model() {
     assert!((0.2..2.5).contains(&squares), "{squares}");
 }
 
+/// A load that ends after 150 samples: its end is the one step, as the state at the first sample describes its beginning, and no mode stands for it.
+#[test]
+fn a_load_that_ends_at_the_start_of_a_record_is_no_mode() {
+    for seed in 30..33 {
+        let found = found(&|t, _| if t < 150 { 4.0 } else { 0.0 }, seed);
+        let note = load_of(&found).expect("a step");
+        let listed = note.strip_prefix("estimated and added to the inputs: 1 step, the largest ");
+        let size = listed.and_then(|listed| listed.strip_suffix(" at 0.1500 s")?.parse::<f64>().ok());
+        assert!(size.is_some_and(|size| (size + 4.0).abs() < 0.05), "{note}");
+        assert_eq!(found.order, 4, "seed {seed}");
+    }
+}
+
 #[test]
 fn no_load_and_dry_friction_are_no_steps() {
     for seed in 10..16 {

@@ -12,5 +12,6 @@ pub(crate) mod resize;
 pub(crate) mod solve;
 pub(crate) mod starts;
 pub(crate) mod states;
+mod unmoved;
 pub(crate) mod unseen;
 mod wide;

@@ -2,6 +2,7 @@
 //! criterion falls.
 
 use super::dead_time::dead_times;
+use super::loads;
 use super::problem::{Choice, LONG, Problem, Solution, Task, credit_of_lags};
 use super::wide;
 use crate::identify::likelihood::Candidate;
@@ -36,11 +37,16 @@ pub(super) fn best(tried: &[Choice]) -> Option<&Choice> {
 impl Problem<'_> {
     /// The model that the records support; what was tried is noted in the table. `None` where no search ends.
     pub(crate) fn solve(&self, table: &mut Vec<Candidate>) -> Option<Solution> {
+        self.solve_from(self.first(table)?, table)
+    }
+
+    /// The models from which others are reached: of a long record that of its first part.
+    pub(super) fn first(&self, table: &mut Vec<Candidate>) -> Option<Vec<Choice>> {
         let samples = self.samples().0;
         if samples > self.long() {
-            return self.solve_from(vec![self.chosen_on_a_part(samples, table)?], table);
+            return Some(vec![self.chosen_on_a_part(samples, table)?]);
         }
-        self.solve_from(self.first(table), table)
+        Some(self.from_regressions(table))
     }
 
     /// Samples above which order and dead time are first chosen on a part of them.
@@ -58,6 +64,9 @@ impl Problem<'_> {
         let now = best(&tried)?.found.feedthrough;
         let here = self.with_feedthrough(now);
         let mut at = here.improved(&mut tried, rounds, table)?;
+        if self.stops_at(&at) {
+            return Some(Solution { chosen: at, rivals: Vec::new(), samples });
+        }
         here.walk_through_unstable(&mut tried, &at, rounds, table);
         if best(&tried)?.criterion < at.criterion {
             at = here.improved(&mut tried, rounds, table)?;
@@ -112,7 +121,7 @@ impl Problem<'_> {
     fn improved(&self, tried: &mut Vec<Choice>, rounds: usize, table: &mut Vec<Candidate>) -> Option<Choice> {
         let mut at = best(tried)?.clone();
         for _ in 0..rounds {
-            if self.out_of_time() {
+            if self.out_of_time() || self.stops_at(&at) {
                 break;
             }
             let tasks = self.neighbours(&at);
@@ -197,7 +206,7 @@ impl Problem<'_> {
     }
 
     /// Searches from long regressions, without dead time and with that which a long regression shows.
-    fn first(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
+    fn from_regressions(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let zero = vec![0; self.inputs()];
         let count = if self.is_wide() { 1 } else { FIRST };
         let mut tasks = match &self.dead_time {
@@ -242,7 +251,7 @@ impl Problem<'_> {
         let parts: Vec<_> = longest.iter().map(cut).collect();
         let short: Vec<Experiment<'_>> = parts.iter().map(|(u, y)| Experiment::new(u.as_ref(), y.as_ref())).collect();
         let part = Problem { experiments: &short, ..self.clone() };
-        let chosen = part.solve(table)?.chosen;
+        let chosen = loads::solve(&part, &[], table)?.solution.chosen;
         let spectra = self.spectra(&chosen.delays);
         let whole = self.with_feedthrough(chosen.found.feedthrough);
         let options = whole.options(15, 0.3, &chosen.delays);

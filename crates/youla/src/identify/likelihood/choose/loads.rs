@@ -6,7 +6,7 @@
 
 use super::lines::Cleaned;
 use super::places::{Places, turned};
-use super::problem::{Choice, Problem, Solution, Task};
+use super::problem::{Choice, LONG, Problem, Solution, Task};
 use super::unmoved::free_modes;
 use crate::identify::likelihood::data::spectra::{Lines, Spectra, long_enough};
 use crate::identify::likelihood::search::separable::separable;
@@ -123,7 +123,9 @@ fn total(all: &Problem<'_>, of: &Cleaned) -> f64 {
 /// would add modes up to the largest order. It stops at a model with several modes that the inputs hardly move: they are left out, and what is
 /// left shows the steps. Where these explain no more than the modes did, the walk goes on.
 pub(super) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
-    let watched = Problem { most_free: if are_sought(all) { FREE } else { usize::MAX }, ..all.clone() };
+    // Of a long record the walk on its first part has been watched.
+    let watches = are_sought(all) && all.samples().0 <= LONG;
+    let watched = Problem { most_free: if watches { FREE } else { usize::MAX }, ..all.clone() };
     let first = all.first(table)?;
     let now = Cleaned::untouched(watched.solve_from(first, table)?);
     if !watched.stops_at(&now.solution.chosen) {

@@ -32,6 +32,9 @@ const LINES: usize = 6000;
 /// Steps of the logarithm of that size: the likelihood is flat to a quarter of a nat.
 const STEPS: [f64; 4] = [2.0, 1.0, 0.5, 0.25];
 
+/// A product from which the next factor might lead out of the range of numbers.
+const LARGE: f64 = 1e100;
+
 /// The filter `1 / H_i` of an output, and what it is made of.
 #[derive(Debug, Clone)]
 pub(crate) struct Driven {
@@ -270,13 +273,19 @@ fn lines(
 fn size(lines: &[[f64; 3]], samples: f64) -> Option<f64> {
     let cost = |ratio: f64| {
         let (mut power, mut logarithms, mut count) = (0.0, 0.0, 0.0);
+        // The logarithm of a product of several shapes is taken at once, where as many lines of the circle stand behind each.
+        let (mut product, mut alike) = (1.0f64, 0.0);
         for [of, energy, gain] in lines {
             let shape = 1.0 + ratio * gain;
             power += energy / shape;
-            logarithms += of * shape.ln();
+            if *of != alike || product > LARGE {
+                logarithms += alike * product.ln();
+                (product, alike) = (1.0, *of);
+            }
+            product *= shape;
             count += of;
         }
-        count * (power / count).ln() + logarithms
+        count * (power / count).ln() + logarithms + alike * product.ln()
     };
     let gains = || lines.iter().map(|l| l[2]).filter(|g| *g > 0.0);
     let (least, most) = (gains().fold(f64::INFINITY, f64::min).ln(), gains().fold(0.0, f64::max).ln());

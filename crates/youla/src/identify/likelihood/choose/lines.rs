@@ -105,7 +105,8 @@ impl Cleaned {
     /// What was taken out of the records.
     pub(crate) fn evidence(&self, all: &Problem<'_>, ts: f64) -> Vec<Evidence> {
         let load = self.steps.as_ref().map(|steps| loads::evidence(steps, all.experiments, &all.sizes.u, ts));
-        self.of_lines(all.experiments, ts).into_iter().chain(load).collect()
+        let shape = self.steps.as_ref().and_then(|steps| loads::of_another_shape(steps, ts));
+        self.of_lines(all.experiments, ts).into_iter().chain(load).chain(shape).collect()
     }
 
     /// The lines that were taken out, and their size over that of what is left of the outputs; `None` where there are none.

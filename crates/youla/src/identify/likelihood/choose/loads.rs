@@ -13,7 +13,7 @@ use crate::identify::likelihood::search::separable::separable;
 use crate::identify::likelihood::search::{with_best_ends, with_best_inputs};
 use crate::identify::likelihood::{Candidate, Evidence};
 use crate::identify::subspace::Experiment;
-use crate::identify::verdict::limits::LARGEST_LOAD;
+use crate::identify::verdict::limits::{LARGEST_LOAD, MOST_STEPS};
 use faer::{Mat, c64};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -301,6 +301,31 @@ pub(crate) fn evidence(steps: &Steps, records: &[Experiment<'_>], sizes: &[f64],
     Evidence::new(question, (square / f64::max(count, 1.0)).sqrt(), LARGEST_LOAD).reported().noted(note)
 }
 
+/// The most steps that lie close together: a push, a gust or a cut has a shape of its own, which several steps describe in part, and what is left
+/// bends the model at low frequencies. `None` where steps lie apart.
+pub(crate) fn of_another_shape(steps: &Steps, ts: f64) -> Option<Evidence> {
+    let crowded = |of: &Vec<Step>| {
+        let mut samples: Vec<usize> = of.iter().map(|step| step.sample).collect();
+        samples.sort_unstable();
+        let near = |first: usize| samples.iter().filter(|t| (first..=first + CROWD).contains(t)).copied().collect();
+        samples.iter().map(|first| near(*first)).max_by_key(Vec::<usize>::len)
+    };
+    let all = steps[0].iter().enumerate().filter_map(|(k, of)| Some((k, crowded(of)?)));
+    let (record, crowd) = all.max_by_key(|(_, crowd)| crowd.len())?;
+    let (first, last) = (*crowd.first()?, *crowd.last()?);
+    if crowd.len() < 2 {
+        return None;
+    }
+    let of = if steps[0].len() > 1 { format!(" of record {}", record + 1) } else { String::new() };
+    let (first, last) = (first as f64 * ts, last as f64 * ts);
+    let note =
+        format!("from {first:.4} s to {last:.4} s{of}; where they describe a push or a gust, leave these samples out");
+    let question = "Steps of load within 600 samples, the most (shape of the load)";
+    Some(Evidence::new(question, crowd.len() as f64, MOST_STEPS).noted(note))
+}
+
+/// Samples within which steps are counted.
+const CROWD: usize = 600;
 /// Steps that are listed.
 const LISTED: usize = 3;
 

@@ -97,6 +97,24 @@ fn a_load_that_ends_at_the_start_of_a_record_is_no_mode() {
     }
 }
 
+/// A push is not described by steps, and the model beside it is not trusted; two steps that lie apart are.
+#[test]
+fn a_push_is_a_load_of_another_shape() {
+    let push = |t: usize, _: f64| {
+        let within = (2000..2400).contains(&t);
+        if within { 4.0 * (std::f64::consts::PI * (t - 2000) as f64 / 400.0).sin() } else { 0.0 }
+    };
+    let shape =
+        |found: &Recommendation| found.evidence.iter().find(|e| e.question.ends_with("(shape of the load)")).cloned();
+    for seed in 40..43 {
+        let found = found(&push, seed);
+        let shape = shape(&found).expect("several steps");
+        assert!(!shape.holds() && !found.trusted() && shape.note.contains(" to 2."), "{shape}");
+    }
+    let apart = |t: usize, _: f64| f64::from(u8::from(t > 2000)) - 2.0 * f64::from(u8::from(t > 4000));
+    assert!(shape(&found(&apart, 43)).is_none());
+}
+
 #[test]
 fn no_load_and_dry_friction_are_no_steps() {
     for seed in 10..16 {

@@ -196,7 +196,7 @@ impl Records<'_> {
             nonlinear,
         };
         let Judgement { mut evidence, loop_ratio, entry_bands, bands, informed } = verdict::judge(&judged)?;
-        evidence.extend(found.evidence(self.all, time.ts()));
+        evidence.extend(found.evidence(self.all, self.verification, time.ts()));
         let recommended = Recommendation {
             predictor: deviation::innovation::predictor(&plant, &choice.found.noise, &problem.sizes.y),
             plant,

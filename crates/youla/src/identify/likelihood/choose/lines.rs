@@ -99,12 +99,13 @@ impl Cleaned {
     /// The columns of what was estimated beside the model of the records of estimation.
     pub(crate) fn nuisance(&self, problem: &Problem<'_>, spectra: &Spectra) -> Nuisance {
         let of = |steps: &Steps| loads::nuisance(problem, &self.solution.chosen, &steps[0], spectra);
-        self.steps.as_ref().map(of).unwrap_or_default()
+        self.steps.as_ref().filter(|steps| loads::in_estimation(steps)).map(of).unwrap_or_default()
     }
 
     /// What was taken out of the records.
-    pub(crate) fn evidence(&self, all: &Problem<'_>, ts: f64) -> Vec<Evidence> {
-        let load = self.steps.as_ref().map(|steps| loads::evidence(steps, all.experiments, &all.sizes.u, ts));
+    pub(crate) fn evidence(&self, all: &Problem<'_>, fresh: &[Experiment<'_>], ts: f64) -> Vec<Evidence> {
+        let records = [all.experiments, fresh];
+        let load = self.steps.as_ref().map(|steps| loads::evidence(steps, records, &all.sizes.u, ts));
         let shape = self.steps.as_ref().and_then(|steps| loads::of_another_shape(steps, ts));
         self.of_lines(all.experiments, ts).into_iter().chain(load).chain(shape).collect()
     }
@@ -136,7 +137,7 @@ pub(crate) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec
         let Some(next) = less_lines(all, fresh, &now, table) else { break };
         now = next;
     }
-    Some(now)
+    Some(loads::in_fresh(all, fresh, now))
 }
 
 /// `None` where no mode is narrower than a line, and where the outputs speak for it without its line.

@@ -94,6 +94,22 @@ pub(super) fn with_steps(
     now
 }
 
+/// Adds the steps that the fresh records alone show: the model is that of the records of estimation, and the fresh ones are compared with it.
+pub(super) fn in_fresh(all: &Problem<'_>, fresh: &[Experiment<'_>], mut now: Cleaned) -> Cleaned {
+    if now.steps.is_some() || !are_sought(all) {
+        return now;
+    }
+    let clean = now.records(1, fresh);
+    let found = clean.par_iter().map(|e| of_record(all, &now.solution.chosen, e));
+    let found = found.collect::<Option<Vec<Vec<Step>>>>().filter(|found| found.iter().any(|steps| !steps.is_empty()));
+    if let Some(found) = found {
+        let steps = [vec![Vec::new(); all.experiments.len()], found];
+        now.inputs = Some([loaded(all.experiments, &steps[0]), loaded(fresh, &steps[1])]);
+        now.steps = Some(steps);
+    }
+    now
+}
+
 /// The model with the steps that it shows; `None` where it shows none.
 fn with_shown(
     all: &Problem<'_>,
@@ -215,7 +231,7 @@ fn steps(all: &Problem<'_>, fresh: &[Experiment<'_>], now: &Cleaned) -> Option<S
         records.par_iter().map(|e| of_record(all, choice, e)).collect::<Option<Vec<Vec<Step>>>>()
     };
     let found = [of(0, all.experiments)?, of(1, fresh)?];
-    found[0].iter().any(|steps| !steps.is_empty()).then_some(found)
+    in_estimation(&found).then_some(found)
 }
 
 /// The steps of one record.
@@ -270,10 +286,12 @@ pub(crate) struct Nuisance {
     pub(crate) values: Vec<Vec<c64>>,
 }
 
-/// The steps of the records of estimation: their size over that of the inputs, where they are.
-pub(crate) fn evidence(steps: &Steps, records: &[Experiment<'_>], sizes: &[f64], ts: f64) -> Evidence {
+/// The steps of the records of estimation, of the fresh ones where only these have some: their size over that of the inputs, where they are.
+pub(crate) fn evidence(steps: &Steps, records: [&[Experiment<'_>]; 2], sizes: &[f64], ts: f64) -> Evidence {
+    let (which, of_records) = if in_estimation(steps) { (0, " of record ") } else { (1, " of fresh record ") };
+    let (steps, records) = (&steps[which], records[which]);
     let (mut square, mut count) = (0.0, 0.0);
-    for (e, steps) in records.iter().zip(&steps[0]) {
+    for (e, steps) in records.iter().zip(steps) {
         let load = loaded(
             &[Experiment { u: Mat::zeros(e.u.nrows(), e.u.ncols()).as_ref(), ..*e }],
             std::slice::from_ref(steps),
@@ -285,12 +303,12 @@ pub(crate) fn evidence(steps: &Steps, records: &[Experiment<'_>], sizes: &[f64],
         }
         count += load.nrows() as f64;
     }
-    let several = records.len() > 1;
+    let several = records.len() > 1 || which == 1;
     let mut listed: Vec<(usize, &Step)> =
-        steps[0].iter().enumerate().flat_map(|(k, of)| of.iter().map(move |s| (k, s))).collect();
+        steps.iter().enumerate().flat_map(|(k, of)| of.iter().map(move |s| (k, s))).collect();
     listed.sort_by(|a, b| (b.1.size / sizes[b.1.input]).abs().total_cmp(&(a.1.size / sizes[a.1.input]).abs()));
     let place = |(k, step): &(usize, &Step)| {
-        let of = if several { format!(" of record {}", k + 1) } else { String::new() };
+        let of = if several { format!("{of_records}{}", k + 1) } else { String::new() };
         let input = if sizes.len() > 1 { format!(" at input {}", step.input + 1) } else { String::new() };
         format!("{:.3}{input} at {:.4} s{of}", step.size, step.sample as f64 * ts)
     };
@@ -299,6 +317,11 @@ pub(crate) fn evidence(steps: &Steps, records: &[Experiment<'_>], sizes: &[f64],
     let listing = if listed.len() == 1 { "1 step".into() } else { format!("{} steps", listed.len()) };
     let note = format!("estimated and added to the inputs: {listing}, the largest {}", largest.join(", "));
     Evidence::new(question, (square / f64::max(count, 1.0)).sqrt(), LARGEST_LOAD).reported().noted(note)
+}
+
+/// Whether the records of estimation have steps.
+pub(super) fn in_estimation(steps: &Steps) -> bool {
+    steps[0].iter().any(|steps| !steps.is_empty())
 }
 
 /// The most steps that lie close together: a push, a gust or a cut has a shape of its own, which several steps describe in part, and what is left
@@ -310,16 +333,12 @@ pub(crate) fn of_another_shape(steps: &Steps, ts: f64) -> Option<Evidence> {
         let near = |first: usize| samples.iter().filter(|t| (first..=first + CROWD).contains(t)).copied().collect();
         samples.iter().map(|first| near(*first)).max_by_key(Vec::<usize>::len)
     };
-    let all = steps[0].iter().enumerate().filter_map(|(k, of)| Some((k, crowded(of)?)));
-    let (record, crowd) = all.max_by_key(|(_, crowd)| crowd.len())?;
-    let (first, last) = (*crowd.first()?, *crowd.last()?);
-    if crowd.len() < 2 {
-        return None;
-    }
-    let of = if steps[0].len() > 1 { format!(" of record {}", record + 1) } else { String::new() };
-    let (first, last) = (first as f64 * ts, last as f64 * ts);
-    let note =
-        format!("from {first:.4} s to {last:.4} s{of}; where they describe a push or a gust, leave these samples out");
+    // What bends no model, those of the fresh records, does not count.
+    let crowds = steps[0].iter().enumerate().filter_map(|(k, of)| Some((k, crowded(of)?)));
+    let (record, crowd) = crowds.max_by_key(|(_, crowd)| crowd.len()).filter(|(_, crowd)| crowd.len() > 1)?;
+    let [first, last] = [crowd.first()?, crowd.last()?].map(|sample| *sample as f64 * ts);
+    let at = format!("from {first:.4} s to {last:.4} s of record {}", record + 1);
+    let note = format!("{at}; where they describe a push or a gust, leave these samples out");
     let question = "Steps of load within 600 samples, the most (shape of the load)";
     Some(Evidence::new(question, crowd.len() as f64, MOST_STEPS).noted(note))
 }

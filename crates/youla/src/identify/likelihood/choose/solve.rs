@@ -46,7 +46,7 @@ impl Problem<'_> {
         if samples > self.long() {
             return Some(vec![self.chosen_on_a_part(samples, table)?]);
         }
-        Some(self.from_regressions(table))
+        Some(self.regressed(table))
     }
 
     /// Samples above which order and dead time are first chosen on a part of them.
@@ -206,7 +206,7 @@ impl Problem<'_> {
     }
 
     /// Searches from long regressions, without dead time and with that which a long regression shows.
-    fn from_regressions(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
+    fn regressed(&self, table: &mut Vec<Candidate>) -> Vec<Choice> {
         let zero = vec![0; self.inputs()];
         let count = if self.is_wide() { 1 } else { FIRST };
         let mut tasks = match &self.dead_time {

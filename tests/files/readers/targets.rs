@@ -102,7 +102,7 @@ pub(crate) fn rig_toml(bytes: &[u8]) {
 }
 
 pub(crate) fn subspace_toml(bytes: &[u8]) {
-    let _ = youla_run::parse_subspace_options(&String::from_utf8_lossy(bytes), path()).map(|o: SubspaceOptions| o);
+    let _ = youla_run::parse_table::<SubspaceOptions>(&String::from_utf8_lossy(bytes), path(), "direct");
 }
 
 /// A structure with its expressions, and its matrices at the start.

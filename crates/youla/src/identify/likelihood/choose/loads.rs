@@ -345,8 +345,8 @@ pub(crate) fn of_another_shape(steps: &Steps, ts: f64) -> Option<Evidence> {
     Some(Evidence::new(question, crowd.len() as f64, MOST_STEPS).noted(note))
 }
 
-/// Samples within which steps are counted, and over which they extend at least. Of pushes two models of five that extend over 300 and more were wrong and
-/// trusted, none of two over 90 and 120; where the phase of cogging jumps there are four within 50.
+/// Samples within which steps are counted, and over which they extend at least. Beside pushes those over 534 and 599 samples were of models wrong
+/// and trusted, those over 120 and 186 of good ones; where the phase of cogging jumps there are four within 50.
 const CROWD: usize = 600;
 const SHORTEST: usize = 150;
 /// Steps that are listed.

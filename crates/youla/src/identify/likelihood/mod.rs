@@ -294,7 +294,7 @@ fn problem<'a>(
         largest_order: options.largest_order,
         masked: Vec::new(),
         feedback: stated.and_then(|known| known.feedback).filter(|k| !k.is_zero()),
-        most_free: usize::MAX,
+        watched: false,
         deadline: options.time_limit.map(Deadline::after),
     })
 }

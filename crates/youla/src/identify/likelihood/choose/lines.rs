@@ -6,8 +6,9 @@
 
 use super::loads::{self, Nuisance, Steps};
 use super::problem::{Choice, Problem, Solution, Task};
-use super::unmoved::{Motion, NARROW};
+use super::unmoved::Motion;
 use crate::identify::likelihood::data::spectra::{Mask, Spectra, long_enough};
+use crate::identify::likelihood::search::driven::NARROW;
 use crate::identify::likelihood::search::model::Model;
 use crate::identify::likelihood::search::point::Point;
 use crate::identify::likelihood::search::{search, with_best_ends, with_best_inputs};

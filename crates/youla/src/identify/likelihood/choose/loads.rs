@@ -27,8 +27,6 @@ const NOTICED: f64 = 1e-4;
 const SAMPLES_PER_STEP: usize = 500;
 /// Samples of a record above which steps are not looked for: time and memory of the transforms. Of a longer record the load is a noise.
 const LONGEST: usize = 100_000;
-/// Modes of a model that the inputs hardly move, from which they may stand for steps of load. Chosen: loops without load have at most one.
-const FREE: usize = 2;
 
 /// A step of load.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -140,8 +138,7 @@ fn total(all: &Problem<'_>, of: &Cleaned) -> f64 {
 /// left shows the steps. Where these explain no more than the modes did, the walk goes on.
 pub(super) fn solve(all: &Problem<'_>, fresh: &[Experiment<'_>], table: &mut Vec<Candidate>) -> Option<Cleaned> {
     // Of a long record the walk on its first part has been watched.
-    let watches = are_sought(all) && all.samples().0 <= LONG;
-    let watched = Problem { most_free: if watches { FREE } else { usize::MAX }, ..all.clone() };
+    let watched = Problem { watched: are_sought(all) && all.samples().0 <= LONG, ..all.clone() };
     let first = all.first(table)?;
     let now = Cleaned::untouched(watched.solve_from(first, table)?);
     if !watched.stops_at(&now.solution.chosen) {
@@ -332,7 +329,7 @@ pub(crate) fn of_another_shape(steps: &Steps, ts: f64) -> Option<Evidence> {
         let mut samples: Vec<usize> = of.iter().map(|step| step.sample).collect();
         samples.sort_unstable();
         let near = |first: usize| samples.iter().filter(|t| (first..=first + CROWD).contains(t)).copied().collect();
-        let long = |crowd: &Vec<usize>| crowd.last() >= crowd.first().map(|first| first + SHORTEST).as_ref();
+        let long = |crowd: &Vec<usize>| crowd.first().zip(crowd.last()).is_some_and(|(a, b)| b - a >= SHORTEST);
         samples.iter().map(|first| near(*first)).filter(long).max_by_key(Vec::<usize>::len)
     };
     // What bends no model, those of the fresh records, does not count.

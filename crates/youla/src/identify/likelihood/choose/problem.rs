@@ -124,8 +124,8 @@ pub(crate) struct Problem<'a> {
     pub(crate) masked: Vec<Mask>,
     /// The feedback that ran, where it explains the log: what it does not stabilise is not the plant.
     pub(crate) feedback: Option<&'a StateSpace<Discrete>>,
-    /// Modes that the inputs hardly move at which the walk stops: `usize::MAX` where it does not.
-    pub(crate) most_free: usize,
+    /// Whether the walk stops at a model with several modes that the inputs hardly move.
+    pub(crate) watched: bool,
     /// When the search for a better model ends.
     pub(crate) deadline: Option<Deadline>,
 }

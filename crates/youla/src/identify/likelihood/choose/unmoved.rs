@@ -3,20 +3,19 @@
 use super::problem::{Choice, Problem};
 use crate::identify::likelihood::data::spectra::Spectra;
 use crate::identify::likelihood::search::block::Block;
+use crate::identify::likelihood::search::driven::{is_line, longest};
 use crate::identify::likelihood::search::noise::Noise;
 use crate::identify::likelihood::search::point::{Point, energy};
 use crate::identify::likelihood::search::with_best_ends;
 use faer::c64;
-use std::f64::consts::TAU;
 
 /// Lines on each side of a mode at which it is not asked what moves it.
 const AWAY: f64 = 5.0;
 /// Power of the free motion of a mode over that which the inputs cause, away from its frequency, from which it is a disturbance: both are alike
 /// for a mode on the unit circle that the inputs move. Modes of plants have 0.01 to 0.3, what unbalance and hum leave 3 to 8000.
 const UNMOVED: f64 = 2.0;
-
-/// Half width of a mode below which it is narrower than a line, in lines of the longest record: what a disturbance leaves has 0.005 to 0.1.
-pub(super) const NARROW: f64 = 0.3;
+/// Modes of a model that the inputs hardly move, from which they may stand for steps of load. Chosen: loops without load have at most one.
+const FREE: usize = 2;
 /// A frequency beyond all lines.
 const NOWHERE: f64 = -1.0;
 
@@ -75,25 +74,29 @@ impl Motion {
 /// The blocks of a model of separated modes whose free motion is distinctly more than what the inputs cause, without those narrower than a line:
 /// these are disturbances at one frequency.
 pub(super) fn free_modes(spectra: &Spectra, point: &Point, noise: &Noise) -> Vec<usize> {
-    let longest = spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64;
-    let narrow =
-        |block: &Block| block.poles().iter().any(|z| z.im != 0.0 && z.norm().ln().abs() / TAU * longest < NARROW);
+    let longest = longest(spectra);
     let blocks = &point.model.blocks;
     let firsts = blocks.iter().scan(0, |next, block| Some(std::mem::replace(next, *next + block.states)));
     let free = |at| Motion::of(at, NOWHERE, (spectra, noise), point).is_free();
-    blocks.iter().zip(firsts).enumerate().filter(|(_, at)| !narrow(at.0) && free(*at)).map(|(k, _)| k).collect()
+    blocks
+        .iter()
+        .zip(firsts)
+        .enumerate()
+        .filter(|(_, at)| !is_line(at.0, longest) && free(*at))
+        .map(|(k, _)| k)
+        .collect()
 }
 
 impl Problem<'_> {
-    /// Whether the walk stops at a model: so many of its modes are free.
+    /// Whether a walk that is watched stops at a model: several of its modes are free.
     pub(super) fn stops_at(&self, choice: &Choice) -> bool {
-        if self.most_free == usize::MAX || self.order.is_some() {
+        if !self.watched || self.order.is_some() {
             return false;
         }
         let Some(model) = choice.found.point.model.separated() else { return false };
         let (spectra, noise) = (self.spectra(&choice.delays), &choice.found.noise);
         let point = with_best_ends(&spectra, model, noise);
         let free = free_modes(&spectra, &point, noise).len();
-        free >= self.most_free && free < point.model.blocks.len()
+        free >= FREE && free < point.model.blocks.len()
     }
 }

@@ -25,8 +25,9 @@ use std::ops::Range;
 const GROWTH: f64 = 2.0;
 /// Product of input and output of a block over the largest below which an output does not see what the inputs move there.
 const UNSEEN: f64 = 1e-8;
-/// Half width of a mode, in lines of the longest record, below which it is a line of the noise and not a peak.
-const NARROW: f64 = 0.3;
+/// Half width of a mode, in lines of the longest record, below which it is a line of the noise and not a peak: what a disturbance leaves has 0.005
+/// to 0.1.
+pub(crate) const NARROW: f64 = 0.3;
 /// About how many lines show the size of the noise.
 const LINES: usize = 6000;
 /// Steps of the logarithm of that size: the likelihood is flat to a quarter of a nat.
@@ -192,7 +193,8 @@ fn hidden(model: &Model, longest: f64, output: usize) -> Vec<usize> {
     (0..model.blocks.len()).filter(|k| left_out(&model.blocks[*k])).collect()
 }
 
-fn is_line(block: &Block, longest: f64) -> bool {
+/// Whether a mode is a line of the noise, by the samples of the longest record.
+pub(crate) fn is_line(block: &Block, longest: f64) -> bool {
     block.poles().iter().any(|p| p.im != 0.0 && p.norm().ln().abs() * longest < NARROW * TAU)
 }
 
@@ -202,7 +204,8 @@ pub(crate) fn has_line(model: &Model, spectra: &Spectra) -> bool {
     model.blocks.iter().any(|block| is_line(block, longest))
 }
 
-fn longest(spectra: &Spectra) -> f64 {
+/// Samples of the longest record.
+pub(crate) fn longest(spectra: &Spectra) -> f64 {
     spectra.records.iter().map(|lines| lines.samples).max().unwrap_or(0) as f64
 }
 

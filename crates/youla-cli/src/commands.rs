@@ -4,7 +4,7 @@ use crate::args::{Args, Command};
 use crate::output::{Failure, Form, say};
 use crate::progress::Progress;
 use crate::run_folder::{OutputFolder, folder_of};
-use crate::{check, commission, compare, excite, export, init, paper, plot, rig, table, workbench};
+use crate::{check, commission, compare, excite, export, init, paper, plot, rig, synchronise, table, workbench};
 use std::path::Path;
 use youla_io::folder::RunFolder;
 use youla_run::{
@@ -32,6 +32,7 @@ fn other(form: Form, command: &Command) -> Result<(), Failure> {
             let (settings, folder) = args.settings()?;
             identify_and_write(form, &args.output_folder, &folder, settings, |s| read_records(&s.data, &folder))
         }
+        Command::Synchronise(args) => synchronise::synchronise(form, args),
         Command::Schema => say(&format!("{:#}", settings_schema())),
         Command::Init(args) => init::init(form, args),
         Command::Signals { settings, out } => signals(form, settings, out),

@@ -17,6 +17,7 @@ mod plot;
 mod progress;
 mod rig;
 mod run_folder;
+mod synchronise;
 mod table;
 mod terminal;
 mod workbench;

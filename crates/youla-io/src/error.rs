@@ -222,6 +222,14 @@ pub enum Error {
         /// How seconds are made of it, such as `/ 1e3`.
         to_seconds: &'static str,
     },
+    /// Channels with their own time stamps cannot be brought to the clock of the controller.
+    #[error("{what}: {problem}")]
+    Clock {
+        /// The log.
+        what: String,
+        /// The channel, what is wrong with it, and the remedy.
+        problem: String,
+    },
     /// Neither a sample time nor a time column is declared.
     #[error(
         "{what}: the sample time is not known; state it in seconds (--sample-time, or sample_time in [data]) or name the column of the time (--time, or time_column)"
@@ -237,7 +245,7 @@ youla::error_context! {
     numerical: Json;
     bad_input: Settings OutputExists BeingWritten NotReplaced Unwritable FileExists NotAModel NotAResponse Io MissingFile NoData Cell FieldCount
         Delimiter Corrupt
-        FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit SampleTimeMissing;
+        FormatNotRead UnequalLength WrongVariable NonUniformTime TimeUnit Clock SampleTimeMissing;
 }
 
 /// Where a damaged file was found to be damaged.
@@ -287,7 +295,8 @@ fn cell_remedy(text: &str, decimal: Option<&str>) -> String {
     let missing = ["", "nan", "na", "null", "none", "-"].contains(&text.trim().to_ascii_lowercase().as_str());
     if missing && decimal.is_none() {
         return "; leave rows without a value out of the file, and gaps = \"split\" in [data] cuts the record there (with a \
-                time_column); every row is read, also those that `segments`, `skip` and `take` do not use"
+                time_column), or, where each channel has rows of its own, bring them to one clock by `youla synchronise`; every row is \
+                read, also those that `segments`, `skip` and `take` do not use"
             .into();
     }
     let remedy =

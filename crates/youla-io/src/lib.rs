@@ -1,8 +1,8 @@
 //! Files of measured records and of models.
 //!
 //! A reader turns a file into a [`youla::signal::Record`] or refuses it: a gap in time, a cell that is not a finite number, or
-//! channels of unequal length is an error that states the file, the line or byte, and the setting to change. Nothing is
-//! repaired, resampled or guessed; channels are chosen by name or column number.
+//! channels of unequal length is an error that states the file, the line or byte, and the setting to change. No reader
+//! repairs, resamples or guesses; channels are chosen by name or column number. [`synchronise`] fills and interpolates, on request, and says what that costs.
 //!
 //! | module or item | content |
 //! |---|---|
@@ -13,6 +13,7 @@
 //! | [`read_response`] | measured responses: tables, universal files with dataset 58 |
 //! | [`Variables`] | the contents of a MATLAB or NumPy file, by path |
 //! | [`survey`] | the columns of a file before any is chosen |
+//! | [`synchronise`] | channels with their own time stamps, on the clock of the controller |
 //! | [`ModelFile`] | the JSON form of a discrete-time model |
 //! | [`export`] | models, controllers and sequences for C, Python, MATLAB; import of models |
 //! | [`folder`] | a folder of results that appears only when it is complete |
@@ -53,13 +54,17 @@ mod response;
 pub(crate) mod scratch;
 mod source;
 mod survey;
+mod synchronise;
 mod time;
 pub mod toml_file;
 mod uff;
 mod values;
 
 pub use choose::{ChannelRef, ChannelSpec};
-pub use csv::{CsvOptions, DecimalSign, Delimiter, HeaderLine, csv_from_bytes, read_csv, write_csv};
+pub use csv::{
+    CsvOptions, DecimalSign, Delimiter, HeaderLine, StampedColumn, csv_from_bytes, read_csv, read_stamped_csv,
+    write_csv,
+};
 #[cfg(not(feature = "mat73"))]
 use disabled::hdf;
 pub use error::{CorruptAt, Error, Result, TextPosition};
@@ -71,5 +76,6 @@ pub use open::{open, read_bytes, read_text};
 pub use response::{ReadResponse, ResponseSignals, read_response};
 pub use source::{Format, Source, check_unit, read, read_parts, sha256, sha256_of};
 pub use survey::{ColumnContent, SurveyedColumn, survey};
+pub use synchronise::{ChannelTiming, Placement, Role, StampedChannel, Synchronised, synchronise};
 pub use time::{Gaps, TimeSource, unit_of_time};
 pub use values::{Value, Variable, Variables};

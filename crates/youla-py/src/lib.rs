@@ -21,7 +21,7 @@ mod _native {
     #[pymodule_export]
     use super::kept::{Region, check_settings, read_mat, redesign, report_html, settings_json, write_files};
     #[pymodule_export]
-    use super::logs::{clock, read_log, unit_of_time};
+    use super::logs::{clock, read_log, synchronise, unit_of_time};
     #[pymodule_export]
     use super::models::{certify, frequency_response, modes, reduce, simulate, simulate_loop};
     #[pymodule_export]

@@ -9,7 +9,7 @@ use youla::identify::likelihood::{ResponseTable, ResponseVariance};
 use youla::lti::Discrete;
 use youla::signal::{Channel, Record};
 use youla::{Mat, c64};
-use youla_io::{ChannelRef, ChannelSpec, Source, TimeSource};
+use youla_io::{ChannelRef, ChannelSpec, Role, Source, StampedChannel, TimeSource};
 
 /// A record as Python holds it: name, sample time, channels with name, unit and column, and an array of samples x columns.
 pub(crate) type Log<'py> = (String, f64, Vec<(String, String, usize)>, PyReadonlyArray2<'py, f64>);
@@ -93,7 +93,7 @@ fn of_log(error: youla_io::Error) -> Failure {
             "leave time out and give the sample time as dt=, or give a mapping with a column of seconds (the column {to_seconds})"
         ),
         Error::NonUniformTime { .. } => {
-            "cut at gaps and give identify a list of records, or interpolate to equal steps before".into()
+            "cut at gaps and give identify a list of records, or bring it to one clock: youla.Channels(frame, time=...).synchronise(dt=...)".into()
         }
         Error::Cell { .. } | Error::FieldCount { .. } | Error::Delimiter { .. } => frame(),
         _ => return error.into(),
@@ -115,4 +115,39 @@ pub(crate) fn clock(what: &str, times: PyReadonlyArray1<'_, f64>, dt: Option<f64
     let times: Vec<f64> = times.as_array().iter().copied().collect();
     let time = TimeSource { ts: dt, ..TimeSource::default() }.of_column(what, &times);
     Ok(time.map_err(Failure::from)?.ts())
+}
+
+/// A channel with its own time stamps: name, unit, role, whether it is written when it changes, times, values.
+type Stamped<'py> = (String, String, String, bool, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
+
+/// Of a channel: name, samples, median and longest step, scatter, delay, placement, filled values and their error.
+type Timing = (String, usize, f64, f64, f64, Option<f64>, &'static str, usize, f64);
+
+/// Records and their beginnings, timing of the channels, drift of the clock, rows left out.
+type SynchronisedOut<'py> = (Vec<(Bound<'py, numpy::PyArray2<f64>>, f64)>, Vec<Timing>, f64, usize);
+
+/// Brings channels to the clock of the controller.
+#[pyfunction]
+pub(crate) fn synchronise<'py>(
+    py: Python<'py>,
+    name: String,
+    channels: Vec<Stamped<'py>>,
+    dt: f64,
+) -> PyResult<SynchronisedOut<'py>> {
+    let one = |(name, unit, role, changes_only, times, values): Stamped<'_>| {
+        let role = match role.as_str() {
+            "inputs" => Role::Input,
+            "outputs" => Role::Output,
+            _ => Role::External,
+        };
+        let of = |array: PyReadonlyArray1<'_, f64>| array.as_array().to_vec();
+        StampedChannel { channel: Channel::new(name, unit), role, changes_only, times: of(times), values: of(values) }
+    };
+    let channels: Vec<StampedChannel> = channels.into_iter().map(one).collect();
+    let found = worker::run(py, false, move |_| Ok(youla_io::synchronise(&name, &channels, Discrete::new(dt)?)?))?;
+    let timing = |t: youla_io::ChannelTiming| {
+        (t.name, t.samples, t.step, t.longest_step, t.jitter, t.delay, t.placement.name(), t.filled, t.error)
+    };
+    let records = found.records.iter().map(|r| (crate::matrices::array(py, r.data()), r.start())).collect();
+    Ok((records, found.timing.into_iter().map(timing).collect(), found.drift, found.left_out))
 }

@@ -100,8 +100,9 @@ impl Fields {
         Ok(())
     }
 
-    /// Reads all remaining lines; of a column that has a cell that is no number, the error of the first one.
-    pub(super) fn read_each(&self, lines: &mut Lines) -> Result<Vec<Result<Vec<f64>>>> {
+    /// Reads all remaining lines; of a column that has a cell that is no number, the error of the first one. With `blanks`, an empty cell or
+    /// `nan` is read as NaN.
+    pub(super) fn read_each(&self, lines: &mut Lines, blanks: bool) -> Result<Vec<Result<Vec<f64>>>> {
         let expected = self.names.len();
         let mut columns: Vec<Result<Vec<f64>>> = self.names.iter().map(|_| Ok(Vec::new())).collect();
         let mut rows = 0;
@@ -115,6 +116,7 @@ impl Fields {
                 let Ok(values) = column else { continue };
                 match number(cell, self.decimal) {
                     Some(value) => values.push(value),
+                    None if blanks && is_blank(cell) => values.push(f64::NAN),
                     None => *column = Err(self.bad_cell(lines, k, cell)),
                 }
             }
@@ -261,6 +263,11 @@ fn header_cells(lines: &Lines, delimiter: Option<u8>) -> Vec<String> {
         Ok(true) => record.iter().map(text).collect(),
         _ => Vec::new(),
     }
+}
+
+/// A cell in which a logger says that a channel has no sample.
+fn is_blank(cell: &[u8]) -> bool {
+    unquoted(cell).is_some_and(|text| text.trim().is_empty() || text.trim().eq_ignore_ascii_case("nan"))
 }
 
 /// A finite number, perhaps in quotes and with blanks around it.

@@ -89,11 +89,46 @@ fn read_columns(
 
 /// All columns with their names, `#1`, `#2` and so on where the file has none; an error for one that holds more than numbers.
 pub(crate) fn read_each(path: &Path, options: &CsvOptions) -> Result<Vec<(String, Result<Vec<f64>>)>> {
+    columns(path, options, false)
+}
+
+fn columns(path: &Path, options: &CsvOptions, blanks: bool) -> Result<Vec<(String, Result<Vec<f64>>)>> {
     let mut lines = Lines::open(path)?;
     let fields = Fields::detect(&mut lines, options)?;
-    let columns = fields.read_each(&mut lines).map_err(|error| lines.damage().unwrap_or(error))?;
+    let columns = fields.read_each(&mut lines, blanks).map_err(|error| lines.damage().unwrap_or(error))?;
     Ok(fields.names().iter().cloned().zip(columns).collect())
 }
+
+/// Name, times and values of each column of numbers of a text file; an empty cell means that the channel has no sample at the time of its
+/// row. Times stay in the unit of the file.
+///
+/// # Errors
+/// Those of [`read_csv`] but for the sample time; a column with other text is left out, but for that of the time.
+pub fn read_stamped_csv(path: impl AsRef<Path>, time: &ChannelRef, options: &CsvOptions) -> Result<Vec<StampedColumn>> {
+    let path = path.as_ref();
+    let mut found = columns(path, options, true)?;
+    let names: Vec<String> = found.iter().map(|(name, _)| name.clone()).collect();
+    let times = found.swap_remove(time.index(&path.display().to_string(), &names)?).1?;
+    if let Some(row) = times.iter().position(|t| t.is_nan()) {
+        let what = format!("{}: the time in row {} (counted from 1)", path.display(), row + 1);
+        return Err(youla::Error::OutOfRange {
+            what,
+            value: f64::NAN,
+            must: "a number; leave rows without a time out",
+        }
+        .into());
+    }
+    found.sort_by_key(|(name, _)| names.iter().position(|n| n == name));
+    let stamped = |(name, values): (String, Result<Vec<f64>>)| {
+        let there = times.iter().zip(values.ok()?).filter(|(_, v)| !v.is_nan());
+        let (times, values) = there.map(|(t, v)| (*t, v)).unzip();
+        Some((name, times, values))
+    };
+    Ok(found.into_iter().filter_map(stamped).collect())
+}
+
+/// Name, times and values of a column.
+pub type StampedColumn = (String, Vec<f64>, Vec<f64>);
 
 /// Refuses a time column in another unit than the second by the head of a text file.
 pub(crate) fn require_seconds(path: &Path, column: &ChannelRef, options: &CsvOptions) -> Result<()> {

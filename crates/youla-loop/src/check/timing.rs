@@ -140,8 +140,8 @@ impl TimingCheck {
                 few(100.0 * self.jitter),
                 few(100.0 * self.worst)
             );
-            let advice = "If only the time stamps are irregular, set sample_time and remove time_column; if the sampling is irregular, \
-                          resample to a uniform clock before the identification";
+            let advice = "If only the time stamps are irregular, set sample_time and remove time_column; if samples are \
+                          missing here and there or channels have clocks of their own, bring them to one clock by `youla synchronise`";
             let numbers = defect(what).number("irregular", self.irregular.len() as f64).number("jitter", self.jitter);
             all.push(numbers.rows(from, to).number("worst", self.worst).advice(advice));
         }

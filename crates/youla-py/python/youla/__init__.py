@@ -7,6 +7,7 @@
 """
 
 from . import _native
+from ._channels import Channels, ChannelTiming, Synchronised
 from ._errors import Error, InputError, NumericalError
 from ._figures import Plots
 from ._identify import demo, identify
@@ -38,6 +39,8 @@ __version__ = _native.version()
 __all__ = [
     "Bootstrap",
     "Certificate",
+    "ChannelTiming",
+    "Channels",
     "Check",
     "Comparison",
     "Error",
@@ -59,6 +62,7 @@ __all__ = [
     "Run",
     "Study",
     "SubspaceEstimate",
+    "Synchronised",
     "Verdict",
     "VerdictTest",
     "bootstrap",

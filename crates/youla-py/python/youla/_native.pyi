@@ -35,6 +35,7 @@ __all__ = [
     "simulate",
     "simulate_loop",
     "subspace",
+    "synchronise",
     "unit_of_time",
     "version",
     "write_files",
@@ -45,6 +46,9 @@ _Options: TypeAlias = Mapping[str, Any]
 _Complex: TypeAlias = npt.NDArray[np.complex128]
 _Region: TypeAlias = tuple[_Complex, tuple[_Array, _Array, float] | None]
 
+def synchronise(
+    name: str, channels: Sequence[tuple[str, str, str, bool, _Array, _Array]], dt: float
+) -> tuple[list[tuple[_Array, float]], list[tuple[str, int, float, float, float, float | None, str, int, float]], float, int]: ...
 def unit_of_time(heading: str) -> tuple[str, str] | None: ...
 def program(args: Sequence[str]) -> int: ...
 def version() -> str: ...

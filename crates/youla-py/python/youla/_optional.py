@@ -10,14 +10,20 @@ from ._errors import InputError
 #: The extra of this package that installs each of them.
 _EXTRAS = {
     "anywidget": "notebook",
+    "asammdf": "logs",
     "control": "control",
     "matplotlib.pyplot": "plot",
+    "nptdms": "logs",
+    "orangebox": "logs",
     "pandas": "frames",
     "pyarrow": "parquet",
     "pyarrow.parquet": "parquet",
+    "pymavlink.DFReader": "logs",
+    "pyulog": "logs",
     "scipy.linalg": "rotor",
     "scipy.signal": "control",
     "traitlets": "notebook",
+    "wpiutil.log": "logs",
 }
 
 

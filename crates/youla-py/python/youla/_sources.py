@@ -88,7 +88,8 @@ def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
         k = int(uneven[0])
         raise InputError(
             f"{what} is not uniform: sample {k + 1}, counted from 0, comes {steps[k]:.6g} s after the one before, the usual step is {usual:.6g} s "
-            f"({uneven.size} such steps); cut at gaps and give identify a list of records, or interpolate to equal steps before"
+            f"({uneven.size} such steps); "
+            "cut at gaps and give identify a list of records, or bring it to one clock: youla.Channels(data, time=...).synchronise(dt=...)"
         )
     return _native.clock(what, np.ascontiguousarray(seconds), dt)
 

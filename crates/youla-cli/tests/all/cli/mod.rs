@@ -18,4 +18,5 @@ mod pid;
 mod plot;
 mod response;
 mod rig;
+mod synchronise;
 mod verbs;

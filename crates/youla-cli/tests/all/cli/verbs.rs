@@ -14,7 +14,7 @@ fn without_arguments_help_is_shown() {
 #[test]
 fn every_verb_has_an_example() {
     let folder = empty_folder("help-verbs");
-    for verb in ["demo", "check", "identify", "signals", "report", "excite", "schema"] {
+    for verb in ["demo", "check", "synchronise", "identify", "signals", "report", "excite", "schema"] {
         let found = youla(&folder, &[verb, "--help"]);
         assert_eq!((found.code, found.stderr.as_str()), (Some(0), ""), "{verb}");
         assert!(found.stdout.contains(&format!("Example:\n  youla {verb}")), "{}", found.stdout);

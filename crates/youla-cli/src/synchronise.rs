@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
 use youla::signal::Channel;
 use youla_io::folder::require_place;
-use youla_io::{ChannelRef, ChannelTiming, Role, StampedChannel, StampedColumn, Synchronised};
+use youla_io::{ChannelRef, ChannelTiming, Placement, Role, StampedChannel, StampedColumn, Synchronised};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -196,5 +196,9 @@ fn text(found: &Synchronised, targets: &[PathBuf]) -> String {
         found.left_out,
         1e6 * found.drift
     );
+    for t in found.timing.iter().filter(|t| t.placement == Placement::Interpolated) {
+        let step = format!("{:.6e}", t.step).parse().unwrap_or(t.step);
+        text += &format!("state in run.toml: outputs = [{{ name = \"{}\", sampled_every = {step} }}]\n", t.name);
+    }
     text + &lines_of(targets)
 }

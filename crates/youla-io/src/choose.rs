@@ -27,7 +27,7 @@ pub enum ChannelRef {
 }
 
 /// A channel of the record and its column in the file.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ChannelSpec {
     /// Name in the record.
@@ -38,17 +38,21 @@ pub struct ChannelSpec {
     /// Unit label such as `um` or `V`.
     #[serde(default)]
     pub unit: String,
+    /// Of an output that was interpolated: step of the samples of its own clock, seconds (`youla synchronise` prints it); the error of the
+    /// interpolation is in the region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sampled_every: Option<f64>,
 }
 
 impl ChannelSpec {
     /// A channel that has the same name in file and record, without a unit.
     pub fn named(name: impl Into<String>) -> Self {
-        ChannelSpec { name: name.into(), from: None, unit: String::new() }
+        ChannelSpec { name: name.into(), from: None, unit: String::new(), sampled_every: None }
     }
 
     /// A channel from another place in the file.
     pub fn from(name: impl Into<String>, from: ChannelRef, unit: impl Into<String>) -> Self {
-        ChannelSpec { name: name.into(), from: Some(from), unit: unit.into() }
+        ChannelSpec { name: name.into(), from: Some(from), unit: unit.into(), sampled_every: None }
     }
 
     /// Channels under the names or numbers by which they are chosen, without units.

@@ -120,6 +120,50 @@ def test_a_betaflight_blackbox_is_read_with_the_flight_that_is_asked_for(tmp_pat
         youla.Channels.read(tmp_path / "log.bbl", flight=3)
 
 
+def test_an_output_with_a_clock_of_its_own_has_its_error_in_the_region(tmp_path):
+    """The machine between the cycles: states at the beginning of a cycle, then exp(A tau) x + A^-1 (exp(A tau) - I) B u."""
+    linalg = pytest.importorskip("scipy.linalg")
+    w = 2 * np.pi * 30
+    a = linalg.block_diag([[0, 1], [-w * w, -0.1 * w]], [[-15.0]])
+    b, c = np.array([[0], [0.3 * w * w], [15.0]]), np.array([[1.0, 0, 1]])
+    poles, v = np.linalg.eig(a)
+    into, out = np.linalg.solve(v, np.eye(3)), c @ v
+    ad = linalg.expm(DT * a)
+    plant = youla.Model(ad, np.linalg.solve(a, (ad - np.eye(3)) @ b), c, [[0.0]], dt=DT)
+    omega = 2 * np.pi * np.geomspace(0.5, 180, 150)
+    true, squares = plant.frequency_response(omega).values[:, 0, 0], []
+    for seed, rate in enumerate((1.37, 0.93, 3.1)):
+        rng, n = np.random.default_rng(seed), 12_000
+        d = np.repeat(rng.standard_normal(n // 4), 4)
+        x, u, states = np.zeros(3), np.zeros(n), np.zeros((n, 3))
+        noise = 0.01 * rng.standard_normal(n)
+        for k in range(n):
+            states[k] = x
+            u[k] = d[k] - 0.4 * (c @ x + noise[k])[0]
+            x = plant.a @ x + plant.b[:, 0] * u[k]
+        stamps = np.arange(0.3 * DT, (n - 1) * DT, DT / rate)
+        k = (stamps / DT).astype(int)
+        decay = np.exp((stamps - k * DT)[:, None] * poles)
+        y = np.real((decay * (states[k] @ into.T) + (decay - 1) / poles * (into @ b).T * u[k, None]) @ out.T)[:, 0]
+        t = DT * np.arange(n)
+        log = youla.Channels({"u": (t, u), "y": (stamps, y + 0.01 * rng.standard_normal(len(y))), "d": (t, d)})
+        found = log.synchronise(inputs="u", outputs="y", excitation="d", dt=DT)
+        assert found.timing[1].placement == "interpolated" and found.timing[1].delay is None
+        run = youla.identify(found.records, controller=0.4, feedback="negative")
+        stated = run.summary["recommended"]["response_deviation"]
+        deviation = np.interp(omega / 2 / np.pi, stated["hz"], [entry[0][0] for entry in stated["absolute"]])
+        miss = np.abs(run.recommended.frequency_response(omega).values[:, 0, 0] - true)
+        squares.append(np.mean((miss / deviation) ** 2))
+        (_, high), *_ = run.verdict.bands
+        below = omega < 2 * np.pi * high
+        assert 40 < high < 130 and (miss[below] < 0.2 * np.abs(true[below])).all()
+    assert np.mean(squares) < 2.25
+    run.save(tmp_path / "run")
+    assert youla.load(tmp_path / "run") == run
+    with pytest.raises(youla.InputError, match="'u', which is no output"):
+        youla.Record({"u": u, "y": u}, inputs="u", outputs="y", dt=DT, sampled_every={"u": 0.1})
+
+
 @needs("nptdms")
 def test_a_tdms_file_keeps_its_units(tmp_path):
     signals = loop(6, 2000)

@@ -3,8 +3,8 @@
 //! Lagrange's polynomial through the eight samples around an instant, in barycentric form (Berrut and Trefethen, SIAM Review 46, 2004):
 //! in the middle of equal steps its gain differs from one by 0.5 % at a fifth of the sample rate and by 5 % at a third.
 
-/// Samples of a polynomial.
-const POINTS: usize = 8;
+use youla::identify::likelihood::INTERPOLATION_POINTS;
+
 /// An instant between samples that are farther apart than this many median steps has no value.
 const GAP: f64 = 2.5;
 
@@ -20,10 +20,13 @@ pub(super) fn value(times: &[f64], values: &[f64], usual: f64, at: f64, without:
     if times.get(high)? - times[low] > reach * usual {
         return None;
     }
-    let first = after.saturating_sub(POINTS / 2).min(times.len().saturating_sub(POINTS + 1));
-    let chosen = (first..times.len()).filter(|k| Some(*k) != without).take(POINTS);
-    let near: Vec<(f64, f64)> =
-        chosen.map(|k| ((times[k] - at) / usual, values[k])).filter(|(x, _)| x.abs() <= GAP * POINTS as f64).collect();
+    let first =
+        after.saturating_sub(INTERPOLATION_POINTS / 2).min(times.len().saturating_sub(INTERPOLATION_POINTS + 1));
+    let chosen = (first..times.len()).filter(|k| Some(*k) != without).take(INTERPOLATION_POINTS);
+    let near: Vec<(f64, f64)> = chosen
+        .map(|k| ((times[k] - at) / usual, values[k]))
+        .filter(|(x, _)| x.abs() <= GAP * INTERPOLATION_POINTS as f64)
+        .collect();
     lagrange(&near)
 }
 

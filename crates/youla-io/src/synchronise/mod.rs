@@ -15,7 +15,8 @@
 //! whose stamp comes up to 0.15 of a cycle before the output, or 0.85 after it, belongs to the same cycle.
 //!
 //! What is filled is an error of the records that is not correlated with what it was filled from; it acts as noise, and the region of a model
-//! identified from the records holds it. Where that error, or the part of the rows that is missing, would decide the result, the log is refused.
+//! identified from the records holds it. What an interpolated output costs is in the region where its `sampled_every` is stated
+//! ([`crate::ChannelSpec`]). Where an error, or the part of the rows that is missing, would decide the result, the log is refused.
 
 mod clock;
 mod interpolate;

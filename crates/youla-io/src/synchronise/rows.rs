@@ -11,8 +11,11 @@ pub(super) const LEAST_ROWS: usize = 50;
 const MOST_MISSING: f64 = 0.3;
 /// From this share of missing samples on, a channel whose value never repeats may be one that is written when it changes.
 const MISSING_TO_ASK: f64 = 0.02;
+/// Least samples in a cycle of an output that is interpolated. Of 15 simulated loops with 0.53 to 2 samples in a cycle the region held the truth; with
+/// 0.5 and 0.26 it did in two of six.
+const LEAST_RATE: f64 = 2.0 / 3.0;
 /// Largest error of an output that is slower than 1.5 samples in a cycle, as a share of its size, where each sample is interpolated from its
-/// neighbours, twice as far as an instant between samples is: of a smooth signal less than a hundredth of it remains there.
+/// neighbours, twice as far as an instant between samples is: a signal that fills the band of its samples is not interpolated.
 const LARGEST_ERROR: f64 = 0.1;
 /// Samples on which that error is measured.
 const TRIALS: usize = 2000;
@@ -164,21 +167,29 @@ fn is_written_on_change(values: &[f64], missing: f64) -> bool {
     quantum > 0.0 && 2.0 * least as f64 >= missing * values.len() as f64
 }
 
-/// An output with a clock of its own: faster than the controller, or so smooth that its samples show what is between them.
+/// An output with a clock of its own, fast enough that its samples show what is between them.
 fn interpolated(channel: &StampedChannel, ts: f64) -> Result<Placed, String> {
     let (name, usual) = (&channel.channel.name, step(&channel.times));
-    let error = error_between(channel, usual);
-    if usual * 1.5 <= ts || error <= LARGEST_ERROR {
-        return Ok(Placed::Interpolated(error));
+    let rate = ts / usual;
+    let refused = |why: String| {
+        Err(format!(
+            "{name:?} is logged every {} s, the controller runs every {ts} s: what happens faster than {} Hz is not in the log ({why}); log it in \
+             each cycle",
+            few(usual),
+            few(0.5 / usual)
+        ))
+    };
+    if rate < LEAST_RATE {
+        return refused(format!("{:.2} samples in a cycle, at least {LEAST_RATE:.2} are taken", rate));
     }
-    Err(format!(
-        "{name:?} is logged every {} s, the controller runs every {ts} s: what happens faster than {} Hz is not in the log \
-         (a sample differs from what its neighbours say by {:.0} % of the size of the channel, at most {:.0} % are taken); log it in each cycle",
-        few(usual),
-        few(0.5 / usual),
-        100.0 * error.min(9.99),
-        100.0 * LARGEST_ERROR
-    ))
+    let error = error_between(channel, usual);
+    if rate < 1.5 && error > LARGEST_ERROR {
+        let [found, most] = [100.0 * error.min(9.99), 100.0 * LARGEST_ERROR];
+        return refused(format!(
+            "a sample differs from what its neighbours say by {found:.0} % of the size of the channel, at most {most:.0} % are taken"
+        ));
+    }
+    Ok(Placed::Interpolated(error))
 }
 
 /// Root mean square of the error of samples that are interpolated from their neighbours, as a share of the size of the channel.

@@ -262,14 +262,16 @@ class Channels:
         step = positive(dt, "dt")
         records, timing, drift, left_out = _native.synchronise(self._name, parts, step)
         several = len(records) > 1
+        kinds = [ChannelTiming(*t) for t in timing]
+        steps = {t.name: t.step for t in kinds if t.placement == "interpolated"}
 
         def record(k: int, data: Array) -> Record:
             name = f"{self._name}, part {k + 1}" if several else self._name
             columns = dict(zip(every, data.T, strict=True))
-            return Record(columns, dt=step, name=name, units=units, **chosen)
+            return Record(columns, dt=step, name=name, units=units, sampled_every=steps, **chosen)
 
         made = tuple(record(k, data) for k, (data, _) in enumerate(records))
-        return Synchronised(made, tuple(ChannelTiming(*t) for t in timing), drift, left_out)
+        return Synchronised(made, tuple(kinds), drift, left_out)
 
     def __repr__(self) -> str:
         def line(c: Logged) -> str:

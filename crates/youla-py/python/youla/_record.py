@@ -55,6 +55,9 @@ class Record:
         Name in reports.
     units : mapping, optional
         Unit labels by channel name, for example ``{"u": "V"}``.
+    sampled_every : mapping, optional
+        Of outputs that were interpolated between samples of a clock of their own, the step of these samples in seconds, by channel name; the
+        error of the interpolation is in the region of the model. `Channels.synchronise` states it.
 
     Raises
     ------
@@ -86,6 +89,7 @@ class Record:
         time: str | int | None = None,
         name: str = "record",
         units: Mapping[str, str] | None = None,
+        sampled_every: Mapping[str, float] | None = None,
     ) -> None:
         if isinstance(data, Record):
             raise InputError("data is already a youla.Record; use it as it is, or cut it by record[first:last]")
@@ -100,6 +104,12 @@ class Record:
         chosen = {group: _listed(names, group) for group, names in asked.items()}
         source = source_of(data, chosen, time, dt)
         self._set(source, chosen, text(name, "name"), labels)
+        steps = {} if sampled_every is None else table(sampled_every, "sampled_every", "{'y': 0.01}")
+        for channel, step in steps.items():
+            positive(step, f"sampled_every[{channel!r}]")
+            if channel not in self.outputs:
+                raise InputError(f"sampled_every names {channel!r}, which is no output; outputs are {list(self.outputs)}")
+        self._steps = {channel: float(step) for channel, step in steps.items()}
 
     def _set(self, source: Source, chosen: dict[str, list[str | int]], name: str, units: dict[str, str]) -> None:
         self._name, self._data, self._dt = name, source.data, source.dt
@@ -213,7 +223,7 @@ class Record:
 
     def _with(self, data: Array, name: str) -> Record:
         part = object.__new__(Record)
-        part._name, part._data, part._dt, part._groups = name, data, self._dt, self._groups
+        part._name, part._data, part._dt, part._groups, part._steps = name, data, self._dt, self._groups, self._steps
         if len(part) < 2:
             raise InputError(f"the rows that are left are {len(part)}, but a record needs at least 2")
         return part
@@ -264,10 +274,15 @@ class Record:
         channels = [channel for group in self._groups.values() for channel in group]
         return (self._name, self._dt, channels, self._data)
 
-    def _tables(self) -> dict[str, list[dict[str, str]]]:
+    def _tables(self) -> dict[str, list[dict[str, Any]]]:
         """The channels as [data] of run.toml lists them."""
         groups = ((key, self._groups[group]) for group, key, _ in _GROUPS)
-        return {key: [{"name": n, "unit": unit} for n, unit, _ in of] for key, of in groups if of}
+
+        def channel(key: str, name: str, unit: str) -> dict[str, Any]:
+            step = self._steps.get(name) if key == "outputs" else None
+            return {"name": name, "unit": unit} | ({} if step is None else {"sampled_every": step})
+
+        return {key: [channel(key, n, unit) for n, unit, _ in of] for key, of in groups if of}
 
 
 def _listed(names: Names, group: str) -> list[str | int]:

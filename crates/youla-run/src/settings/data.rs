@@ -184,7 +184,19 @@ impl DataSettings {
     fn clock_problem(&self) -> Option<String> {
         let ts = self.sample_time.unwrap_or(1.0);
         let fits = ts > 0.0 && ts.is_finite();
-        (!fits).then(|| format!("[data] sample_time is {ts}, but must be a positive number of seconds"))
+        let interpolated = |c: &&ChannelSpec| c.sampled_every.is_some_and(|step| !(step > 0.0 && step.is_finite()));
+        let others = [&self.inputs, &self.input_excitation, &self.reference, &self.alpha];
+        let other = others.into_iter().flatten().find(|c| c.sampled_every.is_some());
+        (!fits)
+            .then(|| format!("[data] sample_time is {ts}, but must be a positive number of seconds"))
+            .or_else(|| {
+                let c = self.outputs.iter().find(interpolated)?;
+                Some(format!("[data] sampled_every of {:?} must be a positive number of seconds", short(&c.name)))
+            })
+            .or_else(|| {
+                let name = short(&other?.name);
+                Some(format!("[data] sampled_every of {name:?} has no meaning: outputs alone are interpolated"))
+            })
     }
 
     fn record_problem(&self) -> Option<String> {

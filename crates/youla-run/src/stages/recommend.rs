@@ -34,17 +34,21 @@ pub(crate) fn weigh(data: &mut DataCheck, model: &Recommendation) {
 /// # Errors
 /// Those of [`identify`], within `[recommended]`.
 pub(crate) fn recommend(run: RunContext<'_>) -> Result<Recommendation> {
-    let (records, running, options) = (run.records, &run.declared.running, &run.settings.recommended);
+    let (records, running) = (run.records, &run.declared.running);
+    let mut options = run.settings.recommended.clone();
+    if run.settings.data.outputs.iter().any(|c| c.sampled_every.is_some()) {
+        options.sampled_every = run.settings.data.outputs.iter().map(|c| c.sampled_every).collect();
+    }
     let nominal = run.declared.nominal.as_ref();
     let within = |e: youla::Error| Error::from(e).within("[recommended]");
     if let Some(measured) = &records.measured {
         let response = measured.response(records.time)?;
-        let mut found = identify_response(&response, running, nominal, options).map_err(within)?.model;
+        let mut found = identify_response(&response, running, nominal, &options).map_err(within)?.model;
         if !run.settings.data.input_excitation.is_empty() && !running.is_open_loop() {
             found.evidence.extend(measured.controller(running.system())?);
         }
         return Ok(found);
     }
-    let found = identify(&records.estimation, &records.verification, running, nominal, options);
+    let found = identify(&records.estimation, &records.verification, running, nominal, &options);
     found.map(|Identified { model, .. }| model).map_err(within)
 }

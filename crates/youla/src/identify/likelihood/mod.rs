@@ -38,6 +38,7 @@ mod tests;
 pub use super::subspace::Experiment;
 pub use super::verdict::LoopRatio;
 pub use super::verdict::limits::LARGEST_IN_BAND;
+pub use deviation::interpolation::INTERPOLATION_POINTS;
 pub use deviation::mode_estimates::ModeEstimate;
 pub use deviation::region::{Draw, Interval, Region, RegionParts};
 pub use deviation::response_error::{EntryErrors, ResponseError};
@@ -58,6 +59,7 @@ use choose::problem::Problem;
 use choose::unseen::{WithoutUnseen, without_unseen};
 use data::spectra::Sizes;
 use deviation::Directions;
+use deviation::interpolation::Interpolated;
 
 /// Largest dead time that is tried, samples.
 const LARGEST_DEAD_TIME: usize = 20;
@@ -117,7 +119,17 @@ pub fn recommend(
     let mut candidates = Vec::new();
     let found = lines::solve(&all, verification, &mut candidates);
     let found = found.ok_or(Error::NoCandidate { samples: all.samples().0 })?;
-    let on = Records { all: &all, verification, known, time };
+    let (p, given) = (all.sizes.y.len(), &options.sampled_every);
+    if !given.is_empty() && given.len() != p {
+        return Err(Error::Ports {
+            what: "the number of steps of interpolated outputs".into(),
+            expected: p,
+            found: given.len(),
+        });
+    }
+    let of = |(output, step): (usize, &Option<f64>)| Some(Interpolated::new(output, time.ts() / (*step)?));
+    let interpolated = given.iter().enumerate().filter_map(of).collect();
+    let on = Records { all: &all, verification, known, time, interpolated };
     let (mut recommended, doubts) = on.judged(&found, 1.0)?;
     if let Some((unseen, widening)) = on.without_unseen(&found, &recommended, &doubts, &mut candidates) {
         let (without, _) = on.judged(&unseen.found, widening)?;
@@ -136,6 +148,8 @@ struct Records<'a> {
     verification: &'a [Experiment<'a>],
     known: Option<&'a LoopKnowledge<'a>>,
     time: Discrete,
+    /// The outputs that were interpolated.
+    interpolated: Vec<Interpolated>,
 }
 
 /// What says whether modes of a model are those of the noise.
@@ -181,7 +195,8 @@ impl Records<'_> {
         let (nonlinear, nonlinear_part) = verdict::nonlinear(&spectra, solution);
         let nuisance = found.nuisance(&problem, &spectra);
         let scatter = (widening * parts.scatter, &nuisance);
-        let directions = Directions::new(&spectra, solution, scatter, witness.clone()).with(nonlinear_part);
+        let directions = Directions::new(&spectra, solution, scatter, witness.clone())
+            .with(nonlinear_part, self.interpolated.clone());
         let plant = deviation::physical::plant(choice, &problem.sizes, time)?;
         let region = deviation::region::Region::new(problem.sizes.clone(), time, &shares, directions);
         let judged = Judged {

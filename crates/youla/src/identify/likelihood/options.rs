@@ -1,7 +1,7 @@
 //! What may be fixed about the recommended model.
 
 /// What is known of the recommended model beforehand; the rest is chosen by the evidence of the records.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "schema", derive(schemars::JsonSchema))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
@@ -22,10 +22,22 @@ pub struct LikelihoodOptions {
     /// was ended. A search that has begun ends first. The result depends on the speed of the machine. No limit when absent.
     #[cfg_attr(feature = "serde", serde(skip_serializing_if = "Option::is_none"))]
     pub time_limit: Option<u32>,
+    /// Of each output, the step in seconds of the samples of another clock from which it was interpolated; `None` for outputs that were not, empty
+    /// where none was. The error of the interpolation is in the region. In run.toml the channels state it.
+    #[cfg_attr(feature = "serde", serde(skip))]
+    pub sampled_every: Vec<Option<f64>>,
 }
 
 impl Default for LikelihoodOptions {
     fn default() -> Self {
-        LikelihoodOptions { order: None, dead_time: None, feedthrough: None, largest_order: 100, time_limit: None }
+        let (largest_order, sampled_every) = (100, Vec::new());
+        LikelihoodOptions {
+            order: None,
+            dead_time: None,
+            feedthrough: None,
+            largest_order,
+            time_limit: None,
+            sampled_every,
+        }
     }
 }

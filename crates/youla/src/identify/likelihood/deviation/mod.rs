@@ -9,6 +9,7 @@
 //! under slow noise held 60 %, as two poles for four were the better choice, and wrong.
 
 pub(crate) mod innovation;
+pub(crate) mod interpolation;
 pub(crate) mod mode_estimates;
 pub(crate) mod physical;
 pub(crate) mod region;
@@ -25,6 +26,7 @@ use crate::identify::likelihood::search::model::Model;
 use crate::identify::verdict::{Excess, NonlinearPart, Witness};
 use crate::linalg::TINY;
 use faer::{Mat, c64};
+use interpolation::Interpolated;
 use response_error::ResponseError;
 use root::Root;
 
@@ -87,6 +89,8 @@ pub(crate) struct Directions {
     seen: Option<[Excess; 3]>,
     /// What acts at an input and is no linear function of it.
     nonlinear_part: Option<NonlinearPart>,
+    /// The outputs that were interpolated.
+    interpolated: Vec<Interpolated>,
 }
 
 /// Mean squares of the error of each entry, by what causes them.
@@ -98,7 +102,7 @@ pub(crate) struct Parts {
     pub(crate) choice: Vec<f64>,
     /// Differences between records and parts of records beyond their noise.
     pub(crate) variation: Vec<f64>,
-    /// What the excitation causes and the model does not explain.
+    /// What the excitation causes and the model does not explain, and the error of interpolated outputs.
     pub(crate) distortion: Vec<f64>,
 }
 
@@ -142,12 +146,22 @@ impl Directions {
         let total: f64 = rivals.iter().map(|(.., weight)| weight).sum::<f64>().max(TINY);
         let kept = rivals.into_iter().filter(|(.., weight)| *weight > LEAST_WEIGHT * total);
         let rivals = kept.map(|(model, delays, weight)| (model, delays, (weight / total).sqrt())).collect();
-        Directions { model, delays, chart, root, rivals, scatter: 1.0, seen: None, nonlinear_part: None }
+        Directions {
+            model,
+            delays,
+            chart,
+            root,
+            rivals,
+            scatter: 1.0,
+            seen: None,
+            nonlinear_part: None,
+            interpolated: Vec::new(),
+        }
     }
 
-    /// The same with what acts at an input and is no linear function of it.
-    pub(crate) fn with(self, nonlinear_part: Option<NonlinearPart>) -> Self {
-        Directions { nonlinear_part, ..self }
+    /// The same with what acts at an input and is no linear function of it, and with the outputs that were interpolated.
+    pub(crate) fn with(self, nonlinear_part: Option<NonlinearPart>, interpolated: Vec<Interpolated>) -> Self {
+        Directions { nonlinear_part, interpolated, ..self }
     }
 
     /// Independent errors of the parameters.
@@ -231,6 +245,9 @@ impl Directions {
         if let Some(nonlinear_part) = &self.nonlinear_part {
             let ratio = nonlinear_part.near(share);
             (nonlinear_part.input..entries).step_by(m).for_each(|i| distortion[i] += g[i].norm_sqr() * ratio);
+        }
+        for output in &self.interpolated {
+            output.add(share, &mut distortion, m, &|share| delayed(&self.model, &self.delays, share));
         }
         Columns { parameters, squares, rivals, variation, distortion }
     }

@@ -1,6 +1,7 @@
 //! A region as it is kept in files: its model with the directions in which it moves, exactly.
 
 use super::Directions;
+use super::interpolation::Interpolated;
 use super::region::Region;
 use super::root::Root;
 use crate::identify::likelihood::data::spectra::Sizes;
@@ -32,6 +33,8 @@ pub(super) struct StoredRegion {
     scatter: f64,
     seen: Option<[Excess; 3]>,
     nonlinear_part: Option<NonlinearPart>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    interpolated: Vec<Interpolated>,
 }
 
 /// A matrix, column by column.
@@ -75,6 +78,7 @@ impl From<Region> for StoredRegion {
             scatter: d.scatter,
             seen: d.seen,
             nonlinear_part: d.nonlinear_part,
+            interpolated: d.interpolated,
         }
     }
 }
@@ -99,6 +103,7 @@ impl TryFrom<StoredRegion> for Region {
             && (stored.chart.is_empty() || stored.units.is_empty())
             && seen
             && stored.nonlinear_part.as_ref().is_none_or(|part| part.is_of(m))
+            && stored.interpolated.iter().all(|of| of.is_of(p))
             && lists.into_iter().all(|list| positive(list))
             && is_of_loop(&stored.model, &stored.delays)
             && stored.rivals.iter().all(|(model, delays, _)| is_of_loop(model, delays));
@@ -126,6 +131,7 @@ impl TryFrom<StoredRegion> for Region {
             scatter: stored.scatter,
             seen: stored.seen,
             nonlinear_part: stored.nonlinear_part,
+            interpolated: stored.interpolated,
         };
         Ok(Region::new(stored.sizes, time, &stored.shares, directions))
     }

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from conftest import ROOT
 
-PAGES = ["docs/python.md", "README.md", "crates/youla-py/README.md"]
+PAGES = ["docs/python.md", "docs/channels.md", "README.md", "crates/youla-py/README.md"]
 
 
 def blocks(text: str) -> list[str]:

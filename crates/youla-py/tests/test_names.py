@@ -35,7 +35,7 @@ def names(record: youla.Record, fresh: youla.Record) -> dict[str, object]:
     structure = {"parameters": {"pole": {"initial": 4.0}, "gain": {"initial": 8.0}}, "a": [["-pole"]], "b": [["gain"]], "c": [[1]]}
     response = control.forced_response(control.ss(0.9, 0.1, 1.0, 0.0, 0.01), inputs=u)
     run = youla.identify(record, nominal=nominal, controller=controller, feedback="negative", verify=fresh, frequency_response={"window": 512})
-    small = {"u": u, "y": u, "G": nominal, "K": controller, "structure": structure, "response": response}
+    small = {"u": u, "y": u, "t1": 0.01 * np.arange(200), "t2": 0.01 * np.arange(200), "G": nominal, "K": controller, "structure": structure, "response": response}
     return {"youla": youla, "log": record, "run": run, "model": model, **small}
 
 

@@ -14,6 +14,7 @@ from ._arrays import Array, as_floats, positive
 from ._checks import file_of, listed, table, text
 from ._errors import InputError
 from ._loggers import Logged, read
+from ._optional import need
 from ._record import Record
 
 Names = str | Iterable[str] | None
@@ -81,8 +82,6 @@ class Synchronised:
 
     def to_frame(self) -> Any:
         """Return the timing as a pandas data frame, a row for each channel."""
-        from ._optional import need
-
         pd = need("pandas")
         return pd.DataFrame([vars(t) for t in self.timing]).set_index("name")
 
@@ -268,7 +267,8 @@ class Channels:
         def record(k: int, data: Array) -> Record:
             name = f"{self._name}, part {k + 1}" if several else self._name
             columns = dict(zip(every, data.T, strict=True))
-            return Record(columns, dt=step, name=name, units=units, sampled_every=steps, **chosen)
+            groups: dict[str, Any] = dict(chosen)
+            return Record(columns, dt=step, name=name, units=units, sampled_every=steps, **groups)
 
         made = tuple(record(k, data) for k, (data, _) in enumerate(records))
         return Synchronised(made, tuple(kinds), drift, left_out)

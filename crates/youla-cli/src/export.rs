@@ -111,7 +111,7 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
             let about = serde_json::json!({
                 "model": "pid", "order": 2 + 2 * pid.notches.len(), "inputs": [&pid.measured], "outputs": [&pid.commanded],
             });
-            (export_pid(&pid, form).into_bytes(), file_name("pid", form.extension()), about)
+            (export_pid(&pid, form)?.into_bytes(), file_name("pid", form.extension()), about)
         }
     };
     let path = args.out.clone().unwrap_or(default);

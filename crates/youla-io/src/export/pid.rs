@@ -6,7 +6,9 @@
 //! each notch: o = b0 v + s1     s1 = b1 v - a1 o + s2           s2 = b2 v - a2 o          v = o
 //! ```
 
+use super::pid_tables::{Firmware, table};
 use super::text::{PROGRAM, number, plain};
+use crate::error::Result;
 use std::fmt::Write;
 use youla::signal::Channel;
 
@@ -50,11 +52,21 @@ pub enum PidForm {
     StructuredText,
     /// Gains for parameter tables.
     Gains,
+    /// Parameters of a firmware.
+    Firmware(Firmware),
 }
 
 impl PidForm {
     /// All forms.
-    pub const ALL: [PidForm; 3] = [PidForm::C, PidForm::StructuredText, PidForm::Gains];
+    pub const ALL: [PidForm; 7] = [
+        PidForm::C,
+        PidForm::StructuredText,
+        PidForm::Gains,
+        PidForm::Firmware(Firmware::Betaflight),
+        PidForm::Firmware(Firmware::Px4),
+        PidForm::Firmware(Firmware::ArduPilot),
+        PidForm::Firmware(Firmware::Odrive),
+    ];
 
     /// The word of `youla export --to`.
     pub fn key(self) -> &'static str {
@@ -62,6 +74,7 @@ impl PidForm {
             PidForm::C => "c-pid",
             PidForm::StructuredText => "st",
             PidForm::Gains => "gains",
+            PidForm::Firmware(firmware) => firmware.key(),
         }
     }
 
@@ -70,18 +83,22 @@ impl PidForm {
         match self {
             PidForm::C => "h",
             PidForm::StructuredText => "st",
-            PidForm::Gains => "txt",
+            PidForm::Gains | PidForm::Firmware(_) => "txt",
         }
     }
 }
 
 /// The text of a PID in a form.
-pub fn export_pid(pid: &PidExport, form: PidForm) -> String {
-    match form {
+///
+/// # Errors
+/// [`crate::Error::NotAModel`] for gains that a firmware cannot hold.
+pub fn export_pid(pid: &PidExport, form: PidForm) -> Result<String> {
+    Ok(match form {
         PidForm::C => c(pid),
         PidForm::StructuredText => structured_text(pid),
         PidForm::Gains => gains(pid),
-    }
+        PidForm::Firmware(firmware) => table(pid, &head(pid), firmware)?,
+    })
 }
 
 /// What every form says of itself, a line each.

@@ -81,6 +81,22 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
         assert!((number("kp") * -y + i - u).abs() < 1e-9 * u.abs().max(1.0), "{t}");
     }
     assert!(read("gains").contains("'IFormula', 'BackwardEuler'"), "{}", read("gains"));
+    // Parameters of firmware are the gains by its scale factors.
+    let (kp, ki) = (number("kp"), number("ki"));
+    for (form, lines) in [
+        ("px4", [format!("MC_ROLLRATE_P {kp}"), format!("MC_ROLLRATE_I {ki}")]),
+        ("ardupilot", [format!("ATC_RAT_RLL_P,{kp}"), format!("ATC_RAT_RLL_I,{ki}")]),
+        ("odrive", [format!("vel_gain = {kp}"), format!("vel_integrator_gain = {ki}")]),
+        ("betaflight", [kp / 0.032029, ki / 0.244381].map(|gain| format!("_roll = {}", gain.round()))),
+    ] {
+        let done = youla(&folder, &["export", "run", "--to", form, "--out", form]);
+        if form == "betaflight" && (kp / 0.032029).max(ki / 0.244381) > 250.0 {
+            assert!(done.code == Some(2) && done.stderr.contains("at most 250"), "{}", done.stderr);
+            continue;
+        }
+        assert_eq!(done.code, Some(0), "{}", done.stderr);
+        assert!(lines.iter().all(|line| read(form).contains(line)), "{}", read(form));
+    }
 }
 
 #[test]

@@ -1,0 +1,154 @@
+//! The gains of a PID as the parameters of flight controllers and drives, with the scale factors of their firmware.
+//!
+//! | firmware | what it computes | its units |
+//! |---|---|---|
+//! | Betaflight 4.3 to 4.5 | `0.032029 p e + 0.244381 i int(e) + 0.000529 d de/dt` (`pid.h`) | e in deg/s; axisP + axisI + axisD of the blackbox |
+//! | PX4, multicopter rate controller | `K (P e + I int(e) + D de/dt)` | e in rad/s; `vehicle_torque_setpoint`, -1 to 1 |
+//! | ArduPilot, Copter rate controller | `P e + I int(e) + D de/dt`, D behind a first-order filter of FLTD Hz (`AC_PID.cpp`) | e in rad/s; the motors' roll input, -1 to 1 |
+//! | ODrive 0.5 and later, velocity controller | `vel_gain e + vel_integrator_gain int(e)` | e in turn/s; Nm |
+
+use super::pid::PidExport;
+use super::text::number;
+use crate::error::{Error, Result};
+use std::fmt::Write;
+use std::path::PathBuf;
+
+/// Firmware with parameters for a PID.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Firmware {
+    /// `set` lines of the command line.
+    Betaflight,
+    /// `param set` lines of the shell.
+    Px4,
+    /// A parameter file.
+    ArduPilot,
+    /// Assignments of odrivetool.
+    Odrive,
+}
+
+/// Scale of P, I and D in Betaflight, and its largest gain (`pid.h`).
+const BETAFLIGHT: ([f64; 3], f64) = ([0.032029, 0.244381, 0.000529], 250.0);
+
+impl Firmware {
+    /// The word of `youla export --to`.
+    pub(super) fn key(self) -> &'static str {
+        match self {
+            Firmware::Betaflight => "betaflight",
+            Firmware::Px4 => "px4",
+            Firmware::ArduPilot => "ardupilot",
+            Firmware::Odrive => "odrive",
+        }
+    }
+
+    /// Units of y and u in which its parameters are stated.
+    fn units(self) -> [&'static str; 2] {
+        match self {
+            Firmware::Betaflight => ["deg/s", "axisP + axisI + axisD of the blackbox"],
+            Firmware::Px4 => ["rad/s", "vehicle_torque_setpoint (-1 to 1)"],
+            Firmware::ArduPilot => ["rad/s", "the motors' input of the axis (-1 to 1)"],
+            Firmware::Odrive => ["turn/s", "Nm"],
+        }
+    }
+
+    /// What its derivative is filtered by, for a first-order filter of `hz`.
+    fn filter(self, hz: f64) -> Vec<String> {
+        let rounded = hz.round();
+        match self {
+            Firmware::Betaflight => {
+                vec!["set dterm_lpf1_type = PT1".into(), format!("set dterm_lpf1_static_hz = {rounded}")]
+            }
+            Firmware::Px4 => vec![
+                "# IMU_DGYRO_CUTOFF is a filter of second order: twice the cutoff has about the delay of the design"
+                    .into(),
+                format!("param set IMU_DGYRO_CUTOFF {}", 2.0 * rounded),
+            ],
+            Firmware::ArduPilot => vec![format!("ATC_RAT_RLL_FLTD,{}", number(hz))],
+            Firmware::Odrive => Vec::new(),
+        }
+    }
+
+    fn gains(self, [p, i, d]: [f64; 3]) -> Vec<String> {
+        let n = number;
+        match self {
+            Firmware::Betaflight => {
+                let gain = |(name, (gain, scale)): (&str, (f64, f64))| {
+                    let exact = gain / scale;
+                    format!(
+                        "set {name}_roll = {}    # exactly {exact:.3}; {} is {} times {scale}",
+                        exact.round(),
+                        n(gain),
+                        n(exact)
+                    )
+                };
+                ["p", "i", "d"].into_iter().zip([p, i, d].into_iter().zip(BETAFLIGHT.0)).map(gain).collect()
+            }
+            Firmware::Px4 => [("P", p), ("I", i), ("D", d), ("K", 1.0)]
+                .into_iter()
+                .map(|(name, gain)| format!("param set MC_ROLLRATE_{name} {}", n(gain)))
+                .collect(),
+            Firmware::ArduPilot => [("P", p), ("I", i), ("D", d), ("FLTE", 0.0)]
+                .into_iter()
+                .map(|(name, gain)| format!("ATC_RAT_RLL_{name},{}", n(gain)))
+                .collect(),
+            Firmware::Odrive => [("vel_gain", p), ("vel_integrator_gain", i)]
+                .into_iter()
+                .map(|(name, gain)| format!("odrv0.axis0.controller.config.{name} = {}", n(gain)))
+                .collect(),
+        }
+    }
+
+    /// Why it cannot hold these gains.
+    fn problem(self, pid: &PidExport) -> Option<String> {
+        let gains = [("kp", pid.kp), ("ki", pid.ki), ("kd", pid.kd)];
+        let key = self.key();
+        if let Some((name, gain)) = gains.iter().find(|(_, gain)| *gain < 0.0) {
+            return Some(format!(
+                "{name} is {}, but {key} takes no negative gain; invert the sign of one channel",
+                number(*gain)
+            ));
+        }
+        if self == Firmware::Odrive && (pid.kd != 0.0 || !pid.notches.is_empty()) {
+            return Some(format!(
+                "{key} has neither derivative nor notch; set terms = \"pi\" and notches = 0 in [redesign.pid]"
+            ));
+        }
+        let (scales, largest) = BETAFLIGHT;
+        let over = gains.into_iter().zip(scales).find(|((_, gain), scale)| gain / scale > largest);
+        let ((name, gain), scale) = over.filter(|_| self == Firmware::Betaflight)?;
+        let asked = number((gain / scale).round());
+        Some(format!(
+            "{name} is {asked} in {key}, at most {largest} are taken; log y in deg/s and u as axisP + axisI + axisD"
+        ))
+    }
+}
+
+/// The lines, behind what every form says of itself.
+pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Result<String> {
+    if let Some(problem) = firmware.problem(pid) {
+        return Err(Error::NotAModel { path: PathBuf::from("pid.json"), problem });
+    }
+    let [y, u] = firmware.units();
+    let mut text = head.iter().map(|line| format!("# {line}\n")).collect::<String>();
+    // Writing to a string cannot fail.
+    let _ = writeln!(
+        text,
+        "# holds where y was logged in {y} and u as {u}: scale factor 1; otherwise scale the channels in [data.computed]"
+    );
+    let _ = writeln!(
+        text,
+        "# the firmware has a discretisation and filters of its own: fly or run it with care, log it, and identify again"
+    );
+    if firmware != Firmware::Odrive {
+        text.push_str("# of the roll axis; write pitch or yaw for another\n");
+    }
+    let mut lines = firmware.gains([pid.kp, pid.ki, pid.kd]);
+    if pid.kd != 0.0 && pid.derivative_filter > 0.0 {
+        lines.extend(firmware.filter(0.5 / (std::f64::consts::PI * pid.derivative_filter)));
+    }
+    for ([hz, width, depth], _) in &pid.notches {
+        let [hz, width, depth] = [hz, width, depth].map(|v| number(*v));
+        lines.push(format!("# and a notch at {hz} Hz, width {width}, depth {depth}, which this table does not set: without it the proof does not hold"));
+    }
+    lines.iter().for_each(|line| text.push_str(&format!("{line}\n")));
+    Ok(text)
+}

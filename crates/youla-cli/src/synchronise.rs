@@ -39,7 +39,10 @@ pub(crate) struct SynchroniseArgs {
     /// Outputs, as the inputs.
     #[arg(long, value_name = "NAME", value_delimiter = ',', required = true)]
     output: Vec<ChannelRef>,
-    /// Known excitation and references.
+    /// Known excitation.
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    excitation: Vec<ChannelRef>,
+    /// Known references.
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     reference: Vec<ChannelRef>,
     /// Those of these channels of which a value is written only when it changes.
@@ -77,7 +80,12 @@ pub(crate) fn synchronise(form: Form, args: &SynchroniseArgs) -> Result<(), Fail
     require_place(&args.out)?;
     let time = Discrete::new(args.sample_time)?;
     let columns = read(args)?;
-    let chosen = [(Role::Input, &args.input), (Role::Output, &args.output), (Role::External, &args.reference)];
+    let chosen = [
+        (Role::Input, &args.input),
+        (Role::Output, &args.output),
+        (Role::External, &args.excitation),
+        (Role::External, &args.reference),
+    ];
     let mut channels = Vec::new();
     for (role, names) in chosen {
         for name in places(names) {
@@ -86,7 +94,8 @@ pub(crate) fn synchronise(form: Form, args: &SynchroniseArgs) -> Result<(), Fail
     }
     for name in places(&args.changes_only) {
         let chosen = channels.iter_mut().find(|c| c.channel.name == name.to_string());
-        let unknown = || refused(format!("--changes-only names {name}, which is no input, output or reference"));
+        let unknown =
+            || refused(format!("--changes-only names {name}, which is no input, output, excitation or reference"));
         chosen.ok_or_else(unknown)?.changes_only = true;
     }
     let what = args.files[0].display().to_string();

@@ -100,7 +100,12 @@ impl Firmware {
     /// Why it cannot hold these gains.
     fn problem(self, pid: &PidExport) -> Option<String> {
         let gains = [("kp", pid.kp), ("ki", pid.ki), ("kd", pid.kd)];
-        let key = self.key();
+        let (key, unit, [stated, _]) = (self.key(), &pid.measured.unit, self.units());
+        if !unit.is_empty() && unit != stated {
+            return Some(format!(
+                "y is in {unit}, but {key} takes {stated}; convert it in [data.computed] and identify again"
+            ));
+        }
         if let Some((name, gain)) = gains.iter().find(|(_, gain)| *gain < 0.0) {
             return Some(format!(
                 "{name} is {}, but {key} takes no negative gain; invert the sign of one channel",
@@ -151,4 +156,59 @@ pub(super) fn table(pid: &PidExport, head: &[String], firmware: Firmware) -> Res
     }
     lines.iter().for_each(|line| text.push_str(&format!("{line}\n")));
     Ok(text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use youla::signal::Channel;
+
+    fn pid() -> PidExport {
+        PidExport {
+            measured: Channel::new("gyro", "deg/s"),
+            commanded: Channel::new("sum", ""),
+            ts: 5e-4,
+            kp: 1.5,
+            ki: 20.0,
+            kd: 0.015,
+            derivative_filter: 1.0 / (std::f64::consts::TAU * 80.0),
+            tustin: false,
+            integral: [0.01, 0.0],
+            derivative: [6.0, 0.8],
+            notches: vec![([180.0, 0.3, 0.1], [[1.0; 3]; 2])],
+            delay: 0,
+            origin: "a run".into(),
+        }
+    }
+
+    #[test]
+    fn gains_are_divided_by_the_scale_factors_of_the_firmware() {
+        let text = table(&pid(), &[], Firmware::Betaflight).unwrap();
+        for line in [
+            "set p_roll = 47 ",
+            "set i_roll = 82 ",
+            "set d_roll = 28 ",
+            "set dterm_lpf1_static_hz = 80\n",
+            "notch at 180.0 Hz",
+        ] {
+            assert!(text.contains(line), "{text}");
+        }
+        let si = PidExport { measured: Channel::new("gyro", "rad/s"), ..pid() };
+        let text = table(&si, &[], Firmware::ArduPilot).unwrap();
+        assert!(text.contains("ATC_RAT_RLL_D,0.015\n") && text.contains("ATC_RAT_RLL_FLTD,80."), "{text}");
+        assert!(table(&si, &[], Firmware::Px4).unwrap().contains("param set IMU_DGYRO_CUTOFF 160\n"));
+    }
+
+    #[test]
+    fn what_a_firmware_cannot_hold_is_refused() {
+        let refused = |pid: PidExport, firmware, says: &str| {
+            let error = table(&pid, &[], firmware).unwrap_err().to_string();
+            assert!(error.contains(says), "{error}");
+        };
+        refused(pid(), Firmware::Px4, "y is in deg/s, but px4 takes rad/s");
+        refused(PidExport { kp: -1.0, ..pid() }, Firmware::Betaflight, "no negative gain");
+        refused(PidExport { kp: 9.0, ..pid() }, Firmware::Betaflight, "kp is 281.0 in betaflight, at most 250");
+        let turns = PidExport { measured: Channel::new("v", "turn/s"), ..pid() };
+        refused(turns, Firmware::Odrive, "terms = \"pi\"");
+    }
 }

@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use youla::identify::likelihood::Region as LibraryRegion;
 use youla_io::folder::RunFolder;
 use youla_io::{Value, mat_from_bytes};
-use youla_run::{RunSettings, records_in_memory, redesign_kept};
+use youla_run::{RunSettings, pid_kept, records_in_memory, redesign_kept};
 
 /// The region of a recommended model, from `4-identify/region.json`.
 #[pyclass(frozen, module = "youla._native")]
@@ -127,4 +127,25 @@ pub(crate) fn redesign<'py>(
     })?;
     let promised = serde_json::to_string(&youla_run::RedesignEntry::from(&new)).map_err(Failure::from)?;
     Ok((promised, model_out(py, &new.controller.system)))
+}
+
+/// One PID for several runs that were kept: the settings and records of the first, and plant and region of each.
+#[pyfunction]
+pub(crate) fn redesign_pid<'py>(
+    py: Python<'py>,
+    chosen: Options,
+    logs: Vec<Log<'py>>,
+    points: Vec<(ModelIn<'py>, PyRef<'py, Region>)>,
+    choices: Options,
+) -> PyResult<(String, ModelOut<'py>)> {
+    let (chosen, logs) = (chosen.settings()?, records(py, logs)?);
+    let point = |(model, region): &(ModelIn<'py>, PyRef<'py, Region>)| Ok((model_in(model)?, region.region.clone()));
+    let points: Vec<_> = points.iter().map(point).collect::<Result<_>>()?;
+    let new = worker::run(py, false, move |_| {
+        let records = records_in_memory(&chosen.data, logs)?;
+        let points = points.iter().map(|(plant, region)| (plant, region)).collect();
+        Ok(pid_kept(&chosen, &records, points, &choices.of("redesign")?)?)
+    })?;
+    let promised = serde_json::to_string(&youla_run::PidEntry::from(&new)).map_err(Failure::from)?;
+    Ok((promised, model_out(py, &new.system)))
 }

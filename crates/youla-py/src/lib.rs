@@ -19,7 +19,9 @@ use pyo3::prelude::*;
 #[pymodule]
 mod _native {
     #[pymodule_export]
-    use super::kept::{Region, check_settings, read_mat, redesign, report_html, settings_json, write_files};
+    use super::kept::{
+        Region, check_settings, read_mat, redesign, redesign_pid, report_html, settings_json, write_files,
+    };
     #[pymodule_export]
     use super::logs::{clock, read_log, synchronise, unit_of_time};
     #[pymodule_export]

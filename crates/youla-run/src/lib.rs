@@ -52,7 +52,7 @@ pub use stages::factors::{DeclaredLoop, LoopFactors, declared_loop, factorise_ru
 pub use stages::grey_box::GreyBoxRun;
 pub use stages::grey_box::criterion::StructureSearch;
 pub use stages::nonparametric::LinesOfRun;
-pub use stages::parts::{recommend_alone, redesign_kept, redesign_of};
+pub use stages::parts::{pid_kept, recommend_alone, redesign_kept, redesign_of};
 pub use stages::pipeline::identify;
 pub use stages::reduction::RunReduction;
 pub use stages::signals::{DeviationSignals, signal_records, write_signals};

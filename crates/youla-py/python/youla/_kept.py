@@ -220,10 +220,15 @@ class Kept:
     def write(self, folder: str, replace: bool) -> str:
         return _native.write_files(folder, replace, {**self.files, "report.html": self.html().encode()})
 
-    def redesign(self, chosen: Mapping[str, Any]) -> tuple[str, Matrices]:
+    def point(self) -> tuple[Matrices, _native.Region]:
+        """Plant and region, on which a controller is designed."""
         plant, region = self.model("likelihood"), self._region()
         if plant is None or region is None:
             raise NumericalError("the run has no recommended model, on which a controller is designed; see its summary['refused']")
+        return plant, region
+
+    def redesign(self, chosen: Mapping[str, Any]) -> tuple[str, Matrices]:
+        plant, region = self.point()
         settings, logs, _ = again(self)
         model = self.model("hansen_reduced") or plant
         return _native.redesign(settings, logs, [plant, model], region, chosen)

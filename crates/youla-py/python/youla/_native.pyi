@@ -28,6 +28,7 @@ __all__ = [
     "read_log",
     "read_mat",
     "redesign",
+    "redesign_pid",
     "reduce",
     "replicate",
     "report_html",
@@ -75,6 +76,9 @@ def simulate_loop(plant: Matrices, controller: Matrices, signals: Sequence[_Arra
 def read_mat(content: bytes, name: str) -> dict[str, _Array]: ...
 def redesign(
     chosen: _Options, logs: Sequence[Log], models: Sequence[Matrices], region: Region, choices: _Options
+) -> tuple[str, Matrices]: ...
+def redesign_pid(
+    chosen: _Options, logs: Sequence[Log], points: Sequence[tuple[Matrices, Region]], choices: _Options
 ) -> tuple[str, Matrices]: ...
 def report_html(json: str) -> str: ...
 def settings_json(toml: str) -> str: ...

@@ -12,6 +12,7 @@ use crate::{Error, Result};
 use std::path::Path;
 use youla::identify::likelihood::{Recommendation, Region};
 use youla::lti::{Discrete, StateSpace};
+use youla_loop::redesign::structured::{PidProblem, PidRedesign, design_pid};
 use youla_loop::redesign::{Redesign, RedesignOptions};
 
 /// The recommended model of a run without anything else; paths are relative to `folder`.
@@ -39,6 +40,22 @@ pub fn redesign_kept(
     let base = declared.nominal.as_ref().unwrap_or(plant);
     let factors = factorise((base, &declared.running), records.sizes(), &settings.factors)?.factors;
     design(records, (plant, model), &factors, region, options)
+}
+
+/// One PID for the plants and regions of runs that were kept, as `[redesign] structure = "pid"` with these options gives it for one; settings
+/// and records are those of the first run, whose controller ran at all points.
+///
+/// # Errors
+/// As [`youla_loop::redesign::structured::design_pid`]; whatever is wrong with the controller.
+pub fn pid_kept(
+    settings: &RunSettings,
+    records: &RunRecords,
+    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    options: &RedesignOptions,
+) -> Result<PidRedesign> {
+    let declared = declared_loop(settings, records, Path::new("."))?;
+    let problem = PidProblem { points, running: declared.controller(), delay: settings.controller.delay() };
+    design_pid(&problem, &options.pid, &options.band).map_err(|e| Error::from(e).within("[redesign]"))
 }
 
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.

@@ -34,8 +34,7 @@ pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<R
     let options = run.settings.redesign.as_ref()?;
     options.structure?;
     let problem = PidProblem {
-        plant: &recommended.plant,
-        region: &recommended.region,
+        points: vec![(&recommended.plant, &recommended.region)],
         running: run.declared.controller(),
         delay: run.settings.controller.delay(),
     };
@@ -51,9 +50,8 @@ pub(crate) fn design(
     options: &RedesignOptions,
 ) -> Result<Redesign> {
     if options.structure.is_some() {
-        let what = "`structure` in a redesign after the run";
-        let instead =
-            "state [redesign] structure before the run, in run.toml; the PID is then in summary and run folder";
+        let what = "`structure` in an LQG or Q of a finished run";
+        let instead = "state [redesign] structure before the run; in Python youla.redesign(run, structure=\"pid\") takes it afterwards too";
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
     let (input, output) = records.sizes();

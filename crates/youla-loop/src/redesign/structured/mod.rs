@@ -36,17 +36,16 @@ use recognise::recognise;
 use scenarios::{Grid, Scenario, Scenarios};
 use search::Search;
 use space::Space;
+use youla::control::{closed_loop, with_input_port};
 use youla::identify::likelihood::Region;
 use youla::lti::{Discrete, StateSpace};
 use youla::validate::BandOptions;
 
 /// The input of a PID design.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct PidProblem<'a> {
-    /// The identified plant.
-    pub plant: &'a StateSpace<Discrete>,
-    /// Its region.
-    pub region: &'a Region,
+    /// The identified plant with its region; of several operating points, all that the one controller must serve.
+    pub points: Vec<(&'a StateSpace<Discrete>, &'a Region)>,
     /// The running controller, `u = K y`, positive feedback.
     pub running: &'a StateSpace<Discrete>,
     /// Dead time in whole samples that the machine adds to its controller; it is in `running` too.
@@ -68,7 +67,7 @@ pub struct PidRedesign {
     pub running_gains: Option<PidController>,
     /// How much better slow loads are rejected: the quotient of the gains of the new and the running controller at the lowest line.
     pub rejection: f64,
-    /// The proof on fresh draws.
+    /// The proof on fresh draws; of several operating points that of the worst one.
     pub proof: PidProof,
     /// The way to the new controller.
     pub steps: Vec<PlannedStep>,
@@ -103,8 +102,9 @@ impl PidRedesign {
 /// stabilise the plant.
 pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
     options.check()?;
-    let PidProblem { plant, region, running, delay } = *problem;
-    if plant.inputs() != 1 || plant.outputs() != 1 {
+    let PidProblem { points, running, delay } = problem;
+    let (running, delay) = (*running, *delay);
+    if points.iter().any(|(plant, _)| plant.inputs() != 1 || plant.outputs() != 1) {
         let what = "a PID for a machine of several inputs or outputs";
         let instead = "leave `structure` out: method = \"lqg\" and \"youla\" design for any number";
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
@@ -114,14 +114,24 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         let instead = "state the running controller in [controller]: its command effort is the measure of the new one";
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
-    let looped = youla::control::closed_loop(plant, &youla::control::with_input_port(running)?)?;
-    youla::control::peak_sensitivity(plant, running)?;
-    let grid = Grid::new(plant.time(), &[plant, &looped])?;
+    let mut resonant = Vec::new();
+    for (plant, _) in points {
+        youla::control::peak_sensitivity(plant, running)?;
+        resonant.extend([(*plant).clone(), closed_loop(plant, &with_input_port(running)?)?]);
+    }
+    let grid = Grid::new(running.time(), &resonant.iter().collect::<Vec<_>>())?;
     let on = grid.any(running)?;
-    let estimate = Scenario::new(&grid, plant.clone(), (running, &on), |_| {});
-    let estimate =
-        estimate.ok_or(Error::NoPid { reason: "the running controller has no margins on the model".into() })?;
-    let drawn = Scenarios::new(&grid, region, running, (band.draws, band.seed))?;
+    let estimates: Option<Vec<Scenario>> =
+        points.iter().map(|(plant, _)| Scenario::new(&grid, (*plant).clone(), (running, &on), |_| {})).collect();
+    let missing = || Error::NoPid { reason: "the running controller has no margins on the model".into() };
+    let mut estimates = estimates.filter(|found| !found.is_empty()).ok_or_else(missing)?.into_iter();
+    let estimate = estimates.next().ok_or_else(missing)?;
+    let draws = |seed: u64| {
+        let of = |(_, region): &(_, &Region)| Scenarios::new(&grid, region, running, (band.draws, seed));
+        points.iter().map(of).collect::<Result<Vec<_>>>()
+    };
+    // The plants of all points are one set, in which the search asks for the worst; the estimates of the other points are among them.
+    let drawn = Scenarios::joined(draws(band.seed)?, estimates);
     let rules = match options.discretisation {
         Some(rule) => vec![rule],
         None => vec![Discretisation::BackwardEuler, Discretisation::Tustin],
@@ -134,11 +144,15 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
     let space = Space { options, discretisation, delay, sign, ts: grid.ts };
     let search = Search { space, grid: &grid, estimate: &estimate, drawn: &drawn, running: running_gains.as_ref() };
     let controller = search.run()?;
-    let system = controller.system(plant.time())?;
-    let fresh = Scenarios::new(&grid, region, running, (band.draws, band.seed.wrapping_add(1)))?;
+    let system = controller.system(running.time())?;
+    let fresh = draws(band.seed.wrapping_add(1))?;
+    let proofs = fresh.iter().map(|fresh| prove(&grid, fresh, (running, &system), options));
+    let worse = |a: &PidProof, b: &PidProof| a.unstable.cmp(&b.unstable).then(a.at_most.total_cmp(&b.at_most));
+    let proof = proofs.collect::<Result<Vec<_>>>()?.into_iter().max_by(worse).ok_or_else(missing)?;
+    let fresh = Scenarios::joined(fresh, std::iter::empty());
     Ok(PidRedesign {
         rejection: grid.controller(&controller).response[0].norm() / c.norm(),
-        proof: prove(&grid, &fresh, (running, &system), options)?,
+        proof,
         steps: plan(&grid, &fresh, (running, running_gains.as_ref()), (&system, &controller))?,
         running: running.clone(),
         running_gains,

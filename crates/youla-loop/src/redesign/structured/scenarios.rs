@@ -139,6 +139,12 @@ impl Scenarios {
         Ok(Scenarios { impossible: all - plants.len(), plants })
     }
 
+    /// Those of several regions as one set, and further plants.
+    pub(super) fn joined(sets: Vec<Scenarios>, further: impl Iterator<Item = Scenario>) -> Self {
+        let impossible = sets.iter().map(|set| set.impossible).sum();
+        Scenarios { plants: sets.into_iter().flat_map(|set| set.plants).chain(further).collect(), impossible }
+    }
+
     /// Margins at each; `None` where the loop is unstable.
     pub(super) fn judge(&self, grid: &Grid, c: &OnGrid) -> Vec<Option<GridMargins>> {
         self.plants.par_iter().map(|plant| margins(grid, plant, c)).collect()

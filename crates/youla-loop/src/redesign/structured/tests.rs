@@ -136,7 +136,7 @@ fn identified(brake: f64) -> youla::identify::likelihood::Recommendation {
 fn what_is_promised_holds_on_the_machine() {
     let model = identified(8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { plant: &model.plant, region: &model.region, running: &k, delay: 0 };
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
     let options = PidOptions { notches: 1, command_effort: 4.0, ..PidOptions::default() };
     let band = BandOptions { draws: 60, seed: 1 };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -151,12 +151,33 @@ fn what_is_promised_holds_on_the_machine() {
     assert!((new.steps[2].response.last().unwrap()[1] - 1.0).abs() < 0.05);
 }
 
+/// One controller for a machine whose brake and resonance change: the limits hold at both points, which the gains for the first alone do not
+/// promise, and the proof is that of the worse point.
+#[test]
+fn one_controller_serves_several_operating_points() {
+    let (first, second) = (identified(8.0), identified(1.0));
+    let k = running().system(time()).unwrap();
+    let both = vec![(&first.plant, &first.region), (&second.plant, &second.region)];
+    let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
+    let band = BandOptions { draws: 60, seed: 1 };
+    let of = |points| design_pid(&PidProblem { points, running: &k, delay: 0 }, &options, &band).unwrap();
+    let new = of(both);
+    assert!(new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
+    for brake in [8.0, 1.0] {
+        let exact = youla::control::margins(&machine(brake), &new.system).unwrap();
+        assert!(exact.output_sensitivity.value < 2.0, "{brake}: {:?}", exact.output_sensitivity);
+    }
+    let alone = [&first, &second].map(|model| of(vec![(&model.plant, &model.region)]).rejection);
+    let least = alone[0].min(alone[1]);
+    assert!(new.rejection < 1.05 * least && new.rejection > 0.3 * least, "{} {alone:?}", new.rejection);
+}
+
 /// An unstable machine needs a gain.
 #[test]
 fn a_refusal_names_the_limit() {
     let model = identified(-8.0);
     let k = running().system(time()).unwrap();
-    let problem = PidProblem { plant: &model.plant, region: &model.region, running: &k, delay: 0 };
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
     let band = BandOptions { draws: 30, seed: 1 };
     let refusal = |options: PidOptions| design_pid(&problem, &options, &band).err().unwrap().to_string();
     let late = refusal(PidOptions { delay_margin: 1.0, ..PidOptions::default() });

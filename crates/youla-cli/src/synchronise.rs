@@ -53,6 +53,9 @@ pub(crate) struct SynchroniseArgs {
     /// Text file for the rows; `-1`, `-2` and so on are added where gaps cut the log.
     #[arg(long, value_name = "FILE", default_value = "synchronised.csv")]
     out: PathBuf,
+    /// Replace files that exist.
+    #[arg(long)]
+    force: bool,
 }
 
 /// Units of a time column.
@@ -101,9 +104,8 @@ pub(crate) fn synchronise(form: Form, args: &SynchroniseArgs) -> Result<(), Fail
     let what = args.files[0].display().to_string();
     let found = youla_io::synchronise(&what, &channels, time)?;
     let targets: Vec<PathBuf> = (1..=found.records.len()).map(|k| target(&args.out, k, found.records.len())).collect();
-    if let Some(path) = targets.iter().find(|path| path.exists()) {
-        let problem = "exists already; choose another file by --out, or remove it";
-        return Err(refused(format!("{} {problem}", path.display())));
+    if let Some(path) = targets.iter().find(|path| path.exists() && !args.force) {
+        return Err(youla_io::Error::FileExists { path: path.clone() }.into());
     }
     for (record, path) in found.records.iter().zip(&targets) {
         youla_io::write_csv(record, path)?;

@@ -76,6 +76,11 @@ fn what_cannot_be_one_log_is_refused() {
     fs::write(folder.join("there.csv"), "mine").unwrap();
     refused(&with(&["--time-unit", "us", "--out", "there.csv"]), &["there.csv exists already"]);
     assert_eq!(fs::read_to_string(folder.join("there.csv")).unwrap(), "mine");
+    let found = youla(
+        &folder,
+        &[&["synchronise"], &with(&["--time-unit", "us", "--out", "there.csv", "--force"])[..]].concat(),
+    );
+    assert_eq!(found.code, Some(0), "{}", found.stderr);
     // A reader of one clock says where to go.
     let found = youla(&folder, &["check", "wide.csv", "--input", "u", "--output", "y", "--time", "t"]);
     assert!(found.stderr.contains("youla synchronise"), "{}", found.stderr);

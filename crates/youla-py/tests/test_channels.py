@@ -213,6 +213,10 @@ def test_a_pause_gives_several_records():
         (lambda log: youla.Channels({**log, "y": (log["y"][0][::-1], log["y"][1])}).synchronise(dt=DT, inputs="u", outputs="y"), '"y", sample 2.*decreases'),
         (lambda log: youla.Channels({**log, "y": (log["y"][0][::8], log["y"][1][::8])}).synchronise(dt=DT, inputs="u", outputs="y"), '"y" is logged every 0.020.* faster than 24'),
         (lambda log: youla.Channels.read("no-such-log.ulg"), "no such file"),
+        (lambda log: youla.Channels("flight.ulg"), r"youla.Channels.read\(path\)"),
+        (lambda log: youla.Record(youla.Channels(log), inputs="u", outputs="y", dt=DT), r"synchronise\(\.\.\.\)\.records"),
+        (lambda log: youla.identify(youla.Channels(log), controller=1.0, feedback="negative"), r"synchronise\(\.\.\.\)\.records"),
+        (lambda log: youla.check(youla.Channels(log).synchronise(inputs="u", outputs="y", dt=DT)), "give its .records"),
     ],
 )
 def test_a_mistake_is_told_with_its_remedy(call, says):

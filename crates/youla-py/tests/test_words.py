@@ -66,7 +66,7 @@ CASES = {
     "key of a scan": (lambda run: youla.scan(log(), {"hansen.hozizon": [5]}, **KNOWN), "grid with 'hansen.hozizon': 5.*did you mean `horizon`"),
     "constant input": (lambda run: youla.identify(log(TABLE * [0, 1, 1]), **KNOWN), "the input 'u' is constant .0. in every record; excite it"),
     "NaN": (lambda run: youla.identify(log(with_nan()), **KNOWN), r"'y' is not finite at sample 17.*\[record\[:17\], record\[18:\]\]"),
-    "uneven time": (lambda run: youla.Record(uneven(), inputs="u", outputs="y", time="t"), "comes 0.51 s after.*interpolate"),
+    "uneven time": (lambda run: youla.Record(uneven(), inputs="u", outputs="y", time="t"), "comes 0.51 s after.*one clock"),
     "improper": (lambda run: improper(), "controller is improper: its numerator has degree 2, its denominator 1"),
     "no sign": (lambda run: youla.identify(log(), controller=2.0), r"feedback is missing: give feedback='negative' for u = K \(r - y\).*; the log "),
     "no seed": (lambda run: youla.bootstrap(run, 3), "seed is missing; give"),

@@ -32,6 +32,18 @@ pub(super) struct Lines {
 /// Lines that are kept of those that were passed over; units stand near the names.
 const MOST_PASSED: usize = 16;
 
+/// First bytes of logs of machines, which the Python package reads.
+const LOGGERS: [(&[u8], &str); 6] = [
+    (b"ULog\x01", "a ULog of PX4"),
+    (b"H Product:Blackbox", "a Betaflight blackbox"),
+    (b"\xa3\x95", "a log of ArduPilot"),
+    (b"WPILOG", "a data log of WPILib"),
+    (b"MDF  ", "an ASAM MDF file"),
+    (b"TDSm", "a TDMS file of LabVIEW"),
+];
+const OF_LOGGERS: &str = "read it in Python by youla.Channels.read(path), or export it as text and bring its channels to one clock by \
+                          `youla synchronise`";
+
 impl Lines {
     pub(super) fn open(path: &Path) -> Result<Lines> {
         Self::over(path, BufReader::with_capacity(BUFFER, open(path)?))
@@ -42,6 +54,9 @@ impl Lines {
         let start = file.fill_buf().map_err(|source| Error::Io { path: path.to_owned(), source })?;
         if start.is_empty() {
             return Err(Error::NoData { path: path.to_owned(), problem: "the file is empty (0 bytes)" });
+        }
+        if let Some((_, found)) = LOGGERS.iter().find(|(magic, _)| start.starts_with(magic)) {
+            return Err(Error::FormatNotRead { path: path.to_owned(), found, remedy: OF_LOGGERS });
         }
         let gzip = start.starts_with(&GZIP_MAGIC);
         Ok(Lines {

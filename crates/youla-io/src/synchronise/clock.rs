@@ -24,6 +24,9 @@ const MOST_BEHIND: f64 = 20.0;
 /// Cycles between the samples of a channel from which on its time is in another unit: a slow telemetry has a sample in each second cycle to fiftieth.
 const MOST_CYCLES: f64 = 100.0;
 
+/// Most cycles of a log: a time stamp of 64 bits counts cycles up to there without rounding them.
+const LONGEST: f64 = 1e12;
+
 /// The clock of the controller and the place of each channel on it.
 pub(super) struct Clocks {
     /// Time of the first stamp, seconds.
@@ -103,6 +106,10 @@ pub(super) fn clocks(channels: &[StampedChannel], ts: f64) -> Result<Clocks, Str
             "the last sample of {:?} comes before the first one of another channel; check that all times are of one clock",
             c.channel.name
         ));
+    }
+    let end = channels.iter().map(|c| c.times[c.times.len() - 1]).fold(zero, f64::max);
+    if (end - zero) / ts > LONGEST {
+        return Err(format!("the time stamps span more than {LONGEST:e} cycles of {ts} s; state all times in seconds"));
     }
     let slow = channels.iter().find(|c| !c.changes_only && step(&c.times) > MOST_CYCLES * ts);
     if let Some(c) = slow {

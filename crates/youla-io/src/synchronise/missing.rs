@@ -18,6 +18,8 @@ use youla::Mat;
 const HALF_WIDTHS: [usize; 5] = [10, 7, 5, 3, 2];
 /// Most entries of a window, but for the narrowest one.
 const MOST_ENTRIES: usize = 160;
+/// Most operations of the solutions, entries cubed for each row that lacks something: some ten seconds.
+const MOST_OPERATIONS: f64 = 1e11;
 /// Least complete windows for each entry of one.
 const WINDOWS_PER_ENTRY: usize = 4;
 /// Most windows of which a covariance is taken.
@@ -42,7 +44,7 @@ pub(super) fn fill(
         return Ok(vec![(0, 0.0); columns.len()]);
     }
     let rows: usize = parts.iter().map(|(from, to)| to - from).sum();
-    let windows = Windows::new(columns, parts).ok_or_else(|| {
+    let windows = Windows::new(columns, parts, missing.iter().sum()).ok_or_else(|| {
         let (n, c) = missing.iter().zip(channels).max_by_key(|(n, _)| **n).map_or((0, ""), |(n, c)| (*n, &c.channel.name));
         format!(
             "too few rows in a row are complete to fill what is missing (channel {c:?} lacks {n} of {rows} samples); log fewer channels, \
@@ -50,11 +52,12 @@ pub(super) fn fill(
         )
     })?;
     let patterns = windows.patterns(columns, parts);
-    let mut solved: HashMap<&[bool], Mat<f64>> = HashMap::new();
-    for (_, _, mask) in &patterns {
-        if !solved.contains_key(mask.as_slice()) {
-            let weights = windows.weights(mask).ok_or("the covariance of the channels is singular; log it again")?;
-            solved.insert(mask, weights);
+    let mut solved = Solved::new();
+    for (_, at, mask) in &patterns {
+        if !solved.contains_key(&(*at, mask.as_slice())) {
+            let weights =
+                windows.weights(mask, *at).ok_or("the covariance of the channels is singular; log it again")?;
+            solved.insert((*at, mask), weights);
         }
     }
     let errors = windows.errors(columns, &patterns, &solved);
@@ -73,7 +76,7 @@ pub(super) fn fill(
     }
     let found: Vec<Vec<(usize, f64)>> = patterns
         .iter()
-        .map(|(row, at, mask)| windows.estimate(columns, (*row, *at), mask, &solved[mask.as_slice()]))
+        .map(|(row, at, mask)| windows.estimate(columns, (*row, *at), mask, &solved[&(*at, mask.as_slice())]))
         .collect();
     for ((row, ..), entries) in patterns.iter().zip(found) {
         entries.into_iter().for_each(|(c, value)| columns[c][*row] = value);
@@ -83,6 +86,9 @@ pub(super) fn fill(
 
 /// A row with missing entries, the row of its window in which it lies, and the entries of the window that are known.
 type Pattern = (usize, usize, Vec<bool>);
+
+/// Weights by the row of the window that is estimated, and what of the window is known.
+type Solved<'a> = HashMap<(usize, &'a [bool]), Mat<f64>>;
 
 /// Windows of 2 w + 1 rows; entry (row, channel) is number row * channels + channel.
 struct Windows {
@@ -97,13 +103,15 @@ struct Windows {
 }
 
 impl Windows {
-    fn new(columns: &[Vec<f64>], parts: &[(usize, usize)]) -> Option<Windows> {
+    /// The widest that the complete rows determine, for so many missing entries.
+    fn new(columns: &[Vec<f64>], parts: &[(usize, usize)], missing: usize) -> Option<Windows> {
         let channels = columns.len();
         let narrowest = HALF_WIDTHS[HALF_WIDTHS.len() - 1];
         let (half, complete) = HALF_WIDTHS.into_iter().find_map(|half| {
             let entries = channels * (2 * half + 1);
             let complete = complete(columns, parts, 2 * half + 1);
-            let fits = entries <= MOST_ENTRIES || half == narrowest;
+            let operations = missing as f64 * (entries as f64).powi(3);
+            let fits = entries <= MOST_ENTRIES && operations <= MOST_OPERATIONS || half == narrowest;
             (fits && complete.len() >= WINDOWS_PER_ENTRY * entries).then_some((half, complete))
         })?;
         let (mut trials, mut taken) = (Vec::new(), Vec::new());
@@ -149,10 +157,15 @@ impl Windows {
         found
     }
 
-    /// Weights of the known entries, one column for each entry of the window that is not known.
-    fn weights(&self, known: &[bool]) -> Option<Mat<f64>> {
-        let of = |wanted: bool| (0..known.len()).filter(|e| known[*e] == wanted).collect::<Vec<usize>>();
-        let (there, absent) = (of(true), of(false));
+    /// Entries of row `at` of the window that are not known.
+    fn absent<'a>(&self, known: &'a [bool], at: usize) -> impl Iterator<Item = usize> + use<'a> {
+        (at * self.channels..(at + 1) * self.channels).filter(|e| !known[*e])
+    }
+
+    /// Weights of the known entries, one column for each entry of row `at` that is not known.
+    fn weights(&self, known: &[bool], at: usize) -> Option<Mat<f64>> {
+        let there: Vec<usize> = (0..known.len()).filter(|e| known[*e]).collect();
+        let absent: Vec<usize> = self.absent(known, at).collect();
         let ridge = |i: usize, j: usize| if i == j { RIDGE } else { 0.0 };
         let own = Mat::from_fn(there.len(), there.len(), |i, j| self.covariance[(there[i], there[j])] + ridge(i, j));
         let cross = Mat::from_fn(there.len(), absent.len(), |i, j| self.covariance[(there[i], absent[j])]);
@@ -169,24 +182,22 @@ impl Windows {
     ) -> Vec<(usize, f64)> {
         let there = (0..known.len()).filter(|e| known[*e]);
         let values: Vec<f64> = there.map(|e| self.entry(columns, row - at, e)).collect();
-        let absent = (0..known.len()).filter(|e| !known[*e]).enumerate();
-        let of_row = absent.filter(|(_, e)| e / self.channels == at);
         let estimate = |(k, e): (usize, usize)| {
             let c = e % self.channels;
             let mean: f64 = values.iter().zip(weights.col(k).iter()).map(|(v, w)| v * w).sum();
             (c, self.means[c] + self.sizes[c] * mean)
         };
-        of_row.map(estimate).collect()
+        self.absent(known, at).enumerate().map(estimate).collect()
     }
 
     /// Root mean square of the error of each channel as a share of its size, on complete windows from which the patterns were taken away.
-    fn errors(&self, columns: &[Vec<f64>], patterns: &[Pattern], solved: &HashMap<&[bool], Mat<f64>>) -> Vec<f64> {
+    fn errors(&self, columns: &[Vec<f64>], patterns: &[Pattern], solved: &Solved<'_>) -> Vec<f64> {
         let mut sums = vec![(0.0, 0.0); self.channels];
         // Patterns of the whole record in turn.
         let step = (patterns.len() / self.trials.len()).max(1);
         for (k, first) in self.trials.iter().enumerate() {
             let (_, at, mask) = &patterns[k * step % patterns.len()];
-            for (c, value) in self.estimate(columns, (first + at, *at), mask, &solved[mask.as_slice()]) {
+            for (c, value) in self.estimate(columns, (first + at, *at), mask, &solved[&(*at, mask.as_slice())]) {
                 sums[c].0 += ((value - columns[c][first + at]) / self.sizes[c].max(f64::MIN_POSITIVE)).powi(2);
                 sums[c].1 += 1.0;
             }

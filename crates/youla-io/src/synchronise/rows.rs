@@ -21,6 +21,8 @@ const LARGEST_ERROR: f64 = 0.1;
 const TRIALS: usize = 2000;
 /// Rows for each stamp of the log: more are a time in another unit.
 const MOST_ROWS: f64 = 100.0;
+/// Most numbers of the rows: 1 GB, as of the files of logs.
+const MOST_NUMBERS: f64 = 1.25e8;
 
 /// Rows of the channels, with NaN where the log has no sample.
 pub(super) struct Table {
@@ -98,10 +100,11 @@ pub(super) fn place(channels: &[StampedChannel], clocks: &Clocks, ts: f64) -> Re
         return Err("no cycle has a sample of each channel; check that all times are of one clock".into());
     }
     let stamps: usize = channels.iter().map(|c| c.times.len()).sum();
-    if (to - from) as f64 > MOST_ROWS * stamps as f64 {
-        let cycles = to - from;
+    let cycles = (to - from) as f64;
+    if cycles > MOST_ROWS * stamps as f64 || cycles * channels.len() as f64 > MOST_NUMBERS {
         return Err(format!(
-            "the log spans {cycles} cycles of {ts} s, but has {stamps} samples; state all times in seconds"
+            "the log spans {cycles} cycles of {ts} s and has {stamps} samples, at most {MOST_NUMBERS:e} numbers are taken; state all times in \
+             seconds, and cut a long log into parts"
         ));
     }
     let column = |(c, placed): (usize, &Placed)| fill_column(&channels[c], placed, clocks, ts, (from, to));

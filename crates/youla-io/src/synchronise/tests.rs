@@ -188,6 +188,12 @@ fn what_cannot_be_brought_to_one_clock_is_refused_with_the_remedy() {
         TS,
         &["no value repeats the one before", "written only when it changes"],
     );
+    refused(&|c| c[1].times[3999] = 1e300, TS, &["the time stamps span more than 1e12 cycles", "in seconds"]);
+    refused(
+        &|c| c.iter_mut().for_each(|c| c.times.iter_mut().for_each(|t| *t *= 1e6)),
+        TS,
+        &["median step", "unit of the time"],
+    );
     let a_quarter_dropped = logged(&truth, ([0.4, 0.0, -0.1], 0.3, 0.25), &mut rng);
     let error = of(&a_quarter_dropped).unwrap_err().to_string();
     assert!(error.contains("too few rows"), "{error}");

@@ -148,6 +148,8 @@ class Channels:
         units: Mapping[str, str] | None = None,
         name: str = "log",
     ) -> None:
+        if isinstance(data, (str, os.PathLike)):
+            raise InputError(f"data is {os.fspath(data)!r}; read a log by youla.Channels.read(path), a text file by pandas.read_csv and time=")
         labels = {} if units is None else table(units, "units", "{'u': 'V'}")
         written = [] if changes_only is None else listed(changes_only, "changes_only", "names")
         found = _of_columns(data, time) if time is not None else _of_pairs(data)

@@ -263,7 +263,8 @@ def _log_of(record: Record) -> Log:
 def records_of(given: Records | None, what: str) -> list[Record]:
     listed = [] if given is None else [given] if isinstance(given, Record) else given
     if not isinstance(listed, Sequence) or not all(isinstance(r, Record) for r in listed):
-        raise InputError(f"{what} is {type(given).__name__}, but must be a youla.Record or a list of them")
+        remedy = {"Channels": "; bring them to one clock by .synchronise(...).records", "Synchronised": "; give its .records"}.get(type(given).__name__, "")
+        raise InputError(f"{what} is {type(given).__name__}, but must be a youla.Record or a list of them{remedy}")
     return list(listed)
 
 

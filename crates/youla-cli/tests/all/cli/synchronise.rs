@@ -85,3 +85,24 @@ fn what_cannot_be_one_log_is_refused() {
     let found = youla(&folder, &["check", "wide.csv", "--input", "u", "--output", "y", "--time", "t"]);
     assert!(found.stderr.contains("youla synchronise"), "{}", found.stderr);
 }
+
+/// Logs of machines are named, with the way to read them.
+#[test]
+fn a_log_of_a_machine_says_how_it_is_read() {
+    let folder = empty_folder("synchronise-loggers");
+    for (bytes, name) in [
+        (&b"ULog\x01\x12\x35\x01\0\0"[..], "ULog of PX4"),
+        (b"H Product:Blackbox flight data recorder\n", "Betaflight"),
+        (b"\xa3\x95\x80\x80\x59FMT\0", "ArduPilot"),
+        (b"WPILOG\0\x01", "WPILib"),
+        (b"MDF     4.10    ", "ASAM MDF"),
+        (b"TDSm\x0e\0\0\0", "TDMS"),
+    ] {
+        fs::write(folder.join("log"), bytes).unwrap();
+        for verb in [&["check", "log", "--input", "u", "--output", "y", "--sample-time", "1"][..], &["init", "log"]] {
+            let found = youla(&folder, verb);
+            let says = found.stderr.contains(name) && found.stderr.contains("youla.Channels.read");
+            assert!(found.code == Some(2) && says, "{verb:?}: {}", found.stderr);
+        }
+    }
+}

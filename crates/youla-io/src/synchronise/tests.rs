@@ -198,3 +198,42 @@ fn what_cannot_be_brought_to_one_clock_is_refused_with_the_remedy() {
     let error = of(&a_quarter_dropped).unwrap_err().to_string();
     assert!(error.contains("too few rows"), "{error}");
 }
+
+/// Hostile stamps end in records of finite numbers or in a sentence.
+#[test]
+fn any_channels_end_in_records_or_a_sentence() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let (mut records, mut refused) = (0, 0);
+    for _ in 0..4000 {
+        let scale = 10f64.powi(rng.random_range(-12..12));
+        let count = rng.random_range(1..5);
+        let channel = |c: usize, rng: &mut ChaCha8Rng| {
+            let n = rng.random_range(1..300);
+            let (jitter, rate) =
+                (10f64.powi(rng.random_range(-6..2)), [1.0, 1.0, 1.0, 0.37, 4.0, 0.0][rng.random_range(0..6)]);
+            let mut times: Vec<f64> =
+                (0..n).map(|k| scale * (f64::from(k) / f64::max(rate, 1e-3) + jitter * rng.random::<f64>())).collect();
+            if rng.random_range(0..20) == 0 {
+                times[(n - 1) as usize] = [f64::MAX, -1e9, 1e18][rng.random_range(0..3)];
+            }
+            times.sort_by(f64::total_cmp);
+            let values =
+                times.iter().map(|_| rng.random_range(-3..4) as f64 * 10f64.powi(rng.random_range(-3..2))).collect();
+            let role = [Role::Input, Role::Output, Role::External][if c < 2 { c } else { rng.random_range(0..3) }];
+            let changes_only = rng.random_range(0..4) == 0;
+            StampedChannel { channel: Channel::new(format!("c{c}"), ""), role, changes_only, times, values }
+        };
+        let channels: Vec<StampedChannel> = (0..count).map(|c| channel(c, &mut rng)).collect();
+        match synchronise("log", &channels, Discrete::new(scale).unwrap()) {
+            Ok(found) => {
+                records += 1;
+                assert!(found.records.iter().all(|r| r.columns().flatten().all(|v| v.is_finite())));
+            }
+            Err(error) => {
+                refused += 1;
+                assert!(error.to_string().len() < 600, "{error}");
+            }
+        }
+    }
+    assert!(records > 200 && refused > 200, "{records} {refused}");
+}

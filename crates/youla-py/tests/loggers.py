@@ -62,9 +62,12 @@ def betaflight(path, times, columns: dict, flights: int = 1) -> None:
             head += [f"Field I name:{','.join(names)}", f"Field I signed:{numbers(0, 1)}"]
             head += [f"Field I predictor:{numbers(0, 0)}", f"Field I encoding:{numbers(1, 0)}"]
             head += [f"Field P predictor:{numbers(0, 0)}", f"Field P encoding:{numbers(1, 0)}"]
+            head += ["Field S name:flightModeFlags,stateFlags", "Field S signed:0,0", "Field S predictor:0,0", "Field S encoding:1,1"]
             file.write("".join(f"H {line}\n" for line in head).encode())
             for k, t in enumerate(times):
                 row = b"".join(signed(int(values[k])) for values in columns.values())
+                if k == 20:
+                    file.write(b"S" + unsigned(3) + unsigned(1))
                 file.write(b"I" + unsigned(k) + unsigned(round(1e6 * t)) + row)
             file.write(b"E\xffEnd of log\0")
 
@@ -90,20 +93,25 @@ def wpilog(path, columns: Columns) -> None:
 
 
 def mf4(path, columns: Columns) -> None:
-    """asammdf's own writer: each channel in a group of its own."""
+    """asammdf's own writer: each channel in a group of its own, its sample 500 marked as invalid."""
+    import numpy as np
     from asammdf import MDF, Signal
 
     with MDF(version="4.10") as log:
         for name, (times, values) in columns.items():
-            log.append([Signal(samples=values, timestamps=times, name=name, unit="V")])
+            invalid = np.zeros(len(values), dtype=bool)
+            invalid[500] = True
+            log.append([Signal(samples=values, timestamps=times, name=name, unit="V", invalidation_bits=invalid)])
         log.save(path, overwrite=True)
 
 
 def tdms(path, columns: dict, dt: float) -> None:
-    """npTDMS's own writer: waveforms of equal steps."""
+    """npTDMS's own writer: waveforms of equal steps; each channel starts two steps after the one before."""
+    import numpy as np
     from nptdms import ChannelObject, TdmsWriter
 
     with TdmsWriter(str(path)) as log:
-        for name, values in columns.items():
-            properties = {"wf_increment": dt, "wf_start_offset": 0.0, "unit_string": "V"}
+        for k, (name, values) in enumerate(columns.items()):
+            start = np.datetime64("2026-11-27T12:00:00.000000") + np.timedelta64(round(2e6 * k * dt), "us")
+            properties = {"wf_increment": dt, "wf_start_offset": 0.0, "wf_start_time": start, "unit_string": "V"}
             log.write_segment([ChannelObject("rig", name, values, properties)])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -35,7 +35,7 @@ def read(path: str, flight: int) -> list[Logged]:
             "give youla.Channels a mapping of (times, values), or a data frame with time="
         )
     try:
-        channels = [c for c in found(path, flight) if len(c.values)]
+        channels = [c for c in map(_without_gaps, found(path, flight)) if len(c.values)]
     except InputError:
         raise
     except Exception as error:  # the packages raise what they meet in a damaged file
@@ -43,6 +43,12 @@ def read(path: str, flight: int) -> list[Logged]:
     if not channels:
         raise InputError(f"{path}: the log holds no numeric channel with time stamps")
     return channels
+
+
+def _without_gaps(channel: Logged) -> Logged:
+    """The samples that are numbers: NaN is how loggers write that there is none."""
+    there = ~np.isnan(channel.values)
+    return channel if there.all() else replace(channel, times=channel.times[there], values=channel.values[there])
 
 
 def _floats(values: Any) -> Array:
@@ -67,11 +73,14 @@ def _betaflight(path: str, flight: int) -> Iterator[Logged]:
         raise InputError(f"flight is {flight}, but {path} has flights 1 to {count}")
     parser.set_log_index(flight)
     names = list(parser.field_names)
-    rows = _floats([frame.data for frame in parser.frames()])
-    clock = names.index("time")
+    rows = [frame.data for frame in parser.frames()]
+    times = _floats([row[names.index("time")] for row in rows]) / 1e6
+    own = len(parser.reader.field_defs[need("orangebox.types").FrameType.INTRA])
     for k, name in enumerate(names):
-        if k != clock and rows.size:
-            yield Logged(name, "", rows[:, clock] / 1e6, rows[:, k])
+        # Slow and GPS fields are repeated in each row, and texts before their first frame.
+        values = _floats([row[k] if isinstance(row[k], (int, float)) else np.nan for row in rows])
+        if name != "time":
+            yield Logged(name, "", times, values, k >= own)
 
 
 def _ardupilot(path: str, _: int) -> Iterator[Logged]:
@@ -132,15 +141,21 @@ def _mdf(path: str, _: int) -> Iterator[Logged]:
                 continue
             seen[signal.name] = count = seen.get(signal.name, 0) + 1
             name = signal.name if count == 1 else f"{signal.name} ({count})"
-            yield Logged(name, signal.unit or "", _floats(signal.timestamps), _floats(signal.samples))
+            valid = slice(None) if signal.invalidation_bits is None else ~np.asarray(signal.invalidation_bits, dtype=bool)
+            yield Logged(name, signal.unit or "", _floats(signal.timestamps)[valid], _floats(signal.samples)[valid])
 
 
 def _tdms(path: str, _: int) -> Iterator[Logged]:
-    for group in need("nptdms").TdmsFile.read(path).groups():
-        for channel in group.channels():
-            if channel.dtype.kind in "fiub" and "wf_increment" in channel.properties:
-                unit = str(channel.properties.get("unit_string", ""))
-                yield Logged(f"{group.name}/{channel.name}", unit, _floats(channel.time_track()), _floats(channel[:]))
+    every = [(g.name, c) for g in need("nptdms").TdmsFile.read(path).groups() for c in g.channels()]
+    timed = [(g, c) for g, c in every if c.dtype.kind in "fiub" and "wf_increment" in c.properties]
+    starts = [c.properties.get("wf_start_time") for _, c in timed]
+    if any(start is None for start in starts) and len(set(starts)) > 1:
+        raise InputError(f"{path}: some channels state the time at which they start, others do not, so that they have no common clock")
+    first = min(starts) if starts and starts[0] is not None else None
+    for (group, channel), start in zip(timed, starts, strict=True):
+        late = 0.0 if first is None else float((start - first) / np.timedelta64(1, "s"))
+        unit = str(channel.properties.get("unit_string", ""))
+        yield Logged(f"{group}/{channel.name}", unit, late + _floats(channel.time_track()), _floats(channel[:]))
 
 
 _READERS: list[tuple[bytes, Callable[[str, int], Iterator[Logged]]]] = [

@@ -15,6 +15,7 @@ _EXTRAS = {
     "matplotlib.pyplot": "plot",
     "nptdms": "logs",
     "orangebox": "logs",
+    "orangebox.types": "logs",
     "pandas": "frames",
     "pyarrow": "parquet",
     "pyarrow.parquet": "parquet",

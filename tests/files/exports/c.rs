@@ -8,7 +8,10 @@ use youla::linalg::{block, eye};
 use youla::lti::{Discrete, StateSpace};
 use youla::signal::Channel;
 use youla::{Mat, MatRef};
-use youla_io::export::{CController, ControllerExport, ModelFormat, c_controller, export_model};
+use youla_io::export::{
+    CController, ControllerExport, ModelFormat, PidExport, PidForm, c_controller, export_model, export_pid,
+};
+use youla_loop::redesign::structured::{Discretisation, Notch, PidController, PidGains};
 
 const EXACT: f64 = 1e-12;
 const WARNINGS: [&str; 6] = ["-std=c99", "-Wall", "-Wextra", "-Werror", "-pedantic", "-O2"];
@@ -81,6 +84,21 @@ int main(void)
 }
 "#;
 
+/// Reads r and y, writes u.
+const PID: &str = r#"
+#include <stdio.h>
+#include "pid.h"
+int main(void)
+{
+    pid_state s = {0};
+    double r, y;
+    while (scanf("%lf %lf", &r, &y) == 2) {
+        printf("%.17g\n", (double)pid_step(&s, (YOULA_REAL)r, (YOULA_REAL)y));
+    }
+    return 0;
+}
+"#;
+
 /// What the program makes of a record, samples x channels.
 fn through_c(name: &str, source: &str, header: (&str, &str), flags: &[&str], input: MatRef<'_, f64>) -> Mat<f64> {
     let folder = folder(name);
@@ -133,6 +151,45 @@ fn the_header_of_a_model_simulates_as_the_library() {
 fn stated(header: &str) -> f64 {
     let (_, rest) = header.split_once("differs from double by at most ").unwrap();
     rest.split_once(' ').unwrap().0.parse().unwrap()
+}
+
+/// A PID with two notches by both rules, in C against the controller that was designed.
+#[test]
+#[ignore = "needs gcc"]
+fn the_header_of_a_pid_computes_the_controller() {
+    let (rng, time) = (&mut rng(3), Discrete::new(TS).unwrap());
+    for discretisation in [Discretisation::BackwardEuler, Discretisation::Tustin] {
+        let gains = PidGains { discretisation, kp: 1.3, ki: 40.0, kd: 0.02, derivative_filter: 3.0 * TS };
+        let notch = |share: f64, depth| Notch { hz: share / TS, width: 0.3, depth };
+        let c = PidController { gains, notches: vec![notch(0.05, 0.1), notch(0.2, 0.5)], delay: 0 };
+        let [(ki, i, _), (kd, d, lag)] = c.gains.parts(TS);
+        let pid = PidExport {
+            measured: Channel::new("y", "m"),
+            commanded: Channel::new("u", "V"),
+            ts: TS,
+            kp: c.gains.kp,
+            ki,
+            kd,
+            derivative_filter: c.gains.derivative_filter,
+            tustin: discretisation == Discretisation::Tustin,
+            integral: i.map(|b| ki * b),
+            derivative: [kd * d[0] / lag[0], -lag[1] / lag[0]],
+            notches: c.notches.iter().map(|n| ([n.hz, n.width, n.depth], n.coefficients(TS))).collect(),
+            delay: 0,
+            origin: "a test".into(),
+        };
+        let header = export_pid(&pid, PidForm::C).unwrap();
+        let input = normal(rng, 2000, 2);
+        // u = K (y - r) with K in positive feedback.
+        let error = Mat::from_fn(2000, 1, |k, _| input[(k, 1)] - input[(k, 0)]);
+        let expected = run(&c.system(time).unwrap(), error.as_ref());
+        let name = format!("pid-{discretisation:?}");
+        let double = through_c(&name, PID, ("pid.h", &header), &[], input.as_ref());
+        assert!(miss(double.as_ref(), expected.as_ref()) <= 1e-9, "{name}");
+        let single =
+            through_c(&format!("{name}-single"), PID, ("pid.h", &header), &["-DYOULA_REAL=float"], input.as_ref());
+        assert!((1e-12..1e-3).contains(&miss(single.as_ref(), expected.as_ref())), "{name}");
+    }
 }
 
 struct Case {

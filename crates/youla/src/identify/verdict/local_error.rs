@@ -15,7 +15,7 @@ use super::limits::{
 };
 use crate::linalg::TINY;
 use crate::statistics::chi_square_deviations;
-use faer::{Mat, Side, c64};
+use faer::{Mat, MatRef, Side, c64};
 
 /// Octaves of the first band that count apart: a band of `BAND_LINES` lines for each of six excitations has eight.
 const OCTAVES: usize = 8;
@@ -149,6 +149,8 @@ fn scatter_of(groups: &[&Band], entry: usize) -> (f64, f64) {
 struct Sums {
     lines: usize,
     xx: Mat<c64>,
+    /// Of the excitation under one more window, which says where in the record it lies.
+    hh: Mat<c64>,
     ux: Mat<c64>,
     vx: Mat<c64>,
     vv: Vec<f64>,
@@ -171,6 +173,7 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
     let empty = |_| Sums {
         lines: 0,
         xx: zeros(q),
+        hh: zeros(q),
         ux: zeros(m),
         vx: zeros(p),
         vv: vec![0.0; p],
@@ -180,6 +183,7 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
     let mut all: Vec<Sums> = (0..count).map(empty).collect();
     for r in records {
         let total = r.v.len() / p.max(1);
+        let h = hann(r.x, q);
         for k in 0..total {
             let band = (k * count / total).min(count - 1);
             let sums = &mut all[band];
@@ -196,6 +200,7 @@ fn sums(records: &[RecordLines<'_>], Channels { m, p, q }: Channels, count: usiz
             for a in 0..q {
                 let xa = r.x[k * q + a].conj();
                 (0..q).for_each(|b| sums.xx[(b, a)] += r.x[k * q + b] * xa);
+                (0..q).for_each(|b| sums.hh[(b, a)] += h[k * q + b] * h[k * q + a].conj());
                 (0..m).for_each(|j| sums.ux[(j, a)] += r.u[k * m + j] * xa);
                 (0..p).for_each(|i| sums.vx[(i, a)] += r.v[k * p + i] * xa);
             }
@@ -245,6 +250,19 @@ fn gain(sums: &Sums, least: f64) -> Option<Mat<c64>> {
     Some(&scaled * eigen.U().adjoint())
 }
 
+/// By how much the variance of a sum of the noise with the excitation exceeds that for an excitation spread over the record, along each column
+/// of `turn`: a sweep is at one frequency at one time, and the window weighs the noise there as it weighs the sweep. With noise of equal power
+/// on the lines without a window,
+/// ```text
+/// var sum_k V_k X_k^* = Phi_v / (3/2) sum_k |H X_k|^2,      H the window,
+/// ```
+/// against `HANN_LOSS Phi_v sum_k |X_k|^2` of the mean over the record. It is never taken as less: at the ends the window leaves little to go by.
+fn centred(sums: &Sums, basis: &Mat<c64>, turn: MatRef<'_, c64>) -> Vec<f64> {
+    let under = basis.adjoint() * &sums.hh * basis * turn;
+    let of = |k: usize| (0..turn.nrows()).map(|a| (turn[(a, k)].conj() * under[(a, k)]).re).sum::<f64>();
+    (0..turn.ncols()).map(|k| (of(k) / (1.5 * HANN_LOSS)).max(1.0)).collect()
+}
+
 /// Chi-square of a band, its degrees of freedom, the error of each entry and its variance.
 struct BandError {
     statistic: f64,
@@ -260,11 +278,9 @@ fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<
     if strong.is_empty() || free < 1.0 {
         return None;
     }
-    let root = |of: &Mat<c64>| {
-        let along = of * eigen.U();
-        Mat::from_fn(of.nrows(), strong.len(), |i, k| along[(i, strong[k])] / eigen.S()[strong[k]].re.sqrt())
-    };
-    let (u, v) = (root(&sums.ux), root(&sums.vx));
+    let of_unit_power = |i: usize, k: usize| eigen.U()[(i, strong[k])] / eigen.S()[strong[k]].re.sqrt();
+    let basis = Mat::from_fn(sums.xx.nrows(), strong.len(), of_unit_power);
+    let (u, v) = (&sums.ux * &basis, &sums.vx * &basis);
     let explained = |of: &Mat<c64>, i: usize| (0..strong.len()).map(|k| of[(i, k)].norm_sqr()).sum::<f64>();
     // Of correlated lines a sum has the variance of `HANN_LOSS` times as many.
     let noise: Vec<f64> = (0..p).map(|i| ((sums.vv[i] - explained(&v, i)) / free).max(TINY)).collect();
@@ -279,15 +295,17 @@ fn error_of(sums: &Sums, least: f64, Channels { m, p, .. }: Channels) -> Option<
     let rank = (0..sizes.len()).take_while(|k| moved(*k)).count();
     // v V: the error along each direction of the excited inputs, with the variance of the noise
     let along = &v * svd.V();
+    let centred = centred(sums, &basis, svd.V());
     let degrees = (2 * rank * p) as f64;
     let (mut error, mut variance) = (vec![c64::ZERO; p * m], vec![0.0; p * m]);
     let mut statistic = 0.0;
     for i in 0..p {
-        (0..rank).for_each(|k| statistic += 2.0 * along[(i, k)].norm_sqr() / noise[i]);
+        (0..rank).for_each(|k| statistic += 2.0 * along[(i, k)].norm_sqr() / (noise[i] * centred[k]));
         for j in 0..m {
             let entry = |sum: c64, k: usize| sum + along[(i, k)] / sizes[k] * svd.U()[(j, k)].conj();
             error[i * m + j] = (0..rank).fold(c64::ZERO, entry);
-            variance[i * m + j] = (0..rank).map(|k| noise[i] * (svd.U()[(j, k)].norm() / sizes[k]).powi(2)).sum();
+            let of = |k: usize| noise[i] * centred[k] * (svd.U()[(j, k)].norm() / sizes[k]).powi(2);
+            variance[i * m + j] = (0..rank).map(of).sum();
         }
     }
     // Mean of the square of Student's variable with `2 free` degrees of freedom.

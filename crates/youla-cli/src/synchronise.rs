@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use youla::lti::Discrete;
 use youla::signal::Channel;
 use youla_io::folder::require_place;
-use youla_io::{ChannelRef, ChannelTiming, Placement, Role, StampedChannel, StampedColumn, Synchronised};
+use youla_io::{ChannelRef, Placement, Role, StampedChannel, StampedColumn, Synchronised};
 
 pub(crate) const EXAMPLES: &str = "\
 Example:
@@ -167,15 +167,9 @@ fn target(out: &Path, k: usize, count: usize) -> PathBuf {
 }
 
 fn json(found: &Synchronised, targets: &[PathBuf]) -> serde_json::Value {
-    let channel = |t: &ChannelTiming| {
-        serde_json::json!({
-            "name": t.name, "samples": t.samples, "step": t.step, "longest_step": t.longest_step, "jitter": t.jitter, "delay": t.delay,
-            "placement": t.placement.name(), "filled": t.filled, "error": t.error,
-        })
-    };
     serde_json::json!({
         "files": targets, "rows": found.records.iter().map(youla::signal::Record::samples).collect::<Vec<_>>(),
-        "channels": found.timing.iter().map(channel).collect::<Vec<_>>(), "drift": found.drift, "left_out": found.left_out,
+        "channels": found.timing, "drift": found.drift, "left_out": found.left_out,
     })
 }
 

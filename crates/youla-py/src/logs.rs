@@ -120,11 +120,8 @@ pub(crate) fn clock(what: &str, times: PyReadonlyArray1<'_, f64>, dt: Option<f64
 /// A channel with its own time stamps: name, unit, role, whether it is written when it changes, times, values.
 type Stamped<'py> = (String, String, String, bool, PyReadonlyArray1<'py, f64>, PyReadonlyArray1<'py, f64>);
 
-/// Of a channel: name, samples, median and longest step, scatter, delay, placement, filled values and their error.
-type Timing = (String, usize, f64, f64, f64, Option<f64>, &'static str, usize, f64);
-
-/// Records and their beginnings, timing of the channels, drift of the clock, rows left out.
-type SynchronisedOut<'py> = (Vec<(Bound<'py, numpy::PyArray2<f64>>, f64)>, Vec<Timing>, f64, usize);
+/// Records and their beginnings, timing of the channels as JSON, drift of the clock, rows left out.
+type SynchronisedOut<'py> = (Vec<(Bound<'py, numpy::PyArray2<f64>>, f64)>, String, f64, usize);
 
 /// Brings channels to the clock of the controller.
 #[pyfunction]
@@ -145,9 +142,7 @@ pub(crate) fn synchronise<'py>(
     };
     let channels: Vec<StampedChannel> = channels.into_iter().map(one).collect();
     let found = worker::run(py, false, move |_| Ok(youla_io::synchronise(&name, &channels, Discrete::new(dt)?)?))?;
-    let timing = |t: youla_io::ChannelTiming| {
-        (t.name, t.samples, t.step, t.longest_step, t.jitter, t.delay, t.placement.name(), t.filled, t.error)
-    };
+    let timing = serde_json::to_string(&found.timing).map_err(Failure::from)?;
     let records = found.records.iter().map(|r| (crate::matrices::array(py, r.data()), r.start())).collect();
-    Ok((records, found.timing.into_iter().map(timing).collect(), found.drift, found.left_out))
+    Ok((records, timing, found.drift, found.left_out))
 }

@@ -108,7 +108,7 @@ pub fn read_stamped_csv(path: impl AsRef<Path>, time: &ChannelRef, options: &Csv
     let path = path.as_ref();
     let mut found = columns(path, options, true)?;
     let names: Vec<String> = found.iter().map(|(name, _)| name.clone()).collect();
-    let times = found.swap_remove(time.index(&path.display().to_string(), &names)?).1?;
+    let times = found.remove(time.index(&path.display().to_string(), &names)?).1?;
     if let Some(row) = times.iter().position(|t| t.is_nan()) {
         let what = format!("{}: the time in row {} (counted from 1)", path.display(), row + 1);
         return Err(youla::Error::OutOfRange {
@@ -118,7 +118,6 @@ pub fn read_stamped_csv(path: impl AsRef<Path>, time: &ChannelRef, options: &Csv
         }
         .into());
     }
-    found.sort_by_key(|(name, _)| names.iter().position(|n| n == name));
     let stamped = |(name, values): (String, Result<Vec<f64>>)| {
         let there = times.iter().zip(values.ok()?).filter(|(_, v)| !v.is_nan());
         let (times, values) = there.map(|(t, v)| (*t, v)).unzip();

@@ -7,7 +7,7 @@
 //! (Mardia and Jupp, Directional statistics, section 2.3), and sample i belongs to cycle round(t_i / T - phi). Gaussian scatter of standard deviation
 //! s T gives R = exp(-2 (pi s)^2).
 
-use super::{ChannelTiming, Placement, Role, StampedChannel, rows::Table};
+use super::{ChannelTiming, Role, StampedChannel, rows::Table};
 use std::f64::consts::TAU;
 use youla::c64;
 use youla::statistics::median;
@@ -100,8 +100,8 @@ impl Phase {
 /// The clocks of channels, or why there is none.
 pub(super) fn clocks(channels: &[StampedChannel], ts: f64) -> Result<Clocks, String> {
     let zero = channels.iter().map(|c| c.times[0]).fold(f64::INFINITY, f64::min);
-    let begin = channels.iter().map(|c| c.times[0]).fold(zero, f64::max);
-    if let Some(c) = channels.iter().find(|c| !c.changes_only && c.times[c.times.len() - 1] <= begin) {
+    let last_start = channels.iter().map(|c| c.times[0]).fold(zero, f64::max);
+    if let Some(c) = channels.iter().find(|c| !c.changes_only && c.times[c.times.len() - 1] <= last_start) {
         return Err(format!(
             "the last sample of {:?} comes before the first one of another channel; check that all times are of one clock",
             c.channel.name
@@ -138,10 +138,7 @@ pub(super) fn clocks(channels: &[StampedChannel], ts: f64) -> Result<Clocks, Str
     };
     let mut on: Vec<Option<OnClock>> = channels.iter().map(on).collect();
     let first = |role, on: &[Option<OnClock>]| (0..on.len()).find(|&c| channels[c].role == role && on[c].is_some());
-    let begin = match first(Role::Output, &on).or(first(Role::Input, &on)) {
-        Some(c) => on[c].map_or(0.0, |o| o.phase),
-        None => 0.0,
-    };
+    let begin = first(Role::Output, &on).or(first(Role::Input, &on)).and_then(|c| on[c]).map_or(0.0, |o| o.phase);
     let delays = |role: Role, low: f64, on: &mut [Option<OnClock>]| {
         let of_role = on.iter_mut().zip(channels).filter(|(_, c)| c.role == role);
         of_role.filter_map(|(o, _)| o.as_mut()).for_each(|o| o.delay = wrap(o.phase - begin, low));
@@ -233,7 +230,7 @@ impl Clocks {
             delay: self.on[c].map(|o| o.delay * ts),
             placement: table.placements[c],
             filled,
-            error: if table.placements[c] == Placement::Interpolated { error.hypot(table.errors[c]) } else { error },
+            error: error.hypot(table.errors[c]),
         }
     }
 }

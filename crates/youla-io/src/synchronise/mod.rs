@@ -54,7 +54,8 @@ pub struct StampedChannel {
 }
 
 /// How the values of the rows come from those of a channel.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Placement {
     /// One sample for each cycle.
     Sampled,
@@ -76,7 +77,7 @@ impl Placement {
 }
 
 /// The clock of a channel, and what its place in the rows costs.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct ChannelTiming {
     /// Name of the channel.
     pub name: String,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from ._errors import InputError
 from ._loggers import Logged, read
 from ._optional import need
 from ._record import Record
+from ._sources import require_seconds
 
 Names = str | Iterable[str] | None
 
@@ -263,7 +265,7 @@ class Channels:
         step = positive(dt, "dt")
         records, timing, drift, left_out = _native.synchronise(self._name, parts, step)
         several = len(records) > 1
-        kinds = [ChannelTiming(*t) for t in timing]
+        kinds = [ChannelTiming(**t) for t in json.loads(timing)]
         steps = {t.name: t.step for t in kinds if t.placement == "interpolated"}
 
         def record(k: int, data: Array) -> Record:
@@ -316,9 +318,7 @@ def _of_columns(data: Any, time: str) -> dict[str, tuple[Array, Array]]:
         raise InputError("data is no data frame and no mapping of columns, but time= names a column; give one of them") from None
     if time not in columns:
         raise InputError(f"time names {time!r}, which is no column; the columns are {_some(names)}")
-    other = _native.unit_of_time(time)
-    if other is not None:
-        raise InputError(f"time {time!r} is in {other[0]} by its name, but times are read in seconds; give a column of seconds (data[{time!r}] {other[1]})")
+    require_seconds(f"time {time!r}", time)
     times = as_floats(columns.pop(time), f"time {time!r}").ravel()
     found = {}
     for name, column in columns.items():

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import _native
 from ._arrays import Array, whole
+from ._channels import Channels, Synchronised
 from ._checks import file_of, known, text
 from ._errors import InputError
 from ._model import FrequencyResponse, _numbered
@@ -263,7 +264,8 @@ def _log_of(record: Record) -> Log:
 def records_of(given: Records | None, what: str) -> list[Record]:
     listed = [] if given is None else [given] if isinstance(given, Record) else given
     if not isinstance(listed, Sequence) or not all(isinstance(r, Record) for r in listed):
-        remedy = {"Channels": "; bring them to one clock by .synchronise(...).records", "Synchronised": "; give its .records"}.get(type(given).__name__, "")
+        of = {Channels: "; bring them to one clock by .synchronise(...).records", Synchronised: "; give its .records"}
+        remedy = next((words for kind, words in of.items() if isinstance(given, kind)), "")
         raise InputError(f"{what} is {type(given).__name__}, but must be a youla.Record or a list of them{remedy}")
     return list(listed)
 

@@ -93,8 +93,6 @@ class Record:
     ) -> None:
         if isinstance(data, Record):
             raise InputError("data is already a youla.Record; use it as it is, or cut it by record[first:last]")
-        if type(data).__name__ == "Channels":
-            raise InputError("data is youla.Channels, whose channels have time stamps of their own; bring them to one clock by .synchronise(...).records")
         if isinstance(time, (bool, np.bool_)) or not isinstance(time, (str, int, np.integer, type(None))):
             raise InputError(f"time is {time!r}, but must be the name or number of a column, or 'index'")
         labels = {} if units is None else table(units, "units", "{'u': 'V'}")

@@ -47,6 +47,8 @@ def source_of(data: Any, chosen: dict[str, list[str | int]], time: str | int | N
         return _of_response(data, time, dt)
     if _is(data, "control", "FrequencyResponseData"):
         raise InputError("data is a frequency response, not a record over time; give it to youla.identify as it is, or as a youla.Response")
+    if _is(data, "youla", "Channels"):
+        raise InputError("data is youla.Channels, whose channels have time stamps of their own; bring them to one clock by .synchronise(...).records")
     if _is(data, "pandas", "DataFrame"):
         return _of_pandas(data, chosen, time, dt)
     if _is(data, "polars", "LazyFrame"):
@@ -65,18 +67,22 @@ def _is(data: Any, module: str, name: str) -> bool:
     return kind is not None and isinstance(data, kind)
 
 
+def require_seconds(what: str, column: Any, otherwise: str = "") -> None:
+    """Refuse a column of the time whose name states another unit than the second."""
+    other = _native.unit_of_time(str(column))
+    if other is not None:
+        raise InputError(
+            f"{what} is in {other[0]} by its name, but times are read in seconds; give a column of seconds (data[{column!r}] {other[1]}){otherwise}"
+        )
+
+
 def _clock(times: Any, dt: float | None, what: str, column: Any = "") -> float:
     if times is None and dt is None:
         raise InputError("dt is missing: give the sample time in seconds, or time= with the column that holds it")
     if times is None:
         assert dt is not None
         return dt
-    other = _native.unit_of_time(str(column))
-    if other is not None:
-        raise InputError(
-            f"{what} is in {other[0]} by its name, but times are read in seconds; give a column of seconds (data[{column!r}] {other[1]}), "
-            "or leave time out and give the sample time as dt="
-        )
+    require_seconds(what, column, ", or leave time out and give the sample time as dt=")
     seconds = as_floats(times, what)
     if not np.isfinite(seconds).all():
         raise InputError(f"{what} has a value that is not finite; cut these rows out")

@@ -7,12 +7,12 @@ use crate::settings::RunSettings;
 use crate::stages::context::RunContext;
 use crate::stages::factors::{declared_loop, factorise};
 use crate::stages::recommend::recommend;
-use crate::stages::redesign::{design, redesigned};
+use crate::stages::redesign::{design, pid_of, redesigned};
 use crate::{Error, Result};
 use std::path::Path;
 use youla::identify::likelihood::{Recommendation, Region};
 use youla::lti::{Discrete, StateSpace};
-use youla_loop::redesign::structured::{PidProblem, PidRedesign, design_pid};
+use youla_loop::redesign::structured::PidRedesign;
 use youla_loop::redesign::{Redesign, RedesignOptions};
 
 /// The recommended model of a run without anything else; paths are relative to `folder`.
@@ -54,8 +54,7 @@ pub fn pid_kept(
     options: &RedesignOptions,
 ) -> Result<PidRedesign> {
     let declared = declared_loop(settings, records, Path::new("."))?;
-    let problem = PidProblem { points, running: declared.controller(), delay: settings.controller.delay() };
-    design_pid(&problem, &options.pid, &options.band).map_err(|e| Error::from(e).within("[redesign]"))
+    pid_of(RunContext { settings, records, declared: &declared, factorisation: None }, points, options)
 }
 
 /// A new controller on the result of a run, as `[redesign]` with these options gives it.

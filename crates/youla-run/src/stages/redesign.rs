@@ -33,12 +33,21 @@ pub(crate) fn redesigned(
 pub(crate) fn pid(run: RunContext<'_>, recommended: &Recommendation) -> Option<Result<PidRedesign>> {
     let options = run.settings.redesign.as_ref()?;
     options.structure?;
-    let problem = PidProblem {
-        points: vec![(&recommended.plant, &recommended.region)],
-        running: run.declared.controller(),
-        delay: run.settings.controller.delay(),
-    };
-    Some(design_pid(&problem, &options.pid, &options.band).map_err(|e| Error::from(e).within("[redesign]")))
+    Some(pid_of(run, vec![(&recommended.plant, &recommended.region)], options))
+}
+
+/// One PID for plants and their regions at which the controller of a run ran.
+///
+/// # Errors
+/// As [`design_pid`].
+pub(crate) fn pid_of(
+    run: RunContext<'_>,
+    points: Vec<(&StateSpace<Discrete>, &Region)>,
+    options: &RedesignOptions,
+) -> Result<PidRedesign> {
+    let (running, delay) = (run.declared.controller(), run.settings.controller.delay());
+    let found = design_pid(&PidProblem { points, running, delay }, &options.pid, &options.band);
+    found.map_err(|e| Error::from(e).within("[redesign]"))
 }
 
 /// Designs on `model` and tests on `plant` and its region.

@@ -33,6 +33,9 @@ pub(crate) struct ExportArgs {
     /// With c-controller: Q from beta to alpha, as a model or as the controller.json of a redesign; without it the controller that ran.
     #[arg(long, value_name = "FILE", conflicts_with = "model")]
     q: Option<PathBuf>,
+    /// Of the new PIDs of several loops the one to write, counted from 1.
+    #[arg(long = "loop", value_name = "N")]
+    of_loop: Option<usize>,
     /// File to write; the name of the model by default, in the working directory.
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -74,6 +77,9 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
         Format::Model(_) | Format::Loop | Format::Pid(_) if args.q.is_some() => {
             Some("--q serves --to c-controller only")
         }
+        Format::Model(_) | Format::Loop | Format::Controller if args.of_loop.is_some() => {
+            Some("--loop serves the exports of a new PID only")
+        }
         Format::Controller if args.model.is_some() => Some("--model does not serve --to c-controller; give a Q by --q"),
         Format::Loop if args.model.is_some() => Some("--model does not serve --to c-loop"),
         Format::Pid(_) if args.model.is_some() => Some("--model does not serve the exports of a new PID"),
@@ -107,11 +113,11 @@ pub(crate) fn export(form: Form, args: &ExportArgs) -> Result<(), Failure> {
             (c_loop(&export)?.into_bytes(), file_name(&export.name, "h"), about)
         }
         Format::Pid(form) => {
-            let pid = pid_for_export(&args.source)?;
+            let pid = pid_for_export(&args.source, args.of_loop)?;
             let about = serde_json::json!({
-                "model": "pid", "order": 2 + 2 * pid.notches.len(), "inputs": [&pid.measured], "outputs": [&pid.commanded],
+                "model": pid.name, "order": 2 + 2 * pid.notches.len(), "inputs": [&pid.measured], "outputs": [&pid.commanded],
             });
-            (export_pid(&pid, form)?.into_bytes(), file_name("pid", form.extension()), about)
+            (export_pid(&pid, form)?.into_bytes(), file_name(&pid.name, form.extension()), about)
         }
     };
     let path = args.out.clone().unwrap_or(default);

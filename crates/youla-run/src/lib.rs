@@ -44,7 +44,8 @@ pub use schema::{settings_schema, summary_schema};
 pub use settings::{
     AlternativeStructure, Cascade, CascadeGains, ControllerSettings, DataFile, DataSettings, Discretisation,
     DisturbanceSettings, Domain, FactorSettings, Feedback, FrequencySettings, GreyBoxSettings, Hold, IdealPid,
-    NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings, parse_table,
+    LoopGain, NominalModel, ParallelPid, Polynomials, Prediction, RunSettings, TachoUnit, VerificationSettings,
+    parse_table,
 };
 pub use stages::certificate::RunCertificate;
 pub use stages::clock::{Stage, StageClock, StageTimes};

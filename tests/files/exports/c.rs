@@ -164,6 +164,7 @@ fn the_header_of_a_pid_computes_the_controller() {
         let c = PidController { gains, notches: vec![notch(0.05, 0.1), notch(0.2, 0.5)], delay: 0 };
         let [(ki, i, _), (kd, d, lag)] = c.gains.parts(TS);
         let pid = PidExport {
+            name: "pid".into(),
             measured: Channel::new("y", "m"),
             commanded: Channel::new("u", "V"),
             ts: TS,

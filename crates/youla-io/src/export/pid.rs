@@ -15,6 +15,8 @@ use youla::signal::Channel;
 /// A PID with notches, and what is known of its channels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PidExport {
+    /// Name of its functions: `pid`, and `pid_2` for the second of several loops.
+    pub name: String,
     /// The output of the plant.
     pub measured: Channel,
     /// The input of the plant.
@@ -162,12 +164,12 @@ fn c(pid: &PidExport) -> String {
         let _ = writeln!(text, "/* {line} */");
     }
     let names = states(pid).join(", ");
-    text.push_str(
-        "#ifndef YOULA_PID_H\n#define YOULA_PID_H\n#ifndef YOULA_REAL\n#define YOULA_REAL double\n#endif\n\n",
-    );
-    let _ = writeln!(text, "/* All zero at the start. */\ntypedef struct {{ YOULA_REAL {names}; }} pid_state;\n");
-    text.push_str(
-        "static YOULA_REAL pid_step(pid_state *s, YOULA_REAL r, YOULA_REAL y)\n{\n    const YOULA_REAL e = r - y;\n",
+    let (name, guard) = (&pid.name, format!("YOULA_{}_H", pid.name.to_uppercase()));
+    let _ = writeln!(
+        text,
+        "#ifndef {guard}\n#define {guard}\n#ifndef YOULA_REAL\n#define YOULA_REAL double\n#endif\n\n\
+         /* All zero at the start. */\ntypedef struct {{ YOULA_REAL {names}; }} {name}_state;\n\n\
+         static YOULA_REAL {name}_step({name}_state *s, YOULA_REAL r, YOULA_REAL y)\n{{\n    const YOULA_REAL e = r - y;"
     );
     text.push_str(if pid.notches.is_empty() { "    YOULA_REAL v;\n" } else { "    YOULA_REAL v, o;\n" });
     for line in statements(pid, "s->") {
@@ -185,7 +187,8 @@ fn structured_text(pid: &PidExport) -> String {
     let names = states(pid).join(", ");
     let _ = writeln!(
         text,
-        "FUNCTION_BLOCK YOULA_PID\nVAR_INPUT\n    r, y : LREAL;\nEND_VAR\nVAR_OUTPUT\n    u : LREAL;\nEND_VAR\nVAR\n    {names}, e, v, o : LREAL;\nEND_VAR"
+        "FUNCTION_BLOCK YOULA_{}\nVAR_INPUT\n    r, y : LREAL;\nEND_VAR\nVAR_OUTPUT\n    u : LREAL;\nEND_VAR\nVAR\n    {names}, e, v, o : LREAL;\nEND_VAR",
+        pid.name.to_uppercase()
     );
     text.push_str("e := r - y;\n");
     for line in statements(pid, "") {

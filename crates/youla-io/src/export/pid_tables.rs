@@ -165,6 +165,7 @@ mod tests {
 
     fn pid() -> PidExport {
         PidExport {
+            name: "pid".into(),
             measured: Channel::new("gyro", "deg/s"),
             commanded: Channel::new("sum", ""),
             ts: 5e-4,

@@ -62,7 +62,7 @@ def identify(
         zero-order hold. A mapping is the table ``[nominal]`` of run.toml. ``hansen`` needs it.
     controller : as `nominal`
         The controller that ran; 0 where none ran. A mapping is the table ``[controller]``, for example
-        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``.
+        ``{"pid": {"kp": 2.0, "discretisation": "tustin"}}``; lists hold the gains of a PID in each loop, ``"kp": [2.0, 1.5]``.
     feedback : {"negative", "positive"}
         Sign with which the controller is written: ``u = K (r - y)`` or ``u = K (y - r)``. Needed where a controller ran and
         its mapping does not state it; the message for a missing one says with which the record agrees.

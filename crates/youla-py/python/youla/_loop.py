@@ -251,7 +251,8 @@ def redesign(run: Run | Sequence[Run], **options: Any) -> Redesign:
     Raises
     ------
     InputError
-        Where the run has no coprime factors, where runs of several points had other controllers or sample times, or have several channels.
+        Where the run has no coprime factors, where runs of several points had other controllers or sample times; of a PID, where
+        the machine is not square or its controller leads an output to the input of another loop.
     NumericalError
         Where no tried weight, or no PID, keeps the limits.
 

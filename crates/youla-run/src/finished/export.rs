@@ -92,11 +92,11 @@ pub fn loop_for_export(source: &Path) -> Result<LoopExport> {
     if source.is_dir() { loop_of_run(source) } else { loop_of_redesign(source) }
 }
 
-/// The new PID of a run.
+/// The new PID of a run, of several loops that of one, counted from 1.
 ///
 /// # Errors
-/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a run without a new PID.
-pub fn pid_for_export(run: &Path) -> Result<PidExport> {
+/// Those of [`read_model`]; [`youla_io::Error::NotAModel`] for a run without a new PID, and for a loop that it has not.
+pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
     require_run(run)?;
     let path = run.join("8-redesign/pid.json");
     if !path.is_file() {
@@ -108,12 +108,20 @@ pub fn pid_for_export(run: &Path) -> Result<PidExport> {
     let found: PidEntry = serde_json::from_str(&youla_io::read_text(&path)?)
         .map_err(|source| Error::NotASummary { path: path.clone(), source })?;
     let model = read_model(run.join("8-redesign/new_controller.json"))?;
-    let (c, ts) = (&found.controller, model.system.time().ts());
+    let loops = found.controllers.len();
+    let place = match of_loop {
+        None if loops == 1 => 0,
+        Some(place) if (1..=loops).contains(&place) => place - 1,
+        None => return Err(not(run, &format!("this run has new PIDs for {loops} loops; add --loop 1 to {loops}"))),
+        Some(place) => return Err(not(run, &format!("--loop is {place}, but must be from 1 to {loops}"))),
+    };
+    let (c, ts) = (&found.controllers[place], model.system.time().ts());
     let [(ki, i, _), (kd, d, lag)] = c.gains.parts(ts);
     let notch = |n: &Notch| ([n.hz, n.width, n.depth], n.coefficients(ts));
     Ok(PidExport {
-        measured: model.inputs[0].clone(),
-        commanded: model.outputs[0].clone(),
+        name: if loops == 1 { "pid".into() } else { format!("pid_{}", place + 1) },
+        measured: model.inputs[place].clone(),
+        commanded: model.outputs[place].clone(),
         ts,
         kp: c.gains.kp,
         ki,

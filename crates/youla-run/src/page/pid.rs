@@ -14,7 +14,7 @@ pub(super) fn drawn(new: &PidRedesign) -> draw::Redesign {
 
 /// What the new controller promises.
 pub(super) fn line(new: &PidRedesign) -> Verdict {
-    let good = new.reservations().is_empty() && new.rejection >= 1.0;
+    let good = new.reservations().is_empty() && new.rejection() >= 1.0;
     let status = if good { Status::Good } else { Status::Caution };
     Verdict { status, text: sentence(new), evidence: ReportPart::Redesign }
 }
@@ -31,18 +31,26 @@ fn sentence(new: &PidRedesign) -> String {
         ),
         _ => format!("Do not take it as it is: {}", new.reservations().join("; ")),
     };
-    let slow_loads = match new.rejection {
-        better if better >= 1.0 => {
-            format!("The new PID rejects slow loads {better:.2} times as well as the running controller")
-        }
-        worse => format!(
-            "The new PID rejects slow loads worse than the running controller, {worse:.2} times as well, which is the price of the limits"
+    let who = match new.controllers.len() {
+        1 => "The new PID rejects".to_owned(),
+        loops => format!("The new PIDs of {loops} loops reject"),
+    };
+    let slow_loads = match new.rejection() {
+        better if better >= 1.0 => format!("{who} slow loads {} times as well as the running controller", times(new)),
+        _ => format!(
+            "{who} slow loads worse than the running controller, {} times as well, which is the price of the limits",
+            times(new)
         ),
     };
     format!(
         "{slow_loads}. The running controller misses a limit at {} of {} models. {kept}. This is a prediction: the controller has not run yet.",
         proof.running_missed, proof.models
     )
+}
+
+/// How many times as well slow loads are rejected, loop by loop.
+fn times(new: &PidRedesign) -> String {
+    new.rejections.iter().map(|times| format!("{times:.2}")).collect::<Vec<_>>().join(" and ")
 }
 
 /// The three steps as the figure names them.
@@ -60,21 +68,24 @@ fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
         [from, to] if from == to => shown(middle),
         [from, to] => format!("{} ({from} to {to})", shown(middle)),
     };
+    let several = new.controllers.len() > 1;
     let row = |f: &FigureBand| {
-        let name = format!("{} {}", f.name.replace('_', " "), f.unit).trim_end().to_owned();
+        let of = if several { format!("loop {}: ", f.channel + 1) } else { String::new() };
+        let name = format!("{of}{} {}", f.name.replace('_', " "), f.unit).trim_end().to_owned();
         vec![name, f.limit.map_or("–".into(), digits), band(f.running), band(f.new)]
     };
     let step = |s: &PlannedStep| {
-        let gains = s.controller.as_ref().map_or("no PID".into(), gains);
+        let gains = s.controllers.as_ref().map_or("no PID".into(), |of| all_gains(of));
         vec![s.name.into(), gains, band(s.peak_sensitivity), band(s.phase_margin), band(s.bandwidth)]
     };
     vec![
         EvidenceTable {
             text: sentence(new),
             caption: format!(
-                "Medians with 95 % bands over {} models that the search has not seen. The command effort is the rms of u per rms of white \
+                "Medians with 95 % bands over {} models that the search has not seen{}. The command effort is the rms of u per rms of white \
                  noise of the sensor; its limit is that at the median.",
-                new.proof.models
+                new.proof.models,
+                if several { "; each loop while the others are closed" } else { "" }
             ),
             ..EvidenceTable::new(
                 "Limits, running and new",
@@ -99,8 +110,16 @@ fn shown(value: f64) -> String {
     if value == f64::INFINITY { "∞".into() } else { digits(value) }
 }
 
+/// The gains of all loops in one line.
+fn all_gains(of: &[PidController]) -> String {
+    match of {
+        [one] => gains(one),
+        _ => of.iter().enumerate().map(|(k, c)| format!("loop {}: {}", k + 1, gains(c))).collect::<Vec<_>>().join("; "),
+    }
+}
+
 /// The gains in one line.
-pub(crate) fn gains(c: &PidController) -> String {
+fn gains(c: &PidController) -> String {
     let g = &c.gains;
     let parts = [("kp", g.kp, ""), ("ki", g.ki, " /s"), ("kd", g.kd, " s"), ("filter", g.derivative_filter, " s")];
     let there = parts.into_iter().filter(|(_, value, _)| *value != 0.0);
@@ -117,19 +136,26 @@ pub(crate) fn figure(new: &PidRedesign) -> Figure {
     let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), log, ..Axis::default() };
     let decibels = |bands: &[Band]| bands.iter().map(|b| b.map(decibel)).collect::<Vec<Band>>();
     let hz = &new.proof.hz;
-    let [before, after] = &new.proof.sensitivities;
     let of = |key: &str, bands: &[Band]| (key.to_owned(), hz.clone(), decibels(bands));
-    let sensitivity = panel(
-        ("Sensitivity", axis("Frequency", "Hz", true), axis("Magnitude", "dB", false)),
-        vec![of("present", before), of("new", after)],
-    );
-    let responses = new.steps.iter().map(|s| (key(s).to_owned(), s.seconds.clone(), s.response.clone())).collect();
-    let step = panel(("Step of the reference", axis("Time", "s", false), axis("y per step", "", false)), responses);
+    let several = new.controllers.len() > 1;
+    let title = |what: &str, i: usize| if several { format!("{what}, loop {}", i + 1) } else { what.to_owned() };
+    let panels = |(i, [before, after]): (usize, &[Vec<Band>; 2])| {
+        let sensitivity = panel(
+            (&title("Sensitivity", i), axis("Frequency", "Hz", true), axis("Magnitude", "dB", false)),
+            vec![of("present", before), of("new", after)],
+        );
+        let response = |s: &PlannedStep| (key(s).to_owned(), s.seconds.clone(), s.responses[i].clone());
+        let step = panel(
+            (&title("Step of the reference", i), axis("Time", "s", false), axis("y per step", "", false)),
+            new.steps.iter().map(response).collect(),
+        );
+        [sensitivity, step]
+    };
     Figure {
         key: "response".into(),
         title: "The loop, running and new".into(),
         caption: "Medians and 95 % bands over models of the region that the search has not seen.".into(),
-        panels: vec![sensitivity, step],
+        panels: new.proof.sensitivities.iter().enumerate().flat_map(panels).collect(),
         ..Figure::default()
     }
 }

@@ -85,9 +85,9 @@ pub enum ControllerSettings {
         #[serde(default)]
         delay: usize,
     },
-    /// PID in its parallel form, `kp + ki/s + kd s/(1 + derivative_filter s)`; one input and one output.
+    /// PID in its parallel form, `kp + ki/s + kd s/(1 + derivative_filter s)`, one or one for each loop.
     Pid(ParallelPid),
-    /// PID in its ideal form, `kp (1 + 1/(ti s) + td s/(1 + derivative_filter s))`; one input and one output.
+    /// PID in its ideal form, `kp (1 + 1/(ti s) + td s/(1 + derivative_filter s))`, one or one for each loop.
     IdealPid(IdealPid),
     /// A velocity loop inside a position loop with feedforward, as servo drives compute it; one input and one output.
     Cascade(Cascade),

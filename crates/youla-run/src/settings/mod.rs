@@ -22,7 +22,7 @@ pub use feedback::Feedback;
 pub use grey_box::{AlternativeStructure, GreyBoxSettings};
 pub use models::{Domain, NominalModel, Polynomials};
 pub use options::{FactorSettings, FrequencySettings, Prediction, VerificationSettings};
-pub use pid::{Discretisation, IdealPid, ParallelPid};
+pub use pid::{Discretisation, IdealPid, LoopGain, ParallelPid};
 
 use crate::{Error, Result};
 use explain::{explain, problem_at};
@@ -218,11 +218,12 @@ impl RunSettings {
 
     fn redesign_problem(&self) -> Option<String> {
         let redesign = self.redesign.as_ref()?;
-        if redesign.structure.is_some() && (self.data.inputs.len(), self.data.outputs.len()) != (1, 1) {
-            return Some(
-                "[redesign] structure = \"pid\" is for one input and one output; leave it out for method = \"lqg\""
-                    .into(),
-            );
+        let (inputs, outputs) = (self.data.inputs.len(), self.data.outputs.len());
+        if redesign.structure.is_some() && inputs != outputs {
+            return Some(format!(
+                "[redesign] structure = \"pid\" designs a PID for each loop of a machine with as many outputs as inputs, but [data] has \
+                 {inputs} inputs and {outputs} outputs; leave `structure` out for method = \"lqg\""
+            ));
         }
         if redesign.structure.is_none() && !redesign.pid.is_default() {
             return Some(

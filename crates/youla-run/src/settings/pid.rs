@@ -1,11 +1,44 @@
-//! PID controllers of run.toml, in parallel and in ideal form; how they are computed is in [`youla_loop::redesign::structured`].
+//! PID controllers of run.toml, in parallel and in ideal form, one or one for each loop; how they are computed is in
+//! [`youla_loop::redesign::structured`].
 
 use super::feedback::Feedback;
 use crate::Result;
 use serde::{Deserialize, Serialize};
 use youla::lti::{Discrete, StateSpace};
 pub use youla_loop::redesign::structured::Discretisation;
-use youla_loop::redesign::structured::PidGains;
+use youla_loop::redesign::structured::{PidGains, diagonal};
+
+/// A gain or a time of a PID: a number, or a list with one for each loop of a machine whose input k follows output k.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
+#[serde(untagged, expecting = "expected a number, or a list with one for each loop")]
+pub enum LoopGain {
+    /// Of all loops.
+    One(f64),
+    /// Of each.
+    Each(Vec<f64>),
+}
+
+impl Default for LoopGain {
+    fn default() -> Self {
+        LoopGain::One(0.0)
+    }
+}
+
+impl LoopGain {
+    fn of(&self, place: usize) -> f64 {
+        match self {
+            LoopGain::One(value) => *value,
+            LoopGain::Each(values) => values.get(place).copied().unwrap_or(f64::NAN),
+        }
+    }
+
+    fn loops(&self) -> Option<usize> {
+        match self {
+            LoopGain::One(_) => None,
+            LoopGain::Each(values) => Some(values.len()),
+        }
+    }
+}
 
 /// PID in its parallel form, `kp + ki/s + kd s/(1 + derivative_filter s)`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -16,16 +49,16 @@ pub struct ParallelPid {
     /// The rule by which integral and derivative were programmed.
     pub discretisation: Discretisation,
     /// Proportional gain.
-    pub kp: f64,
+    pub kp: LoopGain,
     /// Integral gain, per second.
     #[serde(default)]
-    pub ki: f64,
+    pub ki: LoopGain,
     /// Derivative gain, seconds.
     #[serde(default)]
-    pub kd: f64,
+    pub kd: LoopGain,
     /// Time constant of the filter of the derivative, seconds.
     #[serde(default)]
-    pub derivative_filter: f64,
+    pub derivative_filter: LoopGain,
     /// Dead time in whole samples, beyond what the controller itself delays.
     #[serde(default)]
     pub delay: usize,
@@ -40,33 +73,84 @@ pub struct IdealPid {
     /// The rule by which integral and derivative were programmed.
     pub discretisation: Discretisation,
     /// Gain of all three parts.
-    pub kp: f64,
+    pub kp: LoopGain,
     /// Integral time, seconds; no integral part when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub ti: Option<f64>,
+    pub ti: Option<LoopGain>,
     /// Derivative time, seconds.
     #[serde(default)]
-    pub td: f64,
+    pub td: LoopGain,
     /// Time constant of the filter of the derivative, seconds.
     #[serde(default)]
-    pub derivative_filter: f64,
+    pub derivative_filter: LoopGain,
     /// Dead time in whole samples, beyond what the controller itself delays.
     #[serde(default)]
     pub delay: usize,
 }
 
 impl ParallelPid {
-    pub(super) fn parts(&self) -> Pid {
-        let Self { discretisation, kp, ki, kd, derivative_filter: filter, .. } = *self;
-        Pid { discretisation, kp, ki, kd, filter, integral_time: None }
+    pub(super) fn parts(&self) -> Loops {
+        let Self { discretisation, kp, ki, kd, derivative_filter: filter, .. } = self;
+        Loops::new([("kp", kp), ("ki", ki), ("kd", kd), ("derivative_filter", filter)], |[kp, ki, kd, filter]| Pid {
+            discretisation: *discretisation,
+            kp,
+            ki,
+            kd,
+            filter,
+            integral_time: None,
+        })
     }
 }
 
 impl IdealPid {
-    pub(super) fn parts(&self) -> Pid {
-        let Self { discretisation, kp, ti, td, derivative_filter: filter, .. } = *self;
-        let ki = ti.map_or(0.0, |ti| kp / ti);
-        Pid { discretisation, kp, ki, kd: kp * td, filter, integral_time: ti }
+    pub(super) fn parts(&self) -> Loops {
+        let Self { discretisation, kp, ti, td, derivative_filter: filter, .. } = self;
+        let never = LoopGain::One(f64::INFINITY);
+        let times = ti.as_ref().unwrap_or(&never);
+        Loops::new([("kp", kp), ("ti", times), ("td", td), ("derivative_filter", filter)], |[kp, ti, td, filter]| Pid {
+            discretisation: *discretisation,
+            kp,
+            ki: kp / ti,
+            kd: kp * td,
+            filter,
+            integral_time: Some(ti),
+        })
+    }
+}
+
+/// The PIDs of all loops, or what is wrong with their number.
+pub(super) struct Loops(std::result::Result<Vec<Pid>, String>);
+
+impl Loops {
+    fn new(gains: [(&str, &LoopGain); 4], of: impl Fn([f64; 4]) -> Pid) -> Self {
+        let mut lists = gains.iter().filter_map(|(key, gain)| Some((*key, gain.loops()?)));
+        let Some((key, loops)) = lists.next() else {
+            return Loops(Ok(vec![of(gains.map(|(_, gain)| gain.of(0)))]));
+        };
+        let all = "give each gain a number, or a list with one for each loop";
+        if loops == 0 {
+            return Loops(Err(format!("[controller] {key} is an empty list; {all}")));
+        }
+        if let Some((other, count)) = lists.find(|(_, count)| *count != loops) {
+            return Loops(Err(format!(
+                "[controller] the list {key} has another length ({loops}) than {other} ({count}); {all}"
+            )));
+        }
+        Loops(Ok((0..loops).map(|k| of(gains.map(|(_, gain)| gain.of(k)))).collect()))
+    }
+
+    pub(super) fn problem(&self) -> Option<String> {
+        match &self.0 {
+            Ok(loops) => loops.iter().find_map(Pid::problem),
+            Err(problem) => Some(problem.clone()),
+        }
+    }
+
+    /// From the errors to the commands, input k following output k; what is wrong is refused before.
+    pub(super) fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
+        let loops = self.0.as_deref().unwrap_or_default();
+        let each: Vec<_> = loops.iter().map(|pid| pid.gains().system(time)).collect::<youla::Result<_>>()?;
+        Ok(diagonal(&each)?)
     }
 }
 
@@ -104,11 +188,6 @@ impl Pid {
              z = -1); state derivative_filter, or discretisation = \"backward-euler\""
                 .into()
         })
-    }
-
-    /// From the error to the command, with a state for each part that is there.
-    pub(super) fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
-        Ok(self.gains().system(time)?)
     }
 
     pub(super) fn gains(&self) -> PidGains {

@@ -6,17 +6,17 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use youla_loop::redesign::structured::{Band, FigureBand, LEVEL, PidController, PidOptions, PidRedesign, PlannedStep};
 
-/// A new PID with its proof.
+/// A new PID, or one for each loop, with its proof.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct PidEntry {
-    /// The new gains, negative feedback, parallel form.
-    pub controller: PidController,
-    /// Those of the running controller; `null` where it is no such PID.
-    pub running: Option<PidController>,
+    /// The new gains, negative feedback, parallel form; of several loops that of input k, which acts on output k.
+    pub controllers: Vec<PidController>,
+    /// Those of the running controller; `null` where a loop has no such PID.
+    pub running: Option<Vec<PidController>>,
     /// Parts and limits that were asked for.
     pub asked: PidOptions,
-    /// How much better slow loads are rejected than by the running controller.
-    pub rejection: Option<f64>,
+    /// How much better slow loads are rejected than by the running controller, in each loop.
+    pub rejections: Vec<Option<f64>>,
     /// The proof on models that the search has not seen.
     pub proof: ProofEntry,
     /// Figures with their limits and bands.
@@ -50,9 +50,12 @@ pub struct ProofEntry {
     pub at_most: f64,
 }
 
-/// A figure of the loop with lower end, median and upper end of its band.
+/// A figure of a loop with lower end, median and upper end of its band.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct FigureEntry {
+    /// The loop, counted from 1 in the order of the channels.
+    #[serde(rename = "loop")]
+    pub place: usize,
     /// Key of its limit, or `bandwidth`.
     pub name: String,
     /// Unit.
@@ -70,11 +73,11 @@ pub struct FigureEntry {
 pub struct StepEntry {
     /// `running`, `half` or `new`.
     pub name: String,
-    /// Its gains, where it is a PID.
-    pub controller: Option<PidController>,
+    /// Its gains, where each loop has a PID.
+    pub controllers: Option<Vec<PidController>>,
     /// Models at which it is unstable.
     pub unstable: usize,
-    /// Peak of the sensitivity.
+    /// Peak of the sensitivity; of several loops, here and below, that of the worst.
     pub peak_sensitivity: [Option<f64>; 3],
     /// Phase margin, degrees.
     pub phase_margin: [Option<f64>; 3],
@@ -86,10 +89,10 @@ impl From<&PidRedesign> for PidEntry {
     fn from(new: &PidRedesign) -> Self {
         let proof = &new.proof;
         PidEntry {
-            controller: new.controller.clone(),
+            controllers: new.controllers.clone(),
             running: new.running_gains.clone(),
             asked: new.options.clone(),
-            rejection: finite(new.rejection),
+            rejections: new.rejections.iter().copied().map(finite).collect(),
             proof: ProofEntry {
                 holds: proof.holds(),
                 level: LEVEL,
@@ -110,8 +113,8 @@ impl From<&PidRedesign> for PidEntry {
 
 impl From<&FigureBand> for FigureEntry {
     fn from(of: &FigureBand) -> Self {
-        let (name, unit) = (of.name.into(), of.unit.into());
-        FigureEntry { name, unit, limit: of.limit, running: of.running.map(finite), new: of.new.map(finite) }
+        let (place, name, unit) = (of.channel + 1, of.name.into(), of.unit.into());
+        FigureEntry { place, name, unit, limit: of.limit, running: of.running.map(finite), new: of.new.map(finite) }
     }
 }
 
@@ -120,7 +123,7 @@ impl From<&PlannedStep> for StepEntry {
         let all = |band: Band| band.map(finite);
         StepEntry {
             name: step.name.into(),
-            controller: step.controller.clone(),
+            controllers: step.controllers.clone(),
             unstable: step.unstable,
             peak_sensitivity: all(step.peak_sensitivity),
             phase_margin: all(step.phase_margin),

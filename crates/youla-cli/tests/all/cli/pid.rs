@@ -6,14 +6,19 @@ use std::fmt::Write;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// `G = 0.02 / (z - pole)` under a PI, u = d + 2 e + 0.05 i.
-fn log(folder: &Path, pole: f64) {
+/// Uniform on -0.5 to 0.5.
+fn noise() -> impl FnMut() -> f64 {
     let mut state = 7u64;
-    let mut random = move || {
+    move || {
         // Knuth, MMIX.
         state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
         (state >> 11) as f64 / (1u64 << 53) as f64 - 0.5
-    };
+    }
+}
+
+/// `G = 0.02 / (z - pole)` under a PI, u = d + 2 e + 0.05 i.
+fn log(folder: &Path, pole: f64) {
+    let mut random = noise();
     let (mut x, mut i) = (0.0, 0.0);
     let mut text = "u,y,d\n".to_owned();
     for _ in 0..6000 {
@@ -51,8 +56,8 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
     assert_eq!(code, Some(0), "{stderr}");
     let pid = &json(&folder.join("run/summary.json"))["pid"];
     assert_eq!((&pid["proof"]["holds"], &pid["proof"]["unstable"]), (&Value::Bool(true), &Value::from(0)), "{pid}");
-    assert!((pid["running"]["ki"].as_f64().expect("recognised") - 5.0).abs() < 1e-6, "{pid}");
-    assert!(pid["rejection"].as_f64().expect("a number") > 1.5, "{pid}");
+    assert!((pid["running"][0]["ki"].as_f64().expect("recognised") - 5.0).abs() < 1e-6, "{pid}");
+    assert!(pid["rejections"][0].as_f64().expect("a number") > 1.5, "{pid}");
     let revert = json(&folder.join("run/8-redesign/revert.json"));
     assert_eq!(revert["method"], "running");
     let page = fs::read_to_string(folder.join("run/report.html")).expect("written");
@@ -69,7 +74,7 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
         assert!(of_c.contains(statement), "{statement}");
     }
     // The statements, evaluated, are the controller of new_controller.json.
-    let number = |name: &str| pid["controller"][name].as_f64().expect("a number");
+    let number = |name: &str| pid["controllers"][0][name].as_f64().expect("a number");
     let k = json(&folder.join("run/8-redesign/new_controller.json"));
     let matrix = |name: &str| k[name][0][0].as_f64().expect("a number");
     let (mut i, mut x) = (0.0, 0.0);
@@ -97,6 +102,63 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
         assert_eq!(done.code, Some(0), "{}", done.stderr);
         assert!(lines.iter().all(|line| read(form).contains(line)), "{}", read(form));
     }
+}
+
+/// Two tanks, a third of whose flows cross, each under a PI whose gains stand in lists: each loop gets its own gains, figures and files.
+#[test]
+fn each_loop_of_a_machine_gets_a_pid() {
+    let folder = empty_folder("pid-loops");
+    two_tanks(&folder);
+    let settings = "name = \"tanks\"\n[data]\nsample_time = 0.01\ninputs = [{ name = \"u1\" }, { name = \"u2\" }]\noutputs = [{ name = \"y1\" }, { name = \"y2\" }]\n\
+         input_excitation = [{ name = \"d1\" }, { name = \"d2\" }]\nestimation = [{ file = \"log.csv\", take = 4000 }]\n\
+         verification = [{ file = \"log.csv\", skip = 4000, name = \"rest\" }]\n\
+         [controller.pid]\nfeedback = \"negative\"\ndiscretisation = \"backward-euler\"\nkp = 2.0\nki = [5.0, 3.0]\n\
+         [redesign]\nstructure = \"pid\"\n[redesign.pid]\nterms = \"pi\"\n";
+    fs::write(folder.join("run.toml"), settings).expect("written");
+    let done = youla(&folder, &["identify", "run.toml", "--out", "run", "--quiet"]);
+    assert_eq!(done.code, Some(0), "{}", done.stderr);
+    let pid = &json(&folder.join("run/summary.json"))["pid"];
+    assert_eq!((&pid["proof"]["holds"], &pid["proof"]["unstable"]), (&Value::Bool(true), &Value::from(0)), "{pid}");
+    for (k, ki) in [5.0, 3.0].into_iter().enumerate() {
+        assert!((pid["running"][k]["ki"].as_f64().expect("recognised") - ki).abs() < 1e-6, "{pid}");
+        assert!(pid["rejections"][k].as_f64().expect("a number") > 1.5, "{pid}");
+    }
+    let of: Vec<_> = pid["figures"].as_array().expect("a list").iter().map(|f| f["loop"].as_u64()).collect();
+    assert_eq!((of.len(), of[0], of[of.len() - 1]), (12, Some(1), Some(2)));
+    let page = fs::read_to_string(folder.join("run/report.html")).expect("written");
+    assert!(page.contains("loop 2: phase margin") && page.contains("Step of the reference, loop 2"));
+    let export = |more: &[&str]| youla(&folder, &[&["export", "run", "--to", "c-pid"], more].concat());
+    let unnamed = export(&[]);
+    assert!(unnamed.code == Some(2) && unnamed.stderr.contains("add --loop 1 to 2"), "{}", unnamed.stderr);
+    assert!(export(&["--loop", "3"]).stderr.contains("--loop is 3, but must be from 1 to 2"));
+    assert_eq!(export(&["--loop", "2"]).code, Some(0));
+    let header = fs::read_to_string(folder.join("pid_2.h")).expect("written");
+    fs::write(folder.join("run.toml"), settings.replace("kp = 2.0", "kp = [2.0]")).expect("written");
+    let unequal = youla(&folder, &["identify", "run.toml", "--out", "unequal", "--quiet"]);
+    assert!(
+        unequal.code == Some(2)
+            && unequal.stderr.contains("the list kp has another length (1) than ki (2); give each gain a number"),
+        "{}",
+        unequal.stderr
+    );
+    assert!(header.contains("PID from y2 to u2") && header.contains("pid_2_step(pid_2_state *s"), "{header}");
+}
+
+fn two_tanks(folder: &Path) {
+    let mut random = noise();
+    let (mut x, mut i) = ([0.0; 2], [0.0; 2]);
+    let mut text = "u1,u2,y1,y2,d1,d2\n".to_owned();
+    for _ in 0..6000 {
+        let y = [0, 1].map(|k| x[k] + 0.02 * random());
+        let d = [0, 1].map(|_| 2.0 * random());
+        let u = [0, 1].map(|k| {
+            i[k] -= [0.05, 0.03][k] * y[k];
+            d[k] - 2.0 * y[k] + i[k]
+        });
+        x = [0, 1].map(|k| [0.98, 0.95][k] * x[k] + [0.02, 0.04][k] * (u[k] + 0.3 * u[1 - k]));
+        writeln!(text, "{},{},{},{},{},{}", u[0], u[1], y[0], y[1], d[0], d[1]).expect("a string");
+    }
+    fs::write(folder.join("log.csv"), text).expect("written");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-//! Margins of a loop on a grid of frequencies, with `L = G C` (negative feedback) at each line:
+//! Margins of a loop on a grid of frequencies, with `L = g C` (negative feedback) at each line, g being the plant of the channel while the
+//! others are closed ([`Loops`]):
 //!
 //! ```text
 //! peak sensitivity    max 1 / |1 + L|
@@ -11,17 +12,19 @@
 //! loop of the same plant is zero (principle of the argument, both in powers of `z^-1`; the polynomial of the plant cancels),
 //!
 //! ```text
-//! R = (D + G N) / (D_r + G N_r),        C = N / D,  C_r = N_r / D_r the running controller
+//! R = det(D + G N) / det(D_r + G N_r),        C = N / D,  C_r = N_r / D_r the running controllers, diagonal
 //! ```
 //!
 //! Between lines L is taken as straight; `margins_equal_the_exact_ones` holds the figures against [`youla::control::margins()`].
 
+use super::loops::Loops;
 use super::options::PidOptions;
 use super::scenarios::{Grid, Scenario};
 use std::f64::consts::{PI, TAU};
 use youla::c64;
 
-/// A controller on the grid: numerators, denominators and their quotients.
+/// The controller of a channel on the grid: numerators, denominators and their quotients.
+#[derive(Clone)]
 pub(super) struct OnGrid {
     pub(super) numerator: Vec<c64>,
     pub(super) denominator: Vec<c64>,
@@ -60,6 +63,18 @@ impl GridMargins {
         bandwidth: 0.0,
     };
 
+    /// Of several loops, the worst of each figure.
+    pub(super) fn worst(of: &[GridMargins]) -> GridMargins {
+        of.iter().fold(GridMargins { bandwidth: f64::INFINITY, ..Self::NONE }, |a, b| GridMargins {
+            peak_sensitivity: a.peak_sensitivity.max(b.peak_sensitivity),
+            gain: a.gain.min(b.gain),
+            phase: a.phase.min(b.phase),
+            delay: a.delay.min(b.delay),
+            effort: a.effort.max(b.effort),
+            bandwidth: a.bandwidth.min(b.bandwidth),
+        })
+    }
+
     /// By how much each limit is missed, as the logarithm of the quotient of figure and limit: at most 0 where it holds. `running` is the
     /// effort of the running controller on the same plant.
     pub(super) fn excess(&self, limits: &PidOptions, running: f64) -> [f64; 5] {
@@ -75,35 +90,64 @@ impl GridMargins {
     }
 }
 
-/// Margins of a plant under a controller; `None` where the loop is unstable.
-pub(super) fn margins(grid: &Grid, plant: &Scenario, c: &OnGrid) -> Option<GridMargins> {
-    let mut found = GridMargins::NONE;
-    let (mut winding, mut first, mut before) = (0.0, c64::ONE, (c64::ZERO, c64::ONE, 0.0));
-    let (mut least, mut rejects) = (f64::INFINITY, true);
-    for k in 0..grid.omega.len() {
-        let g = plant.response[k];
-        let l = g * c.response[k];
-        let distance = (l + 1.0).norm_sqr();
-        let turned = (c.denominator[k] + g * c.numerator[k]) * plant.reference[k];
-        least = least.min(if k == 0 { distance } else { nearest(before.0, l, distance) });
-        found.effort += grid.weights[k] * c.response[k].norm_sqr() / distance;
-        if k == 0 {
-            first = turned;
-        } else {
-            winding += half_turn(before.1, turned);
-            crossings(&mut found, (before.0, l), (grid.omega[k - 1], grid.omega[k]));
-        }
-        if rejects && distance < 2.0 {
-            rejects = false;
-            found.bandwidth = if k == 0 { 0.0 } else { below_3_db(grid, k, before.2, distance) };
-        }
-        before = (l, turned, distance);
+/// Margins of each loop of a plant under a controller for each channel; `None` where the whole is unstable.
+pub(super) fn margins(grid: &Grid, plant: &Scenario, on: &[OnGrid]) -> Option<Vec<GridMargins>> {
+    let mut of: Vec<Walk> = on.iter().map(|_| Walk::new()).collect();
+    let mut loops = Loops::new(on.len());
+    let start = grid.omega.len();
+    let first = loops.at(plant.at(start), on, start) * plant.reference[start];
+    let (mut winding, mut before) = (0.0, first);
+    for k in 0..start {
+        let turned = loops.at(plant.at(k), on, k) * plant.reference[k];
+        winding += half_turn(before, turned);
+        before = turned;
+        of.iter_mut().zip(&loops.plants).zip(on).for_each(|((walk, g), c)| walk.line(grid, k, *g, c.response[k]));
     }
-    ends(&mut found, plant.response[0] * c.response[0], before.0);
-    found.peak_sensitivity = 1.0 / least.sqrt();
-    found.effort = found.effort.sqrt();
-    let turn = before.1.arg() - first.arg() + TAU * winding;
-    (turn.abs() < 0.5 * PI && least > 0.0 && found.effort.is_finite()).then_some(found)
+    let turn = before.arg() - first.arg() + TAU * winding;
+    let found: Vec<GridMargins> = of.into_iter().map_while(Walk::ended).collect();
+    (turn.abs() < 0.5 * PI && found.len() == on.len()).then_some(found)
+}
+
+/// The margins of one loop from line to line.
+struct Walk {
+    found: GridMargins,
+    /// L at the first line and at the last one.
+    ends: [c64; 2],
+    /// `|1 + L|^2` at the last line, and the least between lines.
+    distance: f64,
+    least: f64,
+    /// Whether the sensitivity is below -3 dB up to here.
+    rejects: bool,
+}
+
+impl Walk {
+    fn new() -> Self {
+        Walk { found: GridMargins::NONE, ends: [c64::ZERO; 2], distance: 0.0, least: f64::INFINITY, rejects: true }
+    }
+
+    fn line(&mut self, grid: &Grid, k: usize, g: c64, c: c64) {
+        let (l, before) = (g * c, self.ends[1]);
+        let distance = (l + 1.0).norm_sqr();
+        self.least = self.least.min(if k == 0 { distance } else { nearest(before, l, distance) });
+        self.found.effort += grid.weights[k] * c.norm_sqr() / distance;
+        if k == 0 {
+            self.ends[0] = l;
+        } else {
+            crossings(&mut self.found, (before, l), (grid.omega[k - 1], grid.omega[k]));
+        }
+        if self.rejects && distance < 2.0 {
+            self.rejects = false;
+            self.found.bandwidth = if k == 0 { 0.0 } else { below_3_db(grid, k, self.distance, distance) };
+        }
+        (self.ends[1], self.distance) = (l, distance);
+    }
+
+    fn ended(mut self) -> Option<GridMargins> {
+        ends(&mut self.found, self.ends);
+        self.found.peak_sensitivity = 1.0 / self.least.sqrt();
+        self.found.effort = self.found.effort.sqrt();
+        (self.least > 0.0 && self.found.effort.is_finite()).then_some(self.found)
+    }
 }
 
 /// Square of the least distance from -1 to the straight line between two points, the second of which has the square `end`.
@@ -153,7 +197,7 @@ fn factor(real: f64) -> f64 {
 }
 
 /// L is real at both ends of all frequencies: at Nyquist, which is a line, and at zero, unless it grows without bound.
-fn ends(found: &mut GridMargins, first: c64, last: c64) {
+fn ends(found: &mut GridMargins, [first, last]: [c64; 2]) {
     for end in [first, last] {
         if end.im.abs() < REAL * end.re.abs() {
             found.gain = found.gain.min(factor(end.re));

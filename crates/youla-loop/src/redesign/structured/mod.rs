@@ -1,8 +1,8 @@
-//! Redesign in a fixed structure: the gains of a PID with notches, as the machine computes it.
+//! Redesign in a fixed structure: the gains of a PID with notches, as the machine computes it, or of one for each loop of a square machine.
 //!
 //! ```text
-//! maximise    ki, or kp without an integral part      such that at every plant drawn from the whole region
-//!             the loop is stable, and peak sensitivity, gain, phase and delay margin and command effort keep their limits
+//! maximise    ki, or kp without an integral part      (of several loops the product) such that at every plant drawn from the whole region
+//!             the whole is stable, and in each loop, the others being closed, peak sensitivity, gain, phase and delay margin and command effort keep their limits
 //! ```
 //!
 //! The objective is the rejection of slow loads (K. J. Åström, H. Panagopoulos, T. Hägglund, Design of PI controllers based on non-convex
@@ -10,7 +10,9 @@
 //! integral of y is `load / ki`. A bandwidth has no use for an integral part where the plant has one of its own, and
 //! would give it up. What the search found is proved on draws that it has not seen.
 
+mod channels;
 mod evolution;
+mod loops;
 mod margins;
 mod options;
 mod pid;
@@ -25,15 +27,18 @@ mod tests;
 
 pub use margins::GridMargins;
 pub use options::{PidOptions, PidTerms, Structure};
-pub use pid::{Discretisation, Notch, PidController, PidGains};
+pub use pid::{Discretisation, Notch, PidController, PidGains, diagonal};
 pub use plan::PlannedStep;
 pub use proof::{Band, FigureBand, LEVEL, PidProof};
 
 use crate::error::{Error, Result};
+use channels::{couples, each};
+use margins::OnGrid;
+use pid::whole;
 use plan::plan;
 use proof::prove;
 use recognise::recognise;
-use scenarios::{Grid, Scenario, Scenarios};
+use scenarios::{Grid, Running, Scenario, Scenarios};
 use search::Search;
 use space::Space;
 use youla::control::{closed_loop, with_input_port};
@@ -52,21 +57,21 @@ pub struct PidProblem<'a> {
     pub delay: usize,
 }
 
-/// A PID with its proof.
+/// A PID, or one for each loop, with its proof.
 #[derive(Debug, Clone)]
 pub struct PidRedesign {
-    /// The new controller, negative feedback.
-    pub controller: PidController,
+    /// The new controllers, negative feedback: that of input k acts on output k.
+    pub controllers: Vec<PidController>,
     /// The same as `u = K y`, positive feedback.
     pub system: StateSpace<Discrete>,
     /// What was designed, within which limits.
     pub options: PidOptions,
     /// The running controller.
     pub running: StateSpace<Discrete>,
-    /// Its gains, where it is a PID.
-    pub running_gains: Option<PidController>,
-    /// How much better slow loads are rejected: the quotient of the gains of the new and the running controller at the lowest line.
-    pub rejection: f64,
+    /// Its gains, where each loop has a PID.
+    pub running_gains: Option<Vec<PidController>>,
+    /// How much better slow loads are rejected in each loop: the quotient of the gains of the new and the running controller at the lowest line.
+    pub rejections: Vec<f64>,
     /// The proof on fresh draws; of several operating points that of the worst one.
     pub proof: PidProof,
     /// The way to the new controller.
@@ -84,28 +89,32 @@ impl PidRedesign {
                 p.models, p.unstable, p.missed
             ));
         }
-        if self.rejection < 1.0 && p.running_holds() {
+        if self.rejection() < 1.0 && p.running_holds() {
             reasons.push(format!(
                 "it rejects slow loads {:.2} times as well as the running controller, which keeps the limits itself",
-                self.rejection
+                self.rejection()
             ));
         }
         reasons
     }
+
+    /// That of the loop in which slow loads gain least.
+    pub fn rejection(&self) -> f64 {
+        self.rejections.iter().copied().fold(f64::INFINITY, f64::min)
+    }
 }
 
-/// Designs a PID on an identified model with one input and one output.
+/// Designs a PID for each loop of an identified machine with as many outputs as inputs.
 ///
 /// # Errors
 /// [`Error::NoPid`] with the limit that stops it; [`youla::Error::OutOfRange`] for options outside of their range;
-/// [`youla::Error::Unsupported`] for more than one channel; [`youla::Error::NotStabilising`] where the running controller does not
-/// stabilise the plant.
+/// [`youla::Error::Unsupported`] for a machine that is not square or whose running controller couples its loops;
+/// [`youla::Error::NotStabilising`] where the running controller does not stabilise the plant.
 pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOptions) -> Result<PidRedesign> {
     options.check()?;
     let PidProblem { points, running, delay } = problem;
     let (running, delay) = (*running, *delay);
-    if points.iter().any(|(plant, _)| plant.inputs() != 1 || plant.outputs() != 1) {
-        let what = "a PID for a machine of several inputs or outputs";
+    if let Some(what) = unsupported(problem)? {
         let instead = "leave `structure` out: method = \"lqg\" and \"youla\" design for any number";
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
@@ -120,14 +129,16 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         resonant.extend([(*plant).clone(), closed_loop(plant, &with_input_port(running)?)?]);
     }
     let grid = Grid::new(running.time(), &resonant.iter().collect::<Vec<_>>())?;
-    let on = grid.any(running)?;
+    let loops = each(running)?;
+    let on = grid.each(&loops)?;
+    let ran = Running { system: running, on: &on };
     let estimates: Option<Vec<Scenario>> =
-        points.iter().map(|(plant, _)| Scenario::new(&grid, (*plant).clone(), (running, &on), |_| {})).collect();
+        points.iter().map(|(plant, _)| Scenario::new(&grid, (*plant).clone(), ran, |_| {})).collect();
     let missing = || Error::NoPid { reason: "the running controller has no margins on the model".into() };
     let mut estimates = estimates.filter(|found| !found.is_empty()).ok_or_else(missing)?.into_iter();
     let estimate = estimates.next().ok_or_else(missing)?;
     let draws = |seed: u64| {
-        let of = |(_, region): &(_, &Region)| Scenarios::new(&grid, region, running, (band.draws, seed));
+        let of = |(_, region): &(_, &Region)| Scenarios::new(&grid, region, ran, (band.draws, seed));
         points.iter().map(of).collect::<Result<Vec<_>>>()
     };
     // The plants of all points are one set, in which the search asks for the worst; the estimates of the other points are among them.
@@ -136,28 +147,44 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         Some(rule) => vec![rule],
         None => vec![Discretisation::BackwardEuler, Discretisation::Tustin],
     };
-    let running_gains = recognise(&grid, running, &rules, delay)?;
-    let discretisation = running_gains.as_ref().map_or(rules[0], |c| c.gains.discretisation);
-    let c = on.response[0];
-    // Of a gain, of an integral (phase -90 degrees) and of what lies between.
-    let sign = if c.re - c.im >= 0.0 { 1.0 } else { -1.0 };
-    let space = Space { options, discretisation, delay, sign, ts: grid.ts };
-    let search = Search { space, grid: &grid, estimate: &estimate, drawn: &drawn, running: running_gains.as_ref() };
-    let controller = search.run()?;
-    let system = controller.system(running.time())?;
+    let known = loops.iter().map(|k| recognise(&grid, k, &rules, delay)).collect::<Result<Vec<_>>>()?;
+    let space = |(known, c): (&Option<PidController>, &OnGrid)| {
+        let discretisation = known.as_ref().map_or(rules[0], |c| c.gains.discretisation);
+        // Of a gain, of an integral (phase -90 degrees) and of what lies between.
+        let sign = if c.response[0].re - c.response[0].im >= 0.0 { 1.0 } else { -1.0 };
+        Space { options, discretisation, delay, sign, ts: grid.ts }
+    };
+    let spaces = known.iter().zip(&on).map(space).collect();
+    let search =
+        Search { spaces, grid: &grid, estimate: &estimate, drawn: &drawn, running: ran, running_gains: &known };
+    let controllers = search.run()?;
+    let system = whole(&controllers, running.time())?;
+    let new = grid.each(&each(&system)?)?;
     let fresh = draws(band.seed.wrapping_add(1))?;
-    let proofs = fresh.iter().map(|fresh| prove(&grid, fresh, (running, &system), options));
+    let proofs = fresh.iter().map(|fresh| prove(&grid, fresh, &on, (&system, &new), options));
     let worse = |a: &PidProof, b: &PidProof| a.unstable.cmp(&b.unstable).then(a.at_most.total_cmp(&b.at_most));
     let proof = proofs.collect::<Result<Vec<_>>>()?.into_iter().max_by(worse).ok_or_else(missing)?;
     let fresh = Scenarios::joined(fresh, std::iter::empty());
+    let running_gains: Option<Vec<PidController>> = known.into_iter().collect();
+    let size = |c: &PidController| grid.controller(c).response[0].norm();
     Ok(PidRedesign {
-        rejection: grid.controller(&controller).response[0].norm() / c.norm(),
+        rejections: controllers.iter().zip(&on).map(|(new, ran)| size(new) / ran.response[0].norm()).collect(),
         proof,
-        steps: plan(&grid, &fresh, (running, running_gains.as_ref()), (&system, &controller))?,
+        steps: plan(&grid, &fresh, (running, running_gains.as_deref()), (&system, &controllers))?,
         running: running.clone(),
         running_gains,
         options: options.clone(),
-        controller,
+        controllers,
         system,
     })
+}
+
+/// What no PID is designed for.
+fn unsupported(problem: &PidProblem<'_>) -> Result<Option<&'static str>> {
+    let sizes = |(plant, _): &(&StateSpace<Discrete>, &Region)| plant.inputs() != plant.outputs();
+    if problem.points.iter().any(sizes) {
+        return Ok(Some("a PID for each loop of a machine with more inputs than outputs, or fewer"));
+    }
+    let what = "a PID for each loop where the running controller leads an output to the input of another loop";
+    Ok(couples(problem.running)?.then_some(what))
 }

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Structure {
-    /// P, PI, PD or PID with a filtered derivative and notches, one input and one output.
+    /// P, PI, PD or PID with a filtered derivative and notches, one for each loop of a machine with as many outputs as inputs.
     Pid,
 }
 

@@ -18,8 +18,9 @@
 
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
+use youla::linalg::block_diagonal;
 use youla::lti::{Discrete, StateSpace};
-use youla::{Mat, Result, c64};
+use youla::{Mat, MatRef, Result, c64};
 
 /// How the integral and the derivative part of a PID are programmed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, schemars::JsonSchema)]
@@ -76,6 +77,25 @@ impl PidGains {
         }
         Ok(sum)
     }
+}
+
+/// The controllers of all channels as one, `u = K y`, positive feedback.
+pub(super) fn whole(of: &[PidController], time: Discrete) -> Result<StateSpace<Discrete>> {
+    diagonal(&of.iter().map(|c| c.system(time)).collect::<Result<Vec<_>>>()?)
+}
+
+/// Systems of one sample time side by side, each from its inputs to its outputs.
+///
+/// # Errors
+/// Those of [`StateSpace::new`].
+///
+/// # Panics
+/// When there is none.
+pub fn diagonal(of: &[StateSpace<Discrete>]) -> Result<StateSpace<Discrete>> {
+    let join = |pick: fn(&StateSpace<Discrete>) -> MatRef<'_, f64>| {
+        of.iter().fold(Mat::zeros(0, 0), |sum: Mat<f64>, s| block_diagonal(sum.as_ref(), pick(s)))
+    };
+    StateSpace::new(join(|s| s.a()), join(|s| s.b()), join(|s| s.c()), join(|s| s.d()), of[0].time())
 }
 
 /// A notch behind a PID.

@@ -1,8 +1,10 @@
 //! The way from the running controller to a new one: the running gains, half way, the new gains, each with its margins and its
 //! response to a step of the reference over fresh draws.
 
+use super::channels::each;
 use super::margins::GridMargins;
-use super::pid::{Notch, PidController, PidGains};
+use super::margins::OnGrid;
+use super::pid::{Notch, PidController, PidGains, whole};
 use super::proof::{Band, band};
 use super::scenarios::{Grid, Scenario, Scenarios};
 use crate::error::Result;
@@ -26,22 +28,22 @@ const LONGEST: usize = 20_000;
 pub struct PlannedStep {
     /// `running`, `half` or `new`.
     pub name: &'static str,
-    /// Its gains, where it is a PID.
-    pub controller: Option<PidController>,
+    /// The gains of each loop, where all are PIDs.
+    pub controllers: Option<Vec<PidController>>,
     /// `u = K y`, positive feedback.
     pub system: StateSpace<Discrete>,
     /// Models at which its loop is unstable.
     pub unstable: usize,
-    /// Peak of the sensitivity over the models at which it is stable.
+    /// Peak of the sensitivity over the models at which it is stable; of several loops, here and below, that of the worst.
     pub peak_sensitivity: Band,
     /// Phase margin, degrees.
     pub phase_margin: Band,
     /// Bandwidth, Hz.
     pub bandwidth: Band,
-    /// Instants of the response to a unit step of the reference, seconds.
+    /// Instants of the responses to a unit step of the reference, seconds.
     pub seconds: Vec<f64>,
-    /// y at these.
-    pub response: Vec<Band>,
+    /// y of each loop at these, after a step of its own reference.
+    pub responses: Vec<Vec<Band>>,
 }
 
 /// The steps, the running controller first; between the two the mean of their gains or, where the running
@@ -49,57 +51,65 @@ pub struct PlannedStep {
 pub(super) fn plan(
     grid: &Grid,
     fresh: &Scenarios,
-    (running, of_running): (&StateSpace<Discrete>, Option<&PidController>),
-    (new, of_new): (&StateSpace<Discrete>, &PidController),
+    (running, of_running): (&StateSpace<Discrete>, Option<&[PidController]>),
+    (new, of_new): (&StateSpace<Discrete>, &[PidController]),
 ) -> Result<Vec<PlannedStep>> {
-    let half = of_running.map(|c| mean(c, of_new));
+    let half = of_running.map(|of| of.iter().zip(of_new).map(|(a, b)| mean(a, b)).collect::<Vec<_>>());
     let between = match &half {
-        Some(c) => c.system(new.time())?,
-        None => running.plus(new)?.map_output(&(faer::Scale(0.5) * eye(1))),
+        Some(of) => whole(of, new.time())?,
+        None => running.plus(new)?.map_output(&(faer::Scale(0.5) * eye(of_new.len()))),
     };
-    let slowest = fresh.judge(grid, &grid.any(new)?).into_iter().flatten().map(|m| m.bandwidth).collect();
+    let on = grid.each(&each(new)?)?;
+    let slowest = fresh.judge(grid, &on).into_iter().flatten().map(|of| GridMargins::worst(&of).bandwidth).collect();
     let length = LENGTH / (TAU * band(slowest)[1].max(1e-12) * grid.ts);
     let samples = (length as usize).clamp(INSTANTS, LONGEST);
-    let steps =
-        [("running", of_running.cloned(), running), ("half", half, &between), ("new", Some(of_new.clone()), new)]
-            .map(|(name, controller, system)| step(grid, fresh, (name, controller, system), samples))
-            .into_iter()
-            .collect::<Result<Vec<_>>>()?;
+    let steps = [
+        ("running", of_running.map(<[_]>::to_vec), running),
+        ("half", half, &between),
+        ("new", Some(of_new.to_vec()), new),
+    ]
+    .map(|(name, controllers, system)| step(grid, fresh, (name, controllers, system), samples))
+    .into_iter()
+    .collect::<Result<Vec<_>>>()?;
     Ok(steps.into_iter().filter(|s| s.unstable == 0 || s.name != "half").collect())
 }
 
 fn step(
     grid: &Grid,
     fresh: &Scenarios,
-    (name, controller, system): (&'static str, Option<PidController>, &StateSpace<Discrete>),
+    (name, controllers, system): (&'static str, Option<Vec<PidController>>, &StateSpace<Discrete>),
     samples: usize,
 ) -> Result<PlannedStep> {
     let stable = fresh.stable(system)?;
-    let judged = fresh.judge(grid, &grid.any(system)?);
-    let found: Vec<&GridMargins> = judged.iter().zip(&stable).filter_map(|(m, s)| m.as_ref().filter(|_| *s)).collect();
-    let of = |pick: fn(&GridMargins) -> f64| band(found.iter().map(|m| pick(m)).collect());
+    let on: Vec<OnGrid> = grid.each(&each(system)?)?;
+    let judged = fresh.judge(grid, &on).into_iter().zip(&stable).filter_map(|(of, stable)| of.filter(|_| *stable));
+    let found: Vec<GridMargins> = judged.map(|of| GridMargins::worst(&of)).collect();
+    let of = |pick: fn(&GridMargins) -> f64| band(found.iter().map(pick).collect());
     let tested = fresh.plants.iter().zip(&stable).filter(|(_, stable)| **stable).take(DRAWS);
     let plants: Vec<&Scenario> = tested.map(|(plant, _)| plant).collect();
-    let responses: Vec<Vec<f64>> =
-        plants.par_iter().map(|p| response(&p.plant, system, samples)).collect::<Result<_>>()?;
     let every = samples.div_ceil(INSTANTS);
-    let at = |t: usize| band(responses.iter().map(|y| y[t]).collect());
+    let bands = |i: usize| -> Result<Vec<Band>> {
+        let of = |p: &&Scenario| response(&p.plant, system, i, samples);
+        let responses: Vec<Vec<f64>> = plants.par_iter().map(of).collect::<Result<_>>()?;
+        Ok((0..samples).step_by(every).map(|t| band(responses.iter().map(|y| y[t]).collect())).collect())
+    };
     Ok(PlannedStep {
         name,
-        controller,
+        controllers,
         system: system.clone(),
         unstable: stable.len() - found.len(),
         peak_sensitivity: of(|m| m.peak_sensitivity),
         phase_margin: of(|m| m.phase),
         bandwidth: of(|m| m.bandwidth),
         seconds: (0..samples).step_by(every).map(|t| t as f64 * grid.ts).collect(),
-        response: (0..samples).step_by(every).map(at).collect(),
+        responses: (0..on.len()).map(bands).collect::<Result<_>>()?,
     })
 }
 
-/// y after a unit step of the reference: the noise input of the loop is -r, its output y - r.
-fn response(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>, samples: usize) -> Result<Vec<f64>> {
-    let looped = closed_loop(plant, &with_input_port(k)?)?.part(1..2, 1..2);
+/// y of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r.
+fn response(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>, i: usize, samples: usize) -> Result<Vec<f64>> {
+    let port = plant.inputs() + i;
+    let looped = closed_loop(plant, &with_input_port(k)?)?.part(port..port + 1, port..port + 1);
     let start = vec![0.0; looped.order()];
     let y = simulate(&looped, Mat::from_fn(samples, 1, |_, _| -1.0).as_ref(), &start)?;
     Ok((0..samples).map(|t| 1.0 + y[(t, 0)]).collect())

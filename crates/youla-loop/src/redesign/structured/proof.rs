@@ -1,9 +1,10 @@
 //! The proof of a design on plants that the search has not seen, and the way from the running controller to it.
 
+use super::loops::Loops;
 use super::margins::{GridMargins, LIMITS, OnGrid};
 use super::options::PidOptions;
 use super::scenarios::{Grid, Scenario, Scenarios};
-use super::search::excesses;
+use super::search::{excesses, worst_excess};
 use crate::error::Result;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -17,9 +18,11 @@ pub const LEVEL: f64 = 0.95;
 /// A figure over the drawn plants: lower end, median and upper end of the band of [`LEVEL`].
 pub type Band = [f64; 3];
 
-/// A figure of the loop with the running and the new controller.
+/// A figure of a loop with the running and the new controller.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FigureBand {
+    /// The loop, counted from 0 in the order of the channels.
+    pub channel: usize,
     /// Key of its limit in run.toml, or `bandwidth`.
     pub name: &'static str,
     /// Unit; empty for a factor.
@@ -54,8 +57,8 @@ pub struct PidProof {
     pub figures: Vec<FigureBand>,
     /// Frequencies of the sensitivities, Hz.
     pub hz: Vec<f64>,
-    /// Magnitude of the sensitivity with the running and with the new controller.
-    pub sensitivities: [Vec<Band>; 2],
+    /// Magnitude of the sensitivity of each loop with the running and with the new controller.
+    pub sensitivities: Vec<[Vec<Band>; 2]>,
 }
 
 impl PidProof {
@@ -73,18 +76,19 @@ impl PidProof {
 pub(super) fn prove(
     grid: &Grid,
     fresh: &Scenarios,
-    (running, new): (&StateSpace<Discrete>, &StateSpace<Discrete>),
+    before: &[OnGrid],
+    (new, after): (&StateSpace<Discrete>, &[OnGrid]),
     limits: &PidOptions,
 ) -> Result<PidProof> {
-    let (before, after) = (grid.any(running)?, grid.any(new)?);
-    let excesses = excesses(grid, fresh, (new, &after), limits)?;
+    let excesses = excesses(grid, fresh, (new, after), limits)?;
     let models = excesses.len();
     let unstable = excesses.iter().filter(|e| e.is_none()).count();
     let beyond = |e: &&[f64; 5]| e.iter().any(|e| *e > TOLERANCE);
     let missed = excesses.iter().flatten().filter(beyond).count();
     let of_limit = |k: usize| (LIMITS[k], excesses.iter().flatten().filter(|e| e[k] > TOLERANCE).count());
-    let now: Vec<GridMargins> = fresh.plants.iter().map(|p| p.running).collect();
-    let then: Vec<GridMargins> = fresh.judge(grid, &after).into_iter().flatten().collect();
+    let now: Vec<&[GridMargins]> = fresh.plants.iter().map(|p| &p.running[..]).collect();
+    let then: Vec<Vec<GridMargins>> = fresh.judge(grid, after).into_iter().flatten().collect();
+    let then: Vec<&[GridMargins]> = then.iter().map(|of| &of[..]).collect();
     Ok(PidProof {
         models,
         impossible: fresh.impossible,
@@ -93,14 +97,16 @@ pub(super) fn prove(
         running_missed: now_missed(fresh, limits),
         misses: (0..LIMITS.len()).map(of_limit).collect(),
         at_most: at_most(unstable + missed, models),
-        figures: figures(&now, &then, limits),
+        figures: (0..after.len()).flat_map(|channel| figures(channel, &now, &then, limits)).collect(),
         hz: grid.omega.iter().map(|w| w / TAU).collect(),
-        sensitivities: [&before, &after].map(|c| sensitivity(fresh, c)),
+        sensitivities: (0..after.len())
+            .map(|i| [before, after].map(|on| sensitivity(fresh, on, i, grid.omega.len())))
+            .collect(),
     })
 }
 
 fn now_missed(fresh: &Scenarios, limits: &PidOptions) -> usize {
-    let misses = |p: &&Scenario| p.running.excess(limits, p.running.effort).iter().any(|e| *e > TOLERANCE);
+    let misses = |p: &&Scenario| worst_excess(&p.running, p, limits).iter().any(|e| *e > TOLERANCE);
     fresh.plants.iter().filter(misses).count()
 }
 
@@ -116,13 +122,10 @@ pub(super) fn band(mut values: Vec<f64>) -> Band {
     }
 }
 
-fn figures(now: &[GridMargins], then: &[GridMargins], limits: &PidOptions) -> Vec<FigureBand> {
-    let of = |name, unit, limit, pick: fn(&GridMargins) -> f64| FigureBand {
-        name,
-        unit,
-        limit,
-        running: band(now.iter().map(pick).collect()),
-        new: band(then.iter().map(pick).collect()),
+fn figures(channel: usize, now: &[&[GridMargins]], then: &[&[GridMargins]], limits: &PidOptions) -> Vec<FigureBand> {
+    let of = |name, unit, limit, pick: fn(&GridMargins) -> f64| {
+        let over = |all: &[&[GridMargins]]| band(all.iter().map(|of| pick(&of[channel])).collect());
+        FigureBand { channel, name, unit, limit, running: over(now), new: over(then) }
     };
     let effort = limits.command_effort * of("", "", None, |m| m.effort).running[1];
     vec![
@@ -135,12 +138,16 @@ fn figures(now: &[GridMargins], then: &[GridMargins], limits: &PidOptions) -> Ve
     ]
 }
 
-fn sensitivity(fresh: &Scenarios, c: &OnGrid) -> Vec<Band> {
+fn sensitivity(fresh: &Scenarios, on: &[OnGrid], i: usize, lines: usize) -> Vec<Band> {
     let at = |k: usize| {
-        let size = |p: &Scenario| 1.0 / (c64::ONE + p.response[k] * c.response[k]).norm();
+        let mut loops = Loops::new(on.len());
+        let size = |p: &Scenario| {
+            loops.at(p.at(k), on, k);
+            1.0 / (c64::ONE + loops.plants[i] * on[i].response[k]).norm()
+        };
         band(fresh.plants.iter().map(size).collect())
     };
-    (0..c.response.len()).into_par_iter().map(at).collect()
+    (0..lines).into_par_iter().map(at).collect()
 }
 
 /// The probability for which `found` or fewer of `count` come with a chance of `1 - LEVEL`.

@@ -9,6 +9,7 @@
 //!
 //! The stability of the loop is exact by eigenvalues for the drawn parameters, and by the winding number with b x.
 
+use super::loops::Loops;
 use super::margins::{GridMargins, OnGrid, margins};
 use super::pid::PidController;
 use crate::error::Result;
@@ -27,6 +28,8 @@ use youla::lti::{Discrete, StateSpace, frequency_response};
 const LINES: [usize; 2] = [240, 120];
 /// The lowest line against the Nyquist frequency. Chosen, not measured.
 const LOWEST: f64 = 2e-4;
+/// Where the winding number starts, against the lowest line: the characteristic polynomials are real at 0 Hz, where a plant may have a pole.
+const START: f64 = 1e-3;
 /// Lines to either side of a resonance, a step being a share of its half width. Chosen, not measured.
 const AT_RESONANCE: [f64; 8] = [0.15, 0.5, 1.0, 1.6, 2.5, 4.0, 7.0, 12.0];
 /// Modes with more damping need no lines of their own. Chosen, not measured.
@@ -39,9 +42,11 @@ const STREAM: u64 = 1 << 32;
 /// Frequencies of the judgement.
 pub(super) struct Grid {
     pub(super) ts: f64,
-    /// Up to the Nyquist frequency, rad/s.
+    /// Lines up to the Nyquist frequency, rad/s.
     pub(super) omega: Vec<f64>,
-    /// `z^-1` at each.
+    /// The lines, and behind them the frequency at which the winding number starts.
+    every: Vec<f64>,
+    /// `z^-1` at each of the last.
     pub(super) q: Vec<c64>,
     /// Weights of the mean over all frequencies.
     pub(super) weights: Vec<f64>,
@@ -71,8 +76,9 @@ impl Grid {
                 0.5 * (at(k + 1) - below) / nyquist
             })
             .collect();
-        let q = omega.iter().map(|w| c64::cis(-w * ts)).collect();
-        Ok(Grid { ts, omega, q, weights })
+        let every: Vec<f64> = omega.iter().copied().chain([START * omega[0]]).collect();
+        let q = every.iter().map(|w| c64::cis(-w * ts)).collect();
+        Ok(Grid { ts, omega, every, q, weights })
     }
 
     pub(super) fn controller(&self, c: &PidController) -> OnGrid {
@@ -86,10 +92,14 @@ impl Grid {
         on
     }
 
-    /// Any controller `u = K y` as C = -K.
-    pub(super) fn any(&self, k: &StateSpace<Discrete>) -> Result<OnGrid> {
+    /// Any controller `u = K y` of a channel each as C = -K.
+    pub(super) fn each(&self, k: &[StateSpace<Discrete>]) -> Result<Vec<OnGrid>> {
+        k.iter().map(|k| self.any(k)).collect()
+    }
+
+    fn any(&self, k: &StateSpace<Discrete>) -> Result<OnGrid> {
         let poles = k.poles()?;
-        let response: Vec<c64> = frequency_response(k, &self.omega)?.entry(0, 0).iter().map(|k| -k).collect();
+        let response: Vec<c64> = frequency_response(k, &self.every)?.entry(0, 0).iter().map(|k| -k).collect();
         let denominator: Vec<c64> =
             self.q.iter().map(|q| poles.iter().fold(c64::ONE, |d, p| d * (c64::ONE - p * q))).collect();
         let numerator = response.iter().zip(&denominator).map(|(c, d)| c * d).collect();
@@ -100,11 +110,21 @@ impl Grid {
 /// A plant at which designs are judged.
 pub(super) struct Scenario {
     pub(super) plant: StateSpace<Discrete>,
-    pub(super) response: Vec<c64>,
+    /// The responses of all entries, row by row, line by line.
+    response: Vec<c64>,
+    /// Their number at a line.
+    entries: usize,
     /// The inverse of the characteristic polynomial of the running loop, up to that of the plant.
     pub(super) reference: Vec<c64>,
-    /// Under the running controller.
-    pub(super) running: GridMargins,
+    /// Of each loop under the running controller.
+    pub(super) running: Vec<GridMargins>,
+}
+
+/// The controller that ran, whole and for each channel on the grid.
+#[derive(Clone, Copy)]
+pub(super) struct Running<'a> {
+    pub(super) system: &'a StateSpace<Discrete>,
+    pub(super) on: &'a [OnGrid],
 }
 
 /// Draws of a region.
@@ -116,13 +136,7 @@ pub(super) struct Scenarios {
 
 impl Scenarios {
     /// `count` draws; a draw depends on the seed and its place only.
-    pub(super) fn new(
-        grid: &Grid,
-        region: &Region,
-        running: &StateSpace<Discrete>,
-        (count, seed): (usize, u64),
-    ) -> Result<Self> {
-        let c = grid.any(running)?;
+    pub(super) fn new(grid: &Grid, region: &Region, running: Running<'_>, (count, seed): (usize, u64)) -> Result<Self> {
         let beyond = beyond(grid, region);
         let draws = region.draws(count, seed);
         let found: Vec<Option<Scenario>> = draws
@@ -131,7 +145,7 @@ impl Scenarios {
             .map(|(place, Draw { plant, .. })| {
                 let mut rng = ChaCha8Rng::seed_from_u64(seed);
                 rng.set_stream(STREAM + place as u64);
-                Scenario::new(grid, plant, (running, &c), |g| disturb(g, grid, &beyond, &mut rng))
+                Scenario::new(grid, plant, running, |g| disturb(g, grid, &beyond, &mut rng))
             })
             .collect();
         let all = found.len();
@@ -145,9 +159,9 @@ impl Scenarios {
         Scenarios { plants: sets.into_iter().flat_map(|set| set.plants).chain(further).collect(), impossible }
     }
 
-    /// Margins at each; `None` where the loop is unstable.
-    pub(super) fn judge(&self, grid: &Grid, c: &OnGrid) -> Vec<Option<GridMargins>> {
-        self.plants.par_iter().map(|plant| margins(grid, plant, c)).collect()
+    /// Margins of each loop at each; `None` where the whole is unstable.
+    pub(super) fn judge(&self, grid: &Grid, on: &[OnGrid]) -> Vec<Option<Vec<GridMargins>>> {
+        self.plants.par_iter().map(|plant| margins(grid, plant, on)).collect()
     }
 
     /// Whether each loop is stable, by its poles.
@@ -163,46 +177,72 @@ impl Scenario {
     pub(super) fn new(
         grid: &Grid,
         plant: StateSpace<Discrete>,
-        (running, c): (&StateSpace<Discrete>, &OnGrid),
+        running: Running<'_>,
         disturb: impl FnOnce(&mut [c64]),
     ) -> Option<Self> {
-        let looped = closed_loop(&plant, &with_input_port(running).ok()?).ok()?;
+        let looped = closed_loop(&plant, &with_input_port(running.system).ok()?).ok()?;
         if !looped.is_stable().ok()? {
             return None;
         }
-        let mut response = frequency_response(&plant, &grid.omega).ok()?.entry(0, 0);
-        let characteristic = |response: &[c64]| -> Vec<c64> {
-            response.iter().enumerate().map(|(k, g)| c64::ONE / (c.denominator[k] + g * c.numerator[k])).collect()
+        let (on, m) = (running.on, running.on.len());
+        let entries = m * m;
+        let found = frequency_response(&plant, &grid.every).ok()?;
+        let response = found.iter().flat_map(|g| (0..entries).map(move |at| g[(at / m, at % m)])).collect();
+        let mut found = Scenario { plant, response, entries, reference: Vec::new(), running: Vec::new() };
+        let mut loops = Loops::new(m);
+        found.reference = (0..grid.every.len()).map(|k| c64::ONE / loops.at(found.at(k), on, k)).collect();
+        disturb(&mut found.response);
+        Some(Scenario { running: margins(grid, &found, on)?, ..found })
+    }
+
+    /// The responses of all entries at line k, row by row.
+    pub(super) fn at(&self, k: usize) -> &[c64] {
+        &self.response[self.entries * k..self.entries * (k + 1)]
+    }
+
+    /// The plant of one loop while the others are closed.
+    pub(super) fn of_loop(&self, on: &[OnGrid], i: usize) -> Vec<c64> {
+        let mut loops = Loops::new(on.len());
+        let at = |k: usize| {
+            loops.at(self.at(k), on, k);
+            loops.plants[i]
         };
-        let reference = characteristic(&response);
-        disturb(&mut response);
-        let found = Scenario { plant, response, reference, running: GridMargins::NONE };
-        Some(Scenario { running: margins(grid, &found, c)?, ..found })
+        (0..self.reference.len() - 1).map(at).collect()
     }
 }
 
-/// Root mean square of what the excitation shows beyond the parameters, at each line.
+/// Root mean square of what the excitation shows beyond the parameters, of each entry at each line.
 fn beyond(grid: &Grid, region: &Region) -> Vec<f64> {
-    let size = |k: usize| region.parts.variation[k][(0, 0)].hypot(region.parts.distortion[k][(0, 0)]);
+    let m = region.parts.variation[0].ncols();
+    let size = |k: usize, at: usize| {
+        let entry = (at / m, at % m);
+        region.parts.variation[k][entry].hypot(region.parts.distortion[k][entry])
+    };
     let at = |w: &f64| {
         let hz = w / TAU;
         let above = region.hz.partition_point(|f| *f < hz).clamp(1, region.hz.len() - 1);
         let (low, high) = (region.hz[above - 1], region.hz[above]);
         let share = ((hz - low) / (high - low)).clamp(0.0, 1.0);
-        (1.0 - share) * size(above - 1) + share * size(above)
+        (0..m * m).map(move |entry| (1.0 - share) * size(above - 1, entry) + share * size(above, entry))
     };
-    grid.omega.iter().map(at).collect()
+    grid.omega.iter().flat_map(at).collect()
 }
 
-/// Adds the error without a plant.
+/// Adds the error without a plant, independent from entry to entry.
 fn disturb(response: &mut [c64], grid: &Grid, beyond: &[f64], rng: &mut ChaCha8Rng) {
     let octaves = (grid.omega[grid.omega.len() - 1] / grid.omega[0]).log2();
     let half = 0.5f64.sqrt();
     let mut normal = || half * rng.sample::<f64, _>(StandardNormal);
-    let knots: Vec<c64> = (0..(KNOTS * octaves) as usize + 2).map(|_| c64::new(normal(), normal())).collect();
-    for (k, g) in response.iter_mut().enumerate() {
-        let place = KNOTS * (grid.omega[k] / grid.omega[0]).log2();
-        let (knot, share) = (place as usize, place.fract());
-        *g += (knots[knot] * (1.0 - share).sqrt() + knots[knot + 1] * share.sqrt()) * beyond[k];
+    let (lines, entries) = (grid.omega.len(), response.len() / grid.every.len());
+    for entry in 0..entries {
+        let knots: Vec<c64> = (0..(KNOTS * octaves) as usize + 2).map(|_| c64::new(normal(), normal())).collect();
+        for (k, w) in grid.omega.iter().enumerate() {
+            let place = KNOTS * (w / grid.omega[0]).log2();
+            let (knot, share) = (place as usize, place.fract());
+            let x = knots[knot] * (1.0 - share).sqrt() + knots[knot + 1] * share.sqrt();
+            response[entries * k + entry] += x * beyond[entries * k + entry];
+        }
+        // Below the lowest line the error is that of the lowest line.
+        response[entries * lines + entry] += knots[0] * beyond[entry];
     }
 }

@@ -9,8 +9,9 @@
 
 use super::options::{PidOptions, PidTerms};
 use super::pid::{Discretisation, Notch, PidController, PidGains};
-use super::scenarios::{Grid, Scenario};
+use super::scenarios::Grid;
 use std::f64::consts::{PI, TAU};
+use youla::c64;
 
 /// Bounds of the frequency of a notch as shares of the sample rate, of its width and of its depth. Chosen, not measured.
 const NOTCH: [[f64; 2]; 3] = [[0.001, 0.48], [0.03, 1.5], [0.01, 1.0]];
@@ -80,20 +81,20 @@ impl Space<'_> {
     }
 
     /// The running controller, with notches that do nothing.
-    pub(super) fn of_running(&self, running: &PidController, grid: &Grid, estimate: &Scenario) -> Vec<f64> {
-        let notches = self.notches(grid, estimate, 1.0);
+    pub(super) fn of_running(&self, running: &PidController, grid: &Grid, plant: &[c64]) -> Vec<f64> {
+        let notches = self.notches(grid, plant, 1.0);
         self.parameters(&PidController { gains: running.gains, notches, delay: self.delay })
     }
 
     /// Notches at the highest resonances.
-    fn notches(&self, grid: &Grid, estimate: &Scenario, depth: f64) -> Vec<Notch> {
-        let at = resonances(grid, estimate, self.options.notches).into_iter();
+    fn notches(&self, grid: &Grid, plant: &[c64], depth: f64) -> Vec<Notch> {
+        let at = resonances(grid, plant, self.options.notches).into_iter();
         at.map(|hz| Notch { hz, width: 0.3, depth }).collect()
     }
 
-    /// Controllers by loop shaping on the response of the estimate: a crossover, the corner of the integral below it, that of the
+    /// Controllers by loop shaping on the response of a plant: a crossover, the corner of the integral below it, that of the
     /// derivative above it, and a part of the gain that gives this crossover; notches at the highest resonances, or none that acts.
-    pub(super) fn shaped(&self, grid: &Grid, estimate: &Scenario) -> Vec<Vec<f64>> {
+    pub(super) fn shaped(&self, grid: &Grid, plant: &[c64]) -> Vec<Vec<f64>> {
         let mut all = Vec::new();
         let depths: &[f64] = if self.options.notches > 0 { &[0.1, 1.0] } else { &[1.0] };
         for at in (0..CROSSOVERS).map(|k| LOWEST.powf(1.0 - (k as f64 + 0.5) / CROSSOVERS as f64) * PI / self.ts) {
@@ -107,12 +108,12 @@ impl Space<'_> {
                         kd: self.sign * above / at,
                         derivative_filter: 0.1 / at,
                     };
-                    let notches = self.notches(grid, estimate, *depth);
+                    let notches = self.notches(grid, plant, *depth);
                     let x = self.parameters(&PidController { gains, notches, delay: self.delay });
                     let c = self.controller(&x);
                     let line = grid.omega.partition_point(|w| *w < at).min(grid.omega.len() - 1);
                     let [n, d] = c.at(self.ts, grid.q[line]);
-                    let unit = (n / d * estimate.response[line]).norm().max(1e-300);
+                    let unit = (n / d * plant[line]).norm().max(1e-300);
                     all.extend([0.03, 0.1, 0.3, 0.8].map(|gain| self.scaled(&x, gain / unit)));
                 }
             }
@@ -133,8 +134,8 @@ const CROSSOVERS: usize = 14;
 const LOWEST: f64 = 5e-4;
 
 /// The frequencies of the highest peaks of the response over its neighbourhood, Hz; at a quarter of the sample rate where there are too few.
-fn resonances(grid: &Grid, estimate: &Scenario, count: usize) -> Vec<f64> {
-    let size: Vec<f64> = estimate.response.iter().map(|g| g.norm()).collect();
+fn resonances(grid: &Grid, plant: &[c64], count: usize) -> Vec<f64> {
+    let size: Vec<f64> = plant.iter().map(|g| g.norm()).collect();
     let mut peaks: Vec<(f64, f64)> = (1..size.len() - 1)
         .filter(|k| size[*k] > size[k - 1] && size[*k] >= size[k + 1])
         .map(|k| (size[k] * grid.omega[k], grid.omega[k] / TAU))

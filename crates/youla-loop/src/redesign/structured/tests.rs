@@ -1,8 +1,9 @@
 //! Identities of the design: what is judged on the grid is what the exact code says of the same loop.
 
 use super::margins::margins;
+use super::pid::diagonal;
 use super::recognise::recognise;
-use super::scenarios::{Grid, Scenario};
+use super::scenarios::{Grid, Running, Scenario};
 use super::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -48,7 +49,8 @@ fn margins_equal_the_exact_ones() {
     let plant = machine(8.0);
     let k = running().system(time()).unwrap();
     let grid = grid_of(&plant, &k);
-    let scenario = Scenario::new(&grid, plant.clone(), (&k, &grid.any(&k).unwrap()), |_| {}).unwrap();
+    let on = grid.each(std::slice::from_ref(&k)).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut stable, mut unstable) = (0, 0);
     for rule in [Discretisation::BackwardEuler, Discretisation::Tustin] {
@@ -59,7 +61,7 @@ fn margins_equal_the_exact_ones() {
                 notches,
                 ..pid(rule, [0.8 * factor(), 2.0 * factor(), 0.02 * factor(), 2e-3 * factor()])
             };
-            let found = margins(&grid, &scenario, &grid.controller(&c));
+            let found = margins(&grid, &scenario, &[grid.controller(&c)]).map(|of| of[0]);
             let exact = youla::control::margins(&plant, &c.system(time()).unwrap());
             assert_eq!(found.is_some(), exact.is_ok(), "{c:?}");
             let (Some(found), Ok(exact)) = (found, exact) else {
@@ -83,16 +85,64 @@ fn margins_equal_the_exact_ones() {
     assert!(stable > 30 && unstable > 20, "{stable} stable, {unstable} unstable");
 }
 
+/// Two motors with resonances that act on each other.
+fn pair(coupling: f64) -> StateSpace<Discrete> {
+    let apart = diagonal(&[machine(8.0), machine(3.0)]).unwrap();
+    let mix = Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { coupling * (1.0 - 2.0 * j as f64) });
+    apart.map_output(&mix)
+}
+
+/// Stability of two random controllers on machines that act on each other, and gain, phase and delay margin of each loop with the other closed,
+/// within 3 % of [`youla::control::margins()`].
+#[test]
+fn margins_of_each_loop_equal_the_exact_ones() {
+    let plant = pair(0.4);
+    let two = |c: [PidController; 2]| whole(&c, time()).unwrap();
+    let k = two([running(), running()]);
+    let grid = grid_of(&plant, &k);
+    let on = grid.each(&each(&k).unwrap()).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let (mut stable, mut unstable) = (0, 0);
+    for _ in 0..120 {
+        let mut factor = || 10f64.powf(rng.random_range(-0.8..0.8));
+        let c = [0, 1].map(|_| {
+            pid(Discretisation::BackwardEuler, [0.8 * factor(), 2.0 * factor(), 0.02 * factor(), 2e-3 * factor()])
+        });
+        let found = margins(&grid, &scenario, &c.each_ref().map(|c| grid.controller(c)));
+        let exact = youla::control::margins(&plant, &two(c));
+        assert_eq!(found.is_some(), exact.is_ok());
+        let (Some(found), Ok(exact)) = (found, exact) else {
+            unstable += 1;
+            continue;
+        };
+        if exact.output_sensitivity.value > 4.0 {
+            continue;
+        }
+        stable += 1;
+        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 0.03, "{a} for {b}");
+        for (found, channel) in found.iter().zip(&exact.outputs) {
+            assert!(found.peak_sensitivity < 1.01 * exact.output_sensitivity.value);
+            let lowest = channel.lowest_gain.filter(|g| g.factor > 1e-6).map_or(f64::INFINITY, |g| 1.0 / g.factor);
+            near(found.gain.min(10.0), 10f64.min(channel.highest_gain.map_or(f64::INFINITY, |g| g.factor).min(lowest)));
+            near(found.phase, channel.phase.unwrap().degrees);
+            near(found.delay, channel.delay.unwrap().seconds);
+        }
+    }
+    assert!(stable > 20 && unstable > 20, "{stable} stable, {unstable} unstable");
+}
+
 /// The effort is the standard deviation of u by simulation.
 #[test]
 fn the_effort_is_the_size_of_u_for_white_noise() {
     let plant = machine(8.0);
     let k = running().system(time()).unwrap();
     let grid = grid_of(&plant, &k);
-    let scenario = Scenario::new(&grid, plant.clone(), (&k, &grid.any(&k).unwrap()), |_| {}).unwrap();
+    let on = grid.each(std::slice::from_ref(&k)).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
     let to_u = closed_loop(&plant, &with_input_port(&k).unwrap()).unwrap().part(0..1, 1..2);
     let exact = youla::lti::h2_norm(&to_u).unwrap();
-    assert!((scenario.running.effort / exact - 1.0).abs() < 0.01, "{} for {exact}", scenario.running.effort);
+    assert!((scenario.running[0].effort / exact - 1.0).abs() < 0.01, "{} for {exact}", scenario.running[0].effort);
 }
 
 #[test]
@@ -119,14 +169,22 @@ fn a_pid_is_recognised_in_any_form() {
 
 /// Identifies the machine from a seeded record under the running controller.
 fn identified(brake: f64) -> youla::identify::likelihood::Recommendation {
-    let plant = machine(brake);
-    let k = running().system(time()).unwrap();
-    let whole = closed_loop(&plant, &with_input_port(&k).unwrap()).unwrap();
+    identified_under(&machine(brake), &running().system(time()).unwrap(), vec![1], 4)
+}
+
+fn identified_under(
+    plant: &StateSpace<Discrete>,
+    k: &StateSpace<Discrete>,
+    dead_time: Vec<usize>,
+    order: usize,
+) -> youla::identify::likelihood::Recommendation {
+    let (m, whole) = (plant.inputs(), closed_loop(plant, &with_input_port(k).unwrap()).unwrap());
     let mut rng = ChaCha8Rng::seed_from_u64(11);
-    let drive = Mat::from_fn(6000, 2, |_, j| [0.3, 0.002][j] * (rng.random::<f64>() - 0.5));
+    let size = |j: usize| if j < m { 0.3 } else { 0.002 };
+    let drive = Mat::from_fn(6000, 2 * m, |_, j| size(j) * (rng.random::<f64>() - 0.5));
     let signals = simulate(&whole, drive.as_ref(), &vec![0.0; whole.order()]).unwrap();
-    let (u, y) = (signals.subcols(0, 1), signals.subcols(1, 1));
-    let options = LikelihoodOptions { order: Some(4), dead_time: Some(vec![1]), ..Default::default() };
+    let (u, y) = (signals.subcols(0, m), signals.subcols(m, m));
+    let options = LikelihoodOptions { order: Some(order), dead_time: Some(dead_time), ..Default::default() };
     recommend(&[Experiment::new(u, y)], &[], None, time(), &options).unwrap()
 }
 
@@ -141,14 +199,14 @@ fn what_is_promised_holds_on_the_machine() {
     let band = BandOptions { draws: 60, seed: 1 };
     let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let new = pool(2).install(|| design_pid(&problem, &options, &band)).unwrap();
-    assert_eq!(new.controller, pool(1).install(|| design_pid(&problem, &options, &band)).unwrap().controller);
-    assert!(new.rejection > 2.0 && new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
+    assert_eq!(new.controllers, pool(1).install(|| design_pid(&problem, &options, &band)).unwrap().controllers);
+    assert!(new.rejection() > 2.0 && new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
     let exact = youla::control::margins(&machine(8.0), &new.system).unwrap();
     assert!(exact.output_sensitivity.value < 2.0, "{:?}", exact.output_sensitivity);
     assert!(exact.outputs[0].phase.unwrap().degrees > 28.0, "{:?}", exact.outputs[0].phase);
     assert!(new.steps.iter().all(|s| s.unstable == 0) && new.steps.len() == 3);
     // The last response ends at its reference.
-    assert!((new.steps[2].response.last().unwrap()[1] - 1.0).abs() < 0.05);
+    assert!((new.steps[2].responses[0].last().unwrap()[1] - 1.0).abs() < 0.05);
 }
 
 /// One controller for a machine whose brake and resonance change: the limits hold at both points, which the gains for the first alone do not
@@ -167,9 +225,32 @@ fn one_controller_serves_several_operating_points() {
         let exact = youla::control::margins(&machine(brake), &new.system).unwrap();
         assert!(exact.output_sensitivity.value < 2.0, "{brake}: {:?}", exact.output_sensitivity);
     }
-    let alone = [&first, &second].map(|model| of(vec![(&model.plant, &model.region)]).rejection);
+    let alone = [&first, &second].map(|model| of(vec![(&model.plant, &model.region)]).rejection());
     let least = alone[0].min(alone[1]);
-    assert!(new.rejection < 1.05 * least && new.rejection > 0.3 * least, "{} {alone:?}", new.rejection);
+    assert!(new.rejection() < 1.05 * least && new.rejection() > 0.3 * least, "{} {alone:?}", new.rejection());
+}
+
+/// A PID for each of two loops that act on each other: the limits hold in both on the machine itself; the other running controller, which
+/// leads an output to both inputs, is refused.
+#[test]
+fn each_loop_of_a_square_machine_gets_its_pid() {
+    let plant = pair(0.3);
+    let k = whole(&[running(), running()], time()).unwrap();
+    let model = identified_under(&plant, &k, vec![1, 1], 8);
+    let problem = PidProblem { points: vec![(&model.plant, &model.region)], running: &k, delay: 0 };
+    let options = PidOptions { command_effort: 4.0, ..PidOptions::default() };
+    let band = BandOptions { draws: 60, seed: 1 };
+    let new = design_pid(&problem, &options, &band).unwrap();
+    assert!(new.proof.unstable == 0 && new.proof.missed <= 3, "{:?}", new.proof.misses);
+    assert!(new.rejections.len() == 2 && new.rejection() > 1.5, "{:?}", new.rejections);
+    let exact = youla::control::margins(&plant, &new.system).unwrap();
+    for channel in &exact.outputs {
+        assert!(channel.phase.unwrap().degrees > 28.0, "{channel:?}");
+        assert!(channel.highest_gain.is_none_or(|g| g.factor > 1.95), "{channel:?}");
+    }
+    let crossed = k.map_output(&Mat::from_fn(2, 2, |i, j| if i == j { 1.0 } else { 0.1 }));
+    let refused = design_pid(&PidProblem { running: &crossed, ..problem }, &options, &band).err().unwrap().to_string();
+    assert!(refused.contains("input of another loop") && refused.contains("lqg"), "{refused}");
 }
 
 /// An unstable machine needs a gain.

@@ -68,6 +68,12 @@ fn negate(x: &mut Mat<f64>) {
     *x = -1.0 * &*x;
 }
 
+/// The part of the input that the controller makes, times a factor.
+fn scale_law(log: &mut Log, factor: impl Fn(usize) -> f64) {
+    let Some(d) = &log.d else { return };
+    log.u = Mat::from_fn(d.nrows(), d.ncols(), |k, j| d[(k, j)] + factor(k) * (log.u[(k, j)] - d[(k, j)]));
+}
+
 /// What a reader refuses.
 pub(crate) fn refused(log: &Log) -> bool {
     let channels = (0..log.y.ncols()).map(|j| youla::signal::Channel::new(format!("y{j}"), "")).collect();
@@ -77,7 +83,7 @@ pub(crate) fn refused(log: &Log) -> bool {
 pub(crate) const TWO_BY_TWO: [&str; 2] = ["inputs exchanged", "outputs exchanged"];
 pub(crate) const IN_THE_LOOP: [&str; 2] = ["input saturates", "not excited"];
 
-pub(crate) const ALL: [Defect; 27] = [
+pub(crate) const ALL: [Defect; 29] = [
     Defect { name: "dead output", plant: |log, _| log.y.col_mut(0).fill(0.0), words: &["constant"] },
     Defect { name: "dead input", plant: |log, _| log.u.col_mut(0).fill(0.3), words: &["constant"] },
     Defect {
@@ -172,6 +178,22 @@ pub(crate) const ALL: [Defect; 27] = [
                 .map(|k| k.map_output(&Mat::from_fn(k.outputs(), k.outputs(), |i, j| if i == j { 0.7 } else { 0.0 })))
         },
         words: &["times the gain"],
+    },
+    Defect {
+        name: "controller switched",
+        plant: |log, rng| {
+            let at = somewhere(log, rng);
+            scale_law(log, |k| if k < at { 1.0 } else { 1.5 });
+        },
+        words: &["the controller changes"],
+    },
+    Defect {
+        name: "gain that varies by 30 %",
+        plant: |log, _| {
+            let n = log.u.nrows() as f64;
+            scale_law(log, |k| 1.0 + 0.3 * (std::f64::consts::TAU * k as f64 / n).sin());
+        },
+        words: &["varies along the record"],
     },
     Defect {
         name: "input one sample early",

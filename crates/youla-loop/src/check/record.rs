@@ -95,7 +95,8 @@ pub fn check_record(
         for ((found, _), channel) in wrong.iter().flatten().zip(&names.outputs) {
             all.extend(found.findings(record.name, record.first_row, channel, options));
         }
-        all.extend(broken(record, names, lagged, wrong.as_deref().unwrap_or_default(), &groups)?);
+        let switches = of_controller.as_ref().map_or(Vec::new(), ControllerCheck::switches);
+        all.extend(broken(record, names, lagged, (wrong.as_deref().unwrap_or_default(), &switches), &groups)?);
         all.extend(trends(record, names, lagged, options)?);
         let feedback = feedback::of_record(lagged, m, p, known, options)?;
         fed_back |= feedback.detected;
@@ -126,7 +127,7 @@ fn of_controller(
     let LoggedRecord { u, y, input_excitation, reference, .. } = *record;
     match controller(k, ControllerRecord { u, y, input_excitation, reference }, options) {
         Ok(found) => {
-            all.extend(found.finding(record.name, &names.inputs, &names.outputs, options));
+            all.extend(found.finding((record.name, record.first_row), &names.inputs, &names.outputs, options));
             Ok(Some(found))
         }
         Err(error @ (Error::Method(youla::Error::Diverged { .. }) | Error::Method(youla::Error::Unstable { .. }))) => {
@@ -137,12 +138,12 @@ fn of_controller(
     }
 }
 
-/// Rows lost or logged twice, but for those at wrong samples of an output, which break the equation of the input too.
+/// Rows lost or logged twice, but for those at wrong samples of an output and at another controller, which break the equation of the input too.
 fn broken(
     record: &LoggedRecord<'_>,
     names: &ChannelNames,
     lagged: &Lagged,
-    wrong: &[(Outliers, f64)],
+    (wrong, switches): (&[(Outliers, f64)], &[usize]),
     groups: &[MatRef<'_, f64>],
 ) -> Result<Vec<Finding>> {
     let (m, p) = (record.u.ncols(), record.y.ncols());
@@ -156,7 +157,8 @@ fn broken(
     let other = |found: &Break| {
         let (Break::Lost(at) | Break::Twice(at) | Break::Jump(at, ..) | Break::Wrong(at, ..)) = *found;
         let of = |o: &Outliers| o.samples.iter().any(|k| near(at, *k)) || o.jump.is_some_and(|(k, _)| near(at, k));
-        !matches!(found, Break::Twice(_)) && wrong.iter().any(|(o, _)| of(o))
+        let switched = switches.iter().any(|k| near(at, *k));
+        !matches!(found, Break::Twice(_)) && (switched || wrong.iter().any(|(o, _)| of(o)))
     };
     let rest = all.into_iter().filter(|found| !other(found));
     Ok(rest.map(|found| found.finding(record.name, record.first_row, &names.outputs)).collect())

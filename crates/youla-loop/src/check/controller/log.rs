@@ -157,7 +157,7 @@ impl<'a> Log<'a> {
 
 /// The controller with a constant at each of its inputs as further states. The mean that was taken out of a record is such a constant,
 /// and an integrator makes a ramp of it.
-fn with_constant(k: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
+pub(super) fn with_constant(k: &StateSpace<Discrete>) -> Result<StateSpace<Discrete>> {
     let (n, p) = (k.order(), k.inputs());
     let zero = Mat::<f64>::zeros(p, n);
     let a = block(&[&[k.a(), k.b()], &[zero.as_ref(), eye(p).as_ref()]]);
@@ -188,7 +188,7 @@ fn shifted(e: &Mat<f64>, w: &Mat<f64>, rows: isize) -> (Mat<f64>, Mat<f64>) {
     (e.subrows(of_e, count).to_owned(), w.subrows(of_w, count).to_owned())
 }
 
-fn centred(x: &Mat<f64>) -> Mat<f64> {
+pub(super) fn centred(x: &Mat<f64>) -> Mat<f64> {
     let mean: Vec<f64> = x.col_iter().map(|c| c.iter().sum::<f64>() / x.nrows() as f64).collect();
     Mat::from_fn(x.nrows(), x.ncols(), |i, j| x[(i, j)] - mean[j])
 }

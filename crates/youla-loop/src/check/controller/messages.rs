@@ -79,7 +79,7 @@ impl Change {
 impl ControllerCheck {
     pub(in crate::check) fn finding(
         &self,
-        record: &str,
+        (record, first_row): (&str, usize),
         inputs: &[Channel],
         outputs: &[Channel],
         options: &CheckOptions,
@@ -105,6 +105,16 @@ impl ControllerCheck {
             );
         }
         let percent = few(100.0 * self.residual);
+        if let Some(parts) = &self.parts {
+            let [what, advice] = parts.words(first_row, &percent);
+            let severe = self.residual > options.controller_defect;
+            let severity = if severe { Severity::Defect } else { Severity::Caution };
+            return Some(
+                Finding::new(Test::Controller, severity, record, what)
+                    .number("residual", self.residual)
+                    .advice(&advice),
+            );
+        }
         let (severity, what) = match (&self.change, self.excited) {
             (None, false) => (
                 Severity::Note,

@@ -8,12 +8,15 @@
 //! Where it is large the same is tried with one thing changed at a time: the sign, one sample earlier or later, a factor on each channel of e
 //! by least squares, two channels or inputs and outputs exchanged, the input limited to its own range, d left out or with the other sign. A change
 //! is proposed where it brings the residual below a tenth of what it was and below `controller_caution` twice over, or to nearly nothing.
+//! Where none is, the law is compared part by part ([`Parts`]): a controller that was switched or is scheduled.
 //! Where no excitation is declared, the residual is the excitation itself, if the controller is right.
 
 mod log;
 mod messages;
+mod parts;
 
 pub(super) use messages::not_simulated;
+pub use parts::Parts;
 
 use super::options::CheckOptions;
 use crate::error::Result;
@@ -65,6 +68,8 @@ pub struct ControllerCheck {
     pub contained: Option<f64>,
     /// The change that leaves least, and what it leaves, where one would help.
     pub change: Option<(Change, f64)>,
+    /// Where no single change helps, how the law changes along the record.
+    pub parts: Option<Parts>,
 }
 
 /// The logged signals of the controller.
@@ -137,12 +142,22 @@ pub fn controller(
     } else {
         None
     };
-    Ok(ControllerCheck { residual, excited, guided, contained, change })
+    let varies = (excited || guided) && change.is_none() && residual > options.controller_caution;
+    let parts = if varies { parts::parts(&log, k, options.controller_caution)? } else { None };
+    Ok(ControllerCheck { residual, excited, guided, contained, change, parts })
 }
 
 impl ControllerCheck {
     /// Whether the controller explains an input that something from outside moves: then no channel is shifted.
     pub(super) fn agrees(&self, options: &CheckOptions) -> bool {
         self.residual <= options.controller_caution && (self.excited || self.guided)
+    }
+
+    /// Samples at which another controller takes over or the declared one comes back.
+    pub(super) fn switches(&self) -> Vec<usize> {
+        match &self.parts {
+            Some(Parts::Switched { holds, .. }) => holds.iter().flat_map(|at| [at.start, at.end]).collect(),
+            _ => Vec::new(),
+        }
     }
 }

@@ -56,7 +56,7 @@ impl Search<'_> {
         for round in 0..ROUNDS {
             let reserve = RESERVE * (1.0 + 0.5 * round as f64);
             let size = self.spaces.iter().map(Space::size).sum::<usize>();
-            let steps = STEPS[usize::from(round > 0)] * size * self.spaces.len();
+            let steps = STEPS[usize::from(round > 0)] * size * self.spaces.len().min(2);
             let width = if round == 0 { 0.4 } else { 0.1 };
             let searched = starts.into_par_iter().enumerate().map(|(k, x)| {
                 let mut judges = self.judges(&active);

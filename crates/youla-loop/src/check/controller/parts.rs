@@ -1,0 +1,244 @@
+//! The law from part to part of a record: controllers are switched, and scheduled with speed or load.
+//!
+//! With v the response of the declared controller to e from rest and P the projection beside its free responses, each part has a factor on
+//! the gain and what it leaves,
+//!
+//! ```text
+//! factor = (P v)' (P w) / |P v|^2,        left = |P w - factor P v| / |w|
+//! ```
+
+use super::log::{Log, centred, with_constant};
+use crate::check::finding::few;
+use crate::error::Result;
+use std::ops::Range;
+use youla::Mat;
+use youla::lti::{Discrete, StateSpace, simulate, simulate_best};
+
+/// Parts of a record, and rows of a part for each state of the controller, at least.
+/// Chosen, not measured.
+const PARTS: usize = 40;
+const ROWS: usize = 25;
+/// Parts in a row under another controller, at least, and under the declared one somewhere: one or two hold a lost row, an outlier or a limit.
+/// Chosen, not measured.
+const STRETCH: usize = 3;
+/// What a factor leaves of a part that it explains, in thresholds of a caution: a schedule varies within a part.
+/// Chosen, not measured.
+const EXPLAINED: f64 = 5.0;
+/// Share of the parts that factors must explain for a schedule, and the quotient of their quantiles at 5 and 95 % that is one.
+/// Chosen, not measured.
+const MOST: f64 = 0.9;
+const SPREAD: f64 = 1.05;
+
+/// How the law of a record changes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Parts {
+    /// The declared controller explains these samples, counted from 0, and another one ran in the others.
+    Switched {
+        /// First sample of each stretch, and the one behind its last.
+        holds: Vec<Range<usize>>,
+        /// The most that it leaves of one of them.
+        residual: f64,
+        /// Least and largest factor on its gain in the others, where that explains them.
+        factors: Option<[f64; 2]>,
+    },
+    /// A factor on the gain that varies explains the record: its quantiles at 5 and 95 % of the parts.
+    Scheduled([f64; 2]),
+}
+
+/// A part: what the declared law leaves, the factor on its gain, and what that leaves.
+struct Part {
+    declared: f64,
+    factor: f64,
+    left: f64,
+}
+
+/// Looks for a change of the law; `caution` is the residual up to which a law holds.
+pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Result<Option<Parts>> {
+    let rows = (log.w.nrows() / PARTS).max(ROWS * (k.order() + k.inputs()));
+    let count = log.w.nrows() / rows;
+    if count < 2 * STRETCH {
+        return Ok(None);
+    }
+    let constant = with_constant(k)?;
+    let of = |i: usize| part(log, &constant, i * rows..if i + 1 == count { log.w.nrows() } else { (i + 1) * rows });
+    let all = (0..count).map(of).collect::<Result<Vec<Part>>>()?;
+    let holds: Vec<bool> = all.iter().map(|p| p.declared <= caution).collect();
+    let explained = |p: &&Part| p.left <= EXPLAINED * caution;
+    let factors = |of: &[&Part]| {
+        let mut sorted: Vec<f64> = of.iter().map(|p| p.factor).collect();
+        sorted.sort_by(f64::total_cmp);
+        [0.05, 0.95].map(|share| youla::statistics::quantile(&sorted, share))
+    };
+    let stretches = stretches(&holds);
+    let longest = stretches.iter().filter(|s| holds[s.start]).map(Range::len).max();
+    // The parts at the ends of stretches hold the change itself.
+    let inner = |i: &usize| !holds[*i] && (*i == 0 || !holds[i - 1]) && holds.get(i + 1) != Some(&true);
+    let others: Vec<&Part> = (0..count).filter(inner).map(|i| &all[i]).collect();
+    if longest.is_some_and(|longest| longest >= STRETCH) {
+        if stretches.iter().any(|s| !holds[s.start] && s.len() < STRETCH) || others.is_empty() {
+            return Ok(None);
+        }
+        let of = |s: &Range<usize>| {
+            let to = if s.end == count { log.w.nrows() } else { s.end * rows };
+            ends(log, k, s.start * rows..to, rows, caution)
+        };
+        let held = stretches.iter().filter(|s| holds[s.start]).map(of).collect::<Result<Vec<_>>>()?;
+        let left = held.iter().map(|at| residual(log, k, at)).collect::<Result<Vec<f64>>>()?;
+        let residual = left.into_iter().fold(0.0, f64::max);
+        let factors = others.iter().all(explained).then(|| factors(&others));
+        return Ok(Some(Parts::Switched { holds: held, residual, factors }));
+    }
+    let told: Vec<&Part> = all.iter().filter(explained).collect();
+    let [low, high] = factors(&told.iter().copied().chain(told.is_empty().then_some(&all[0])).collect::<Vec<_>>());
+    let most = told.len() as f64 >= MOST * count as f64;
+    Ok((most && low > 0.0 && high > SPREAD * low).then_some(Parts::Scheduled([low, high])))
+}
+
+fn part(log: &Log<'_>, constant: &StateSpace<Discrete>, at: Range<usize>) -> Result<Part> {
+    let (e, w) = (log.e.subrows(at.start, at.len()), log.w.subrows(at.start, at.len()));
+    let rest = Mat::<f64>::zeros(e.nrows(), e.ncols());
+    let beside = |x: &Mat<f64>| -> Result<Mat<f64>> { Ok(x - simulate_best(constant, rest.as_ref(), x.as_ref())?) };
+    let v = beside(&simulate(constant, e, &vec![0.0; constant.order()])?)?;
+    let (size, w) = (centred(&w.to_owned()).norm_l2().max(f64::MIN_POSITIVE), beside(&w.to_owned())?);
+    let product: f64 = v.col_iter().zip(w.col_iter()).map(|(v, w)| v.transpose() * w).sum();
+    let factor = product / v.squared_norm_l2().max(f64::MIN_POSITIVE);
+    let left = |factor: f64| (&w - faer::Scale(factor) * &v).norm_l2() / size;
+    Ok(Part { declared: left(1.0), factor, left: left(factor) })
+}
+
+/// Runs of equal values.
+fn stretches(holds: &[bool]) -> Vec<Range<usize>> {
+    let starts: Vec<usize> = (0..holds.len()).filter(|i| *i == 0 || holds[*i] != holds[i - 1]).collect();
+    let end = |k: usize| starts.get(k + 1).copied().unwrap_or(holds.len());
+    starts.iter().enumerate().map(|(k, start)| *start..end(k)).collect()
+}
+
+fn residual(log: &Log<'_>, k: &StateSpace<Discrete>, at: &Range<usize>) -> Result<f64> {
+    let of = |x: &Mat<f64>| x.subrows(at.start, at.len()).to_owned();
+    log.residual(k, &of(&log.e), &of(&log.w))
+}
+
+/// The first and the last sample that the law explains together with the parts at the ends of a stretch, by bisection.
+fn ends(
+    log: &Log<'_>,
+    k: &StateSpace<Discrete>,
+    within: Range<usize>,
+    rows: usize,
+    caution: f64,
+) -> Result<Range<usize>> {
+    let most = |explains: &dyn Fn(usize) -> Result<bool>, most: usize| -> Result<usize> {
+        let (mut low, mut high) = (0, most + 1);
+        while high - low > 1 {
+            let middle = low + (high - low) / 2;
+            if explains(middle)? { low = middle } else { high = middle }
+        }
+        Ok(low)
+    };
+    let before = |more: usize| Ok(residual(log, k, &(within.start - more..within.start + rows))? <= caution);
+    let behind = |more: usize| Ok(residual(log, k, &(within.end - rows..within.end + more))? <= caution);
+    let start = within.start - most(&before, within.start.min(rows))?;
+    let end = within.end + most(&behind, (log.w.nrows() - within.end).min(rows))?;
+    Ok(start..end)
+}
+
+impl Parts {
+    /// The finding and the remedy in words; `row` is that of the first sample.
+    pub(super) fn words(&self, row: usize, percent: &str) -> [String; 2] {
+        let factor = |[low, high]: &[f64; 2]| match high / low < SPREAD {
+            true => format!("{} times its gain", few(0.5 * (low + high))),
+            false => format!("{} to {} times its gain", few(*low), few(*high)),
+        };
+        match self {
+            Parts::Switched { holds, residual, factors } => [
+                format!(
+                    "the controller changes in the record: the declared one explains rows {} but for {} %, and not the others{}",
+                    holds.iter().map(|at| format!("{} to {}", row + at.start, row + at.end - 1)).collect::<Vec<_>>().join(", "),
+                    few(100.0 * residual),
+                    factors.as_ref().map_or(String::new(), |of| format!(", which {} explain", factor(of)))
+                ),
+                "Cut the record there by `take` and `skip`, and identify each part with the controller that ran".to_owned(),
+            ],
+            Parts::Scheduled(of) => [
+                format!(
+                    "the gain of the controller varies along the record: the declared one does not explain {percent} % of the logged input, \
+                     {} explain it",
+                    factor(of)
+                ),
+                "The model does not need the controller, but margins and certificate are those of the declared one: log with fixed gains, or \
+                 look for a limit or another path into the input"
+                    .to_owned(),
+            ],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::check::{CheckOptions, ControllerCheck, ControllerRecord, Parts, controller};
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+    use youla::Mat;
+    use youla::lti::{Discrete, StateSpace};
+
+    const ROWS: usize = 4000;
+
+    /// `x+ = 0.95 x + 0.1 u` under `u = d - gain(t) (1.5 y + integral of y)`: what the check says of the law with a gain of 1.
+    fn checked(seed: u64, gain: impl Fn(usize) -> f64, wrong: impl Fn(usize) -> f64) -> ControllerCheck {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut draw = || rng.sample::<f64, _>(StandardNormal);
+        let (mut x, mut integral) = (0.0, 0.0);
+        let rows: Vec<[f64; 3]> = (0..ROWS)
+            .map(|t| {
+                let (d, y) = (draw(), x + 0.1 * draw());
+                let u = d - gain(t) * (1.5 * y + integral);
+                integral += 0.02 * y;
+                x = 0.95 * x + 0.1 * u;
+                [u, y + wrong(t), d]
+            })
+            .collect();
+        let [u, y, d] = [0, 1, 2].map(|j| Mat::from_fn(ROWS, 1, |t, _| rows[t][j]));
+        let number = |v: f64| Mat::from_fn(1, 1, |_, _| v);
+        let time = Discrete::new(1e-3).unwrap();
+        let k = StateSpace::new(number(1.0), number(0.02), number(-1.0), number(-1.5), time).unwrap();
+        let record =
+            ControllerRecord { u: u.as_ref(), y: y.as_ref(), input_excitation: Some(d.as_ref()), reference: None };
+        controller(&k, record, &CheckOptions::default()).unwrap()
+    }
+
+    /// Planted: the gain is 1.4 times as large between two rows. Both are found, within ten rows, and the factor.
+    #[test]
+    fn a_controller_that_is_switched_is_found_with_its_rows() {
+        for seed in 0..20 {
+            let at = [1000 + 37 * seed as usize, 2800 + 11 * seed as usize];
+            let found = checked(seed, |t| if (at[0]..at[1]).contains(&t) { 1.4 } else { 1.0 }, |_| 0.0);
+            let Some(Parts::Switched { holds, factors: Some([low, high]), .. }) = &found.parts else {
+                panic!("seed {seed}: {found:?}")
+            };
+            assert!(holds.len() == 2 && holds[0].start == 0 && holds[1].end == ROWS, "seed {seed}: {holds:?}");
+            let near = holds[0].end.abs_diff(at[0]) <= 10 && holds[1].start.abs_diff(at[1]) <= 10;
+            assert!(near && (low - 1.4).abs() < 0.02 && (high - 1.4).abs() < 0.02, "seed {seed}: {holds:?} for {at:?}");
+        }
+    }
+
+    /// Planted: a gain that varies by 30 % to either side over the record.
+    #[test]
+    fn a_gain_that_varies_along_the_record_is_a_schedule() {
+        for seed in 0..20 {
+            let found = checked(seed, |t| 1.0 + 0.3 * (t as f64 * std::f64::consts::TAU / 3000.0).sin(), |_| 0.0);
+            let Some(Parts::Scheduled([low, high])) = found.parts else { panic!("seed {seed}: {found:?}") };
+            assert!((low - 0.7).abs() < 0.03 && (high - 1.3).abs() < 0.03, "seed {seed}: {low} {high}");
+        }
+    }
+
+    /// Controls: the declared law, one with another gain throughout, and wrong samples of the output are neither.
+    #[test]
+    fn other_faults_are_no_change_of_the_controller() {
+        for seed in 0..20 {
+            assert_eq!(checked(seed, |_| 1.0, |_| 0.0).parts, None, "seed {seed}");
+            assert_eq!(checked(seed, |_| 1.4, |_| 0.0).parts, None, "seed {seed}");
+            let wrong = checked(seed, |_| 1.0, |t| if t / 60 == 30 { 3.0 } else { 0.0 });
+            assert!(wrong.residual > 0.01 && wrong.parts.is_none(), "seed {seed}: {wrong:?}");
+        }
+    }
+}

@@ -6,9 +6,9 @@ const openLoop = data => ({ state_space: { feedback: "positive", a: [], b: [], c
 /** Forms with their fields: name, label, kind, unit. @type {Record<string, { name: string, start: any, fields: [string, string, string, string?][] }>} */
 const FORMS = {
   pid: { name: "PID, parallel: kp + ki/s + kd s/(1 + tf s)", start: { discretisation: "backward-euler" },
-    fields: [["kp", "kp", "number"], ["ki", "ki", "number?", "1/s"], ["kd", "kd", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
+    fields: [["kp", "kp", "gain"], ["ki", "ki", "gain?", "1/s"], ["kd", "kd", "gain?", "s"], ["derivative_filter", "Filter tf", "gain?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   ideal_pid: { name: "PID, ideal: kp (1 + 1/(ti s) + td s/(1 + tf s))", start: { discretisation: "backward-euler" },
-    fields: [["kp", "kp", "number"], ["ti", "ti", "number?", "s"], ["td", "td", "number?", "s"], ["derivative_filter", "Filter tf", "number?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
+    fields: [["kp", "kp", "gain"], ["ti", "ti", "gain?", "s"], ["td", "td", "gain?", "s"], ["derivative_filter", "Filter tf", "gain?", "s"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   cascade: { name: "Cascade: velocity loop inside a position loop", start: { discretisation: "backward-euler", position: {}, velocity: {} },
     fields: [["position.kp", "Position kp", "number", "1/s"], ["velocity.kp", "Velocity kp", "number"], ["velocity.ki", "Velocity ki", "number?", "1/s"], ["velocity_filter", "Filter of the velocity", "number?", "s"], ["velocity_feedforward", "Velocity feedforward", "number?"], ["acceleration_feedforward", "Acceleration feedforward", "number?"], ["discretisation", "Computed by", "rule"], ["delay", "Further delay", "count", "samples"]] },
   difference_equation: { name: "Difference equation in z⁻¹", start: { numerator: [1], denominator: [1] },
@@ -38,6 +38,7 @@ function formFields(form, of, changes, forms = FORMS) {
     const [table, name] = path.includes(".") ? path.split(".") : ["", path], values = table ? of[table] ?? {} : of;
     const changed = (/** @type {string} */ key, /** @type {any} */ value) => table ? changes(table, { ...values, [key]: value }) : changes(key, value);
     if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
+    if (kind.startsWith("gain")) return gainField({ label, unit, name, optional: kind !== "gain", value: values[name], changed: value => changed(name, value) });
     if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, name, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
     const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {

@@ -26,23 +26,26 @@ const gains = (() => {
   function fields() {
     const form = Object.keys(edited)[0], values = edited[form];
     const changed = (name, value) => { if (value === undefined) delete values[name]; else values[name] = value; ask(); };
-    const sliders = ["kp", "ki", "kd", "ti", "td"].filter(name => values[name] > 0).map(name => slider(name, values, changed));
-    place.replaceChildren(...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && f[2].startsWith("number"))) fields(); }) : [])),
+    const loops = name => [values[name]].flat().keys(), sliders = ["kp", "ki", "kd", "ti", "td"].filter(name => values[name] !== undefined)
+      .flatMap(name => [...loops(name)].filter(k => [values[name]].flat()[k] > 0).map(k => slider(name, k, values, changed)));
+    place.replaceChildren(...sliders, element("div", { class: "fields" }, ...(FORMS[form] ? formFields(form, values, (name, value) => { changed(name, value); if (FORMS[form].fields.some(f => f[0] === name && /^(number|gain)/.test(f[2]))) fields(); }) : [])),
       element("div", { class: "fields" }, element("button", { type: "button", class: "action", onclick: () => { edited = structuredClone(ran); fields(); ask(); } }, "Back to the controller that ran"),
         element("button", { type: "button", class: "action", onclick: () => download("controller.json", new TextEncoder().encode(JSON.stringify(edited, null, 2))) }, "Save these gains")));
   }
 
-  /** A factor from a tenth to ten times the value of the controller that ran. @param {string} name @param {any} values @param {(name: string, value: number) => void} changed */
-  function slider(name, values, changed) {
-    const base = Object.values(ran)[0][name] || values[name], place10 = Math.max(-1, Math.min(1, Math.log10(values[name] / base)));
-    const input = element("input", { type: "range", min: -1, max: 1, step: 0.005, value: place10, "aria-label": `${name}, from a tenth to ten times that of the controller that ran` }), shown = element("output", {}, readOut(values[name]));
+  /** A factor from a tenth to ten times the value of the controller that ran, in one loop. @param {string} name @param {number} k @param {any} values @param {(name: string, value: number | number[]) => void} changed */
+  function slider(name, k, values, changed) {
+    const all = () => [values[name]].flat(), several = all().length > 1, title = several ? `${name}, loop ${k + 1}` : name;
+    const base = [Object.values(ran)[0][name]].flat()[k] || all()[k], place10 = Math.max(-1, Math.min(1, Math.log10(all()[k] / base)));
+    const input = element("input", { type: "range", min: -1, max: 1, step: 0.005, value: place10, "aria-label": `${title}, from a tenth to ten times that of the controller that ran` }), shown = element("output", {}, readOut(all()[k]));
     input.addEventListener("input", () => {
       const value = Number((base * 10 ** Number(input.value)).toPrecision(4)), field = place.querySelector(`.fields input[data-name="${name}"]`);
       shown.textContent = readOut(value);
-      if (field instanceof HTMLInputElement) field.value = String(value);
-      changed(name, value);
+      const next = all().map((was, of) => of === k ? value : was);
+      if (field instanceof HTMLInputElement) field.value = gainText(next);
+      changed(name, several ? next : value);
     });
-    return element("label", { class: "slider" }, element("span", {}, name), input, shown);
+    return element("label", { class: "slider" }, element("span", {}, title), input, shown);
   }
 
   // Where S first exceeds -3 dB, overshoot of the first output, largest command for a unit step of the reference.

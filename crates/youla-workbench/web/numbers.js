@@ -35,6 +35,20 @@ function numberField({ label, value, unit, changed, optional, name }) {
   return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
 }
 
+/** Gains of the loops as one types them. @param {number | number[] | undefined} value */
+const gainText = value => value === undefined ? "" : [value].flat().join("; ");
+
+/** A field for a gain, or for one of each loop with semicolons between them. @param {{ label: string, value?: number | number[], unit?: string, changed: (value: number | number[] | undefined) => void, optional?: boolean, name: string }} of */
+function gainField({ label, value, unit, changed, optional, name }) {
+  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: gainText(value), "data-name": name, autocomplete: "off", title: "A number, or one for each loop: 2; 1.5" });
+  input.addEventListener("change", () => {
+    const empty = input.value.trim() === "", read = numberOf(input.value) ?? (input.value.includes(";") ? numbersOf(input.value) : null), wrong = read == null && !(empty && optional);
+    complain(input, wrong && "A number, such as 0.5 or 2e-3, or one for each loop, such as 2; 1.5");
+    if (!wrong) changed(read ?? undefined);
+  });
+  return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
+}
+
 /** A choice. @param {{ label: string, value: string, options: [string, string][], changed: (value: string) => void }} of */
 function choiceField({ label, value, options, changed }) {
   const select = element("select", { "aria-label": label }, ...options.map(([key, name]) => element("option", { value: key, selected: key === value ? "" : null }, name)));

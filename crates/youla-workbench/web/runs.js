@@ -116,10 +116,11 @@ const runs = (() => {
     const needed = [!data.inputs.length && "an input", !data.outputs.length && "an output", !log.sampleTime() && "the sample time", !controller && "the controller that ran",
       controller && !of.feedback && "the sign of its feedback", pid && of.kp == null && "its kp"].filter(Boolean);
     const names = (/** @type {any[]} */ list) => list.map(c => c.from ?? c.name).join(", ");
-    const many = !needed.length && pid && (data.inputs.length > 1 || data.outputs.length > 1);
+    const loops = Math.max(1, ...Object.values(of).map(value => Array.isArray(value) ? value.length : 1));
+    const many = !needed.length && pid && (data.inputs.length !== loops || data.outputs.length !== loops);
     start.disabled = running || needed.length > 0 || many;
     by("missing").textContent = needed.length ? `Still needed: ${needed.join(", ")}.` : many
-      ? `A PID drives one input and reads one output, but the inputs are ${names(data.inputs)} and the outputs ${names(data.outputs)}. Is one of them the excitation, or not used?` : "";
+      ? `${loops === 1 ? "A PID drives one input and reads one output" : `The gains are those of ${loops} loops`}, but the inputs are ${names(data.inputs)} and the outputs ${names(data.outputs)}. Is one of them the excitation, or not used? The gains of several loops have semicolons between them: 2; 1.5.` : "";
     aged();
     order.querySelector("input").value = table.recommended?.order ?? "";
   });

@@ -5,7 +5,7 @@ use super::redesign::loops;
 use youla::identify::likelihood::figure as digits;
 use youla_loop::redesign::structured::{Band, FigureBand, PidController, PidRedesign, PlannedStep};
 use youla_report::data::{self as draw, EvidenceTable, Method, ReportPart, Role, Status, Verdict};
-use youla_report::figure::{Axis, Content, Curve, Figure, Panel, Region};
+use youla_report::figure::{Axis, Content, Curve, Figure, Layout, Panel, Region};
 
 /// The section of the page.
 pub(super) fn drawn(new: &PidRedesign) -> draw::Redesign {
@@ -71,7 +71,8 @@ fn tables(new: &PidRedesign) -> Vec<EvidenceTable> {
     let several = new.controllers.len() > 1;
     let row = |f: &FigureBand| {
         let of = if several { format!("loop {}: ", f.channel + 1) } else { String::new() };
-        let name = format!("{of}{} {}", f.name.replace('_', " "), f.unit).trim_end().to_owned();
+        let unit = if f.unit.is_empty() { String::new() } else { format!(", {}", f.unit) };
+        let name = format!("{of}{}{unit}", f.name.replace('_', " "));
         vec![name, f.limit.map_or("–".into(), digits), band(f.running), band(f.new)]
     };
     let step = |s: &PlannedStep| {
@@ -123,12 +124,22 @@ fn gains(c: &PidController) -> String {
     let g = &c.gains;
     let parts = [("kp", g.kp, ""), ("ki", g.ki, " /s"), ("kd", g.kd, " s"), ("filter", g.derivative_filter, " s")];
     let there = parts.into_iter().filter(|(_, value, _)| *value != 0.0);
-    let mut text: Vec<String> = there.map(|(name, value, unit)| format!("{name} {value:.4e}{unit}")).collect();
+    let mut text: Vec<String> = there.map(|(name, value, unit)| format!("{name} {}{unit}", gain(value))).collect();
     let notch = |n: &youla_loop::redesign::structured::Notch| {
         format!("notch at {} Hz, width {}, depth {}", digits(n.hz), digits(n.width), digits(n.depth))
     };
     text.extend(c.notches.iter().map(notch));
     text.join(", ")
+}
+
+/// Five significant digits, as one types them in.
+fn gain(value: f64) -> String {
+    let place = value.abs().log10().floor();
+    if !(-4.0..6.0).contains(&place) {
+        return format!("{value:.4e}");
+    }
+    let text = format!("{value:.*}", (4.0 - place).max(0.0) as usize);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 /// Sensitivities and step responses with their bands.
@@ -155,6 +166,7 @@ pub(crate) fn figure(new: &PidRedesign) -> Figure {
         key: "response".into(),
         title: "The loop, running and new".into(),
         caption: "Medians and 95 % bands over models of the region that the search has not seen.".into(),
+        layout: Layout::Beside,
         panels: new.proof.sensitivities.iter().enumerate().flat_map(panels).collect(),
         ..Figure::default()
     }

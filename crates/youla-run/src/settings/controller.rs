@@ -164,6 +164,15 @@ impl ControllerSettings {
         }
     }
 
+    /// The number of loops of PIDs.
+    pub(super) fn pid_loops(&self) -> Option<usize> {
+        match self {
+            Self::Pid(pid) => Some(pid.parts().count()),
+            Self::IdealPid(pid) => Some(pid.parts().count()),
+            _ => None,
+        }
+    }
+
     /// What the types allow and no controller is, in one sentence.
     pub(super) fn problem(&self) -> Option<String> {
         match self {

@@ -189,6 +189,7 @@ impl RunSettings {
             .or_else(|| self.controller.problem())
             .or_else(|| self.nominal_problem())
             .or_else(|| self.loop_problem())
+            .or_else(|| self.pid_problem())
             .or_else(|| self.redesign_problem())
             .or_else(|| self.number_problem());
         problem.or_else(structure)
@@ -214,6 +215,24 @@ impl RunSettings {
         ];
         let (what, _) = asked.into_iter().find(|(_, asked)| *asked && self.nominal.is_none())?;
         Some(format!("{what} a nominal model; add [nominal], a model of the plant, which may be rough"))
+    }
+
+    /// PIDs for another number of loops than the machine has.
+    fn pid_problem(&self) -> Option<String> {
+        let loops = self.controller.pid_loops()?;
+        let (inputs, outputs) = (self.data.inputs.len(), self.data.outputs.len());
+        let remedy = match (loops, inputs == outputs) {
+            _ if (inputs, outputs) == (loops, loops) => return None,
+            (1, true) => "give each gain a list with one number for each loop, input k following output k",
+            _ => {
+                "a PID leads an output to its input; state any other controller in [controller.difference_equation] or another form"
+            }
+        };
+        Some(format!(
+            "[controller] holds the PID{} of {loops} loop{}, but [data] has {inputs} inputs and {outputs} outputs; {remedy}",
+            if loops == 1 { "" } else { "s" },
+            if loops == 1 { "" } else { "s" },
+        ))
     }
 
     fn redesign_problem(&self) -> Option<String> {

@@ -146,6 +146,10 @@ impl Loops {
         }
     }
 
+    pub(super) fn count(&self) -> usize {
+        self.0.as_ref().map_or(0, Vec::len)
+    }
+
     /// From the errors to the commands, input k following output k; what is wrong is refused before.
     pub(super) fn system(&self, time: Discrete) -> Result<StateSpace<Discrete>> {
         let loops = self.0.as_deref().unwrap_or_default();

@@ -193,12 +193,19 @@ test("decimal commas, two inputs and two outputs, a page that is saved and opene
   await page.setInputFiles("#open-file", csv("paar.csv", axis({ channels: 2 }), { separator: ";", decimal: "," }));
   await page.waitForSelector("#traces canvas");
   assert.match(await page.textContent("#log-status"), /decimal comma/);
-  const controller = { difference_equation: { feedback: "negative", numerator: [[[2.406, -4.4, 2], [0]], [[0], [2.406, -4.4, 2]]], denominator: [1, -1] } };
-  await page.selectOption("#controller select >> nth=0", "json");
-  await page.fill("#controller textarea", JSON.stringify(controller));
-  await page.locator("h1").click();
+  // A PID in each loop: lists, and a slider for each.
+  await page.selectOption("#controller select >> nth=0", "pid");
+  for (const [label, value] of [["kp", "0,4; 0,4"], ["ki", "6; 6"], ["kd", "0,002"]]) await field(page, label, value);
+  await page.check("input[name=feedback][value=negative]");
+  assert.match(await page.inputValue("#toml"), /kp = \[0\.4, 0\.4\]/);
   assert.match(await identified(page), /Trusted for this loop/);
-  await page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Stable on all"));
+  const stable = () => page.waitForFunction(() => document.getElementById("gain-verdict").textContent.startsWith("Stable on all"));
+  await stable();
+  const before = await page.textContent("#gain-verdict");
+  await page.getByRole("slider", { name: /^kp, loop 2/ }).fill("0.1");
+  await page.waitForFunction(before => document.getElementById("gain-verdict").textContent !== before, before);
+  await stable();
+  assert.match(await page.locator("#gain-fields .fields input[data-name=kp]").inputValue(), /^0\.4; 0\.50/);
   const [saved] = await Promise.all([page.waitForEvent("download"), page.click("#save")]);
   const path = join(folder, "saved.html");
   await saved.saveAs(path);

@@ -133,14 +133,15 @@ fn each_loop_of_a_machine_gets_a_pid() {
     assert!(export(&["--loop", "3"]).stderr.contains("--loop is 3, but must be from 1 to 2"));
     assert_eq!(export(&["--loop", "2"]).code, Some(0));
     let header = fs::read_to_string(folder.join("pid_2.h")).expect("written");
-    fs::write(folder.join("run.toml"), settings.replace("kp = 2.0", "kp = [2.0]")).expect("written");
-    let unequal = youla(&folder, &["identify", "run.toml", "--out", "unequal", "--quiet"]);
-    assert!(
-        unequal.code == Some(2)
-            && unequal.stderr.contains("the list kp has another length (1) than ki (2); give each gain a number"),
-        "{}",
-        unequal.stderr
-    );
+    for (gains, says) in [
+        ("kp = [2.0]\nki = [5.0, 3.0]", "the list kp has another length (1) than ki (2); give each gain a number"),
+        ("kp = 2.0\nki = 5.0", "PID of 1 loop, but [data] has 2 inputs and 2 outputs; give each gain a list"),
+        ("kp = [2.0, 1.0, 1.0]", "PIDs of 3 loops, but [data] has 2 inputs and 2 outputs"),
+    ] {
+        fs::write(folder.join("run.toml"), settings.replace("kp = 2.0\nki = [5.0, 3.0]", gains)).expect("written");
+        let refused = youla(&folder, &["identify", "run.toml", "--out", "refused", "--quiet"]);
+        assert!(refused.code == Some(2) && refused.stderr.contains(says), "{}", refused.stderr);
+    }
     assert!(header.contains("PID from y2 to u2") && header.contains("pid_2_step(pid_2_state *s"), "{header}");
 }
 

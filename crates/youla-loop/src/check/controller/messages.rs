@@ -1,6 +1,6 @@
 //! The finding on a controller.
 
-use super::{Change, ControllerCheck};
+use super::{Change, ControllerCheck, Parts};
 use crate::check::finding::{Finding, Severity, Test, few};
 use crate::check::options::CheckOptions;
 use crate::error::Error;
@@ -107,7 +107,8 @@ impl ControllerCheck {
         let percent = few(100.0 * self.residual);
         if let Some(parts) = &self.parts {
             let [what, advice] = parts.words(first_row, &percent);
-            let severe = self.residual > options.controller_defect;
+            // A controller that did run as declared, but not always, spoils no result.
+            let severe = self.residual > options.controller_defect && matches!(parts, Parts::Scheduled(_));
             let severity = if severe { Severity::Defect } else { Severity::Caution };
             return Some(
                 Finding::new(Test::Controller, severity, record, what)

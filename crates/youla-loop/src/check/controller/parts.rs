@@ -18,15 +18,18 @@ use youla::lti::{Discrete, StateSpace, simulate, simulate_best};
 /// Chosen, not measured.
 const PARTS: usize = 40;
 const ROWS: usize = 25;
-/// Parts in a row under another controller, at least, and under the declared one somewhere: one or two hold a lost row, an outlier or a limit.
+/// Parts in a row under another controller, at least, and under the declared one somewhere: one or two hold an interruption.
 /// Chosen, not measured.
 const STRETCH: usize = 3;
 /// What a factor leaves of a part that it explains, in thresholds of a caution: a schedule varies within a part.
 /// Chosen, not measured.
 const EXPLAINED: f64 = 5.0;
-/// Share of the parts that factors must explain for a schedule, and the quotient of their quantiles at 5 and 95 % that is one.
+/// Share of the parts that factors must explain for a schedule, or the declared law for interruptions, and the quotient of the quantiles of
+/// factors at 5 and 95 % that is a schedule.
 /// Chosen, not measured.
 const MOST: f64 = 0.9;
+/// A factor below this is none.
+const NONE: f64 = 0.01;
 const SPREAD: f64 = 1.05;
 
 /// How the law of a record changes.
@@ -41,6 +44,8 @@ pub enum Parts {
         /// Least and largest factor on its gain in the others, where that explains them.
         factors: Option<[f64; 2]>,
     },
+    /// The declared controller explains all but a few parts, which begin and end at these samples: a reset, a held command, wrong samples.
+    Interrupted(Vec<Range<usize>>),
     /// A factor on the gain that varies explains the record: its quantiles at 5 and 95 % of the parts.
     Scheduled([f64; 2]),
 }
@@ -75,8 +80,11 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
     let inner = |i: &usize| !holds[*i] && (*i == 0 || !holds[i - 1]) && holds.get(i + 1) != Some(&true);
     let others: Vec<&Part> = (0..count).filter(inner).map(|i| &all[i]).collect();
     if longest.is_some_and(|longest| longest >= STRETCH) {
-        if stretches.iter().any(|s| !holds[s.start] && s.len() < STRETCH) || others.is_empty() {
-            return Ok(None);
+        let broken = stretches.iter().filter(|s| !holds[s.start]);
+        if broken.clone().any(|s| s.len() < STRETCH) || others.is_empty() {
+            let at = |s: &Range<usize>| s.start * rows..if s.end == count { log.w.nrows() } else { s.end * rows };
+            let few = holds.iter().filter(|holds| **holds).count() as f64 >= MOST * count as f64;
+            return Ok(few.then(|| Parts::Interrupted(broken.map(at).collect())));
         }
         let of = |s: &Range<usize>| {
             let to = if s.end == count { log.w.nrows() } else { s.end * rows };
@@ -144,24 +152,35 @@ fn ends(
 impl Parts {
     /// The finding and the remedy in words; `row` is that of the first sample.
     pub(super) fn words(&self, row: usize, percent: &str) -> [String; 2] {
-        let factor = |[low, high]: &[f64; 2]| match high / low < SPREAD {
-            true => format!("{} times its gain", few(0.5 * (low + high))),
-            false => format!("{} to {} times its gain", few(*low), few(*high)),
+        let factor = |[low, high]: &[f64; 2]| match (low.abs().max(high.abs()) < NONE, high / low < SPREAD) {
+            (true, _) => "no controller".to_owned(),
+            (_, true) => format!("one of {} times its gain", few(0.5 * (low + high))),
+            _ => format!("one of {} to {} times its gain", few(*low), few(*high)),
+        };
+        let list = |of: &[Range<usize>]| {
+            let rows = |at: &Range<usize>| format!("{} to {}", row + at.start, row + at.end - 1);
+            of.iter().map(rows).collect::<Vec<_>>().join(", ")
         };
         match self {
             Parts::Switched { holds, residual, factors } => [
                 format!(
                     "the controller changes in the record: the declared one explains rows {} but for {} %, and not the others{}",
-                    holds.iter().map(|at| format!("{} to {}", row + at.start, row + at.end - 1)).collect::<Vec<_>>().join(", "),
+                    list(holds),
                     few(100.0 * residual),
-                    factors.as_ref().map_or(String::new(), |of| format!(", which {} explain", factor(of)))
+                    factors.as_ref().map_or(String::new(), |of| format!(", in which {} ran", factor(of)))
                 ),
                 "Cut the record there by `take` and `skip`, and identify each part with the controller that ran".to_owned(),
+            ],
+            Parts::Interrupted(at) => [
+                format!("the declared controller explains all of the record but rows {}", list(at)),
+                "Look there for a reset of the integrator, a command that was held, a limit, or wrong samples; leave the rows out by `segments` \
+                 where the input is not the one that acted"
+                    .to_owned(),
             ],
             Parts::Scheduled(of) => [
                 format!(
                     "the gain of the controller varies along the record: the declared one does not explain {percent} % of the logged input, \
-                     {} explain it",
+                     {} does",
                     factor(of)
                 ),
                 "The model does not need the controller, but margins and certificate are those of the declared one: log with fixed gains, or \
@@ -231,14 +250,15 @@ mod tests {
         }
     }
 
-    /// Controls: the declared law, one with another gain throughout, and wrong samples of the output are neither.
+    /// Controls: the declared law and one with another gain throughout. Wrong samples of the output are named with their rows.
     #[test]
-    fn other_faults_are_no_change_of_the_controller() {
+    fn wrong_samples_are_an_interruption_and_another_gain_no_change() {
         for seed in 0..20 {
             assert_eq!(checked(seed, |_| 1.0, |_| 0.0).parts, None, "seed {seed}");
             assert_eq!(checked(seed, |_| 1.4, |_| 0.0).parts, None, "seed {seed}");
             let wrong = checked(seed, |_| 1.0, |t| if t / 60 == 30 { 3.0 } else { 0.0 });
-            assert!(wrong.residual > 0.01 && wrong.parts.is_none(), "seed {seed}: {wrong:?}");
+            let Some(Parts::Interrupted(at)) = &wrong.parts else { panic!("seed {seed}: {wrong:?}") };
+            assert!(at.len() == 1 && at[0].contains(&1800) && at[0].contains(&1859), "seed {seed}: {at:?}");
         }
     }
 }

@@ -41,6 +41,8 @@ pub struct PidExport {
     pub notches: Vec<([f64; 3], [[f64; 3]; 2])>,
     /// Dead time in samples that the machine has beside this code.
     pub delay: usize,
+    /// Time constant of a filter of the reference that keeps the overshoot of a step to 10 %, seconds; zero for none.
+    pub reference_filter: f64,
     /// Where it comes from.
     pub origin: String,
 }
@@ -122,6 +124,12 @@ fn head(pid: &PidExport) -> Vec<String> {
         format!("integral and derivative by {}", if pid.tustin { "Tustin's rule" } else { "backward differences" }),
         "no limit of u and no anti-windup in it: they are the machine's, and were not in the design".to_owned(),
     ];
+    if pid.reference_filter > 0.0 {
+        let by = number(pid.ts / (pid.ts + pid.reference_filter));
+        lines.push(format!(
+            "a filter of the reference, w = w + {by} (r - w) and w in the place of r, keeps the overshoot of a step to 10 %; it is not in this code"
+        ));
+    }
     if pid.delay > 0 {
         lines.push(format!("the dead time of {} samples is the machine's and not in it", pid.delay));
     }

@@ -178,6 +178,7 @@ mod tests {
             derivative: [6.0, 0.8],
             notches: vec![([180.0, 0.3, 0.1], [[1.0; 3]; 2])],
             delay: 0,
+            reference_filter: 0.0,
             origin: "a run".into(),
         }
     }

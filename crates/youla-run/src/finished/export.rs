@@ -132,6 +132,7 @@ pub fn pid_for_export(run: &Path, of_loop: Option<usize>) -> Result<PidExport> {
         derivative: if kd == 0.0 { [0.0; 2] } else { [kd * d[0] / lag[0], -lag[1] / lag[0]] },
         notches: c.notches.iter().map(notch).collect(),
         delay: c.delay,
+        reference_filter: found.steps.last().and_then(|s| s.reference_filters.get(place)).copied().unwrap_or(0.0),
         origin: origin(run, &path)?,
     })
 }

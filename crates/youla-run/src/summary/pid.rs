@@ -83,6 +83,11 @@ pub struct StepEntry {
     pub phase_margin: [Option<f64>; 3],
     /// Frequency up to which the sensitivity is below -3 dB, Hz.
     pub bandwidth: [Option<f64>; 3],
+    /// Overshoot of each loop after a step of its reference, upper end of the band, as a share of the step.
+    pub overshoots: Vec<Option<f64>>,
+    /// Time constant of a filter of each reference, `w += ts / (ts + T) (r - w)`, behind which the overshoot is 10 % at most, seconds; zero where it is
+    /// so without one.
+    pub reference_filters: Vec<f64>,
 }
 
 impl From<&PidRedesign> for PidEntry {
@@ -128,6 +133,8 @@ impl From<&PlannedStep> for StepEntry {
             peak_sensitivity: all(step.peak_sensitivity),
             phase_margin: all(step.phase_margin),
             bandwidth: all(step.bandwidth),
+            overshoots: step.overshoots.iter().copied().map(finite).collect(),
+            reference_filters: step.reference_filters.clone(),
         }
     }
 }

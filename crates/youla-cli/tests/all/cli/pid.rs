@@ -73,6 +73,10 @@ fn a_pid_comes_with_its_proof_and_a_way_back() {
     for statement in of_st.iter().filter(|l| l.contains(" * ")) {
         assert!(of_c.contains(statement), "{statement}");
     }
+    // The head states the filter of the reference that the plan asks for.
+    let filter = pid["steps"][2]["reference_filters"][0].as_f64().expect("a number");
+    let by = format!("w = w + {} (r - w)", 0.01 / (0.01 + filter));
+    assert!(filter > 0.0 && read("c-pid").contains(&by) && read("gains").contains(&by), "{by}: {}", read("gains"));
     // The statements, evaluated, are the controller of new_controller.json.
     let number = |name: &str| pid["controllers"][0][name].as_f64().expect("a number");
     let k = json(&folder.join("run/8-redesign/new_controller.json"));

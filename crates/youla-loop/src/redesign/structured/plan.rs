@@ -23,6 +23,9 @@ const LENGTH: f64 = 12.0;
 /// The longest step response, samples.
 const LONGEST: usize = 20_000;
 
+/// Overshoot that a step of the filtered reference has at most. Chosen: that of a second-order system with a damping ratio of 0.6.
+const OVERSHOOT: f64 = 0.1;
+
 /// One step of the way.
 #[derive(Debug, Clone)]
 pub struct PlannedStep {
@@ -44,6 +47,10 @@ pub struct PlannedStep {
     pub seconds: Vec<f64>,
     /// y of each loop at these, after a step of its own reference.
     pub responses: Vec<Vec<Band>>,
+    /// Overshoot of each loop, upper end of its band, as a share of the step; zero for none.
+    pub overshoots: Vec<f64>,
+    /// Time constant of a filter of each reference, seconds, behind which it is 10 % at most; zero where it is so without one.
+    pub reference_filters: Vec<f64>,
 }
 
 /// The steps, the running controller first; between the two the mean of their gains or, where the running
@@ -88,10 +95,12 @@ fn step(
     let tested = fresh.plants.iter().zip(&stable).filter(|(_, stable)| **stable).take(DRAWS);
     let plants: Vec<&Scenario> = tested.map(|(plant, _)| plant).collect();
     let every = samples.div_ceil(INSTANTS);
-    let bands = |i: usize| -> Result<Vec<Band>> {
-        let of = |p: &&Scenario| response(&p.plant, system, i, samples);
-        let responses: Vec<Vec<f64>> = plants.par_iter().map(of).collect::<Result<_>>()?;
-        Ok((0..samples).step_by(every).map(|t| band(responses.iter().map(|y| y[t]).collect())).collect())
+    let of_loop = |i: usize| -> Result<Vec<Vec<f64>>> {
+        plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect()
+    };
+    let all = (0..on.len()).map(of_loop).collect::<Result<Vec<_>>>()?;
+    let bands = |of: &Vec<Vec<f64>>| {
+        (0..samples).step_by(every).map(|t| band(of.iter().map(|y| y[t]).collect())).collect::<Vec<Band>>()
     };
     Ok(PlannedStep {
         name,
@@ -102,8 +111,36 @@ fn step(
         phase_margin: of(|m| m.phase),
         bandwidth: of(|m| m.bandwidth),
         seconds: (0..samples).step_by(every).map(|t| t as f64 * grid.ts).collect(),
-        responses: (0..on.len()).map(bands).collect::<Result<_>>()?,
+        responses: all.iter().map(bands).collect(),
+        overshoots: all.iter().map(|of| overshoot(of, 0.0)).collect(),
+        reference_filters: all.iter().map(|of| grid.ts * reference_filter(of)).collect(),
     })
+}
+
+/// Upper end of the band of the overshoots behind the filter `w += (r - w) / (1 + lag)` of the reference, which commutes with the loop.
+fn overshoot(responses: &[Vec<f64>], lag: f64) -> f64 {
+    let highest = |y: &Vec<f64>| {
+        let mut w = 0.0;
+        y.iter().fold(1.0, |most: f64, y| {
+            w += (y - w) / (1.0 + lag);
+            most.max(w)
+        })
+    };
+    band(responses.iter().map(highest).collect())[2] - 1.0
+}
+
+/// The least time constant, in samples and to 1 %, behind which a step overshoots by [`OVERSHOOT`] at most.
+fn reference_filter(responses: &[Vec<f64>]) -> f64 {
+    let longest = responses.first().map_or(0, Vec::len) as f64;
+    if responses.is_empty() || overshoot(responses, 0.0) <= OVERSHOOT {
+        return 0.0;
+    }
+    let (mut low, mut high) = (0.01, longest);
+    while high > 1.01 * low {
+        let middle = (low * high).sqrt();
+        if overshoot(responses, middle) > OVERSHOOT { low = middle } else { high = middle }
+    }
+    high
 }
 
 /// y of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r.

@@ -205,6 +205,14 @@ fn what_is_promised_holds_on_the_machine() {
     assert!(exact.output_sensitivity.value < 2.0, "{:?}", exact.output_sensitivity);
     assert!(exact.outputs[0].phase.unwrap().degrees > 28.0, "{:?}", exact.outputs[0].phase);
     assert!(new.steps.iter().all(|s| s.unstable == 0) && new.steps.len() == 3);
+    // Behind the filter of the reference a step of the machine itself overshoots by little more than 10 %.
+    let (last, port) = (&new.steps[2], with_input_port(&new.system).unwrap());
+    assert!(last.overshoots[0] > 0.1 && last.reference_filters[0] > 0.0, "{last:?}");
+    let looped = closed_loop(&machine(8.0), &port).unwrap().part(1..2, 1..2);
+    let lag = last.reference_filters[0] / 1e-3;
+    let r = Mat::from_fn(3000, 1, |t, _| (lag / (1.0 + lag)).powi(t as i32 + 1) - 1.0);
+    let y = simulate(&looped, r.as_ref(), &vec![0.0; looped.order()]).unwrap() - &r;
+    assert!((y.col(0).iter().fold(0.0, |a: f64, b| a.max(*b)) - 1.1).abs() < 0.02);
     // The last response ends at its reference.
     assert!((new.steps[2].responses[0].last().unwrap()[1] - 1.0).abs() < 0.05);
 }

@@ -155,7 +155,7 @@ fn gain(value: f64) -> String {
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
-/// Sensitivities and step responses with their bands.
+/// Sensitivities, step responses and commands with their bands.
 pub(crate) fn figure(new: &PidRedesign) -> Figure {
     let axis = |label: &str, unit: &str, log| Axis { label: label.into(), unit: unit.into(), log, ..Axis::default() };
     let decibels = |bands: &[Band]| bands.iter().map(|b| b.map(decibel)).collect::<Vec<Band>>();
@@ -163,29 +163,30 @@ pub(crate) fn figure(new: &PidRedesign) -> Figure {
     let of = |key: &str, bands: &[Band]| (key.to_owned(), hz.clone(), decibels(bands));
     let several = new.controllers.len() > 1;
     let title = |what: &str, i: usize| if several { format!("{what}, loop {}", i + 1) } else { what.to_owned() };
-    let panels = |(i, [before, after]): (usize, &[Vec<Band>; 2])| {
-        let sensitivity = panel(
-            (&title("Sensitivity", i), axis("Frequency", "Hz", true), axis("Magnitude", "dB", false)),
-            vec![of("present", before), of("new", after)],
-        );
-        let response = |s: &PlannedStep| (key(s).to_owned(), s.seconds.clone(), s.responses[i].clone());
-        let step = panel(
-            (&title("Step of the reference", i), axis("Time", "s", false), axis("y per step", "", false)),
-            new.steps.iter().map(response).collect(),
-        );
-        [sensitivity, step]
+    let loops = new.proof.sensitivities.iter().enumerate();
+    let sensitivity = |(i, [before, after]): (usize, &[Vec<Band>; 2])| {
+        let axes = (axis("Frequency", "Hz", true), axis("Magnitude", "dB", false));
+        panel(&title("Sensitivity", i), axes, vec![of("present", before), of("new", after)])
     };
+    let over_time = |what: &str, i: usize, y: &str, pick: &dyn Fn(&PlannedStep) -> &Vec<Band>| {
+        let curves = new.steps.iter().map(|s| (key(s).to_owned(), s.seconds.clone(), pick(s).clone())).collect();
+        panel(&title(what, i), (axis("Time", "s", false), axis(y, "", false)), curves)
+    };
+    let step = |i: usize| over_time("Step of the reference", i, "y per step", &|s| &s.responses[i]);
+    let command = |i: usize| over_time("Command after the step", i, "u per step", &|s| &s.commands[i]);
+    let all = 0..new.controllers.len();
+    let panels = loops.map(sensitivity).chain(all.clone().map(step)).chain(all.map(command)).collect();
     Figure {
         key: "response".into(),
         title: "The loop, running and new".into(),
         caption: "Medians and 95 % bands over models of the region that the search has not seen.".into(),
         layout: Layout::Beside,
-        panels: new.proof.sensitivities.iter().enumerate().flat_map(panels).collect(),
+        panels,
         ..Figure::default()
     }
 }
 
-fn panel((title, x, y): (&str, Axis, Axis), of: Vec<(String, Vec<f64>, Vec<Band>)>) -> Panel {
+fn panel(title: &str, (x, y): (Axis, Axis), of: Vec<(String, Vec<f64>, Vec<Band>)>) -> Panel {
     let at = |bands: &[Band], k: usize| bands.iter().map(|b| b[k]).collect::<Vec<f64>>();
     let regions = of.iter().map(|(method, x, bands)| Region {
         method: method.clone(),

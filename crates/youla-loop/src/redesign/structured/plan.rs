@@ -47,6 +47,8 @@ pub struct PlannedStep {
     pub seconds: Vec<f64>,
     /// y of each loop at these, after a step of its own reference.
     pub responses: Vec<Vec<Band>>,
+    /// u of each loop at these, after the same step.
+    pub commands: Vec<Vec<Band>>,
     /// Overshoot of each loop, upper end of its band, as a share of the step; zero for none.
     pub overshoots: Vec<f64>,
     /// Time constant of a filter of each reference, seconds, behind which it is 10 % at most; zero where it is so without one.
@@ -95,10 +97,17 @@ fn step(
     let tested = fresh.plants.iter().zip(&stable).filter(|(_, stable)| **stable).take(DRAWS);
     let plants: Vec<&Scenario> = tested.map(|(plant, _)| plant).collect();
     let every = samples.div_ceil(INSTANTS);
-    let of_loop = |i: usize| -> Result<Vec<Vec<f64>>> {
-        plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect()
+    let of_loop = |i: usize| -> Result<[Vec<Vec<f64>>; 2]> {
+        let both = plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect::<Result<Vec<_>>>()?;
+        let (y, u) = both.into_iter().unzip();
+        Ok([y, u])
     };
-    let all = (0..on.len()).map(of_loop).collect::<Result<Vec<_>>>()?;
+    let (mut all, mut commands) = (Vec::new(), Vec::new());
+    for i in 0..on.len() {
+        let [y, u] = of_loop(i)?;
+        all.push(y);
+        commands.push(u);
+    }
     let bands = |of: &Vec<Vec<f64>>| {
         (0..samples).step_by(every).map(|t| band(of.iter().map(|y| y[t]).collect())).collect::<Vec<Band>>()
     };
@@ -112,6 +121,7 @@ fn step(
         bandwidth: of(|m| m.bandwidth),
         seconds: (0..samples).step_by(every).map(|t| t as f64 * grid.ts).collect(),
         responses: all.iter().map(bands).collect(),
+        commands: commands.iter().map(bands).collect(),
         overshoots: all.iter().map(|of| overshoot(of, 0.0)).collect(),
         reference_filters: all.iter().map(|of| grid.ts * reference_filter(of)).collect(),
     })
@@ -143,13 +153,18 @@ fn reference_filter(responses: &[Vec<f64>]) -> f64 {
     high
 }
 
-/// y of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r.
-fn response(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>, i: usize, samples: usize) -> Result<Vec<f64>> {
+/// y and u of a loop after a unit step of its reference: the noise input of the loop is -r, its output y - r.
+fn response(
+    plant: &StateSpace<Discrete>,
+    k: &StateSpace<Discrete>,
+    i: usize,
+    samples: usize,
+) -> Result<(Vec<f64>, Vec<f64>)> {
     let port = plant.inputs() + i;
-    let looped = closed_loop(plant, &with_input_port(k)?)?.part(port..port + 1, port..port + 1);
+    let looped = closed_loop(plant, &with_input_port(k)?)?.part(0..plant.inputs() + plant.outputs(), port..port + 1);
     let start = vec![0.0; looped.order()];
     let y = simulate(&looped, Mat::from_fn(samples, 1, |_, _| -1.0).as_ref(), &start)?;
-    Ok((0..samples).map(|t| 1.0 + y[(t, 0)]).collect())
+    Ok((0..samples).map(|t| (1.0 + y[(t, port)], y[(t, i)])).unzip())
 }
 
 /// Half way: the geometric mean of gains and filters, the mean where one is missing or has another sign; notches of half their depth in

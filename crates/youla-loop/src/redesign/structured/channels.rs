@@ -47,7 +47,7 @@ fn krylov(a: MatRef<'_, f64>, b: MatRef<'_, f64>, mut size: f64) -> Mat<f64> {
         if left <= ROUNDING * size {
             break;
         }
-        next = next * Scale(1.0 / left);
+        next *= Scale(1.0 / left);
         basis =
             Mat::from_fn(
                 a.nrows(),

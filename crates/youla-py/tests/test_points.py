@@ -70,4 +70,5 @@ def test_each_loop_of_a_machine_gets_a_pid() -> None:
     new = youla.redesign(youla.identify(record, controller=controller, feedback="negative"), structure="pid", pid={"terms": "pi"})
     assert new.promised["proof"]["holds"] and [round(c["ki"], 6) for c in new.promised["running"]] == [5.0, 3.0]
     assert min(new.promised["rejections"]) > 1.5 and {f["loop"] for f in new.promised["figures"]} == {1, 2}
+    assert repr(new).count("kp ") == 2 and "proved on" in repr(new)
     assert youla.certify(tanks, new.controller, feedback="positive").stable

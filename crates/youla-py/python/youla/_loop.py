@@ -224,8 +224,7 @@ class Redesign:
 
     def __repr__(self) -> str:
         if "proof" in self.promised:
-            gains = self.promised["controller"]
-            named = ", ".join(f"{key} {gains[key]:.4g}" for key in ("kp", "ki", "kd"))
+            named = "; ".join(", ".join(f"{key} {gains[key]:.4g}" for key in ("kp", "ki", "kd")) for gains in self.promised["controllers"])
             return f"<youla.Redesign: {named}; {'proved' if self.promised['proof']['holds'] else 'NOT proved'} on {self.promised['proof']['models']} models>"
         loops = [f"{key} {of['least_damping']:.4g}" for key, of in self.promised.items() if isinstance(of, dict) and of.get("least_damping") is not None]
         return f"<youla.Redesign: controller of order {self.controller.order}; least damping {', '.join(loops) or 'unknown'}>"

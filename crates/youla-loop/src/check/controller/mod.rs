@@ -137,13 +137,17 @@ pub fn controller(
         let least = HELPS * residual;
         change = change.filter(|(_, left)| *left < least && *left < 5.0 * options.controller_caution);
     }
+    // A change that leaves more than a caution may only resemble what happened: a law that explains every part goes before it.
+    let told = change.as_ref().is_some_and(|(_, left)| *left <= options.controller_caution);
+    let varies = (excited || guided) && residual > options.controller_caution && !told;
+    let parts = if varies { parts::parts(&log, k, options.controller_caution)? } else { None };
+    let parts = parts.filter(|parts| change.is_none() || parts.explain_all());
+    let change = change.filter(|_| parts.is_none());
     let contained = if excited && change.is_none() && residual > options.controller_caution {
         Some(log.contained(k)?)
     } else {
         None
     };
-    let varies = (excited || guided) && change.is_none() && residual > options.controller_caution;
-    let parts = if varies { parts::parts(&log, k, options.controller_caution)? } else { None };
     Ok(ControllerCheck { residual, excited, guided, contained, change, parts })
 }
 

@@ -150,6 +150,11 @@ fn ends(
 }
 
 impl Parts {
+    /// Whether each part is explained, by the declared law or by a factor on its gain.
+    pub(super) fn explain_all(&self) -> bool {
+        matches!(self, Parts::Scheduled(_) | Parts::Switched { factors: Some(_), .. })
+    }
+
     /// The finding and the remedy in words; `row` is that of the first sample.
     pub(super) fn words(&self, row: usize, percent: &str) -> [String; 2] {
         let factor = |[low, high]: &[f64; 2]| match (low.abs().max(high.abs()) < NONE, high / low < SPREAD) {

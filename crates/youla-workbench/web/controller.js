@@ -38,8 +38,7 @@ function formFields(form, of, changes, forms = FORMS) {
     const [table, name] = path.includes(".") ? path.split(".") : ["", path], values = table ? of[table] ?? {} : of;
     const changed = (/** @type {string} */ key, /** @type {any} */ value) => table ? changes(table, { ...values, [key]: value }) : changes(key, value);
     if (CHOICES[kind]) return choiceField({ label, value: values[name], options: CHOICES[kind], changed: value => changed(name, value) });
-    if (kind.startsWith("gain")) return gainField({ label, unit, name, optional: kind !== "gain", value: values[name], changed: value => changed(name, value) });
-    if (kind.startsWith("number") || kind === "count") return numberField({ label, unit, name, optional: kind !== "number", value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
+    if (/^(number|gain|count)/.test(kind)) return numberField({ label, unit, name, optional: !["number", "gain"].includes(kind), several: kind.startsWith("gain"), value: values[name], changed: value => changed(name, kind === "count" ? Math.max(0, Math.round(value ?? 0)) || undefined : value ?? undefined) });
     const input = element("input", { type: "text", size: 34, value: values[name] === undefined ? "" : kind === "json" ? JSON.stringify(values[name]) : [values[name]].flat(2).join(", "), autocomplete: "off" });
     input.addEventListener("change", () => {
       let read = null;

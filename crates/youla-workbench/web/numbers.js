@@ -24,27 +24,17 @@ function complain(input, what) {
   if (what) input.reportValidity();
 }
 
-/** A field for a number. @param {{ label: string, value?: number | null, unit?: string, changed: (value: number | null) => void, optional?: boolean, name?: string }} of */
-function numberField({ label, value, unit, changed, optional, name }) {
-  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: value == null ? "" : String(value), "data-name": name, autocomplete: "off" });
+/** Gains of the loops as one types them. @param {number | number[] | null | undefined} value */
+const gainText = value => value == null ? "" : [value].flat().join("; ");
+
+/** A field for a number or, where `several` may be given, one for each loop with semicolons between them.
+ * @param {{ label: string, value?: number | number[] | null, unit?: string, changed: (value: any) => void, optional?: boolean, name?: string, several?: boolean }} of */
+function numberField({ label, value, unit, changed, optional, name, several }) {
+  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: gainText(value), "data-name": name, autocomplete: "off", title: several ? "A number, or one for each loop: 2; 1.5" : null });
   input.addEventListener("change", () => {
-    const empty = input.value.trim() === "", read = numberOf(input.value), wrong = read == null && !(empty && optional);
-    complain(input, wrong && "A number, such as 0.5 or 2e-3");
+    const empty = input.value.trim() === "", read = numberOf(input.value) ?? (several && input.value.includes(";") ? numbersOf(input.value) : null), wrong = read == null && !(empty && optional);
+    complain(input, wrong && `A number, such as 0.5 or 2e-3${several ? ", or one for each loop, such as 2; 1.5" : ""}`);
     if (!wrong) changed(read);
-  });
-  return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
-}
-
-/** Gains of the loops as one types them. @param {number | number[] | undefined} value */
-const gainText = value => value === undefined ? "" : [value].flat().join("; ");
-
-/** A field for a gain, or for one of each loop with semicolons between them. @param {{ label: string, value?: number | number[], unit?: string, changed: (value: number | number[] | undefined) => void, optional?: boolean, name: string }} of */
-function gainField({ label, value, unit, changed, optional, name }) {
-  const input = element("input", { type: "text", inputmode: "decimal", size: 10, value: gainText(value), "data-name": name, autocomplete: "off", title: "A number, or one for each loop: 2; 1.5" });
-  input.addEventListener("change", () => {
-    const empty = input.value.trim() === "", read = numberOf(input.value) ?? (input.value.includes(";") ? numbersOf(input.value) : null), wrong = read == null && !(empty && optional);
-    complain(input, wrong && "A number, such as 0.5 or 2e-3, or one for each loop, such as 2; 1.5");
-    if (!wrong) changed(read ?? undefined);
   });
   return element("label", { class: "field" }, element("span", {}, unit ? `${label} (${unit})` : label), input);
 }

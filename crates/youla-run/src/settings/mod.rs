@@ -228,10 +228,9 @@ impl RunSettings {
                 "a PID leads an output to its input; state any other controller in [controller.difference_equation] or another form"
             }
         };
+        let s = if loops == 1 { "" } else { "s" };
         Some(format!(
-            "[controller] holds the PID{} of {loops} loop{}, but [data] has {inputs} inputs and {outputs} outputs; {remedy}",
-            if loops == 1 { "" } else { "s" },
-            if loops == 1 { "" } else { "s" },
+            "[controller] holds the PID{s} of {loops} loop{s}, but [data] has {inputs} inputs and {outputs} outputs; {remedy}"
         ))
     }
 

@@ -89,9 +89,9 @@ pub struct IdealPid {
 }
 
 impl ParallelPid {
-    pub(super) fn parts(&self) -> Loops {
+    pub(super) fn parts(&self) -> PidLoops {
         let Self { discretisation, kp, ki, kd, derivative_filter: filter, .. } = self;
-        Loops::new([("kp", kp), ("ki", ki), ("kd", kd), ("derivative_filter", filter)], |[kp, ki, kd, filter]| Pid {
+        PidLoops::new([("kp", kp), ("ki", ki), ("kd", kd), ("derivative_filter", filter)], |[kp, ki, kd, filter]| Pid {
             discretisation: *discretisation,
             kp,
             ki,
@@ -103,40 +103,35 @@ impl ParallelPid {
 }
 
 impl IdealPid {
-    pub(super) fn parts(&self) -> Loops {
+    pub(super) fn parts(&self) -> PidLoops {
         let Self { discretisation, kp, ti, td, derivative_filter: filter, .. } = self;
         let never = LoopGain::One(f64::INFINITY);
         let times = ti.as_ref().unwrap_or(&never);
-        Loops::new([("kp", kp), ("ti", times), ("td", td), ("derivative_filter", filter)], |[kp, ti, td, filter]| Pid {
-            discretisation: *discretisation,
-            kp,
-            ki: kp / ti,
-            kd: kp * td,
-            filter,
-            integral_time: Some(ti),
+        PidLoops::new([("kp", kp), ("ti", times), ("td", td), ("derivative_filter", filter)], |[kp, ti, td, filter]| {
+            Pid { discretisation: *discretisation, kp, ki: kp / ti, kd: kp * td, filter, integral_time: Some(ti) }
         })
     }
 }
 
 /// The PIDs of all loops, or what is wrong with their number.
-pub(super) struct Loops(std::result::Result<Vec<Pid>, String>);
+pub(super) struct PidLoops(std::result::Result<Vec<Pid>, String>);
 
-impl Loops {
+impl PidLoops {
     fn new(gains: [(&str, &LoopGain); 4], of: impl Fn([f64; 4]) -> Pid) -> Self {
         let mut lists = gains.iter().filter_map(|(key, gain)| Some((*key, gain.loops()?)));
         let Some((key, loops)) = lists.next() else {
-            return Loops(Ok(vec![of(gains.map(|(_, gain)| gain.of(0)))]));
+            return PidLoops(Ok(vec![of(gains.map(|(_, gain)| gain.of(0)))]));
         };
         let all = "give each gain a number, or a list with one for each loop";
         if loops == 0 {
-            return Loops(Err(format!("[controller] {key} is an empty list; {all}")));
+            return PidLoops(Err(format!("[controller] {key} is an empty list; {all}")));
         }
         if let Some((other, count)) = lists.find(|(_, count)| *count != loops) {
-            return Loops(Err(format!(
+            return PidLoops(Err(format!(
                 "[controller] the list {key} has another length ({loops}) than {other} ({count}); {all}"
             )));
         }
-        Loops(Ok((0..loops).map(|k| of(gains.map(|(_, gain)| gain.of(k)))).collect()))
+        PidLoops(Ok((0..loops).map(|k| of(gains.map(|(_, gain)| gain.of(k)))).collect()))
     }
 
     pub(super) fn problem(&self) -> Option<String> {

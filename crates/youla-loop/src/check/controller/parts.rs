@@ -28,9 +28,9 @@ const EXPLAINED: f64 = 5.0;
 /// factors at 5 and 95 % that is a schedule.
 /// Chosen, not measured.
 const MOST: f64 = 0.9;
+const SPREAD: f64 = 1.05;
 /// A factor below this is none.
 const NONE: f64 = 0.01;
-const SPREAD: f64 = 1.05;
 
 /// How the law of a record changes.
 #[derive(Debug, Clone, PartialEq)]
@@ -65,8 +65,10 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
         return Ok(None);
     }
     let constant = with_constant(k)?;
-    let of = |i: usize| part(log, &constant, i * rows..if i + 1 == count { log.w.nrows() } else { (i + 1) * rows });
-    let all = (0..count).map(of).collect::<Result<Vec<Part>>>()?;
+    // The last part has the rest of the rows.
+    let samples =
+        |parts: Range<usize>| parts.start * rows..if parts.end == count { log.w.nrows() } else { parts.end * rows };
+    let all = (0..count).map(|i| part(log, &constant, samples(i..i + 1))).collect::<Result<Vec<Part>>>()?;
     let holds: Vec<bool> = all.iter().map(|p| p.declared <= caution).collect();
     let explained = |p: &&Part| p.left <= EXPLAINED * caution;
     let factors = |of: &[&Part]| {
@@ -80,26 +82,23 @@ pub(super) fn parts(log: &Log<'_>, k: &StateSpace<Discrete>, caution: f64) -> Re
     let inner = |i: &usize| !holds[*i] && (*i == 0 || !holds[i - 1]) && holds.get(i + 1) != Some(&true);
     let others: Vec<&Part> = (0..count).filter(inner).map(|i| &all[i]).collect();
     if longest.is_some_and(|longest| longest >= STRETCH) {
-        let broken = stretches.iter().filter(|s| !holds[s.start]);
-        if broken.clone().any(|s| s.len() < STRETCH) || others.is_empty() {
-            let at = |s: &Range<usize>| s.start * rows..if s.end == count { log.w.nrows() } else { s.end * rows };
-            let few = holds.iter().filter(|holds| **holds).count() as f64 >= MOST * count as f64;
-            return Ok(few.then(|| Parts::Interrupted(broken.map(at).collect())));
+        let (held, broken): (Vec<_>, Vec<_>) = stretches.into_iter().partition(|s| holds[s.start]);
+        if broken.iter().any(|s| s.len() < STRETCH) || others.is_empty() {
+            let most = holds.iter().filter(|holds| **holds).count() as f64 >= MOST * count as f64;
+            return Ok(most.then(|| Parts::Interrupted(broken.into_iter().map(samples).collect())));
         }
-        let of = |s: &Range<usize>| {
-            let to = if s.end == count { log.w.nrows() } else { s.end * rows };
-            ends(log, k, s.start * rows..to, rows, caution)
-        };
-        let held = stretches.iter().filter(|s| holds[s.start]).map(of).collect::<Result<Vec<_>>>()?;
+        let held = held.into_iter().map(|s| ends(log, k, samples(s), rows, caution)).collect::<Result<Vec<_>>>()?;
         let left = held.iter().map(|at| residual(log, k, at)).collect::<Result<Vec<f64>>>()?;
         let residual = left.into_iter().fold(0.0, f64::max);
         let factors = others.iter().all(explained).then(|| factors(&others));
         return Ok(Some(Parts::Switched { holds: held, residual, factors }));
     }
-    let told: Vec<&Part> = all.iter().filter(explained).collect();
-    let [low, high] = factors(&told.iter().copied().chain(told.is_empty().then_some(&all[0])).collect::<Vec<_>>());
-    let most = told.len() as f64 >= MOST * count as f64;
-    Ok((most && low > 0.0 && high > SPREAD * low).then_some(Parts::Scheduled([low, high])))
+    let scaled: Vec<&Part> = all.iter().filter(explained).collect();
+    if (scaled.len() as f64) < MOST * count as f64 {
+        return Ok(None);
+    }
+    let [low, high] = factors(&scaled);
+    Ok((low > 0.0 && high > SPREAD * low).then_some(Parts::Scheduled([low, high])))
 }
 
 fn part(log: &Log<'_>, constant: &StateSpace<Discrete>, at: Range<usize>) -> Result<Part> {

@@ -48,14 +48,7 @@ fn krylov(a: MatRef<'_, f64>, b: MatRef<'_, f64>, mut size: f64) -> Mat<f64> {
             break;
         }
         next *= Scale(1.0 / left);
-        basis =
-            Mat::from_fn(
-                a.nrows(),
-                basis.ncols() + 1,
-                |i, j| {
-                    if j < basis.ncols() { basis[(i, j)] } else { next[(i, 0)] }
-                },
-            );
+        basis.resize_with(a.nrows(), basis.ncols() + 1, |i, _| next[(i, 0)]);
         next = a * &next;
         size = next.norm_l2();
     }

@@ -20,7 +20,7 @@ pub(super) struct Point {
     pub(super) cost: f64,
 }
 
-/// Searches from a point with a step size; `steps` evaluations of the cost, which is told the least cost so far and may return anything larger
+/// Searches from a point with a step size; `steps` evaluations of the cost, which is given the least cost so far and may return anything larger
 /// for a larger one. The same seed gives the same result.
 pub(super) fn evolve(
     start: Point,

@@ -38,7 +38,7 @@ use pid::whole;
 use plan::plan;
 use proof::prove;
 use recognise::recognise;
-use scenarios::{Grid, Running, Scenario, Scenarios};
+use scenarios::{Grid, Judged, Scenario, Scenarios};
 use search::Search;
 use space::Space;
 use youla::control::{closed_loop, with_input_port};
@@ -114,13 +114,7 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
     options.check()?;
     let PidProblem { points, running, delay } = problem;
     let (running, delay) = (*running, *delay);
-    if let Some(what) = unsupported(problem)? {
-        let instead = "leave `structure` out: method = \"lqg\" and \"youla\" design for any number";
-        return Err(Error::Method(youla::Error::Unsupported { what, instead }));
-    }
-    if running.is_zero() {
-        let what = "a PID for a machine that no controller ran";
-        let instead = "state the running controller in [controller]: its command effort is the measure of the new one";
+    if let Some((what, instead)) = unsupported(problem)? {
         return Err(Error::Method(youla::Error::Unsupported { what, instead }));
     }
     let mut resonant = Vec::new();
@@ -129,9 +123,8 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         resonant.extend([(*plant).clone(), closed_loop(plant, &with_input_port(running)?)?]);
     }
     let grid = Grid::new(running.time(), &resonant.iter().collect::<Vec<_>>())?;
-    let loops = each(running)?;
-    let on = grid.each(&loops)?;
-    let ran = Running { system: running, on: &on };
+    let on = grid.each(running)?;
+    let ran = Judged { system: running, on: &on };
     let estimates: Option<Vec<Scenario>> =
         points.iter().map(|(plant, _)| Scenario::new(&grid, (*plant).clone(), ran, |_| {})).collect();
     let missing = || Error::NoPid { reason: "the running controller has no margins on the model".into() };
@@ -147,7 +140,7 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         Some(rule) => vec![rule],
         None => vec![Discretisation::BackwardEuler, Discretisation::Tustin],
     };
-    let known = loops.iter().map(|k| recognise(&grid, k, &rules, delay)).collect::<Result<Vec<_>>>()?;
+    let known = each(running)?.iter().map(|k| recognise(&grid, k, &rules, delay)).collect::<Result<Vec<_>>>()?;
     let space = |(known, c): (&Option<PidController>, &OnGrid)| {
         let discretisation = known.as_ref().map_or(rules[0], |c| c.gains.discretisation);
         // Of a gain, of an integral (phase -90 degrees) and of what lies between.
@@ -159,9 +152,9 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
         Search { spaces, grid: &grid, estimate: &estimate, drawn: &drawn, running: ran, running_gains: &known };
     let controllers = search.run()?;
     let system = whole(&controllers, running.time())?;
-    let new = grid.each(&each(&system)?)?;
+    let new = Judged { system: &system, on: &grid.each(&system)? };
     let fresh = draws(band.seed.wrapping_add(1))?;
-    let proofs = fresh.iter().map(|fresh| prove(&grid, fresh, &on, (&system, &new), options));
+    let proofs = fresh.iter().map(|fresh| prove(&grid, fresh, &on, new, options));
     let worse = |a: &PidProof, b: &PidProof| a.unstable.cmp(&b.unstable).then(a.at_most.total_cmp(&b.at_most));
     let proof = proofs.collect::<Result<Vec<_>>>()?.into_iter().max_by(worse).ok_or_else(missing)?;
     let fresh = Scenarios::joined(fresh, std::iter::empty());
@@ -170,7 +163,7 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
     Ok(PidRedesign {
         rejections: controllers.iter().zip(&on).map(|(new, ran)| size(new) / ran.response[0].norm()).collect(),
         proof,
-        steps: plan(&grid, &fresh, (running, running_gains.as_deref()), (&system, &controllers))?,
+        steps: plan(&grid, &fresh, (ran, running_gains.as_deref()), (new, &controllers))?,
         running: running.clone(),
         running_gains,
         options: options.clone(),
@@ -179,12 +172,17 @@ pub fn design_pid(problem: &PidProblem<'_>, options: &PidOptions, band: &BandOpt
     })
 }
 
-/// What no PID is designed for.
-fn unsupported(problem: &PidProblem<'_>) -> Result<Option<&'static str>> {
-    let sizes = |(plant, _): &(&StateSpace<Discrete>, &Region)| plant.inputs() != plant.outputs();
-    if problem.points.iter().any(sizes) {
-        return Ok(Some("a PID for each loop of a machine with more inputs than outputs, or fewer"));
+/// What no PID is designed for, and what to do instead.
+fn unsupported(problem: &PidProblem<'_>) -> Result<Option<(&'static str, &'static str)>> {
+    let other = "leave `structure` out: method = \"lqg\" and \"youla\" design for any number";
+    if problem.points.iter().any(|(plant, _)| plant.inputs() != plant.outputs()) {
+        return Ok(Some(("a PID for each loop of a machine with more inputs than outputs, or fewer", other)));
     }
-    let what = "a PID for each loop where the running controller leads an output to the input of another loop";
-    Ok(couples(problem.running)?.then_some(what))
+    if couples(problem.running)? {
+        let what = "a PID for each loop where the running controller leads an output to the input of another loop";
+        return Ok(Some((what, other)));
+    }
+    let what = "a PID for a machine that no controller ran";
+    let state = "state the running controller in [controller]: its command effort is the measure of the new one";
+    Ok(problem.running.is_zero().then_some((what, state)))
 }

@@ -1,12 +1,10 @@
 //! The way from the running controller to a new one: the running gains, half way, the new gains, each with its margins and its
 //! response to a step of the reference over fresh draws.
 
-use super::channels::each;
 use super::margins::GridMargins;
-use super::margins::OnGrid;
 use super::pid::{Notch, PidController, PidGains, whole};
 use super::proof::{Band, band};
-use super::scenarios::{Grid, Scenario, Scenarios};
+use super::scenarios::{Grid, Judged, Scenario, Scenarios};
 use crate::error::Result;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -60,24 +58,24 @@ pub struct PlannedStep {
 pub(super) fn plan(
     grid: &Grid,
     fresh: &Scenarios,
-    (running, of_running): (&StateSpace<Discrete>, Option<&[PidController]>),
-    (new, of_new): (&StateSpace<Discrete>, &[PidController]),
+    (running, of_running): (Judged<'_>, Option<&[PidController]>),
+    (new, of_new): (Judged<'_>, &[PidController]),
 ) -> Result<Vec<PlannedStep>> {
     let half = of_running.map(|of| of.iter().zip(of_new).map(|(a, b)| mean(a, b)).collect::<Vec<_>>());
     let between = match &half {
-        Some(of) => whole(of, new.time())?,
-        None => running.plus(new)?.map_output(&(faer::Scale(0.5) * eye(of_new.len()))),
+        Some(of) => whole(of, new.system.time())?,
+        None => running.system.plus(new.system)?.map_output(&(faer::Scale(0.5) * eye(of_new.len()))),
     };
-    let on = grid.each(&each(new)?)?;
-    let slowest = fresh.judge(grid, &on).into_iter().flatten().map(|of| GridMargins::worst(&of).bandwidth).collect();
+    let between = Judged { system: &between, on: &grid.each(&between)? };
+    let slowest = fresh.judge(grid, new.on).into_iter().flatten().map(|of| GridMargins::worst(&of).bandwidth).collect();
     let length = LENGTH / (TAU * band(slowest)[1].max(1e-12) * grid.ts);
     let samples = (length as usize).clamp(INSTANTS, LONGEST);
     let steps = [
         ("running", of_running.map(<[_]>::to_vec), running),
-        ("half", half, &between),
+        ("half", half, between),
         ("new", Some(of_new.to_vec()), new),
     ]
-    .map(|(name, controllers, system)| step(grid, fresh, (name, controllers, system), samples))
+    .map(|(name, controllers, judged)| step(grid, fresh, (name, controllers, judged), samples))
     .into_iter()
     .collect::<Result<Vec<_>>>()?;
     Ok(steps.into_iter().filter(|s| s.unstable == 0 || s.name != "half").collect())
@@ -86,28 +84,20 @@ pub(super) fn plan(
 fn step(
     grid: &Grid,
     fresh: &Scenarios,
-    (name, controllers, system): (&'static str, Option<Vec<PidController>>, &StateSpace<Discrete>),
+    (name, controllers, Judged { system, on }): (&'static str, Option<Vec<PidController>>, Judged<'_>),
     samples: usize,
 ) -> Result<PlannedStep> {
     let stable = fresh.stable(system)?;
-    let on: Vec<OnGrid> = grid.each(&each(system)?)?;
-    let judged = fresh.judge(grid, &on).into_iter().zip(&stable).filter_map(|(of, stable)| of.filter(|_| *stable));
+    let judged = fresh.judge(grid, on).into_iter().zip(&stable).filter_map(|(of, stable)| of.filter(|_| *stable));
     let found: Vec<GridMargins> = judged.map(|of| GridMargins::worst(&of)).collect();
     let of = |pick: fn(&GridMargins) -> f64| band(found.iter().map(pick).collect());
     let tested = fresh.plants.iter().zip(&stable).filter(|(_, stable)| **stable).take(DRAWS);
     let plants: Vec<&Scenario> = tested.map(|(plant, _)| plant).collect();
     let every = samples.div_ceil(INSTANTS);
-    let of_loop = |i: usize| -> Result<[Vec<Vec<f64>>; 2]> {
-        let both = plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect::<Result<Vec<_>>>()?;
-        let (y, u) = both.into_iter().unzip();
-        Ok([y, u])
-    };
-    let (mut all, mut commands) = (Vec::new(), Vec::new());
-    for i in 0..on.len() {
-        let [y, u] = of_loop(i)?;
-        all.push(y);
-        commands.push(u);
-    }
+    let of_loop =
+        |i: usize| plants.par_iter().map(|p| response(&p.plant, system, i, samples)).collect::<Result<Vec<_>>>();
+    let of_loops = (0..on.len()).map(of_loop).collect::<Result<Vec<_>>>()?.into_iter();
+    let (all, commands): (Vec<_>, Vec<_>) = of_loops.map(|of| of.into_iter().unzip::<_, _, Vec<_>, Vec<_>>()).unzip();
     let bands = |of: &Vec<Vec<f64>>| {
         (0..samples).step_by(every).map(|t| band(of.iter().map(|y| y[t]).collect())).collect::<Vec<Band>>()
     };

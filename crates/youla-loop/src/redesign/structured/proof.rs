@@ -3,13 +3,12 @@
 use super::loops::Loops;
 use super::margins::{GridMargins, LIMITS, OnGrid};
 use super::options::PidOptions;
-use super::scenarios::{Grid, Scenario, Scenarios};
+use super::scenarios::{Grid, Judged, Scenario, Scenarios};
 use super::search::{excesses, worst_excess};
 use crate::error::Result;
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 use youla::c64;
-use youla::lti::{Discrete, StateSpace};
 use youla::statistics::quantile;
 
 /// Level of bands and of the probability, that of regions and intervals elsewhere.
@@ -77,10 +76,10 @@ pub(super) fn prove(
     grid: &Grid,
     fresh: &Scenarios,
     before: &[OnGrid],
-    (new, after): (&StateSpace<Discrete>, &[OnGrid]),
+    new: Judged<'_>,
     limits: &PidOptions,
 ) -> Result<PidProof> {
-    let excesses = excesses(grid, fresh, (new, after), limits)?;
+    let (after, excesses) = (new.on, excesses(grid, fresh, new, limits)?);
     let models = excesses.len();
     let unstable = excesses.iter().filter(|e| e.is_none()).count();
     let beyond = |e: &&[f64; 5]| e.iter().any(|e| *e > TOLERANCE);

@@ -9,6 +9,7 @@
 //!
 //! The stability of the loop is exact by eigenvalues for the drawn parameters, and by the winding number with b x.
 
+use super::channels::each;
 use super::loops::Loops;
 use super::margins::{GridMargins, OnGrid, margins};
 use super::pid::PidController;
@@ -92,9 +93,9 @@ impl Grid {
         on
     }
 
-    /// Any controller `u = K y` of a channel each as C = -K.
-    pub(super) fn each(&self, k: &[StateSpace<Discrete>]) -> Result<Vec<OnGrid>> {
-        k.iter().map(|k| self.any(k)).collect()
+    /// Each channel of a controller `u = K y` that couples none as C = -K.
+    pub(super) fn each(&self, k: &StateSpace<Discrete>) -> Result<Vec<OnGrid>> {
+        each(k)?.iter().map(|k| self.any(k)).collect()
     }
 
     fn any(&self, k: &StateSpace<Discrete>) -> Result<OnGrid> {
@@ -120,9 +121,9 @@ pub(super) struct Scenario {
     pub(super) running: Vec<GridMargins>,
 }
 
-/// The controller that ran, whole and for each channel on the grid.
+/// A controller, whole and for each channel on the grid.
 #[derive(Clone, Copy)]
-pub(super) struct Running<'a> {
+pub(super) struct Judged<'a> {
     pub(super) system: &'a StateSpace<Discrete>,
     pub(super) on: &'a [OnGrid],
 }
@@ -136,7 +137,7 @@ pub(super) struct Scenarios {
 
 impl Scenarios {
     /// `count` draws; a draw depends on the seed and its place only.
-    pub(super) fn new(grid: &Grid, region: &Region, running: Running<'_>, (count, seed): (usize, u64)) -> Result<Self> {
+    pub(super) fn new(grid: &Grid, region: &Region, running: Judged<'_>, (count, seed): (usize, u64)) -> Result<Self> {
         let beyond = beyond(grid, region);
         let draws = region.draws(count, seed);
         let found: Vec<Option<Scenario>> = draws
@@ -177,7 +178,7 @@ impl Scenario {
     pub(super) fn new(
         grid: &Grid,
         plant: StateSpace<Discrete>,
-        running: Running<'_>,
+        running: Judged<'_>,
         disturb: impl FnOnce(&mut [c64]),
     ) -> Option<Self> {
         let looped = closed_loop(&plant, &with_input_port(running.system).ok()?).ok()?;

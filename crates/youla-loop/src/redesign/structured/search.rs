@@ -9,11 +9,11 @@ use super::evolution::{Point, evolve};
 use super::margins::{GridMargins, LIMITS, OnGrid, margins};
 use super::options::PidOptions;
 use super::pid::{PidController, whole};
-use super::scenarios::{Grid, Running, Scenario, Scenarios};
+use super::scenarios::{Grid, Judged, Scenario, Scenarios};
 use super::space::Space;
 use crate::error::{Error, Result};
 use rayon::prelude::*;
-use youla::lti::{Discrete, StateSpace};
+use youla::lti::Discrete;
 
 /// Rounds of constraint generation. Chosen: on 60 loops the last was used in none that met its limits.
 const ROUNDS: usize = 8;
@@ -39,7 +39,7 @@ pub(super) struct Search<'a> {
     pub(super) grid: &'a Grid,
     pub(super) estimate: &'a Scenario,
     pub(super) drawn: &'a Scenarios,
-    pub(super) running: Running<'a>,
+    pub(super) running: Judged<'a>,
     /// Of each loop, where it is a PID.
     pub(super) running_gains: &'a [Option<PidController>],
 }
@@ -111,8 +111,8 @@ impl Search<'_> {
         self.penalised(gains, &on, judges, (reserve, enough))
     }
 
-    /// Minus the gains, and a penalty where a limit is missed at one of the plants. It rises from plant to plant: beyond `enough` the rest is not
-    /// asked, and the plant that said so is asked first by the next.
+    /// Minus the gains, and a penalty where a limit is missed at one of the plants. It rises from plant to plant: beyond `enough` the remaining
+    /// plants are not evaluated, and the one that exceeded it comes first for the next controller.
     fn penalised(&self, gains: f64, on: &[OnGrid], judges: &mut [&Scenario], (reserve, enough): (f64, f64)) -> f64 {
         let (mut worst, mut unstable, mut cost) = (f64::NEG_INFINITY, 0, -gains);
         for k in 0..judges.len() {
@@ -181,7 +181,7 @@ impl Search<'_> {
     fn missed(&self, controllers: &[PidController]) -> Result<(Vec<usize>, String)> {
         let on: Vec<OnGrid> = controllers.iter().map(|c| self.grid.controller(c)).collect();
         let system = whole(controllers, Discrete::new(self.grid.ts)?)?;
-        let excesses = excesses(self.grid, self.drawn, (&system, &on), self.limits())?;
+        let excesses = excesses(self.grid, self.drawn, Judged { system: &system, on: &on }, self.limits())?;
         let worst = |k: usize| excesses[k].map_or(f64::INFINITY, |e| e.into_iter().fold(f64::NEG_INFINITY, f64::max));
         let mut missed: Vec<usize> = (0..excesses.len()).filter(|k| worst(*k) > 0.0).collect();
         missed.sort_by(|a, b| worst(*b).total_cmp(&worst(*a)));
@@ -207,10 +207,10 @@ pub(super) fn worst_excess(of: &[GridMargins], plant: &Scenario, limits: &PidOpt
 pub(super) fn excesses(
     grid: &Grid,
     drawn: &Scenarios,
-    (k, on): (&StateSpace<Discrete>, &[OnGrid]),
+    Judged { system, on }: Judged<'_>,
     limits: &PidOptions,
 ) -> Result<Vec<Option<[f64; 5]>>> {
-    let stable = drawn.stable(k)?;
+    let stable = drawn.stable(system)?;
     let of = |(plant, stable): (&Scenario, &bool)| if *stable { excess(grid, plant, on, limits) } else { None };
     Ok(drawn.plants.par_iter().zip(&stable).map(of).collect())
 }

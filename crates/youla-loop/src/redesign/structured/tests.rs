@@ -3,7 +3,7 @@
 use super::margins::margins;
 use super::pid::diagonal;
 use super::recognise::recognise;
-use super::scenarios::{Grid, Running, Scenario};
+use super::scenarios::{Grid, Judged, Scenario};
 use super::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -42,6 +42,38 @@ fn grid_of(plant: &StateSpace<Discrete>, k: &StateSpace<Discrete>) -> Grid {
     Grid::new(time(), &[plant, &looped]).unwrap()
 }
 
+fn near(a: f64, b: f64) {
+    assert!((a / b - 1.0).abs() < 0.03, "{a} for {b}");
+}
+
+/// Margins of controllers on the grid and the exact ones, whose stability and whose gain, phase and delay margins in each loop agree; `None` where the
+/// loop is unstable or its peak is beyond 4, which is far from where a design ends. Counts the compared and the unstable ones.
+fn compared(
+    grid: &Grid,
+    scenario: &Scenario,
+    c: &[PidController],
+    [stable, unstable]: [&mut usize; 2],
+) -> Option<(Vec<GridMargins>, youla::control::Margins)> {
+    let found = margins(grid, scenario, &c.iter().map(|c| grid.controller(c)).collect::<Vec<_>>());
+    let exact = youla::control::margins(&scenario.plant, &whole(c, time()).unwrap());
+    assert_eq!(found.is_some(), exact.is_ok(), "{c:?}");
+    let (Some(found), Ok(exact)) = (found, exact) else {
+        *unstable += 1;
+        return None;
+    };
+    if exact.output_sensitivity.value > 4.0 {
+        return None;
+    }
+    *stable += 1;
+    for (found, channel) in found.iter().zip(&exact.outputs) {
+        let lowest = channel.lowest_gain.filter(|g| g.factor > 1e-6).map_or(f64::INFINITY, |g| 1.0 / g.factor);
+        near(found.gain.min(10.0), 10f64.min(channel.highest_gain.map_or(f64::INFINITY, |g| g.factor).min(lowest)));
+        near(found.phase, channel.phase.unwrap().degrees);
+        near(found.delay, channel.delay.unwrap().seconds);
+    }
+    Some((found, exact))
+}
+
 /// Stability of random controllers, and up to a peak of the sensitivity of 4 peak, gain, phase and delay margin, each within 3 % of
 /// [`youla::control::margins()`].
 #[test]
@@ -49,8 +81,8 @@ fn margins_equal_the_exact_ones() {
     let plant = machine(8.0);
     let k = running().system(time()).unwrap();
     let grid = grid_of(&plant, &k);
-    let on = grid.each(std::slice::from_ref(&k)).unwrap();
-    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
+    let on = grid.each(&k).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Judged { system: &k, on: &on }, |_| {}).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(4);
     let (mut stable, mut unstable) = (0, 0);
     for rule in [Discretisation::BackwardEuler, Discretisation::Tustin] {
@@ -61,25 +93,8 @@ fn margins_equal_the_exact_ones() {
                 notches,
                 ..pid(rule, [0.8 * factor(), 2.0 * factor(), 0.02 * factor(), 2e-3 * factor()])
             };
-            let found = margins(&grid, &scenario, &[grid.controller(&c)]).map(|of| of[0]);
-            let exact = youla::control::margins(&plant, &c.system(time()).unwrap());
-            assert_eq!(found.is_some(), exact.is_ok(), "{c:?}");
-            let (Some(found), Ok(exact)) = (found, exact) else {
-                unstable += 1;
-                continue;
-            };
-            // A design ends far from there.
-            if exact.output_sensitivity.value > 4.0 {
-                continue;
-            }
-            stable += 1;
-            let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 0.03, "{a} for {b}: {c:?}");
-            near(found.peak_sensitivity, exact.output_sensitivity.value);
-            let channel = &exact.outputs[0];
-            let lowest = channel.lowest_gain.filter(|g| g.factor > 1e-6).map_or(f64::INFINITY, |g| 1.0 / g.factor);
-            near(found.gain.min(10.0), 10f64.min(channel.highest_gain.map_or(f64::INFINITY, |g| g.factor).min(lowest)));
-            near(found.phase, channel.phase.unwrap().degrees);
-            near(found.delay, channel.delay.unwrap().seconds);
+            let Some((found, exact)) = compared(&grid, &scenario, &[c], [&mut stable, &mut unstable]) else { continue };
+            near(found[0].peak_sensitivity, exact.output_sensitivity.value);
         }
     }
     assert!(stable > 30 && unstable > 20, "{stable} stable, {unstable} unstable");
@@ -97,11 +112,10 @@ fn pair(coupling: f64) -> StateSpace<Discrete> {
 #[test]
 fn margins_of_each_loop_equal_the_exact_ones() {
     let plant = pair(0.4);
-    let two = |c: [PidController; 2]| whole(&c, time()).unwrap();
-    let k = two([running(), running()]);
+    let k = whole(&[running(), running()], time()).unwrap();
     let grid = grid_of(&plant, &k);
-    let on = grid.each(&each(&k).unwrap()).unwrap();
-    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
+    let on = grid.each(&k).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Judged { system: &k, on: &on }, |_| {}).unwrap();
     let mut rng = ChaCha8Rng::seed_from_u64(5);
     let (mut stable, mut unstable) = (0, 0);
     for _ in 0..120 {
@@ -109,25 +123,8 @@ fn margins_of_each_loop_equal_the_exact_ones() {
         let c = [0, 1].map(|_| {
             pid(Discretisation::BackwardEuler, [0.8 * factor(), 2.0 * factor(), 0.02 * factor(), 2e-3 * factor()])
         });
-        let found = margins(&grid, &scenario, &c.each_ref().map(|c| grid.controller(c)));
-        let exact = youla::control::margins(&plant, &two(c));
-        assert_eq!(found.is_some(), exact.is_ok());
-        let (Some(found), Ok(exact)) = (found, exact) else {
-            unstable += 1;
-            continue;
-        };
-        if exact.output_sensitivity.value > 4.0 {
-            continue;
-        }
-        stable += 1;
-        let near = |a: f64, b: f64| assert!((a / b - 1.0).abs() < 0.03, "{a} for {b}");
-        for (found, channel) in found.iter().zip(&exact.outputs) {
-            assert!(found.peak_sensitivity < 1.01 * exact.output_sensitivity.value);
-            let lowest = channel.lowest_gain.filter(|g| g.factor > 1e-6).map_or(f64::INFINITY, |g| 1.0 / g.factor);
-            near(found.gain.min(10.0), 10f64.min(channel.highest_gain.map_or(f64::INFINITY, |g| g.factor).min(lowest)));
-            near(found.phase, channel.phase.unwrap().degrees);
-            near(found.delay, channel.delay.unwrap().seconds);
-        }
+        let Some((found, exact)) = compared(&grid, &scenario, &c, [&mut stable, &mut unstable]) else { continue };
+        assert!(found.iter().all(|of| of.peak_sensitivity < 1.01 * exact.output_sensitivity.value));
     }
     assert!(stable > 20 && unstable > 20, "{stable} stable, {unstable} unstable");
 }
@@ -138,8 +135,8 @@ fn the_effort_is_the_size_of_u_for_white_noise() {
     let plant = machine(8.0);
     let k = running().system(time()).unwrap();
     let grid = grid_of(&plant, &k);
-    let on = grid.each(std::slice::from_ref(&k)).unwrap();
-    let scenario = Scenario::new(&grid, plant.clone(), Running { system: &k, on: &on }, |_| {}).unwrap();
+    let on = grid.each(&k).unwrap();
+    let scenario = Scenario::new(&grid, plant.clone(), Judged { system: &k, on: &on }, |_| {}).unwrap();
     let to_u = closed_loop(&plant, &with_input_port(&k).unwrap()).unwrap().part(0..1, 1..2);
     let exact = youla::lti::h2_norm(&to_u).unwrap();
     assert!((scenario.running[0].effort / exact - 1.0).abs() < 0.01, "{} for {exact}", scenario.running[0].effort);
